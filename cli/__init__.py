@@ -1,0 +1,1 @@
+"""The command line, installed as `kemba_cli`; one file per verb."""

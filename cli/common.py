@@ -1,0 +1,45 @@
+"""Streams and options shared by the verbs: results on stdout, talk on stderr."""
+
+from __future__ import annotations
+
+import json
+import sys
+from functools import lru_cache
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing but the result.")]
+
+
+@lru_cache(maxsize=1)
+def results() -> Console:
+    """The console for results (stdout)."""
+    from rich.console import Console
+
+    return Console(highlight=False)
+
+
+@lru_cache(maxsize=1)
+def talk() -> Console:
+    """The console for progress and remarks (stderr)."""
+    from rich.console import Console
+
+    return Console(stderr=True, highlight=False)
+
+
+def say(text: str, quiet: bool = False) -> None:
+    """A remark on stderr, as it is: `[N.m]` is a unit, not markup."""
+    if not quiet:
+        typer.echo(text, err=True)
+
+
+def print_json(data: Any) -> None:
+    """The one JSON object of `--json` on stdout; NaN becomes null."""
+    from kemba.files import plain
+
+    sys.stdout.write(json.dumps(plain(data), indent=2, allow_nan=False) + "\n")

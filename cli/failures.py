@@ -1,0 +1,61 @@
+"""Exit codes and messages of failures, the same for every verb."""
+
+from __future__ import annotations
+
+import errno
+import functools
+import os
+import tempfile
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import typer
+
+from kemba.errors import KembaError
+
+BAD_ANSWER = 1
+BAD_INPUT = 2
+INTERRUPTED = 130
+
+
+def guarded(verb: Callable[..., None]) -> Callable[..., None]:
+    """The verb, with exceptions turned into messages on stderr and exit codes."""
+
+    @functools.wraps(verb)
+    def run(*args: Any, **options: Any) -> None:
+        try:
+            verb(*args, **options)
+        except (typer.Exit, typer.Abort, typer.BadParameter):
+            raise
+        except KembaError as error:
+            typer.echo(str(error), err=True)
+            raise typer.Exit(BAD_INPUT) from None
+        except KeyboardInterrupt:
+            typer.echo("interrupted", err=True)
+            raise typer.Exit(INTERRUPTED) from None
+        except Exception as error:
+            if isinstance(error, OSError) and error.errno == errno.EPIPE:
+                raise  # the reader of our output went away; click leaves quietly
+            typer.echo(_crash(error), err=True)
+            raise typer.Exit(BAD_ANSWER) from None
+
+    return run
+
+
+def _crash(error: Exception) -> str:
+    """What to say about an exception nobody expected: short, or all of it with KEMBA_DEBUG."""
+    whole = "".join(traceback.format_exception(error))
+    if os.environ.get("KEMBA_DEBUG"):
+        return whole
+    with tempfile.NamedTemporaryFile(
+        "w", prefix="kemba-crash-", suffix=".log", delete=False, encoding="utf-8"
+    ) as log:
+        log.write(whole)
+    last = traceback.extract_tb(error.__traceback__)[-1]
+    place = f"{Path(last.filename).name}:{last.lineno}"
+    return (
+        f"kemba failed unexpectedly: {type(error).__name__} at {place}: {error}\n"
+        f"This is a fault of kemba; please report it with the file {log.name}"
+    )

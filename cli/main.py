@@ -1,0 +1,53 @@
+"""`kemba-opt`: the verbs.
+
+Verb modules import typer only; numpy, casadi and the like belong inside their functions, so that
+`--help` answers at once.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+import kemba
+from kemba_cli.check import check
+from kemba_cli.failures import guarded
+from kemba_cli.plot import plot
+from kemba_cli.schema import schema
+from kemba_cli.solve import solve
+
+VERBS = (
+    solve,
+    check,
+    plot,
+    schema,
+)
+
+app = typer.Typer(
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+for verb in VERBS:
+    app.command()(guarded(verb))
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"kemba {kemba.__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    """Plan, execute and explain jumps of a legged robot with pneumatic knees."""
+
+
+def main() -> None:
+    """Run `kemba-opt`. Exit code 0 good, 1 bad answer, 2 wrong usage or input, 130 interrupted."""
+    app(prog_name="kemba-opt")

@@ -1,0 +1,33 @@
+"""`kemba-opt schema`: JSON Schemas for editors."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from kemba_cli.common import print_json
+
+
+def schema(
+    kind: Annotated[str, typer.Argument(help="models, robots, ...; all when omitted.")] = "",
+    out: Annotated[
+        Path | None, typer.Option(help="Write KIND.schema.json files into this folder.")
+    ] = None,
+) -> None:
+    """JSON Schema of the YAML files, so that editors complete and check them.
+
+    Example: kemba-opt schema models
+    """
+    from kemba.files import write_json
+    from kemba_cli.schemas import SCHEMAS, schema_of
+
+    kinds = [kind] if kind else list(SCHEMAS)
+    found = {name: schema_of(name).model_json_schema() for name in kinds}
+    if out is None:
+        print_json(found[kind] if kind else found)
+        return
+    for name, content in found.items():
+        write_json(out / f"{name}.schema.json", content)
+        typer.echo(str(out / f"{name}.schema.json"))

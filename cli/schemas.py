@@ -1,0 +1,44 @@
+"""The kinds of YAML file there are, and the schema of each."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from kemba.errors import KembaError, suggest
+
+if TYPE_CHECKING:
+    from pydantic import BaseModel
+
+    from kemba.config import Document
+
+# Kind (the folder under configs/) and where its schema lives; a new kind is one line.
+SCHEMAS = {
+    "tasks": "kemba.ocp.task:Task",
+    "models": "kemba.model.spec:ModelSpec",
+    "robots": "kemba.mechanism.links:Robot",
+}
+
+
+def schema_of(kind: str) -> type[BaseModel]:
+    """The pydantic model of a kind of file; KembaError when there is no such kind."""
+    if kind not in SCHEMAS:
+        raise KembaError(kind, "no such kind of file", hint=suggest(kind, SCHEMAS))
+    module, name = SCHEMAS[kind].split(":")
+    found: type[BaseModel] = getattr(import_module(module), name)
+    return found
+
+
+def kind_of(document: Document) -> str:
+    """The kind of a document: by its folder, else by the schema that shares most keys with it."""
+    folder = Path(document.source).resolve().parent.name
+    if folder in SCHEMAS:
+        return folder
+    keys: set[Any] = set(document.data if isinstance(document.data, dict) else ())
+    shared = {kind: len(keys & set(schema_of(kind).model_fields)) for kind in SCHEMAS}
+    best = max(shared, key=lambda kind: shared[kind])
+    if not shared[best]:
+        expected = f"keys of one of these were expected: {', '.join(SCHEMAS)}"
+        raise KembaError(document.source, "is no kind of file that kemba knows", expected)
+    return best

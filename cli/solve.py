@@ -1,0 +1,111 @@
+"""`kemba-opt solve`: from a task file to a certified plan."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from kemba_cli.common import Json, Quiet, print_json, say
+
+if TYPE_CHECKING:
+    from kemba.ocp import Plan, Task
+
+Set = Annotated[
+    list[str] | None, typer.Option("--set", help="Override a key: --set 'height=0.6 m'.")
+]
+
+
+def solve(
+    task: Annotated[str, typer.Argument(help="Task YAML, here or among the shipped ones.")],
+    out: Annotated[Path | None, typer.Option(help="Run folder to write.")] = None,
+    overrides: Set = None,
+    model: Annotated[str | None, typer.Option(help="Model YAML instead of the task's.")] = None,
+    time_limit: Annotated[float | None, typer.Option(help="Seconds of solving at most.")] = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Check the task and say its size; solve nothing.")
+    ] = False,
+    figure: Annotated[bool, typer.Option(help="Draw the plan.")] = True,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Plan a motion; write trajectory, controller table, certificate and figure to a run folder.
+
+    Example: kemba-opt solve jump.yaml --set "height=0.6 m"
+    """
+    from kemba.config import find_config
+    from kemba.ocp import load_task
+
+    options = list(overrides or [])
+    if time_limit is not None:
+        options.append(f"solver.time_limit={time_limit}")
+    resolved, document = load_task(task, options)
+    if dry_run:
+        _dry_run(resolved, document, model, json)
+        return
+    answer = _solve(resolved, document, find_config(task, "tasks"), out, model, figure, quiet or json)
+    if json:
+        print_json(answer)
+    else:
+        typer.echo(answer["run"])
+        say(answer["sentence"], quiet)
+    if answer["status"] == "interrupted":
+        raise typer.Exit(130)
+    if answer["status"] != "solved":
+        raise typer.Exit(1)
+
+
+def _solve(
+    task: Task, document: Any, source: Path, out: Path | None, model: str | None, figure: bool, quiet: bool
+) -> dict[str, Any]:
+    from kemba.config import dump_yaml, find_config
+    from kemba.ocp import plan
+    from kemba.ocp.report import answer
+    from kemba.runs import RunFolder
+    from kemba_cli.progress import Progress
+
+    model_file = find_config(model or task.model, "models")
+    folder = RunFolder.create(out, task.name, inputs=[source, model_file])
+    dump_yaml(task.model_dump(exclude_none=True), folder / "task.yaml")
+    try:
+        with Progress(quiet) as progress:
+            found = plan(
+                task,
+                document,
+                model,
+                log=folder / "solver.log",
+                tell=progress.tell,
+                watch=progress.watch,
+            )
+        result = answer(found, str(folder.path))
+        _write(found, result, folder, figure)
+    except BaseException:
+        folder.finish("failed")
+        raise
+    folder.finish(found.status, sentence=found.sentence)
+    return result
+
+
+def _write(found: Plan, result: dict[str, Any], folder: Any, figure: bool) -> None:
+    from kemba.ocp import controller_table
+    from kemba.runs import write_json
+
+    found.trajectory.write(folder / "trajectory.csv")
+    controller_table(found.model, found.trajectory).write(folder / "controller.csv")
+    write_json(folder / "certificate.json", result)
+    if figure:
+        from kemba import plotting
+
+        sources = plotting.load_sources([folder.path])
+        plotting.save_figure(plotting.draw(sources), folder / "figure.png")
+
+
+def _dry_run(task: Task, document: Any, model: str | None, json: bool) -> None:
+    from kemba.ocp.plan import program_size
+
+    size = program_size(task, document, model)
+    if json:
+        print_json({"task": task.name, **size})
+    else:
+        typer.echo(f"{task.name}: {size['variables']} variables, {size['constraints']} rows")

@@ -1,0 +1,186 @@
+"""The contract of an effect: its fields are its parameters, one method gives its physics."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Literal, Protocol
+
+import casadi as ca
+from pydantic import BaseModel, ConfigDict
+
+from kemba.quantity import Param, Quantity
+
+
+@dataclass(frozen=True)
+class PortAt:
+    """A port's position, velocity and acceleration as an effect sees them."""
+
+    x: ca.SX
+    v: ca.SX
+    a: ca.SX
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Complementarity 0 <= a _|_ b >= 0, declared once and relaxed or solved per reader."""
+
+    name: str
+    a: ca.SX
+    b: ca.SX
+    unit_a: str = "m"
+    unit_b: str = "N"
+
+
+@dataclass(frozen=True)
+class Signal:
+    """What an effect does to a signal that others read: a gain, or a lagged value in its place."""
+
+    gain: Any = 1.0
+    lagged: ca.SX | None = None
+
+
+@dataclass(frozen=True)
+class Contribution:
+    """What one effect adds at one place.
+
+    effort: per port [N or N.m], on the right-hand side; rate: time derivative of own states;
+    add_rate: addition to the rate of another effect's state; pairs; limits: expressions >= 0;
+    publish: values that other effects may read by symbol; outputs: columns of its own.
+    """
+
+    effort: Mapping[str, Any] = field(default_factory=dict)
+    rate: Mapping[str, Any] = field(default_factory=dict)
+    add_rate: Mapping[str, Any] = field(default_factory=dict)
+    pairs: Iterable[Pair] = ()
+    limits: Mapping[str, Any] = field(default_factory=dict)
+    publish: Mapping[str, Any] = field(default_factory=dict)
+    outputs: Iterable[tuple[Quantity, Any]] = ()
+
+
+class At(Protocol):
+    """Where an effect stands: ports, own states, inputs and forces, signals, others' values.
+
+    `at.piston`, `at.hip`, `at.foot_x`, `at.foot_z`, `at.body_x`, `at.body_z`, `at.pitch` are
+    ports; any other attribute is looked up by symbol, first at this leg, then at the robot.
+    """
+
+    supply: float  # Pa
+    gravity: float  # m.s-2
+    stroke: float  # m
+    body_mass: float  # kg, of the body link alone
+    piston: PortAt
+    hip: PortAt
+    foot_x: PortAt
+    foot_z: PortAt
+    body_x: PortAt
+    body_z: PortAt
+    pitch: PortAt
+
+    @property
+    def legs(self) -> list[At]:
+        """Every leg, as its own effects see it (for effects of the whole robot)."""
+
+    def standing(self, name: str) -> float:
+        """Value of a coordinate of this place in the standing pose, pistons retracted."""
+
+    def source(self, signal: str) -> Any:
+        """A signal before any lag: what the lagging effect itself follows."""
+
+    def __getattr__(self, symbol: str) -> Any: ...
+
+
+class Effect(BaseModel):
+    """One piece of physics that can stand on a model's list.
+
+    Subclasses declare parameters as annotated fields, variables by symbol (as the equation
+    writes them) and `evaluate`. They know no solver, step size, file or plot.
+    `off` names the one parameter that switches an effect and the value at which it is absent;
+    its other parameters are shapes, which matter only when it is on and default to a typical
+    value. A parameter that may not change sign has a lower bound; the `size` of a scale is that
+    of scale - 1.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    kind: str
+    on: Literal["front", "rear"] | None = None
+
+    place: ClassVar[Literal["leg", "body"]] = "leg"
+    family: ClassVar[str] = ""
+    equation: ClassVar[str] = ""
+    source: ClassVar[str] = ""
+    ports: ClassVar[tuple[str, ...]] = ()
+    reads: ClassVar[tuple[str, ...]] = ()  # signals with nominal value 1 that it multiplies in
+    publishes: ClassVar[tuple[str, ...]] = ()
+    carried_by: ClassVar[Mapping[str, str]] = {}  # published value: the own state that moves it
+    off: ClassVar[Mapping[str, float]] = {}
+    replaces: ClassVar[tuple[str, ...]] = ()  # kinds that give way when this one is listed
+    mirror: ClassVar[Mapping[str, str]] = {}  # symbols that change sign or name in the mirror
+    dissipative: ClassVar[bool] = False
+    on_rod: ClassVar[bool] = True  # False: its piston effort is not felt by a rod force sensor
+
+    def states(self) -> dict[str, Quantity]:
+        """Own states by symbol."""
+        return {}
+
+    def inputs(self) -> dict[str, Quantity]:
+        """Commands by symbol."""
+        return {}
+
+    def forces(self) -> dict[str, Quantity]:
+        """Own algebraic unknowns by symbol, e.g. contact forces."""
+        return {}
+
+    def signals(self, at: At) -> dict[str, Signal]:
+        """What it does to signals; may read own states and parameters only."""
+        return {}
+
+    def timing(self) -> dict[str, float]:
+        """Seconds by which valves switch `on` and `off` later than commanded."""
+        return {}
+
+    def evaluate(self, at: At) -> Contribution:
+        """Efforts, rates, pairs, limits at one place."""
+        return Contribution()
+
+    @property
+    def leg(self) -> str | None:
+        """The one leg it is restricted to."""
+        return self.on
+
+    @property
+    def name(self) -> str:
+        """Unique name within a model: the kind, and the leg where it is not on both."""
+        return f"{self.kind}:{self.on}" if self.on else self.kind
+
+    @classmethod
+    def declared(cls) -> dict[str, Param]:
+        """Scalar parameters of the kind by field name."""
+        found = {}
+        for name, info in cls.model_fields.items():
+            params = [m for m in info.metadata if isinstance(m, Param)]
+            if params and info.annotation is float:
+                found[name] = params[0]
+        return found
+
+    def parameters(self) -> dict[str, Param]:
+        """Scalar parameters of this effect by name."""
+        return self.declared()
+
+    def shapes(self) -> tuple[str, ...]:
+        """Parameters that matter only when the effect is on."""
+        return tuple(name for name in self.parameters() if name not in self.off) if self.off else ()
+
+    def value(self, name: str) -> Any:
+        """Value of the parameter `name`."""
+        return getattr(self, name)
+
+    def bind(self, values: Mapping[str, Any]) -> Effect:
+        """The same effect with parameters replaced, by numbers or by symbols, unchecked."""
+        return self.model_copy(update=dict(values))
+
+    def listed(self) -> dict[str, Any]:
+        """The effect as an item of a model's YAML list."""
+        values = self.model_dump(mode="json", by_alias=True, exclude_defaults=True)
+        return {"kind": self.kind, **values}

@@ -1,0 +1,37 @@
+"""The support boom as the body feels it: inertia and weight."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, Literal
+
+from kemba.effects.base import At, Contribution, Effect
+from kemba.quantity import Param
+
+
+class Boom(Effect):
+    """Boom about its pivot, for small angles: I/l^2 on each axis and its weight's share.
+
+    The lever differs between axes because the body hangs below the boom's end.
+    """
+
+    kind: Literal["boom"] = "boom"
+    inertia: Annotated[float, Param("kg.m2", 0.1, lower=0.0, doc="about the pivot")] = 4.82
+    mass: Annotated[float, Param("kg", 0.1, lower=0.0, doc="mass")] = 2.699
+    com: Annotated[float, Param("m", 0.05, lower=0.0, doc="COM from the pivot")] = 1.149
+    length_x: Annotated[float, Param("m", 0.05, lower=0.0, doc="lever, horizontal")] = 2.575
+    length_z: Annotated[float, Param("m", 0.05, lower=0.0, doc="lever, vertical")] = 2.493
+
+    place: ClassVar[Literal["leg", "body"]] = "body"
+    family: ClassVar[str] = "boom"
+    equation: ClassVar[str] = "-(I/l_x^2) ax on x; -(I/l_z^2) az - m g com/l_z on z"
+    source: ClassVar[str] = "paper II-B (mass, inertia); authors' program (lengths, COM)"
+    ports: ClassVar[tuple[str, ...]] = ("body_x", "body_z")
+
+    def evaluate(self, at: At) -> Contribution:
+        weight = self.mass * at.gravity * self.com / self.length_z
+        return Contribution(
+            effort={
+                "body_x": -self.inertia / self.length_x**2 * at.body_x.a,
+                "body_z": -self.inertia / self.length_z**2 * at.body_z.a - weight,
+            }
+        )

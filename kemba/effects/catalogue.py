@@ -1,0 +1,93 @@
+"""Every effect there is, by name, and the families a model can be built from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from kemba.effects.base import Effect
+from kemba.effects.boom import Boom
+from kemba.effects.boom_faults import (
+    BoomDamping,
+    BoomForce,
+    BoomFriction,
+    BoomInertia,
+    BoomSpring,
+    PitchFriction,
+)
+from kemba.effects.chamber import Chamber
+from kemba.effects.contact import Contact
+from kemba.effects.damping import ModeDamping
+from kemba.effects.friction import PressureFriction, SealFriction, StribeckFriction
+from kemba.effects.ground import GroundCompliance, GroundFriction
+from kemba.effects.hip import (
+    HipDamping,
+    HipFriction,
+    HipSpring,
+    MotorLag,
+    RotorInertia,
+    TorqueScale,
+)
+from kemba.effects.hose import BothModeLoss, CrossLeak, HoseLag
+from kemba.effects.load import ComOffset, Payload
+from kemba.effects.motor import Motor
+from kemba.effects.piston import EndCushion, GasSpring, PistonDamping, QuadraticDamping
+from kemba.effects.sensors import SensorBias, SensorDelay, SensorScale
+from kemba.effects.stops import EndStop
+from kemba.effects.supply import RiseTimeScale, SupplyDroop, SupplyScale
+from kemba.effects.timing import ValveCloseDelay, ValveDelay
+from kemba.effects.valve import Valve
+
+# the planning model's own physics
+PLANNING: tuple[type[Effect], ...] = (Valve, Chamber, ModeDamping, EndStop, Motor, Boom, Contact)
+
+# what a real machine may have beside it
+AIR: tuple[type[Effect], ...] = (
+    ValveDelay,
+    ValveCloseDelay,
+    SupplyScale,
+    SupplyDroop,
+    RiseTimeScale,
+    HoseLag,
+    CrossLeak,
+    BothModeLoss,
+)
+PISTON: tuple[type[Effect], ...] = (
+    SealFriction,
+    StribeckFriction,
+    PressureFriction,
+    PistonDamping,
+    QuadraticDamping,
+    EndCushion,
+    GasSpring,
+)
+HIP: tuple[type[Effect], ...] = (
+    HipFriction,
+    HipDamping,
+    TorqueScale,
+    MotorLag,
+    HipSpring,
+    RotorInertia,
+)
+BODY: tuple[type[Effect], ...] = (
+    Payload,
+    ComOffset,
+    BoomForce,
+    BoomInertia,
+    BoomFriction,
+    BoomDamping,
+    BoomSpring,
+    PitchFriction,
+)
+GROUND: tuple[type[Effect], ...] = (GroundCompliance, GroundFriction)
+SENSORS: tuple[type[Effect], ...] = (SensorBias, SensorScale, SensorDelay)
+
+# what may be missing from a model: the candidates of identification
+MISSING: tuple[type[Effect], ...] = (*AIR, *PISTON, *HIP, *BODY, *GROUND, *SENSORS)
+
+EFFECTS: tuple[type[Effect], ...] = (*PLANNING, *MISSING)
+
+BY_KIND: dict[str, type[Effect]] = {e.model_fields["kind"].default: e for e in EFFECTS}
+
+CHAMBERS: dict[str, Callable[[], list[Effect]]] = {
+    "first_order": lambda: [Chamber(), ModeDamping()],
+}

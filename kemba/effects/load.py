@@ -1,0 +1,61 @@
+"""Mass carried by, or misplaced on, the body."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, Literal
+
+import casadi as ca
+
+from kemba.effects.base import At, Contribution, Effect
+from kemba.quantity import Param
+
+
+class Payload(Effect):
+    """A point mass at the body's centre: inertia and weight."""
+
+    kind: Literal["payload"] = "payload"
+    m: Annotated[float, Param("kg", 0.3, lower=0.0, doc="mass")] = 0.0
+
+    place: ClassVar[Literal["leg", "body"]] = "body"
+    family: ClassVar[str] = "body"
+    equation: ClassVar[str] = "-m ax on x, -m (az + g) on z"
+    source: ClassVar[str] = "point mass"
+    ports: ClassVar[tuple[str, ...]] = ("body_x", "body_z")
+    off: ClassVar[dict[str, float]] = {"m": 0.0}
+
+    def evaluate(self, at: At) -> Contribution:
+        return Contribution(
+            effort={
+                "body_x": -self.m * at.body_x.a,
+                "body_z": -self.m * (at.body_z.a + at.gravity),
+            }
+        )
+
+
+class ComOffset(Effect):
+    """The body link's mass M sits d forward of the body's centre.
+
+    Its d'Alembert and weight forces at the offset point, less those at the centre, where the
+    link table has them.
+    """
+
+    kind: Literal["com_offset"] = "com_offset"
+    d: Annotated[float, Param("m", 0.02, doc="forward offset along the body")] = 0.0
+
+    place: ClassVar[Literal["leg", "body"]] = "body"
+    family: ClassVar[str] = "body"
+    equation: ClassVar[str] = "M at (d cos pitch, d sin pitch) from the body's centre, not at it"
+    source: ClassVar[str] = "rigid-body kinematics; M = 2.886 kg (authors' program)"
+    ports: ClassVar[tuple[str, ...]] = ("body_x", "body_z", "pitch")
+    off: ClassVar[dict[str, float]] = {"d": 0.0}
+
+    def evaluate(self, at: At) -> Contribution:
+        M, spin, turn = at.body_mass, at.pitch.v**2, at.pitch.a
+        along, up = self.d * ca.cos(at.pitch.x), self.d * ca.sin(at.pitch.x)
+        # acceleration of the point against that of the centre
+        ax, az = -up * turn - along * spin, along * turn - up * spin
+        F_x = -M * (at.body_x.a + ax)
+        F_z = -M * (at.body_z.a + az + at.gravity)
+        return Contribution(
+            effort={"body_x": -M * ax, "body_z": -M * az, "pitch": along * F_z - up * F_x}
+        )

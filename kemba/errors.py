@@ -1,0 +1,58 @@
+"""Errors that teach: where it is, what is wrong, what was expected, what to do next."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+LISTED = 12  # more names than this in a hint help nobody
+
+
+class KembaError(Exception):
+    """Bad input, described so that its author can mend it.
+
+    `where` is a file position, an option or a name; `excerpt` holds lines shown below the message.
+    """
+
+    def __init__(
+        self, where: str, what: str, expected: str = "", hint: str = "", excerpt: str = ""
+    ) -> None:
+        super().__init__(where, what, expected, hint, excerpt)
+        self.where = where
+        self.what = what
+        self.expected = expected
+        self.hint = hint
+        self.excerpt = excerpt
+
+    def __str__(self) -> str:
+        sentence = "; ".join(part for part in (self.what, self.expected, self.hint) if part)
+        message = ": ".join(part for part in (self.where, sentence) if part)
+        return f"{message}\n{self.excerpt}" if self.excerpt else message
+
+
+class ConfigErrors(KembaError):  # noqa: N818  several errors, not one
+    """All the errors of one or several files, so that they can be mended in one go."""
+
+    def __init__(self, errors: Iterable[KembaError]) -> None:
+        self.errors = list(errors)
+        first = self.errors[0]
+        super().__init__(first.where, first.what, first.expected, first.hint, first.excerpt)
+
+    def __reduce__(self) -> tuple[type[ConfigErrors], tuple[list[KembaError]]]:
+        return type(self), (self.errors,)  # errors cross process borders in sweeps
+
+    def __str__(self) -> str:
+        return "\n".join(str(error) for error in self.errors)
+
+
+def suggest(name: str, candidates: Iterable[str]) -> str:
+    """The nearest valid name as a question, or the valid names when none is near."""
+    names = sorted(set(candidates))
+    if not names:
+        return ""
+    folded = {candidate.casefold(): candidate for candidate in names}
+    near = difflib.get_close_matches(str(name).casefold(), folded, n=1)
+    if near:
+        return f"did you mean '{folded[near[0]]}'?"
+    more = f", ... ({len(names) - LISTED} more)" if len(names) > LISTED else ""
+    return "one of: " + ", ".join(names[:LISTED]) + more

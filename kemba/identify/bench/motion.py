@@ -1,0 +1,136 @@
+"""Position and velocity of an imposed motion from a noisy, jittering position sensor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from kemba.identify.problem import Array
+
+HALF_WIDTHS = (5, 8, 11, 15, 20, 27, 40, 60, 90, 135)  # samples
+
+
+@dataclass(frozen=True)
+class Motion:
+    """x [m], v [m.s-1], a [m.s-2] at `time` (n,) [s], and one sigma of v (n,)."""
+
+    time: Array
+    x: Array
+    v: Array
+    a: Array
+    v_sigma: Array
+    x_sigma: float
+
+
+def difference_sigma(values: Array) -> float:
+    """White noise per sample, robustly from third differences (smooth motion cancels)."""
+    d = np.diff(values[np.isfinite(values)], n=3)
+    if len(d) < 8:
+        return 0.0
+    # the mean of |d| as well as its median: a quantised signal has a median of zero
+    median = float(np.median(np.abs(d))) / 0.6745
+    trimmed = np.sort(np.abs(d))[: int(0.9 * len(d))]
+    mean = float(np.mean(trimmed)) / 0.6287  # E|d| of a normal below its 90 % point
+    return max(median, mean) / np.sqrt(20.0)
+
+
+def smooth_motion(time: Array, x: Array, v: Array | None = None) -> Motion:
+    """Local cubics, each of the width that promises the smallest error of the velocity.
+
+    At rest the window is wide, so that noise does not look like creeping; in fast motion it is
+    narrow, so that the velocity is not blunted. `v` [m.s-1], when measured, is weighed in.
+    """
+    good = np.isfinite(x)
+    step = float(np.median(np.diff(time)))
+    count = max(int(np.ceil((time[-1] - time[0]) / step)) + 1, 8)
+    grid = np.linspace(time[0], time[-1], count)
+    step = float(grid[1] - grid[0])
+    values = np.interp(grid, time[good], x[good])
+    sigma = max(difference_sigma(x[good]), 1e-9)
+    position, rate, spread, half = _adaptive(values, sigma, step)
+    if v is not None and np.isfinite(v).sum() > 0.5 * len(v):
+        rate, spread = _weigh_in(grid, rate, spread, half, time, v)
+    a = np.gradient(_mean(rate, 3), step)
+    columns = (np.interp(time, grid, c) for c in (position, rate, a, spread))
+    return Motion(time, *columns, sigma)
+
+
+def _adaptive(values: Array, sigma: float, step: float) -> tuple[Array, Array, Array, Array]:
+    """Position, rate, its error and the half width chosen sample by sample.
+
+    A cubic is too stiff where a quintic in the same window says otherwise: the square of their
+    difference, less what noise makes of it, estimates the square of the cubic's bias.
+    """
+    n = len(values)
+    best = np.full(n, np.inf)
+    position, rate, half = values.copy(), np.zeros(n), np.zeros(n)
+    for width in HALF_WIDTHS:
+        if 2 * width + 1 > n:
+            break
+        x, v, gain = _local_fit(values, width, step, 3)
+        _, finer, finer_gain = _local_fit(values, width, step, 5)
+        noise = (sigma * gain) ** 2
+        bias = _mean((finer - v) ** 2, max(width // 2, 2)) - (sigma * finer_gain) ** 2 + noise
+        risk = noise + np.maximum(bias, 0.0)
+        better = risk < best
+        position[better], rate[better], half[better] = x[better], v[better], width
+        best[better] = risk[better]
+    return position, _mean(rate, 1), np.sqrt(best), half
+
+
+def _local_fit(values: Array, width: int, step: float, order: int) -> tuple[Array, Array, Array]:
+    """Value and slope of the polynomial through 2 width + 1 samples, and the slope's noise gain.
+
+    All (n,). At the ends the window stays inside and is read off its centre.
+    """
+    n = len(values)
+    smooth, slope = _weights(width, order)
+    x = np.convolve(values, smooth[::-1, width], mode="valid")
+    v = np.convolve(values, slope[::-1, width], mode="valid") / step
+    gain = np.full(n, float(np.linalg.norm(slope[:, width])) / step)
+    x, v = np.pad(x, width), np.pad(v, width)
+    head, tail = values[: 2 * width + 1], values[n - 2 * width - 1 :]
+    x[:width], v[:width] = head @ smooth[:, :width], head @ slope[:, :width] / step
+    x[n - width :], v[n - width :] = (
+        tail @ smooth[:, width + 1 :],
+        tail @ slope[:, width + 1 :] / step,
+    )
+    gain[:width] = np.linalg.norm(slope[:, :width], axis=0) / step
+    gain[n - width :] = np.linalg.norm(slope[:, width + 1 :], axis=0) / step
+    return x, v, gain
+
+
+@lru_cache(maxsize=64)
+def _weights(width: int, order: int) -> tuple[Array, Array]:
+    """Columns: weights of the samples for value and slope at each place of the window."""
+    s = np.arange(-width, width + 1) / width
+    powers = np.arange(order + 1)
+    basis = s[:, None] ** powers
+    slope = powers * s[:, None] ** np.maximum(powers - 1, 0) / width
+    pinv = np.linalg.pinv(basis)
+    return (basis @ pinv).T, (slope @ pinv).T
+
+
+def _weigh_in(
+    grid: Array, rate: Array, spread: Array, half: Array, time: Array, v: Array
+) -> tuple[Array, Array]:
+    """The measured velocity joined to the derived one, unless the two contradict each other."""
+    good = np.isfinite(v)
+    measured = np.interp(grid, time[good], v[good])
+    sigma = max(difference_sigma(v[good]), 1e-6)
+    width = 6
+    smoothed = _mean(measured, width)
+    sd = np.full(len(grid), sigma / np.sqrt(2 * width + 1))
+    gap = np.median(np.abs(smoothed - rate) / np.hypot(sd, spread))
+    if gap > 3.0:
+        return rate, spread
+    weight = spread**2 / (spread**2 + sd**2)
+    return rate + weight * (smoothed - rate), np.sqrt(weight) * sd
+
+
+def _mean(values: Array, width: int) -> Array:
+    """Moving average over 2 width + 1 samples, shrinking at the ends."""
+    kernel = np.ones(2 * width + 1)
+    return np.convolve(values, kernel, "same") / np.convolve(np.ones(len(values)), kernel, "same")

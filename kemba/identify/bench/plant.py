@@ -1,0 +1,179 @@
+"""The rig's chambers driven by an imposed motion: fast prediction of the rod force."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from kemba.effects.base import Effect
+from kemba.identify.bench.motion import Motion
+from kemba.identify.bench.switching import delayed, edges, is_on
+from kemba.identify.problem import Array
+from kemba.model.model import Model
+
+LONGEST_STEP = 1.5e-3  # s; the fastest chamber answers in 8 ms
+BLUR = 0.75e-3  # s; no log says on which side of a switching instant its sample was taken
+
+Pulses = tuple[list[tuple[float, float]], list[tuple[float, float]]]  # of both valves
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Rod force and chamber forces at the samples, with the force's local sensitivities."""
+
+    force: Array
+    by_rate: Array  # dF/dv
+    by_valve: Array  # (n, 2) dF/du
+    valve: Array  # (n, 2) share of the sample's neighbourhood in which each valve is on
+    states: dict[str, Array]
+
+
+class Rig:
+    """One model compiled with numbers left free: `free` parameters, `scaled` tables."""
+
+    def __init__(self, model: Model, free: tuple[str, ...], scaled: tuple[str, ...]) -> None:
+        self.model, self.names = model, (*free, *scaled)
+        node = model.build(free, scaled)
+        self._state_names = [q.name for q in model.states.values()]
+        rate = ca.substitute(-node.rate, node.sd, ca.SX.zeros(node.sd.numel()))
+        inputs = [node.s, node.q, node.v, node.a, node.u, node.p]
+        self._rate = ca.Function("rate", inputs, [rate, ca.jacobian(rate, node.s)])
+        force = node.outputs["piston/F"]
+        results = ca.vertcat(force, ca.jacobian(force, node.v), ca.jacobian(force, node.u).T)
+        self._output = ca.Function("output", inputs, [results])
+        self._step = _runge_kutta(node, rate)
+        self._maps: dict[tuple[str, int], ca.Function] = {}
+        self._start = np.array([q.value for q in model.states.values()])
+
+    def timing(self, values: Mapping[str, float]) -> tuple[float, float]:
+        """Seconds by which the valves switch on and off late, with these parameters."""
+        on = off = 0.0
+        for effect in self.model.effects:
+            times = effect.bind(_own(effect, values)).timing()
+            on, off = on + times.get("on", 0.0), off + times.get("off", 0.0)
+        return on, off
+
+    def predict(
+        self,
+        motion: Motion,
+        commands: Pulses,
+        values: Mapping[str, float],
+        start: Mapping[str, float] | None = None,
+        lead: float = 0.0,
+    ) -> Prediction:
+        """Integrate from equilibrium (plus `start` by state name) with exact switching instants.
+
+        `values` holds every name this rig was compiled for; `lead` [s] is added to the delays.
+        """
+        on, off = self.timing(values)
+        valves = [delayed(c, on + lead, off + lead) for c in commands]
+        p = np.array([values[name] for name in self.names])
+        times, at_sample = _breakpoints(motion.time, np.concatenate([edges(v) for v in valves]))
+        u = np.stack([is_on(v, times) for v in valves])
+        s = self._integrate(times, motion, u, p, start or {})[:, at_sample]
+        blurred = np.stack([_share(v, motion.time) for v in valves])
+        n = len(motion.time)
+        columns = [s, motion.x, motion.v, motion.a, blurred, np.repeat(p[:, None], n, axis=1)]
+        out = np.asarray(self._mapped("output", n)(*map(_dense, columns)))
+        states = dict(zip(self._state_names, s, strict=True))
+        return Prediction(out[0], out[1], out[2:4].T, blurred.T, states)
+
+    def _integrate(
+        self, times: Array, motion: Motion, u: Array, p: Array, start: Mapping[str, float]
+    ) -> Array:
+        middle = 0.5 * (times[:-1] + times[1:])
+        paths = [np.interp(t, motion.time, c) for t in (times, middle) for c in _columns(motion)]
+        x, v, a, xm, vm, am = paths
+        s0 = self._equilibrium(np.array([x[0], 0.0, 0.0]), u[:, 0], p)
+        s0 += np.array([start.get(name, 0.0) for name in self._state_names])
+        n = len(times) - 1
+        drive = np.stack(
+            [np.diff(times), x[:-1], v[:-1], a[:-1], xm, vm, am, x[1:], v[1:], a[1:], *u[:, :-1]]
+        )
+        later = np.asarray(
+            self._mapped("step", n)(s0, _dense(drive), _dense(np.repeat(p[:, None], n, axis=1)))
+        )
+        return np.concatenate([s0[:, None], later], axis=1)
+
+    def _equilibrium(self, motion: Array, u: Array, p: Array) -> Array:
+        """Where the states come to rest under constant commands."""
+        s = self._start.copy()
+        for _ in range(12):
+            rate, slope = self._rate(s, *motion, u, p)
+            move = np.linalg.lstsq(np.asarray(slope), np.asarray(rate).ravel(), rcond=None)[0]
+            s = s - move
+            if np.all(np.abs(move) <= 1e-9 * (1.0 + np.abs(s))):
+                break
+        return s
+
+    def _mapped(self, kind: str, n: int) -> ca.Function:
+        if (kind, n) not in self._maps:
+            one = self._step if kind == "step" else self._output
+            self._maps[kind, n] = one.mapaccum(n) if kind == "step" else one.map(n)
+        return self._maps[kind, n]
+
+    @cached_property
+    def state_names(self) -> tuple[str, ...]:
+        return tuple(self._state_names)
+
+
+def _runge_kutta(node: Any, rate: ca.SX) -> ca.Function:
+    """(s, drive, p) -> s after one classical step of fourth order."""
+    f = ca.Function("f", [node.s, node.q, node.v, node.a, node.u, node.p], [rate])
+    s, d, p = (ca.SX.sym(n, k) for n, k in (("s", node.s.numel()), ("d", 12), ("p", node.p.numel())))
+    h, u = d[0], d[10:12]
+    k1 = f(s, d[1], d[2], d[3], u, p)
+    k2 = f(s + h / 2 * k1, d[4], d[5], d[6], u, p)
+    k3 = f(s + h / 2 * k2, d[4], d[5], d[6], u, p)
+    k4 = f(s + h * k3, d[7], d[8], d[9], u, p)
+    return ca.Function("step", [s, d, p], [s + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)])
+
+
+def _breakpoints(samples: Array, events: Array) -> tuple[Array, Any]:
+    """Samples, switching instants between them and sub-steps; and where the samples stand.
+
+    Their number depends on the number of events only, so that compiled maps are reused.
+    """
+    inside = np.clip(events, samples[0], samples[-1])
+    pieces = np.maximum(np.ceil(np.diff(samples) / LONGEST_STEP - 1e-6).astype(int), 1)
+    fill = [
+        np.linspace(a, b, k + 1)[1:-1]
+        for a, b, k in zip(samples[:-1], samples[1:], pieces, strict=True)
+        if k > 1
+    ]
+    times = np.concatenate([samples, inside, *fill])
+    order = np.argsort(times, kind="stable")
+    place = np.empty(len(times), dtype=int)
+    place[order] = np.arange(len(times))
+    return times[order], place[: len(samples)]
+
+
+def _share(intervals: Array, times: Array) -> Array:
+    """Share of [t - BLUR, t + BLUR] in which the valve is on: continuous in any delay."""
+    flat = np.clip(intervals, times[0] - 1.0, times[-1] + 1.0).ravel()
+    if not len(flat):
+        return np.zeros(len(times))
+    knots = np.concatenate([[times[0] - 1.5], flat, [times[-1] + 1.5]])
+    slope = np.arange(len(knots) - 1) % 2
+    on_time = np.concatenate([[0.0], np.cumsum(slope * np.diff(knots))])
+    later, earlier = np.interp(times + BLUR, knots, on_time), np.interp(times - BLUR, knots, on_time)
+    return np.clip((later - earlier) / (2 * BLUR), 0.0, 1.0)
+
+
+def _columns(motion: Motion) -> tuple[Array, Array, Array]:
+    return motion.x, motion.v, motion.a
+
+
+def _dense(columns: Array) -> ca.DM:
+    return ca.DM(np.atleast_2d(columns))
+
+
+def _own(effect: Effect, values: Mapping[str, float]) -> dict[str, float]:
+    """The scalar parameters among `values` that belong to this effect."""
+    prefix = f"{effect.name}."
+    return {k[len(prefix) :]: v for k, v in values.items() if k.startswith(prefix) and "[" not in k}

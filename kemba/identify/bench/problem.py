@@ -1,0 +1,277 @@
+"""Bench logs under one model: the force predicted along the imposed motion, as residuals."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from kemba.effects import BY_KIND
+from kemba.effects.base import Effect
+from kemba.identify.bench.motion import Motion, difference_sigma, smooth_motion
+from kemba.identify.bench.plant import Prediction, Pulses, Rig
+from kemba.identify.bench.switching import pulses
+from kemba.identify.candidates import effect_candidates, sensor_candidates
+from kemba.identify.noise import Colour, whiten
+from kemba.identify.problem import Array, Candidate, Rows, Theta, secant_jacobian
+from kemba.model.model import Model
+from kemba.trajectory import Trajectory
+
+PRESSURES = ("chamber/extend/P", "chamber/retract/P")
+JITTER = 0.02  # nominal figures are off by 1-3 %
+DEAD_TIME_SIGMA = 1e-4  # s
+SAMPLE_SHARE = 1e-3  # blocks of rows used for the shape of the noise
+
+
+@dataclass(frozen=True)
+class Run:
+    """One bench log, prepared: motion, commands, and the measured channels."""
+
+    name: str
+    motion: Motion
+    commands: Pulses
+    measured: dict[str, Array]
+    sigma: dict[str, float]
+    mode: np.ndarray
+    keep: dict[str, np.ndarray] = field(default_factory=dict)
+
+
+def prepare(name: str, log: Trajectory) -> Run:
+    """Smooth the motion and learn each channel's white noise from its fastest differences."""
+    v = log["piston/v"] if "piston/v" in log else None
+    motion = smooth_motion(log.time, log["piston/x"], v)
+    extend, retract = (pulses(log.time, log[f"valve/{c}"]) for c in ("extend", "retract"))
+    channels = ["piston/F", *(p for p in PRESSURES if p in log)]
+    measured = {c: log[c] for c in channels}
+    floor = {"piston/F": 0.05, **dict.fromkeys(PRESSURES, 50.0)}
+    sigma = {c: max(difference_sigma(y), floor[c]) for c, y in measured.items()}
+    on = [log[f"valve/{c}"] > 0.5 for c in ("extend", "retract")]
+    mode = np.char.add(on[0].astype(int).astype(str), on[1].astype(int).astype(str))
+    keep = {c: np.isfinite(y) for c, y in measured.items()}
+    return Run(name, motion, (extend, retract), measured, sigma, mode, keep)
+
+
+class BenchProblem:
+    """Residuals of bench runs; effects join the model's list when theta switches them on."""
+
+    def __init__(self, runs: Iterable[Run], model: Model, sensors: bool = True) -> None:
+        self._runs = list(runs)
+        self.model = model
+        self.runs = tuple(run.name for run in self._runs)
+        self.candidates = effect_candidates(model)
+        if sensors:
+            self.candidates |= sensor_candidates(self._sensor_sigmas())
+        self._scaled = _scaled(model)
+        self.nuisance = {name: (1.0, JITTER) for name in self._scaled}
+        self.nuisance["valve.lead"] = (0.0, DEAD_TIME_SIGMA)
+        self._rigs: dict[tuple[str, ...], Rig] = {}
+        self._starts = {
+            f"start:{name}[{i}]": (i, name)
+            for i in range(len(self._runs))
+            for name in self._rig(()).state_names
+        }
+        for key, (_, name) in self._starts.items():
+            self.nuisance[key] = (0.0, 0.3 * self._state_scale[name])
+        for channel in self.channels[1:]:
+            self.nuisance[f"offset:{channel}"] = (0.0, 2e5)
+            self.nuisance[f"gain:{channel}"] = (1.0, JITTER)
+        self.colour: dict[tuple[int, int], Colour] = {}
+        self._settle_starts()
+
+    @cached_property
+    def channels(self) -> tuple[str, ...]:
+        return tuple(dict.fromkeys(c for run in self._runs for c in run.measured))
+
+    @cached_property
+    def _state_scale(self) -> dict[str, float]:
+        return {q.name: q.scale for q in self.model.states.values()}
+
+    def _sensor_sigmas(self) -> dict[str, float]:
+        force = float(np.median([run.sigma["piston/F"] for run in self._runs]))
+        position = float(np.median([run.motion.x_sigma for run in self._runs]))
+        return {"piston/F": force, "piston/x": position}
+
+    # -- prediction -------------------------------------------------------------------------
+
+    def _rig(self, active: tuple[str, ...]) -> Rig:
+        """The model with these effects on its list, compiled once."""
+        if active not in self._rigs:
+            extra = [BY_KIND[self.candidates[name].effect]() for name in active]
+            model = self.model.with_effects(_unlike(self.model, extra))
+            free = tuple(
+                key
+                for name in active
+                for key in self.candidates[name].keys()
+                if key in model.parameters
+            )
+            self._rigs[active] = Rig(model, free, self._scaled)
+        return self._rigs[active]
+
+    def _active(self, theta: Theta) -> tuple[str, ...]:
+        return tuple(
+            name
+            for name, c in sorted(self.candidates.items())
+            if not c.sensor and theta.get(c.key, c.lead.off) != c.lead.off
+        )
+
+    def predict(self, theta: Theta, index: int) -> dict[str, tuple[Array, Array]]:
+        """Per channel of run `index`: what should have been measured, and its variance."""
+        run = self._runs[index]
+        rig = self._rig(self._active(theta))
+        values = {name: theta.get(name, self.nuisance.get(name, (0.0,))[0]) for name in rig.names}
+        start = {
+            name: theta.get(key, 0.0) for key, (i, name) in self._starts.items() if i == index
+        }
+        lead = theta.get("valve.lead", 0.0)
+        motion = _true_motion(run.motion, theta)
+        p = rig.predict(motion, run.commands, values, start, lead)
+        out = {"piston/F": _force(p, run, theta)}
+        for channel in PRESSURES:
+            if channel in run.measured:
+                out[channel] = self._pressure(channel, p, run, theta)
+        return out
+
+    def _pressure(
+        self, channel: str, p: Prediction, run: Run, theta: Theta
+    ) -> tuple[Array, Array]:
+        from kemba.identify.bench.pressure import absolute_pressure
+
+        value = absolute_pressure(channel, p.states)
+        gain, offset = theta.get(f"gain:{channel}", 1.0), theta.get(f"offset:{channel}", 0.0)
+        return gain * value + offset, np.full(len(value), run.sigma[channel] ** 2)
+
+    # -- the contract -----------------------------------------------------------------------
+
+    def residual(self, theta: Theta, runs: Collection[int] | None = None) -> Array:
+        parts = []
+        for i in range(len(self._runs)) if runs is None else runs:
+            for channel, r in self.standardised(theta, i).items():
+                colour = self.colour.get((i, self.channels.index(channel)))
+                parts.append(r if colour is None else whiten(r, colour))
+        return np.concatenate(parts)
+
+    def standardised(self, theta: Theta, index: int) -> dict[str, Array]:
+        """Per channel (predicted - measured) / sigma of run `index`, before whitening."""
+        run = self._runs[index]
+        return {
+            c: ((y - run.measured[c]) / np.sqrt(variance))[run.keep[c]]
+            for c, (y, variance) in self.predict(theta, index).items()
+        }
+
+    def jacobian(
+        self, theta: Theta, names: Iterable[str], runs: Collection[int] | None = None
+    ) -> Array:
+        names = list(names)
+        plain = [n for n in names if n not in self._starts]
+        columns = dict(zip(plain, secant_jacobian(self, theta, plain, runs).T, strict=True))
+        columns |= self._start_columns(theta, [n for n in names if n in self._starts], runs)
+        return np.stack([columns[n] for n in names], axis=1)
+
+    def _start_columns(
+        self, theta: Theta, names: list[str], runs: Collection[int] | None
+    ) -> dict[str, Array]:
+        """Columns of the initial states: each moves its own run only."""
+        if not names:
+            return {}
+        at = self.rows(runs).run
+        base = self.residual(theta, runs)
+        columns = {}
+        for state in {self._starts[n][1] for n in names}:
+            own = {n: self._starts[n][0] for n in names if self._starts[n][1] == state}
+            step = {n: theta.get(n, 0.0) + 0.1 * self._state_scale[state] for n in own}
+            slope = (self.residual({**theta, **step}, runs) - base) / (0.1 * self._state_scale[state])
+            columns |= {n: np.where(at == i, slope, 0.0) for n, i in own.items()}
+        return columns
+
+    def rows(self, runs: Collection[int] | None = None) -> Rows:
+        parts: list[tuple[np.ndarray, ...]] = []
+        for i in range(len(self._runs)) if runs is None else runs:
+            run = self._runs[i]
+            for c in run.measured:
+                keep = run.keep[c]
+                n, k = int(keep.sum()), self.channels.index(c)
+                label = np.where(np.abs(run.motion.v[keep]) < 2e-3, "rest", "moving")
+                one = (np.full(n, i), np.full(n, k), run.motion.time[keep], label, run.mode[keep])
+                parts.append((*one, np.full(n, run.sigma[c])))
+        run_, channel, time, phase, mode, sigma = (
+            np.concatenate(p) for p in zip(*parts, strict=True)
+        )
+        return Rows(run_, channel, time, phase, mode, self.channels, sigma)
+
+    def library(self, theta: Theta) -> Mapping[str, Array]:
+        return {}
+
+    # -- how the logs begin -----------------------------------------------------------------
+
+    def _settle_starts(self) -> None:
+        """A valve on in the first row: on for long, or just switched? The data say."""
+        for i, run in enumerate(self._runs):
+            options = [_begun(c, run.motion.time[0]) for c in run.commands]
+            trials = [(e, r) for e in options[0] for r in options[1]]
+            if len(trials) == 1:
+                continue
+            early = run.motion.time[run.keep["piston/F"]] < run.motion.time[0] + 0.1
+            costs = []
+            for trial in trials:
+                self._runs[i] = replace(run, commands=trial)
+                r = self.standardised({}, i)["piston/F"][early]
+                costs.append(float(np.median(np.abs(r))))
+            self._runs[i] = replace(run, commands=trials[int(np.argmin(costs))])
+
+
+def _begun(
+    intervals: list[tuple[float, float]], start: float
+) -> list[list[tuple[float, float]]]:
+    if not intervals or np.isfinite(intervals[0][0]):
+        return [intervals]
+    return [intervals, [(start, intervals[0][1]), *intervals[1:]]]
+
+
+def _scaled(model: Model) -> tuple[str, ...]:
+    """Nominal numbers that a rig of the same make may have a little different."""
+    known = {
+        "chamber": ("F_extend", "F_retract", "fill[0]", "fill[1]", "vent[0]", "vent[1]"),
+        "mode_damping": ("c_extend", "c_retract", "c_both", "c_none"),
+    }
+    names = []
+    for effect in model.effects:
+        if effect.kind in known:
+            names += [f"{effect.name}.{f}" for f in known[effect.kind]]
+        elif effect.kind.startswith("orifice"):
+            names += [f"{effect.name}.{f}" for f in effect.parameters()]
+    return tuple(names)
+
+
+def _unlike(model: Model, extra: list[Effect]) -> list[Effect]:
+    """Effects not on the model's list already; those that are stay as they are."""
+    names = {e.name for e in model.effects}
+    return [e for e in extra if e.name not in names]
+
+
+def _true_motion(motion: Motion, theta: Theta) -> Motion:
+    """The motion that made the position sensor say what it said."""
+    k = theta.get("sensor_scale:piston/x.k", 0.0)
+    b = theta.get("sensor_bias:piston/x.b", 0.0)
+    dt = theta.get("sensor_delay:piston/x.dt", 0.0)
+    if k == b == dt == 0.0:
+        return motion
+    later = motion.time + dt
+    x, v, a = (np.interp(later, motion.time, c) for c in (motion.x, motion.v, motion.a))
+    return replace(motion, x=(x - b) / (1 + k), v=v / (1 + k), a=a / (1 + k))
+
+
+def _force(p: Prediction, run: Run, theta: Theta) -> tuple[Array, Array]:
+    """The transducer's reading and its variance: sensor, velocity error, switching instants."""
+    force, valve = p.force, p.valve
+    dt = theta.get("sensor_delay:piston/F.dt", 0.0)
+    if dt:
+        earlier = run.motion.time - dt
+        force = np.interp(earlier, run.motion.time, force)
+        valve = np.stack([np.interp(earlier, run.motion.time, c) for c in valve.T], axis=1)
+    force = (1 + theta.get("sensor_scale:piston/F.k", 0.0)) * force
+    force = force + theta.get("sensor_bias:piston/F.b", 0.0)
+    variance = run.sigma["piston/F"] ** 2 + (p.by_rate * run.motion.v_sigma) ** 2
+    variance = variance + np.sum(p.by_valve**2 * valve * (1 - valve), axis=1)
+    return force, variance

@@ -1,0 +1,57 @@
+"""Coloured noise: a short autoregression, learnt on what a flexible model leaves over."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import solve_toeplitz
+from scipy.signal import lfilter
+
+from kemba.identify.problem import Array
+
+ORDER = 4
+TRIM = 5.0  # rows beyond so many sigma are switching instants, not noise
+
+
+@dataclass(frozen=True)
+class Colour:
+    """AR model r_t = sum phi_k r_{t-k} + sigma e_t of a standardised residual."""
+
+    phi: Array
+    sigma: float
+
+    @property
+    def spread(self) -> float:
+        """Standard deviation of the coloured series itself."""
+        impulse = np.zeros(2000)
+        impulse[0] = 1.0
+        response = lfilter([1.0], np.concatenate([[1.0], -self.phi]), impulse)
+        return float(self.sigma * np.sqrt(np.sum(response**2)))
+
+
+def learn(residual: Array, order: int = ORDER) -> Colour:
+    """Yule-Walker fit, order by BIC; spikes are cut down first."""
+    scale = max(1.4826 * float(np.median(np.abs(residual))), 0.2)
+    r = np.clip(residual, -TRIM * scale, TRIM * scale)
+    n = len(r)
+    if n < 50:
+        return Colour(np.zeros(0), max(float(np.sqrt(np.mean(r**2))), 0.2))
+    c = np.array([np.dot(r[: n - k], r[k:]) / n for k in range(order + 1)])
+    best, chosen = np.inf, (np.zeros(0), float(c[0]))
+    for p in range(order + 1):
+        phi = solve_toeplitz(c[:p], c[1 : p + 1]) if p else np.zeros(0)
+        power = max(float(c[0] - phi @ c[1 : p + 1]), 1e-6)
+        bic = n * np.log(power) + p * np.log(n)
+        if bic < best - 1e-9:
+            best, chosen = bic, (phi, power)
+    return Colour(chosen[0], float(np.sqrt(chosen[1])))
+
+
+def whiten(residual: Array, colour: Colour) -> Array:
+    """e_t = (r_t - sum phi_k r_{t-k}) / sigma; the first rows are scaled by the series' spread."""
+    white = lfilter(np.concatenate([[1.0], -colour.phi]), [1.0], residual) / colour.sigma
+    p = len(colour.phi)
+    if p:
+        white[:p] = residual[:p] / max(colour.spread, colour.sigma)
+    return np.asarray(white)

@@ -1,0 +1,99 @@
+"""A Kalman filter over several runs at once: gains once, then any number of columns through it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+MISSING = 1e12  # times the variance: a row that was not measured tells nothing
+
+
+@dataclass(frozen=True)
+class System:
+    """Deviations from a reference, x' = F x + G (g + w), y = H x + n, over n steps of L runs.
+
+    F (n, L, d, d), G (n, L, d, k), W (n, L, k, k) the covariance of w per step, H (n, L, m, d),
+    R (n, L, m) variances of the rows (infinite: not measured), P0 (L, d, d).
+    """
+
+    F: Array
+    G: Array
+    W: Array
+    H: Array
+    R: Array
+    P0: Array
+
+
+@dataclass(frozen=True)
+class Gains:
+    """What the filter makes of a System: gains, whiteners of the innovations, predicted P."""
+
+    K: Array
+    whitener: Array
+    P: Array
+
+
+def gains(system: System) -> Gains:
+    """Run the covariance recursion."""
+    s = system
+    n, runs, m, d = s.H.shape
+    known = np.isfinite(s.R)
+    R = np.where(known, s.R, MISSING * np.nanmax(np.where(known, s.R, 0.0)))
+    noise = s.G @ s.W @ s.G.swapaxes(-1, -2)
+    Ft, Ht = s.F.swapaxes(-1, -2), s.H.swapaxes(-1, -2)
+    eye, diagonal = np.eye(d), np.arange(m)
+    K = np.empty((n, runs, d, m))
+    L = np.empty((n, runs, m, m))
+    P_all = np.empty((n, runs, d, d))
+    P = s.P0.copy()
+    for k in range(n):
+        P_all[k] = P
+        PHt = P @ Ht[k]
+        S = s.H[k] @ PHt
+        S[:, diagonal, diagonal] += R[k]
+        L[k] = np.linalg.cholesky(S)
+        # Joseph's form keeps P positive where a row is a thousand times sharper than the state
+        K[k] = np.linalg.solve(S, PHt.swapaxes(-1, -2)).swapaxes(-1, -2)
+        A = eye - K[k] @ s.H[k]
+        P = A @ P @ A.swapaxes(-1, -2) + (K[k] * R[k][:, None, :]) @ K[k].swapaxes(-1, -2)
+        P = s.F[k] @ P @ Ft[k] + noise[k]
+        P = 0.5 * (P + P.swapaxes(-1, -2))
+    return Gains(K, np.linalg.inv(L), P_all)
+
+
+def innovations(system: System, gain: Gains, y: Array, g: Array) -> tuple[Array, Array]:
+    """(predicted x (n, L, d, c), innovations (n, L, m, c)) of columns y (n, L, m, c), g."""
+    s = system
+    n, runs, m, d = s.H.shape
+    y = np.where(np.isfinite(y) & np.isfinite(s.R)[..., None], y, 0.0)
+    push = s.G @ g
+    states = np.empty((n, runs, d, y.shape[-1]))
+    errors = np.empty((n, runs, m, y.shape[-1]))
+    x = np.zeros((runs, d, y.shape[-1]))
+    for k in range(n):
+        states[k] = x
+        errors[k] = y[k] - s.H[k] @ x
+        x = s.F[k] @ (x + gain.K[k] @ errors[k]) + push[k]
+    return states, errors
+
+
+def smooth(system: System, gain: Gains, y: Array, g: Array) -> tuple[Array, Array]:
+    """(smoothed x (n, L, d), smoothed w (n, L, k)) of one column (Bryson and Frazier)."""
+    s = system
+    states, errors = innovations(s, gain, y[..., None], g[..., None])
+    n, runs, _, d = s.H.shape
+    solved = gain.whitener.swapaxes(-1, -2) @ (gain.whitener @ errors)
+    Ft, Ht = s.F.swapaxes(-1, -2), s.H.swapaxes(-1, -2)
+    WGt = s.W @ s.G.swapaxes(-1, -2)
+    x, w = np.empty((n, runs, d)), np.empty((n, runs, s.G.shape[-1]))
+    pull = np.zeros((runs, d, 1))
+    for k in reversed(range(n)):
+        w[k] = (WGt[k] @ pull)[..., 0]
+        carried = Ft[k] @ pull
+        pull = Ht[k] @ (solved[k] - gain.K[k].swapaxes(-1, -2) @ carried) + carried
+        x[k] = (states[k] + gain.P[k] @ pull)[..., 0]
+    return x, w

@@ -1,0 +1,44 @@
+"""The closed loop femur - tibia - piston as an analytic map of the knee's flexion."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+
+from kemba.mechanism.links import Leg
+
+
+def pivot_to_pin(leg: Leg, flexion: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """Vector from the cylinder's pivot to the rod's pin in leg axes [m]: along the femur from
+    hip to knee, and to the side on which the tibia folds."""
+    piston = leg.piston
+    along = leg.femur.length + piston.pin * ca.cos(flexion)
+    aside = piston.pin * ca.sin(flexion) - piston.mount
+    return along, aside
+
+
+def extension(leg: Leg, flexion: ca.SX) -> ca.SX:
+    """Piston extension [m] for a knee flexion [rad]: 0 retracted, `stroke` extended."""
+    along, aside = pivot_to_pin(leg, flexion)
+    return ca.sqrt(along**2 + aside**2) - leg.piston.retracted
+
+
+def cylinder_angle(leg: Leg, flexion: ca.SX) -> ca.SX:
+    """Angle [rad] of the cylinder against the femur, positive towards the folding side."""
+    along, aside = pivot_to_pin(leg, flexion)
+    return ca.atan2(aside, along)
+
+
+def flexion(leg: Leg, x: float) -> float:
+    """Knee flexion [rad] for a piston extension `x` [m]; 0 is a straight leg.
+
+    Raises ValueError where the linkage cannot reach.
+    """
+    piston, femur = leg.piston, leg.femur.length
+    d = piston.retracted + x
+    # |d|^2 = f^2 + p^2 + m^2 + 2 p (f cos k - m sin k) = f^2 + p^2 + m^2 + 2 p r cos(k + phase)
+    reach = np.hypot(femur, piston.mount)
+    cosine = (d**2 - femur**2 - piston.pin**2 - piston.mount**2) / (2 * piston.pin * reach)
+    if abs(cosine) > 1.0:
+        raise ValueError(f"the knee cannot reach a piston extension of {x:g} m")
+    return float(np.arccos(cosine) - np.arctan2(piston.mount, femur))

@@ -1,0 +1,86 @@
+"""What every reader sees of a mechanism: coordinates, ports, and its inverse dynamics."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import casadi as ca
+
+from kemba.errors import KembaError, suggest
+from kemba.quantity import Quantity
+
+
+@dataclass(frozen=True)
+class Port:
+    """One scalar phi(q) of a mechanism at which effects push.
+
+    Its velocity J v and acceleration J a + Jdot v come from AD, and an effort e at the port
+    enters the generalised forces as J'e.
+    """
+
+    quantity: Quantity
+    rate: Quantity
+    phi: ca.SX
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """A mechanism in reduced coordinates.
+
+    `q, v, a` are SX symbols (n,); `inverse_dynamics` (n,) is the generalised force that the
+    motion (q, v, a) needs, gravity included, no effect included. `legs` are the prefixes under
+    which leg ports are found ("" for a rig). `imposed`: the motion is given, forces are answers.
+    `mirror` maps a coordinate to its mirror image ("-" prefixed where the sign turns).
+    `standing`: coordinates with retracted pistons and each foot on the ground under its hip.
+    `points`: (x, z) of places that pictures need, such as `front/pin`; nothing pushes there.
+    """
+
+    name: str
+    q: ca.SX
+    v: ca.SX
+    a: ca.SX
+    coordinates: tuple[Quantity, ...]
+    velocities: tuple[Quantity, ...]
+    inverse_dynamics: ca.SX
+    ports: dict[str, Port]
+    legs: tuple[str, ...]
+    weight: float = 1.0
+    mass: float = 1.0
+    body_mass: float = 0.0
+    gravity: float = 9.81
+    stroke: float = 0.07
+    imposed: bool = False
+    mirror: dict[str, str] = field(default_factory=dict)
+    standing: dict[str, float] = field(default_factory=dict)
+    points: dict[str, ca.SX] = field(default_factory=dict)
+
+    @property
+    def n(self) -> int:
+        """Number of coordinates."""
+        return len(self.coordinates)
+
+    def port(self, name: str) -> Port:
+        """The port called `name`, e.g. `front/piston/x`. Raises KembaError."""
+        if name not in self.ports:
+            raise KembaError(self.name, f"no port '{name}'", hint=suggest(name, self.ports))
+        return self.ports[name]
+
+    @cached_property
+    def _motions(self) -> dict[str, tuple[ca.SX, ca.SX, ca.SX]]:
+        phi = ca.vertcat(*(p.phi for p in self.ports.values()))
+        rate = ca.jtimes(phi, self.q, self.v)
+        acc = ca.jtimes(rate, self.q, self.v) + ca.jtimes(phi, self.q, self.a)
+        return {name: (phi[i], rate[i], acc[i]) for i, name in enumerate(self.ports)}
+
+    def motion(self, name: str) -> tuple[ca.SX, ca.SX, ca.SX]:
+        """Position, velocity and acceleration of a port, as expressions of q, v, a."""
+        self.port(name)
+        return self._motions[name]
+
+    def generalised(self, efforts: dict[str, ca.SX]) -> ca.SX:
+        """Generalised force (n,) of efforts given per port: sum of J'e."""
+        if not efforts:
+            return ca.SX.zeros(self.n)
+        phi = ca.vertcat(*(self.port(name).phi for name in efforts))
+        return ca.jtimes(phi, self.q, ca.vertcat(*efforts.values()), True)

@@ -1,0 +1,179 @@
+"""The legged robot: tree of the pin.Model, knee loops closed, seen through ports."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+
+from kemba.mechanism import knee
+from kemba.mechanism.links import Robot, load_robot
+from kemba.mechanism.pin_model import build_pin_model
+from kemba.mechanism.planar import Mechanism, Port
+from kemba.mechanism.recursion import Motion, forward, read_joints, rnea
+from kemba.quantity import Quantity
+
+HIP_RANGE = 2.2  # rad; beyond it the knee would enter the body
+
+
+def robot_mechanism(robot: Robot | str = "kemba") -> Mechanism:
+    """The mechanism of a link table: q = (x, z, pitch, hips, knees), n = 3 + 2 legs."""
+    robot = load_robot(robot) if isinstance(robot, str) else robot
+    coordinates, velocities = _coordinates(robot)
+    n = len(coordinates)
+    q, v, a = ca.SX.sym("q", n), ca.SX.sym("v", n), ca.SX.sym("a", n)
+    model = build_pin_model(robot)
+    joints = read_joints(model)
+    tree = tree_angles(robot, q)
+    tree_v = ca.jtimes(tree, q, v)
+    tree_a = ca.jtimes(tree_v, q, v) + ca.jtimes(tree, q, a)
+    tree_tau = rnea(joints, tree, tree_v, tree_a, robot.gravity)
+    motions = dict(
+        zip((j.name for j in joints), forward(joints, tree, tree_v, tree_a, 0.0), strict=True)
+    )
+    mass = sum(j.mass for j in joints)
+    return Mechanism(
+        name=robot.name,
+        q=q,
+        v=v,
+        a=a,
+        coordinates=coordinates,
+        velocities=velocities,
+        inverse_dynamics=ca.jtimes(tree, q, tree_tau, True),
+        ports=_ports(robot, q, motions),
+        legs=tuple(robot.legs),
+        weight=float(mass * robot.gravity),
+        mass=float(mass),
+        body_mass=robot.body.mass,
+        gravity=robot.gravity,
+        stroke=robot.leg.piston.stroke,
+        mirror=_mirror(robot),
+        standing=standing_pose(robot),
+        points=_points(robot, motions),
+    )
+
+
+def standing_pose(robot: Robot, x: float = 0.0) -> dict[str, float]:
+    """Coordinates of the level robot with every foot on the ground under its hip and all pistons
+    at extension `x` [m]."""
+    femur, tibia = robot.leg.femur.length, robot.leg.tibia.length
+    bend = knee.flexion(robot.leg, x)
+    down, aside = femur + tibia * np.cos(bend), tibia * np.sin(bend)
+    pose = {"body/x": 0.0, "body/z": float(np.hypot(down, aside)), "body/pitch": 0.0}
+    for leg, place in robot.legs.items():
+        pose[f"{leg}/hip/q"] = -place.fold * float(np.arctan2(aside, down))
+        pose[f"{leg}/knee/q"] = place.fold * bend
+    return pose
+
+
+def tree_angles(robot: Robot, q: ca.SX) -> ca.SX:
+    """The opened tree's joint positions as a function of the reduced coordinates:
+    x, z, pitch, then per leg hip, knee, cylinder, rod. The loop is closed by construction."""
+    legs = len(robot.legs)
+    tree = [q[0], q[1], q[2]]
+    for i, place in enumerate(robot.legs.values()):
+        hip, knee_q = q[3 + i], q[3 + legs + i]
+        bend = place.fold * knee_q
+        angle = place.fold * knee.cylinder_angle(robot.leg, bend)
+        tree += [hip, knee_q, angle, knee.extension(robot.leg, bend)]
+    return ca.vertcat(*tree)
+
+
+def _coordinates(robot: Robot) -> tuple[tuple[Quantity, ...], tuple[Quantity, ...]]:
+    stroke = robot.leg.piston.stroke
+    bends = sorted(knee.flexion(robot.leg, x) for x in (0.0, stroke))
+    slack = 0.05  # the end stops hold the knee; these bounds only keep solvers out of trouble
+    q = [
+        Quantity("body/x", "m", -5.0, 5.0, 0.1, doc="body centre, forward"),
+        Quantity("body/z", "m", 0.0, 3.0, 0.1, doc="body centre, height above the ground"),
+        Quantity("body/pitch", "rad", -np.pi / 2, np.pi / 2, 0.2, doc="nose up positive"),
+    ]
+    q += [
+        Quantity(f"{leg}/hip/q", "rad", -HIP_RANGE, HIP_RANGE, 0.5, doc="femur against body")
+        for leg in robot.legs
+    ]
+    for leg, place in robot.legs.items():
+        low, high = sorted(place.fold * b for b in (bends[0] - slack, bends[1] + slack))
+        q.append(Quantity(f"{leg}/knee/q", "rad", low, high, 0.5, doc="tibia against femur"))
+    v = [
+        Quantity("body/vx", "m.s-1", -20, 20, 1.0, doc="body centre, forward"),
+        Quantity("body/vz", "m.s-1", -20, 20, 1.0, doc="body centre, upward"),
+        Quantity("body/pitch_rate", "rad.s-1", -50, 50, 2.0, doc="nose up positive"),
+    ]
+    for joint in ("hip", "knee"):
+        v += [
+            Quantity(f"{leg}/{joint}/w", "rad.s-1", -100, 100, 5.0, doc=f"{joint} rate")
+            for leg in robot.legs
+        ]
+    return tuple(q), tuple(v)
+
+
+def _ports(robot: Robot, q: ca.SX, motions: dict[str, Motion]) -> dict[str, Port]:
+    legs = len(robot.legs)
+    ports = [
+        _port("body/x", "body/vx", "m", q[0], "body centre, forward"),
+        _port("body/z", "body/vz", "m", q[1], "body centre, height"),
+        _port("body/pitch", "body/pitch_rate", "rad", q[2], "nose up positive"),
+    ]
+    for i, (leg, place) in enumerate(robot.legs.items()):
+        bend = place.fold * q[3 + legs + i]
+        hip, tibia = motions[f"{leg}/hip"], motions[f"{leg}/knee"]
+        foot = tibia.turn(np.array([0.0, -robot.leg.tibia.length]))
+        x, z = tibia.position
+        ports += [
+            _port(f"{leg}/hip/q", f"{leg}/hip/w", "rad", q[3 + i], "femur against body"),
+            _port(f"{leg}/knee/q", f"{leg}/knee/w", "rad", q[3 + legs + i], "tibia against femur"),
+            _port(
+                f"{leg}/piston/x",
+                f"{leg}/piston/v",
+                "m",
+                knee.extension(robot.leg, bend),
+                "piston extension, 0 retracted",
+            ),
+            _point(leg, "foot", "x", x + foot[0]),
+            _point(leg, "foot", "z", z + foot[1]),
+            _point(leg, "knee", "x", x),
+            _point(leg, "knee", "z", z),
+            _point(leg, "hip", "x", hip.position[0]),
+            _point(leg, "hip", "z", hip.position[1]),
+        ]
+    return {p.quantity.name: p for p in ports}
+
+
+def _points(robot: Robot, motions: dict[str, Motion]) -> dict[str, ca.SX]:
+    """Where each leg's hip, knee and foot are, and its cylinder's pivot and its rod's pin."""
+    points: dict[str, ca.SX] = {}
+    for leg in robot.legs:
+        hip, tibia = motions[f"{leg}/hip"], motions[f"{leg}/knee"]
+        sole = tibia.turn(np.array([0.0, -robot.leg.tibia.length]))
+        foot = (tibia.position[0] + sole[0], tibia.position[1] + sole[1])
+        places = {
+            "hip": hip.position,
+            "knee": tibia.position,
+            "foot": foot,
+            "mount": motions[f"{leg}/cylinder"].position,
+            "pin": motions[f"{leg}/rod"].position,
+        }
+        points |= {f"{leg}/{place}": ca.vertcat(*at) for place, at in places.items()}
+    return points
+
+
+def _port(name: str, rate: str, unit: str, phi: ca.SX, doc: str) -> Port:
+    return Port(Quantity(name, unit, doc=doc), Quantity(rate, f"{unit}.s-1", doc=doc), phi)
+
+
+def _point(leg: str, point: str, axis: str, phi: ca.SX) -> Port:
+    name = f"{leg}/{point}/{axis}"
+    return _port(name, f"{leg}/{point}/v{axis}", "m", phi, f"{point} position, {axis}")
+
+
+def _mirror(robot: Robot) -> dict[str, str]:
+    """Left-right mirror of the plane for a robot with one leg on either side; {} if it has none."""
+    if len(robot.legs) != 2:
+        return {}
+    (a, pa), (b, pb) = robot.legs.items()
+    if pa.hip != -pb.hip or pa.fold != -pb.fold:
+        return {}
+    mirror = {"body/x": "-body/x", "body/z": "body/z", "body/pitch": "-body/pitch"}
+    for joint in ("hip", "knee"):
+        mirror |= {f"{a}/{joint}/q": f"-{b}/{joint}/q", f"{b}/{joint}/q": f"-{a}/{joint}/q"}
+    return mirror

@@ -1,0 +1,218 @@
+"""Model: a mechanism and a list of effects, resolved into one labelled residual."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from functools import cached_property
+from typing import Any
+
+import casadi as ca
+
+from kemba.effects.base import Effect
+from kemba.errors import KembaError, suggest
+from kemba.mechanism import Mechanism
+from kemba.model.node import Node, Row
+from kemba.model.scene import Instance, Key, Scene, full_name, place_effects, port_name
+from kemba.quantity import Param, Quantity
+
+
+class Model:
+    """A mechanism with effects; the order of the list does not matter.
+
+    `supply` is the air pressure [Pa] at which the tables of the effects are read.
+    """
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        effects: Iterable[Effect],
+        supply: float = 0.7e6,
+        name: str = "model",
+    ) -> None:
+        self.mechanism, self.effects = mechanism, tuple(effects)
+        self.supply, self.name = supply, name
+        self.instances = place_effects(mechanism, self.effects)
+        self.states = self._variables("states")
+        self.inputs = self._variables("inputs")
+        self.forces = self._variables("forces")
+
+    def _variables(self, role: str) -> dict[Key, Quantity]:
+        found: dict[Key, Quantity] = {}
+        for instance in self.instances:
+            for key, quantity in instance.variables(role).items():
+                if key in found:
+                    raise KembaError(
+                        f"effects.{instance.effect.name}", f"'{quantity.name}' is declared twice"
+                    )
+                found[key] = quantity
+        return found
+
+    def with_effects(self, effects: Iterable[Effect]) -> Model:
+        """The same model with `effects` added; one of the same name is replaced."""
+        new = {e.name: e for e in (*self.effects, *effects)}
+        return Model(self.mechanism, new.values(), self.supply, self.name)
+
+    def effect(self, name: str) -> Effect:
+        """The effect called `name`. Raises KembaError."""
+        for effect in self.effects:
+            if effect.name == name:
+                return effect
+        names = [e.name for e in self.effects]
+        raise KembaError(self.name, f"no effect '{name}'", hint=suggest(name, names))
+
+    def timing(self, leg: str | None) -> tuple[float, float]:
+        """Seconds by which a leg's valves switch on and off after the command."""
+        here = [i.effect.timing() for i in self.instances if i.leg in (leg, None)]
+        on = sum(t.get("on", 0.0) for t in here)
+        return on, sum(t.get("off", 0.0) for t in here)
+
+    @cached_property
+    def parameters(self) -> dict[str, tuple[Param, float]]:
+        """Every scalar parameter as `effect.field`: its unit and size, and its value."""
+        return {
+            f"{effect.name}.{field}": (param, effect.value(field))
+            for effect in self.effects
+            for field, param in effect.parameters().items()
+        }
+
+    @cached_property
+    def node(self) -> Node:
+        """The residual with every parameter at its value."""
+        return self.build()
+
+    def build(self, free: Iterable[str] = (), scaled: Iterable[str] = ()) -> Node:
+        """The residual with the parameters `free` (names as in `parameters`) left as symbols.
+
+        Every number named in `scaled`, also a whole table (`chamber.F_extend`) or one entry of it
+        (`chamber.fill[0]`), is multiplied by a symbol; these follow the free ones in p.
+        """
+        free, scaled = list(free), list(scaled)
+        for name in free:
+            if name not in self.parameters:
+                raise KembaError(self.name, f"no parameter '{name}'", hint=suggest(name, self.parameters))
+        p = ca.SX.sym("p", len(free) + len(scaled))
+        bound: dict[str, dict[str, Any]] = {}
+        for i, name in enumerate(free):
+            effect, field = name.rsplit(".", 1)
+            bound.setdefault(effect, {})[field] = p[i]
+        for i, name in enumerate(scaled, start=len(free)):
+            _scale(self, bound, name, p[i])
+        instances = [
+            Instance(i.effect.bind(bound.get(i.effect.name, {})), i.leg) for i in self.instances
+        ]
+        return _assemble(self, instances, p)
+
+
+def _scale(model: Model, bound: dict[str, dict[str, Any]], name: str, factor: ca.SX) -> None:
+    """Multiply the number, table or table entry `name` by `factor` in `bound`."""
+    effect, field = name.rsplit(".", 1)
+    field, _, entry = field.partition("[")
+    values = bound.setdefault(effect, {})
+    value = values.get(field, getattr(model.effect(effect), field))
+    if not isinstance(value, tuple):
+        values[field] = value * factor
+    else:
+        chosen = {int(entry.rstrip("]"))} if entry else set(range(len(value)))
+        values[field] = tuple(v * factor if i in chosen else v for i, v in enumerate(value))
+
+
+def _symbols(prefix: str, quantities: Mapping[Key, Quantity]) -> tuple[ca.SX, dict[Key, ca.SX]]:
+    vector = ca.vertcat(*(ca.SX.sym(f"{prefix}:{q.name}") for q in quantities.values()))
+    vector = ca.SX(vector) if quantities else ca.SX.zeros(0, 1)
+    return vector, {key: vector[i] for i, key in enumerate(quantities)}
+
+
+def _assemble(model: Model, instances: list[Instance], p: ca.SX) -> Node:
+    mechanism = model.mechanism
+    s, states = _symbols("s", model.states)
+    lam, forces = _symbols("lam", model.forces)
+    u, inputs = _symbols("u", model.inputs)
+    sd = ca.SX.sym("sd", s.numel())
+    scene = Scene(
+        mechanism, instances, {**states, **forces, **inputs}, set(model.inputs), model.supply
+    )
+    parts = [(instance, scene.contribution(i)) for i, instance in enumerate(instances)]
+
+    efforts: dict[str, Any] = {}
+    rod = {leg: ca.SX(0) for leg in mechanism.legs}
+    pairs, pair_rows, limits, limit_rows = [], [], [], []
+    rates: dict[Key, Any] = {}
+    own: list[tuple[Quantity, Any]] = []
+    for instance, part in parts:
+        for quantity, value in part.outputs:
+            own.append((replace(quantity, name=full_name(instance.leg, quantity.name)), value))
+        for alias, effort in part.effort.items():
+            port = port_name(instance.leg, alias)
+            efforts[port] = efforts.get(port, 0) + effort
+            if alias == "piston" and instance.effect.on_rod:
+                rod[instance.leg or ""] += effort
+        for pair in part.pairs:
+            label = f"{instance.label}:{pair.name}"
+            pairs.append((pair.a, pair.b))
+            pair_rows.append((Row(label, pair.unit_a), Row(label, pair.unit_b, mechanism.weight)))
+        for name, limit in part.limits.items():
+            limits.append(limit)
+            limit_rows.append(Row(f"{instance.label}:{name}", "1"))
+        for symbol, rate in (*part.rate.items(), *part.add_rate.items()):
+            key = (instance.leg, symbol)
+            rates[key] = rates.get(key, 0) + rate
+    _check_rates(model, rates)
+
+    return Node(
+        q=mechanism.q,
+        v=mechanism.v,
+        a=mechanism.a,
+        s=s,
+        sd=sd,
+        lam=lam,
+        u=u,
+        p=p,
+        dynamics=mechanism.inverse_dynamics - mechanism.generalised(efforts),
+        rate=ca.SX(sd - ca.vertcat(*(rates[key] for key in states))) if states else sd,
+        pair_a=ca.SX(ca.vertcat(*(a for a, _ in pairs))),
+        pair_b=ca.SX(ca.vertcat(*(b for _, b in pairs))),
+        limits=ca.SX(ca.vertcat(*limits)),
+        **_outputs(mechanism, rod, own),
+        dynamics_rows=tuple(
+            Row(f"dynamics:{c.name}", "N" if c.unit == "m" else "N.m", mechanism.weight)
+            for c in mechanism.coordinates
+        ),
+        rate_rows=tuple(
+            Row(f"rate:{quantity.name}", f"{quantity.unit}.s-1", quantity.scale)
+            for quantity in model.states.values()
+        ),
+        pair_rows=tuple(pair_rows),
+        limit_rows=tuple(limit_rows),
+    )
+
+
+def _check_rates(model: Model, rates: Mapping[Key, Any]) -> None:
+    for key in model.states:
+        if key not in rates:
+            raise KembaError(full_name(*key), "has no rate: its effect declares but never moves it")
+    for leg, symbol in rates:
+        if (leg, symbol) not in model.states:
+            raise KembaError(
+                full_name(leg, symbol), "an effect changes its rate, but no effect declares it"
+            )
+
+
+def _outputs(
+    mechanism: Mechanism, rod: Mapping[str, ca.SX], own: list[tuple[Quantity, Any]]
+) -> dict[str, Any]:
+    outputs: dict[str, ca.SX] = {quantity.name: value for quantity, value in own}
+    quantities = [quantity for quantity, _ in own]
+    for name, port in mechanism.ports.items():
+        x, v, _ = mechanism.motion(name)
+        outputs |= {name: x, port.rate.name: v}
+        quantities += [port.quantity, port.rate]
+    for axis in ("x", "z"):
+        if f"body/{axis}" in mechanism.ports:
+            outputs[f"body/a{axis}"] = mechanism.motion(f"body/{axis}")[2]
+            quantities.append(Quantity(f"body/a{axis}", "m.s-2", doc="body centre acceleration"))
+    for leg, force in rod.items():
+        name = full_name(leg, "piston/F")
+        outputs[name] = force
+        quantities.append(Quantity(name, "N", doc="air and friction on the rod, pushing positive"))
+    return {"outputs": outputs, "output_quantities": tuple(quantities)}

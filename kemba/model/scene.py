@@ -1,0 +1,192 @@
+"""Effects placed on a mechanism: names resolved, signals composed, each evaluated once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import casadi as ca
+
+from kemba.effects.base import At, Contribution, Effect, PortAt, Signal
+from kemba.errors import KembaError, suggest
+from kemba.mechanism import Mechanism
+from kemba.quantity import Quantity
+
+LEG_PORTS = {"piston": "piston/x", "hip": "hip/q", "foot_x": "foot/x", "foot_z": "foot/z"}
+BODY_PORTS = {"body_x": "body/x", "body_z": "body/z", "pitch": "body/pitch"}
+
+Key = tuple[str | None, str]  # (leg, symbol); leg None: the whole robot
+
+
+def full_name(leg: str | None, name: str) -> str:
+    """Column name of a leg's or the robot's quantity."""
+    return f"{leg}/{name}" if leg else name
+
+
+class Instance:
+    """One effect at one place."""
+
+    def __init__(self, effect: Effect, leg: str | None) -> None:
+        self.effect, self.leg = effect, leg
+
+    @property
+    def label(self) -> str:
+        return full_name(self.leg, self.effect.name)
+
+    def variables(self, role: str) -> dict[Key, Quantity]:
+        """Its `states`, `inputs` or `forces`, under their full column names."""
+        found = {}
+        for symbol, quantity in getattr(self.effect, role)().items():
+            found[(self.leg, symbol)] = replace(quantity, name=full_name(self.leg, quantity.name))
+        return found
+
+
+def place_effects(mechanism: Mechanism, effects: Iterable[Effect]) -> list[Instance]:
+    """Every effect at every place where it acts, in canonical order. Raises KembaError."""
+    listed = sorted(effects, key=lambda e: e.name)
+    names = [e.name for e in listed]
+    for name in names:
+        if names.count(name) > 1:
+            raise KembaError(f"effects.{name}", "listed twice", "each effect once per leg")
+    gone = {kind for e in listed for kind in e.replaces}
+    instances = []
+    for effect in listed:
+        if effect.kind in gone:
+            continue
+        legs: Iterable[str | None] = (None,) if effect.place == "body" else mechanism.legs
+        if effect.leg is not None:
+            if effect.leg not in mechanism.legs:
+                raise KembaError(
+                    f"effects.{effect.name}", f"{mechanism.name} has no leg '{effect.leg}'"
+                )
+            legs = (effect.leg,)
+        for leg in legs:
+            _check_ports(mechanism, effect, leg)
+            instances.append(Instance(effect, leg))
+    return instances
+
+
+def _check_ports(mechanism: Mechanism, effect: Effect, leg: str | None) -> None:
+    for alias in effect.ports:
+        name = port_name(leg, alias)
+        if name not in mechanism.ports:
+            raise KembaError(
+                f"effects.{effect.name}",
+                f"needs the port '{name}', which {mechanism.name} does not have",
+                hint=f"ports: {', '.join(mechanism.ports)}",
+            )
+
+
+def port_name(leg: str | None, alias: str) -> str:
+    """Full port name of an alias such as `piston` at a leg."""
+    return BODY_PORTS[alias] if alias in BODY_PORTS else full_name(leg, LEG_PORTS[alias])
+
+
+class Scene:
+    """All instances with the symbols of one evaluation.
+
+    `values` holds the SX of every state, input and force by (leg, symbol). Published values and
+    signals are resolved on demand, so the order of the effects cannot matter.
+    """
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        instances: list[Instance],
+        values: Mapping[Key, ca.SX],
+        inputs: set[Key],
+        supply: float,
+    ) -> None:
+        self.mechanism, self.instances, self.supply = mechanism, instances, supply
+        self.values, self.inputs = values, inputs
+        self.slots = {slot for i in instances for slot in i.effect.reads}
+        self._contributions: dict[int, Contribution] = {}
+        self._busy: set[int] = set()
+        self._signals = self._collect_signals()
+
+    def at(self, leg: str | None) -> At:
+        """The view of effects at `leg` (None: the robot)."""
+        return _Place(self, leg)  # type: ignore[return-value]
+
+    def contribution(self, index: int) -> Contribution:
+        """What instance `index` adds; evaluated once."""
+        if index not in self._contributions:
+            if index in self._busy:
+                raise KembaError(self.instances[index].label, "reads a value that depends on it")
+            self._busy.add(index)
+            instance = self.instances[index]
+            self._contributions[index] = instance.effect.evaluate(self.at(instance.leg))
+            self._busy.discard(index)
+        return self._contributions[index]
+
+    def lookup(self, leg: str | None, symbol: str) -> Any:
+        """Value of a symbol as seen from `leg`: signal, variable, or published value."""
+        if symbol in self.slots or (leg, symbol) in self.inputs:
+            return self.signal(leg, symbol)
+        for place in (leg, None):
+            if (place, symbol) in self.values:
+                return self.values[(place, symbol)]
+            for index, instance in enumerate(self.instances):
+                if instance.leg == place and symbol in instance.effect.publishes:
+                    return self.contribution(index).publish[symbol]
+        known = {s for _, s in self.values} | self.slots
+        raise KembaError(
+            full_name(leg, symbol), "no effect of this model provides it", hint=suggest(symbol, known)
+        )
+
+    def signal(self, leg: str | None, name: str, lag: bool = True) -> Any:
+        """A signal: its input (or 1) times every gain, or the lagged value in its place."""
+        value: Any = self.values[(leg, name)] if (leg, name) in self.inputs else 1.0
+        for place in dict.fromkeys((leg, None)):
+            for signal in self._signals.get((place, name), ()):
+                if signal.lagged is not None:
+                    if lag:
+                        return signal.lagged
+                else:
+                    value = value * signal.gain
+        return value
+
+    def _collect_signals(self) -> dict[Key, list[Signal]]:
+        found: dict[Key, list[Signal]] = {}
+        heard = self.slots | {symbol for _, symbol in self.inputs}
+        for instance in self.instances:
+            for name, signal in instance.effect.signals(self.at(instance.leg)).items():
+                if name not in heard:
+                    raise KembaError(
+                        f"effects.{instance.effect.name}",
+                        f"changes the signal '{name}', which no effect of this model reads",
+                        hint="add the effect it acts on, or remove it",
+                    )
+                found.setdefault((instance.leg, name), []).append(signal)
+        for (leg, name), signals in found.items():
+            if sum(s.lagged is not None for s in signals) > 1:
+                raise KembaError(full_name(leg, name), "two effects lag the same signal")
+            # a lag answers last, whatever the order of the list
+            signals.sort(key=lambda s: s.lagged is None)
+        return found
+
+
+class _Place:
+    """`At` for one leg of a scene."""
+
+    def __init__(self, scene: Scene, leg: str | None) -> None:
+        self._scene, self._leg = scene, leg
+        self.supply = scene.supply
+        self.gravity, self.stroke = scene.mechanism.gravity, scene.mechanism.stroke
+        self.body_mass = scene.mechanism.body_mass
+
+    @property
+    def legs(self) -> list[At]:
+        return [self._scene.at(leg) for leg in self._scene.mechanism.legs]
+
+    def source(self, signal: str) -> Any:
+        return self._scene.signal(self._leg, signal, lag=False)
+
+    def standing(self, name: str) -> float:
+        return self._scene.mechanism.standing[full_name(self._leg, name)]
+
+    def __getattr__(self, symbol: str) -> Any:
+        if symbol in LEG_PORTS or symbol in BODY_PORTS:
+            return PortAt(*self._scene.mechanism.motion(port_name(self._leg, symbol)))
+        return self._scene.lookup(self._leg, symbol)

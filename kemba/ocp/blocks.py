@@ -1,0 +1,147 @@
+"""Sparse NLP functions from small blocks: exact patterns, derivatives mapped over the nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+from scipy import sparse
+
+Entries = tuple[ca.MX, np.ndarray, np.ndarray]  # nonzeros, their rows, their columns
+
+
+@dataclass(frozen=True)
+class Block:
+    """Rows `g` (m,) and cost `f` of the local variables `z`, repeated over `columns`.
+
+    `columns` (repeats, len(z)): where each repeat's local variables stand in the full vector.
+    """
+
+    z: ca.SX
+    g: ca.SX
+    f: ca.SX
+    columns: np.ndarray
+
+    @cached_property
+    def multipliers(self) -> tuple[ca.SX, ca.SX]:
+        """Symbols of the Lagrangian: of f and of g."""
+        return ca.SX.sym("lam_f"), ca.SX.sym("lam_g", self.g.numel())
+
+    @cached_property
+    def jacobian(self) -> ca.SX:
+        return ca.jacobian(self.g, self.z)
+
+    @cached_property
+    def hessian(self) -> ca.SX:
+        """Upper triangle of the Lagrangian's Hessian."""
+        lam_f, lam_g = self.multipliers
+        return ca.triu(ca.hessian(lam_f * self.f + ca.dot(lam_g, ca.densify(self.g)), self.z)[0])
+
+
+class BlockProblem:
+    """min sum f, g stacked block by block, with Jacobian and Hessian given exactly.
+
+    Functions of (x, p): `f`, `grad_f`, `g`, `jac_g`, `hess_lag`, ready for `ca.nlpsol`.
+    """
+
+    def __init__(self, blocks: Sequence[Block], size: int, p: ca.SX) -> None:
+        self.blocks, self.size, self.p = list(blocks), size, p
+        self.rows = sum(len(b.columns) * b.g.numel() for b in blocks)
+        x, parameter = ca.MX.sym("x", size), ca.MX.sym("p", p.numel())
+        lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", self.rows)
+        self.x, self.parameter = x, parameter
+        f, gradients, g = ca.MX(0), [], []
+        jac: list[Entries] = []
+        hess: list[Entries] = []
+        row = 0
+        for block in blocks:
+            m, n = block.g.numel(), len(block.columns)
+            local = _gather(x, block.columns)
+            many = ca.repmat(parameter, 1, n)
+            value, slope = _mapped(block, p, n, "first")(local, many)
+            f += ca.sum2(value)
+            gradients.append((ca.vec(slope), block.columns.ravel()))
+            g_block, j_block = _mapped(block, p, n, "rows")(local, many)
+            g.append(ca.vec(g_block))
+            multipliers = ca.reshape(lam_g[row : row + m * n], m, n)
+            h_block = _mapped(block, p, n, "second")(
+                local, many, ca.repmat(lam_f, 1, n), multipliers
+            )
+            jac.append(_place_jacobian(block, j_block, row))
+            hess.append(_place_hessian(block, h_block))
+            row += m * n
+        stacked = ca.vertcat(*g)
+        jacobian = _scatter(jac, self.rows, size)
+        hessian = _scatter(hess, size, size)
+        spread = ca.vertcat(*(nz for nz, _ in gradients))
+        where = np.concatenate([at for _, at in gradients])
+        S = sparse.csc_matrix((np.ones(len(where)), (where, np.arange(len(where)))), (size, len(where)))
+        gradient = ca.densify(ca.mtimes(_dm(S), spread))
+        self.nlp = {"x": x, "p": parameter, "f": f, "g": stacked}
+        names = ["x", "p"]
+        self.grad_f = ca.Function("grad_f", [x, parameter], [f, gradient], names, ["f", "grad_f_x"])
+        self.jac_g = ca.Function("jac_g", [x, parameter], [stacked, jacobian], names, ["g", "jac_g_x"])
+        self.hess_lag = ca.Function(
+            "hess_lag",
+            [x, parameter, lam_f, lam_g],
+            [hessian],
+            [*names, "lam_f", "lam_g"],
+            ["triu_hess_gamma_x_x"],
+        )
+        self.g = ca.Function("g", [x, parameter], [stacked], names, ["g"])
+
+
+def _gather(x: ca.MX, columns: np.ndarray) -> ca.MX:
+    index = columns.ravel().tolist()
+    return ca.reshape(x[index], columns.shape[1], columns.shape[0])
+
+
+def _mapped(block: Block, p: ca.SX, n: int, order: str) -> ca.Function:
+    z, f, g = block.z, block.f, block.g
+    if order == "first":
+        function = ca.Function("first", [z, p], [f, ca.densify(ca.gradient(f, z))])
+    elif order == "rows":
+        function = ca.Function("rows", [z, p], [ca.densify(g), _column(block.jacobian)])
+    else:
+        function = ca.Function("second", [z, p, *block.multipliers], [_column(block.hessian)])
+    return function.map(n)
+
+
+def _column(matrix: ca.SX) -> ca.SX:
+    """Nonzeros as a dense column, so that mapped outputs line up."""
+    return ca.vertcat(*matrix.nonzeros()) if matrix.nnz() else ca.SX(0, 1)
+
+
+def _place_jacobian(block: Block, nonzeros: ca.MX, row: int) -> Entries:
+    rows, columns = (np.array(t, dtype=int) for t in block.jacobian.sparsity().get_triplet())
+    repeats = np.arange(len(block.columns))[:, None]
+    at_rows = (row + repeats * block.g.numel() + rows).ravel()
+    return ca.vec(nonzeros), at_rows, block.columns[:, columns].ravel()
+
+
+def _place_hessian(block: Block, nonzeros: ca.MX) -> Entries:
+    rows, columns = (np.array(t, dtype=int) for t in block.hessian.sparsity().get_triplet())
+    first, second = block.columns[:, rows].ravel(), block.columns[:, columns].ravel()
+    return ca.vec(nonzeros), np.minimum(first, second), np.maximum(first, second)
+
+
+def _scatter(parts: list[Entries], rows: int, columns: int) -> ca.MX:
+    """A sparse matrix from nonzeros and their places; entries at one place add up."""
+    nonzeros = ca.vertcat(*(nz for nz, _, _ in parts))
+    key = np.concatenate([c.astype(np.int64) * rows + r for _, r, c in parts])
+    places, target = np.unique(key, return_inverse=True)
+    S = sparse.csc_matrix((np.ones(len(key)), (target, np.arange(len(key)))), (len(places), len(key)))
+    pattern = ca.Sparsity.triplet(
+        rows, columns, (places % rows).tolist(), (places // rows).tolist()
+    )
+    return ca.MX(pattern, ca.densify(ca.mtimes(_dm(S), nonzeros)))
+
+
+def _dm(matrix: sparse.csc_matrix) -> ca.DM:
+    pattern = ca.Sparsity(
+        *matrix.shape, matrix.indptr.tolist(), matrix.indices.tolist()
+    )
+    return ca.DM(pattern, matrix.data)

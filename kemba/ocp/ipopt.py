@@ -1,0 +1,175 @@
+"""IPOPT on a transcription: options checked, its text in a log file, warm starts, a time limit."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from kemba.ocp.transcribe import Transcription
+
+SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
+
+
+@dataclass(frozen=True)
+class Point:
+    """A primal-dual iterate: Y (nodes + 1, n), multipliers of bounds and rows, and how it ended."""
+
+    Y: np.ndarray
+    lam_x: np.ndarray | None = None
+    lam_g: np.ndarray | None = None
+    objective: float = np.nan
+    message: str = ""
+    iterations: int = 0
+
+    @property
+    def solved(self) -> bool:
+        """Whether IPOPT says it converged."""
+        return self.message in SOLVED
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """What a step of a schedule sets: pair relaxation and the weights of valve penalty,
+    switching and pair penalty."""
+
+    eps: float
+    valve: float = 0.0
+    switching: float = 0.0
+    pairs: float = 0.0
+
+    @property
+    def vector(self) -> list[float]:
+        return [self.eps, self.valve, self.switching, self.pairs]
+
+
+Watch = Callable[[int, float, float], None]  # iteration, objective, worst scaled violation
+
+
+class _Watcher(ca.Callback):
+    """Tells `watch` about every iteration."""
+
+    def __init__(self, transcription: Transcription, watch: Watch) -> None:
+        super().__init__()
+        self.t, self.watch, self.count = transcription, watch, 0
+        self.construct("watcher", {})
+
+    def get_n_in(self) -> int:
+        return int(ca.nlpsol_n_out())
+
+    def get_n_out(self) -> int:
+        return 1
+
+    def get_name_in(self, i: int) -> str:
+        return str(ca.nlpsol_out(i))
+
+    def get_sparsity_in(self, i: int) -> ca.Sparsity:
+        rows = {"x": self.t.problem.size, "lam_x": self.t.problem.size, "f": 1}
+        rows |= {"g": self.t.problem.rows, "lam_g": self.t.problem.rows}
+        return ca.Sparsity.dense(rows.get(ca.nlpsol_out(i), 4))
+
+    def eval(self, arguments: list[ca.DM]) -> list[int]:
+        g = np.asarray(arguments[2]).ravel()
+        over = np.maximum(self.t.g_lower - g, g - self.t.g_upper)
+        self.watch(self.count, float(arguments[1]), float(over.max(initial=0.0)))
+        self.count += 1
+        return [0]
+
+
+COMMON: dict[str, Any] = {
+    "print_level": 0,
+    "sb": "yes",
+    "nlp_scaling_method": "none",
+    "mu_strategy": "monotone",
+}
+
+WARM: dict[str, Any] = {
+    "warm_start_init_point": "yes",
+    "warm_start_bound_push": 1e-6,
+    "warm_start_bound_frac": 1e-6,
+    "warm_start_slack_bound_push": 1e-6,
+    "warm_start_slack_bound_frac": 1e-6,
+    "warm_start_mult_bound_push": 1e-6,
+}
+
+
+class Ipopt:
+    """Solves a transcription, again and again with other parameters, bounds and options.
+
+    `options` go to IPOPT every time; `log` collects its text; `deadline` is in time.monotonic().
+    """
+
+    def __init__(
+        self,
+        transcription: Transcription,
+        options: Mapping[str, Any] | None = None,
+        log: Path | None = None,
+        deadline: float = np.inf,
+        watch: Watch | None = None,
+    ) -> None:
+        self.transcription, self.options = transcription, dict(options or {})
+        self.log, self.deadline, self.watch = log, deadline, watch
+        self.iterations = 0
+
+    def solve(
+        self,
+        start: Point,
+        parameters: Parameters,
+        options: Mapping[str, Any] | None = None,
+        fixed: Mapping[int, np.ndarray] | None = None,
+    ) -> Point:
+        """One solve from `start`; `fixed` maps columns of Y to values (nodes + 1,) they keep."""
+        t = self.transcription
+        remaining = self.deadline - time.monotonic()
+        if remaining <= 0:
+            return replace(start, message="Maximum_CpuTime_Exceeded", iterations=0)
+        lower, upper = t.lower.copy(), t.upper.copy()
+        for column, values in (fixed or {}).items():
+            lower[1:, column] = upper[1:, column] = values[1:]
+        own = {**COMMON, **self.options, **(options or {})}
+        if np.isfinite(remaining):
+            own["max_wall_time"] = remaining
+        if self.log is not None:
+            own |= {"output_file": str(self.log), "file_print_level": 5, "file_append": "yes"}
+        plugin = self._plugin(own)
+        if self.watch is not None:
+            plugin["iteration_callback"] = _Watcher(t, self.watch)
+        solver = ca.nlpsol("solver", "ipopt", t.problem.nlp, plugin)
+        arguments: dict[str, Any] = {
+            "x0": np.clip(start.Y, lower, upper).ravel(),
+            "p": parameters.vector,
+            "lbx": lower.ravel(),
+            "ubx": upper.ravel(),
+            "lbg": t.g_lower,
+            "ubg": t.g_upper,
+        }
+        if start.lam_g is not None and own.get("warm_start_init_point") == "yes":
+            arguments |= {"lam_x0": start.lam_x, "lam_g0": start.lam_g}
+        found = solver(**arguments)
+        stats = solver.stats()
+        self.iterations += int(stats["iter_count"])
+        return Point(
+            Y=np.array(found["x"]).reshape(t.shape),
+            lam_x=np.array(found["lam_x"]).ravel(),
+            lam_g=np.array(found["lam_g"]).ravel(),
+            objective=float(found["f"]),
+            message=str(stats["return_status"]),
+            iterations=int(stats["iter_count"]),
+        )
+
+    def _plugin(self, options: Mapping[str, Any]) -> dict[str, Any]:
+        problem = self.transcription.problem
+        return {
+            "print_time": False,
+            "error_on_fail": False,
+            "grad_f": problem.grad_f,
+            "jac_g": problem.jac_g,
+            "hess_lag": problem.hess_lag,
+            "calc_lam_p": False,
+            **{f"ipopt.{name}": value for name, value in options.items()},
+        }

@@ -1,0 +1,218 @@
+"""From a task to a certified plan: strategies in turn, the first that solves wins."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from kemba.config import Document
+from kemba.effects.load import Payload
+from kemba.model import Model, load_model
+from kemba.ocp.certify import Certificate, certify, costs
+from kemba.ocp.guess import automatic_guess
+from kemba.ocp.ipopt import Ipopt, Parameters, Point, Watch
+from kemba.ocp.mirror import Reduction, find_symmetry, whole, wishes_are_symmetric
+from kemba.ocp.options import check_options
+from kemba.ocp.result import to_trajectory
+from kemba.ocp.schedule import Attempt, Search, Stopped, confirm, find, refine
+from kemba.ocp.task import Task
+from kemba.ocp.transcribe import Transcription
+from kemba.ocp.verdict import verdict
+from kemba.ocp.wishes import Wish, resolve
+from kemba.trajectory import Trajectory
+
+COARSEST = 24  # nodes below which a coarser grid no longer helps
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What solving gave: the trajectory, how good it really is, and what it took."""
+
+    task: Task
+    model: Model
+    wishes: tuple[Wish, ...]
+    trajectory: Trajectory
+    certificate: Certificate
+    status: str
+    sentence: str
+    cost: dict[str, float]
+    attempts: tuple[Attempt, ...]
+    solve_s: float
+    build_s: float
+    variables: int
+    constraints: int
+
+    @property
+    def iterations(self) -> int:
+        """IPOPT iterations over all solves."""
+        return sum(a.iterations for a in self.attempts)
+
+
+@dataclass
+class Planner:
+    """Builds programs of one task on demand and solves them by a list of strategies."""
+
+    task: Task
+    model: Model
+    wishes: list[Wish]
+    log: Path | None = None
+    tell: Callable[[str], None] = lambda text: None
+    watch: Watch | None = None
+    attempts: list[Attempt] = field(default_factory=list)
+    build_s: float = 0.0
+    deadline: float = np.inf
+
+    def search(self, nodes: int, reduction: Reduction) -> Search:
+        """A fresh program on a grid of `nodes`."""
+        started = time.perf_counter()
+        transcription = Transcription(self.model, self.task, self.wishes, reduction, nodes)
+        options = {"max_iter": self.task.solver.max_iterations, **self.task.solver.options}
+        ipopt = Ipopt(transcription, options, self.log, self.deadline, self.watch)
+        self.build_s += time.perf_counter() - started
+        name = "half" if reduction.symmetric else "whole"
+
+        def tell(text: str) -> None:
+            self.tell(f"{text} ({name} robot, {nodes} nodes)")
+
+        return Search(ipopt, self.task.solver.complementarity, tell, self.attempts)
+
+    def guess(self, transcription: Transcription) -> Point:
+        """The automatic start guess on a program's grid."""
+        t = transcription
+        return Point(automatic_guess(self.model, self.task, self.wishes, t.layout, t.nodes))
+
+    def reductions(self) -> Iterator[Reduction]:
+        """Half robot first where model and task are mirror images of themselves."""
+        if self.task.solver.symmetry:
+            half = find_symmetry(self.model)
+            if half is not None and wishes_are_symmetric(self.model, self.wishes):
+                yield half
+        yield whole(self.model.node)
+
+    def strategies(self) -> Iterator[Callable[[], tuple[Transcription, Point]]]:
+        """Ways to a plan, the quickest first."""
+        nodes = self.task.nodes
+        for reduction in self.reductions():
+            if self.task.solver.coarse and nodes // 2 >= COARSEST:
+                yield lambda r=reduction: self._coarse_to_fine(r)  # type: ignore[misc]
+            yield lambda r=reduction: self._direct(r)  # type: ignore[misc]
+
+    def _coarse_to_fine(self, reduction: Reduction) -> tuple[Transcription, Point]:
+        coarse = self.search(self.task.nodes // 2, reduction)
+        point = find(coarse, self.guess(coarse.transcription))
+        if not point.solved:
+            return coarse.transcription, point
+        fine = self.search(self.task.nodes, reduction)
+        return self._whole(fine, refine(fine, coarse.transcription, point))
+
+    def _direct(self, reduction: Reduction) -> tuple[Transcription, Point]:
+        search = self.search(self.task.nodes, reduction)
+        return self._whole(search, find(search, self.guess(search.transcription)))
+
+    def _whole(self, search: Search, point: Point) -> tuple[Transcription, Point]:
+        if not point.solved or not search.transcription.reduction.symmetric:
+            return search.transcription, point
+        full = self.search(self.task.nodes, whole(self.model.node))
+        return full.transcription, confirm(full, search.transcription, point)
+
+    def penalty(self) -> tuple[Transcription, Point]:
+        """The paper's way (eq. 9): one solve with every complementarity in the cost."""
+        search = self.search(self.task.nodes, whole(self.model.node))
+        weight = 1e4 * self.task.step / 100.0  # rho, in the units of the stage's cost
+        parameters = Parameters(eps=1e6, valve=weight * self.task.nodes, pairs=weight)
+        start = self.guess(search.transcription)
+        return search.transcription, search.solve("penalty", start, parameters)
+
+    def run(self) -> tuple[Transcription, Point]:
+        """The first strategy that solves, else where the first one ended; a stop keeps its
+        iterate."""
+        try:
+            if self.task.method == "penalty":
+                return self.penalty()
+            first = None
+            for strategy in self.strategies():
+                found = strategy()
+                if found[1].solved:
+                    return found
+                first = first or found
+            assert first is not None
+            return first
+        except Stopped as stop:
+            return stop.transcription, stop.point
+
+
+def task_model(task: Task, name: str | Path | None = None) -> Model:
+    """The model of a task: its own unless `name` is given, with the task's supply and payload."""
+    extra = [Payload(m=task.payload)] if task.payload else []
+    return load_model(name or task.model, extra, task.supply)
+
+
+def plan(
+    task: Task,
+    document: Document | None = None,
+    model: str | Path | None = None,
+    log: Path | None = None,
+    tell: Callable[[str], None] = lambda text: None,
+    watch: Watch | None = None,
+) -> Plan:
+    """Solve a task. Never raises for a task that cannot be met: the status says so.
+
+    Raises ConfigErrors for wrong names, units and solver options. `log` collects IPOPT's text,
+    `tell` hears what is being done, `watch` every iteration.
+    """
+    document = document or Document(task.model_dump())
+    started = time.perf_counter()
+    check_options(task.solver.options, document)
+    built = task_model(task, model)
+    planner = Planner(task, built, resolve(task, built, document), log, tell, watch)
+    planner.build_s = time.perf_counter() - started
+    planner.deadline = time.monotonic() + task.solver.time_limit
+    started = time.perf_counter()
+    build_before = planner.build_s
+    transcription, point = planner.run()
+    elapsed = time.perf_counter() - started - (planner.build_s - build_before)
+    trajectory = to_trajectory(transcription, point.Y)
+    return judge(planner, transcription, trajectory, point, elapsed)
+
+
+def program_size(
+    task: Task, document: Document, model: str | Path | None = None
+) -> dict[str, int]:
+    """Variables and rows of the whole program of a task, everything checked, nothing solved."""
+    check_options(task.solver.options, document)
+    built = task_model(task, model)
+    wishes = resolve(task, built, document)
+    transcription = Transcription(built, task, wishes, whole(built.node), task.nodes)
+    return {"variables": transcription.variables, "constraints": transcription.constraints}
+
+
+def judge(
+    planner: Planner,
+    transcription: Transcription,
+    trajectory: Trajectory,
+    point: Point,
+    solve_s: float,
+) -> Plan:
+    """Certificate, status and sentence of what was found."""
+    certificate = certify(planner.model, planner.task, planner.wishes, trajectory)
+    status, sentence = verdict(planner.task, certificate, trajectory, point.message)
+    return Plan(
+        task=planner.task,
+        model=planner.model,
+        wishes=tuple(planner.wishes),
+        trajectory=trajectory,
+        certificate=certificate,
+        status=status,
+        sentence=sentence,
+        cost=costs(planner.model, trajectory),
+        attempts=tuple(planner.attempts),
+        solve_s=solve_s,
+        build_s=planner.build_s,
+        variables=transcription.variables,
+        constraints=transcription.constraints,
+    )
+

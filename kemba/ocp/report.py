@@ -1,0 +1,43 @@
+"""A plan as the machine-readable answer of `kemba-opt solve`."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+from kemba.ocp.plan import Plan
+
+
+def answer(plan: Plan, run: str) -> dict[str, Any]:
+    """The JSON of `solve`, also written as certificate.json."""
+    trajectory, certificate = plan.trajectory, plan.certificate
+    tolerances = plan.task.tolerances
+    limit = max(tolerances.complementarity, tolerances.dynamics, tolerances.bounds)
+    return {
+        "status": plan.status,
+        "sentence": plan.sentence,
+        "run": run,
+        "task": plan.task.name,
+        "apex_m": float(max(trajectory["body/z"])),
+        "duration_s": float(trajectory.time[-1]),
+        "cost": plan.cost,
+        "solve_s": plan.solve_s,
+        "build_s": plan.build_s,
+        "iterations": plan.iterations,
+        "variables": plan.variables,
+        "constraints": plan.constraints,
+        "residuals": {
+            "complementarity": certificate.complementarity,
+            "binary": certificate.binary,
+            "dynamics": certificate.dynamics,
+            "bounds": certificate.bounds,
+        },
+        "replay": None,
+        "plant_replay": None,
+        "worst": [
+            {key: value for key, value in asdict(v).items() if key != "size"}
+            for v in certificate.worst
+            if v.size > limit
+        ],
+        "attempts": [asdict(a) for a in plan.attempts],
+    }

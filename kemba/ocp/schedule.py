@@ -1,0 +1,131 @@
+"""The solving strategy: relaxed pairs from a loose interior start, valves rounded and fixed,
+pairs tightened; coarse before fine, half before whole, with fallbacks. See docs/solving.md."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from kemba.ocp.ipopt import WARM, Ipopt, Parameters, Point
+from kemba.ocp.transcribe import Transcription
+
+LOOSE, TIGHT = 1e-3, 1e-4  # relaxation of the pairs: body weights times metres
+MARGIN = 0.8  # the last relaxation stays this much below what the certificate asks
+VALVE, SWITCHING = 0.1, 0.05
+STOPS = ("User_Requested_Stop", "Maximum_CpuTime_Exceeded", "Maximum_WallTime_Exceeded")
+EXACT: dict[str, Any] = {"tol": 1e-7, "constr_viol_tol": 1e-8, "acceptable_iter": 0}
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """One solve of a schedule, for reports: what, how it ended, iterations."""
+
+    name: str
+    message: str
+    iterations: int
+
+
+class Stopped(Exception):
+    """The user or a limit ended a solve; the best iterate travels along."""
+
+    def __init__(self, transcription: Transcription, point: Point) -> None:
+        super().__init__(point.message)
+        self.transcription, self.point = transcription, point
+
+
+@dataclass
+class Search:
+    """A transcription being solved: its solver, what was tried, and who is told."""
+
+    ipopt: Ipopt
+    final_eps: float
+    tell: Callable[[str], None] = lambda text: None
+    attempts: list[Attempt] = field(default_factory=list)
+
+    @property
+    def transcription(self) -> Transcription:
+        return self.ipopt.transcription
+
+    def solve(self, name: str, start: Point, parameters: Parameters, **how: Any) -> Point:
+        """One labelled solve. Raises Stopped when it was cut short."""
+        self.tell(name)
+        point = self.ipopt.solve(start, parameters, **how)
+        self.attempts.append(Attempt(name, point.message, point.iterations))
+        if point.message in STOPS:
+            raise Stopped(self.transcription, point)
+        return point
+
+    def valves(self, point: Point) -> dict[int, np.ndarray]:
+        """Columns of the valves with their rounded values."""
+        columns = self.transcription.layout.binary
+        return {c: np.round(np.clip(point.Y[:, c], 0.0, 1.0)) for c in columns}
+
+
+def warm(mu: float, **more: Any) -> dict[str, Any]:
+    """IPOPT options of a warm start at barrier parameter `mu`."""
+    return {**WARM, "mu_init": mu, **more}
+
+
+def find(search: Search, start: Point, loose: bool = True) -> Point:
+    """From a guess to a plan with binary valves and tight pairs, on one grid."""
+    point = start
+    if loose:
+        interior = {"bound_push": 0.3, "bound_frac": 0.3, "mu_init": 0.1, "tol": 1e-3}
+        point = search.solve("relax", start, Parameters(LOOSE), options=interior)
+    binary = Parameters(LOOSE, VALVE, SWITCHING)
+    point = search.solve("binary valves", point, binary, options=warm(1e-3, tol=1e-3))
+    return settle(search, point)
+
+
+def settle(search: Search, point: Point) -> Point:
+    """Fix the rounded valves and tighten the pairs."""
+    fixed = search.valves(point)
+    for name, eps, mu, tol in (
+        ("fix valves", TIGHT, 1e-3, 1e-4),
+        ("tighten", MARGIN * search.final_eps, 1e-5, None),
+    ):
+        options = warm(mu, **(EXACT if tol is None else {"tol": tol}))
+        point = search.solve(name, point, Parameters(eps), options=options, fixed=fixed)
+    return point
+
+
+def refine(search: Search, coarse: Transcription, point: Point) -> Point:
+    """A coarse plan on the finer grid of `search`, with its valves kept."""
+    return settle(search, Point(prolong(coarse, search.transcription, point.Y)))
+
+
+def prolong(coarse: Transcription, fine: Transcription, Y: np.ndarray) -> np.ndarray:
+    """Y of a coarse grid on a finer one: states in between, inputs and forces held."""
+    layout = coarse.layout
+    nodes = np.linspace(0.0, coarse.nodes, fine.nodes + 1)
+    result = np.empty(fine.shape)
+    held = np.minimum(np.ceil(nodes - 1e-9).astype(int), coarse.nodes)
+    for group, part in layout.slices.items():
+        if group in ("q", "v", "s"):
+            for column in range(part.start, part.stop):
+                result[:, column] = np.interp(nodes, np.arange(coarse.nodes + 1), Y[:, column])
+        else:
+            result[:, part] = Y[held, part]
+    return result
+
+
+def widen(half: Transcription, whole: Transcription, Y: np.ndarray) -> np.ndarray:
+    """Y of the half robot as Y of the whole one."""
+    groups = {g: half.layout.full(Y, g) for g in ("q", "v", "s", "u", "lam")}
+    groups["h"] = half.layout.half(Y, "h")
+    return whole.layout.pack(groups)
+
+
+def confirm(search: Search, half: Transcription, point: Point) -> Point:
+    """A plan of the half robot, solved again on the whole one from there."""
+    start = replace(point, Y=widen(half, search.transcription, point.Y), lam_x=None, lam_g=None)
+    return search.solve(
+        "confirm on the whole robot",
+        start,
+        Parameters(MARGIN * search.final_eps),
+        options=warm(1e-7, **EXACT),
+        fixed=search.valves(start),
+    )

@@ -1,0 +1,110 @@
+"""Tasks: what a motion should do, by quantity name, as their YAML writes it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from kemba.config import Document, apply_overrides, find_config, load_yaml, parse
+from kemba.quantity import Param
+
+Value = float | str
+
+
+class Section(BaseModel):
+    """A frozen part of a task; unknown keys are refused."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Bound(Section):
+    """A value or a range of one quantity. A bare value means `equals`.
+
+    Values carry units (`0.5 m`), are bare SI, or name a top-level key of the task (`height`).
+    """
+
+    equals: Value | None = None
+    at_least: Value | None = None
+    at_most: Value | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _bare(cls, data: Any) -> Any:
+        return data if isinstance(data, dict) else {"equals": data}
+
+
+class Goal(Section):
+    """What one quantity should be at a moment: start, middle, end or a fraction of the nodes."""
+
+    quantity: str
+    at: Literal["start", "middle", "end"] | Annotated[float, Field(ge=0, le=1)] = "end"
+    equals: Value | None = None
+    at_least: Value | None = None
+    at_most: Value | None = None
+
+
+class Solver(Section):
+    """How hard to try. `options` go to IPOPT."""
+
+    time_limit: Annotated[float, Param("s", lower=0.1, doc="wall time")] = 300.0
+    max_iterations: Annotated[int, Field(ge=1)] = 3000
+    symmetry: bool = True
+    coarse: bool = True
+    complementarity: Annotated[float, Param("1", lower=1e-9, upper=1e-3)] = 1e-6
+    options: dict[str, float | int | str] = Field(default_factory=dict)
+
+
+class Tolerances(Section):
+    """What the certificate accepts."""
+
+    complementarity: Annotated[float, Param("1", lower=0.0)] = 1e-6
+    dynamics: Annotated[float, Param("1", lower=0.0)] = 1e-6
+    bounds: Annotated[float, Param("1", lower=0.0)] = 1e-6
+    apex: Annotated[float, Param("m", lower=0.0, doc="replayed apex against plan")] = 0.03
+    touchdown: Annotated[float, Param("s", lower=0.0, doc="replayed touchdown")] = 0.02
+
+
+class Task(Section):
+    """A motion to plan: grid, wishes at start and end, bounds on the way, goals, costs.
+
+    `step_variation`: each step lasts duration/nodes within this fraction. `start` and `end` map
+    quantities to values; `rest: true` there means all rates zero (and vented chambers at start).
+    """
+
+    name: str = "task"
+    notes: str = ""
+    model: str = "planning"
+    height: Annotated[float, Param("m", lower=0.0, doc="of the body's centre")] | None = None
+    distance: Annotated[float, Param("m", doc="forward")] | None = None
+    supply: Annotated[float, Param("Pa", lower=0.6e6, upper=0.8e6, doc="supply")] | None = None
+    payload: Annotated[float, Param("kg", lower=0.0, doc="at the body's centre")] = 0.0
+    duration: Annotated[float, Param("s", lower=0.01, upper=20.0, doc="nominal")] = 0.5
+    nodes: Annotated[int, Field(ge=4, le=2000)] = 100
+    step_variation: Annotated[float, Param("1", lower=0.0, upper=0.9)] = 0.2
+    start: dict[str, Bound] = Field(default_factory=dict)
+    end: dict[str, Bound] = Field(default_factory=dict)
+    bounds: dict[str, Bound] = Field(default_factory=dict)
+    goals: dict[str, Goal] = Field(default_factory=dict)
+    cost: dict[str, float] = Field(default_factory=lambda: {"torque_squared": 1.0})
+    guess: Literal["automatic", "standing"] = "automatic"
+    guess_noise: Annotated[float, Param("1", lower=0.0, upper=1.0)] = 0.0
+    seed: int = 0
+    method: Literal["relaxation", "penalty"] = "relaxation"
+    solver: Solver = Field(default_factory=Solver)
+    tolerances: Tolerances = Field(default_factory=Tolerances)
+
+    @property
+    def step(self) -> float:
+        """Nominal step [s]."""
+        return self.duration / self.nodes
+
+
+def load_task(name: str | Path, overrides: list[str] | None = None) -> tuple[Task, Document]:
+    """The task YAML `name` (a path or a shipped task) and its document, for error positions.
+
+    Raises KembaError with every mistake at its line.
+    """
+    document = apply_overrides(load_yaml(find_config(name, "tasks")), overrides or [])
+    return parse(document, Task), document

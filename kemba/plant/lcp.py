@@ -1,0 +1,106 @@
+"""Small linear complementarity problems: 0 <= z _|_ w = A z + b >= 0.
+
+Contact modes rarely change from one step to the next, so the last one is tried first; Lemke's
+method (lexicographic, hence finite for contact with friction: Stewart and Trinkle, 1996) answers
+where that fails.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kemba.trajectory import Array
+
+TOLERANCE = 1e-9
+SWAPS = 6  # changes of the active set before Lemke's method takes over
+
+
+class NoSolution(ArithmeticError):
+    """The complementarity problem has no solution that pivoting can reach."""
+
+
+def solve_lcp(A: Array, b: Array, guess: Array) -> tuple[Array, Array]:
+    """Solution z (n,) and its active set, starting from the active set `guess` (n,) of booleans.
+
+    Rows and columns are scaled to speeds, so that forces and slip speeds compare. Raises
+    NoSolution.
+    """
+    row, column = _scales(A)
+    A, b = row[:, None] * A * column, row * b
+    for start in (guess, np.zeros(len(b), dtype=bool)):
+        found = _active_set(A, b, start)
+        if found is not None:
+            return column * found[0], found[1]
+    z = lemke(A, b)
+    return column * z, z > 0.0
+
+
+def _scales(A: Array) -> tuple[Array, Array]:
+    """Scales of rows and columns: a force has a diagonal, a slip speed and its cone have none."""
+    diagonal = A.diagonal()
+    force = diagonal > 0.0
+    mean = float(diagonal[force].mean()) if force.any() else 1.0
+    return np.where(force, 1.0, mean), np.where(force, 1.0 / mean, 1.0)
+
+
+def _active_set(A: Array, b: Array, on: Array) -> tuple[Array, Array] | None:
+    for _ in range(SWAPS):
+        z = np.zeros(len(b))
+        if on.any():
+            try:
+                z[on] = np.linalg.solve(A[on][:, on], -b[on])
+            except np.linalg.LinAlgError:
+                return None
+        w = A @ z + b
+        small = TOLERANCE * (1.0 + np.abs(z).max())
+        wrong = np.where(on, z < -small, w < -small)
+        if not wrong.any():
+            return np.maximum(z, 0.0), on
+        on = on ^ wrong
+    return None
+
+
+def lemke(A: Array, b: Array) -> Array:
+    """Lemke's complementary pivoting. Raises NoSolution when it ends on a ray."""
+    n = len(b)
+    if (b >= 0.0).all():
+        return np.zeros(n)
+    # columns: w (n), z (n), the artificial variable, right-hand side
+    table = np.hstack([np.eye(n), -A, -np.ones((n, 1)), b[:, None]])
+    basis = np.arange(n)
+    row, entering = int(np.argmin(b)), 2 * n
+    for _ in range(50 * n):
+        leaving = int(basis[row])
+        _pivot(table, row, entering)
+        basis[row] = entering
+        if leaving == 2 * n:
+            z = np.zeros(2 * n + 1)
+            z[basis] = table[:, -1]
+            return np.maximum(z[n : 2 * n], 0.0)
+        entering = leaving + n if leaving < n else leaving - n
+        row = _leaving_row(table, entering, basis)
+    raise NoSolution("the contact forces do not settle")
+
+
+def _pivot(table: Array, row: int, column: int) -> None:
+    table[row] /= table[row, column]
+    others = np.arange(len(table)) != row
+    table[others] -= np.outer(table[others, column], table[row])
+
+
+def _leaving_row(table: Array, entering: int, basis: Array) -> int:
+    """Row of the smallest ratio; ties go to the artificial variable, else lexicographically."""
+    n = len(table)
+    column = table[:, entering]
+    rows = np.flatnonzero(column > 1e-11 * max(1.0, np.abs(column).max()))
+    if not len(rows):
+        raise NoSolution("the contact forces have no solution")
+    for key in (-1, *range(n)):
+        ratio = table[rows, key] / column[rows]
+        rows = rows[ratio <= ratio.min() + 1e-12 * (1.0 + abs(ratio.min()))]
+        artificial = rows[basis[rows] == 2 * n]
+        if key == -1 and len(artificial):
+            return int(artificial[0])
+        if len(rows) == 1:
+            break
+    return int(rows[0])

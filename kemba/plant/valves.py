@@ -1,0 +1,43 @@
+"""From valve commands as sent to what the valves do: dead time, late closing, merged pulses."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kemba.model import Model
+from kemba.plant.commands import Profile
+
+
+def acting(sent: Profile, on: float, off: float) -> Profile:
+    """The profile of a 0/1 valve that opens `on` and closes `off` [s] after the command.
+
+    Pulses that overlap after the shift merge; those that vanish are dropped. A valve that is on
+    before the first command stays on until its first closing.
+    """
+    merged: list[list[float]] = []
+    for start, end in _pulses(sent):
+        start, end = start + on, end + off
+        if end <= start:
+            continue
+        if merged and start <= merged[-1][1]:
+            merged[-1][1] = max(merged[-1][1], end)
+        else:
+            merged.append([start, end])
+    return Profile.pulses(*((a, b) for a, b in merged))
+
+
+def delayed(model: Model, profiles: dict[str, Profile]) -> dict[str, Profile]:
+    """The profiles with every valve's switching times of the model applied."""
+    late = dict(profiles)
+    for (leg, _), quantity in model.inputs.items():
+        if quantity.binary and quantity.name in profiles:
+            late[quantity.name] = acting(profiles[quantity.name], *model.timing(leg))
+    return late
+
+
+def _pulses(sent: Profile) -> list[tuple[float, float]]:
+    on = sent.values > 0.5
+    edges = np.flatnonzero(np.diff(on.astype(int))) + 1
+    starts = [-np.inf] * bool(on[0]) + [float(sent.times[i]) for i in edges if on[i]]
+    ends = [float(sent.times[i]) for i in edges if not on[i]]
+    return list(zip(starts, ends + [np.inf] * (len(starts) - len(ends)), strict=True))

@@ -1,0 +1,37 @@
+"""Figures of plans, logs and diagnoses; the only room that knows matplotlib.
+
+Figures are made without pyplot, so they need no display; pass `figure=pyplot.figure()` to a
+function to have one that `pyplot.show` opens.
+"""
+
+from kemba.plotting.animation import animate, save_animation
+from kemba.plotting.bench import plot_bench, plot_force_velocity, valve_modes
+from kemba.plotting.diagnosis import Band, plot_bands, plot_heat_map, plot_ladder
+from kemba.plotting.draw import draw
+from kemba.plotting.machine import Machine, load_machine
+from kemba.plotting.motion import plot_motion
+from kemba.plotting.source import Source, default_path, load_source, load_sources
+from kemba.plotting.style import paper_figure, paper_style, save_figure
+
+__all__ = [
+    "Band",
+    "Machine",
+    "Source",
+    "animate",
+    "default_path",
+    "draw",
+    "load_machine",
+    "load_source",
+    "load_sources",
+    "paper_figure",
+    "paper_style",
+    "plot_bands",
+    "plot_bench",
+    "plot_force_velocity",
+    "plot_heat_map",
+    "plot_ladder",
+    "plot_motion",
+    "save_animation",
+    "save_figure",
+    "valve_modes",
+]

@@ -1,0 +1,109 @@
+"""Quantities: every number that has a name and a unit outside the code."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from kemba.errors import KembaError
+from kemba.units import convert, expectation, is_si, is_unit, to_si
+
+if TYPE_CHECKING:
+    from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+    from pydantic_core import CoreSchema
+
+__all__ = ["Param", "Quantity", "convert", "expectation", "is_si", "to_si"]
+
+HEADER = re.compile(r"(?P<name>[^\s/,\[\]]+(?:/[^\s/,\[\]]+)*) \[(?P<unit>[^\[\]]+)\]")
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A state, input, force, parameter, output or column: a name and what its number means.
+
+    `lower`, `upper`, `scale` and `value` (the nominal one) are in `unit`, which is SI.
+    """
+
+    name: str
+    unit: str = "1"
+    lower: float = -math.inf
+    upper: float = math.inf
+    scale: float = 1.0
+    value: float = 0.0
+    doc: str = ""
+    binary: bool = False
+
+    @property
+    def header(self) -> str:
+        """The column header: `front/hip/tau [N.m]`."""
+        return f"{self.name} [{self.unit}]"
+
+    @classmethod
+    def from_header(cls, text: str) -> Quantity:
+        """The quantity of a column header; KembaError when the header is malformed."""
+        match = HEADER.fullmatch(text)
+        if match is None:
+            raise KembaError(
+                "", f"column header '{text}' is malformed", "'path/symbol [unit]' was expected"
+            )
+        if not is_unit(match["unit"]):
+            raise KembaError(
+                "",
+                f"column header '{text}' has the malformed unit '{match['unit']}'",
+                "a unit such as [m.s-1], [N.m] or [1] was expected",
+            )
+        return cls(match["name"], match["unit"])
+
+
+@dataclass(frozen=True)
+class Param:
+    """What a number in a schema means: `F_c: Annotated[float, Param("N", size=10, lower=0)]`.
+
+    pydantic then accepts `12 N`, `0.012 kN` or a bare SI number, refuses other dimensions and
+    values outside `lower..upper`, and puts unit and `doc` into the JSON Schema. `size` is what
+    would matter in practice, a prior width rather than a limit. Numbers are in `unit`.
+    """
+
+    unit: str = "1"
+    size: float = 1.0
+    lower: float = -math.inf
+    upper: float = math.inf
+    doc: str = ""
+
+    def validate(self, value: Any) -> float:
+        """`value` in `unit`; ValueError when it has another dimension or is out of bounds."""
+        number = to_si(value, self.unit)
+        if not self.lower <= number <= self.upper:
+            raise ValueError(f"'{value}' is out of range; {self.bounds} was expected")
+        return number
+
+    @property
+    def bounds(self) -> str:
+        """The admissible values in words."""
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        if math.isinf(self.upper):
+            return f"at least {self.lower:g}{unit}"
+        if math.isinf(self.lower):
+            return f"at most {self.upper:g}{unit}"
+        return f"{self.lower:g} to {self.upper:g}{unit}"
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        from pydantic_core import core_schema
+
+        return core_schema.no_info_plain_validator_function(self.validate)
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        limits = {"minimum": self.lower, "maximum": self.upper}
+        number = {key: limit for key, limit in limits.items() if math.isfinite(limit)}
+        text = f"{self.doc} [{self.unit}]" if self.doc else f"[{self.unit}]"
+        return {
+            "anyOf": [{"type": "number", **number}, {"type": "string"}],
+            "unit": self.unit,
+            "description": text,
+        }

@@ -1,0 +1,160 @@
+"""Run folders: what was asked, with which versions, how it ended, and the results."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+import sys
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from datetime import datetime, timezone
+from functools import cached_property
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import kemba
+from kemba.errors import KembaError
+from kemba.files import read_json, write_json
+from kemba.trajectory import Trajectory
+
+__all__ = ["Run", "RunFolder", "load_run", "write_json"]
+
+MANIFEST = "manifest.json"
+LIBRARIES = ("casadi", "pin", "numpy")
+
+
+@dataclass
+class RunFolder:
+    """A folder being filled by a verb; its manifest says `running` until `finish`."""
+
+    path: Path
+    manifest: dict[str, Any] = field(default_factory=dict)
+
+    @classmethod
+    def create(
+        cls,
+        out: str | Path | None,
+        task: str,
+        inputs: Iterable[str | Path] = (),
+        command: Sequence[str] | None = None,
+    ) -> RunFolder:
+        """Make the folder `out`, or the next free `runs/<task>-<n>`, and note what goes in.
+
+        `inputs` are the task and model files, of which hashes are kept. A folder left by a run
+        that never finished is used again. Raises KembaError when `out` holds a finished run or
+        other files, or cannot be made.
+        """
+        path = _next_free(task) if out is None else _usable(Path(out))
+        folder = cls(path)
+        folder.manifest = {
+            "status": "running",
+            "task": task,
+            "command": list(sys.argv if command is None else command),
+            "started": _now(),
+            "finished": None,
+            "versions": versions(),
+            "inputs": {str(name): sha256(name) for name in inputs},
+        }
+        write_json(path / MANIFEST, folder.manifest)
+        return folder
+
+    def finish(self, status: str, **facts: Any) -> None:
+        """Replace the manifest by its final form; `facts` are further entries."""
+        self.manifest.update(status=status, finished=_now(), **facts)
+        write_json(self.path / MANIFEST, self.manifest)
+
+    def __truediv__(self, name: str) -> Path:
+        return self.path / name
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run folder to read; results are read when asked for. KembaError when one is missing."""
+
+    path: Path
+    manifest: dict[str, Any]
+
+    @cached_property
+    def trajectory(self) -> Trajectory:
+        """The planned trajectory."""
+        return Trajectory.read(self._file("trajectory.csv"))
+
+    @cached_property
+    def controller(self) -> Trajectory:
+        """The commands for the robot, at the controller's rate."""
+        return Trajectory.read(self._file("controller.csv"))
+
+    @cached_property
+    def certificate(self) -> dict[str, Any]:
+        """The outcome, residuals and replay of the plan."""
+        return dict(read_json(self._file("certificate.json")))
+
+    @property
+    def task(self) -> Path:
+        """The resolved task's YAML."""
+        return self._file("task.yaml")
+
+    def _file(self, name: str) -> Path:
+        if (self.path / name).is_file():
+            return self.path / name
+        status = self.manifest.get("status", "unknown")
+        raise KembaError(str(self.path), f"has no {name}", hint=f"the run's status is '{status}'")
+
+
+def load_run(path: str | Path) -> Run:
+    """The run in a folder (or the folder of the file given); KembaError when it is none."""
+    folder = Path(path)
+    if folder.is_file():
+        folder = folder.parent
+    if not folder.is_dir():
+        runs = ", ".join(str(item.parent) for item in sorted(Path("runs").glob(f"*/{MANIFEST}")))
+        hint = f"runs here: {runs}" if runs else "make one with: kemba-opt solve jump.yaml"
+        raise KembaError(str(path), "no such run folder", hint=hint)
+    if not (folder / MANIFEST).is_file():
+        expected = f"a folder with a {MANIFEST}, as solve writes it, was expected"
+        raise KembaError(str(folder), "is not a run folder", expected)
+    return Run(folder, dict(read_json(folder / MANIFEST)))
+
+
+def versions() -> dict[str, str]:
+    """The versions that decide about a result."""
+    found = {"kemba": kemba.__version__, "python": platform.python_version()}
+    return found | {name: metadata.version(name) for name in LIBRARIES}
+
+
+def sha256(path: str | Path) -> str:
+    """The hash of a file's content."""
+    return hashlib.sha256(Path(path).read_bytes()).hexdigest()
+
+
+def _now() -> str:
+    return datetime.now(timezone.utc).isoformat(timespec="seconds")
+
+
+def _next_free(task: str) -> Path:
+    """A new folder `runs/<task>-<n>`; making it claims it against other processes."""
+    number = 1
+    while True:
+        path = Path("runs") / f"{task}-{number}"
+        try:
+            path.mkdir(parents=True)
+        except FileExistsError:
+            number += 1
+        else:
+            return path
+
+
+def _usable(path: Path) -> Path:
+    """The folder asked for, made, or left over from an unfinished run."""
+    if path.is_dir() and any(path.iterdir()):
+        if not (path / MANIFEST).is_file():
+            raise KembaError(f"--out {path}", "holds other files", "a new folder was expected")
+        if read_json(path / MANIFEST).get("status") != "running":
+            hint = "give another --out, or delete it first"
+            raise KembaError(f"--out {path}", "holds a finished run already", hint=hint)
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise KembaError(f"--out {path}", error.strerror or str(error)) from None
+    return path

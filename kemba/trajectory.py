@@ -1,0 +1,169 @@
+"""Trajectories: times and named columns with units, the only thing exchanged between verbs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kemba.document import dump_yaml, load_yaml
+from kemba.errors import KembaError, suggest
+from kemba.files import atomic_text
+from kemba.quantity import Quantity
+from kemba.table import read_table
+
+TIME = "time [s]"
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+
+class Trajectory:
+    """A plan, a simulation or a measurement: `time` (n,) in s and columns (n,) in SI units.
+
+    Columns are given by header, `{"body/z [m]": z}`, and read by name, `t["body/z"]`; NaN means
+    not measured. `meta` is what the sidecar file says. Raises KembaError on a malformed or
+    repeated header and on columns that are not as long as `time`.
+    """
+
+    def __init__(
+        self, time: Any, columns: Mapping[str, Any], meta: Mapping[str, Any] | None = None
+    ) -> None:
+        self.time: Array = np.asarray(time, dtype=float)
+        self.meta = dict(meta or {})
+        self._columns: dict[str, Array] = {}
+        self._units: dict[str, str] = {}
+        if self.time.ndim != 1:
+            raise KembaError("time [s]", f"has the shape {self.time.shape}", "(n,) was expected")
+        for header, values in columns.items():
+            self._add(Quantity.from_header(header), np.asarray(values, dtype=float))
+
+    def _add(self, quantity: Quantity, values: Array) -> None:
+        if quantity.name in self._columns or quantity.name == "time":
+            raise KembaError(quantity.header, "this column stands twice")
+        if values.shape != self.time.shape:
+            expected = f"{self.time.shape} as the time was expected"
+            raise KembaError(quantity.header, f"has the shape {values.shape}", expected)
+        self._columns[quantity.name] = values
+        self._units[quantity.name] = quantity.unit
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._columns
+
+    def __getitem__(self, name: str) -> Array:
+        """The column `name` (n,), in SI; KembaError with the nearest name when there is none."""
+        self._known(name)
+        return self._columns[name]
+
+    def __repr__(self) -> str:
+        return f"Trajectory({len(self)} rows: {', '.join(self.headers)})"
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The columns' names in order, without the time."""
+        return tuple(self._columns)
+
+    @property
+    def headers(self) -> tuple[str, ...]:
+        """The columns' headers in order, without the time."""
+        return tuple(f"{name} [{unit}]" for name, unit in self._units.items())
+
+    def unit(self, name: str) -> str:
+        """The unit of column `name`; KembaError when there is none."""
+        self._known(name)
+        return self._units[name]
+
+    def select(self, names: Iterable[str]) -> Trajectory:
+        """The same times with the columns `names` only, in that order."""
+        columns = {f"{name} [{self.unit(name)}]": self[name] for name in names}
+        return Trajectory(self.time, columns, self.meta)
+
+    def with_columns(self, columns: Mapping[str, Any]) -> Trajectory:
+        """The same with columns, given by header, added or replaced."""
+        replaced = {Quantity.from_header(header).name for header in columns}
+        kept = self.select(name for name in self.names if name not in replaced)
+        own = dict(zip(kept.headers, (kept[name] for name in kept.names), strict=True))
+        return Trajectory(self.time, {**own, **columns}, self.meta)
+
+    def interpolate(self, times: Any, hold: Collection[str] = ()) -> Trajectory:
+        """The columns at `times` (m,) in s, linear in between; those in `hold` keep their value.
+
+        Before the first and after the last row the end values stand.
+        """
+        for name in hold:
+            self._known(name)
+        times = np.asarray(times, dtype=float)
+        held = np.clip(np.searchsorted(self.time, times, side="right") - 1, 0, None)
+        columns = {}
+        for header, name in zip(self.headers, self.names, strict=True):
+            values = self[name]
+            columns[header] = values[held] if name in hold else np.interp(times, self.time, values)
+        return Trajectory(times, columns, self.meta)
+
+    def write(self, path: str | Path) -> None:
+        """Write the CSV, and the sidecar when there is metadata; reading it back is exact.
+
+        Raises KembaError when the times are not strictly increasing.
+        """
+        check_times(self.time, str(path), first_row=2)
+        texts = [_texts(self.time), *(_texts(values) for values in self._columns.values())]
+        with atomic_text(path) as stream:
+            stream.write(",".join((TIME, *self.headers)) + "\n")
+            stream.writelines(",".join(row) + "\n" for row in zip(*texts, strict=True))
+        if self.meta:
+            dump_yaml(self.meta, sidecar(path))
+
+    @classmethod
+    def read(cls, path: str | Path, strict: bool = True) -> Trajectory:
+        """The trajectory in a CSV file, with its sidecar.
+
+        `strict=False` lets through no rows and times that do not increase, for readers who judge
+        the data themselves. Raises KembaError with file:row:column of the first fault.
+        """
+        headers, table = read_table(path)
+        if headers[0] != TIME:
+            hint = "map foreign columns with --map" if TIME not in headers else ""
+            raise KembaError(
+                f"{path}:1:1", f"the first column is '{headers[0]}'", f"'{TIME}' was expected", hint
+            )
+        if strict and not len(table):
+            raise KembaError(str(path), "has no rows below its header")
+        if strict:
+            check_times(table[:, 0], str(path), first_row=2)
+        meta = load_yaml(sidecar(path)).data if sidecar(path).is_file() else {}
+        if not isinstance(meta, dict | None):
+            raise KembaError(str(sidecar(path)), "has no keys", "such as 'kind: robot'")
+        columns = dict(zip(headers[1:], table[:, 1:].T, strict=True))
+        return cls(table[:, 0], columns, meta)
+
+    def _known(self, name: str) -> None:
+        if name not in self._columns:
+            raise KembaError("", f"no column '{name}'", hint=suggest(name, self._columns))
+
+
+def sidecar(path: str | Path) -> Path:
+    """The metadata file beside a CSV: `jump.csv` has `jump.meta.yaml`."""
+    return Path(path).with_suffix(".meta.yaml")
+
+
+def check_times(time: Array, where: str, first_row: int) -> None:
+    """Raise KembaError at the first of the times (n,) that is not finite or does not increase."""
+    wrong = ~np.isfinite(time)
+    wrong[1:] |= ~(np.diff(time) > 0)
+    if not wrong.any():
+        return
+    index = int(np.argmax(wrong))
+    what = "the time is missing"
+    if math.isfinite(time[index]):
+        what = f"the time {time[index]:.12g} s does not come after {time[index - 1]:.12g} s"
+    raise KembaError(f"{where}:{index + first_row}:1", what, "times must increase from row to row")
+
+
+def _texts(values: Array) -> list[str]:
+    """The shortest texts that read back as the same numbers."""
+    switch = np.isin(values, (0.0, 1.0)).all() and not np.signbit(values).any()
+    return [str(int(value)) if switch else repr(value) for value in values.tolist()]

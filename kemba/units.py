@@ -1,0 +1,168 @@
+"""Numbers with units: the unit grammar `m.s-1`, and conversion by pint.
+
+pint is imported only when a unit really has to be converted: bare numbers cost nothing.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from functools import lru_cache
+from numbers import Real
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from kemba.errors import suggest
+
+if TYPE_CHECKING:
+    import numpy as np
+    import pint
+
+    Number = TypeVar("Number", float, np.ndarray)
+
+NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
+FACTOR = re.compile(r"([./* ]*)([A-Za-zµμΩ°%]+|1)(?:\^|\*\*)?([+-]?\d+)?")
+HEADER_UNIT = re.compile(r"1|[A-Za-z%]+(?:-?\d+)?(?:\.[A-Za-z%]+(?:-?\d+)?)*")
+SI_SYMBOLS = frozenset("1 m s kg A K mol cd rad N Pa J W V C F Hz T H".split())
+ALIASES = {"Nm": (("N", 1), ("m", 1)), "°": (("deg", 1),)}  # `Nm` is a textile unit to pint
+COMMON = "m mm cm s ms min kg g N kN Pa kPa MPa bar psi rad deg K degC J W Hz rpm L".split()
+
+# What people call each unit, and an example of its size on a robot.
+NAMES = {
+    "1": ("number", "0.5"),
+    "m": ("length", "0.5 m"),
+    "m2": ("area", "4 cm2"),
+    "m3": ("volume", "20 mL"),
+    "s": ("time", "5 ms"),
+    "kg": ("mass", "0.5 kg"),
+    "rad": ("angle", "30 deg"),
+    "m.s-1": ("speed", "0.5 m.s-1"),
+    "m.s-2": ("acceleration", "9.81 m.s-2"),
+    "rad.s-1": ("angular speed", "3 rad.s-1"),
+    "s-1": ("rate", "3 s-1"),
+    "N": ("force", "12 N"),
+    "N.m": ("torque", "12 N.m"),
+    "Pa": ("pressure", "7 bar"),
+    "N.m-1": ("stiffness", "400 N.m-1"),
+    "N.s.m-1": ("damping", "15 N.s.m-1"),
+    "N.s2.m-2": ("quadratic damping", "40 N.s2.m-2"),
+    "N.m.rad-1": ("rotary stiffness", "1.5 N.m.rad-1"),
+    "N.m.s.rad-1": ("rotary damping", "0.1 N.m.s.rad-1"),
+    "kg.m2": ("moment of inertia", "0.01 kg.m2"),
+    "W": ("power", "50 W"),
+    "K": ("temperature", "293 K"),
+}
+
+
+def to_si(value: float | int | str, unit: str) -> float:
+    """`value` in the SI unit `unit`: `'5 mm'` and `0.005` are both 0.005 in `m`.
+
+    Bare numbers are SI already. Raises ValueError, in words for the author of the file, when the
+    value is not a finite number or has another dimension than `unit`.
+    """
+    if isinstance(value, str):
+        number, written = _split(value.strip(), unit)
+    elif isinstance(value, Real) and not isinstance(value, bool):
+        number, written = float(value), ""
+    else:
+        raise ValueError(f"{_called(value)} is not a number; {expectation(unit)}")
+    if not math.isfinite(number):
+        raise ValueError(f"'{value}' is not a finite number; {expectation(unit)}")
+    if written in ("", unit):
+        return number
+    try:
+        return convert(number, written, unit)
+    except ValueError as error:
+        raise ValueError(f"'{value}' {error}") from None
+
+
+def convert(value: Number, source_unit: str, target_unit: str) -> Number:
+    """`value` (a float or an array of any shape) in `source_unit`, expressed in `target_unit`.
+
+    Raises ValueError when a unit is unknown or the dimensions differ.
+    """
+    if source_unit == target_unit:
+        return value
+    source, target = _parse(source_unit), _parse(target_unit)
+    if source.dimensionality != target.dimensionality:
+        raise ValueError(f"is {_dimension(source_unit)}; {expectation(target_unit)}")
+    if "rad" in target_unit and re.search(r"Hz\b", source_unit):
+        raise ValueError("could mean turns or radians; write rpm or rad.s-1")
+    converted: Number = registry().Quantity(value, source).to(target).magnitude
+    return converted
+
+
+def is_unit(text: str) -> bool:
+    """Whether `text` follows the grammar of headers: symbols with powers, joined by dots."""
+    return HEADER_UNIT.fullmatch(text) is not None
+
+
+def is_si(unit: str) -> bool:
+    """Whether every symbol of `unit` is an SI unit without a prefix (kg excepted)."""
+    return all(symbol in SI_SYMBOLS for _, symbol, _ in FACTOR.findall(unit))
+
+
+def expectation(unit: str) -> str:
+    """What a value in `unit` looks like: `a length such as '0.5 m' was expected`."""
+    name, example = NAMES.get(unit, (f"value in {unit}", f"1 {unit}"))
+    article = "an" if name[0] in "aeiou" else "a"
+    return f"{article} {name} such as '{example}' was expected"
+
+
+@lru_cache(maxsize=1)
+def registry() -> pint.UnitRegistry[Any]:
+    """The one pint registry, made when first needed."""
+    import pint
+
+    return pint.UnitRegistry(autoconvert_offset_to_baseunit=True)
+
+
+def _split(text: str, unit: str) -> tuple[float, str]:
+    """The number and the unit of `text`."""
+    match = NUMBER.match(text)
+    rest = text[match.end() :] if match else text
+    if match and re.match(r",\d", rest):
+        raise ValueError(f"'{text}' has a comma; write numbers with a point only, like '0.5 m'")
+    if match is None or re.match(r"[\d.,_]", rest):
+        raise ValueError(f"'{text}' is not a number with a unit; {expectation(unit)}")
+    return float(match.group()), rest.strip()
+
+
+@lru_cache(maxsize=256)
+def _parse(text: str) -> pint.Unit:
+    """The pint unit of `m.s-1`, `m/s`, `N m` or `m/s^2`."""
+    unit, end = registry().Unit(""), 0
+    for match in FACTOR.finditer(text.strip()):
+        if match.start() != end:
+            break
+        end = match.end()
+        separator, symbol, power = match.groups()
+        sign = -1 if "/" in separator else 1
+        for name, exponent in ALIASES.get(symbol, ((symbol, 1),)):
+            unit *= _symbol(name) ** (sign * exponent * int(power or 1))
+    if end != len(text.strip()) or not text.strip():
+        raise ValueError(f"has the unreadable unit '{text}'; units are written like m.s-1 or N.m")
+    return unit
+
+
+def _symbol(name: str) -> pint.Unit:
+    """The pint unit of one symbol; ValueError with the nearest one when there is none."""
+    if name == "1":
+        return registry().Unit("")
+    try:
+        return registry().Unit("percent" if name == "%" else name)
+    except (AttributeError, ValueError):  # pint's UndefinedUnitError is an AttributeError
+        raise ValueError(f"has the unknown unit '{name}'; {suggest(name, COMMON)}") from None
+
+
+def _dimension(unit: str) -> str:
+    """The everyday name of a unit's dimension, with its article."""
+    for known, (name, _) in NAMES.items():
+        if _parse(known).dimensionality == _parse(unit).dimensionality:
+            return f"an {name}" if name[0] in "aeiou" else f"a {name}"
+    return f"in {unit}"
+
+
+def _called(value: object) -> str:
+    """What a YAML author would call a value that is not a number."""
+    names = {bool: "true/false", list: "a list", dict: "a group of keys", type(None): "nothing"}
+    return names.get(type(value), f"'{value}'")

@@ -1,0 +1,97 @@
+"""Bench figures, and the figures of comparing and identifying."""
+
+import numpy as np
+import pytest
+
+from kemba.errors import KembaError
+from kemba.plotting import (
+    Band,
+    Source,
+    draw,
+    plot_bands,
+    plot_bench,
+    plot_force_velocity,
+    plot_heat_map,
+    plot_ladder,
+    valve_modes,
+)
+from kemba.trajectory import Trajectory
+
+TIME = np.linspace(0.0, 1.0, 101)
+
+
+def bench(name: str, scale: float = 1.0) -> Source:
+    """A bench log whose force is scaled, as from another model."""
+    columns = {
+        "piston/x [m]": 0.035 + 0.03 * np.sin(6 * TIME),
+        "piston/F [N]": scale * 300 * np.sin(6 * TIME),
+        "valve/extend [1]": TIME > 0.3,
+        "valve/retract [1]": (TIME > 0.2) & (TIME < 0.4),
+    }
+    return Source(name, Trajectory(TIME, columns))
+
+
+def test_bench_logs_have_their_own_figure() -> None:
+    figure = draw([bench("full"), bench("approximate", 0.9)])
+    assert [axes.get_ylabel() for axes in figure.axes] == ["piston x [mm]", "piston F [N]", ""]
+    force = [line for line in figure.axes[1].lines if line.get_gid() == "piston/F"]
+    assert len({line.get_color() for line in force}) == 2
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["full", "approximate"]
+
+
+def test_bench_and_robot_do_not_mix(plan: Source) -> None:
+    with pytest.raises(KembaError, match="plan: is a robot's motion; 'full' is a bench log"):
+        draw([plan, bench("full")])
+    with pytest.raises(KembaError, match="nothing to plot"):
+        plot_bench([Source("odd", Trajectory(TIME, {"wind [m.s-1]": TIME}))])
+
+
+def test_modes_part_the_rows() -> None:
+    modes = valve_modes(bench("full").trajectory)
+    assert np.sum(list(modes.values()), axis=0).tolist() == [1] * 101
+    assert TIME[modes["both"]].min() == pytest.approx(0.31)
+    assert not modes["none"][25]
+
+
+def test_force_over_velocity() -> None:
+    v = np.linspace(-0.5, 0.5, 11)
+    modes = {"extend": (324.0, 97.0), "none": (0.0, 25.0)}
+    points = {mode: (v, rest - c * v) for mode, (rest, c) in modes.items()}
+    axes = plot_force_velocity(points, modes).axes[0]
+    fitted = np.asarray(axes.lines[2].get_ydata())
+    np.testing.assert_allclose(fitted, [324 + 48.5, 324 - 48.5])
+    assert axes.get_legend_handles_labels()[1] == ["extend", "none"]
+
+
+def test_heat_map_tells_its_numbers() -> None:
+    before = np.array([[1.0, 45.0], [np.nan, 130.0]])
+    tables = {"before": before, "after": np.minimum(before, 1.1)}
+    bold = {"before": before > 3}
+    figure = plot_heat_map(tables, ["body/z [m]", "front/piston/x [m]"], ["rest", "flight"], bold)
+    first, second, _ = figure.axes
+    assert [text.get_text() for text in first.texts] == ["1.0", "45.0", "130"]
+    assert [text.get_fontweight() for text in first.texts] == ["normal", "bold", "bold"]
+    assert len(second.texts) == 3
+    assert [label.get_text() for label in second.get_xticklabels()] == ["rest", "flight"]
+
+
+def test_bands_show_estimate_and_explanation() -> None:
+    d = np.sin(6 * TIME)
+    bands = [
+        Band("front rod d [N]", TIME, d, d - 1, d + 1, 0.9 * d, [(0.0, 0.2)]),
+        Band("rear rod d [N]", TIME, d, d - 1, d + 1),
+    ]
+    figure = plot_bands(bands, "seal friction")
+    names = figure.axes[0].get_legend_handles_labels()[1]
+    assert sorted(names) == ["95 %", "estimate", "seal friction"]
+    assert [axes.get_ylabel() for axes in figure.axes] == [band.label for band in bands]
+    assert [p.get_gid() for p in figure.axes[0].patches] == ["stance"]
+
+
+def test_ladder_goes_down_effect_by_effect() -> None:
+    figure = plot_ladder(["planning", "supply_droop"], [8.0, 1.1], [9.0, 1.3])
+    (axes,) = figure.axes
+    names = [label.get_text() for label in axes.get_yticklabels()]
+    assert names == ["planning", "+ supply_droop"]
+    assert axes.yaxis_inverted()
+    assert axes.get_legend_handles_labels()[1] == ["fitted runs", "held-out runs", "noise"]

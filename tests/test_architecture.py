@@ -1,0 +1,101 @@
+"""The rules that keep the tree readable: imports one way, small files, nothing heavy at --help."""
+
+import ast
+import re
+import statistics
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+if sys.version_info >= (3, 11):
+    import tomllib
+
+ROOT = Path(__file__).parent.parent
+
+# From the bottom up; a room may import its own level and those below.
+LEVELS = [
+    {"errors"},
+    {"files", "units"},
+    {"quantity"},
+    {"document", "schema", "complaints", "config"},
+    {"table", "trajectory"},
+    {"mechanism"},
+    {"effects"},
+    {"model"},
+    {"ocp", "plant"},
+    {"identify"},
+    {"runs"},
+    {"plotting", "report"},
+    {"cli"},
+]
+LEVEL = {room: level for level, rooms in enumerate(LEVELS) for room in rooms}
+ONLY_IN = {
+    "pinocchio": {"mechanism"},
+    "matplotlib": {"plotting"},
+    "typer": {"cli"},
+    "rich": {"cli"},
+    "pint": {"units"},
+    "ruamel": {"document"},
+}
+SOURCES = sorted([*ROOT.glob("kemba/**/*.py"), *ROOT.glob("cli/**/*.py")])
+FOLDERS = (".", ".ci", ".github", "cli", "configs", "docs", "kemba", "tests")
+TEXTS = [
+    path
+    for folder in FOLDERS
+    for path in (ROOT / folder).glob("*" if folder == "." else "**/*")
+    if path.is_file() and path.suffix in {".md", ".py", ".toml", ".yaml", ".yml"}
+]
+
+
+def room(path: Path) -> str:
+    """The room a source file belongs to."""
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return "cli" if parts[0] == "cli" else parts[1]
+
+
+def imported(path: Path) -> Iterator[tuple[str, int]]:
+    """Every imported module and its line, wherever in the file it is imported."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from ((alias.name, node.lineno) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}:{node.lineno}: write the import in full"
+            yield node.module or "", node.lineno
+            if node.module == "kemba":
+                yield from ((f"kemba.{alias.name}", node.lineno) for alias in node.names)
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_imports_go_one_way(path: Path) -> None:
+    own = room(path)
+    for module, line in imported(path):
+        top, *rest = module.split(".")
+        assert own in ONLY_IN.get(top, {own}), f"{path}:{line}: {top} belongs in {ONLY_IN[top]}"
+        target = "cli" if top == "kemba_cli" else rest[0] if top == "kemba" and rest else None
+        if target and own != "__init__":
+            assert LEVEL[target] <= LEVEL[own], f"{path}:{line}: {own} must not import {target}"
+
+
+def test_files_are_small() -> None:
+    lengths = {path: len(path.read_text(encoding="utf-8").splitlines()) for path in SOURCES}
+    assert max(lengths.values()) <= 400, max(lengths, key=lambda path: lengths[path])
+    assert statistics.median(lengths.values()) < 150
+
+
+@pytest.mark.skipif(sys.version_info < (3, 11), reason="tomllib came with Python 3.11")
+def test_every_package_is_installed() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    folders = {path.parent for path in ROOT.glob("kemba/**/*.py")}
+    names = {".".join(folder.relative_to(ROOT).parts) for folder in folders}
+    listed = project["tool"]["setuptools"]["packages"]
+    assert listed == sorted(names | {"kemba_cli", "kemba_configs"})
+    assert all((folder / "__init__.py").is_file() for folder in folders)
+
+
+def test_nothing_names_a_machine() -> None:
+    place = re.compile(r"(?<![\w.:)~-])/(?:home|root|tmp|work|Users)/\w|index-url")
+    for path in TEXTS:
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
+            assert not place.search(line) or "re.compile" in line, f"{path}:{number}: {line}"

@@ -1,0 +1,308 @@
+"""Equations of motion and the integration loop of the whole robot.
+
+State y: 27 positions, 27 velocities, 2 x N_AIR air states, the supply.  Classical Runge-Kutta with
+steps that end on every valve event and control tick; after each tick the pose is projected back on
+the constraints.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .air import A_TORQUE, N_AIR, air_rates, rod_force
+from .bodies import NC, NQ, apply_inverse, constraints, factor, inverse_mass, solve
+from .catalogue import (
+    B_CABLE,
+    B_CABLE_Z,
+    B_COM,
+    B_COULOMB,
+    B_DAMP,
+    B_DRAG,
+    B_DROOP,
+    B_DROOP_T,
+    B_FORCE,
+    B_INERTIA,
+    B_PAYLOAD,
+    B_PITCH,
+    B_SPRING,
+    B_SPRING_Z,
+    L_COGGING,
+    L_COGGING_N,
+    L_GEAR,
+    L_HIP_COULOMB,
+    L_HIP_DAMP,
+    L_HIP_Q0,
+    L_HIP_SPRING,
+    L_MOTOR_LAG,
+    L_ROTOR,
+    L_TORQUE,
+)
+from .contact import creep, foot_normal, foot_tangent, stop_force
+from .control import hip_command
+from .jit import njit
+from .numbers import CLOSED, GRAVITY, TIBIA, TIBIA_COM
+
+NY = 2 * NQ + 2 * N_AIR + 1
+AIR, SUPPLY = 2 * NQ, 2 * NQ + 2 * N_AIR
+# One row of what is recorded beside the state: rod force, foot forces x and z, torque (x 2 legs).
+NOUT = 8
+# Columns of the scalar figures handed to the kernel.
+S_ROTOR, S_BOOM_MX, S_BOOM_MZ, S_BOOM_W, S_MU, S_PHYSICAL, S_GROUND, S_COUNT = range(8)
+
+
+@njit
+def workspace():
+    return (
+        np.empty((NC, 6), dtype=np.int64),
+        np.empty((NC, 6)),
+        np.empty(NC),
+        np.empty(NC),
+        np.empty(NQ),
+        np.empty((5, 5)),
+        np.empty((NC, NQ)),
+        np.empty((NC, NC)),
+        np.empty(NQ),
+        np.empty(NQ),
+    )
+
+
+@njit
+def piston_state(y, leg):
+    b, r = 9 + 12 * leg, 12 + 12 * leg
+    s, c = np.sin(y[b + 2]), np.cos(y[b + 2])
+    x = (y[r] - y[b]) * s - (y[r + 1] - y[b + 1]) * c - CLOSED
+    v = (y[NQ + r] - y[NQ + b]) * s - (y[NQ + r + 1] - y[NQ + b + 1]) * c
+    return x, v, s, -c
+
+
+@njit
+def foot_state(y, leg):
+    t = 6 + 12 * leg
+    s, c = np.sin(y[t + 2]), np.cos(y[t + 2])
+    reach = TIBIA - TIBIA_COM
+    w = y[NQ + t + 2]
+    return (
+        y[t] + reach * s,
+        y[t + 1] - reach * c,
+        y[NQ + t] + reach * c * w,
+        y[NQ + t + 1] + reach * s * w,
+        reach * c,
+        reach * s,
+    )
+
+
+@njit
+def near_ground(y):
+    return min(foot_state(y, 0)[1], foot_state(y, 1)[1]) < 0.004
+
+
+@njit
+def hip_force(leg, y, command, row):
+    """Torque on the femur: motor chain, then friction and the other hip effects."""
+    f = 3 + 12 * leg
+    angle, speed = y[f + 2] - y[2], y[NQ + f + 2] - y[NQ + 2]
+    torque = row[L_TORQUE] * command
+    if row[L_MOTOR_LAG] > 0.0:
+        torque = y[AIR + N_AIR * leg + A_TORQUE]
+    total = torque - row[L_HIP_COULOMB] * np.tanh(speed / 0.1) - row[L_HIP_DAMP] * speed
+    total -= row[L_HIP_SPRING] * (angle - row[L_HIP_Q0])
+    total += row[L_COGGING] * np.sin(row[L_COGGING_N] * angle)
+    total -= row[L_GEAR] * abs(torque) * np.tanh(speed / 0.1)
+    return total
+
+
+@njit
+def body_force(y, push, body, s, mass, f):
+    """Gravity on every link, the boom, and the effects on the body, added to `f`."""
+    for i in range(9):
+        f[3 * i + 1] -= mass[i] * GRAVITY
+    z, vx, vz, w = y[1], y[NQ], y[NQ + 1], y[NQ + 2]
+    offset = body[B_COM]
+    c, sn = np.cos(y[2]), np.sin(y[2])
+    f[0] += mass[0] * offset * w * w * c
+    f[1] += mass[0] * offset * w * w * sn
+    f[2] -= mass[0] * GRAVITY * offset * c
+    f[1] -= s[S_BOOM_W] + body[B_PAYLOAD] * GRAVITY
+    f[1] += body[B_FORCE] - body[B_SPRING] * (z - body[B_SPRING_Z])
+    f[1] -= body[B_CABLE] * max(0.0, z - body[B_CABLE_Z])
+    f[0] -= body[B_COULOMB] * np.tanh(vx / 0.02) + body[B_DAMP] * vx + body[B_DRAG] * vx * abs(vx)
+    f[1] -= body[B_COULOMB] * np.tanh(vz / 0.02) + body[B_DAMP] * vz + body[B_DRAG] * vz * abs(vz)
+    f[2] -= body[B_PITCH] * np.tanh(w / 0.05)
+    f[0] += push[0]
+    f[1] += push[1]
+    f[2] += push[2]
+
+
+@njit
+def rates(y, u, command, push, anchor, mass, inertia, s, air, leg, body, ws, dy, out):
+    """dy = f(y); `out` gets rod force, Fx, Fz and hip torque of both legs."""
+    index, value, gap, bias, w, block, wg, a, f, acc = ws
+    physical = s[S_PHYSICAL] > 0.5
+    f[:] = 0.0
+    body_force(y, push, body, s, mass, f)
+    demand = 0.0
+    for n in range(2):
+        state = y[AIR + N_AIR * n : AIR + N_AIR * (n + 1)]
+        x, v, ax, az = piston_state(y, n)
+        row = leg[n]
+        rod = rod_force(x, v, u[2 * n], u[2 * n + 1], state, air[n], row, physical) + push[5 + n]
+        total = rod + stop_force(x, v)
+        b, r = 9 + 12 * n, 12 + 12 * n
+        f[r] += total * ax
+        f[r + 1] += total * az
+        f[b] -= total * ax
+        f[b + 1] -= total * az
+        torque = hip_force(n, y, command[n], row) + push[3 + n]
+        f[5 + 12 * n] += torque
+        f[2] -= torque
+        fx, fz, vx, vz, lx, lz = foot_state(y, n)
+        normal = foot_normal(-fz, -vz, body) if s[S_GROUND] > 0.5 else 0.0
+        side = foot_tangent(fx - anchor[n], vx, normal, body, s[S_MU]) if normal > 0.0 else 0.0
+        t = 6 + 12 * n
+        f[t] += side
+        f[t + 1] += normal
+        f[t + 2] += side * lx + normal * lz
+        out[n], out[2 + n], out[4 + n], out[6 + n] = rod, side, normal, torque
+        slot = dy[AIR + N_AIR * n : AIR + N_AIR * (n + 1)]
+        demand += air_rates(x, v, u[2 * n], u[2 * n + 1], state, y[SUPPLY], air[n], row, physical,
+                            slot)  # fmt: skip
+        lag = row[L_MOTOR_LAG]
+        slot[A_TORQUE] = (row[L_TORQUE] * command[n] - state[A_TORQUE]) / lag if lag > 0.0 else 0.0
+    dy[SUPPLY] = 0.0
+    if body[B_DROOP] != 0.0:
+        dy[SUPPLY] = (1.0 - y[SUPPLY]) / body[B_DROOP_T] - body[B_DROOP] * demand
+    _dynamics(y, s, leg, body, mass, inertia, ws)
+    for i in range(NQ):
+        dy[i] = y[NQ + i]
+        dy[NQ + i] = acc[i]
+
+
+@njit
+def _prepare(y, s, leg, body, mass, inertia, ws):
+    index, value, gap, bias, w, block, wg, a, _, _ = ws
+    constraints(y[:NQ], y[NQ : 2 * NQ], index, value, gap, bias)
+    inverse_mass(
+        y[:NQ], mass, inertia,
+        s[S_BOOM_MX] + body[B_INERTIA], s[S_BOOM_MZ] + body[B_INERTIA],
+        body[B_PAYLOAD], body[B_COM],
+        s[S_ROTOR] + leg[0, L_ROTOR], s[S_ROTOR] + leg[1, L_ROTOR], w, block,
+    )  # fmt: skip
+    factor(index, value, w, block, wg, a)
+
+
+@njit
+def _dynamics(y, s, leg, body, mass, inertia, ws):
+    """Accelerations from the loads in the workspace: M a = f - G' lam with G a = bias."""
+    index, value, _, bias, w, block, wg, a, f, acc = ws
+    _prepare(y, s, leg, body, mass, inertia, ws)
+    apply_inverse(w, block, f, acc)
+    for r in range(NC):
+        total = -bias[r]
+        for n in range(6):
+            total += value[r, n] * acc[index[r, n]]
+        bias[r] = total
+    solve(a, bias)
+    for r in range(NC):
+        for j in range(NQ):
+            acc[j] -= wg[r, j] * bias[r]
+
+
+@njit
+def project(y, s, leg, body, mass, inertia, ws):
+    """One Newton step back on the constraints, in position and in velocity, mass-weighted."""
+    index, value, gap, bias, w, block, wg, a, _, _ = ws
+    _prepare(y, s, leg, body, mass, inertia, ws)
+    for r in range(NC):
+        total = 0.0
+        for n in range(6):
+            total += value[r, n] * y[NQ + index[r, n]]
+        bias[r] = total
+    solve(a, gap)
+    solve(a, bias)
+    for r in range(NC):
+        for j in range(NQ):
+            y[j] -= wg[r, j] * gap[r]
+            y[NQ + j] -= wg[r, j] * bias[r]
+
+
+@njit
+def integrate(
+    y, u, anchor, ticks, split, h_max, refs, pushes, events, mass, inertia, s, air, leg, body
+):
+    """Run the robot over the control `ticks`; `split` records per tick.
+
+    y, u (acting valves) and anchor (where the feet last stuck) move on in place.  refs[tick, :] are
+    control rows (see `control`); events[:, 3] = time, valve number, value, sorted.
+    Returns times, states, outputs, commands, acting valves.
+    """
+    n = ticks.size - 1
+    total = n * split + 1
+    times, states = np.empty(total), np.empty((total, NY))
+    outputs, commands = np.empty((total, NOUT)), np.empty((n + 1, 2))
+    valves = np.empty((total, 4))
+    ws = workspace()
+    dy, stage, acc_dy = np.empty(NY), np.empty(NY), np.empty(NY)
+    out, command = np.empty(NOUT), np.zeros(2)
+    project(y, s, leg, body, mass, inertia, ws)
+    t, event, row = ticks[0], 0, 0
+    for k in range(n + 1):
+        for m in range(2):
+            x, v, _, _ = piston_state(y, m)
+            f = 3 + 12 * m
+            command[m] = hip_command(
+                m, y[f + 2] - y[2], y[NQ + f + 2] - y[NQ + 2], x, v, y[2], y[NQ + 2], refs[k]
+            )
+            commands[k, m] = command[m]
+        push = pushes[k]
+        for part in range(split if k < n else 1):
+            while event < events.shape[0] and events[event, 0] <= t + 1e-12:
+                u[int(events[event, 1])] = events[event, 2]
+                event += 1
+            rates(y, u, command, push, anchor, mass, inertia, s, air, leg, body, ws, dy, out)
+            times[row], states[row], outputs[row], valves[row] = t, y, out, u
+            row += 1
+            if k == n:
+                break
+            stop = ticks[k] + (ticks[k + 1] - ticks[k]) * (part + 1) / split
+            while t < stop - 1e-12:
+                until = stop
+                if event < events.shape[0] and events[event, 0] < stop:
+                    until = events[event, 0]
+                # light feet on stiff ground need half the step
+                h = 0.5 * h_max if near_ground(y) else h_max
+                steps = max(1, int(np.ceil((until - t) / h - 1e-9)))
+                h = (until - t) / steps
+                for _ in range(steps):
+                    _step(y, h, u, command, push, anchor, mass, inertia, s, air, leg, body, ws,
+                          dy, stage, acc_dy, out)  # fmt: skip
+                t = until
+                while event < events.shape[0] and events[event, 0] <= t + 1e-12:
+                    u[int(events[event, 1])] = events[event, 2]
+                    event += 1
+            t = stop
+        project(y, s, leg, body, mass, inertia, ws)
+        if not np.isfinite(y[1]):
+            break
+    return times[:row], states[:row], outputs[:row], commands, valves[:row]
+
+
+@njit
+def _step(y, h, u, command, push, anchor, mass, inertia, s, air, leg, body, ws, dy, stage, total,
+          out):  # fmt: skip
+    """One classical Runge-Kutta step; the friction anchors move after it."""
+    rates(y, u, command, push, anchor, mass, inertia, s, air, leg, body, ws, dy, out)
+    for i in range(NY):
+        total[i] = dy[i]
+        stage[i] = y[i] + 0.5 * h * dy[i]
+    for n in range(2):
+        rates(stage, u, command, push, anchor, mass, inertia, s, air, leg, body, ws, dy, out)
+        reach = 0.5 * h if n == 0 else h
+        for i in range(NY):
+            total[i] += 2.0 * dy[i]
+            stage[i] = y[i] + reach * dy[i]
+    rates(stage, u, command, push, anchor, mass, inertia, s, air, leg, body, ws, dy, out)
+    for i in range(NY):
+        y[i] += h / 6.0 * (total[i] + dy[i])
+    for n in range(2):
+        fx, fz, _, vz, _, _ = foot_state(y, n)
+        anchor[n] = creep(anchor[n], fx, foot_normal(-fz, -vz, body), body, s[S_MU])
