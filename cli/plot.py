@@ -22,8 +22,8 @@ def plot(
     ] = None,
     show: Annotated[bool, typer.Option("--show", help="Open a window.")] = False,
     model: Annotated[
-        str, typer.Option(help="Model YAML whose robot and limits are drawn.")
-    ] = "planning",
+        str | None, typer.Option(help="Model YAML with the robot and limits, not the run's own.")
+    ] = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -38,7 +38,7 @@ def plot(
     figure = plotting.draw(sources, model, open_window() if show else None)
     written = {"figure": plotting.save_figure(figure, save or plotting.default_path(sources))}
     if animate:
-        machine = plotting.load_machine(model)
+        machine = plotting.machine_of(sources[0], model)
         written["animation"] = plotting.save_animation(sources[0], machine, animate)
     paths = {kind: str(path) for kind, path in written.items()}
     if json:

@@ -65,7 +65,8 @@ def _solve(
     from kemba.runs import RunFolder
     from kemba_cli.progress import Progress
 
-    model_file = find_config(model or task.model, "models")
+    task = task.model_copy(update={"model": model or task.model})
+    model_file = find_config(task.model, "models")
     folder = RunFolder.create(out, task.name, inputs=[source, model_file])
     dump_yaml(task.model_dump(exclude_none=True), folder / "task.yaml")
     try:
@@ -73,7 +74,6 @@ def _solve(
             found = plan(
                 task,
                 document,
-                model,
                 log=folder / "solver.log",
                 tell=progress.tell,
                 watch=progress.watch,

@@ -26,6 +26,17 @@ SI_SYMBOLS = frozenset("1 m s kg A K mol cd rad N Pa J W V C F Hz T H".split())
 ALIASES = {"Nm": (("N", 1), ("m", 1)), "°": (("deg", 1),)}  # `Nm` is a textile unit to pint
 COMMON = "m mm cm s ms min kg g N kN Pa kPa MPa bar psi rad deg K degC J W Hz rpm L".split()
 
+# SI unit of each of pint's dimensions
+BASE = {
+    "[length]": "m",
+    "[time]": "s",
+    "[mass]": "kg",
+    "[temperature]": "K",
+    "[current]": "A",
+    "[substance]": "mol",
+    "[luminosity]": "cd",
+}
+
 # What people call each unit, and an example of its size on a robot.
 NAMES = {
     "1": ("number", "0.5"),
@@ -82,13 +93,41 @@ def convert(value: Number, source_unit: str, target_unit: str) -> Number:
     """
     if source_unit == target_unit:
         return value
-    source, target = _parse(source_unit), _parse(target_unit)
+    source, target = parse_unit(source_unit), parse_unit(target_unit)
     if source.dimensionality != target.dimensionality:
         raise ValueError(f"is {_dimension(source_unit)}; {expectation(target_unit)}")
     if "rad" in target_unit and re.search(r"Hz\b", source_unit):
         raise ValueError("could mean turns or radians; write rpm or rad.s-1")
     converted: Number = registry().Quantity(value, source).to(target).magnitude
     return converted
+
+
+def read_si(value: float | int | str) -> tuple[float, str]:
+    """Number and SI unit of a value of any dimension: `'5 mm'` is (0.005, 'm'), 3 is (3.0, '1').
+
+    Raises ValueError, in words for the author of the file.
+    """
+    if not isinstance(value, str):
+        return to_si(value, "1"), "1"
+    number, written = _split(value.strip(), "1")
+    written = written or "1"
+    if is_unit(written) and is_si(written):
+        return to_si(number, written), written
+    unit = parse_unit(written)
+    si = next((u for u in NAMES if parse_unit(u).dimensionality == unit.dimensionality), None)
+    si = si or ".".join(
+        f"{BASE[dimension]}{power if power != 1 else ''}"
+        for dimension, power in unit.dimensionality.items()
+    )
+    return to_si(value, si), si
+
+
+def called_dimension(unit: pint.Unit) -> str:
+    """The everyday name of a unit's dimension with its article: `a length`."""
+    for known, (name, _) in NAMES.items():
+        if parse_unit(known).dimensionality == unit.dimensionality:
+            return f"an {name}" if name[0] in "aeiou" else f"a {name}"
+    return f"in {unit:~C}"
 
 
 def is_unit(text: str) -> bool:
@@ -128,7 +167,7 @@ def _split(text: str, unit: str) -> tuple[float, str]:
 
 
 @lru_cache(maxsize=256)
-def _parse(text: str) -> pint.Unit:
+def parse_unit(text: str) -> pint.Unit:
     """The pint unit of `m.s-1`, `m/s`, `N m` or `m/s^2`."""
     unit, end = registry().Unit(""), 0
     for match in FACTOR.finditer(text.strip()):
@@ -156,10 +195,8 @@ def _symbol(name: str) -> pint.Unit:
 
 def _dimension(unit: str) -> str:
     """The everyday name of a unit's dimension, with its article."""
-    for known, (name, _) in NAMES.items():
-        if _parse(known).dimensionality == _parse(unit).dimensionality:
-            return f"an {name}" if name[0] in "aeiou" else f"a {name}"
-    return f"in {unit}"
+    named = called_dimension(parse_unit(unit))
+    return f"in {unit}" if named.startswith("in ") else named
 
 
 def _called(value: object) -> str:

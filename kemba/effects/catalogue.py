@@ -17,6 +17,7 @@ from kemba.effects.boom_faults import (
 from kemba.effects.chamber import Chamber
 from kemba.effects.contact import Contact
 from kemba.effects.damping import ModeDamping
+from kemba.effects.expression import Expression
 from kemba.effects.friction import PressureFriction, SealFriction, StribeckFriction
 from kemba.effects.ground import GroundCompliance, GroundFriction
 from kemba.effects.hip import (
@@ -30,15 +31,20 @@ from kemba.effects.hip import (
 from kemba.effects.hose import BothModeLoss, CrossLeak, HoseLag
 from kemba.effects.load import ComOffset, Payload
 from kemba.effects.motor import Motor
+from kemba.effects.orifice import OrificeChamber
 from kemba.effects.piston import EndCushion, GasSpring, PistonDamping, QuadraticDamping
 from kemba.effects.sensors import SensorBias, SensorDelay, SensorScale
 from kemba.effects.stops import EndStop
 from kemba.effects.supply import RiseTimeScale, SupplyDroop, SupplyScale
+from kemba.effects.supply_line import SupplyLine
 from kemba.effects.timing import ValveCloseDelay, ValveDelay
 from kemba.effects.valve import Valve
 
 # the planning model's own physics
 PLANNING: tuple[type[Effect], ...] = (Valve, Chamber, ModeDamping, EndStop, Motor, Boom, Contact)
+
+# the same air, seen closer
+PHYSICAL: tuple[type[Effect], ...] = (OrificeChamber, SupplyLine)
 
 # what a real machine may have beside it
 AIR: tuple[type[Effect], ...] = (
@@ -84,10 +90,11 @@ SENSORS: tuple[type[Effect], ...] = (SensorBias, SensorScale, SensorDelay)
 # what may be missing from a model: the candidates of identification
 MISSING: tuple[type[Effect], ...] = (*AIR, *PISTON, *HIP, *BODY, *GROUND, *SENSORS)
 
-EFFECTS: tuple[type[Effect], ...] = (*PLANNING, *MISSING)
+EFFECTS: tuple[type[Effect], ...] = (*PLANNING, *PHYSICAL, *MISSING, Expression)
 
 BY_KIND: dict[str, type[Effect]] = {e.model_fields["kind"].default: e for e in EFFECTS}
 
 CHAMBERS: dict[str, Callable[[], list[Effect]]] = {
     "first_order": lambda: [Chamber(), ModeDamping()],
+    "orifice": lambda: [OrificeChamber()],
 }

@@ -10,8 +10,8 @@ from kemba.identify.problem import Candidate, Parameter
 from kemba.model.model import Model
 from kemba.model.scene import port_name
 
-# The planning model's own parts: they are there, and their figures are nuisance.
-STRUCTURE = {"valve", "chamber", "mode_damping", "motor", "end_stop", "contact", "boom"}
+FASTEST = 6e-4  # s
+REACH = 10.0  # a shape parameter is looked for within this factor of its typical value
 
 
 def effect_candidates(model: Model) -> dict[str, Candidate]:
@@ -19,25 +19,26 @@ def effect_candidates(model: Model) -> dict[str, Candidate]:
     present = {e.kind for e in model.effects}
     found = {}
     for kind, effect in BY_KIND.items():
-        if kind in STRUCTURE | present or not _is_switch(effect) or not _fits(model, effect):
-            continue
-        found[kind] = candidate(effect)
+        sensor = effect.family == "sensors"
+        if effect.off and not sensor and kind not in present and _fits(model, effect):
+            found[kind] = candidate(effect)
     return found
 
 
 def candidate(effect: type[Effect]) -> Candidate:
-    """Its first parameter switches it; the others are shapes."""
-    lead, *shapes = effect.parameters()
-    fields = effect.model_fields
-    param = effect.parameters()[lead]
-    off = float(fields[lead].default)
-    switch = Parameter(lead, param.unit, off, param.size, param.lower, param.upper)
-    others = []
-    for name in shapes:
-        p, typical = effect.parameters()[name], float(fields[name].default)
-        bounds = (max(p.lower, typical / 10.0), min(p.upper, typical * 10.0))
-        others.append(Parameter(name, p.unit, typical, 0.5, *bounds, typical))
-    return Candidate(fields["kind"].default, switch, tuple(others))
+    """What `effect` declares: the parameter in `off` switches it, the others are shapes."""
+    fields, declared = effect.model_fields, effect.declared()
+    (lead, off), *_ = effect.off.items()
+    param = declared[lead]
+    # a time constant far below the sampling interval is no different from none
+    lower = max(param.lower, FASTEST) if param.unit == "s" and param.lower > 0 else param.lower
+    switch = Parameter(lead, param.unit, off, param.size, lower, param.upper)
+    shapes = []
+    for name in (n for n in declared if n != lead):
+        p, typical = declared[name], float(fields[name].default)
+        bounds = (max(p.lower, typical / REACH), min(p.upper, typical * REACH))
+        shapes.append(Parameter(name, p.unit, typical, 0.7, *bounds, typical))
+    return Candidate(fields["kind"].default, switch, tuple(shapes))
 
 
 def sensor_candidates(sigmas: Mapping[str, float]) -> dict[str, Candidate]:
@@ -57,12 +58,6 @@ def sensor_candidates(sigmas: Mapping[str, float]) -> dict[str, Candidate]:
 def _unit(channel: str) -> str:
     last = channel.rsplit("/", 1)[-1]
     return {"F": "N", "x": "m", "z": "m", "q": "rad", "pitch": "rad", "P": "Pa"}.get(last, "1")
-
-
-def _is_switch(effect: type[Effect]) -> bool:
-    """Whether its parameters' defaults make it do nothing, so that theta can switch it on."""
-    fields, names = effect.model_fields, list(effect.parameters())
-    return bool(names) and all(isinstance(fields[n].default, float) for n in names)
 
 
 def _fits(model: Model, effect: type[Effect]) -> bool:

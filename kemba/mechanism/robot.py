@@ -12,7 +12,7 @@ from kemba.mechanism.planar import Mechanism, Port
 from kemba.mechanism.recursion import Motion, forward, read_joints, rnea
 from kemba.quantity import Quantity
 
-HIP_RANGE = 2.2  # rad; beyond it the knee would enter the body
+HIP_RANGE = 1.4  # rad; beyond it the knee would rise above the body
 
 
 def robot_mechanism(robot: Robot | str = "kemba") -> Mechanism:

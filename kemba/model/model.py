@@ -154,9 +154,11 @@ def _assemble(model: Model, instances: list[Instance], p: ca.SX) -> Node:
         for name, limit in part.limits.items():
             limits.append(limit)
             limit_rows.append(Row(f"{instance.label}:{name}", "1"))
-        for symbol, rate in (*part.rate.items(), *part.add_rate.items()):
-            key = (instance.leg, symbol)
-            rates[key] = rates.get(key, 0) + rate
+        for symbol, rate in part.rate.items():
+            rates[(instance.leg, symbol)] = rates.get((instance.leg, symbol), 0) + rate
+        for symbol, rate in part.add_rate.items():
+            state, slope = scene.carrier(instance.leg, symbol)
+            rates[(instance.leg, state)] = rates.get((instance.leg, state), 0) + rate / slope
     _check_rates(model, rates)
 
     return Node(

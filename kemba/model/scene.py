@@ -49,11 +49,9 @@ def place_effects(mechanism: Mechanism, effects: Iterable[Effect]) -> list[Insta
     for name in names:
         if names.count(name) > 1:
             raise KembaError(f"effects.{name}", "listed twice", "each effect once per leg")
-    gone = {kind for e in listed for kind in e.replaces}
+    gone = {(kind, e.leg) for e in listed for kind in e.replaces}
     instances = []
     for effect in listed:
-        if effect.kind in gone:
-            continue
         legs: Iterable[str | None] = (None,) if effect.place == "body" else mechanism.legs
         if effect.leg is not None:
             if effect.leg not in mechanism.legs:
@@ -62,6 +60,8 @@ def place_effects(mechanism: Mechanism, effects: Iterable[Effect]) -> list[Insta
                 )
             legs = (effect.leg,)
         for leg in legs:
+            if gone & {(effect.kind, None), (effect.kind, leg)}:
+                continue
             _check_ports(mechanism, effect, leg)
             instances.append(Instance(effect, leg))
     return instances
@@ -134,6 +134,15 @@ class Scene:
         raise KembaError(
             full_name(leg, symbol), "no effect of this model provides it", hint=suggest(symbol, known)
         )
+
+    def carrier(self, leg: str | None, symbol: str) -> tuple[str, Any]:
+        """The state through which a published value is moved, and d value / d state."""
+        for instance in self.instances:
+            if instance.leg == leg and symbol in instance.effect.carried_by:
+                state = instance.effect.carried_by[symbol]
+                value = self.lookup(leg, symbol)
+                return state, ca.jacobian(value, self.values[(leg, state)])
+        return symbol, 1.0
 
     def signal(self, leg: str | None, name: str, lag: bool = True) -> Any:
         """A signal: its input (or 1) times every gain, or the lagged value in its place."""

@@ -69,7 +69,8 @@ class Advance:
         """The state after `h`, or at the first touch of a gap that is open now."""
         rows = self.rows(now, reach)
         new = self.stepper.step(now, self.u, h, rows)
-        through = (new.gap < 0.0) & (now.gap > reach)
+        may_hit = (now.gap > reach) & self.eq.pairs.rigid
+        through = (new.gap < 0.0) & may_hit
         if not through.any():
             return new, False
         for _ in range(4):
@@ -78,7 +79,7 @@ class Advance:
             times = [_root(now, new, i, length) for i in hits]
             first, length = hits[int(np.argmin(times))], max(min(times), 1e-9)
             new = self.stepper.step(now, self.u, length, rows)
-            through = (new.gap < -MISSED) & (now.gap > reach)
+            through = (new.gap < -MISSED) & may_hit
             through[first] = abs(new.gap[first]) > MISSED
             if not through.any():
                 break
@@ -86,7 +87,7 @@ class Advance:
 
     def _collide(self, now: State, reach: float) -> State:
         """The state after an impact at everything that touches."""
-        rows = self.rows(now, reach)
+        rows = self.stepper.hard(self.rows(now, reach))
         if not len(rows):
             return now
         new, impulse, lost = self.stepper.impact(now, self.u, rows)

@@ -13,20 +13,25 @@ from kemba.trajectory import Array
 
 
 class Inputs:
-    """Values u (nu,) of a model's inputs in their order, held between `breaks`."""
+    """Values u (nu,) of a model's inputs in their order, held between `breaks`.
 
-    def __init__(self, model: Model, profiles: Mapping[str, Profile], commands: Commands) -> None:
+    `acting` are the profiles as they reach the model; `sent` (nu,) are the values as commanded,
+    which a log shows.
+    """
+
+    def __init__(self, model: Model, commands: Commands, acting: Mapping[str, Profile]) -> None:
         self.names = [quantity.name for quantity in model.inputs.values()]
-        for name in profiles:
+        for name in commands.profiles:
             if name not in self.names:
                 raise KembaError(model.name, f"no input '{name}'", hint=suggest(name, self.names))
-        self.profiles, self.feedback = dict(profiles), commands.feedback
+        self.profiles, self.commanded = dict(acting), dict(commands.profiles)
+        self.feedback = commands.feedback
         self.period, self._tick = commands.period, 0
         self.u = np.zeros(len(self.names))
 
     def breaks(self, duration: float) -> Array:
         """Times in (0, duration) [s] at which an input may jump."""
-        times = [profile.times for profile in self.profiles.values()]
+        times = [p.times for p in (*self.profiles.values(), *self.commanded.values())]
         if self.feedback:
             times.append(np.arange(1, int(duration / self.period) + 1) * self.period)
         found = np.concatenate([np.empty(0), *times])
@@ -41,6 +46,13 @@ class Inputs:
             self._ask(self.feedback, time, sense, u)
             self._tick += 1
         self.u = u
+        return u
+
+    def sent(self, time: float) -> Array:
+        """The inputs as commanded at `time` [s]."""
+        u = self.u.copy()
+        for name, profile in self.commanded.items():
+            u[self.names.index(name)] = profile(time)
         return u
 
     def _ask(self, feedback: Feedback, time: float, sense: Sense, u: Array) -> None:

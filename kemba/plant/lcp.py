@@ -39,8 +39,10 @@ def _scales(A: Array) -> tuple[Array, Array]:
     """Scales of rows and columns: a force has a diagonal, a slip speed and its cone have none."""
     diagonal = A.diagonal()
     force = diagonal > 0.0
-    mean = float(diagonal[force].mean()) if force.any() else 1.0
-    return np.where(force, 1.0, mean), np.where(force, 1.0 / mean, 1.0)
+    usual = float(np.median(diagonal[force])) if force.any() else 1.0
+    with np.errstate(divide="ignore"):
+        row = np.where(force, usual / diagonal, usual)
+    return row, np.where(force, 1.0 / usual, 1.0)
 
 
 def _active_set(A: Array, b: Array, on: Array) -> tuple[Array, Array] | None:

@@ -1,8 +1,9 @@
 """Complementarity pairs as the plant steps them: one force each, gaps told from rates.
 
 Every pair has one side that is a force symbol of its own (z) and an expression on the other (w).
-Where w depends on coordinates only it is a gap, held at velocity level; otherwise it is already a
-relation between velocities and forces, such as a friction cone.
+Where w without forces depends on coordinates only it is a gap: rigid, held at velocity level, or
+compliant, with a force that follows from its depth. Otherwise it is already a relation between
+velocities and forces, such as a friction cone.
 """
 
 from __future__ import annotations
@@ -23,14 +24,16 @@ class PairTable:
     """Pairs ordered by their force: row i is the pair of lam[i].
 
     `gap` (ng, 1) holds the expressions of the position pairs and `gaps` their rows; `group`
-    numbers the effect instance of each row. w = W v + L lam + w0, for a gap with W its Jacobian
-    and w0 = 0. `free_speeds`: rows of slip speeds, with the rows of slip they bound; an open
+    numbers the effect instance of each row. w = W v + L lam + w0, where a rigid gap has its
+    Jacobian in W and w0 = 0, and a compliant one, which yields with its force, W = 0 and w0 the
+    gap itself. `free_speeds`: rows of slip speeds, with the rows of slip they bound; an open
     contact leaves them undetermined.
     """
 
     labels: tuple[str, ...]
     gap: ca.SX
     gaps: Array
+    rigid: Array  # (ng,) whether each gap is rigid
     group: Array
     W: ca.SX
     L: ca.SX
@@ -43,14 +46,19 @@ class PairTable:
         return np.isin(np.arange(len(self.labels)), self.gaps)
 
     @cached_property
-    def always_mask(self) -> Array:
+    def compliant(self) -> Array:
+        """The rows of compliant gaps."""
+        return self.gaps[~self.rigid]
+
+    @cached_property
+    def ungapped(self) -> Array:
         """Whether each row belongs to an instance without gaps, which cannot open."""
         return ~np.isin(self.group, self.group[self.gaps])
 
     @cached_property
     def always(self) -> Array:
         """The rows that always take part."""
-        return np.flatnonzero(self.always_mask)
+        return np.flatnonzero(self.ungapped)
 
 
 def read_pairs(node: Any) -> PairTable:
@@ -80,23 +88,28 @@ def _split(
 def _table(node: Any, rows: list[tuple[str, ca.SX]]) -> PairTable:
     labels = tuple(label for label, _ in rows)
     w = ca.SX(ca.vertcat(*(other for _, other in rows)))
-    moving = ca.vertcat(node.v, node.lam, node.s, node.u)
-    gaps = [i for i in range(len(rows)) if not _depends(w[i], moving)]
+    L = ca.jacobian(w, node.lam)
+    if rows and _depends(L, ca.vertcat(node.lam, node.a)):
+        raise KembaError(labels[0], "the pairs are not linear in the forces")
+    base = ca.substitute([w], [node.lam], [ca.SX.zeros(node.lam.numel())])[0]
+    moving = ca.vertcat(node.v, node.s, node.u)
+    gaps = [
+        i
+        for i in range(len(rows))
+        if _depends(base[i], node.q) and not _depends(base[i], moving)
+    ]
+    rigid = [L[i, :].nnz() == 0 for i in gaps]
+    W, w0 = ca.jacobian(base, node.v), base - ca.jtimes(base, node.v, node.v)
+    for i, hard in zip(gaps, rigid, strict=True):
+        if hard:
+            W[i, :], w0[i] = ca.jacobian(base[i], node.q), 0
+    gap = ca.SX(ca.vertcat(*(base[i] for i in gaps))) if gaps else ca.SX.zeros(0, 1)
     instances = [label.rsplit(":", 1)[0] for label in labels]
     order = list(dict.fromkeys(instances))
-    W, L = ca.jacobian(w, node.v), ca.jacobian(w, node.lam)
-    rest = w - ca.jtimes(w, node.v, node.v)
-    w0 = ca.substitute([rest], [node.lam], [ca.SX.zeros(node.lam.numel())])[0]
-    if rows and _depends(ca.horzcat(W, L), ca.vertcat(node.lam, node.a)):
-        raise KembaError(labels[0], "the pairs are not linear in the forces")
-    for i in gaps:
-        W[i, :] = ca.jacobian(w[i], node.q)
-        w0[i] = 0
-    gap = ca.SX(ca.vertcat(*(w[i] for i in gaps))) if gaps else ca.SX.zeros(0, 1)
     group = np.array([order.index(name) for name in instances], dtype=int)
-    return PairTable(
-        labels, gap, np.array(gaps, dtype=int), group, W, L, w0, _free_speeds(W, L, gaps, group)
-    )
+    index, hard = np.array(gaps, dtype=int), np.array(rigid, dtype=bool)
+    slips = _free_speeds(W, L, gaps, group)
+    return PairTable(labels, gap, index, hard, group, W, L, w0, slips)
 
 
 def _free_speeds(

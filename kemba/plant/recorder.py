@@ -23,15 +23,15 @@ class Recorder:
         self._sources = [*listed.values(), *model.states.values(), *model.inputs.values()]
         self._sources += [*model.forces.values(), *outputs]
 
-    def record(self, now: State) -> None:
-        """Add the row at `now`: values just after it."""
+    def record(self, now: State, sent: Array) -> None:
+        """Add the row at `now`, values just after it, with the inputs as `sent` (nu,)."""
         advance = self.advance
         rows = advance.rows(now)
         a, lam = advance.stepper.instant(now, advance.u, rows, advance.longest)
         self._slip(now, lam, rows)
         y = self.eq.measure(q=now.q, v=now.v, a=a, s=now.s, sd=0.0, lam=lam, u=advance.u)["y"]
         self._times.append(now.time)
-        self._rows.append(np.concatenate([now.q, now.v, now.s, advance.u, lam, y]))
+        self._rows.append(np.concatenate([now.q, now.v, now.s, sent, lam, y]))
 
     def _slip(self, now: State, lam: Array, rows: Array) -> None:
         """Slip speeds of open feet: the least that keeps their pairs true."""

@@ -32,7 +32,7 @@ def first_stage(forms: Forms, at: Symbols) -> Symbols:
     """Complementarity problem w = A lam + b of the first stage."""
     h = at["h"]
     k1, T, _, _ = _first(forms, at)
-    W, L, w0, _ = forms.pair_rows(at["q"] + h * at["v"], at["v"], at["s"], at["u"])
+    W, L, w0, _ = _pairs(forms, at, (at["q"] + h * at["v"], at["v"], at["s"], at["u"]))
     return {"A": W @ (h * T) + L, "b": W @ (at["v"] + h * k1) + w0}
 
 
@@ -56,12 +56,25 @@ def second_stage(forms: Forms, at: Symbols) -> Symbols:
     q2, v2 = q + h * (v + v1) / 2, v + h * (3 * k1 + outer[:, 0]) / 2
     s2 = s + h * (3 * ks1 + ks2) / 2
     T = h / 2 * outer[:, 1:]
-    W, L, w0, gap = forms.pair_rows(q2, v1, s2, u)
+    middle = {"q": q1, "v": v1, "s": s + h * ks1, "u": u}
+    W, L, w0, gap = _pairs(forms, middle, (q2, v1, s2, u))
     for i, row in enumerate(forms.pairs.gaps):
-        w0[int(row)] += PULL_BACK * gap[i] / ca.fmax(h, SHORTEST)
+        if forms.pairs.rigid[i]:
+            w0[int(row)] += PULL_BACK * gap[i] / ca.fmax(h, SHORTEST)
     return {
         "q": q2, "v": v2, "s": s2, "T": T, "A": W @ T + L, "b": W @ v2 + w0, "gap": gap, "W": W,
     }  # fmt: skip
+
+
+def _pairs(forms: Forms, at: Symbols, end: tuple[ca.SX, ...]) -> tuple[ca.SX, ...]:
+    """Pairs as they shall hold at the `end` of a stage; a compliant gap pushes with the force of
+    the state `at` which the stage is evaluated, like any smooth force."""
+    W, L, w0, gap = forms.pair_rows(*end)
+    if len(forms.pairs.compliant):
+        _, L_at, w0_at, _ = forms.pair_rows(at["q"], at["v"], at["s"], at["u"])
+        for row in forms.pairs.compliant:
+            L[int(row), :], w0[int(row)] = L_at[int(row), :], w0_at[int(row)]
+    return W, L, w0, gap
 
 
 def _first(forms: Forms, at: Symbols) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:

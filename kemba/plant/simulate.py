@@ -43,7 +43,8 @@ def simulate(
     `initial`: coordinates, velocities and effect states by column name; the standing pose at rest
     stands for what is missing. `step` [s] is the longest step; valve switchings, controller
     ticks and impacts end steps exactly. `sample` [s], or the times themselves (m,). `dead_time`:
-    valves act later than sent, by the model's own timing. Values at a sample hold just after it.
+    valves act later than sent, by the model's own timing; their columns show them as sent.
+    Values at a sample hold just after it.
     Raises KembaError on unknown names and on models without free motion.
     """
     return run(model, initial, commands, duration, step, sample, dead_time).trajectory
@@ -66,7 +67,7 @@ def run(
     commands = commands or Commands()
     times = _samples(duration, sample)
     profiles = dict(commands.profiles)
-    inputs = Inputs(model, delayed(model, profiles) if dead_time else profiles, commands)
+    inputs = Inputs(model, commands, delayed(model, profiles) if dead_time else profiles)
     advance = Advance(equations_of(model), step)
     recorder = Recorder(model, advance)
     senses = Senses(model)
@@ -80,7 +81,7 @@ def run(
             now = advance.to(now, float(until))
             advance.u = inputs.update(float(until), senses.of(now.q, now.v, now.s))
         if wanted:
-            recorder.record(now)
+            recorder.record(now, inputs.sent(now.time))
     return Run(recorder.trajectory(), tuple(advance.impacts))
 
 

@@ -11,6 +11,9 @@ from kemba.plant.lcp import solve_lcp
 from kemba.trajectory import Array
 
 
+SOFT_REACH = 1e-3  # m; compliant gaps this close take part, whether they push or not
+
+
 @dataclass
 class State:
     """Coordinates q, velocities v and effect states s at a time [s]; `gap` (ng,) [m] and its
@@ -32,15 +35,21 @@ class Stepper:
         self._active = np.zeros(equations.nl, dtype=bool)
 
     def touching(self, gap: Array, reach: float) -> Array:
-        """Rows of the pair table that take part, those of gaps within `reach` [m] closed."""
+        """Rows of the pair table that take part: gaps within `reach` [m] (compliant ones within
+        `SOFT_REACH`) with the friction that belongs to them."""
         pairs = self.eq.pairs
-        near = gap <= reach
+        near = gap <= np.where(pairs.rigid, reach, SOFT_REACH)
         if not near.any():
             return pairs.always
         closed = np.zeros(self.eq.nl, dtype=bool)
         closed[pairs.gaps] = near
         groups = np.isin(pairs.group, pairs.group[closed])
-        return np.flatnonzero(closed | (groups & ~pairs.is_gap) | pairs.always_mask)
+        return np.flatnonzero(closed | (groups & ~pairs.is_gap) | pairs.ungapped)
+
+    def hard(self, rows: Array) -> Array:
+        """Those of `rows` that can pass on an impact: of instances with a rigid gap."""
+        pairs = self.eq.pairs
+        return rows[np.isin(pairs.group[rows], pairs.group[pairs.gaps[pairs.rigid]])]
 
     def step(self, now: State, u: Array, h: float, rows: Array) -> State:
         """The state after `h` [s] with the pairs `rows` held and the others left alone."""
@@ -82,9 +91,12 @@ class Stepper:
         a, T = solved[:, 0], solved[:, 1:]
         if not len(rows):
             return a, np.zeros(self.eq.nl)
-        P = self.eq.ahead(q=now.q + h * now.v, v=now.v, s=now.s, u=u)
-        W = P["W"]
-        lam = self._forces(rows, W @ (h * T) + P["L"], W @ (now.v + h * a) + P["w0"])
+        P, soft = self.eq.ahead(q=now.q + h * now.v, v=now.v, s=now.s, u=u), self.eq.pairs.compliant
+        W, L, w0 = P["W"], P["L"].copy(), P["w0"].copy()
+        L[soft], w0[soft] = E["L"][soft], E["w0"][soft]
+        b = W @ (now.v + h * a) + w0
+        b[self.eq.pairs.gaps] -= np.minimum(now.rate, 0.0)  # touching at rest, not hitting
+        lam = self._forces(rows, W @ (h * T) + L, b)
         return a + T @ lam, lam
 
     def _forces(self, rows: Array, A: Array, b: Array) -> Array:

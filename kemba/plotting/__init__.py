@@ -7,7 +7,7 @@ function to have one that `pyplot.show` opens.
 from kemba.plotting.animation import animate, save_animation
 from kemba.plotting.bench import plot_bench, plot_force_velocity, valve_modes
 from kemba.plotting.diagnosis import Band, plot_bands, plot_heat_map, plot_ladder
-from kemba.plotting.draw import draw
+from kemba.plotting.draw import draw, machine_of
 from kemba.plotting.machine import Machine, load_machine
 from kemba.plotting.motion import plot_motion
 from kemba.plotting.source import Source, default_path, load_source, load_sources
@@ -23,6 +23,7 @@ __all__ = [
     "load_machine",
     "load_source",
     "load_sources",
+    "machine_of",
     "paper_figure",
     "paper_style",
     "plot_bands",

@@ -6,25 +6,39 @@ from collections.abc import Sequence
 
 from matplotlib.figure import Figure
 
+from kemba.config import load_yaml
 from kemba.errors import KembaError
 from kemba.plotting.bench import plot_bench
-from kemba.plotting.machine import load_machine
+from kemba.plotting.machine import Machine, load_machine
 from kemba.plotting.motion import plot_motion
 from kemba.plotting.source import Source
+from kemba.quantity import to_si
 
 
 def draw(
-    sources: Sequence[Source], model: str = "planning", figure: Figure | None = None
+    sources: Sequence[Source], model: str | None = None, figure: Figure | None = None
 ) -> Figure:
-    """All sources over each other; `model` (a path or shipped) has the robot and its limits.
+    """All sources over each other; `model` as in `machine_of`, for the first of them.
 
     Raises KembaError when bench and robot logs are mixed, or have nothing to plot.
     """
     bench = [source for source in sources if source.bench]
     if not bench:
-        return plot_motion(sources, load_machine(model), figure)
+        return plot_motion(sources, machine_of(sources[0], model), figure)
     if len(bench) < len(sources):
         robot = next(source for source in sources if not source.bench)
         hint = f"'{bench[0].name}' is a bench log; plot the two kinds one after the other"
         raise KembaError(robot.name, "is a robot's motion", hint=hint)
     return plot_bench(sources, figure)
+
+
+def machine_of(source: Source, model: str | None = None) -> Machine:
+    """The robot of `model` (a path or a shipped model), else of the run's own task with its
+    supply pressure, else the shipped one. Raises KembaError."""
+    task = source.path.with_name("task.yaml") if source.path else None
+    if model is not None or task is None or not task.is_file():
+        return load_machine(model or "planning")
+    data = load_yaml(task).data
+    asked = data if isinstance(data, dict) else {}
+    supply = to_si(asked["supply"], "Pa") if "supply" in asked else None
+    return load_machine(asked.get("model", "planning"), supply)

@@ -52,10 +52,10 @@ class Machine:
         return np.zeros(len(trajectory)) if optional else None
 
     def _knee(self, leg: str, extension: Array) -> Array:
-        """Knee angles [rad] of piston extensions [m]."""
-        reach = np.clip(extension, -OVERTRAVEL, self.mechanism.stroke + OVERTRAVEL)
-        bend = [knee.flexion(self.robot.leg, x) for x in reach]
-        return self.robot.legs[leg].fold * np.array(bend)
+        """Knee angles [rad] of piston extensions [m], from a table so fine that none can tell."""
+        table = np.linspace(-OVERTRAVEL, self.mechanism.stroke + OVERTRAVEL, 2001)
+        bend = [knee.flexion(self.robot.leg, x) for x in table]
+        return np.asarray(self.robot.legs[leg].fold * np.interp(extension, table, bend))
 
     def points(self, coordinates: Array) -> dict[str, Array]:
         """Places (rows, 2) such as `front/knee` in x and z [m], from coordinates (rows, n)."""
@@ -75,10 +75,11 @@ class Machine:
 
 
 @lru_cache(maxsize=4)
-def load_machine(model: str = "planning") -> Machine:
-    """The robot of a model YAML (a path or a shipped model). Raises KembaError."""
+def load_machine(model: str = "planning", supply: float | None = None) -> Machine:
+    """The robot of a model YAML (a path or a shipped model), fed with `supply` [Pa] instead of
+    the model's own pressure. Raises KembaError."""
     spec = load_spec(model)
-    built, robot = build_model(spec), load_robot(spec.robot or "kemba")
+    built, robot = build_model(spec, supply=supply), load_robot(spec.robot or "kemba")
     mechanism = built.mechanism
     places = ca.Function("places", [mechanism.q], [ca.vertcat(*mechanism.points.values())])
     return Machine(robot, mechanism, _limits(built), places)

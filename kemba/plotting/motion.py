@@ -42,6 +42,7 @@ LEG = (
         (Trace("foot/Fz", "normal", kind="force"), Trace("foot/Fx", "along", kind="force")),
     ),
 )
+STRIP = WIDTH - 0.75  # in, between the labels and the margin
 
 
 @paper_style
@@ -62,18 +63,18 @@ def plot_motion(
     shown = film(sources[0], machine)
     heights = [row[0].height for row in rows]
     if shown:
-        heights.insert(0, strip_height(shown, WIDTH - 0.75))
+        heights.insert(0, strip_height(shown, STRIP))
     figure = paper_figure(sum(heights) + 0.14 * len(heights) + 0.4, figure=figure)
     grid = figure.add_gridspec(len(heights), max(map(len, rows)), height_ratios=heights)
     if shown:
-        draw_strip(figure.add_subplot(grid[0, :]), sources[0], machine, shown, len(sources) == 1)
+        strip = figure.add_subplot(grid[0, :])
+        draw_strip(strip, sources[0], machine, shown, STRIP, valves=len(sources) == 1)
     axes = _axes(figure, grid, rows, first=int(bool(shown)))
     for row, panels in zip(axes, rows, strict=True):
         for ax, panel in zip(row, panels, strict=True):
             draw_panel(ax, panel, sources, machine.limits)
             shade(ax, stance_spans(sources[0], machine, panel.owner))
-    for ax, panel in zip(axes[0], rows[0], strict=True):
-        widen(ax, panel.least)
+            widen(ax, panel.least)
     _name_legs(axes, rows, legs)
     if len(sources) > 1:
         name_sources(figure, sources)

@@ -133,5 +133,6 @@ def _raster(axes: Axes, panel: Panel, sources: Sequence[Source]) -> None:
 
 def shade(axes: Axes, spans: Sequence[tuple[float, float]]) -> None:
     """Grey bands over the whole height, behind everything."""
-    for start, end in spans:
-        axes.axvspan(start, end, color=SHADE, lw=0, zorder=0, gid="stance")
+    bars = [(start, end - start) for start, end in spans]
+    whole = axes.get_xaxis_transform()
+    axes.broken_barh(bars, (0, 1), transform=whole, fc=SHADE, lw=0, zorder=0, gid="stance")

@@ -13,9 +13,11 @@ from kemba.plotting.sticks import Pose, StickFigure, poses
 from kemba.plotting.style import GREY, INK, SHADE
 from kemba.trajectory import Array
 
-FRAMES = 8
-GAP = 0.06  # m between neighbours
-HEAD, FOOT = 0.04, 0.14  # m above the highest figure, and below the ground for the times
+FRAMES = 7  # odd: the middle of a jump is its apex
+GAP = 0.08  # m between neighbours
+HEAD = 0.04  # m above the highest figure
+FOOT = 0.24  # in below the ground, for the times
+LARGE = 1.4  # in per metre at which lines have their full width
 
 
 def film(source: Source, machine: Machine, frames: int = FRAMES) -> list[Pose]:
@@ -27,30 +29,39 @@ def film(source: Source, machine: Machine, frames: int = FRAMES) -> list[Pose]:
 def strip_height(shown: list[Pose], width: float) -> float:
     """Height [in] of a strip of `width` [in] in which the figures just fit."""
     left, right, top = _extent(shown, _shifts(shown))
-    return width * (top + HEAD + FOOT) / (right - left)
+    return width * (top + HEAD) / (right - left) + FOOT
 
 
 def draw_strip(
-    axes: Axes, source: Source, machine: Machine, shown: list[Pose], valves: bool = True
+    axes: Axes,
+    source: Source,
+    machine: Machine,
+    shown: list[Pose],
+    width: float,
+    valves: bool = True,
 ) -> None:
     """The figures of `shown` from left to right, times below, and the body's path through them.
 
-    `valves` colours the cylinders by their valves.
+    `width` [in] is that of the axes; `valves` colours the cylinders by their valves.
     """
     shifts = _shifts(shown)
+    left, right, top = _extent(shown, shifts)
+    scale = width / (right - left)
     for number, (pose, shift) in enumerate(zip(shown, shifts, strict=True)):
-        StickFigure(axes, machine.mechanism.legs, valves=valves).show(pose, shift)
+        thick = min(1.0, scale / LARGE)
+        StickFigure(axes, machine.mechanism.legs, thick, valves).show(pose, shift)
         label = f"{pose.time:.2f}" + " s" * (number == 0)
-        at = pose.centre[0] + shift, -0.05
-        axes.text(*at, label, ha="center", va="top", fontsize=7, color=INK)
+        at = float(pose.centre[0] + shift), 0.0
+        axes.annotate(
+            label, at, (0, -6), textcoords="offset points", ha="center", va="top", fontsize=7
+        )
     times = np.linspace(shown[0].time, shown[-1].time, 40 * len(shown))
     path = np.array([pose.centre for pose in poses(source, machine, times)])
     path[:, 0] += np.linspace(shifts[0], shifts[-1], len(times))
     axes.plot(path[:, 0], path[:, 1], color=GREY, lw=0.7, zorder=2, gid="path")
-    left, right, top = _extent(shown, shifts)
     draw_ground(axes)
     axes.set_xlim(left, right)
-    axes.set_ylim(-FOOT, top + HEAD)
+    axes.set_ylim(-FOOT / scale, top + HEAD)
 
 
 def draw_ground(axes: Axes) -> None:

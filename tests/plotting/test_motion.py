@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,7 +11,15 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from kemba.errors import KembaError
-from kemba.plotting import Machine, Source, draw, plot_motion, save_figure
+from kemba.plotting import (
+    Machine,
+    Source,
+    draw,
+    load_source,
+    machine_of,
+    plot_motion,
+    save_figure,
+)
 from kemba.plotting.motion import stance_spans
 from kemba.trajectory import Trajectory
 
@@ -91,6 +100,14 @@ def test_limits_are_shown(plan: Source, machine: Machine) -> None:
     assert limits("front/piston/F") == []
 
 
+def test_limits_follow_the_runs_own_supply(tmp_path: Path, jump: Callable[..., Trajectory]) -> None:
+    jump(5).write(tmp_path / "run/trajectory.csv")
+    (tmp_path / "run/task.yaml").write_text("model: planning\nsupply: 6 bar\n")
+    source = load_source(tmp_path / "run")
+    assert machine_of(source).limits["chamber/F"] == (287.0, 239.0)
+    assert machine_of(source, "planning").limits["chamber/F"] == (324.0, 260.0)
+
+
 def test_valves_are_bars_over_the_time_they_are_on(plan: Source, machine: Machine) -> None:
     figure = plot_motion([plan], machine)
     rows = [c for axes in figure.axes for c in axes.collections if "valve" in str(c.get_gid())]
@@ -105,7 +122,8 @@ def test_valves_are_bars_over_the_time_they_are_on(plan: Source, machine: Machin
 def test_stance_is_shaded_in_every_panel(plan: Source, log: Source, machine: Machine) -> None:
     figure = plot_motion([plan], machine)
     for axes in figure.axes[1:]:
-        assert sum(patch.get_gid() == "stance" for patch in axes.patches) == 2
+        (bands,) = (c for c in axes.collections if c.get_gid() == "stance")
+        assert len(bands.get_paths()) == 2
     (_, takeoff), (landing, _) = stance_spans(log, machine, "front")  # from the foot's height
     assert (takeoff, landing) == pytest.approx((0.20, 0.49), abs=0.03)
 

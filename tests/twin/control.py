@@ -17,8 +17,8 @@ from .numbers import (
     TIBIA,
 )
 
-# Columns of one control row: angle, rate, torque (2 legs each), follow, kp, kd, kp and kd of pitch.
-R_Q, R_QD, R_TAU, R_FOLLOW, R_KP, R_KD, R_PITCH, R_PITCHD, R_COUNT = 0, 2, 4, 6, 7, 8, 9, 10, 11
+# Columns of one control row: angle, rate, torque (2 legs each), follow, kp, kd.
+R_Q, R_QD, R_TAU, R_FOLLOW, R_KP, R_KD, R_COUNT = 0, 2, 4, 6, 7, 8, 9
 _SLOPE = RATED_TORQUE / (NO_LOAD_SPEED - RATED_SPEED)
 _ARM, _TILT = np.hypot(FEMUR, MOUNT), np.arctan2(MOUNT, FEMUR)
 _CLOSED_LENGTH = 0.2057
@@ -41,7 +41,7 @@ def limited(torque, speed):
 
 
 @njit
-def hip_command(leg, q, w, x, v, pitch, pitch_rate, row):
+def hip_command(leg, q, w, x, v, row):
     """PD and feed-forward; with `follow` the reference keeps the foot under the hip."""
     q_ref, w_ref = row[R_Q + leg], row[R_QD + leg]
     if row[R_FOLLOW] > 0.0:
@@ -50,6 +50,4 @@ def hip_command(leg, q, w, x, v, pitch, pitch_rate, row):
         q_ref -= row[R_FOLLOW] * s * fold_angle(x)
         w_ref -= row[R_FOLLOW] * s * slope * v
     torque = row[R_KP] * (q_ref - q) + row[R_KD] * (w_ref - w) + row[R_TAU + leg]
-    # the hips turn the body level against the feet: a positive pitch asks for a positive torque
-    torque += row[R_PITCH] * pitch + row[R_PITCHD] * pitch_rate
     return limited(torque, w)

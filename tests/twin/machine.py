@@ -1,6 +1,6 @@
 """Equations of motion and the integration loop of the whole robot.
 
-State y: 27 positions, 27 velocities, 2 x N_AIR air states, the supply.  Classical Runge-Kutta with
+State y: 27 positions, 27 velocities, 2 x N_AIR air states, the supply.  Explicit Runge-Kutta with
 steps that end on every valve event and control tick; after each tick the pose is projected back on
 the constraints.
 """
@@ -241,7 +241,7 @@ def integrate(
     outputs, commands = np.empty((total, NOUT)), np.empty((n + 1, 2))
     valves = np.empty((total, 4))
     ws = workspace()
-    dy, stage, acc_dy = np.empty(NY), np.empty(NY), np.empty(NY)
+    dy, stage = np.empty(NY), np.empty(NY)
     out, command = np.empty(NOUT), np.zeros(2)
     project(y, s, leg, body, mass, inertia, ws)
     t, event, row = ticks[0], 0, 0
@@ -250,7 +250,7 @@ def integrate(
             x, v, _, _ = piston_state(y, m)
             f = 3 + 12 * m
             command[m] = hip_command(
-                m, y[f + 2] - y[2], y[NQ + f + 2] - y[NQ + 2], x, v, y[2], y[NQ + 2], refs[k]
+                m, y[f + 2] - y[2], y[NQ + f + 2] - y[NQ + 2], x, v, refs[k]
             )
             commands[k, m] = command[m]
         push = pushes[k]
@@ -274,7 +274,7 @@ def integrate(
                 h = (until - t) / steps
                 for _ in range(steps):
                     _step(y, h, u, command, push, anchor, mass, inertia, s, air, leg, body, ws,
-                          dy, stage, acc_dy, out)  # fmt: skip
+                          dy, stage, out)  # fmt: skip
                 t = until
                 while event < events.shape[0] and events[event, 0] <= t + 1e-12:
                     u[int(events[event, 1])] = events[event, 2]
@@ -287,22 +287,17 @@ def integrate(
 
 
 @njit
-def _step(y, h, u, command, push, anchor, mass, inertia, s, air, leg, body, ws, dy, stage, total,
-          out):  # fmt: skip
-    """One classical Runge-Kutta step; the friction anchors move after it."""
+def _step(y, h, u, command, push, anchor, mass, inertia, s, air, leg, body, ws, dy, stage, out):
+    """One strong-stability-preserving Runge-Kutta step (order 3); friction anchors move after it."""
     rates(y, u, command, push, anchor, mass, inertia, s, air, leg, body, ws, dy, out)
     for i in range(NY):
-        total[i] = dy[i]
-        stage[i] = y[i] + 0.5 * h * dy[i]
-    for n in range(2):
-        rates(stage, u, command, push, anchor, mass, inertia, s, air, leg, body, ws, dy, out)
-        reach = 0.5 * h if n == 0 else h
-        for i in range(NY):
-            total[i] += 2.0 * dy[i]
-            stage[i] = y[i] + reach * dy[i]
+        stage[i] = y[i] + h * dy[i]
     rates(stage, u, command, push, anchor, mass, inertia, s, air, leg, body, ws, dy, out)
     for i in range(NY):
-        y[i] += h / 6.0 * (total[i] + dy[i])
+        stage[i] = 0.75 * y[i] + 0.25 * (stage[i] + h * dy[i])
+    rates(stage, u, command, push, anchor, mass, inertia, s, air, leg, body, ws, dy, out)
+    for i in range(NY):
+        y[i] = (y[i] + 2.0 * (stage[i] + h * dy[i])) / 3.0
     for n in range(2):
         fx, fz, _, vz, _, _ = foot_state(y, n)
         anchor[n] = creep(anchor[n], fx, foot_normal(-fz, -vz, body), body, s[S_MU])

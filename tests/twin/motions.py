@@ -7,7 +7,7 @@ import numpy as np
 from .layout import knees
 from .numbers import STANCE_Z
 from .plan import Sight, Wish, fold_of, length_of, record, slope_of
-from .run import Truth
+from .run import Truth, simulate
 from .scripts import (
     FRONT_E,
     FRONT_R,
@@ -41,7 +41,7 @@ class Leaper:
         self.tuck = rng.uniform(0.02, 0.045) if rng.random() < 0.5 else None
         self.skew = rng.normal(0.0, 0.0015, 2).clip(-0.003, 0.003)
         self.from_hips = None
-        self.sink = (0.3, 0.0)
+        self.sink = (0.3, 0.0, 0.0, 15.0)
         self.done = None
 
     def _enter(self, phase: str, see: Sight) -> None:
@@ -49,12 +49,8 @@ class Leaper:
         if phase == "air":
             self.from_hips = tuple(see.y[3:5])
         if phase == "land":
-            self.sink = (
-                see.y[1] - 0.0,
-                float(see.w[1]),
-                0.5 * (see.y[5] - see.y[6]),
-                self.rng.uniform(13.0, 18.0),
-            )
+            skew = 0.5 * (see.y[5] - see.y[6])
+            self.sink = (see.y[1], see.w[1], skew, self.rng.uniform(13.0, 18.0))
         if phase == "rest":
             self.wait = self.rng.uniform(0.08, 0.16)
             if not self.pushes:
@@ -143,11 +139,11 @@ def jump(rng, height=None, lean=0.0, rate=1000.0, jitter=0.0, name="jump") -> Sc
 
 
 def forward_jump(rng, rate=1000.0, jitter=0.0) -> Script:
-    lean = rng.uniform(0.05, 0.12) * rng.choice([-1.0, 1.0])
+    lean = rng.uniform(0.03, 0.08) * rng.choice([-1.0, 1.0])
     return jump(rng, rng.uniform(0.42, 0.6), lean, rate, jitter, "forward")
 
 
-def hops(rng, count=3, rate=1000.0, jitter=0.0) -> Script:
+def hops(rng, count=2, rate=1000.0, jitter=0.0) -> Script:
     """Small hops, one after the other."""
     goal = Leaper(rng, [push_for(h) for h in rng.uniform(0.36, 0.46, count)])
     goal.tuck = None
@@ -163,32 +159,47 @@ def drop(rng, height=None, rate=1000.0, jitter=0.0) -> Script:
     return record("drop", clock(2.0, rate, jitter, rng), begin, goal, stop=goal.finished)
 
 
-def squat(rng, duration=2.5, rate=1000.0, jitter=0.0, fast=False) -> Script:
-    """Knee squats: body height on a slow wave, front and rear a little unlike."""
+class Squats:
+    """Goal: one knee bend after another.  Between them the pistons rest on their ends, which ends
+    the slow drift apart of front and rear that open-loop valves cannot hold."""
+
+    def __init__(self, rng, fast: bool):
+        self.rng, self.fast, self.begin = rng, fast, 0.03
+        self._draw()
+
+    def _draw(self):
+        rng = self.rng
+        self.period = rng.uniform(0.4, 0.55) if self.fast else rng.uniform(0.6, 0.85)
+        self.depth = rng.uniform(0.05, 0.1) if self.fast else rng.uniform(0.08, 0.16)
+        self.tilt = rng.uniform(-0.008, 0.008)
+        self.pause = rng.uniform(0.1, 0.16)
+
+    def _length(self, t: float, sign: float) -> float:
+        phase = np.clip(t / self.period, 0.0, 1.0)
+        wave = 0.5 - 0.5 * np.cos(2 * np.pi * phase)
+        return STANCE_Z + wave * (self.depth + sign * self.tilt)
+
+    def __call__(self, see: Sight) -> Wish:
+        t = see.t - self.begin
+        if t > self.period + self.pause:
+            self.begin = see.t
+            self._draw()
+            t = 0.0
+        now = [piston_of(self._length(t, s)) for s in (1.0, -1.0)]
+        before = [piston_of(self._length(t - 1e-3, s)) for s in (1.0, -1.0)]
+        resting = t < 0.0 or t > self.period - 0.03
+        return Wish(
+            x=(now[0], now[1]),
+            v=((now[0] - before[0]) / 1e-3, (now[1] - before[1]) / 1e-3),
+            valves=(0, 0, 0, 0) if resting else None,
+            stiff=20.0,
+        )
+
+
+def squat(rng, duration=2.4, rate=1000.0, jitter=0.0, fast=False) -> Script:
+    """Knee squats, front and rear a little unlike."""
     ticks = clock(duration, rate, jitter, rng)
-    f = rng.uniform(1.3, 1.9) if fast else rng.uniform(0.5, 0.9)
-    depth = rng.uniform(0.05, 0.09) if fast else rng.uniform(0.07, 0.15)
-    tilt = rng.uniform(0.0, 0.02, 2)
-    phase = rng.uniform(-0.5, 0.5)
-
-    def length(t, leg):
-        start = min(t / 0.2, 1.0)
-        wave = 0.5 - 0.5 * np.cos(2 * np.pi * f * t)
-        lean = tilt[leg] * np.sin(2 * np.pi * 1.7 * f * t + phase + 2.0 * leg)
-        return STANCE_Z + start * (0.02 + lean) + depth * wave
-
-    def goal(see: Sight) -> Wish:
-        x, v, hips, rates = [], [], [], []
-        for leg, s in ((0, 1.0), (1, -1.0)):
-            now = piston_of(length(see.t, leg))
-            before = piston_of(length(see.t - 1e-3, leg))
-            x.append(now)
-            v.append((now - before) / 1e-3)
-            hips.append(-s * fold_of(now) - see.y[2] * 0.0)
-            rates.append(-s * (fold_of(now) - fold_of(before)) / 1e-3)
-        return Wish(x=tuple(x), v=tuple(v), hips=tuple(hips), hip_rates=tuple(rates))
-
-    return record("heave" if fast else "squat", ticks, Start(), goal)
+    return record("heave" if fast else "squat", ticks, Start(), Squats(rng, fast))
 
 
 def heave(rng, duration=2.0, rate=1000.0, jitter=0.0) -> Script:
@@ -252,3 +263,14 @@ MOTIONS = {
     "drop": drop,
     "sway": sway,
 }
+
+
+def motion(name: str, seed: int, rate: float = 1000.0, jitter: float = 0.0) -> Script:
+    """A motion that the nominal robot survives when it runs open loop; redrawn until it does."""
+    for attempt in range(12):
+        rng = np.random.default_rng([seed, attempt, sum(name.encode())])
+        draft = MOTIONS[name](rng, rate=rate, jitter=jitter)
+        truth = simulate(draft)
+        if sane(truth) and np.abs(truth.y[:, 2]).max() < 0.35:
+            return draft
+    raise RuntimeError(f"{name} {seed}: no draw kept its feet")

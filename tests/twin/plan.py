@@ -13,10 +13,10 @@ import numpy as np
 
 from . import catalogue, layout, machine
 from .bodies import NQ
-from .control import R_COUNT, R_FOLLOW, R_KD, R_KP, R_PITCH, R_PITCHD, R_Q, R_QD, R_TAU
+from .control import R_COUNT, R_FOLLOW, R_KD, R_KP, R_Q, R_QD, R_TAU
 from .numbers import DEAD_TIME, Robot, leg_fold
 from .run import STEP, initial_state, scalars
-from .scripts import KD, KD_PITCH, KP, KP_PITCH, Script, Start
+from .scripts import KD, KP, Script, Start
 
 _X = np.linspace(0.0, 0.07, 71)
 _L = np.array([leg_fold(x)[0] for x in _X])
@@ -133,7 +133,6 @@ def record(
     refs[:, R_QD : R_QD + 2] = _smooth(speeds[:n])
     refs[:, R_TAU : R_TAU + 2] = _smooth(commands[:n])
     refs[:, R_KP], refs[:, R_KD] = kp, kd
-    refs[:, R_PITCH], refs[:, R_PITCHD] = KP_PITCH, KD_PITCH
     return Script(name, ticks[:n].copy(), refs, sent[:n].copy(), start)
 
 
@@ -146,7 +145,6 @@ def _look(t: float, y: np.ndarray) -> Sight:
 def _row(wish: Wish, kp: float, kd: float) -> np.ndarray:
     row = np.zeros(R_COUNT)
     row[R_KP], row[R_KD] = kp, kd
-    row[R_PITCH], row[R_PITCHD] = KP_PITCH, KD_PITCH
     if wish.hips is None:
         row[R_FOLLOW] = 1.0
         row[R_Q : R_Q + 2] = wish.hip_offset

@@ -8,12 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from .control import R_COUNT, R_FOLLOW, R_KD, R_KP, R_PITCH, R_PITCHD, R_Q, R_QD, R_TAU
+from .control import R_COUNT, R_FOLLOW, R_KD, R_KP, R_Q, R_QD, R_TAU
 from .numbers import HALF_BODY, STANCE_HIP, STANCE_Z, leg_fold
 from .valves import VALVES
 
 KP, KD = 150.0, 3.0
-KP_PITCH, KD_PITCH = 60.0, 6.0  # the body is turned level by the hips, against the feet
 FRONT_E, FRONT_R, REAR_E, REAR_R = range(4)
 
 

@@ -47,7 +47,7 @@ class Rig:
         results = ca.vertcat(force, ca.jacobian(force, node.v), ca.jacobian(force, node.u).T)
         self._output = ca.Function("output", inputs, [results])
         self._step = _runge_kutta(node, rate)
-        self._maps: dict[tuple[str, int], ca.Function] = {}
+        self._maps: dict[tuple[str, int], _Call] = {}
         self._start = np.array([q.value for q in model.states.values()])
 
     def timing(self, values: Mapping[str, float]) -> tuple[float, float]:
@@ -79,7 +79,7 @@ class Rig:
         blurred = np.stack([_share(v, motion.time) for v in valves])
         n = len(motion.time)
         columns = [s, motion.x, motion.v, motion.a, blurred, np.repeat(p[:, None], n, axis=1)]
-        out = np.asarray(self._mapped("output", n)(*map(_dense, columns)))
+        out = self._mapped("output", n)(*columns)
         states = dict(zip(self._state_names, s, strict=True))
         return Prediction(out[0], out[1], out[2:4].T, blurred.T, states)
 
@@ -95,9 +95,7 @@ class Rig:
         drive = np.stack(
             [np.diff(times), x[:-1], v[:-1], a[:-1], xm, vm, am, x[1:], v[1:], a[1:], *u[:, :-1]]
         )
-        later = np.asarray(
-            self._mapped("step", n)(s0, _dense(drive), _dense(np.repeat(p[:, None], n, axis=1)))
-        )
+        later = self._mapped("step", n)(s0, drive, np.repeat(p[:, None], n, axis=1))
         return np.concatenate([s0[:, None], later], axis=1)
 
     def _equilibrium(self, motion: Array, u: Array, p: Array) -> Array:
@@ -111,15 +109,32 @@ class Rig:
                 break
         return s
 
-    def _mapped(self, kind: str, n: int) -> ca.Function:
+    def _mapped(self, kind: str, n: int) -> _Call:
         if (kind, n) not in self._maps:
             one = self._step if kind == "step" else self._output
-            self._maps[kind, n] = one.mapaccum(n) if kind == "step" else one.map(n)
+            self._maps[kind, n] = _Call(one.mapaccum(n) if kind == "step" else one.map(n))
         return self._maps[kind, n]
 
     @cached_property
     def state_names(self) -> tuple[str, ...]:
         return tuple(self._state_names)
+
+
+class _Call:
+    """A CasADi function called on NumPy arrays without copying element by element."""
+
+    def __init__(self, function: ca.Function) -> None:
+        self._buffer, self._evaluate = function.buffer()
+        self._function, self._shape = function, function.size_out(0)
+
+    def __call__(self, *arguments: Array) -> Array:
+        kept = [np.asfortranarray(a, dtype=float).reshape(-1, order="F") for a in arguments]
+        for i, a in enumerate(kept):
+            self._buffer.set_arg(i, memoryview(a))
+        out = np.zeros(self._shape[0] * self._shape[1])
+        self._buffer.set_res(0, memoryview(out))
+        self._evaluate()
+        return out.reshape(self._shape, order="F")
 
 
 def _runge_kutta(node: Any, rate: ca.SX) -> ca.Function:
@@ -167,10 +182,6 @@ def _share(intervals: Array, times: Array) -> Array:
 
 def _columns(motion: Motion) -> tuple[Array, Array, Array]:
     return motion.x, motion.v, motion.a
-
-
-def _dense(columns: Array) -> ca.DM:
-    return ca.DM(np.atleast_2d(columns))
 
 
 def _own(effect: Effect, values: Mapping[str, float]) -> dict[str, float]:

@@ -14,7 +14,7 @@ from kemba.identify.bench.motion import Motion, difference_sigma, smooth_motion
 from kemba.identify.bench.plant import Prediction, Pulses, Rig
 from kemba.identify.bench.switching import pulses
 from kemba.identify.candidates import effect_candidates, sensor_candidates
-from kemba.identify.noise import Colour, whiten
+from kemba.identify.noise import Colour, learn, whiten
 from kemba.identify.problem import Array, Candidate, Rows, Theta, secant_jacobian
 from kemba.model.model import Model
 from kemba.trajectory import Trajectory
@@ -202,6 +202,17 @@ class BenchProblem:
 
     def library(self, theta: Theta) -> Mapping[str, Array]:
         return {}
+
+    def recolour(self, residual: Array | None) -> None:
+        """Learn each series' colour from residuals (n,) that were not whitened, or forget it."""
+        self.colour = {}
+        if residual is None:
+            return
+        rows = self.rows()
+        for i in range(len(self._runs)):
+            for k in np.unique(rows.channel[rows.run == i]):
+                own = (rows.run == i) & (rows.channel == k)
+                self.colour[i, int(k)] = learn(residual[own])
 
     # -- how the logs begin -----------------------------------------------------------------
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from scipy.ndimage import binary_dilation, binary_erosion
+from scipy.signal import savgol_filter
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Flags = np.ndarray[Any, np.dtype[np.bool_]]
@@ -16,6 +17,7 @@ NEAR_STOP = 0.4e-3  # m from the level at which pistons rest
 BLUR = 0.004  # s by which contact is thought to begin earlier and end later
 SETTLED = 0.010  # s within contact before a foot's height is trusted
 SLOW_FOOT, SLIDING, SLOW_BODY = 0.15, 0.06, 0.05  # m.s-1
+RATE_WINDOW = 0.02  # s
 
 
 @dataclass(frozen=True)
@@ -34,11 +36,12 @@ class Schedule:
 
 
 def read_schedule(
-    time: Array, feet: Array, feet_rate: Array, pistons: Array, stroke: float, speed: Array
+    time: Array, feet: Array, pistons: Array, stroke: float, body: Array
 ) -> Schedule:
-    """The schedule of one run from feet (n, legs, [x, z]) and their rates, pistons (n, legs),
-    and the speed (n,) of the fastest coordinate."""
+    """The schedule of one run from feet (n, legs, [x, z]), pistons (n, legs) and body (n, k)."""
     dt = max(float(np.median(np.diff(time))), 1e-4)
+    feet_rate = slope(feet, dt)
+    speed = np.abs(slope(body, dt)).max(axis=1)
     blur, settle = max(1, round(BLUR / dt)), max(1, round(SETTLED / dt))
     legs = range(feet.shape[1])
     touch, settled, struck, slides, low, high = ([] for _ in range(6))
@@ -63,6 +66,12 @@ def read_schedule(
     return Schedule(
         may, np.stack(settled, 1), hit, np.stack(slides, 1), np.stack(low, 1), np.stack(high, 1), phase
     )
+
+
+def slope(values: Array, dt: float) -> Array:
+    """Rate of a noisy signal (n, ...) over a few hundredths of a second."""
+    window = min(2 * max(2, round(RATE_WINDOW / dt / 2)) + 1, (len(values) - 1) // 2 * 2 + 1)
+    return np.asarray(savgol_filter(values, window, 2, deriv=1, delta=dt, axis=0))
 
 
 def ground_level(z: Array, rate: Array) -> float:

@@ -19,6 +19,7 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 # Spectral densities (variance per Hz times s): force of body x, z [N2.s], then moments.
 KINEMATIC = {"body/x": 30.0, "body/z": 60.0, "body/pitch": 300.0, "hip": 2e3, "knee": 2e5}
 GROUND_SIGMA, GROUND_PRIOR, GROUND_WANDER = 1e-4, 5e-4, 1e-4 / np.sqrt(0.02)
+ANCHOR_PRIOR, ANCHOR_FREE = 3.0, 1.0  # m, m.s-1/2: where along the ground a foot stands
 CONTACT, IMPACT = 300.0, 3e4  # N2.s
 UNKNOWN_AIR, AIR_FADES = 100.0, 0.025  # N2.s at the start of a log that does not begin at rest
 
@@ -93,10 +94,8 @@ def schedules(physics: Physics, batch: Batch, ref: Reference) -> list[Schedule]:
     """Contact read from the motion of each run."""
     q, v = batch.flat(ref.q), batch.flat(ref.v)
     legs = len(physics.legs)
-    feet, rates, _ = physics.call("feet", q, v)
+    feet = batch.deep(physics.call("feet", q, v)[0].reshape(-1, legs, 2))
     y = batch.deep(physics.call("measured", q, v)[0])
-    feet, rates = (batch.deep(a.reshape(-1, legs, 2)) for a in (feet, rates))
-    speed = np.abs(ref.v).max(axis=2)
     found = []
     for i, track in enumerate(batch.tracks):
         n = len(track.time)
@@ -104,10 +103,9 @@ def schedules(physics: Physics, batch: Batch, ref: Reference) -> list[Schedule]:
             read_schedule(
                 track.time,
                 feet[:n, i],
-                rates[:n, i],
                 y[:n, i, -legs:],
                 physics.mechanism.stroke,
-                speed[:n, i],
+                ref.q[:n, i, :3],
             )
         )
     return found
@@ -158,12 +156,11 @@ def air_states(
         k = len(SETTLING)
         lead = [np.repeat(a[:, :1], k, axis=1) for a in (q, 0 * v, u)]
         joined = [np.hstack(pair) for pair in zip(lead, (q, v, u), strict=True)]
-        s = physics.states.run(np.append(SETTLING, h), *joined, p)[:, k:].T
-        nodes = s[index]
-        states.append(np.vstack([0.5 * (nodes[1:] + nodes[:-1]), nodes[-1:]]))
-        share = np.add.reduceat(np.append(u * h, 0 * u[:, :1], axis=1), index, axis=1).T
-        width = np.append(np.diff(track.time), 1.0)[:, None]
-        inputs.append(np.vstack([(share / width)[:-1], u[:, -1:].T]))
+        s = physics.states.run(np.append(SETTLING, h), *joined, p)[:, k:]
+        width = np.append(np.diff(track.time), 1.0)
+        for values, store in ((s, states), (u, inputs)):
+            sums = np.add.reduceat(np.append(values * h, 0 * values[:, :1], axis=1), index, axis=1)
+            store.append(np.vstack([(sums / width).T[:-1], values[:, -1:].T]))
     return batch.pad(states, 0.0), batch.pad(inputs, 0.0)
 
 

@@ -1,0 +1,86 @@
+"""Executing a run several times, as on hardware, and writing the logs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kemba.errors import KembaError
+from kemba.model import Model
+from kemba.plant.commands import Profile
+from kemba.plant.controller import Execution, Gains, execute, read_controller
+from kemba.plant.replay import Replay
+from kemba.plant.sensors import Sensors, take_log
+from kemba.trajectory import Trajectory
+
+VALVE_SCATTER = 1e-4  # s, 1 sigma of every switching on hardware; Fig. 3 shows less than 1 ms
+
+
+@dataclass(frozen=True)
+class Repeat:
+    """One execution: the log that was written, and how it compares with the plan (None without
+    a plan)."""
+
+    path: Path
+    execution: Execution
+    replay: Replay | None
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The figures of `kemba-opt simulate --json` for this log."""
+        motion = self.execution.trajectory
+        facts = {"log": str(self.path), "apex_m": float(motion["body/z"].max())}
+        return facts | (self.replay.summary() if self.replay else {})
+
+
+def repeat_run(
+    run: str | Path,
+    model: Model,
+    out: str | Path,
+    count: int = 1,
+    noise: bool = False,
+    seed: int = 0,
+    gains: Gains | None = None,
+) -> list[Repeat]:
+    """Execute the controller of a run `count` times on `model` and write `log-1.csv`, ... to `out`.
+
+    With `noise`, sensors are noisy and the valves scatter; the same `seed` gives the same logs.
+    Raises KembaError when `run` has no controller table.
+    """
+    folder = Path(run)
+    controller = folder / "controller.csv" if folder.is_dir() else folder
+    if not controller.is_file():
+        raise KembaError(str(run), "has no controller.csv", hint="make one with: kemba-opt solve")
+    table = read_controller(controller)
+    plan_file = controller.parent / "trajectory.csv"
+    plan = Trajectory.read(plan_file) if plan_file.is_file() else None
+    repeats = []
+    for number in range(1, count + 1):
+        rng = np.random.default_rng([seed, number])
+        sensors = Sensors.usual() if noise else Sensors()
+        scattered = _scattered(model, table, rng) if noise else None
+        sample = sensors.times(float(table.time[-1]), rng)
+        done = execute(table, model, gains, valves=scattered, sample=sample)
+        log = take_log(done.trajectory, sensors, rng, model.effects)
+        log.meta |= {"run": number, "repeat_of": controller.parent.name, "plant": model.name}
+        path = Path(out) / f"log-{number}.csv"
+        log.write(path)
+        repeats.append(Repeat(path, done, done.against(model, plan) if plan else None))
+    return repeats
+
+
+def _scattered(
+    model: Model, table: Trajectory, rng: np.random.Generator
+) -> dict[str, Profile]:
+    """The valve commands with every switching moved a little."""
+    moved = {}
+    for quantity in model.inputs.values():
+        if quantity.binary:
+            profile = Profile.of(table.time, table[quantity.name])
+            times = profile.times.copy()
+            times[1:] += rng.normal(0.0, VALVE_SCATTER, len(times) - 1)
+            moved[quantity.name] = replace(profile, times=np.maximum.accumulate(times))
+    return moved

@@ -1,0 +1,182 @@
+"""What every effect of the catalogue promises, tried on each of them."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+from contract.cases import (
+    BY_KIND,
+    KINDS,
+    example,
+    model_of,
+    points,
+    slopes,
+    values_of,
+    without,
+)
+
+from kemba.config import parse
+from kemba.document import dump_yaml, load_text
+from kemba.effects.sensors import SensorEffect
+from kemba.model.spec import ModelSpec
+from kemba.ocp.mirror import find_symmetry
+from kemba.quantity import is_si
+
+pytestmark = pytest.mark.parametrize("kind", KINDS)
+
+LOPSIDED = {"com_offset", "expression"}  # a mirror image of theirs is another value
+
+
+def test_is_documented(kind: str) -> None:
+    effect = BY_KIND[kind]
+    assert effect.__doc__ and effect.__doc__ != effect.__base__.__doc__
+    assert effect.family and effect.equation and effect.source
+    for name, param in effect.declared().items():
+        assert is_si(param.unit) and param.doc, f"{kind}.{name}"
+        assert math.isfinite(param.size) and param.size > 0
+    for role in ("states", "inputs", "forces"):
+        for quantity in getattr(example(kind), role)().values():
+            assert is_si(quantity.unit) and quantity.doc, f"{kind}: {quantity.name}"
+
+
+def test_off_value_is_admissible(kind: str) -> None:
+    effect = BY_KIND[kind]
+    assert set(effect.off) <= set(effect.declared())
+    for name, off in effect.off.items():
+        param = effect.declared()[name]
+        assert param.lower <= off <= param.upper
+        if math.isfinite(off):
+            assert effect.model_fields[name].default == off, "listed without a value: off"
+    assert set(example(kind).shapes()).isdisjoint(effect.off)
+
+
+def test_yaml_round_trip(kind: str) -> None:
+    effect = example(kind)
+    text = dump_yaml({"effects": [effect.listed()]})
+    assert parse(load_text(text, "model.yaml"), ModelSpec).effects == (effect,)
+    json.dumps(effect.listed())
+
+
+def test_schema_names_units(kind: str) -> None:
+    schema = json.dumps(BY_KIND[kind].model_json_schema())
+    for param in BY_KIND[kind].declared().values():
+        assert f'"unit": "{param.unit}"' in schema
+
+
+@pytest.mark.parametrize("rig", [False, True], ids=["robot", "rig"])
+def test_residual_and_gradient_are_finite(kind: str, rig: bool) -> None:
+    effect = example(kind)
+    if rig and not set(effect.ports) <= {"piston"}:
+        pytest.skip("not on the bench")
+    if rig and kind == "end_stop":
+        pytest.skip("the bench imposes the motion")
+    model = model_of(effect, rig=rig)
+    free = [f"{effect.name}.{name}" for name in effect.parameters()]
+    p = [effect.value(name) for name in effect.parameters()]
+    both = slopes(model, free)
+    for point in points(model):
+        for name, value in both(**point, p=p).items():
+            assert np.isfinite(np.asarray(value)).all(), f"{kind}: {name} at {point}"
+
+
+def test_every_parameter_matters(kind: str) -> None:
+    effect = example(kind)
+    if isinstance(effect, SensorEffect):
+        time = np.linspace(0.0, 1.0, 50)
+        true = np.sin(9 * time)
+        assert np.abs(effect.measured(time, true) - true).max() > 1e-3
+        return
+    if effect.timing():
+        for name in effect.parameters():
+            later = effect.bind({name: effect.value(name) + 0.001})
+            assert later.timing() != effect.timing()
+        return
+    model = model_of(effect)
+    free = [f"{effect.name}.{name}" for name in effect.parameters()]
+    p = [effect.value(name) for name in effect.parameters()]
+    both = slopes(model, free)
+    slope = sum(np.abs(np.asarray(both(**point, p=p)["dp"])) for point in points(model, 12))
+    for i, name in enumerate(effect.parameters()):
+        assert slope[:, i].max() > 1e-9, f"{kind}.{name} changes nothing"
+
+
+def test_off_is_absent(kind: str) -> None:
+    effect = BY_KIND[kind]
+    if not effect.off:
+        pytest.skip("part of the planning model")
+    off = example(kind).bind(effect.off)
+    model = model_of(off)
+    base = without(model, off.name)
+    if effect.replaces:
+        base = model_of()
+    kept = [i for i, key in enumerate(model.states) if key in base.states]
+    for point in points(model):
+        point["s"] = settled(model, point, kept)
+        there = {**point, "s": point["s"][kept], "sd": point["sd"][kept]}
+        found, wanted = values_of(model, point), values_of(base, there)
+        found["rate"] = found["rate"][kept]
+        for part, value in wanted.items():
+            np.testing.assert_allclose(found[part], value, rtol=1e-6, atol=1e-6, err_msg=part)
+
+
+def settled(model, point, kept):
+    """Effect states with those that are not `kept` at rest: their rates are linear in them."""
+    own = [i for i in range(len(model.states)) if i not in kept]
+    s = np.array(point["s"], dtype=float)
+    if not own:
+        return s
+    for i in own:
+        s[i] = list(model.states.values())[i].value
+    start = values_of(model, {**point, "s": s})["rate"][own]
+    slope = np.zeros((len(own), len(own)))
+    for column, i in enumerate(own):
+        moved = s.copy()
+        moved[i] += 1e-3
+        slope[:, column] = (values_of(model, {**point, "s": moved})["rate"][own] - start) / 1e-3
+    s[own] -= np.linalg.solve(slope, start)
+    return s
+
+
+def test_dissipative_ones_dissipate(kind: str) -> None:
+    effect = example(kind)
+    if not effect.dissipative:
+        pytest.skip("may store or feed energy")
+    model = model_of(effect)
+    base = without(model, effect.name)
+    lost = []
+    for point in points(model, 12):
+        change = values_of(model, point)["dynamics"] - values_of(base, point)["dynamics"]
+        lost.append(float(point["v"] @ change))
+    assert min(lost) >= -1e-9
+    assert max(lost) > 1e-6
+
+
+def test_order_of_the_list_does_not_matter(kind: str) -> None:
+    effect = example(kind)
+    model = model_of(effect)
+    turned = type(model)(model.mechanism, model.effects[::-1], model.supply)
+    for point in points(model, 2):
+        for part, value in values_of(model, point).items():
+            np.testing.assert_allclose(values_of(turned, point)[part], value, rtol=1e-12)
+
+
+def test_keeps_the_mirror(kind: str) -> None:
+    symmetric = find_symmetry(model_of(example(kind))) is not None
+    assert symmetric == (kind not in LOPSIDED) or kind == "expression"
+
+
+def test_one_leg_only(kind: str) -> None:
+    effect = BY_KIND[kind]
+    if effect.place == "body" or kind in ("valve", "chamber", "mode_damping", "motor", "expression"):
+        pytest.skip("whole robot, or others need it on both legs")
+    one = example(kind).model_copy(update={"on": "rear"})
+    assert one.name == f"{kind}:rear"
+    model = model_of(one)
+    labels = [i.label for i in model.instances]
+    assert f"rear/{kind}:rear" in labels and f"front/{kind}:rear" not in labels
+    for replaced in effect.replaces:
+        assert f"front/{replaced}" in labels or kind == "orifice_chamber"
+    assert np.isfinite(values_of(model, next(iter(points(model))))["dynamics"]).all()
