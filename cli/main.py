@@ -11,15 +11,23 @@ from typing import Annotated
 import typer
 
 import kemba
+from kemba_cli.characterise import characterise
 from kemba_cli.check import check
+from kemba_cli.effects import effects
 from kemba_cli.failures import guarded
 from kemba_cli.plot import plot
 from kemba_cli.schema import schema
+from kemba_cli.simulate import simulate
 from kemba_cli.solve import solve
+from kemba_cli.sweep import sweep
 
 VERBS = (
     solve,
+    sweep,
+    simulate,
+    characterise,
     check,
+    effects,
     plot,
     schema,
 )

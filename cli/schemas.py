@@ -18,6 +18,8 @@ SCHEMAS = {
     "tasks": "kemba.ocp.task:Task",
     "models": "kemba.model.spec:ModelSpec",
     "robots": "kemba.mechanism.links:Robot",
+    "sweeps": "kemba.sweep.schema:Sweep",
+    "rigs": "kemba.plant.bench:RigFile",
 }
 
 

@@ -27,6 +27,7 @@ LEVELS = [
     {"ocp", "plant"},
     {"identify"},
     {"runs"},
+    {"sweep"},
     {"plotting", "report"},
     {"cli"},
 ]
@@ -36,6 +37,8 @@ ONLY_IN = {
     "matplotlib": {"plotting"},
     "typer": {"cli"},
     "rich": {"cli"},
+    "distributed": {"sweep"},
+    "statsmodels": {"sweep"},
     "pint": {"units"},
     "ruamel": {"document"},
 }

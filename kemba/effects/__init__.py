@@ -7,7 +7,10 @@ from pydantic import Field
 from kemba.effects.base import At, Contribution, Effect, Pair, PortAt, Signal
 from kemba.effects.catalogue import BY_KIND, EFFECTS
 
-AnyEffect = Annotated[Union[EFFECTS], Field(discriminator="kind")]  # type: ignore[valid-type]
+AnyEffect = Annotated[
+    Union[EFFECTS],  # type: ignore[valid-type]  # noqa: UP007
+    Field(discriminator="kind"),
+]
 
 __all__ = [
     "BY_KIND",

@@ -118,6 +118,7 @@ class Effect(BaseModel):
     replaces: ClassVar[tuple[str, ...]] = ()  # kinds that give way when this one is listed
     mirror: ClassVar[Mapping[str, str]] = {}  # symbols that change sign or name in the mirror
     dissipative: ClassVar[bool] = False
+    moves: ClassVar[bool] = True  # False: in what is measured only; plans and simulations ignore it
     on_rod: ClassVar[bool] = True  # False: its piston effort is not felt by a rod force sensor
 
     def states(self) -> dict[str, Quantity]:

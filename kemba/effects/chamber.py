@@ -9,9 +9,9 @@ import numpy as np
 from kemba.effects.base import At, Contribution, Effect
 from kemba.quantity import Param, Quantity
 
-Newton = Annotated[float, Param("N", lower=0.0)]
-Pascal = Annotated[float, Param("Pa", lower=0.0)]
-Second = Annotated[float, Param("s", lower=0.0)]
+Newton = Annotated[float, Param("N", 10.0, lower=0.0, doc="of Table II")]
+Pascal = Annotated[float, Param("Pa", 1e4, lower=0.0, doc="pressure")]
+Second = Annotated[float, Param("s", 2e-3, lower=0.0, doc="of Table I")]
 
 TABLE_PRESSURES = (0.6e6, 0.7e6, 0.8e6)
 

@@ -8,7 +8,7 @@ from kemba.effects.base import At, Contribution, Effect
 from kemba.effects.chamber import TABLE_PRESSURES, Pascal, at_supply
 from kemba.quantity import Param
 
-Damping = Annotated[float, Param("N.s.m-1", lower=0.0)]
+Damping = Annotated[float, Param("N.s.m-1", 10.0, lower=0.0, doc="of Table II")]
 
 
 class ModeDamping(Effect):
@@ -19,7 +19,7 @@ class ModeDamping(Effect):
     c_extend: tuple[Damping, ...] = (91.0, 97.0, 103.0)
     c_retract: tuple[Damping, ...] = (78.0, 84.0, 89.0)
     c_both: tuple[Damping, ...] = (52.0, 59.0, 64.0)
-    c_none: Damping = 25.0
+    c_none: Annotated[float, Param("N.s.m-1", 10.0, lower=0.0, doc="both valves off")] = 25.0
 
     family: ClassVar[str] = "piston"
     equation: ClassVar[str] = "-c_d(u_e, u_r) v, c_d = c0 + u_e c1 + u_r c2 + u_e u_r c3"

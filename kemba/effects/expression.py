@@ -125,13 +125,19 @@ class Expression(Effect):
         return self.constants[name].value
 
     def bind(self, values: Mapping[str, Any]) -> Expression:
-        bound = {name: c._replace(value=values.get(name, c.value)) for name, c in self.constants.items()}
+        bound = {
+            name: c._replace(value=values.get(name, c.value)) for name, c in self.constants.items()
+        }
         return self.model_copy(update={"constants": bound})
 
     def evaluate(self, at: At) -> Contribution:
         motion = getattr(at, self.port)
         own = PORTS[self.port][3]
-        values = {"x": motion.x, "v": motion.v, **dict(zip(own, (motion.x, motion.v), strict=False))}
+        values = {
+            "x": motion.x,
+            "v": motion.v,
+            **dict(zip(own, (motion.x, motion.v), strict=False)),
+        }
         tree = parse_formula(self.force)
         for name in names_of(tree) - set(values):
             values[name] = (

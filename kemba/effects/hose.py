@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar, Literal
 
-from kemba.effects.base import At, Contribution, Effect, Signal
 from kemba.effects.air import AREA_E, AREA_R
+from kemba.effects.base import At, Contribution, Effect, Signal
 from kemba.quantity import Param, Quantity
 
 

@@ -26,13 +26,13 @@ class OrificeChamber(Effect):
     """
 
     kind: Literal["orifice_chamber"] = "orifice_chamber"
-    a_fill: Area = 4.2e-6
-    a_vent: Area = 4.2e-6
-    V_e: Volume = 17e-6
-    V_r: Volume = 17e-6
-    n: Annotated[float, Param("1", 0.1, lower=1.0, upper=KAPPA, doc="polytropic exponent")] = KAPPA
+    a_fill: Area = 4.63e-6
+    a_vent: Area = 3.99e-6
+    V_e: Volume = 14.3e-6
+    V_r: Volume = 15.0e-6
+    n: Annotated[float, Param("1", 0.1, lower=1.0, upper=KAPPA, doc="polytropic exponent")] = 1.27
     pressures: tuple[Pascal, ...] = TABLE_PRESSURES
-    gauge: tuple[Pascal, ...] = (0.59e6, 0.66e6, 0.72e6)
+    gauge: tuple[Pascal, ...] = (0.572e6, 0.634e6, 0.696e6)
 
     family: ClassVar[str] = "air"
     equation: ClassVar[str] = (
@@ -52,8 +52,12 @@ class OrificeChamber(Effect):
     def states(self) -> dict[str, Quantity]:
         low, high, size = 1e4, 3e6, 2e5
         return {
-            "P_e": Quantity("chamber/extend/P", "Pa", low, high, size, ATMOSPHERE, "extend, absolute"),
-            "P_r": Quantity("chamber/retract/P", "Pa", low, high, size, ATMOSPHERE, "retract, absolute"),
+            "P_e": Quantity(
+                "chamber/extend/P", "Pa", low, high, size, ATMOSPHERE, "extend, absolute"
+            ),
+            "P_r": Quantity(
+                "chamber/retract/P", "Pa", low, high, size, ATMOSPHERE, "retract, absolute"
+            ),
         }
 
     def rate(self, P: Any, V: Any, dV: Any, inflow: Any) -> Any:

@@ -35,7 +35,9 @@ class QuadraticDamping(Effect):
 
     family: ClassVar[str] = "piston"
     equation: ClassVar[str] = "-c v abs(v)"
-    source: ClassVar[str] = "turbulent flow through ports; paper Fig. 6 is almost, not quite, linear"
+    source: ClassVar[str] = (
+        "turbulent flow through ports; paper Fig. 6 is almost, not quite, linear"
+    )
     ports: ClassVar[tuple[str, ...]] = ("piston",)
     off: ClassVar[dict[str, float]] = {"c": 0.0}
     dissipative: ClassVar[bool] = True

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
@@ -38,6 +39,7 @@ class SensorEffect(Effect):
 
     place: ClassVar[Literal["leg", "body"]] = "body"
     family: ClassVar[str] = "sensors"
+    moves: ClassVar[bool] = False
 
     @field_validator("channel")
     @classmethod
@@ -142,3 +144,12 @@ class SensorDelay(SensorEffect):
 
     def expanded(self, true: Any, rate: Any) -> Any:
         return true - self.dt * rate
+
+
+def as_measured(effects: Iterable[Effect], channel: str, time: Any, true: Any) -> Any:
+    """A channel (a column without its unit) with all its faults: late, then scaled, then offset."""
+    order = (SensorDelay, SensorScale, SensorBias)
+    faults = [e for e in effects if isinstance(e, SensorEffect) and e.channel == channel]
+    for fault in sorted(faults, key=lambda e: order.index(type(e))):
+        true = fault.measured(time, true)
+    return true

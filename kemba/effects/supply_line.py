@@ -18,7 +18,7 @@ class SupplyLine(Effect):
     """
 
     kind: Literal["supply_line"] = "supply_line"
-    a: Annotated[float, Param("m2", 5e-6, lower=0.0, doc="orifice from tank to hose")] = 20e-6
+    a: Annotated[float, Param("m2", 1e-6, lower=0.0, doc="orifice from tank to hose")] = 3.48e-6
     V: Annotated[float, Param("m3", 5e-5, lower=1e-6, doc="hose volume")] = 0.15e-3
     V_tank: Annotated[float, Param("m3", 0.05, lower=1e-4, doc="tank volume")] = 0.1
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -17,10 +17,12 @@ EVALUATIONS = 14
 
 @dataclass(frozen=True)
 class Fit:
-    """Theta of a hypothesis at its best, and half the sum of squares, priors included."""
+    """Theta of a hypothesis at its best, half the sum of squares (priors included), and the
+    slopes of the residual along its own parameters there."""
 
     theta: dict[str, float]
     cost: float
+    columns: dict[str, Array] = field(default_factory=dict)  # (n,) by name; shapes by ln
 
 
 @dataclass(frozen=True)
@@ -93,9 +95,7 @@ class _Search:
         heat: float,
     ) -> None:
         self.problem, self.frozen, self.scale = problem, frozen, 1.0 / np.sqrt(heat)
-        self.own = {
-            key: p for e in hypothesis for key, p in problem.candidates[e].keys().items()
-        }
+        self.own = {key: p for e in hypothesis for key, p in problem.candidates[e].keys().items()}
         self.switches = {problem.candidates[e].key for e in hypothesis}
         self.nuisance = list(frozen.names)
         self.start = dict(start)
@@ -115,7 +115,15 @@ class _Search:
             ftol=1e-6,
             xtol=1e-5,
         )
-        return Fit(self._theta(found.x), float(found.cost))
+        return Fit(self._theta(found.x), float(found.cost), self._columns(found.jac))
+
+    def _columns(self, jacobian: Array) -> dict[str, Array]:
+        rows, n = len(self.frozen.jacobian), len(self.nuisance)
+        columns = {}
+        for i, (key, p) in enumerate(self.own.items(), start=n):
+            unit = p.size if is_shape(self.problem, key) else SLAB * p.size
+            columns[key] = jacobian[:rows, i] / (self.scale * unit)
+        return columns
 
     def _nuisance_start(self) -> Iterable[float]:
         for name in self.nuisance:
@@ -140,8 +148,10 @@ class _Search:
         lower, upper = np.full(n + len(self.own), -8.0), np.full(n + len(self.own), 8.0)
         for i, (key, p) in enumerate(self.own.items(), start=n):
             if np.isfinite(p.lower):
-                lower[i] = max(lower[i], self._in(key, p.lower) if p.lower > 0 or key in
-                               self.switches else -8.0)
+                lower[i] = max(
+                    lower[i],
+                    self._in(key, p.lower) if p.lower > 0 or key in self.switches else -8.0,
+                )
             if np.isfinite(p.upper):
                 upper[i] = min(upper[i], self._in(key, p.upper))
         return lower, np.maximum(upper, lower + 1e-3)

@@ -49,8 +49,12 @@ def learn(residual: Array, order: int = ORDER) -> Colour:
 
 
 def whiten(residual: Array, colour: Colour) -> Array:
-    """e_t = (r_t - sum phi_k r_{t-k}) / sigma; the first rows are scaled by the series' spread."""
-    white = lfilter(np.concatenate([[1.0], -colour.phi]), [1.0], residual) / colour.sigma
+    """e_t = (r_t - sum phi_k r_{t-k}) / sigma along the first axis of (n,) or (n, k).
+
+    The first rows are scaled by the series' spread instead.
+    """
+    taps = np.concatenate([[1.0], -colour.phi])
+    white = lfilter(taps, [1.0], residual, axis=0) / colour.sigma
     p = len(colour.phi)
     if p:
         white[:p] = residual[:p] / max(colour.spread, colour.sigma)

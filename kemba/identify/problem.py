@@ -46,6 +46,8 @@ class Candidate:
     lead: Parameter
     shapes: tuple[Parameter, ...] = ()
     sensor: bool = False
+    # searched as 1/value, reported as the catalogue has it: {"softness": ("k", "N.m-1")}
+    reciprocal: Mapping[str, tuple[str, str]] = field(default_factory=dict)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

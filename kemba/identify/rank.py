@@ -19,6 +19,7 @@ SLAB = 0.7  # width of a large effect, in sizes
 TOLERANCES = (0.5, 1.0, 1.5)  # how far nominal figures are off, in units of their prior sigma
 
 Hypothesis = tuple[str, ...]  # names of the effects that are large, sorted
+NULL: Hypothesis = ()
 
 
 @dataclass(frozen=True)
@@ -42,15 +43,12 @@ class Ranker:
         floor: float = FLOOR,
     ) -> None:
         self.linear, self.candidates, self.heat, self.floor = linear, candidates, heat, floor
+        self.silent: frozenset[str] = frozenset()  # effects with no floor of their own
         free = set(nuisance)
-        self._nuisance = np.array([name in free for name in linear.names])
-        self._lead = {c.effect: linear.index(c.key) for c in candidates.values()}
+        self.nuisance = np.array([name in free for name in linear.names])
+        self.lead = {c.effect: linear.index(c.key) for c in candidates.values()}
         self._shape = {
-            effect: [
-                linear.index(key)
-                for key in c.keys()
-                if key != c.key and key in linear.names
-            ]
+            effect: [linear.index(key) for key in c.keys() if key != c.key and key in linear.names]
             for effect, c in candidates.items()
         }
         gram, slope, power = linear.total
@@ -64,7 +62,7 @@ class Ranker:
         return Score(total, best.z, best.covariance)
 
     def _score(self, hypothesis: Hypothesis, tolerance: float) -> Score:
-        width = self._widths(hypothesis, tolerance)
+        width = self.widths(hypothesis, tolerance)
         precision = 1.0 / width**2
         shift = self.linear.mean - self.linear.at
         h = self._gram + np.diag(precision)
@@ -80,11 +78,12 @@ class Ranker:
         log_evidence = -0.5 * quadratic - 0.5 * log_det + self._sides(hypothesis, z, covariance)
         return Score(log_evidence, z, covariance)
 
-    def _widths(self, hypothesis: Hypothesis, tolerance: float) -> Array:
+    def widths(self, hypothesis: Hypothesis, tolerance: float) -> Array:
         width = self.linear.width.copy()
-        width[self._nuisance] *= tolerance
-        for effect, i in self._lead.items():
-            share = np.hypot(SLAB, self.floor) if effect in hypothesis else self.floor
+        width[self.nuisance] *= tolerance
+        for effect, i in self.lead.items():
+            floor = 1e-6 if effect in self.silent else self.floor
+            share = np.hypot(SLAB, floor) if effect in hypothesis else floor
             width[i] *= share
         return np.maximum(width, 1e-12)
 
@@ -92,14 +91,18 @@ class Ranker:
         """A switch that cannot be negative halves its prior, and may rule out its posterior."""
         total = 0.0
         for effect in hypothesis:
-            lead, i = self.candidates[effect].lead, self._lead[effect]
+            lead, i = self.candidates[effect].lead, self.lead[effect]
             if not lead.signed:
                 sd = float(np.sqrt(covariance[i, i]))
                 total += float(np.log(2.0) + norm.logcdf((z[i] - lead.off) / sd))
         return total
 
-    def table(self, sizes: Iterable[int] = (1, 2), among: Iterable[str] | None = None,
-              given: Hypothesis = ()) -> dict[Hypothesis, float]:
+    def table(
+        self,
+        sizes: Iterable[int] = (1, 2),
+        among: Iterable[str] | None = None,
+        given: Hypothesis = (),
+    ) -> dict[Hypothesis, float]:
         """Log evidence of every set of the wanted sizes that contains `given`."""
         names = sorted(self.candidates if among is None else among)
         others = [n for n in names if n not in given]

@@ -5,18 +5,26 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
 from kemba.identify.fit import Fit, Frozen, refit
-from kemba.identify.linear import Linear, estimate, linearise, time_blocks
+from kemba.identify.linear import (
+    Linear,
+    condense,
+    estimate,
+    linearise,
+    names_of,
+    priors,
+    time_blocks,
+)
 from kemba.identify.problem import Array, Problem
-from kemba.identify.rank import Hypothesis, Ranker, Score, log_prior, probabilities
+from kemba.identify.rank import FLOOR, NULL, Hypothesis, Ranker, Score, log_prior, probabilities
 
 LEADERS = 6
 LARGEST = 3  # effects in one answer; more need another experiment
 GAIN = 3.0  # nats beyond prior odds that a further effect must bring
-NULL: Hypothesis = ()
 
 
 @dataclass(frozen=True)
@@ -31,6 +39,17 @@ class Point:
     @property
     def log_evidence(self) -> float:
         return self.score.log_evidence
+
+
+@runtime_checkable
+class Colourable(Protocol):
+    """A problem whose noise colour can be learnt from the residuals of a flexible model."""
+
+    def recolour(self, residual: Array | None) -> None:
+        """Learn from residuals (n,) that were not whitened; None: forget."""
+
+    def whiten(self, columns: Array) -> Array:
+        """Columns (n, k) computed before any colour as they are under the present one."""
 
 
 @dataclass
@@ -66,27 +85,37 @@ class Search:
 
     def start(self) -> None:
         """Null fit, noise colour, and the linear table at the null."""
-        theta: dict[str, float] = {}
-        for _ in range(2):
-            theta = self._null_step(theta)
-        self._learn_noise(theta)
-        self._null(theta)
+        names = tuple(self.problem.nuisance)
+        linear, jacobian, _ = linearise(self.problem, {}, self.blocks, names)
+        theta = estimate(self.problem, linear, best_fit(linear))
+        r = self.problem.residual(theta)
+        at, mean, width = priors(self.problem, theta, names)
+        again = condense(names, at, mean, width, jacobian, r, self.blocks)
+        theta = estimate(self.problem, again, best_fit(again))
+        self._null(theta, theta)
 
-    def _null_step(self, theta: Mapping[str, float]) -> dict[str, float]:
-        linear, _, _ = linearise(self.problem, theta, self.blocks, tuple(self.problem.nuisance))
-        score = _nuisance_fit(linear)
-        return estimate(self.problem, linear, score)
-
-    def _null(self, theta: Mapping[str, float]) -> None:
-        linear, jacobian, r = linearise(self.problem, theta, self.blocks)
+    def _null(self, theta: Mapping[str, float], seen_from: Mapping[str, float]) -> None:
+        """Linear at the null, whitened by what is left over as seen from another point."""
+        jacobian = self._learn_noise(seen_from, keep=theta is seen_from)
+        if jacobian is None:
+            names = names_of(self.problem, theta)
+            jacobian = self.problem.jacobian(theta, names)
+        names = names_of(self.problem, theta)
+        r = self.problem.residual(theta)
+        at, mean, width = priors(self.problem, theta, names)
+        linear = condense(names, at, mean, width, jacobian, r, self.blocks)
         self.null_jacobian, self.null_residual = jacobian, r
         ranker = self.ranker(linear)
         fit = Fit(dict(theta), 0.5 * float(r @ r))
         self.points = {NULL: Point(NULL, fit, linear, ranker.score(NULL))}
         self.null_table = ranker.table((0, 1, 2))
 
-    def ranker(self, linear: Linear) -> Ranker:
-        return Ranker(linear, self.problem.candidates, self.problem.nuisance, self.heat)
+    def flexible_fit(self) -> Array:
+        """z (k,) at the null with every effect free at its full size."""
+        return best_fit(self.points[NULL].linear)
+
+    def ranker(self, linear: Linear, floor: float = FLOOR) -> Ranker:
+        return Ranker(linear, self.problem.candidates, self.problem.nuisance, self.heat, floor)
 
     @property
     def frozen(self) -> Frozen:
@@ -111,22 +140,35 @@ class Search:
             return ranker.table((len(given) + 1,), given=given)
         single = {h: e for h, e in self.null_table.items() if len(h) == 1}
         base = max(single.values())
-        best_pair = max((h for h in self.null_table if len(h) == 2), key=self.null_table.__getitem__)
+        best_pair = max(
+            (h for h in self.null_table if len(h) == 2), key=self.null_table.__getitem__
+        )
         if self.null_table[best_pair] > base + GAIN:
             for name in best_pair:
                 single[(name,)] = max(single[(name,)], base)
         return single
 
     def visit(self, hypothesis: Hypothesis) -> Point:
-        """Refit a hypothesis and linearise there (once)."""
+        """Refit a hypothesis (once) and score it there."""
         if hypothesis not in self.points:
             self.say(f"refitting {' + '.join(hypothesis)}")
             fit = refit(self.problem, hypothesis, self._guess(hypothesis), self.frozen, self.heat)
-            linear, _, _ = linearise(self.problem, fit.theta, self.blocks)
-            self.points[hypothesis] = Point(
-                hypothesis, fit, linear, self.ranker(linear).score(hypothesis)
-            )
+            linear = self._near(fit)
+            score = self.ranker(linear).score(hypothesis)
+            self.points[hypothesis] = Point(hypothesis, fit, linear, score)
         return self.points[hypothesis]
+
+    def _near(self, fit: Fit) -> Linear:
+        """Linear at a refitted point: its own slopes are fresh, the others are the null's."""
+        names = names_of(self.problem, fit.theta)
+        known = self.points[NULL].linear
+        columns = [
+            fit.columns[n] if n in fit.columns else self.null_jacobian[:, known.index(n)]
+            for n in names
+        ]
+        r = self.problem.residual(fit.theta)
+        at, mean, width = priors(self.problem, fit.theta, names)
+        return condense(names, at, mean, width, np.stack(columns, axis=1), r, self.blocks)
 
     def _guess(self, hypothesis: Hypothesis) -> dict[str, float]:
         """Start from the largest part that was refitted, moved by the linear estimate there."""
@@ -156,19 +198,23 @@ class Search:
 
     # -- noise ------------------------------------------------------------------------------
 
-    def _learn_noise(self, theta: Mapping[str, float]) -> None:
-        """Colour of what remains when every effect of the catalogue may help to explain."""
-        if not hasattr(self.problem, "recolour"):
-            return
-        self.problem.recolour(None)
-        linear, jacobian, r = linearise(self.problem, theta, self.blocks)
-        self.problem.recolour(r + jacobian @ (_flexible(linear) - linear.at))
+    def _learn_noise(self, theta: Mapping[str, float], keep: bool) -> Array | None:
+        """Colour of what remains when every effect of the catalogue may help to explain.
+
+        Returns the Jacobian at theta under the new colour when it is wanted (`keep`).
+        """
+        problem = self.problem
+        if not isinstance(problem, Colourable):
+            return None
+        problem.recolour(None)
+        linear, jacobian, r = linearise(problem, theta, self.blocks)
+        problem.recolour(r + jacobian @ (best_fit(linear) - linear.at))
+        return problem.whiten(jacobian) if keep else None
 
     def _recolour(self, best: Hypothesis) -> None:
         """The same, seen from the best point so far; all points are then refitted."""
         theta, null = self.points[best].fit.theta, self.points[NULL].fit.theta
-        self._learn_noise(theta)
-        self._null(null)
+        self._null(null, theta)
 
     def probabilities(self) -> dict[Hypothesis, float]:
         """Over everything refitted, and the rest of the singles by their linear evidence."""
@@ -179,16 +225,14 @@ class Search:
         return probabilities(evidence, len(self.problem.candidates))
 
 
-def _nuisance_fit(linear: Linear) -> Array:
+def best_fit(linear: Linear) -> Array:
+    """z (k,) with every name free within its prior."""
     gram, slope, _ = linear.total
     precision = 1.0 / linear.width**2
     shift = linear.mean - linear.at
     h = (gram + np.diag(precision)) * np.outer(linear.width, linear.width)
     eta = linear.width * (precision * shift - slope)
     return linear.at + linear.width * np.linalg.solve(h, eta)
-
-
-_flexible = _nuisance_fit  # with every switch among the names: all effects at their full size
 
 
 def share_of(probability: Mapping[Hypothesis, float], effects: Iterable[str]) -> dict[str, float]:

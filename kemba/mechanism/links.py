@@ -21,7 +21,7 @@ class Table(BaseModel):
 
 
 class Link(Table):
-    """A rigid link: COM measured from its upper end (a rod: before its lower end), inertia at COM."""
+    """A rigid link; COM from its upper end (a rod: before its lower end), inertia at the COM."""
 
     mass: Mass
     inertia: Inertia

@@ -61,6 +61,11 @@ class Model:
         names = [e.name for e in self.effects]
         raise KembaError(self.name, f"no effect '{name}'", hint=suggest(name, names))
 
+    @property
+    def ignored(self) -> list[str]:
+        """Effects that are part of measuring, not of the motion, such as a sensor's bias."""
+        return [e.name for e in self.effects if not e.moves]
+
     def timing(self, leg: str | None) -> tuple[float, float]:
         """Seconds by which a leg's valves switch on and off after the command."""
         here = [i.effect.timing() for i in self.instances if i.leg in (leg, None)]
@@ -90,7 +95,8 @@ class Model:
         free, scaled = list(free), list(scaled)
         for name in free:
             if name not in self.parameters:
-                raise KembaError(self.name, f"no parameter '{name}'", hint=suggest(name, self.parameters))
+                hint = suggest(name, self.parameters)
+                raise KembaError(self.name, f"no parameter '{name}'", hint=hint)
         p = ca.SX.sym("p", len(free) + len(scaled))
         bound: dict[str, dict[str, Any]] = {}
         for i, name in enumerate(free):

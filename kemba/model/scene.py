@@ -8,6 +8,7 @@ from typing import Any
 
 import casadi as ca
 
+from kemba.effects import BY_KIND
 from kemba.effects.base import At, Contribution, Effect, PortAt, Signal
 from kemba.errors import KembaError, suggest
 from kemba.mechanism import Mechanism
@@ -83,6 +84,19 @@ def port_name(leg: str | None, alias: str) -> str:
     return BODY_PORTS[alias] if alias in BODY_PORTS else full_name(leg, LEG_PORTS[alias])
 
 
+def _providers(symbol: str) -> str:
+    """Which effects of the catalogue would provide a symbol, in words."""
+    found = []
+    for kind, effect in BY_KIND.items():
+        variables: set[str] = set()
+        if not any(field.is_required() for field in effect.model_fields.values()):
+            example = effect.model_validate({})
+            variables = {*example.states(), *example.inputs(), *example.forces()}
+        if symbol in effect.publishes or symbol in variables:
+            found.append(kind)
+    return f"add {' or '.join(found)}" if found else ""
+
+
 class Scene:
     """All instances with the symbols of one evaluation.
 
@@ -102,22 +116,22 @@ class Scene:
         self.values, self.inputs = values, inputs
         self.slots = {slot for i in instances for slot in i.effect.reads}
         self._contributions: dict[int, Contribution] = {}
-        self._busy: set[int] = set()
+        self._busy: dict[int, None] = {}  # in the order in which they ask for one another
         self._signals = self._collect_signals()
 
     def at(self, leg: str | None) -> At:
         """The view of effects at `leg` (None: the robot)."""
-        return _Place(self, leg)  # type: ignore[return-value]
+        return _Place(self, leg)
 
     def contribution(self, index: int) -> Contribution:
         """What instance `index` adds; evaluated once."""
         if index not in self._contributions:
             if index in self._busy:
                 raise KembaError(self.instances[index].label, "reads a value that depends on it")
-            self._busy.add(index)
+            self._busy[index] = None
             instance = self.instances[index]
             self._contributions[index] = instance.effect.evaluate(self.at(instance.leg))
-            self._busy.discard(index)
+            del self._busy[index]
         return self._contributions[index]
 
     def lookup(self, leg: str | None, symbol: str) -> Any:
@@ -131,8 +145,12 @@ class Scene:
                 if instance.leg == place and symbol in instance.effect.publishes:
                     return self.contribution(index).publish[symbol]
         known = {s for _, s in self.values} | self.slots
+        asking = [self.instances[i].label for i in self._busy]
+        place = leg or self.mechanism.name
         raise KembaError(
-            full_name(leg, symbol), "no effect of this model provides it", hint=suggest(symbol, known)
+            f"effects.{asking[-1]}" if asking else full_name(leg, symbol),
+            f"needs '{symbol}' at {place}, which no effect of this model gives",
+            hint=_providers(symbol) or suggest(symbol, known),
         )
 
     def carrier(self, leg: str | None, symbol: str) -> tuple[str, Any]:

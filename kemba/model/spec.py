@@ -66,9 +66,9 @@ def build_model(
     `rig`: the same effects on the bench piston; those whose ports it lacks stay away.
     """
     mechanism = rig_mechanism() if rig else robot_mechanism(spec.robot or "kemba")
-    effects = [*spec.effects, *CHAMBERS[spec.chambers or "first_order"]()]
-    named = {e.name: e for e in effects} | {e.name: e for e in spec.effects}
-    listed: list[Effect] = [*named.values()]
+    effects: list[Effect] = [*spec.effects, *CHAMBERS[spec.chambers or "first_order"]()]
+    named = {e.name: e for e in (*effects, *spec.effects)}
+    listed = [*named.values()]
     if rig:
         listed = [e for e in listed if set(e.ports) <= {"piston"} and e.kind != "end_stop"]
     named = {e.name: e for e in (*listed, *extra)}

@@ -12,6 +12,8 @@ from scipy import sparse
 
 Entries = tuple[ca.MX, np.ndarray, np.ndarray]  # nonzeros, their rows, their columns
 
+MAP: tuple = ()
+
 
 @dataclass(frozen=True)
 class Block:
@@ -53,7 +55,7 @@ class BlockProblem:
         x, parameter = ca.MX.sym("x", size), ca.MX.sym("p", p.numel())
         lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", self.rows)
         self.x, self.parameter = x, parameter
-        f, gradients, g = ca.MX(0), [], []
+        f, total, gradients, g, rows = ca.MX(0), ca.MX(0), [], [], []
         jac: list[Entries] = []
         hess: list[Entries] = []
         row = 0
@@ -61,11 +63,14 @@ class BlockProblem:
             m, n = block.g.numel(), len(block.columns)
             local = _gather(x, block.columns)
             many = ca.repmat(parameter, 1, n)
-            value, slope = _mapped(block, p, n, "first")(local, many)
+            value, values = _mapped(block, p, n, "value")(local, many)
             f += ca.sum2(value)
+            g.append(ca.vec(values))
+            value, slope = _mapped(block, p, n, "first")(local, many)
+            total += ca.sum2(value)
             gradients.append((ca.vec(slope), block.columns.ravel()))
             g_block, j_block = _mapped(block, p, n, "rows")(local, many)
-            g.append(ca.vec(g_block))
+            rows.append(ca.vec(g_block))
             multipliers = ca.reshape(lam_g[row : row + m * n], m, n)
             h_block = _mapped(block, p, n, "second")(
                 local, many, ca.repmat(lam_f, 1, n), multipliers
@@ -78,12 +83,15 @@ class BlockProblem:
         hessian = _scatter(hess, size, size)
         spread = ca.vertcat(*(nz for nz, _ in gradients))
         where = np.concatenate([at for _, at in gradients])
-        S = sparse.csc_matrix((np.ones(len(where)), (where, np.arange(len(where)))), (size, len(where)))
+        entries = (np.ones(len(where)), (where, np.arange(len(where))))
+        S = sparse.csc_matrix(entries, (size, len(where)))
         gradient = ca.densify(ca.mtimes(_dm(S), spread))
         self.nlp = {"x": x, "p": parameter, "f": f, "g": stacked}
         names = ["x", "p"]
         self.grad_f = ca.Function("grad_f", [x, parameter], [f, gradient], names, ["f", "grad_f_x"])
-        self.jac_g = ca.Function("jac_g", [x, parameter], [stacked, jacobian], names, ["g", "jac_g_x"])
+        self.jac_g = ca.Function(
+            "jac_g", [x, parameter], [stacked, jacobian], names, ["g", "jac_g_x"]
+        )
         self.hess_lag = ca.Function(
             "hess_lag",
             [x, parameter, lam_f, lam_g],
@@ -101,18 +109,20 @@ def _gather(x: ca.MX, columns: np.ndarray) -> ca.MX:
 
 def _mapped(block: Block, p: ca.SX, n: int, order: str) -> ca.Function:
     z, f, g = block.z, block.f, block.g
-    if order == "first":
-        function = ca.Function("first", [z, p], [f, ca.densify(ca.gradient(f, z))])
+    if order == "value":
+        outputs, inputs = [f, ca.densify(g)], [z, p]
+    elif order == "first":
+        outputs, inputs = [f, ca.densify(ca.gradient(f, z))], [z, p]
     elif order == "rows":
-        function = ca.Function("rows", [z, p], [ca.densify(g), _column(block.jacobian)])
+        outputs, inputs = [ca.densify(g), _column(block.jacobian)], [z, p]
     else:
-        function = ca.Function("second", [z, p, *block.multipliers], [_column(block.hessian)])
-    return function.map(n)
+        outputs, inputs = [_column(block.hessian)], [z, p, *block.multipliers]
+    return ca.Function(order, inputs, ca.cse(outputs)).map(n, *MAP)
 
 
 def _column(matrix: ca.SX) -> ca.SX:
     """Nonzeros as a dense column, so that mapped outputs line up."""
-    return ca.vertcat(*matrix.nonzeros()) if matrix.nnz() else ca.SX(0, 1)
+    return ca.SX(matrix.nz[:]) if matrix.nnz() else ca.SX(0, 1)
 
 
 def _place_jacobian(block: Block, nonzeros: ca.MX, row: int) -> Entries:
@@ -133,7 +143,8 @@ def _scatter(parts: list[Entries], rows: int, columns: int) -> ca.MX:
     nonzeros = ca.vertcat(*(nz for nz, _, _ in parts))
     key = np.concatenate([c.astype(np.int64) * rows + r for _, r, c in parts])
     places, target = np.unique(key, return_inverse=True)
-    S = sparse.csc_matrix((np.ones(len(key)), (target, np.arange(len(key)))), (len(places), len(key)))
+    entries = (np.ones(len(key)), (target, np.arange(len(key))))
+    S = sparse.csc_matrix(entries, (len(places), len(key)))
     pattern = ca.Sparsity.triplet(
         rows, columns, (places % rows).tolist(), (places // rows).tolist()
     )
@@ -141,7 +152,6 @@ def _scatter(parts: list[Entries], rows: int, columns: int) -> ca.MX:
 
 
 def _dm(matrix: sparse.csc_matrix) -> ca.DM:
-    pattern = ca.Sparsity(
-        *matrix.shape, matrix.indptr.tolist(), matrix.indices.tolist()
-    )
+    rows, columns = matrix.shape
+    pattern = ca.Sparsity(rows, columns, matrix.indptr.tolist(), matrix.indices.tolist())
     return ca.DM(pattern, matrix.data)

@@ -9,8 +9,9 @@ import casadi as ca
 import numpy as np
 
 from kemba.model import Model
+from kemba.ocp.costs import COSTS
 from kemba.ocp.result import arrays
-from kemba.ocp.stage import ANGLE_ARM, running_cost
+from kemba.ocp.stage import ANGLE_ARM
 from kemba.ocp.task import Task, Tolerances
 from kemba.ocp.wishes import Wish
 from kemba.quantity import Quantity
@@ -78,9 +79,7 @@ def certify(
         for j, (what, unit, scale) in enumerate(labels):
             k = int(np.argmax(values[:, j]))
             size = float(values[k, j])
-            found.append(
-                Violation(what, k + first, float(t[k + first]), size * scale, unit, size)
-            )
+            found.append(Violation(what, k + first, float(t[k + first]), size * scale, unit, size))
         return float(max(values.max(), 0.0))
 
     arm = np.array([1.0 if r.unit == "N" else ANGLE_ARM for r in node.dynamics_rows])
@@ -159,6 +158,6 @@ def costs(model: Model, trajectory: Trajectory) -> dict[str, float]:
     symbol, step = ca.SX.sym("u", u.shape[1]), ca.SX.sym("h")
     totals = {}
     for name, key in (("torque_squared", "torque_squared_integral"), ("air", "valve_open_s")):
-        f = ca.Function(name, [symbol, step], [running_cost(model, symbol, step, name)])
+        f = ca.Function(name, [symbol, step], [COSTS[name](model, symbol, step)])
         totals[key] = float(ca.sum2(f.map(len(h))(u.T, h[None, :])))
     return totals

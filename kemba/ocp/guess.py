@@ -108,7 +108,11 @@ def automatic_guess(
         for k in (flexion(robot.leg, x) for x in (0.0, robot.leg.piston.stroke))
     ]
     gravity = model.mechanism.gravity
-    course = body_course(wishes, task.duration, (lengths[0], lengths[1]), gravity)
+    if task.guess == "standing":
+        still = task.duration
+        course = Course([0.0, still], [lengths[0]] * 2, [0.0] * 2, (still, still))
+    else:
+        course = body_course(wishes, task.duration, (lengths[0], lengths[1]), gravity)
     z, az = course(t), course(t, 2)
     airborne = (t > course.flight[0]) & (t < course.flight[1])
     x0, x1 = (asked(wishes, "body/x", at) or 0.0 for at in (0.0, 1.0))
@@ -127,14 +131,18 @@ def automatic_guess(
         q[:, names.index(f"{leg}/hip/q")] = hip
         q[:, names.index(f"{leg}/knee/q")] = place.fold * bend
         forces[leg] = share * _lever(robot, bend)
-    v = np.gradient(q, t, axis=0)
-    groups = {"q": q, "v": v, "h": np.full((nodes + 1, 1), task.duration / nodes)}
+    v = np.asarray(np.gradient(q, t, axis=0))
+    groups: dict[str, np.ndarray] = {
+        "q": q,
+        "v": v,
+        "h": np.full((nodes + 1, 1), task.duration / nodes),
+    }
     groups |= _efforts(model, t, forces, share)
     Y = layout.pack(groups)
     if task.guess_noise:
         rng = np.random.default_rng(task.seed)
         Y = Y + task.guess_noise * rng.normal(size=Y.shape)
-    return np.clip(Y, layout.lower, layout.upper)
+    return np.asarray(np.clip(Y, layout.lower, layout.upper))
 
 
 def _lever(robot: Robot, bend: np.ndarray) -> np.ndarray:
@@ -142,10 +150,11 @@ def _lever(robot: Robot, bend: np.ndarray) -> np.ndarray:
     f, b = robot.leg.femur.length, robot.leg.tibia.length
 
     def length(k: np.ndarray) -> np.ndarray:
-        return np.hypot(f + b * np.cos(k), b * np.sin(k))
+        return np.asarray(np.hypot(f + b * np.cos(k), b * np.sin(k)))
 
     step = 1e-4
-    dx = np.array([float(extension(robot.leg, k + step) - extension(robot.leg, k - step)) for k in bend])
+    ahead, behind = ([extension(robot.leg, k + d) for k in bend] for d in (step, -step))
+    dx = np.array(ahead, float) - np.array(behind, float)
     return np.asarray((length(bend + step) - length(bend - step)) / dx)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -73,7 +73,7 @@ class _Watcher(ca.Callback):
         rows |= {"g": self.t.problem.rows, "lam_g": self.t.problem.rows}
         return ca.Sparsity.dense(rows.get(ca.nlpsol_out(i), 4))
 
-    def eval(self, arguments: list[ca.DM]) -> list[int]:
+    def eval(self, arguments: Sequence[ca.DM]) -> list[int]:
         g = np.asarray(arguments[2]).ravel()
         over = np.maximum(self.t.g_lower - g, g - self.t.g_upper)
         self.watch(self.count, float(arguments[1]), float(over.max(initial=0.0)))

@@ -26,12 +26,12 @@ class Reduction:
 
     def expand(self, group: str, half: Matrix) -> Matrix:
         """Full values (..., n) of half values (..., nh)."""
-        return np.asarray(half) @ self.B[group].T
+        return np.asarray(np.asarray(half) @ self.B[group].T)
 
     def restrict(self, group: str, full: Matrix) -> Matrix:
         """Half values (..., nh) of symmetric full values (..., n)."""
         b = self.B[group]
-        return np.asarray(full) @ (b / np.maximum((b**2).sum(axis=0), 1e-300))
+        return np.asarray(np.asarray(full) @ (b / np.maximum((b**2).sum(axis=0), 1e-300)))
 
 
 def whole(node: Node) -> Reduction:
@@ -66,9 +66,7 @@ def mirror_names(model: Model) -> dict[str, str]:
                 if key not in quantities:
                     return {}
                 names[quantity.name] = "-" * image.startswith("-") + quantities[key].name
-    rates = {
-        v.name: _rate_image(model, i, names) for i, v in enumerate(model.mechanism.velocities)
-    }
+    rates = {v.name: _rate_image(model, i, names) for i, v in enumerate(model.mechanism.velocities)}
     return {**names, **rates}
 
 
@@ -91,8 +89,8 @@ def find_symmetry(model: Model) -> Reduction | None:
     first = model.mechanism.legs[0]
 
     def kept(labels: list[str]) -> list[int]:
-        legs = [next((leg for leg in model.mechanism.legs if leg in label), None) for label in labels]
-        return [i for i, leg in enumerate(legs) if leg in (None, first)]
+        others = [leg for leg in model.mechanism.legs if leg != first]
+        return [i for i, label in enumerate(labels) if not any(leg in label for leg in others)]
 
     node = model.node
     return Reduction(
@@ -126,7 +124,7 @@ def _image_matrix(columns: list[str], names: Mapping[str, str]) -> Matrix:
 
 def _basis(image: Matrix) -> Matrix:
     """Columns that span the symmetric subspace: each variable with its image, once."""
-    columns = []
+    columns: list[Matrix] = []
     for i in range(len(image)):
         column = np.sign(np.eye(len(image))[:, i] + image[:, i])
         if np.any(column) and not any(np.array_equal(np.abs(column), np.abs(c)) for c in columns):
@@ -146,9 +144,8 @@ def _residual_is_symmetric(model: Model, images: Mapping[str, Matrix]) -> bool:
         lam, u = draw["lam"] * 50.0, draw["u"]
         here = residual(q, v, a, s, sd, lam, u, [])
         m = images
-        there = residual(
-            m["q"] @ q, m["q"] @ v, m["q"] @ a, m["s"] @ s, m["s"] @ sd, m["lam"] @ lam, m["u"] @ u, []
-        )
+        motion = (m["q"] @ q, m["q"] @ v, m["q"] @ a)
+        there = residual(*motion, m["s"] @ s, m["s"] @ sd, m["lam"] @ lam, m["u"] @ u, [])
         dynamics = np.allclose(m["q"] @ np.array(here[0]).ravel(), np.array(there[0]).ravel())
         rates = np.allclose(m["s"] @ np.array(here[1]).ravel(), np.array(there[1]).ravel())
         pairs = np.allclose(

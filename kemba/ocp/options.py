@@ -1,12 +1,13 @@
-"""IPOPT's options, checked before IPOPT sees them."""
+"""Names that a task gives to costs and IPOPT's options, checked before anything is built."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from kemba.config import Document
-from kemba.errors import ConfigErrors, suggest
+from kemba.errors import KembaError, suggest
+from kemba.ocp.costs import COSTS
 
 # what users of this package reasonably set; HSL and Pardiso options need libraries that are not
 # in the wheel, and a failed load makes the next solve crash
@@ -51,8 +52,17 @@ KNOWN = {
 LINEAR_SOLVERS = ("mumps", "spral")
 
 
-def check_options(options: Mapping[str, Any], document: Document) -> None:
-    """Raises ConfigErrors naming every unknown option, wrong type or missing linear solver."""
+def cost_errors(costs: Iterable[str], document: Document) -> list[KembaError]:
+    """Every cost that there is not."""
+    return [
+        document.error(("cost", name), f"cost: unknown cost '{name}'", hint=suggest(name, COSTS))
+        for name in costs
+        if name not in COSTS
+    ]
+
+
+def option_errors(options: Mapping[str, Any], document: Document) -> list[KembaError]:
+    """Every unknown option, wrong type or missing linear solver."""
     errors = []
     for name, value in options.items():
         at = ("solver", "options", name)
@@ -66,5 +76,4 @@ def check_options(options: Mapping[str, Any], document: Document) -> None:
         elif name == "linear_solver" and value not in LINEAR_SOLVERS:
             what = f"solver.options.linear_solver: '{value}' is not in the installed IPOPT"
             errors.append(document.error(at, what, hint="one of: mumps, spral"))
-    if errors:
-        raise ConfigErrors(errors)
+    return errors

@@ -14,9 +14,9 @@ from kemba.effects.load import Payload
 from kemba.model import Model, load_model
 from kemba.ocp.certify import Certificate, certify, costs
 from kemba.ocp.guess import automatic_guess
-from kemba.ocp.ipopt import Ipopt, Parameters, Point, Watch
+from kemba.ocp.ipopt import Ipopt, Point, Watch
 from kemba.ocp.mirror import Reduction, find_symmetry, whole, wishes_are_symmetric
-from kemba.ocp.options import check_options
+from kemba.ocp.penalty import WEIGHTS, penalise
 from kemba.ocp.result import to_trajectory
 from kemba.ocp.schedule import Attempt, Search, Stopped, confirm, find, refine
 from kemba.ocp.task import Task
@@ -42,6 +42,7 @@ class Plan:
     cost: dict[str, float]
     attempts: tuple[Attempt, ...]
     solve_s: float
+    solve_cpu_s: float
     build_s: float
     variables: int
     constraints: int
@@ -64,15 +65,17 @@ class Planner:
     watch: Watch | None = None
     attempts: list[Attempt] = field(default_factory=list)
     build_s: float = 0.0
+    build_cpu_s: float = 0.0
     deadline: float = np.inf
 
     def search(self, nodes: int, reduction: Reduction) -> Search:
         """A fresh program on a grid of `nodes`."""
-        started = time.perf_counter()
+        started, busy = time.perf_counter(), time.process_time()
         transcription = Transcription(self.model, self.task, self.wishes, reduction, nodes)
         options = {"max_iter": self.task.solver.max_iterations, **self.task.solver.options}
         ipopt = Ipopt(transcription, options, self.log, self.deadline, self.watch)
         self.build_s += time.perf_counter() - started
+        self.build_cpu_s += time.process_time() - busy
         name = "half" if reduction.symmetric else "whole"
 
         def tell(text: str) -> None:
@@ -120,18 +123,16 @@ class Planner:
         return full.transcription, confirm(full, search.transcription, point)
 
     def penalty(self) -> tuple[Transcription, Point]:
-        """The paper's way (eq. 9): one solve with every complementarity in the cost."""
+        """The paper's way, on the whole robot."""
         search = self.search(self.task.nodes, whole(self.model.node))
-        weight = 1e4 * self.task.step / 100.0  # rho, in the units of the stage's cost
-        parameters = Parameters(eps=1e6, valve=weight * self.task.nodes, pairs=weight)
         start = self.guess(search.transcription)
-        return search.transcription, search.solve("penalty", start, parameters)
+        return search.transcription, penalise(search, start, self.task.method)
 
     def run(self) -> tuple[Transcription, Point]:
         """The first strategy that solves, else where the first one ended; a stop keeps its
         iterate."""
         try:
-            if self.task.method == "penalty":
+            if self.task.method in WEIGHTS:
                 return self.penalty()
             first = None
             for strategy in self.strategies():
@@ -166,24 +167,23 @@ def plan(
     """
     document = document or Document(task.model_dump())
     started = time.perf_counter()
-    check_options(task.solver.options, document)
     built = task_model(task, model)
     planner = Planner(task, built, resolve(task, built, document), log, tell, watch)
     planner.build_s = time.perf_counter() - started
     planner.deadline = time.monotonic() + task.solver.time_limit
-    started = time.perf_counter()
+    started, busy = time.perf_counter(), time.process_time()
     build_before = planner.build_s
     transcription, point = planner.run()
     elapsed = time.perf_counter() - started - (planner.build_s - build_before)
+    busy = time.process_time() - busy - planner.build_cpu_s
     trajectory = to_trajectory(transcription, point.Y)
-    return judge(planner, transcription, trajectory, point, elapsed)
+    return judge(planner, transcription, trajectory, point, elapsed, busy)
 
 
 def program_size(
     task: Task, document: Document, model: str | Path | None = None
 ) -> dict[str, int]:
     """Variables and rows of the whole program of a task, everything checked, nothing solved."""
-    check_options(task.solver.options, document)
     built = task_model(task, model)
     wishes = resolve(task, built, document)
     transcription = Transcription(built, task, wishes, whole(built.node), task.nodes)
@@ -196,6 +196,7 @@ def judge(
     trajectory: Trajectory,
     point: Point,
     solve_s: float,
+    solve_cpu_s: float,
 ) -> Plan:
     """Certificate, status and sentence of what was found."""
     certificate = certify(planner.model, planner.task, planner.wishes, trajectory)
@@ -211,6 +212,7 @@ def judge(
         cost=costs(planner.model, trajectory),
         attempts=tuple(planner.attempts),
         solve_s=solve_s,
+        solve_cpu_s=solve_cpu_s,
         build_s=planner.build_s,
         variables=transcription.variables,
         constraints=transcription.constraints,

@@ -22,6 +22,7 @@ def answer(plan: Plan, run: str) -> dict[str, Any]:
         "duration_s": float(trajectory.time[-1]),
         "cost": plan.cost,
         "solve_s": plan.solve_s,
+        "solve_cpu_s": plan.solve_cpu_s,
         "build_s": plan.build_s,
         "iterations": plan.iterations,
         "variables": plan.variables,

@@ -9,6 +9,8 @@ import casadi as ca
 import numpy as np
 
 from kemba.model import Model
+from kemba.model.node import Row
+from kemba.ocp.costs import COSTS
 from kemba.ocp.layout import Layout
 from kemba.ocp.mirror import Reduction
 
@@ -98,7 +100,7 @@ def build_stage(
             INF,
         ),
     )
-    objective = sum(w * running_cost(model, now["u"], h, name) for name, w in cost.items())
+    objective = sum(w * COSTS[name](model, now["u"], h) for name, w in cost.items())
     u, u0 = y[layout.binary], y0[layout.binary]
     objective = (
         objective / COST_SCALE
@@ -107,21 +109,7 @@ def build_stage(
         + weights[2] * ca.sum1(product)
     )
     kept = tuple(r for r in rows if r.g.numel())
-    return Stage(layout, y0, y, eps, weights, kept, ca.SX(objective))
-
-
-COSTS = ("torque_squared", "air", "duration")
-
-
-def running_cost(model: Model, u: ca.SX, h: ca.SX, name: str) -> ca.SX:
-    """One step of a cost's time integral: `torque_squared` (eq. 9), `air` (open valves' time),
-    `duration`."""
-    inputs = list(model.inputs.values())
-    if name == "torque_squared":
-        return h * ca.sumsqr(u[[i for i, q in enumerate(inputs) if q.unit == "N.m"]])
-    if name == "air":
-        return h * ca.sum1(u[[i for i, q in enumerate(inputs) if q.binary]])
-    return h
+    return Stage(layout, y0, y, eps, weights, kept, ca.densify(ca.SX(objective)))
 
 
 def _rows(
@@ -168,7 +156,9 @@ def _rates(model: Model, reduction: Reduction, rate: ca.SX, h: ca.SX) -> Rows:
     return _rows("defect", g, [r.label for r in rows], units, scales=scale)
 
 
-def _signs(g: ca.SX, y: ca.SX, layout: Layout, rows: Sequence, scales: Sequence[float]) -> Rows:
+def _signs(
+    g: ca.SX, y: ca.SX, layout: Layout, rows: Sequence[Row], scales: Sequence[float]
+) -> Rows:
     """Rows g >= 0, except where g is a variable whose own bound says so."""
     kept = [i for i in range(g.numel()) if not _bounded_below(g[i], y, layout)]
     return _rows(
@@ -187,7 +177,7 @@ def as_variable(g: ca.SX, y: ca.SX) -> tuple[int, float, float] | None:
     jacobian = ca.jacobian(g, y)
     if jacobian.nnz() != 1 or ca.symvar(jacobian):
         return None
-    factor = float(jacobian.nonzeros()[0])
+    factor = float(ca.SX(jacobian.nz[0]))
     index = jacobian.sparsity().get_triplet()[1][0]
     offset = float(ca.evalf(ca.substitute(g, y, ca.SX.zeros(y.numel()))))
     return index, factor, offset

@@ -70,7 +70,7 @@ class Task(Section):
     """A motion to plan: grid, wishes at start and end, bounds on the way, goals, costs.
 
     `step_variation`: each step lasts duration/nodes within this fraction. `start` and `end` map
-    quantities to values; `rest: true` there means all rates zero (and vented chambers at start).
+    quantities to values; `rest: true` there means that all rates are zero.
     """
 
     name: str = "task"
@@ -91,7 +91,7 @@ class Task(Section):
     guess: Literal["automatic", "standing"] = "automatic"
     guess_noise: Annotated[float, Param("1", lower=0.0, upper=1.0)] = 0.0
     seed: int = 0
-    method: Literal["relaxation", "penalty"] = "relaxation"
+    method: Literal["relaxation", "penalty", "penalty_ramped"] = "relaxation"
     solver: Solver = Field(default_factory=Solver)
     tolerances: Tolerances = Field(default_factory=Tolerances)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -15,6 +15,9 @@ from kemba.ocp.mirror import Reduction
 from kemba.ocp.stage import INF, Rows, Stage, as_variable, build_stage
 from kemba.ocp.task import Task
 from kemba.ocp.wishes import Wish, quantity_expression
+
+
+WishBlock = tuple[Block, Rows, list[int]]  # with the nodes at which its rows hold
 
 
 @dataclass(frozen=True)
@@ -43,20 +46,20 @@ class Transcription:
         self.layout = Layout(model, reduction, task.duration / nodes, task.step_variation)
         self.stage: Stage = build_stage(model, self.layout, reduction, task.cost, nodes)
         n = self.layout.size
-        self.shape = (nodes + 1, n)
-        self.lower = np.tile(self.layout.lower, (nodes + 1, 1))
-        self.upper = np.tile(self.layout.upper, (nodes + 1, 1))
+        self.shape = (nodes + 1, n + self.extra_columns())
+        self.lower, self.upper = np.zeros(self.shape), np.zeros(self.shape)
+        self.lower[:, :n], self.upper[:, :n] = self.layout.lower, self.layout.upper
         self._rest_before_start()
-        moments = self._apply_wishes()
         stage = self.stage
-        index = np.arange((nodes + 1) * n).reshape(self.shape)
-        pairs = np.hstack([index[:-1], index[1:]])
+        index = np.arange((nodes + 1) * self.shape[1]).reshape(self.shape)
+        moments = self.wish_blocks(index)
+        pairs = np.hstack([index[:-1, :n], index[1:, :n]])
         both, p = ca.vertcat(stage.y0, stage.y), ca.vertcat(stage.eps, stage.weights)
         blocks = [Block(both, stage.g, stage.cost, pairs)]
         meanings = [m for k in range(1, nodes + 1) for r in stage.rows for m in _meanings(r, k)]
         g_bounds = [(r.lower, r.upper) for r in stage.rows for _ in r.labels] * nodes
-        for rows, where in moments:
-            blocks.append(Block(stage.y, rows.g, ca.SX(0), index[where]))
+        for block, rows, where in moments:
+            blocks.append(block)
             meanings += [m for k in where for m in _meanings(rows, k)]
             g_bounds += [(rows.lower, rows.upper)] * len(where)
         self.meanings = meanings
@@ -71,29 +74,47 @@ class Transcription:
         part = self.layout.slices["h"]
         self.lower[0, part] = self.upper[0, part] = 1.0
 
-    def _apply_wishes(self) -> list[tuple[Rows, list[int]]]:
+    def extra_columns(self) -> int:
+        """Columns of Y behind the layout's own, kept at zero unless `wish_blocks` frees them."""
+        return 0
+
+    def wish_blocks(self, index: np.ndarray) -> list[WishBlock]:
         """Wishes on plain variables tighten their bounds; the others become rows at nodes."""
+        blocks = (self.hard(wish, g, where, index) for wish, g, where in self.wish_expressions())
+        return [block for block in blocks if block is not None]
+
+    def hard(
+        self, wish: Wish, g: ca.SX, where: list[int], index: np.ndarray
+    ) -> WishBlock | None:
+        """The rows of a wish that holds exactly; None where tighter bounds do it."""
+        variable = as_variable(g, self.stage.y)
+        if variable is not None:
+            self._tighten(where, variable, wish)
+            return None
+        rows = _wish_row(g, wish)
+        at = index[where, : self.layout.size]
+        return Block(self.stage.y, rows.g, ca.SX(0), at), rows, where
+
+    def wish_expressions(self) -> Iterator[tuple[Wish, ca.SX, list[int]]]:
+        """Every wish as an expression of the stage's y and the nodes at which it holds; those that
+        symmetry grants or repeats are left out."""
         full = {g: ca.densify(self.layout.full(self.stage.y, g)) for g in GROUPS if g != "h"}
         node = self.model.node
         symbols = {"q": node.q, "v": node.v, "s": node.s, "u": node.u, "lam": node.lam}
-        rows: list[tuple[Rows, list[int]]] = []
+        values = [full[name] for name in symbols]
         seen: set[tuple[object, ...]] = set()
         for wish in self.wishes:
             expression = quantity_expression(self.model, wish.quantity.name)
-            g = ca.substitute(
-                [expression], list(symbols.values()), [full[name] for name in symbols]
-            )[0]
+            g = ca.substitute([expression], list(symbols.values()), values)[0]
             g = ca.SX(ca.cse(ca.densify(g)))
-            if ca.jacobian(g, self.stage.y).nnz() == 0:
-                continue  # zero by symmetry
-            where = list(range(self.nodes + 1)) if wish.at is None else [wish.node(self.nodes)]
-            variable = as_variable(g, self.stage.y)
-            if variable is not None:
-                self._tighten(where, variable, wish)
-            elif (key := (wish.at, str(g), wish.lower, wish.upper)) not in seen:
-                seen.add(key)  # the mirrored leg's wish is the same row
-                rows.append((_wish_row(g, wish), where))
-        return rows
+            key = (wish.location, wish.at, str(g), wish.lower, wish.upper)
+            if ca.jacobian(g, self.stage.y).nnz() == 0 or key in seen:
+                continue
+            seen.add(key)
+            # inputs and forces act on the interval before a node, so the first node has none
+            acts = ca.depends_on(expression, ca.vertcat(node.u, node.lam))
+            where = list(range(int(acts), self.nodes + 1))
+            yield wish, g, where if wish.at is None else [wish.node(self.nodes)]
 
     def _tighten(self, where: list[int], variable: tuple[int, float, float], wish: Wish) -> None:
         index, factor, offset = variable

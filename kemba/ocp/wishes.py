@@ -13,6 +13,7 @@ from kemba.config import Document
 from kemba.document import Location, written
 from kemba.errors import ConfigErrors, KembaError, suggest
 from kemba.model import Model
+from kemba.ocp.options import cost_errors, option_errors
 from kemba.ocp.task import Bound, Goal, Task
 from kemba.quantity import Quantity, to_si
 
@@ -67,7 +68,8 @@ def quantity_expression(model: Model, name: str) -> ca.SX:
 
 
 def resolve(task: Task, model: Model, document: Document) -> list[Wish]:
-    """All wishes of a task. Raises ConfigErrors with every wrong name, unit or range."""
+    """All wishes of a task. Raises ConfigErrors with every wrong name, unit or range, of its
+    costs and solver options too."""
     known = quantities(model)
     wishes: list[Wish] = []
     errors: list[KembaError] = []
@@ -80,6 +82,8 @@ def resolve(task: Task, model: Model, document: Document) -> list[Wish]:
                 (error.what, error.hint) if isinstance(error, KembaError) else (str(error), "")
             )
             errors.append(document.error(location, f"{written(location)}: {what}", hint=hint))
+    errors += cost_errors(task.cost, document)
+    errors += option_errors(task.solver.options, document)
     if errors:
         raise ConfigErrors(errors)
     return wishes

@@ -15,7 +15,7 @@ from kemba.plant.valves import delayed
 from kemba.trajectory import Array, Trajectory
 
 Motion = Callable[[Array], tuple[Array, Array]]  # times (m,) -> x [m], v [m/s]
-STEP = 1e-4  # s
+STEP = 2e-4  # s
 
 
 def drive(
@@ -71,7 +71,7 @@ def _settled(model: Model, eq: Equations, motion: Motion, time: float, u: Array)
     """Effect states after long rest at the first position and commands."""
     x, _ = motion(np.array([time]))
     s = np.array([q.value for q in model.states.values()], dtype=float)
-    for _ in range(4000):
+    for _ in range(800):
         s = eq.driven(q=x[0], v=0.0, s=s, u=u, q1=x[0], v1=0.0, h=1e-3)["s"].copy()
     return s
 

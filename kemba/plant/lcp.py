@@ -11,7 +11,7 @@ import numpy as np
 
 from kemba.trajectory import Array
 
-TOLERANCE = 1e-9
+ROUNDING = 1e-11  # of the terms of a row; a smaller violation is none
 SWAPS = 6  # changes of the active set before Lemke's method takes over
 
 
@@ -22,21 +22,20 @@ class NoSolution(ArithmeticError):
 def solve_lcp(A: Array, b: Array, guess: Array) -> tuple[Array, Array]:
     """Solution z (n,) and its active set, starting from the active set `guess` (n,) of booleans.
 
-    Rows and columns are scaled to speeds, so that forces and slip speeds compare. Raises
-    NoSolution.
+    Raises NoSolution.
     """
-    row, column = _scales(A)
-    A, b = row[:, None] * A * column, row * b
     for start in (guess, np.zeros(len(b), dtype=bool)):
         found = _active_set(A, b, start)
         if found is not None:
-            return column * found[0], found[1]
-    z = lemke(A, b)
-    return column * z, z > 0.0
+            return found
+    row, column = _scales(A)
+    z = column * lemke(row[:, None] * A * column, row * b)
+    return z, z > 0.0
 
 
 def _scales(A: Array) -> tuple[Array, Array]:
-    """Scales of rows and columns: a force has a diagonal, a slip speed and its cone have none."""
+    """Scales of rows and columns that let forces and slip speeds compare: a force has a diagonal,
+    a slip speed and its cone have none."""
     diagonal = A.diagonal()
     force = diagonal > 0.0
     usual = float(np.median(diagonal[force])) if force.any() else 1.0
@@ -46,16 +45,17 @@ def _scales(A: Array) -> tuple[Array, Array]:
 
 
 def _active_set(A: Array, b: Array, on: Array) -> tuple[Array, Array] | None:
+    z = np.zeros(len(b))
     for _ in range(SWAPS):
-        z = np.zeros(len(b))
+        z[:] = 0.0
         if on.any():
             try:
                 z[on] = np.linalg.solve(A[on][:, on], -b[on])
             except np.linalg.LinAlgError:
                 return None
-        w = A @ z + b
-        small = TOLERANCE * (1.0 + np.abs(z).max())
-        wrong = np.where(on, z < -small, w < -small)
+        size = np.abs(z)
+        w, terms = A @ z + b, np.abs(A) @ size + np.abs(b)
+        wrong = np.where(on, z < -ROUNDING * size.max(), w < -ROUNDING * terms)
         if not wrong.any():
             return np.maximum(z, 0.0), on
         on = on ^ wrong

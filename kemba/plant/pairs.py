@@ -55,11 +55,6 @@ class PairTable:
         """Whether each row belongs to an instance without gaps, which cannot open."""
         return ~np.isin(self.group, self.group[self.gaps])
 
-    @cached_property
-    def always(self) -> Array:
-        """The rows that always take part."""
-        return np.flatnonzero(self.ungapped)
-
 
 def read_pairs(node: Any) -> PairTable:
     """The pair table of a node. Raises KembaError where a pair has no force of its own."""

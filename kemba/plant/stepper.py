@@ -33,18 +33,20 @@ class Stepper:
     def __init__(self, equations: Equations) -> None:
         self.eq = equations
         self._active = np.zeros(equations.nl, dtype=bool)
+        self._rows: dict[bytes, Array] = {}
 
     def touching(self, gap: Array, reach: float) -> Array:
         """Rows of the pair table that take part: gaps within `reach` [m] (compliant ones within
         `SOFT_REACH`) with the friction that belongs to them."""
         pairs = self.eq.pairs
         near = gap <= np.where(pairs.rigid, reach, SOFT_REACH)
-        if not near.any():
-            return pairs.always
-        closed = np.zeros(self.eq.nl, dtype=bool)
-        closed[pairs.gaps] = near
-        groups = np.isin(pairs.group, pairs.group[closed])
-        return np.flatnonzero(closed | (groups & ~pairs.is_gap) | pairs.ungapped)
+        key = near.tobytes()
+        if key not in self._rows:
+            closed = np.zeros(self.eq.nl, dtype=bool)
+            closed[pairs.gaps] = near
+            friction = np.isin(pairs.group, pairs.group[closed]) & ~pairs.is_gap
+            self._rows[key] = np.flatnonzero(closed | friction | pairs.ungapped)
+        return self._rows[key]
 
     def hard(self, rows: Array) -> Array:
         """Those of `rows` that can pass on an impact: of instances with a rigid gap."""

@@ -10,6 +10,7 @@ from kemba.plotting.diagnosis import Band, plot_bands, plot_heat_map, plot_ladde
 from kemba.plotting.draw import draw, machine_of
 from kemba.plotting.machine import Machine, load_machine
 from kemba.plotting.motion import plot_motion
+from kemba.plotting.robustness import plot_growth, plot_robustness
 from kemba.plotting.source import Source, default_path, load_source, load_sources
 from kemba.plotting.style import paper_figure, paper_style, save_figure
 
@@ -29,9 +30,11 @@ __all__ = [
     "plot_bands",
     "plot_bench",
     "plot_force_velocity",
+    "plot_growth",
     "plot_heat_map",
     "plot_ladder",
     "plot_motion",
+    "plot_robustness",
     "save_animation",
     "save_figure",
     "valve_modes",

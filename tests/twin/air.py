@@ -31,8 +31,7 @@ from .catalogue import (
     L_STRIBECK_V,
     L_SUPPLY,
 )
-from .jit import njit
-from .numbers import (
+from .figures import (
     AREA_E,
     AREA_R,
     ATMOSPHERE,
@@ -45,8 +44,8 @@ from .numbers import (
     N_C11,
     N_DEAD_E,
     N_FE,
-    N_FR,
     N_FILL,
+    N_FR,
     N_PS,
     N_ROD_C,
     N_TF0,
@@ -56,6 +55,7 @@ from .numbers import (
     N_VENT,
     STROKE,
 )
+from .jit import njit
 
 N_AIR = 6
 A_UE, A_UR, A_TORQUE, A_DAHL = 2, 3, 4, 5
@@ -77,8 +77,10 @@ def thin_plate(up, down):
     ratio = max(down / up, _CHOKED)
     near = 0.9995
     if ratio > near:
-        shape = (1.0 - ratio) / (1.0 - near) * np.sqrt(
-            near ** (2.0 / KAPPA) - near ** ((KAPPA + 1.0) / KAPPA)
+        shape = (
+            (1.0 - ratio)
+            / (1.0 - near)
+            * np.sqrt(near ** (2.0 / KAPPA) - near ** ((KAPPA + 1.0) / KAPPA))
         )
     else:
         shape = np.sqrt(ratio ** (2.0 / KAPPA) - ratio ** ((KAPPA + 1.0) / KAPPA))

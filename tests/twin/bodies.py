@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .jit import njit
-from .numbers import (
+from .figures import (
     CYLINDER_COM,
     FEMUR,
     FEMUR_COM,
@@ -20,6 +19,7 @@ from .numbers import (
     ROD_COM,
     TIBIA_COM,
 )
+from .jit import njit
 
 NQ, NC = 27, 20
 # Indices coupled in the mass matrix: body x, z, angle and the two femur angles (hip rotors).
@@ -94,7 +94,7 @@ def _pin(row, one, two, ax, az, bx, bz, wa, wb, q, index, value, gap, bias):
 
 @njit
 def inverse_mass(q, mass, inertia, boom_mx, boom_mz, payload, offset, rotor_f, rotor_r, w, block):
-    """Diagonal of M^-1 into `w`; the coupled 5 x 5 part into `block`.  Boom mass acts on x and z."""
+    """Diagonal of M^-1 into `w`, the coupled 5 x 5 part into `block`; the boom acts on x and z."""
     for i in range(9):
         w[3 * i] = w[3 * i + 1] = 1.0 / mass[i]
         w[3 * i + 2] = 1.0 / inertia[i]

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .numbers import STANCE_HIP, STANCE_Z
+from .figures import STANCE_HIP, STANCE_Z
 
 # Columns of the per-leg table.
 (
@@ -23,8 +23,9 @@ from .numbers import STANCE_HIP, STANCE_Z
 
 # Columns of the body table.
 (
-    B_DROOP, B_DROOP_T, B_PAYLOAD, B_COM, B_FORCE, B_INERTIA, B_COULOMB, B_DAMP, B_SPRING, B_SPRING_Z,
-    B_PITCH, B_GROUND_K, B_GROUND_D, B_MU, B_CABLE, B_CABLE_Z, B_DRAG, B_COUNT,
+    B_DROOP, B_DROOP_T, B_PAYLOAD, B_COM, B_FORCE, B_INERTIA, B_COULOMB, B_DAMP,
+    B_SPRING, B_SPRING_Z, B_PITCH, B_GROUND_K, B_GROUND_D, B_MU,
+    B_CABLE, B_CABLE_Z, B_DRAG, B_COUNT,
 ) = range(18)  # fmt: skip
 
 
@@ -124,9 +125,7 @@ CATALOGUE: dict[str, Entry] = {
     "cable_pull": _body(("k", B_CABLE, 80.0, "N.m-1"), ("z", B_CABLE_Z, 0.3, "m"), known=False),
     "boom_drag": _body(("c", B_DRAG, 2.5, "N.s2.m-2"), known=False),
     # the value drifts from run to run (warming air, a draining tank): see `cases`
-    "temperature_drift": _leg(
-        ("c", L_DAMP, 40.0, "N.s.m-1"), bench=True, signed=True, known=False
-    ),
+    "temperature_drift": _leg(("c", L_DAMP, 40.0, "N.s.m-1"), bench=True, signed=True, known=False),
 }
 
 SENSOR_KINDS = {"sensor_bias": "b", "sensor_scale": "k", "sensor_delay": "dt"}

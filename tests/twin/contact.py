@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from .catalogue import B_GROUND_D, B_GROUND_K, B_MU
+from .figures import STROKE
 from .jit import njit
-from .numbers import STROKE
 
 GROUND_K, GROUND_C = 4.0e6, 5.5e3
 SIDE_K, SIDE_C = 2.0e6, 2.5e3
-STOP_K, STOP_C = 1.0e7, 2.0e4
+STOP_K, STOP_C = 2.0e7, 6.0e4
 _SOFT = 3.0e-5  # damping grows over this depth, so that the force starts from zero
 
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .jit import njit
-from .numbers import (
+from .figures import (
     FEMUR,
     LEVER,
     MOUNT,
@@ -16,6 +15,7 @@ from .numbers import (
     STROKE,
     TIBIA,
 )
+from .jit import njit
 
 # Columns of one control row: angle, rate, torque (2 legs each), follow, kp, kd.
 R_Q, R_QD, R_TAU, R_FOLLOW, R_KP, R_KD, R_COUNT = 0, 2, 4, 6, 7, 8, 9

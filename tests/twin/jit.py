@@ -1,7 +1,7 @@
-"""Compilation switch: cached, keyed by the content of every kernel file.
+"""Compilation switch and the folder where slow results are kept between runs.
 
 Numba's own cache looks only at the file of the outermost function, so a changed callee in another
-file would be served stale.  Naming the cache folder after the content of all files prevents that
+file would be served stale.  Naming the folder after the content of all kernel files prevents that
 (and after the package name: compiled code remembers under which name it was imported).
 """
 
@@ -16,17 +16,39 @@ from pathlib import Path
 import numba
 from numba import njit as _njit
 
-_FILES = sorted(Path(__file__).parent.glob("*.py"))
-_CONTENT = b"".join(f.read_bytes() for f in _FILES) + __name__.encode()
-_KEY = hashlib.sha256(_CONTENT).hexdigest()[:16]
+_KERNELS = (
+    "air",
+    "bench",
+    "bodies",
+    "catalogue",
+    "contact",
+    "control",
+    "figures",
+    "jit",
+    "loads",
+    "machine",
+)
+_PLANNERS = ("layout", "motions", "plan", "run", "scripts", "valves")
+
+
+def _fingerprint(*names: str) -> str:
+    here = Path(__file__).parent
+    content = b"".join((here / f"{n}.py").read_bytes() for n in names)
+    return hashlib.sha256(content + __name__.encode()).hexdigest()[:16]
+
+
+def kept(kind: str) -> Path:
+    """Folder for `kind` ("code" or "motions"), named after the sources it depends on."""
+    try:
+        user = getpass.getuser()
+    except (KeyError, OSError):
+        user = "user"
+    names = _KERNELS if kind == "code" else _KERNELS + _PLANNERS
+    return Path(tempfile.gettempdir()) / f"twin-{user}" / f"{kind}-{_fingerprint(*names)}"
+
 
 if "NUMBA_CACHE_DIR" not in os.environ:
-    try:
-        _user = getpass.getuser()
-    except (KeyError, OSError):
-        _user = "user"
-    _root = Path(tempfile.gettempdir()) / f"twin-numba-{_user}"
-    numba.config.CACHE_DIR = str(_root / _KEY)
+    numba.config.CACHE_DIR = str(kept("code"))
 
 
 def njit(function):

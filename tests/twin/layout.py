@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .bodies import NQ
-from .numbers import (
+from .figures import (
     CLOSED,
     CYLINDER_COM,
     FEMUR,
@@ -65,7 +65,7 @@ def push(x, z, pitch, hips, pistons, rates) -> tuple[np.ndarray, np.ndarray]:
 def feet(q: np.ndarray) -> np.ndarray:
     """Foot positions, shape (..., 2 legs, 2)."""
     q = np.asarray(q)
-    out = np.empty(q.shape[:-1] + (2, 2))
+    out = np.empty((*q.shape[:-1], 2, 2))
     for leg in range(2):
         t = 6 + 12 * leg
         reach = TIBIA - TIBIA_COM
@@ -77,7 +77,7 @@ def feet(q: np.ndarray) -> np.ndarray:
 def knees(q: np.ndarray) -> np.ndarray:
     """Knee positions, shape (..., 2 legs, 2)."""
     q = np.asarray(q)
-    out = np.empty(q.shape[:-1] + (2, 2))
+    out = np.empty((*q.shape[:-1], 2, 2))
     for leg in range(2):
         f = 3 + 12 * leg
         reach = FEMUR - FEMUR_COM
@@ -88,7 +88,7 @@ def knees(q: np.ndarray) -> np.ndarray:
 
 def measured(q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(x, z, pitch, hip front/rear, piston front/rear) and their rates along the last axis."""
-    y, w = np.empty(q.shape[:-1] + (7,)), np.empty(q.shape[:-1] + (7,))
+    y, w = np.empty((*q.shape[:-1], 7)), np.empty((*q.shape[:-1], 7))
     y[..., 0:3], w[..., 0:3] = q[..., 0:3], v[..., 0:3]
     for leg in range(2):
         f = 3 + 12 * leg

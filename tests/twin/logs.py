@@ -14,7 +14,7 @@ def write(path: Path, columns: dict[str, np.ndarray]) -> Path:
     table = np.column_stack(list(columns.values()))
     lines = [",".join(columns)]
     for row in table:
-        lines.append(",".join("" if np.isnan(v) else f"{v:.9g}" for v in row))
+        lines.append(",".join("" if np.isnan(v) else f"{v + 0.0:.9g}" for v in row))
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return path
 

@@ -12,27 +12,11 @@ import numpy as np
 from .air import A_TORQUE, N_AIR, air_rates, rod_force
 from .bodies import NC, NQ, apply_inverse, constraints, factor, inverse_mass, solve
 from .catalogue import (
-    B_CABLE,
-    B_CABLE_Z,
     B_COM,
-    B_COULOMB,
-    B_DAMP,
-    B_DRAG,
     B_DROOP,
     B_DROOP_T,
-    B_FORCE,
     B_INERTIA,
     B_PAYLOAD,
-    B_PITCH,
-    B_SPRING,
-    B_SPRING_Z,
-    L_COGGING,
-    L_COGGING_N,
-    L_GEAR,
-    L_HIP_COULOMB,
-    L_HIP_DAMP,
-    L_HIP_Q0,
-    L_HIP_SPRING,
     L_MOTOR_LAG,
     L_ROTOR,
     L_TORQUE,
@@ -40,14 +24,25 @@ from .catalogue import (
 from .contact import creep, foot_normal, foot_tangent, stop_force
 from .control import hip_command
 from .jit import njit
-from .numbers import CLOSED, GRAVITY, TIBIA, TIBIA_COM
+from .loads import (
+    AIR,
+    S_BOOM_MX,
+    S_BOOM_MZ,
+    S_GROUND,
+    S_MU,
+    S_PHYSICAL,
+    S_ROTOR,
+    SUPPLY,
+    body_force,
+    foot_state,
+    hip_force,
+    near_ground,
+    piston_state,
+)
 
 NY = 2 * NQ + 2 * N_AIR + 1
-AIR, SUPPLY = 2 * NQ, 2 * NQ + 2 * N_AIR
 # One row of what is recorded beside the state: rod force, foot forces x and z, torque (x 2 legs).
 NOUT = 8
-# Columns of the scalar figures handed to the kernel.
-S_ROTOR, S_BOOM_MX, S_BOOM_MZ, S_BOOM_W, S_MU, S_PHYSICAL, S_GROUND, S_COUNT = range(8)
 
 
 @njit
@@ -67,76 +62,9 @@ def workspace():
 
 
 @njit
-def piston_state(y, leg):
-    b, r = 9 + 12 * leg, 12 + 12 * leg
-    s, c = np.sin(y[b + 2]), np.cos(y[b + 2])
-    x = (y[r] - y[b]) * s - (y[r + 1] - y[b + 1]) * c - CLOSED
-    v = (y[NQ + r] - y[NQ + b]) * s - (y[NQ + r + 1] - y[NQ + b + 1]) * c
-    return x, v, s, -c
-
-
-@njit
-def foot_state(y, leg):
-    t = 6 + 12 * leg
-    s, c = np.sin(y[t + 2]), np.cos(y[t + 2])
-    reach = TIBIA - TIBIA_COM
-    w = y[NQ + t + 2]
-    return (
-        y[t] + reach * s,
-        y[t + 1] - reach * c,
-        y[NQ + t] + reach * c * w,
-        y[NQ + t + 1] + reach * s * w,
-        reach * c,
-        reach * s,
-    )
-
-
-@njit
-def near_ground(y):
-    return min(foot_state(y, 0)[1], foot_state(y, 1)[1]) < 0.004
-
-
-@njit
-def hip_force(leg, y, command, row):
-    """Torque on the femur: motor chain, then friction and the other hip effects."""
-    f = 3 + 12 * leg
-    angle, speed = y[f + 2] - y[2], y[NQ + f + 2] - y[NQ + 2]
-    torque = row[L_TORQUE] * command
-    if row[L_MOTOR_LAG] > 0.0:
-        torque = y[AIR + N_AIR * leg + A_TORQUE]
-    total = torque - row[L_HIP_COULOMB] * np.tanh(speed / 0.1) - row[L_HIP_DAMP] * speed
-    total -= row[L_HIP_SPRING] * (angle - row[L_HIP_Q0])
-    total += row[L_COGGING] * np.sin(row[L_COGGING_N] * angle)
-    total -= row[L_GEAR] * abs(torque) * np.tanh(speed / 0.1)
-    return total
-
-
-@njit
-def body_force(y, push, body, s, mass, f):
-    """Gravity on every link, the boom, and the effects on the body, added to `f`."""
-    for i in range(9):
-        f[3 * i + 1] -= mass[i] * GRAVITY
-    z, vx, vz, w = y[1], y[NQ], y[NQ + 1], y[NQ + 2]
-    offset = body[B_COM]
-    c, sn = np.cos(y[2]), np.sin(y[2])
-    f[0] += mass[0] * offset * w * w * c
-    f[1] += mass[0] * offset * w * w * sn
-    f[2] -= mass[0] * GRAVITY * offset * c
-    f[1] -= s[S_BOOM_W] + body[B_PAYLOAD] * GRAVITY
-    f[1] += body[B_FORCE] - body[B_SPRING] * (z - body[B_SPRING_Z])
-    f[1] -= body[B_CABLE] * max(0.0, z - body[B_CABLE_Z])
-    f[0] -= body[B_COULOMB] * np.tanh(vx / 0.02) + body[B_DAMP] * vx + body[B_DRAG] * vx * abs(vx)
-    f[1] -= body[B_COULOMB] * np.tanh(vz / 0.02) + body[B_DAMP] * vz + body[B_DRAG] * vz * abs(vz)
-    f[2] -= body[B_PITCH] * np.tanh(w / 0.05)
-    f[0] += push[0]
-    f[1] += push[1]
-    f[2] += push[2]
-
-
-@njit
 def rates(y, u, command, push, anchor, mass, inertia, s, air, leg, body, ws, dy, out):
     """dy = f(y); `out` gets rod force, Fx, Fz and hip torque of both legs."""
-    index, value, gap, bias, w, block, wg, a, f, acc = ws
+    f, acc = ws[8], ws[9]
     physical = s[S_PHYSICAL] > 0.5
     f[:] = 0.0
     body_force(y, push, body, s, mass, f)
@@ -210,7 +138,7 @@ def _dynamics(y, s, leg, body, mass, inertia, ws):
 @njit
 def project(y, s, leg, body, mass, inertia, ws):
     """One Newton step back on the constraints, in position and in velocity, mass-weighted."""
-    index, value, gap, bias, w, block, wg, a, _, _ = ws
+    index, value, gap, bias, _, _, wg, a, _, _ = ws
     _prepare(y, s, leg, body, mass, inertia, ws)
     for r in range(NC):
         total = 0.0
@@ -249,9 +177,7 @@ def integrate(
         for m in range(2):
             x, v, _, _ = piston_state(y, m)
             f = 3 + 12 * m
-            command[m] = hip_command(
-                m, y[f + 2] - y[2], y[NQ + f + 2] - y[NQ + 2], x, v, refs[k]
-            )
+            command[m] = hip_command(m, y[f + 2] - y[2], y[NQ + f + 2] - y[NQ + 2], x, v, refs[k])
             commands[k, m] = command[m]
         push = pushes[k]
         for part in range(split if k < n else 1):
@@ -288,7 +214,7 @@ def integrate(
 
 @njit
 def _step(y, h, u, command, push, anchor, mass, inertia, s, air, leg, body, ws, dy, stage, out):
-    """One strong-stability-preserving Runge-Kutta step (order 3); friction anchors move after it."""
+    """One step of the strong-stability-preserving Runge-Kutta scheme of order 3."""
     rates(y, u, command, push, anchor, mass, inertia, s, air, leg, body, ws, dy, out)
     for i in range(NY):
         stage[i] = y[i] + h * dy[i]

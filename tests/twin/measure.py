@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .catalogue import SENSOR_KINDS, SENSOR_SIZES
-from .numbers import AREA_E, AREA_R, ATMOSPHERE
+from .figures import AREA_E, AREA_R, ATMOSPHERE
 
 # channel -> (unit, noise sigma, quantisation step)
 CHANNELS = {
@@ -78,7 +78,7 @@ def read(channel, times, truth_times, truth, sensors: Sensors, faults, rng) -> n
     """One measured column: delay, scale, bias, noise, quantisation, gaps, in that order."""
     shift, scale, bias = 0.0, 1.0, 0.0
     for fault in faults:
-        kind, where = fault["kind"].split(":", 1)
+        where = fault["kind"].split(":", 1)[1]
         if where != channel:
             continue
         shift += fault["parameters"].get("dt", 0.0)

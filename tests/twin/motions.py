@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from .figures import STANCE_Z
 from .layout import knees
-from .numbers import STANCE_Z
 from .plan import Sight, Wish, fold_of, length_of, record, slope_of
-from .run import Truth, simulate
+from .run import Truth
 from .scripts import (
     FRONT_E,
     FRONT_R,
@@ -41,6 +41,7 @@ class Leaper:
         self.tuck = rng.uniform(0.02, 0.045) if rng.random() < 0.5 else None
         self.skew = rng.normal(0.0, 0.0015, 2).clip(-0.003, 0.003)
         self.from_hips = None
+        self.both = bool(rng.random() < 0.4)
         self.sink = (0.3, 0.0, 0.0, 15.0)
         self.done = None
 
@@ -114,7 +115,7 @@ class Leaper:
         v = rate / slope_of(x)
         back = self.lean * max(0.0, 1.0 - 2.0 * slow)
         return Wish(
-            x=(x + skew, x - skew), v=(v, v), hip_offset=(back, back), stiff=20.0
+            x=(x + skew, x - skew), v=(v, v), hip_offset=(back, back), stiff=20.0, both=self.both
         )
 
     def finished(self, see: Sight) -> bool:
@@ -173,6 +174,7 @@ class Squats:
         self.depth = rng.uniform(0.05, 0.1) if self.fast else rng.uniform(0.08, 0.16)
         self.tilt = rng.uniform(-0.008, 0.008)
         self.pause = rng.uniform(0.1, 0.16)
+        self.both = bool(rng.random() < 0.5)
 
     def _length(self, t: float, sign: float) -> float:
         phase = np.clip(t / self.period, 0.0, 1.0)
@@ -192,6 +194,7 @@ class Squats:
             x=(now[0], now[1]),
             v=((now[0] - before[0]) / 1e-3, (now[1] - before[1]) / 1e-3),
             valves=(0, 0, 0, 0) if resting else None,
+            both=self.both,
             stiff=20.0,
         )
 
@@ -220,7 +223,7 @@ def swing(rng, height=None, rate=1000.0, jitter=0.0) -> Script:
         while t < duration:
             on = rng.uniform(0.03, 0.07)
             pulses.append((pair[side], t, t + on))
-            if rng.random() < 0.25:
+            if rng.random() < 0.3:
                 pulses.append((pair[1 - side], t, t + on))
             t += on + rng.uniform(0.02, 0.07)
             side = 1 - side
@@ -263,14 +266,3 @@ MOTIONS = {
     "drop": drop,
     "sway": sway,
 }
-
-
-def motion(name: str, seed: int, rate: float = 1000.0, jitter: float = 0.0) -> Script:
-    """A motion that the nominal robot survives when it runs open loop; redrawn until it does."""
-    for attempt in range(12):
-        rng = np.random.default_rng([seed, attempt, sum(name.encode())])
-        draft = MOTIONS[name](rng, rate=rate, jitter=jitter)
-        truth = simulate(draft)
-        if sane(truth) and np.abs(truth.y[:, 2]).max() < 0.35:
-            return draft
-    raise RuntimeError(f"{name} {seed}: no draw kept its feet")

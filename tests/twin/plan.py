@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import catalogue, layout, machine
+from . import catalogue, layout, loads, machine
 from .bodies import NQ
 from .control import R_COUNT, R_FOLLOW, R_KD, R_KP, R_Q, R_QD, R_TAU
-from .numbers import DEAD_TIME, Robot, leg_fold
+from .figures import DEAD_TIME, Robot, leg_fold
 from .run import STEP, initial_state, scalars
 from .scripts import KD, KP, Script, Start
 
@@ -53,6 +53,7 @@ class Wish:
     hip_offset: tuple[float, float] = (0.0, 0.0)
     stiff: float = 16.0  # bandwidth of the knee rule (rad/s)
     airborne: bool = False
+    both: bool = False  # hold small forces with both valves on
 
 
 def fold_of(x: float) -> float:
@@ -78,6 +79,8 @@ def knee_rule(leg: int, wish: Wish, see: Sight) -> tuple[bool, bool]:
     accel = wish.stiff**2 * (wish.x[leg] - ahead) + 1.6 * wish.stiff * (wish.v[leg] - v)
     force = mass * accel + weight + 40.0 * v
     extend = force > see.force[leg, 0] + 15.0
+    if wish.both and 0.0 < force < 150.0:
+        return True, True
     # retract only when clearly asked for, or with both valves on as a brake
     retract = force < -60.0 - see.force[leg, 1] or (force < 60.0 and v > 0.25 and not wish.airborne)
     return bool(extend), bool(retract)
@@ -138,7 +141,7 @@ def record(
 
 def _look(t: float, y: np.ndarray) -> Sight:
     pose, rate = layout.measured(y[:NQ], y[NQ : 2 * NQ])
-    air = y[machine.AIR : machine.SUPPLY].reshape(2, -1)[:, :2]
+    air = y[loads.AIR : loads.SUPPLY].reshape(2, -1)[:, :2]
     return Sight(float(t), pose, rate, layout.feet(y[:NQ]), air)
 
 

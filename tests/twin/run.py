@@ -6,12 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import catalogue, layout, machine, valves
+from . import catalogue, layout, loads, machine, valves
 from .air import N_AIR
 from .bodies import NQ
-from .numbers import ATMOSPHERE, Robot
+from .figures import ATMOSPHERE, Robot
 from .scripts import Script
-
 
 STEP = 40e-6  # largest integration step (s); half of it near the ground
 
@@ -51,8 +50,8 @@ def initial_state(start, physical: bool) -> np.ndarray:
     )
     if physical:
         for n in range(2):
-            y[machine.AIR + N_AIR * n : machine.AIR + N_AIR * n + 2] = ATMOSPHERE
-    y[machine.SUPPLY] = 1.0
+            y[loads.AIR + N_AIR * n : loads.AIR + N_AIR * n + 2] = ATMOSPHERE
+    y[loads.SUPPLY] = 1.0
     return y
 
 
@@ -61,6 +60,29 @@ def scalars(robot: Robot, physical: bool, ground: bool) -> np.ndarray:
         robot.rotor, robot.boom_mx, robot.boom_mz, robot.boom_weight, robot.friction,
         float(physical), float(ground),
     ])  # fmt: skip
+
+
+def _settle(y, script, step, robot, figures, leg, body) -> None:
+    """Let a standing robot find its rest on the springs of the ground before time zero.
+
+    Kinetic relaxation: whenever the kinetic energy has passed a peak, the motion is stopped.
+    """
+    if np.any(script.start.rates) or layout.feet(y[:NQ])[:, 1].max() > 1e-3:
+        return
+    ticks, row = np.array([0.0, 0.002]), np.stack([script.refs[0]] * 2)
+    anchor = np.ascontiguousarray(layout.feet(y[:NQ])[:, 0])
+    before = 0.0
+    for _ in range(60):
+        machine.integrate(
+            y, np.zeros(4), anchor, ticks, 1, step, row, np.zeros((2, 7)), np.zeros((0, 3)),
+            robot.mass, robot.inertia, figures, robot.air, leg, body,
+        )  # fmt: skip
+        speed = float(np.sum(y[NQ : 2 * NQ] ** 2))
+        if speed < before:
+            y[NQ : 2 * NQ] = 0.0
+            speed = 0.0
+        before = speed
+    y[NQ : 2 * NQ] = 0.0
 
 
 def simulate(
@@ -72,19 +94,23 @@ def simulate(
     split: int = 2,
     pushes: np.ndarray | None = None,
     ground: bool = True,
+    settle: bool = True,
 ) -> Truth:
     """Run `script`.  `pushes[tick, 7]`: disturbance on x, z, pitch, hips, rods, held per tick."""
     robot = robot or Robot()
     physical = {"first_order": False, "orifice": True}[chambers]
     leg, body, late = catalogue.tables(list(effects))
+    figures = scalars(robot, physical, ground)
     y = initial_state(script.start, physical)
+    if ground and settle:
+        _settle(y, script, step, robot, figures, leg, body)
     if pushes is None:
         pushes = np.zeros((script.ticks.size, 7))
     times, states, outputs, command, acted = machine.integrate(
         y, np.zeros(4), np.ascontiguousarray(layout.feet(y[:NQ])[:, 0]),
         script.ticks, split, step, script.refs, pushes,
         valves.events(script.ticks, script.sent, late),
-        robot.mass, robot.inertia, scalars(robot, physical, ground), robot.air, leg, body,
+        robot.mass, robot.inertia, figures, robot.air, leg, body,
     )  # fmt: skip
     q, v = states[:, :NQ], states[:, NQ : 2 * NQ]
     measured, speeds = layout.measured(q, v)
@@ -96,8 +122,8 @@ def simulate(
         v=v,
         y=measured,
         w=speeds,
-        air=states[:, machine.AIR : machine.SUPPLY].reshape(-1, 2, N_AIR),
-        supply=states[:, machine.SUPPLY],
+        air=states[:, loads.AIR : loads.SUPPLY].reshape(-1, 2, N_AIR),
+        supply=states[:, loads.SUPPLY],
         rod=outputs[:, 0:2],
         foot=np.stack([outputs[:, 2:4], outputs[:, 4:6]], axis=-1),
         command=command,

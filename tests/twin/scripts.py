@@ -1,4 +1,4 @@
-"""Command scripts: what the operator sends (hip references, open-loop valves), and where it starts."""
+"""Command scripts: hip references, open-loop valves, and where it starts."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from .control import R_COUNT, R_FOLLOW, R_KD, R_KP, R_Q, R_QD, R_TAU
-from .numbers import HALF_BODY, STANCE_HIP, STANCE_Z, leg_fold
+from .figures import HALF_BODY, STANCE_HIP, STANCE_Z, leg_fold
 from .valves import VALVES
 
 KP, KD = 150.0, 3.0
@@ -41,9 +41,11 @@ class Script:
 
 def clock(duration: float, rate: float = 1000.0, jitter: float = 0.0, rng=None) -> np.ndarray:
     """Tick times; `jitter` (s) moves each inner tick, never past its neighbour."""
-    ticks = np.arange(int(round(duration * rate)) + 1) / rate
+    ticks = np.arange(round(duration * rate) + 1) / rate
     if jitter > 0.0:
-        ticks[1:-1] += np.clip(jitter * rng.standard_normal(ticks.size - 2), -0.4 / rate, 0.4 / rate)
+        ticks[1:-1] += np.clip(
+            jitter * rng.standard_normal(ticks.size - 2), -0.4 / rate, 0.4 / rate
+        )
     return ticks
 
 
@@ -63,7 +65,7 @@ def in_air(z: float, pistons=(0.03, 0.03), pitch: float = 0.0, rates=(0.0,) * 7)
 
 
 def script(name, ticks, pulses, start=None, offsets=None, follow=1.0, kp=KP, kd=KD, feed=None):
-    """Build a script.  `pulses`: (valve, on, off).  `offsets`: (time, front, rear) hip knots (rad)."""
+    """Build a script; `pulses`: (valve, on, off), `offsets`: (time, front, rear) hip knots."""
     refs = np.zeros((ticks.size, R_COUNT))
     refs[:, R_FOLLOW], refs[:, R_KP], refs[:, R_KD] = follow, kp, kd
     if offsets is not None:
@@ -84,7 +86,7 @@ def with_start(motion: Script, **changes) -> Script:
 
 
 def from_table(path: str | Path, name: str | None = None, kp=KP, kd=KD, start=None) -> Script:
-    """A controller table: time, hip q / qd (or w) / tau and the valves as sent, in log-format names.
+    """A controller table: time, hip q, w (or qd) and tau, valves as sent; names of the log format.
 
     The run starts at rest in the pose of the first row, or at `start`.
     """

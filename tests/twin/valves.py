@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .numbers import DEAD_TIME
+from .figures import DEAD_TIME
 
 VALVES = ("front/valve/extend", "front/valve/retract", "rear/valve/extend", "rear/valve/retract")
 

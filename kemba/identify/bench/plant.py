@@ -17,6 +17,7 @@ from kemba.identify.problem import Array
 from kemba.model.model import Model
 
 LONGEST_STEP = 1.5e-3  # s; the fastest chamber answers in 8 ms
+CHUNK = 1024  # steps per call of a compiled map
 BLUR = 0.75e-3  # s; no log says on which side of a switching instant its sample was taken
 
 Pulses = tuple[list[tuple[float, float]], list[tuple[float, float]]]  # of both valves
@@ -64,19 +65,18 @@ class Rig:
         commands: Pulses,
         values: Mapping[str, float],
         start: Mapping[str, float] | None = None,
-        lead: float = 0.0,
     ) -> Prediction:
         """Integrate from equilibrium (plus `start` by state name) with exact switching instants.
 
-        `values` holds every name this rig was compiled for; `lead` [s] is added to the delays.
+        `values` holds every name this rig was compiled for.
         """
         on, off = self.timing(values)
-        valves = [delayed(c, on + lead, off + lead) for c in commands]
+        valves = [delayed(c, on, off) for c in commands]
         p = np.array([values[name] for name in self.names])
         times, at_sample = _breakpoints(motion.time, np.concatenate([edges(v) for v in valves]))
         u = np.stack([is_on(v, times) for v in valves])
         s = self._integrate(times, motion, u, p, start or {})[:, at_sample]
-        blurred = np.stack([_share(v, motion.time) for v in valves])
+        blurred = np.stack([share(v, motion.time) for v in valves])
         n = len(motion.time)
         columns = [s, motion.x, motion.v, motion.a, blurred, np.repeat(p[:, None], n, axis=1)]
         out = self._mapped("output", n)(*columns)
@@ -95,8 +95,12 @@ class Rig:
         drive = np.stack(
             [np.diff(times), x[:-1], v[:-1], a[:-1], xm, vm, am, x[1:], v[1:], a[1:], *u[:, :-1]]
         )
-        later = self._mapped("step", n)(s0, drive, np.repeat(p[:, None], n, axis=1))
-        return np.concatenate([s0[:, None], later], axis=1)
+        drive = np.pad(drive, ((0, 0), (0, -n % CHUNK)))  # steps of no length at the end
+        fixed = np.repeat(p[:, None], CHUNK, axis=1)
+        step, states = self._mapped("step", CHUNK), [s0[:, None]]
+        for i in range(0, drive.shape[1], CHUNK):
+            states.append(step(states[-1][:, -1], drive[:, i : i + CHUNK], fixed))
+        return np.concatenate(states, axis=1)[:, : n + 1]
 
     def _equilibrium(self, motion: Array, u: Array, p: Array) -> Array:
         """Where the states come to rest under constant commands."""
@@ -140,7 +144,9 @@ class _Call:
 def _runge_kutta(node: Any, rate: ca.SX) -> ca.Function:
     """(s, drive, p) -> s after one classical step of fourth order."""
     f = ca.Function("f", [node.s, node.q, node.v, node.a, node.u, node.p], [rate])
-    s, d, p = (ca.SX.sym(n, k) for n, k in (("s", node.s.numel()), ("d", 12), ("p", node.p.numel())))
+    s, d, p = (
+        ca.SX.sym(n, k) for n, k in (("s", node.s.numel()), ("d", 12), ("p", node.p.numel()))
+    )
     h, u = d[0], d[10:12]
     k1 = f(s, d[1], d[2], d[3], u, p)
     k2 = f(s + h / 2 * k1, d[4], d[5], d[6], u, p)
@@ -168,7 +174,7 @@ def _breakpoints(samples: Array, events: Array) -> tuple[Array, Any]:
     return times[order], place[: len(samples)]
 
 
-def _share(intervals: Array, times: Array) -> Array:
+def share(intervals: Array, times: Array) -> Array:
     """Share of [t - BLUR, t + BLUR] in which the valve is on: continuous in any delay."""
     flat = np.clip(intervals, times[0] - 1.0, times[-1] + 1.0).ravel()
     if not len(flat):
@@ -176,7 +182,10 @@ def _share(intervals: Array, times: Array) -> Array:
     knots = np.concatenate([[times[0] - 1.5], flat, [times[-1] + 1.5]])
     slope = np.arange(len(knots) - 1) % 2
     on_time = np.concatenate([[0.0], np.cumsum(slope * np.diff(knots))])
-    later, earlier = np.interp(times + BLUR, knots, on_time), np.interp(times - BLUR, knots, on_time)
+    later, earlier = (
+        np.interp(times + BLUR, knots, on_time),
+        np.interp(times - BLUR, knots, on_time),
+    )
     return np.clip((later - earlier) / (2 * BLUR), 0.0, 1.0)
 
 

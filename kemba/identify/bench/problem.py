@@ -3,54 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
 from kemba.effects import BY_KIND
 from kemba.effects.base import Effect
-from kemba.identify.bench.motion import Motion, difference_sigma, smooth_motion
-from kemba.identify.bench.plant import Prediction, Pulses, Rig
-from kemba.identify.bench.switching import pulses
+from kemba.identify.bench.library import terms
+from kemba.identify.bench.motion import Motion
+from kemba.identify.bench.plant import Prediction, Rig, share
+from kemba.identify.bench.plausible import contradictions
+from kemba.identify.bench.pressure import absolute_pressure
+from kemba.identify.bench.run import PRESSURES, Run
+from kemba.identify.bench.switching import delayed
 from kemba.identify.candidates import effect_candidates, sensor_candidates
+from kemba.identify.checks import BadData
 from kemba.identify.noise import Colour, learn, whiten
-from kemba.identify.problem import Array, Candidate, Rows, Theta, secant_jacobian
+from kemba.identify.problem import Array, Rows, Theta, secant_jacobian
 from kemba.model.model import Model
-from kemba.trajectory import Trajectory
 
-PRESSURES = ("chamber/extend/P", "chamber/retract/P")
 JITTER = 0.02  # nominal figures are off by 1-3 %
-DEAD_TIME_SIGMA = 1e-4  # s
-SAMPLE_SHARE = 1e-3  # blocks of rows used for the shape of the noise
-
-
-@dataclass(frozen=True)
-class Run:
-    """One bench log, prepared: motion, commands, and the measured channels."""
-
-    name: str
-    motion: Motion
-    commands: Pulses
-    measured: dict[str, Array]
-    sigma: dict[str, float]
-    mode: np.ndarray
-    keep: dict[str, np.ndarray] = field(default_factory=dict)
-
-
-def prepare(name: str, log: Trajectory) -> Run:
-    """Smooth the motion and learn each channel's white noise from its fastest differences."""
-    v = log["piston/v"] if "piston/v" in log else None
-    motion = smooth_motion(log.time, log["piston/x"], v)
-    extend, retract = (pulses(log.time, log[f"valve/{c}"]) for c in ("extend", "retract"))
-    channels = ["piston/F", *(p for p in PRESSURES if p in log)]
-    measured = {c: log[c] for c in channels}
-    floor = {"piston/F": 0.05, **dict.fromkeys(PRESSURES, 50.0)}
-    sigma = {c: max(difference_sigma(y), floor[c]) for c, y in measured.items()}
-    on = [log[f"valve/{c}"] > 0.5 for c in ("extend", "retract")]
-    mode = np.char.add(on[0].astype(int).astype(str), on[1].astype(int).astype(str))
-    keep = {c: np.isfinite(y) for c, y in measured.items()}
-    return Run(name, motion, (extend, retract), measured, sigma, mode, keep)
 
 
 class BenchProblem:
@@ -64,8 +37,7 @@ class BenchProblem:
         if sensors:
             self.candidates |= sensor_candidates(self._sensor_sigmas())
         self._scaled = _scaled(model)
-        self.nuisance = {name: (1.0, JITTER) for name in self._scaled}
-        self.nuisance["valve.lead"] = (0.0, DEAD_TIME_SIGMA)
+        self.nuisance = dict.fromkeys(self._scaled, (1.0, JITTER))
         self._rigs: dict[tuple[str, ...], Rig] = {}
         self._starts = {
             f"start:{name}[{i}]": (i, name)
@@ -121,23 +93,16 @@ class BenchProblem:
         run = self._runs[index]
         rig = self._rig(self._active(theta))
         values = {name: theta.get(name, self.nuisance.get(name, (0.0,))[0]) for name in rig.names}
-        start = {
-            name: theta.get(key, 0.0) for key, (i, name) in self._starts.items() if i == index
-        }
-        lead = theta.get("valve.lead", 0.0)
+        start = {name: theta.get(key, 0.0) for key, (i, name) in self._starts.items() if i == index}
         motion = _true_motion(run.motion, theta)
-        p = rig.predict(motion, run.commands, values, start, lead)
+        p = rig.predict(motion, run.commands, values, start)
         out = {"piston/F": _force(p, run, theta)}
         for channel in PRESSURES:
             if channel in run.measured:
                 out[channel] = self._pressure(channel, p, run, theta)
         return out
 
-    def _pressure(
-        self, channel: str, p: Prediction, run: Run, theta: Theta
-    ) -> tuple[Array, Array]:
-        from kemba.identify.bench.pressure import absolute_pressure
-
+    def _pressure(self, channel: str, p: Prediction, run: Run, theta: Theta) -> tuple[Array, Array]:
         value = absolute_pressure(channel, p.states)
         gain, offset = theta.get(f"gain:{channel}", 1.0), theta.get(f"offset:{channel}", 0.0)
         return gain * value + offset, np.full(len(value), run.sigma[channel] ** 2)
@@ -181,7 +146,9 @@ class BenchProblem:
         for state in {self._starts[n][1] for n in names}:
             own = {n: self._starts[n][0] for n in names if self._starts[n][1] == state}
             step = {n: theta.get(n, 0.0) + 0.1 * self._state_scale[state] for n in own}
-            slope = (self.residual({**theta, **step}, runs) - base) / (0.1 * self._state_scale[state])
+            slope = (self.residual({**theta, **step}, runs) - base) / (
+                0.1 * self._state_scale[state]
+            )
             columns |= {n: np.where(at == i, slope, 0.0) for n, i in own.items()}
         return columns
 
@@ -201,7 +168,27 @@ class BenchProblem:
         return Rows(run_, channel, time, phase, mode, self.channels, sigma)
 
     def library(self, theta: Theta) -> Mapping[str, Array]:
-        return {}
+        """Columns per newton, or per the coefficient's unit, of simple terms beyond the catalogue."""
+        parts: dict[str, list[Array]] = {}
+        for i, run in enumerate(self._runs):
+            predicted = self.predict(theta, i)
+            found = dict(terms(_true_motion(run.motion, theta), self._acting(theta, i)))
+            for channel, (_, variance) in predicted.items():
+                keep = run.keep[channel]
+                for formula, force in found.items():
+                    column = force if channel == "piston/F" else np.zeros(len(force))
+                    parts.setdefault(formula, []).append((column / np.sqrt(variance))[keep])
+        columns = np.stack([np.concatenate(p) for p in parts.values()], axis=1)
+        return dict(zip(parts, self.whiten(columns).T, strict=True))
+
+    def _acting(self, theta: Theta, index: int) -> Array:
+        """Share of each sample's neighbourhood in which the valves act (n, 2)."""
+        run, rig = self._runs[index], self._rig(self._active(theta))
+        delays = rig.timing(theta)
+        return np.stack(
+            [share(delayed(c, *delays), run.motion.time) for c in run.commands],
+            axis=1,
+        )
 
     def recolour(self, residual: Array | None) -> None:
         """Learn each series' colour from residuals (n,) that were not whitened, or forget it."""
@@ -213,6 +200,29 @@ class BenchProblem:
             for k in np.unique(rows.channel[rows.run == i]):
                 own = (rows.run == i) & (rows.channel == k)
                 self.colour[i, int(k)] = learn(residual[own])
+
+    def whiten(self, columns: Array) -> Array:
+        """Columns (n, k) of not whitened slopes as `jacobian` would now return them."""
+        rows, out = self.rows(), columns.copy()
+        for (i, k), colour in self.colour.items():
+            own = (rows.run == i) & (rows.channel == k)
+            out[own] = whiten(columns[own], colour)
+        return out
+
+    def plausible(self) -> list[str]:
+        """Raise BadData when columns must be mixed up; returns remarks."""
+        rig = self._rig(())
+        values = {name: self.nuisance[name][0] for name in rig.names}
+        faults = [
+            fault
+            for run in self._runs
+            for fault in contradictions(
+                run, lambda r: rig.predict(r.motion, r.commands, values).force
+            )
+        ]
+        if faults:
+            raise BadData(faults)
+        return []
 
     # -- how the logs begin -----------------------------------------------------------------
 
@@ -232,9 +242,7 @@ class BenchProblem:
             self._runs[i] = replace(run, commands=trials[int(np.argmin(costs))])
 
 
-def _begun(
-    intervals: list[tuple[float, float]], start: float
-) -> list[list[tuple[float, float]]]:
+def _begun(intervals: list[tuple[float, float]], start: float) -> list[list[tuple[float, float]]]:
     if not intervals or np.isfinite(intervals[0][0]):
         return [intervals]
     return [intervals, [(start, intervals[0][1]), *intervals[1:]]]
@@ -283,6 +291,6 @@ def _force(p: Prediction, run: Run, theta: Theta) -> tuple[Array, Array]:
         valve = np.stack([np.interp(earlier, run.motion.time, c) for c in valve.T], axis=1)
     force = (1 + theta.get("sensor_scale:piston/F.k", 0.0)) * force
     force = force + theta.get("sensor_bias:piston/F.b", 0.0)
-    variance = run.sigma["piston/F"] ** 2 + (p.by_rate * run.motion.v_sigma) ** 2
+    variance = run.sigma["piston/F"] ** 2 + run.blunt**2
     variance = variance + np.sum(p.by_valve**2 * valve * (1 - valve), axis=1)
     return force, variance

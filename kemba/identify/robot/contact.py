@@ -16,7 +16,7 @@ NEAR_GROUND = 2.0e-3  # m above the level on which feet rest
 NEAR_STOP = 0.4e-3  # m from the level at which pistons rest
 BLUR = 0.004  # s by which contact is thought to begin earlier and end later
 SETTLED = 0.010  # s within contact before a foot's height is trusted
-SLOW_FOOT, SLIDING, SLOW_BODY = 0.15, 0.06, 0.05  # m.s-1
+SLOW_FOOT, SLIDING, SLOW_BODY, SLOW_PISTON = 0.15, 0.06, 0.05, 0.02  # m.s-1
 RATE_WINDOW = 0.02  # s
 
 
@@ -33,6 +33,13 @@ class Schedule:
     low: Flags
     high: Flags
     phase: np.ndarray[Any, Any]
+    rests: Flags  # (n, legs): piston settled on a stop
+
+    @property
+    def held(self) -> Flags:
+        """(n, 3 legs): places known to stand still; x and z of each foot, then the stops."""
+        feet = np.stack([self.settled & (self.slides == 0.0), self.settled], axis=-1)
+        return np.hstack([feet.reshape(len(feet), -1), self.rests])
 
 
 def read_schedule(
@@ -40,11 +47,11 @@ def read_schedule(
 ) -> Schedule:
     """The schedule of one run from feet (n, legs, [x, z]), pistons (n, legs) and body (n, k)."""
     dt = max(float(np.median(np.diff(time))), 1e-4)
-    feet_rate = slope(feet, dt)
+    feet_rate, piston_rate = slope(feet, dt), slope(pistons, dt)
     speed = np.abs(slope(body, dt)).max(axis=1)
     blur, settle = max(1, round(BLUR / dt)), max(1, round(SETTLED / dt))
     legs = range(feet.shape[1])
-    touch, settled, struck, slides, low, high = ([] for _ in range(6))
+    touch, settled, struck, slides, low, high, rests = ([] for _ in range(7))
     for i in legs:
         z, vx, vz = feet[:, i, 1], feet_rate[:, i, 0], feet_rate[:, i, 1]
         raw = z < ground_level(z, vz) + NEAR_GROUND
@@ -56,15 +63,25 @@ def read_schedule(
         settled.append(inner)
         slides.append(np.where(inner & (np.abs(vx) > SLIDING), np.sign(vx), 0.0))
         bottom, top = stop_levels(pistons[:, i], stroke)
-        low.append(_dilate(pistons[:, i] < bottom + NEAR_STOP, 2))
-        high.append(_dilate(pistons[:, i] > top - NEAR_STOP, 2))
+        at_low, at_high = pistons[:, i] < bottom + NEAR_STOP, pistons[:, i] > top - NEAR_STOP
+        still = np.abs(piston_rate[:, i]) < SLOW_PISTON
+        rests.append(_erode(at_low | at_high, 2 * blur) & still)
+        low.append(_dilate(at_low, 2))
+        high.append(_dilate(at_high, 2))
     may, hit = np.stack(touch, 1), np.stack(struck, 1)
     count = may.sum(axis=1)
     phase = np.array(["flight", "stance1", "stance2"], dtype=object)[np.minimum(count, 2)]
     phase[(count == may.shape[1]) & (speed < SLOW_BODY)] = "rest"
     phase[hit.any(axis=1)] = "impact"
     return Schedule(
-        may, np.stack(settled, 1), hit, np.stack(slides, 1), np.stack(low, 1), np.stack(high, 1), phase
+        may,
+        np.stack(settled, 1),
+        hit,
+        np.stack(slides, 1),
+        np.stack(low, 1),
+        np.stack(high, 1),
+        phase,
+        np.stack(rests, 1),
     )
 
 

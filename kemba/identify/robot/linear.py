@@ -18,6 +18,9 @@ from kemba.identify.robot.reference import (
     GROUND_PRIOR,
     GROUND_SIGMA,
     GROUND_WANDER,
+    SLIPPING,
+    STOP_SIGMA,
+    STOP_WANDER,
     Reference,
     integrator,
 )
@@ -30,7 +33,7 @@ class Linearised:
     """Everything about one reference that does not change with theta."""
 
     ref: Reference
-    middle: tuple[Array, Array, Array]  # flat q, v, a in the middle of each step
+    middle: tuple[Array, Array, Array]  # flat q, v in the middle of each step, the model's a
     states: tuple[Array, Array]
     system: System
     inverse: Array  # (n, L, k, k) of the mass matrix
@@ -38,9 +41,11 @@ class Linearised:
     normal: Array  # (n, L, legs) contact force, up
     y: Array
     rate: Array
-    feet: Array  # (n, L, 2 legs), x and z of each
+    places: Array  # (n, L, 3 legs): x and z of each foot, pistons
     sinking: Array
     masses: Array
+    less_grip: Array  # (n, L, k) generalised force per unit of friction coefficient, missing
+    shift: Array  # (n, L, k) acceleration of the model beyond the reference's
     A: tuple[Array, Array]
 
     def force(self, physics: Physics, batch: Batch, states: tuple[Array, Array], p: Array) -> Array:
@@ -48,19 +53,25 @@ class Linearised:
         s, u = (batch.flat(a) for a in states)
         return batch.deep(physics.call("residual", *self.middle, s, u, p=p)[0]) - self.contact
 
+    def response(self, force: Array) -> Array:
+        """Acceleration (n, L, k) by which a missing force pushes."""
+        return -(self.inverse @ force[..., None])[..., 0]
+
     def defect(self, force: Array) -> Array:
         """Acceleration that the model adds to the reference's, (n, L, k)."""
-        return -(self.inverse @ force[..., None])[..., 0]
+        live = np.any(self.inverse != 0.0, axis=(2, 3))[..., None]
+        return np.where(live, self.shift, 0.0) + self.response(force)
 
     def extend(self, g: Array) -> Array:
         """`g` (n, L, k, c) with the feet's places, which nothing pushes."""
-        return np.concatenate([g, np.zeros((*g.shape[:2], 2 * self.normal.shape[2], g.shape[3]))], 2)
+        return np.concatenate([g, np.zeros((*g.shape[:2], 3 * self.normal.shape[2], g.shape[3]))], 2)
 
     def penetration(self, softness: float, d: float) -> Array:
-        """Depth (n, L, 2 legs) of the feet in a floor of stiffness 1/softness."""
+        """Depth (n, L, places) of the feet in a floor of stiffness 1/softness."""
         growth = np.maximum(1.0 + d * self.sinking, 0.05)
-        depth = np.zeros_like(self.feet)
-        depth[..., 1::2] = softness * np.maximum(self.normal, 0.0) / growth
+        legs = self.normal.shape[2]
+        depth = np.zeros_like(self.places)
+        depth[..., 1 : 2 * legs : 2] = softness * np.maximum(self.normal, 0.0) / growth
         return depth
 
 
@@ -77,44 +88,58 @@ def linearise(
     k, legs = physics.mechanism.n, len(physics.legs)
     mid = tuple(batch.flat(a) for a in ref.middle(batch.h))
     s, u = (batch.flat(a) for a in states)
-    M, by_q, by_v = (batch.deep(a) for a in physics.call("linear", *mid, s, u, p=p))
+    inverse = np.linalg.inv(batch.deep(physics.call("mass", *mid, s, u, p=p)[0]))
     force = batch.deep(physics.call("residual", *mid, s, u, p=p)[0])
     at_nodes = [batch.flat(ref.q), batch.flat(ref.v)]
     y, rate, Jy = (batch.deep(a) for a in physics.call("measured", *at_nodes))
     feet, feet_rate, Jf = (batch.deep(a) for a in physics.call("feet", *at_nodes))
-    inverse = np.linalg.inv(M)
-    A_q, A_v = -inverse @ by_q, -inverse @ by_v
-    channels = np.concatenate([Jy, Jf], axis=2).swapaxes(-1, -2)
+    slip = batch.pad([x.slides for x in plan], 0.0)
+    density = density.copy()
+    for leg in range(legs):  # a sliding foot pushes along the edge of its cone
+        pushing = k + 2 * leg
+        density[..., pushing] = np.where(slip[..., leg] != 0.0, SLIPPING, density[..., pushing])
+    grip = physics.grip * slip[..., None] * Jf[..., 0::2, :]
+    Jf_force = Jf.copy()
+    Jf_force[..., 1::2, :] -= grip
+    channels = np.concatenate([Jy, Jf_force], axis=2).swapaxes(-1, -2)
     contact, feet_force = contact_force(channels, density, force, k, legs)
+    normal = feet_force[..., 1::2]
+    # inertia effects are judged at the model's acceleration: the data's own is noise for the most
+    # part, and noise in a regressor passes for a smaller mass
+    shift = -(inverse @ (force - contact)[..., None])[..., 0]
+    mid = (mid[0], mid[1], mid[2] + batch.flat(shift))
+    stiffness = (batch.deep(a) for a in physics.call("stiffness", *mid, s, u, p=p))
+    A_q, A_v = (-inverse @ a for a in stiffness)
+    less_grip = (slip[..., None] * np.maximum(normal, 0.0)[..., None] * Jf[..., 0::2, :]).sum(axis=2)
 
     h = batch.h[..., None, None]
-    places = 2 * legs  # x and z of every foot's place on the ground
-    F, G = integrator(batch.h, k, places)
+    F, G = integrator(batch.h, k, 3 * legs)
     F[..., :k, :k] += h**2 / 2 * A_q
     F[..., :k, k : 2 * k] += h**2 / 2 * A_v
     F[..., k : 2 * k, :k] += h * A_q
     F[..., k : 2 * k, k : 2 * k] += h * A_v
     pushed = inverse @ channels
+    places = 3 * legs  # where each foot stands (x, z), and the stop on which each piston rests
     W = np.zeros((*batch.h.shape, k + places, k + places))
     W[..., :k, :k] = (pushed * (density[..., None, :] / h)) @ pushed.swapaxes(-1, -2)
-    settled = batch.pad([x.settled.astype(float) for x in plan], 0.0) > 0.5
-    slides = batch.pad([x.slides for x in plan], 0.0) != 0.0
-    held = np.stack([settled & ~slides, settled], axis=-1).reshape(*batch.h.shape, places)
-    free = np.tile([ANCHOR_FREE, GROUND_WANDER], legs)
+    held = batch.pad([x.held.astype(float) for x in plan], 0.0) > 0.5
+    wander = np.array([GROUND_WANDER] * 2 * legs + [STOP_WANDER] * legs)
+    free = np.array([ANCHOR_FREE, GROUND_WANDER] * legs + [ANCHOR_FREE] * legs)
     i = np.arange(places)
-    W[..., k + i, k + i] = np.where(held, GROUND_WANDER, free) ** 2 * batch.h[..., None]
+    W[..., k + i, k + i] = np.where(held, wander, free) ** 2 * batch.h[..., None]
     H = np.zeros((*batch.h.shape, k + places, 2 * k + places))
     H[..., :k, :k] = Jy
-    H[..., k:, :k] = Jf
+    H[..., k:, :k] = np.concatenate([Jf, Jy[..., k - legs :, :]], axis=2)
     H[..., k + i, 2 * k + i] = 1.0
+    sharp = np.array([GROUND_SIGMA] * 2 * legs + [STOP_SIGMA] * legs)
     R = np.concatenate(
         [
             np.where(np.isfinite(batch.y), batch.sigma**2, np.inf),
-            np.where(held, GROUND_SIGMA**2, np.inf),
+            np.where(held, sharp**2, np.inf),
         ],
         axis=2,
     )
-    prior = [0.03] * k + [3.0] * k + [ANCHOR_PRIOR, GROUND_PRIOR] * legs
+    prior = [0.03] * k + [3.0] * k + [ANCHOR_PRIOR, GROUND_PRIOR] * legs + [ANCHOR_PRIOR] * legs
     P0 = np.diag(prior) ** 2
     system = System(F, G, W, H, R, np.broadcast_to(P0, (len(batch.tracks), *P0.shape)))
     ends = ~batch.valid
@@ -123,8 +148,8 @@ def linearise(
     inverse = np.where(ends[..., None, None], 0.0, inverse)
     masses = batch.deep(physics.call("masses", *mid)[0])
     return Linearised(
-        ref, mid, states, system, inverse, contact, feet_force[..., 1::2], y, rate,
-        feet, -feet_rate[..., 1::2], masses, (A_q, A_v),
+        ref, mid, states, system, inverse, contact, normal, y, rate,
+        np.concatenate([feet, y[..., k - legs :]], axis=2), -feet_rate[..., 1::2], masses, less_grip, shift, (A_q, A_v),
     )
 
 

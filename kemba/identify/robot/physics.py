@@ -22,7 +22,7 @@ class Physics:
     parameters in the order of every `p`, those of `free` first, then the nuisance ones.
     """
 
-    def __init__(self, model: Model, free: tuple[str, ...]) -> None:
+    def __init__(self, model: Model, free: tuple[str, ...], grip: float = 1.0) -> None:
         self.base = model
         self.model, further, self.nuisance = with_tolerances(model)
         early = [n for n in self.nuisance if n in self.model.parameters]
@@ -38,6 +38,7 @@ class Physics:
         start = np.array([q.value for q in self.model.states.values()])
         self.states = StateRunner([node.q, node.v, node.s, node.u, self.p], rate, start)
         self.moving = [n for n, used in zip(self.names, ca.which_depends(rate, self.p, 1), strict=True) if used]
+        self.grip = grip
         self._maps: dict[tuple[str, int], ca.Function] = {}
 
     @property
@@ -57,8 +58,8 @@ class Physics:
         motion = [m.q, m.v]
         named = {
             "residual": (full, [r]),
-            "linear": (full, [ca.jacobian(r, x) for x in (node.a, node.q, node.v)]),
-            "by_state": (full, [ca.jacobian(r, node.s)]),
+            "mass": (full, [ca.jacobian(r, node.a)]),
+            "stiffness": (full, [ca.jacobian(r, x) for x in (node.q, node.v)]),
             "by_parameter": (full, [ca.jacobian(r, self.p)]),
             "measured": (motion, [y, ca.jtimes(y, m.q, m.v), ca.jacobian(y, m.q)]),
             "feet": (motion, [feet, ca.jtimes(feet, m.q, m.v), ca.jacobian(feet, m.q)]),

@@ -14,10 +14,12 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
+from kemba.effects import BY_KIND
 from kemba.identify.candidates import effect_candidates, sensor_candidates
 from kemba.identify.problem import Candidate, Parameter, Rows, Theta
 from kemba.identify.robot.batch import Batch
 from kemba.identify.robot.filter import gains, innovations
+from kemba.identify.robot.linear import Linearised, linearise, smoothed
 from kemba.identify.robot.physics import Physics
 from kemba.identify.robot.reference import (
     LOOSE,
@@ -28,9 +30,7 @@ from kemba.identify.robot.reference import (
     first_reference,
     schedules,
 )
-from kemba.identify.robot.linear import Linearised, linearise, smoothed
 from kemba.identify.robot.track import read_track
-from kemba.effects import BY_KIND
 from kemba.model.model import Model
 from kemba.trajectory import Trajectory
 
@@ -57,8 +57,9 @@ class RobotProblem:
         extended = Model(model.mechanism, rest, model.supply, model.name).with_effects(
             BY_KIND[c.effect]() for c in effects
         )
+        grip = [e.mu for e in model.effects if e.kind in GROUND]  # type: ignore[attr-defined]
         free = tuple(k for c in effects for k in c.keys())
-        self.physics = Physics(extended, free)
+        self.physics = Physics(extended, free, float(np.prod(grip)))
         self.nuisance = dict(self.physics.nuisance)
         self.floor = floor or Floor()
         channels = self.physics.channels
@@ -80,7 +81,7 @@ class RobotProblem:
         """Smooth and linearise anew with the model at `base`."""
         self.base = dict(base)
         self._kept: tuple[Any, Any] = (None, None)
-        self._mass: dict[str, Array] = {}
+        self._linear: dict[str, tuple[Array, float]] = {}
         physics, batch = self.physics, self.batch
         ref = first_reference(physics, batch)
         self.plan = schedules(physics, batch, ref)
@@ -91,8 +92,9 @@ class RobotProblem:
         tight = densities(physics, batch, self.plan, self.floor)
         self.point = self._linearise(ref, tight)
         names, columns = self.physics.masses, self.point.masses
-        self.nuisance |= {n: (0.0, 0.02) for n in names}
-        self._mass = dict(zip(names, np.moveaxis(columns, -1, 0), strict=True))
+        self.nuisance |= dict.fromkeys(names, (0.0, 0.02))
+        self._linear = {n: (columns[..., i], 0.0) for i, n in enumerate(names)}
+        self._linear["ground_friction.mu"] = (self.point.less_grip, 1.0)
         self.gain = gains(self.point.system)
         self._mask = self._keep()
 
@@ -119,9 +121,9 @@ class RobotProblem:
         """Acceleration defects (n, L, k) at theta."""
         p, delays = self._values(theta)
         force = point.force(self.physics, self.batch, self._states(point, p, delays), p)
-        for name, column in self._mass.items():
+        for name, (column, nominal) in self._linear.items():
             if name in theta:
-                force = force + theta[name] * column
+                force = force + (theta[name] - nominal) * column
         return point.defect(force)
 
     def _states(self, point: Linearised, p: Array, delays: Array) -> tuple[Array, Array]:
@@ -137,7 +139,7 @@ class RobotProblem:
         seen = self._sensed(point, theta)
         depth = point.penetration(theta.get("ground_compliance.softness", 0.0),
                                   theta.get("ground_compliance.d", 1.0))
-        return np.concatenate([self.batch.y - seen, -point.feet - depth], axis=2)
+        return np.concatenate([self.batch.y - seen, -point.places - depth], axis=2)
 
     def _sensed(self, point: Linearised, theta: Theta) -> Array:
         seen = point.y.copy()
@@ -195,7 +197,7 @@ class RobotProblem:
         return self._pick(np.stack([columns[n] for n in names], axis=-1), runs)
 
     def _is_direct(self, name: str) -> bool:
-        known = name in self.physics.names or name in self._mass
+        known = name in self.physics.names or name in self._linear
         return known and name not in self.physics.moving and name not in DELAYS
 
     def _direct(self, theta: Theta, names: Sequence[str]) -> dict[str, Array]:
@@ -209,10 +211,10 @@ class RobotProblem:
         slopes = self.physics.call("by_parameter", *self.point.middle, s, u, p=p)[0]
         place = {n: i for i, n in enumerate(self.physics.names)}
         forces = [
-            self._mass[n] if n in self._mass else self.batch.deep(slopes[:, :, place[n]])
+            self._linear[n][0] if n in self._linear else self.batch.deep(slopes[:, :, place[n]])
             for n in names
         ]
-        g = np.stack([self.point.defect(f) for f in forces], axis=-1)
+        g = np.stack([self.point.response(f) for f in forces], axis=-1)
         y = np.zeros((*self.point.system.R.shape, len(names)))
         _, errors = innovations(self.point.system, self.gain, y, self.point.extend(g))
         return dict(zip(names, np.moveaxis(-(self.gain.whitener @ errors), -1, 0), strict=True))
@@ -243,7 +245,7 @@ class RobotProblem:
             parts["time"].append(np.broadcast_to(time, mask.shape)[mask])
             parts["phase"].append(np.broadcast_to(phase, mask.shape)[mask])
             parts["mode"].append(mode.T[mask])
-            spread = np.append(track.sigma, [1e-4] * 2 * len(self.physics.legs))
+            spread = np.append(track.sigma, [1e-4] * 3 * len(self.physics.legs))
             sigma.append(np.broadcast_to(spread[:, None], mask.shape)[mask])
         joined = {k: np.concatenate(v) for k, v in parts.items()}
         return Rows(**joined, channels=channels, sigma=np.concatenate(sigma))
@@ -252,7 +254,8 @@ class RobotProblem:
     def channels(self) -> tuple[str, ...]:
         """Channels of the rows: the measured ones, and the places where feet stand."""
         feet = (f"{leg}/foot/{axis}" for leg in self.physics.legs for axis in "xz")
-        return (*self.physics.channels, *feet)
+        stops = (f"{leg}/stop" for leg in self.physics.legs)
+        return (*self.physics.channels, *feet, *stops)
 
     def modes(self, run: int) -> np.ndarray[Any, Any]:
         """Valve mode (n, m) of each row: the channel's own leg, else both legs' when alike."""

@@ -19,8 +19,10 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 # Spectral densities (variance per Hz times s): force of body x, z [N2.s], then moments.
 KINEMATIC = {"body/x": 30.0, "body/z": 60.0, "body/pitch": 300.0, "hip": 2e3, "knee": 2e5}
 GROUND_SIGMA, GROUND_PRIOR, GROUND_WANDER = 1e-4, 5e-4, 1e-4 / np.sqrt(0.02)
+STOP_SIGMA, STOP_WANDER = 3e-5, 3e-5 / np.sqrt(0.02)
 ANCHOR_PRIOR, ANCHOR_FREE = 3.0, 1.0  # m, m.s-1/2: where along the ground a foot stands
 CONTACT, IMPACT = 300.0, 3e4  # N2.s
+SLIPPING = 0.05  # N2.s: friction of a sliding foot beyond Coulomb's
 UNKNOWN_AIR, AIR_FADES = 100.0, 0.025  # N2.s at the start of a log that does not begin at rest
 
 
@@ -34,7 +36,7 @@ class Floor:
     rod: float = 2e-2
 
 
-LOOSE = Floor(body=0.5, pitch=0.02, hip=0.02, rod=10.0)  # for smoothing: follow the data
+LOOSE = Floor(body=0.05, pitch=2e-3, hip=2e-3, rod=0.5)  # for smoothing: follow the data
 
 
 @dataclass(frozen=True)

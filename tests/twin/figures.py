@@ -1,4 +1,4 @@
-"""The robot's figures as this simulator uses them (SI), typed in by hand from the parameter sheet."""
+"""The robot's figures (SI) as this simulator uses them, typed in by hand."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ DEAD_TIME = 0.006
 
 _AIR = np.array([
     324.0, 260.0, 25.0, 97.0, 84.0, 59.0, 0.008, 0.025, 0.013, 0.037,
-    0.66e6 + ATMOSPHERE, 17e-6, 17e-6, 2.6e-6, 2.6e-6, 10.0,
+    0.66e6 + ATMOSPHERE, 17e-6, 17e-6, 3.6e-6, 3.6e-6, 10.0,
 ])  # fmt: skip
 
 # body, then per leg: femur, tibia, piston body, piston rod (front leg first)

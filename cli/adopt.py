@@ -1,0 +1,26 @@
+"""`kemba-opt adopt`: a model with another effect of a ranking than the winner."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from kemba_cli.common import Quiet
+
+
+def adopt(
+    answer: Annotated[Path, typer.Argument(help="Folder written by discover.")],
+    effect: Annotated[str, typer.Argument(help="Effect of its ranking, such as seal_friction.")],
+    out: Annotated[Path | None, typer.Option(help="Model YAML to write.")] = None,
+    quiet: Quiet = False,
+) -> None:
+    """Write a model YAML with the chosen effect of an answer added.
+
+    Example: kemba-opt adopt answer pressure_friction --out model.yaml
+    """
+    from kemba.identify.adopt import adopt_effect
+
+    path = out or answer / f"model_{effect.replace(':', '_').replace('/', '_')}.yaml"
+    typer.echo(adopt_effect(answer, effect, path))

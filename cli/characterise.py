@@ -1,0 +1,60 @@
+"""`kemba-opt characterise`: chambers, damping and valves of a cylinder from bench logs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from kemba_cli.common import Json, Quiet, print_json, results, say
+
+if TYPE_CHECKING:
+    from kemba.plant.characterise import Characteristics
+
+
+def characterise(
+    logs: Annotated[list[Path], typer.Argument(help="Bench logs (CSV), or folders of them.")],
+    out: Annotated[Path | None, typer.Option(help="Model YAML to write.")] = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Fit eq. 4 to 7 to bench logs; print Tables I and II beside the paper's; write a model.
+
+    Example: kemba-opt characterise bench/locked bench/dynamometer --out cylinder.yaml
+    """
+    from kemba.plant.characterise import characterise as fit
+    from kemba.plant.tables import as_json
+    from kemba.trajectory import Trajectory
+
+    files = [f for item in logs for f in (sorted(item.glob("*.csv")) if item.is_dir() else [item])]
+    found = fit({str(file): Trajectory.read(file) for file in files})
+    if out:
+        found.write_model(out, out.stem)
+    answer: dict[str, Any] = {"logs": len(files), **as_json(found), "model": out and str(out)}
+    if json:
+        print_json(answer)
+        return
+    _print(found)
+    say(f"wrote {out}" if out else "write a model with --out MODEL.yaml", quiet)
+
+
+def _print(found: Characteristics) -> None:
+    from rich.table import Table
+
+    from kemba.plant.tables import check_rows, force_rows, rise_rows
+
+    for title, columns, rows in (
+        ("Chamber force rise time", ("chamber", "x", "rise time", "95 %", "paper"), rise_rows(found)),
+        (
+            "Steady state: F = F_static - c_d v",
+            ("mode", "supply", "F_static", "95 %", "paper", "c_d", "95 %", "paper", "R2"),
+            force_rows(found),
+        ),
+        ("Fitted model against logs", ("log", "R2", "RMS"), check_rows(found)),
+    ):
+        if rows:
+            table = Table(*columns, title=title, title_justify="left")
+            for row in rows:
+                table.add_row(*row)
+            results().print(table)

@@ -1,0 +1,74 @@
+"""`kemba-opt effects`: the catalogue of physics."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from kemba_cli.common import Json, print_json, results
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+
+def effects(
+    name: Annotated[str, typer.Argument(help="One effect; the whole catalogue if omitted.")] = "",
+    json: Json = False,
+    markdown: Annotated[
+        bool, typer.Option("--markdown", help="The catalogue as a page of the documentation.")
+    ] = False,
+) -> None:
+    """Show the catalogue: equation, parameters with unit and size, source.
+
+    Example: kemba-opt effects seal_friction
+    """
+    from kemba.effects.describe import CHAPTERS, describe, find_effect, page
+
+    if name:
+        found = describe(find_effect(name))
+        print_json(found) if json else _detail(found)
+    elif markdown:
+        typer.echo(page(), nl=False)
+    elif json:
+        print_json({"effects": [describe(e) for group in CHAPTERS.values() for e in group]})
+    else:
+        for chapter, group in CHAPTERS.items():
+            results().print(_table(chapter, [describe(effect) for effect in group]))
+
+
+def _table(title: str, rows: list[dict[str, Any]]) -> Table:
+    from rich.markup import escape
+    from rich.table import Table
+
+    from kemba.effects.describe import in_words
+
+    table = Table(title=title, title_justify="left", expand=False)
+    for column in ("name", "equation", "parameters (unit) size", "source"):
+        table.add_column(column, no_wrap=column == "name", overflow="fold")
+    for row in rows:
+        parameters = "\n".join(in_words(p) for p in row["parameters"])
+        table.add_row(*map(escape, (row["name"], row["equation"], parameters, row["source"])))
+    return table
+
+
+def _detail(found: dict[str, Any]) -> None:
+    from kemba.effects.describe import in_words
+
+    ports = ", ".join(found["ports"]) or found["place"]
+    lines = [
+        f"{found['name']} ({found['family']}, on {ports})",
+        "",
+        found["description"],
+        "",
+        f"equation    {found['equation']}",
+        *(f"parameter   {in_words(p)}: {p['doc']}" for p in found["parameters"]),
+        *(
+            f"table       {t['name']} ({t['unit']}) = {t['default']}: {t['doc']}"
+            for t in found["tables"]
+        ),
+        f"source      {found['source']}",
+    ]
+    if found["replaces"]:
+        lines.append(f"replaces    {', '.join(found['replaces'])}")
+    typer.echo("\n".join(lines))

@@ -1,0 +1,135 @@
+"""`kemba-opt sweep`: many tasks or executions on Dask, resumable."""
+
+from __future__ import annotations
+
+import time
+from contextlib import suppress
+from pathlib import Path
+from types import TracebackType
+from typing import Annotated, Any
+
+import typer
+
+from kemba_cli.common import Json, Quiet, print_json, say, talk
+
+EVERY = 10.0  # s between lines where no one watches
+
+
+def sweep(
+    file: Annotated[str, typer.Argument(metavar="SWEEP", help="Sweep YAML, here or shipped.")],
+    out: Annotated[
+        Path | None, typer.Option(help="Folder to write or to continue [sweeps/NAME].")
+    ] = None,
+    overrides: Annotated[
+        list[str] | None, typer.Option("--set", help="Override a key: --set seed=2.")
+    ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="A Dask scheduler instead of our own.")
+    ] = None,
+    jobs: Annotated[int | None, typer.Option(min=1, help="Processes of our own [cores].")] = None,
+    time_limit: Annotated[
+        float | None, typer.Option(min=0.1, help="Seconds after which to stop.")
+    ] = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Run many cases and tell how many succeeded; the same command continues what was stopped.
+
+    Exit code 1 when a block succeeded less often than it `expect`s, or cases have no answer.
+
+    Example: kemba-opt sweep reliability.yaml --jobs 2
+    """
+    from kemba import sweep as room
+
+    asked, document = room.load_sweep(file, list(overrides or []))
+    folder = room.open_folder(out, asked, document)
+    say(f"results in {folder}", quiet or json)
+    cases = room.expand(asked, document, folder)
+    missing = {case.key for case in cases if not case.path(folder).is_file()}
+    status, records = "interrupted", {}
+    try:
+        with Bar(len(missing), len({case.key for case in cases}), quiet or json) as bar:
+            records = room.run_cases(cases, folder, scheduler, jobs, time_limit, bar.tell)
+        done = all(case.key in records for case in cases)
+        status = "finished" if done else "limit"
+    finally:
+        known = records or {c.key: r for c in cases if (r := c.record(folder)) is not None}
+        summary = room.write_results(folder, asked, cases, known, status)
+    _figures(folder, cases, known, summary)
+    _answer(folder, status, summary, json)
+    if status != "finished" or not summary["good"]:
+        raise typer.Exit(1)
+
+
+def _answer(folder: Path, status: str, summary: dict[str, Any], json: bool) -> None:
+    from kemba.sweep.summary import sentence
+
+    if json:
+        print_json({"folder": folder, "status": status, **summary})
+        return
+    typer.echo(str(folder))
+    for name, block in summary["blocks"].items():
+        typer.echo(f"{name}: {sentence(block)}")
+
+
+def _figures(folder: Path, cases: Any, records: Any, summary: dict[str, Any]) -> None:
+    """A picture of every block of executions."""
+    for name, block in summary["blocks"].items():
+        found = [records.get(case.key) or {} for case in cases if case.block == name]
+        flown = [record for record in found if "apex_m" in record]
+        if block["kind"] != "execute" or not flown:
+            continue
+        import numpy as np
+
+        from kemba.plotting import plot_robustness, save_figure
+
+        ranks = {
+            key: {answer: told and told["correlation"] for answer, told in pair.items()}
+            for key, pair in block["ranks"].items()
+        }
+        apex, landed = (np.array([r[key] for r in flown]) for key in ("apex_m", "good"))
+        planned = flown[0]["apex_m"] - flown[0]["apex_error_m"]
+        save_figure(plot_robustness(apex, landed, ranks, planned), folder / f"{name}.png")
+
+
+class Bar:
+    """Progress over cases: a bar where someone watches, a line now and then elsewhere."""
+
+    def __init__(self, missing: int, total: int, quiet: bool) -> None:
+        self.done, self.total, self.quiet = total - missing, total, quiet
+        self.began = self.told = time.monotonic()
+        self.bar: Any = None
+
+    def __enter__(self) -> Bar:
+        if self.done:
+            say(f"{self.done} of {self.total} cases are done already", self.quiet)
+        if not self.quiet and talk().is_terminal:
+            from rich.progress import Progress, TimeRemainingColumn
+
+            columns = [*Progress.get_default_columns()[:-1], TimeRemainingColumn()]
+            self.bar = Progress(*columns, console=talk())
+            self.bar.start()
+            self.task = self.bar.add_task("cases", total=self.total, completed=self.done)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self.bar is not None:
+            with suppress(KeyboardInterrupt):
+                self.bar.stop()
+
+    def tell(self, case: Any, record: dict[str, Any]) -> None:
+        """A case has ended."""
+        self.done += 1
+        last = f"{case.block} {case.index}: {record['sentence']}"
+        if self.bar is not None:
+            self.bar.update(self.task, completed=self.done)
+            if not record["good"]:
+                self.bar.console.print(last, markup=False)
+        elif not record["good"] or time.monotonic() > self.told + EVERY or self.done == self.total:
+            self.told = time.monotonic()
+            say(f"{self.told - self.began:6.1f} s  {self.done}/{self.total}  {last}", self.quiet)

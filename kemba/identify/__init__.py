@@ -1,0 +1,1 @@
+"""Compare with measurements, find the missing physics."""

@@ -1,0 +1,63 @@
+"""From an answer to a model: the base, and the effects that were found."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from kemba.config import dump_yaml, parse
+from kemba.effects import BY_KIND
+from kemba.errors import KembaError, suggest
+from kemba.files import read_json
+from kemba.model.spec import ModelSpec, load_spec
+
+
+def write_model(
+    path: Path, base: str, ranking: Iterable[Mapping[str, Any]], effects: Iterable[str]
+) -> Path:
+    """A model YAML at `path`: `base` with these effects of the ranking. Checked by loading it."""
+    wanted = list(effects)
+    rows = {row["effect"]: row for row in ranking}
+    listed = [item(name, rows[name]["parameters"]) for name in wanted]
+    data = {
+        "name": f"{Path(base).stem}_{'_'.join(w.split(':')[0] for w in wanted)}"[:60],
+        "base": reference(base, path),
+        "effects": listed,
+        "notes": "found by kemba-opt discover",
+    }
+    parse(data, ModelSpec)
+    dump_yaml(data, path)
+    load_spec(path)
+    return path
+
+
+def item(name: str, parameters: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    """One effect of a model's list from its row of the ranking."""
+    kind, _, place = name.partition(":")
+    values = {p: float(f"{v['value']:.6g}") for p, v in parameters.items()}
+    if kind not in BY_KIND:
+        raise KembaError(name, "is no effect of the catalogue", hint=suggest(kind, BY_KIND))
+    where = {}
+    if place:
+        where = {"channel": place} if kind.startswith("sensor_") else {"on": place}
+    return {"kind": kind, **where, **values}
+
+
+def reference(base: str, path: Path) -> str:
+    """How a model in `path` names its base: shipped models by name, own ones by their path."""
+    if not Path(base).is_file():
+        return base
+    return str(Path(base).resolve())
+
+
+def adopt_effect(folder: str | Path, effect: str, out: Path) -> Path:
+    """The model of another row of an answer's ranking. Raises KembaError."""
+    file = Path(folder) / "answer.json"
+    answer = read_json(file)
+    names = [row["effect"] for row in answer["ranking"]]
+    if effect not in names:
+        raise KembaError(
+            str(file), f"'{effect}' is not in the ranking", hint=suggest(effect, names)
+        )
+    return write_model(out, str(answer.get("base") or "planning"), answer["ranking"], [effect])

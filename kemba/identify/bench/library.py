@@ -1,0 +1,57 @@
+"""Simple force laws beyond the catalogue, by the formula that a model's YAML would hold."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from kemba.effects.friction import V_COULOMB
+from kemba.identify.bench.motion import Motion
+from kemba.identify.problem import Array
+
+STROKE = 0.070  # m
+RANGES = (0.003, 0.005, 0.008, 0.013, 0.02)  # m, reach of a force at an end of the stroke
+CREEPS = (0.002, 0.006, 0.015)  # m, travel over which a hysteresis turns round
+
+
+def terms(motion: Motion, u: Array) -> Iterator[tuple[str, Array]]:
+    """(formula, force per unit coefficient (n,)); `u` (n, 2): share of each valve being on."""
+    x, v, (u_e, u_r) = motion.x, motion.v, u.T
+    sign = np.tanh(v / V_COULOMB)
+    out, back = np.maximum(v, 0.0), np.minimum(v, 0.0)
+    for d in RANGES:
+        yield f"exp(-(x/{d:g})**2)", np.exp(-((x / d) ** 2))
+        yield f"exp(-(({STROKE:g} - x)/{d:g})**2)", np.exp(-(((STROKE - x) / d) ** 2))
+    yield f"x - {STROKE / 2:g}", x - STROKE / 2
+    yield f"(x - {STROKE / 2:g})**2", (x - STROKE / 2) ** 2
+    yield f"(x - {STROKE / 2:g})**3", (x - STROKE / 2) ** 3
+    yield "x*u_e", x * u_e
+    yield "x*u_r", x * u_r
+    yield "max(v, 0)", out
+    yield "max(v, 0)*u_e", out * u_e
+    yield "max(v, 0)*u_r", out * u_r
+    yield "min(v, 0)*u_e", back * u_e
+    yield "min(v, 0)*u_r", back * u_r
+    yield "v*x", v * x
+    yield "v**3", v**3
+    yield f"tanh(v/{V_COULOMB:g})*u_e", sign * u_e
+    yield f"tanh(v/{V_COULOMB:g})*u_r", sign * u_r
+    yield f"tanh(v/{V_COULOMB:g})*x", sign * x
+    yield f"max(tanh(v/{V_COULOMB:g}), 0)", np.maximum(sign, 0.0)
+    yield "a", motion.a
+    yield "u_e", u_e
+    yield "u_r", u_r
+    for travel in CREEPS:
+        yield f"dahl(x, {travel:g})", dahl(x, travel)
+
+
+def dahl(x: Array, travel: float) -> Array:
+    """Hysteresis: z' = (v - abs(v) z)/travel along the path x (n,), which remembers its turns."""
+    z, out = 0.0, np.empty(len(x))
+    out[0] = z
+    for i, step in enumerate(np.diff(x), start=1):
+        target = 1.0 if step > 0 else -1.0
+        z = target + (z - target) * np.exp(-abs(step) / travel)
+        out[i] = z
+    return out

@@ -1,0 +1,66 @@
+"""Does it hold on data it was not fitted to? Prediction of left-out blocks, and held-out logs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from kemba.identify.linear import estimate, linearise, time_blocks
+from kemba.identify.problem import Problem, Theta
+from kemba.identify.rank import NULL, Hypothesis
+from kemba.identify.search import Point, Search, best_fit
+
+NONE = 1e-6  # a floor that lets nothing through
+
+
+@dataclass(frozen=True)
+class Gain:
+    """Log-likelihood gained on left-out data [nats], with its standard error over blocks."""
+
+    nats: float
+    error: float
+
+    @property
+    def significant(self) -> bool:
+        return self.nats > max(self.error, 2.0)
+
+
+def left_out(search: Search, hypothesis: Hypothesis, against: Hypothesis = NULL) -> Gain:
+    """Gain of one hypothesis over another, each block predicted from all others."""
+    ours = _predicted(search, search.points[hypothesis])
+    theirs = _predicted(search, search.points[against])
+    gains = ours - theirs
+    count = len(gains)
+    return Gain(float(gains.sum()), float(np.sqrt(count) * gains.std(ddof=1)) if count > 1 else 0.0)
+
+
+def _predicted(search: Search, point: Point) -> np.ndarray:
+    """Log likelihood (b,) of each block under the fit to all others."""
+    linear, found = point.linear, []
+    # a left-out block judges the hypothesis itself: nothing else may help at floor level
+    for block in range(len(linear.count)):
+        mask = np.arange(len(linear.count)) == block
+        rest = search.ranker(linear.without(mask), floor=NONE)
+        step = rest.score(point.hypothesis).z - linear.at
+        one = linear.only(mask)
+        power = one.power[0] + 2 * one.slope[0] @ step + step @ one.gram[0] @ step
+        found.append(-0.5 * float(power) / search.heat)
+    return np.array(found)
+
+
+def predicted_error(search: Search, point: Point) -> float:
+    """RMS of whitened residuals, each block predicted from all others."""
+    power = -2.0 * search.heat * float(_predicted(search, point).sum())
+    return float(np.sqrt(max(power, 0.0) / point.linear.count.sum()))
+
+
+def rms(problem: Problem, theta: Theta) -> float:
+    """RMS of whitened residuals on other logs; only how their runs start is fitted to them."""
+    names = tuple(n for n in problem.nuisance if n not in theta or n.startswith("start:"))
+    theta = {k: v for k, v in theta.items() if not k.startswith("start:")}
+    if names:
+        linear, _, _ = linearise(problem, theta, time_blocks(problem), names)
+        theta = theta | estimate(problem, linear, best_fit(linear))
+    r = problem.residual(theta)
+    return float(np.sqrt(np.mean(r**2)))

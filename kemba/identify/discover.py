@@ -1,0 +1,219 @@
+"""From a problem to an answer: search, doubt, confirm."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from kemba.identify.answer import Answer, Ranked, Value, phrase
+from kemba.identify.confirm import left_out, predicted_error, rms
+from kemba.identify.linear import is_shape, time_blocks
+from kemba.identify.null import NullTest, bootstrap, smallest_detectable
+from kemba.identify.problem import Array, Candidate, Problem
+from kemba.identify.rank import NULL, Hypothesis
+from kemba.identify.search import Search, share_of
+from kemba.identify.unknown import Formula, look
+
+SIGNIFICANT = 0.02
+CLASS = 3.0  # nats within which two explanations are the same to these data
+FINE = 0.1  # s, blocks whose signs are redrawn
+SHOWN = 8
+
+Talk = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Found:
+    """A finished search and what was made of it."""
+
+    answer: Answer
+    search: Search
+    best: Hypothesis
+
+
+def discover(
+    problem: Problem,
+    holdout: Problem | None = None,
+    time_limit: float = np.inf,
+    say: Talk = lambda text: None,
+) -> Found:
+    """Which effect is missing from the model behind `problem`, if any."""
+    started = time.monotonic()
+    search = Search(problem, started + 0.8 * time_limit, say)
+    best = search.run()
+    say("asking whether nothing would look like this")
+    test = null_test(search)
+    best, p_value = _believed(search, best, test)
+    formula = look(search, best)
+    answer = _answer(search, best, p_value, test, formula, holdout)
+    answer.runtime_s = time.monotonic() - started
+    return Found(answer, search, best)
+
+
+def null_test(search: Search) -> NullTest:
+    """The bootstrap of the search, with the noise these data have."""
+    point = search.points[NULL]
+    blocks = time_blocks(search.problem, shortest=FINE)
+    left = search.null_residual + search.null_jacobian @ (search.flexible_fit() - point.linear.at)
+    pieces = search.null_jacobian * left[:, None]
+    order = np.argsort(blocks, kind="stable")
+    edges = np.flatnonzero(np.diff(blocks[order], prepend=-1))
+    noise = np.add.reduceat(pieces[order], edges, axis=0)
+    singles = [(name,) for name in search.problem.candidates]
+    return bootstrap(search.ranker(point.linear), noise, singles)
+
+
+def _believed(search: Search, best: Hypothesis, test: NullTest) -> tuple[Hypothesis, float]:
+    """The best hypothesis cut down to what is significant and holds on left-out data."""
+    null = search.points[NULL].log_evidence
+    singles = [p.log_evidence - null for h, p in search.points.items() if h]
+    p_value = test.p_value(max(singles, default=0.0))
+    if not best or p_value > SIGNIFICANT:
+        return NULL, p_value
+    while best:
+        smaller = [h for h in search.points if len(h) == len(best) - 1 and set(h) < set(best)]
+        against = max(smaller, key=lambda h: search.points[h].log_evidence, default=NULL)
+        if left_out(search, best, against).significant:
+            return best, p_value
+        best = against
+    return NULL, p_value
+
+
+def _answer(
+    search: Search,
+    best: Hypothesis,
+    p_value: float,
+    test: NullTest,
+    formula: Formula | None,
+    holdout: Problem | None,
+) -> Answer:
+    problem = search.problem
+    ranking = ranked(search, best, holdout)
+    before = error(search, NULL, holdout)
+    after = error(search, best, holdout) if best else before
+    verdict = "unknown" if formula else "missing" if best else "nothing"
+    ranker = search.ranker(search.points[NULL].linear)
+    sizes = smallest_detectable(ranker, test.threshold)
+    answer = Answer(
+        verdict=verdict,  # type: ignore[arg-type]
+        p_value_nothing=p_value if not formula else min(p_value, float(np.exp(-formula.gain))),
+        ranking=ranking,
+        added=tuple(r.effect for r in ranking if r.effect in best) if verdict == "missing" else (),
+        error_before=before,
+        error_after=after,
+        smallest_detectable={
+            effect: {problem.candidates[effect].lead.name: size} for effect, size in sizes.items()
+        },
+        formula=str(formula) if formula else None,
+        split_by="held-out logs" if holdout else "runs" if len(problem.runs) > 3 else "time blocks",
+        ladder=_ladder(search, best, holdout),
+    )
+    answer.sentence = phrase(answer)
+    return answer
+
+
+def error(search: Search, hypothesis: Hypothesis, holdout: Problem | None) -> float:
+    """Whitened RMS on data the fit has not seen."""
+    point = search.points[hypothesis]
+    if holdout is None:
+        return predicted_error(search, point)
+    return rms(holdout, point.fit.theta)
+
+
+def ranked(search: Search, best: Hypothesis, holdout: Problem | None) -> list[Ranked]:
+    """The effects in order of probability; those of the best answer first."""
+    problem = search.problem
+    probability = search.probabilities()
+    if not best:
+        probability = _doubted(probability)
+    shares = share_of(probability, problem.candidates)
+    order = sorted(shares, key=lambda e: (e not in best, -_strength(search, e, best), -shares[e]))
+    found = []
+    before = error(search, NULL, holdout)
+    for effect in order[:SHOWN]:
+        hypothesis = best if effect in best else (effect,)
+        point = search.points.get(hypothesis)
+        if point is None:
+            continue
+        found.append(
+            Ranked(
+                effect,
+                shares[effect],
+                values(search, hypothesis, effect),
+                equivalents(search, hypothesis, effect),
+                before,
+                error(search, hypothesis, holdout),
+                left_out(search, hypothesis).nats,
+            )
+        )
+    return found
+
+
+def _doubted(probability: Mapping[Hypothesis, float]) -> dict[Hypothesis, float]:
+    """Where nothing was found significant, nothing is the likeliest."""
+    rest = sum(p for h, p in probability.items() if h)
+    scale = min(1.0, 0.5 / rest) if rest > 0 else 1.0
+    return {h: p * scale if h else 1.0 - rest * scale for h, p in probability.items()}
+
+
+def _strength(search: Search, effect: str, best: Hypothesis) -> float:
+    """How much evidence goes when this effect is taken out of the answer."""
+    if effect not in best:
+        return 0.0
+    rest = tuple(h for h in best if h != effect)
+    point = search.points.get(rest)
+    return search.points[best].log_evidence - point.log_evidence if point else 0.0
+
+
+def equivalents(search: Search, hypothesis: Hypothesis, effect: str) -> tuple[str, ...]:
+    """Effects that could stand in this one's place and explain the data as well."""
+    own = search.points[hypothesis].log_evidence
+    rest = set(hypothesis) - {effect}
+    found = []
+    for other, point in search.points.items():
+        swapped = set(other) - rest
+        if len(other) == len(hypothesis) and rest < set(other) | {""} and len(swapped) == 1:
+            (name,) = swapped
+            if name != effect and rest <= set(other) and own - point.log_evidence < CLASS:
+                found.append(name)
+    return tuple(sorted(found))
+
+
+def values(search: Search, hypothesis: Hypothesis, effect: str) -> dict[str, Value]:
+    """Parameters of one effect with 95 % intervals."""
+    point, candidate = search.points[hypothesis], search.problem.candidates[effect]
+    found = {}
+    for key, parameter in candidate.keys().items():
+        i = point.linear.index(key)
+        centre, sd = point.score.z[i], float(np.sqrt(point.score.covariance[i, i]))
+        low, high = centre - 1.96 * sd, centre + 1.96 * sd
+        triple = np.array([centre, low, high])
+        if is_shape(search.problem, key):
+            triple = np.exp(np.clip(triple, -50, 50))
+        triple = np.clip(triple, parameter.lower, parameter.upper)
+        name, unit, triple = reported(candidate, parameter.name, parameter.unit, triple)
+        found[name] = Value(*(float(t) for t in triple), unit)
+    return found
+
+
+def reported(candidate: Candidate, name: str, unit: str, triple: Array) -> tuple[str, str, Array]:
+    """A parameter under the catalogue's name: searched reciprocally, reported as it stands there."""
+    if name not in candidate.reciprocal:
+        return name, unit, triple
+    name, unit = candidate.reciprocal[name]
+    value, low, high = 1.0 / np.maximum(triple, 1e-12)
+    return name, unit, np.array([value, high, low])
+
+
+def _ladder(search: Search, best: Hypothesis, holdout: Problem | None) -> list[tuple[str, float]]:
+    """Held-out error as the effects join, the strongest first."""
+    steps = [("model as it is", error(search, NULL, holdout))]
+    order = sorted(best, key=lambda e: -_strength(search, e, best))
+    for i in range(len(order)):
+        part = tuple(sorted(order[: i + 1]))
+        if part in search.points:
+            steps.append((order[i], error(search, part, holdout)))
+    return steps

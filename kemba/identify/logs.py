@@ -1,0 +1,170 @@
+"""Reading logs: own format or foreign columns through a map; robot or bench is read off them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from kemba.config import find_config, load_yaml, parse
+from kemba.errors import KembaError, suggest
+from kemba.quantity import Quantity, convert
+from kemba.table import read_table
+from kemba.trajectory import Array, Trajectory, sidecar
+
+Kind = Literal["robot", "bench"]
+ROBOT = (
+    "body/x",
+    "body/z",
+    "body/pitch",
+    *(
+        f"{leg}/{name}"
+        for leg in ("front", "rear")
+        for name in ("hip/q", "hip/tau", "piston/x", "valve/extend", "valve/retract")
+    ),
+)
+BENCH = ("piston/x", "valve/extend", "valve/retract", "piston/F")
+NEEDED: dict[str, tuple[str, ...]] = {"robot": ROBOT, "bench": BENCH}
+
+
+class Source(BaseModel):
+    """Where a column comes from: ours = sign * scale * source [unit in SI] + offset.
+
+    `delay`: seconds by which the source column lags behind the others.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    source: str
+    unit: str | None = None
+    scale: float = 1.0
+    sign: Literal[-1, 1] = 1
+    offset: float = 0.0
+    delay: float = 0.0
+
+
+class ColumnMap(BaseModel):
+    """A map file: our header (`piston/x [m]`, `time [s]`) -> the foreign column."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    kind: Kind | None = None
+    notes: str = ""
+    columns: dict[str, Source] = Field(min_length=2)
+
+
+def load_map(name: str | Path) -> ColumnMap:
+    """The map YAML `name`, a path or one shipped in configs/logs. Raises KembaError."""
+    path = find_config(str(name), "logs")
+    found = parse(load_yaml(path), ColumnMap)
+    if "time [s]" not in found.columns:
+        raise KembaError(str(path), "columns: 'time [s]' is not mapped", "every log needs its time")
+    for header in found.columns:
+        if header != "time [s]":
+            Quantity.from_header(header)
+    return found
+
+
+def read_log(path: str | Path, columns: ColumnMap | None = None) -> Trajectory:
+    """One log, unchecked; `meta` has its kind and name. Raises KembaError with row and column."""
+    path = Path(path)
+    if path.is_dir():
+        raise KembaError(str(path), "is a folder", "a CSV log was expected")
+    log = Trajectory.read(path, strict=False) if columns is None else _foreign(path, columns)
+    log.meta.setdefault("kind", (columns and columns.kind) or kind_of(log, path))
+    log.meta["name"] = path.stem
+    log.meta["path"] = str(path)
+    if log.meta["kind"] not in NEEDED:
+        raise KembaError(
+            str(sidecar(path)), f"kind: '{log.meta['kind']}'", hint=suggest("robot", NEEDED)
+        )
+    return log
+
+
+def read_logs(paths: Sequence[str | Path], columns: ColumnMap | None = None) -> list[Trajectory]:
+    """Several logs of one kind, in the order of their names and not of the arguments."""
+    if not paths:
+        raise KembaError("", "no log given", "one or more CSV files were expected")
+    unique = sorted({Path(p).resolve(): Path(p) for p in paths}.values(), key=_order)
+    logs = [read_log(p, columns) for p in unique]
+    kinds = {log.meta["kind"] for log in logs}
+    if len(kinds) > 1:
+        named = ", ".join(f"{log.meta['name']}: {log.meta['kind']}" for log in logs)
+        raise KembaError("", "robot and bench logs cannot be fitted together", named)
+    return logs
+
+
+def kind_of(log: Trajectory, where: str | Path = "") -> Kind:
+    """Robot or bench, by the columns."""
+    if any(name.startswith(("body/", "front/", "rear/")) for name in log.names):
+        return "robot"
+    if any(name in BENCH for name in log.names):
+        return "bench"
+    raise KembaError(
+        f"{where}:1",
+        "has neither the columns of a robot log nor those of a bench log",
+        f"at least {', '.join(BENCH)} of a rig, or body/z and so on of a robot, were expected",
+        "map foreign columns with --map",
+    )
+
+
+def _order(path: Path) -> tuple[str, str]:
+    return path.name, str(path)
+
+
+def _foreign(path: Path, columns: ColumnMap) -> Trajectory:
+    headers, table = read_table(path, plain_headers=True)
+    time_source = columns.columns["time [s]"]
+    time = _values(path, headers, table, "time [s]", time_source)
+    found = {}
+    for header, source in columns.columns.items():
+        if header == "time [s]":
+            continue
+        values = _values(path, headers, table, header, source)
+        if source.delay:
+            values = _earlier(time, values, source.delay, hold="/valve/" in f"/{header}")
+        found[header] = values
+    meta = load_yaml(sidecar(path)).data if sidecar(path).is_file() else {}
+    return Trajectory(time, found, meta)
+
+
+def _values(path: Path, headers: list[str], table: Array, header: str, source: Source) -> Array:
+    if source.source not in headers:
+        raise KembaError(
+            f"{path}:1",
+            f"has no column '{source.source}', which the map reads as '{header}'",
+            hint=suggest(source.source, headers),
+        )
+    values: Array = table[:, headers.index(source.source)]
+    unit = header[header.index("[") + 1 : -1]
+    try:
+        values = convert(values, source.unit or unit, unit)
+    except ValueError as error:
+        raise KembaError(str(path), f"map of '{header}': unit '{source.unit}' {error}") from None
+    return np.asarray(source.sign * source.scale * values + source.offset)
+
+
+def _earlier(time: Array, values: Array, delay: float, hold: bool) -> Array:
+    """The column as it would be without its lag."""
+    if hold:
+        at = np.clip(np.searchsorted(time, time + delay, side="right") - 1, 0, len(time) - 1)
+        return np.asarray(values[at])
+    return np.interp(time + delay, time, values)
+
+
+def grouped(logs: Iterable[Trajectory]) -> dict[str, list[str]]:
+    """Runs with the same command, by group: `repeat_of` of the sidecar, else each its own."""
+    groups: dict[str, list[str]] = {}
+    for log in logs:
+        groups.setdefault(str(log.meta.get("repeat_of", log.meta["name"])), []).append(
+            log.meta["name"]
+        )
+    return groups
+
+
+def metadata(log: Trajectory) -> dict[str, Any]:
+    """What the sidecar said."""
+    return {k: v for k, v in log.meta.items() if k not in ("name", "path")}

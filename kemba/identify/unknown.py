@@ -1,0 +1,98 @@
+"""What no effect of the catalogue explains: terms of a library, judged by the same evidence."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kemba.identify.linear import Linear, condense
+from kemba.identify.problem import Array, Candidate, Parameter
+from kemba.identify.rank import NULL, Hypothesis, Ranker
+from kemba.identify.search import Search
+
+WIDTH = 10.0  # prior of a term: so many sigma where it acts most
+AHEAD = 6.0  # nats by which a formula must beat the catalogue
+LEFT = 0.25  # share of what the catalogue explains that may be left to a formula
+
+
+@dataclass(frozen=True)
+class Formula:
+    """Terms found, coefficients (value, sigma), and how much evidence they add [nats]."""
+
+    terms: tuple[str, ...]
+    coefficients: tuple[tuple[float, float], ...]
+    gain: float
+
+    def __str__(self) -> str:
+        return "F = " + " + ".join(
+            f"({c:.4g} +- {1.96 * s:.2g})*({t})"
+            for t, (c, s) in zip(self.terms, self.coefficients, strict=True)
+        )
+
+
+def extended(
+    search: Search, linear: Linear, jacobian: Array, r: Array, library: Mapping[str, Array]
+) -> tuple[Ranker, dict[str, str]]:
+    """A ranker that knows the library's terms as further candidates; their names by formula."""
+    names = {f"term{i}": formula for i, formula in enumerate(library)}
+    columns = np.stack([library[f] for f in names.values()], axis=1)
+    reach = np.percentile(np.abs(columns), 99, axis=0)
+    widths = WIDTH / np.maximum(reach, 1e-9)
+    keep = [i for i in range(len(names)) if reach[i] > 1e-9]
+    names = {n: f for i, (n, f) in enumerate(names.items()) if i in keep}
+    columns, widths = columns[:, keep], widths[keep]
+    candidates = {
+        n: Candidate(n, Parameter("c", size=float(w))) for n, w in zip(names, widths, strict=True)
+    }
+    zeros = np.zeros(len(widths))
+    joined = condense(
+        (*linear.names, *(c.key for c in candidates.values())),
+        np.concatenate([linear.at, zeros]),
+        np.concatenate([linear.mean, zeros]),
+        np.concatenate([linear.width, widths]),
+        np.concatenate([jacobian, columns], axis=1),
+        r,
+        search.blocks,
+    )
+    ranker = Ranker(
+        joined, {**search.problem.candidates, **candidates}, search.problem.nuisance, search.heat
+    )
+    ranker.silent = frozenset(candidates)
+    return ranker, names
+
+
+def look(search: Search, best: Hypothesis) -> Formula | None:
+    """The formula that explains what the best catalogue answer cannot, if there is one."""
+    null = search.points[NULL]
+    library = search.problem.library(null.fit.theta)
+    if not library:
+        return None
+    ranker, names = extended(
+        search, null.linear, search.null_jacobian, search.null_residual, library
+    )
+    alone = _grow(ranker, names, ())
+    catalogue = search.points[best].log_evidence - null.log_evidence if best else 0.0
+    if alone is not None and alone.gain > catalogue + AHEAD:
+        return replace(alone, gain=alone.gain - catalogue)
+    return None
+
+
+def _grow(ranker: Ranker, names: Mapping[str, str], start: Hypothesis) -> Formula | None:
+    """Greedy choice of at most two terms; each must bring its share."""
+    base = ranker.score(start).log_evidence
+    chosen, reached = start, base
+    for _ in range(2):
+        table = {n: ranker.score((*chosen, n)).log_evidence for n in names if n not in chosen}
+        name = max(table, key=table.__getitem__)
+        if table[name] < reached + AHEAD + 2.0:
+            break
+        chosen, reached = (*chosen, name), table[name]
+    terms = tuple(n for n in chosen if n not in start)
+    if not terms:
+        return None
+    score = ranker.score(chosen)
+    at = [ranker.lead[n] for n in terms]
+    values = tuple((float(score.z[i]), float(np.sqrt(score.covariance[i, i]))) for i in at)
+    return Formula(tuple(names[n] for n in terms), values, reached - base)

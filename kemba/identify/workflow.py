@@ -1,0 +1,100 @@
+"""From files to an answer folder: read, check, search, write."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from kemba.errors import KembaError
+from kemba.files import write_json
+from kemba.identify.adopt import write_model
+from kemba.identify.answer import Answer
+from kemba.identify.checks import BadData, check_logs, sentence
+from kemba.identify.discover import Found, discover
+from kemba.identify.logs import load_map, read_logs
+from kemba.identify.problem import Problem
+from kemba.trajectory import Trajectory
+
+Paths = Sequence[str | Path]
+
+
+def discover_logs(
+    logs: Paths,
+    holdout: Paths = (),
+    model: str = "planning",
+    column_map: str | Path | None = None,
+    time_limit: float = 300.0,
+    say: Callable[[str], None] = lambda text: None,
+    out: str | Path | None = None,
+) -> tuple[Answer, Found | None]:
+    """Answer which effect `model` lacks; written to the folder `out` when one is given.
+
+    Data that cannot be right give the verdict `bad-data`, and nothing is fitted. Raises
+    KembaError for files that cannot be read.
+    """
+    started = time.monotonic()
+    columns = load_map(column_map) if column_map else None
+    fitted, kept = read_logs(logs, columns), read_logs(holdout, columns) if holdout else []
+    found: Found | None = None
+    try:
+        _apart(fitted, kept)
+        remarks = check_logs([*fitted, *kept])
+        say("preparing the logs")
+        problem = make_problem(fitted, model)
+        remarks = [*remarks, *plausible(problem)]
+        judge = make_problem(kept, model) if kept else None
+        left = time_limit - (time.monotonic() - started)
+        found = discover(problem, judge, left, say)
+        answer = found.answer
+        answer.remarks = remarks
+    except BadData as error:
+        answer = Answer("bad-data", sentence=sentence(error.errors))
+        answer.remarks = [str(e) for e in error.errors]
+    answer.runtime_s = time.monotonic() - started
+    if out is not None:
+        write_answer(answer, Path(out), model)
+    return answer, found
+
+
+def make_problem(logs: Sequence[Trajectory], model: str) -> Problem:
+    """The problem of explaining bench or robot logs with a model."""
+    from kemba.model.spec import load_model
+
+    if logs[0].meta["kind"] == "bench":
+        from kemba.identify.bench import bench_problem
+
+        return bench_problem(logs, load_model(model, rig=True))
+    from kemba.identify.robot import robot_problem
+
+    return robot_problem(logs, load_model(model))
+
+
+def plausible(problem: Problem) -> list[str]:
+    """Remarks of the problem's own gate. Raises BadData when the model and the data contradict
+    each other so grossly that a column must be wrong."""
+    gate = getattr(problem, "plausible", None)
+    return list(gate()) if gate else []
+
+
+def write_answer(answer: Answer, out: Path, model: str) -> None:
+    """answer.json, and the model with what was found."""
+    out.mkdir(parents=True, exist_ok=True)
+    data: dict[str, Any] = answer.json()
+    for stale in ("model.yaml", "answer.json"):
+        (out / stale).unlink(missing_ok=True)
+    if answer.verdict == "missing":
+        base = model if not Path(model).is_file() else str(Path(model).resolve())
+        path = write_model(out / "model.yaml", base, data["ranking"], answer.added)
+        answer.model = data["model"] = str(path)
+    write_json(out / "answer.json", data | {"base": model})
+
+
+def _apart(fitted: Sequence[Trajectory], kept: Sequence[Trajectory]) -> None:
+    """A held-out log must not be fitted as well."""
+    both = {Path(t.meta["path"]).resolve() for t in fitted} & {
+        Path(t.meta["path"]).resolve() for t in kept
+    }
+    if both:
+        raise KembaError("--holdout", f"{sorted(both)[0].name} is also among the logs to be fitted")

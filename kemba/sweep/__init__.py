@@ -1,0 +1,19 @@
+"""Sweeps: many tasks to plan, or many executions of one plan, on Dask."""
+
+from kemba.sweep.case import Case
+from kemba.sweep.expand import expand, load_sweep
+from kemba.sweep.farm import run_cases
+from kemba.sweep.machine import machine
+from kemba.sweep.results import open_folder, write_results
+from kemba.sweep.schema import Sweep
+
+__all__ = [
+    "Case",
+    "Sweep",
+    "expand",
+    "load_sweep",
+    "machine",
+    "open_folder",
+    "run_cases",
+    "write_results",
+]

@@ -1,0 +1,82 @@
+"""A case: one piece of work of a sweep, known by the hash of its content."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from kemba.files import plain, read_json, write_json
+
+Record = dict[str, Any]
+Work = Mapping[str, Any]
+
+
+def content_hash(data: Any) -> str:
+    """A short hash of plain data, whatever the order of its keys."""
+    text = json.dumps(plain(data), sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()[:20]
+
+
+@dataclass(frozen=True)
+class Case:
+    """Work for `function` (`module:name`), of which `problem` tells what is being solved.
+
+    `values` are what varies, as the sweep's table shows it. Cases with equal content have equal
+    keys, and their work is done once.
+    """
+
+    block: str
+    index: int
+    values: Mapping[str, Any]
+    function: str
+    work: Work = field(repr=False)
+    problem: str = ""
+
+    @cached_property
+    def key(self) -> str:
+        return content_hash([self.function, self.work])
+
+    def path(self, folder: Path) -> Path:
+        """Where its result is kept."""
+        return folder / "cases" / f"{self.key}.json"
+
+    def record(self, folder: Path) -> Record | None:
+        """Its result, None while there is none."""
+        path = self.path(folder)
+        return dict(read_json(path)) if path.is_file() else None
+
+
+def perform(function: str, work: Work, path: str) -> Record:
+    """Do a case's work and keep its result at `path`, at once and whole. Runs in a worker.
+
+    What goes wrong in it is an outcome too. Where the folder of `path` is not to be seen, the
+    record is returned only.
+    """
+    wall, cpu = time.perf_counter(), time.process_time()
+    try:
+        result = resolve(function)(work)
+    except Exception as error:
+        result = {"status": "error", "good": False, "sentence": f"{type(error).__name__}: {error}"}
+    record = {
+        **result,
+        "wall_s": time.perf_counter() - wall,
+        "cpu_s": time.process_time() - cpu,
+        "finished": time.time(),
+    }
+    if Path(path).parent.is_dir():
+        write_json(path, record)
+    return record
+
+
+def resolve(function: str) -> Callable[[Work], Record]:
+    """The function called `module:name`."""
+    module, name = function.split(":")
+    found: Callable[[Work], Record] = getattr(import_module(module), name)
+    return found

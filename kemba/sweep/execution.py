@@ -1,0 +1,167 @@
+"""Executing one plan under many conditions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kemba.config import Document, parse
+from kemba.effects import Effect
+from kemba.effects.catalogue import BY_KIND
+from kemba.effects.load import Payload
+from kemba.errors import KembaError, suggest
+from kemba.model import Model, load_model
+from kemba.plant import Gains, Profile, Replay, execute
+from kemba.plant.controller import read_controller
+from kemba.plant.replay import first_row
+from kemba.quantity import to_si
+from kemba.runs import load_run, sha256
+from kemba.sweep.case import Case, Work, content_hash
+from kemba.sweep.sampling import sample
+from kemba.sweep.schema import Conditions, ExecuteBlock
+from kemba.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from kemba.sweep.expand import Expansion
+
+
+def execute_cases(
+    expansion: Expansion, name: str, block: ExecuteBlock, folder: Path
+) -> list[Case]:
+    """The cases of a block; its plan is made first when it is not there yet."""
+    from kemba.sweep.expand import model_hash, model_name
+
+    plant = model_name(expansion, block.plant)
+    base = Document(block.conditions.model_dump(exclude_none=True))
+    works = []
+    for values in sample(block, name, expansion.sweep.seed):
+        conditions = parse(expansion.varied(base, name, values), Conditions)
+        works.append((values, conditions))
+    model = load_model(plant)
+    try:
+        for _, conditions in works:
+            changed_effects(model, conditions)
+            start_offsets(model, conditions)
+    except KembaError as error:
+        what = ": ".join(part for part in (error.where, error.what) if part)
+        raise expansion.document.error(
+            ("blocks", name), what, error.expected, error.hint
+        ) from None
+    plan = _plan_folder(expansion, name, block, folder)
+    shared = {
+        "plan": str(plan.absolute()),
+        "plan_hash": [sha256(plan / f) for f in ("trajectory.csv", "controller.csv")],
+        "plant": plant,
+        "plant_hash": model_hash(plant),
+    }
+    return [
+        Case(name, index, values, "kemba.sweep.work:execute_case",
+             shared | {"conditions": conditions.model_dump(exclude_none=True)}, name)
+        for index, (values, conditions) in enumerate(works)
+    ]  # fmt: skip
+
+
+def _plan_folder(expansion: Expansion, name: str, block: ExecuteBlock, folder: Path) -> Path:
+    """The folder of the plan to execute. Raises KembaError when there is no good plan."""
+    from kemba.ocp import Task, controller_table, plan
+
+    if block.run is not None:
+        near = expansion.beside / block.run
+        run = load_run(near if near.is_dir() else block.run)
+        assert len(run.controller) and len(run.trajectory)
+        return run.path
+    document = expansion.task_document(name)
+    task = parse(document, Task)
+    path = folder / "plans" / content_hash(task.model_dump(exclude_none=True))
+    if not (path / "controller.csv").is_file():
+        found = plan(task, document)
+        if found.status not in ("solved", "acceptable"):
+            at = ("blocks", name, "task")
+            raise expansion.document.error(at, f"{block.task}: {found.sentence}")
+        found.trajectory.write(path / "trajectory.csv")
+        controller_table(found.model, found.trajectory).write(path / "controller.csv")
+    return path
+
+
+def run_on_plant(work: Work) -> Replay:
+    """The execution that a case asks for, compared with its plan."""
+    conditions = parse(work["conditions"], Conditions)
+    plain = load_model(work["plant"])
+    model = load_model(work["plant"], changed_effects(plain, conditions), conditions.supply)
+    table = read_controller(work["plan"])
+    done = execute(
+        table,
+        model,
+        Gains(conditions.gains.K_p, conditions.gains.K_d),
+        extra=conditions.after,
+        start=standing(model, table, start_offsets(model, conditions)),
+        valves=_scattered(model, table, conditions) if conditions.jitter else None,
+    )
+    return done.against(model, Trajectory.read(Path(work["plan"]) / "trajectory.csv"))
+
+
+def changed_effects(model: Model, conditions: Conditions) -> list[Effect]:
+    """The effects that differ from the plant's. Raises KembaError for unknown kinds."""
+    changed: list[Effect] = [Payload(m=conditions.payload)] if conditions.payload else []
+    for kind, parameters in conditions.effects.items():
+        if kind not in BY_KIND:
+            raise KembaError(f"effects.{kind}", "no such effect", hint=suggest(kind, BY_KIND))
+        listed = next((e for e in model.effects if e.name == kind), None)
+        own = listed.model_dump() if listed else {}
+        try:
+            changed.append(parse({**own, "kind": kind, **parameters}, BY_KIND[kind]))
+        except KembaError as error:
+            raise KembaError(f"effects.{kind}", error.what, error.expected, error.hint) from None
+    return changed
+
+
+def start_offsets(model: Model, conditions: Conditions) -> dict[str, float]:
+    """Offsets of the first pose in SI units. Raises KembaError for what is no coordinate."""
+    mechanism = model.mechanism
+    knees = {f"{leg}/knee/q" for leg in mechanism.legs}  # their pistons are easier to picture
+    units = {c.name: c.unit for c in mechanism.coordinates if c.name not in knees}
+    units |= {f"{leg}/piston/x": "m" for leg in mechanism.legs}
+    offsets = {}
+    for name, value in conditions.start.items():
+        if name not in units:
+            raise KembaError(f"start.{name}", "no such coordinate", hint=suggest(name, units))
+        try:
+            offsets[name] = to_si(value, units[name])
+        except ValueError as error:
+            raise KembaError(f"start.{name}", str(error)) from None
+    return offsets
+
+
+def standing(model: Model, table: Trajectory, offsets: Mapping[str, float]) -> dict[str, float]:
+    """The table's first pose, moved, with the lower foot on the ground."""
+    import casadi as ca
+
+    from kemba.plant.start import initial_values
+
+    if not offsets:
+        return {}
+    pose = first_row(model, table)
+    moved = {name: pose.get(name, 0.0) + offset for name, offset in offsets.items()}
+    q, *_ = initial_values(model, pose | moved)
+    mechanism = model.mechanism
+    feet = ca.vertcat(*(mechanism.port(f"{leg}/foot/z").phi for leg in mechanism.legs))
+    lowest = float(ca.mmin(ca.Function("feet", [mechanism.q], [feet])(q)))
+    height = q[[c.name for c in mechanism.coordinates].index("body/z")]
+    return moved | {"body/z": float(height - lowest)}
+
+
+def _scattered(model: Model, table: Trajectory, conditions: Conditions) -> dict[str, Any]:
+    """The valves' commands with every switching moved by chance."""
+    rng = np.random.default_rng(conditions.seed)
+    moved = {}
+    for quantity in model.inputs.values():
+        if quantity.binary:
+            profile = Profile.of(table.time, table[quantity.name])
+            times = profile.times.copy()
+            times[1:] += rng.normal(0.0, conditions.jitter, len(times) - 1)
+            moved[quantity.name] = replace(profile, times=np.maximum.accumulate(times))
+    return moved

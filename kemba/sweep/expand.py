@@ -1,0 +1,131 @@
+"""From a sweep's YAML to its cases, every mistake found before anything runs."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from kemba.config import Document, apply_overrides, find_config, load_yaml, parse, shipped_configs
+from kemba.document import Location
+from kemba.errors import ConfigErrors, KembaError
+from kemba.model.spec import load_spec
+from kemba.ocp.task import Task
+from kemba.runs import sha256
+from kemba.sweep.case import Case, content_hash
+from kemba.sweep.sampling import sample
+from kemba.sweep.schema import ExecuteBlock, SolveBlock, Sweep
+
+# of a task: what tells how it is solved, not what is to be found
+HOW = {"name", "notes", "guess", "guess_noise", "seed", "method", "solver", "tolerances"}
+
+
+def load_sweep(name: str | Path, overrides: list[str] | None = None) -> tuple[Sweep, Document]:
+    """The sweep YAML `name` (a path or a shipped one) and its document. Raises KembaError."""
+    document = apply_overrides(load_yaml(find_config(name, "sweeps")), overrides or [])
+    return parse(document, Sweep), document
+
+
+class Expansion:
+    """A sweep's document and blocks, on the way to cases; paths are those beside the sweep."""
+
+    def __init__(self, sweep: Sweep, document: Document) -> None:
+        self.sweep, self.document = sweep, document
+        self.beside = Path(document.source).parent if document.source else Path()
+
+    def found(self, name: str | Path, folder: str) -> Path:
+        """The file `name` beside the sweep, as given, or shipped."""
+        near = self.beside / name
+        return near if near.is_file() else find_config(name, folder)
+
+    def task_document(self, name: str) -> Document:
+        """The task of a block with what it sets."""
+        block = self.sweep.blocks[name]
+        try:
+            document = load_yaml(self.found(str(block.task), "tasks"))
+        except KembaError as error:
+            at = ("blocks", name, "task")
+            raise self.document.error(at, f"{error.where}: {error.what}", hint=error.hint) from None
+        return self.changed(document, block.overrides, ("blocks", name, "set"))
+
+    def changed(self, base: Document, values: Mapping[str, Any], at: Location) -> Document:
+        """`base` with values set; mistakes in them are told at their place in the sweep."""
+        options = {f"{key}={json.dumps(value)}": key for key, value in values.items()}
+        document = apply_overrides(base, options)
+        places = {
+            f"--set {option}": self.document.error((*at, key), "").where
+            for option, key in options.items()
+        }
+        told = {key: places.get(text, text) for key, text in document.overrides.items()}
+        return dataclasses.replace(document, overrides=told)
+
+    def place(self, name: str, key: str) -> Location:
+        """Where a block names what varies."""
+        kind = "vary" if key in self.sweep.blocks[name].vary else "grid"
+        return ("blocks", name, kind)
+
+    def varied(self, base: Document, name: str, values: Mapping[str, Any]) -> Document:
+        """`base` as one case has it."""
+        for key, value in values.items():
+            base = self.changed(base, {key: value}, self.place(name, key))
+        return base
+
+
+def expand(sweep: Sweep, document: Document, folder: Path) -> list[Case]:
+    """All cases of a sweep. Raises ConfigErrors with the mistakes of all blocks.
+
+    `folder` keeps the plans that are to be executed; they are made here when missing.
+    """
+    from kemba.sweep.execution import execute_cases
+
+    expansion = Expansion(sweep, document)
+    cases: list[Case] = []
+    errors: list[KembaError] = []
+    for name, block in sweep.blocks.items():
+        try:
+            if isinstance(block, ExecuteBlock):
+                cases += execute_cases(expansion, name, block, folder)
+            else:
+                cases += _solve_cases(expansion, name, block)
+        except ConfigErrors as error:
+            errors += error.errors
+        except KembaError as error:
+            errors.append(error)
+    if errors:
+        raise ConfigErrors({str(error): error for error in errors}.values())
+    return cases
+
+
+def _solve_cases(expansion: Expansion, name: str, block: SolveBlock) -> list[Case]:
+    from kemba.ocp import task_model
+    from kemba.ocp.wishes import resolve
+
+    base = expansion.task_document(name)
+    cases = []
+    for index, values in enumerate(sample(block, name, expansion.sweep.seed)):
+        document = expansion.varied(base, name, values)
+        task = parse(document, Task)
+        task = task.model_copy(update={"model": model_name(expansion, block.model or task.model)})
+        if index == 0:  # names of quantities are the same in all
+            resolve(task, task_model(task), document)
+        work = {"task": task.model_dump(exclude_none=True), "model": model_hash(task.model)}
+        aim = {key: value for key, value in work["task"].items() if key not in HOW}
+        problem = content_hash([aim, work["model"]])
+        cases.append(Case(name, index, values, "kemba.sweep.work:solve_case", work, problem))
+    return cases
+
+
+def model_name(expansion: Expansion, name: str) -> str:
+    """A model as every worker finds it: shipped ones by name, others by their whole path."""
+    if name in shipped_configs("models") or f"{name}.yaml" in shipped_configs("models"):
+        return name
+    return str(expansion.found(name, "models").absolute())
+
+
+def model_hash(name: str) -> str:
+    """What a model's YAML and its robot's hold."""
+    spec = load_spec(name)
+    robot = find_config(spec.robot or "kemba", "robots")
+    return content_hash([spec.model_dump(mode="json"), sha256(robot)])

@@ -1,0 +1,109 @@
+"""Running cases on Dask: every result kept the moment it is there, nothing done twice."""
+
+from __future__ import annotations
+
+import logging
+import os
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from kemba.errors import KembaError
+from kemba.files import write_json
+from kemba.sweep.case import Case, Record, perform
+
+Tell = Callable[[Case, Record], None]
+
+
+def run_cases(
+    cases: Sequence[Case],
+    folder: Path,
+    scheduler: str | None = None,
+    jobs: int | None = None,
+    time_limit: float | None = None,
+    tell: Tell = lambda case, record: None,
+) -> dict[str, Record]:
+    """Do what is not done yet; `tell` hears of each case that ends. Records by key.
+
+    Missing from the answer: what `time_limit` [s] cut off. A case whose workers died again and
+    again is an error in the answer, but not in the folder, so that the next time tries it anew.
+    Raises KembaError when the `scheduler` cannot be reached.
+    """
+    (folder / "cases").mkdir(parents=True, exist_ok=True)
+    found: dict[str, Record] = {}
+    waiting: dict[str, Case] = {}
+    for case in cases:
+        record = case.record(folder)
+        if record is None:
+            waiting.setdefault(case.key, case)
+        else:
+            found[case.key] = record
+    if waiting:
+        with _client(scheduler, jobs, len(waiting)) as client:
+            found |= _gather(client, waiting, folder, time_limit, tell)
+    return found
+
+
+def _gather(
+    client: Any, waiting: dict[str, Case], folder: Path, time_limit: float | None, tell: Tell
+) -> dict[str, Record]:
+    from distributed import TimeoutError as TimeIsUp
+    from distributed import as_completed
+
+    found: dict[str, Record] = {}
+    tasks = {
+        client.submit(
+            perform, case.function, dict(case.work), str(case.path(folder).absolute()),
+            key=f"kemba-{case.key}", pure=False,
+        ): case
+        for case in waiting.values()
+    }  # fmt: skip
+    try:
+        for task in as_completed(tasks, timeout=time_limit):
+            case = tasks[task]
+            record = _record(task)
+            if record["status"] != "lost" and not case.path(folder).is_file():
+                write_json(case.path(folder), record)  # the worker does not see our files
+            found[case.key] = record
+            tell(case, record)
+            task.release()
+    except TimeIsUp:
+        client.cancel(list(tasks), force=True)
+    return found
+
+
+def _record(task: Any) -> Record:
+    """What came of a task; `lost` when its workers died under it."""
+    if task.status == "finished":
+        return dict(task.result())
+    error = task.exception()
+    sentence = f"its worker died, again and again ({type(error).__name__})"
+    return {"status": "lost", "good": False, "sentence": sentence}
+
+
+@contextmanager
+def _client(scheduler: str | None, jobs: int | None, most: int) -> Iterator[Any]:
+    """A client of the cluster asked for, or of a local one that ends with the block."""
+    from distributed import Client, LocalCluster
+
+    if scheduler is not None:
+        try:
+            client = Client(scheduler, timeout=10, set_as_default=False)
+        except (OSError, ValueError, TimeoutError) as error:
+            what = f"cannot be reached: {error}".splitlines()[0]
+            raise KembaError(f"--scheduler {scheduler}", what, "such as tcp://host:8786") from None
+        with client:
+            yield client
+        return
+    with (
+        LocalCluster(
+            n_workers=min(jobs or os.cpu_count() or 1, most),
+            threads_per_worker=1,
+            processes=True,
+            dashboard_address=None,
+            silence_logs=logging.CRITICAL,
+        ) as cluster,
+        Client(cluster, set_as_default=False) as client,
+    ):
+        yield client

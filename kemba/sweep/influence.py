@@ -1,0 +1,65 @@
+"""Which of the varied conditions an executed plan suffers from: rank correlations."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from kemba.sweep.case import Case, Record
+from kemba.units import read_si
+
+FEWEST = 5  # cases below which a correlation says nothing
+CHANCE = 0.05  # p-value above which it may be chance
+
+
+def influence(rows: list[tuple[Case, Record | None]]) -> dict[str, Any]:
+    """Spearman's rank correlations of each varied number with apex and landing.
+
+    `costs_most`: the condition with the strongest one, landing first, apex where all or none
+    landed; None when each may be chance.
+    """
+    done = [(case, record) for case, record in rows if record and "apex_m" in record]
+    landed = np.array([float(record["good"]) for _, record in done])
+    apex = np.array([record["apex_m"] for _, record in done], dtype=float)
+    ranks = {
+        key: {"landing": rank(values, landed), "apex": rank(values, apex)}
+        for key, values in numbers([case for case, _ in done]).items()
+    }
+    return {"ranks": ranks, "costs_most": costliest(ranks)}
+
+
+def costliest(ranks: dict[str, dict[str, Any]]) -> str | None:
+    """The condition that matters most."""
+    for answer in ("landing", "apex"):
+        told = {
+            key: abs(found[answer]["correlation"])
+            for key, found in ranks.items()
+            if found[answer] and found[answer]["p_value"] < CHANCE
+        }
+        if told:
+            return max(told, key=lambda key: told[key])
+    return None
+
+
+def rank(x: np.ndarray, y: np.ndarray) -> dict[str, float] | None:
+    """Spearman's correlation and its p-value; None where either never changes."""
+    from scipy.stats import spearmanr
+
+    if len(x) < FEWEST or np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
+        return None
+    found = spearmanr(x, y)
+    return {"correlation": float(found.statistic), "p_value": float(found.pvalue)}
+
+
+def numbers(cases: list[Case]) -> dict[str, np.ndarray]:
+    """What varies in all of the cases and is a number, in SI units, by key."""
+    columns = {}
+    for key in cases[0].values if cases else ():
+        try:
+            values = [read_si(case.values[key])[0] for case in cases]
+        except (KeyError, ValueError):
+            continue
+        if key != "seed":
+            columns[key] = np.array(values)
+    return columns

@@ -1,0 +1,106 @@
+"""A sweep's folder: what was asked, every case's result, the table and the summary."""
+
+from __future__ import annotations
+
+import csv
+import sys
+from collections.abc import Mapping, Sequence
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Any
+
+from kemba.config import Document, dump_yaml
+from kemba.errors import KembaError
+from kemba.files import atomic_text, read_json, write_json
+from kemba.runs import versions
+from kemba.sweep.case import Case, Record
+from kemba.sweep.machine import machine
+from kemba.sweep.schema import Sweep
+from kemba.sweep.summary import best_known, cost_of, cost_ratio, summarise
+
+MANIFEST = "manifest.json"
+FIGURES = (
+    "status", "good", "sentence", "apex_m", "apex_error_m", "touchdown_error_s", "final_error_m",
+    "pitch_rad", "duration_s", "solve_s", "solve_cpu_s", "build_s", "wall_s", "cpu_s",
+    "iterations", "variables",
+)  # fmt: skip
+
+
+def open_folder(out: str | Path | None, sweep: Sweep, document: Document) -> Path:
+    """The folder of a sweep, `sweeps/<name>` unless told; one that is there is continued.
+
+    Raises KembaError when it holds something else, or another sweep.
+    """
+    path = Path("sweeps") / sweep.name if out is None else Path(out)
+    manifest = path / MANIFEST
+    if path.exists() and not path.is_dir():
+        raise KembaError(f"--out {path}", "is a file", "a folder was expected")
+    if path.is_dir() and any(path.iterdir()):
+        known = read_json(manifest) if manifest.is_file() else {}
+        if known.get("sweep") != sweep.name:
+            what = f"holds the sweep '{known['sweep']}'" if "sweep" in known else "holds other files"
+            raise KembaError(f"--out {path}", what, hint="give another --out")
+    facts = {
+        "sweep": sweep.name,
+        "status": "running",
+        "command": sys.argv,
+        "started": _now(),
+        "machine": machine(),
+        "versions": versions(),
+    }
+    try:
+        write_json(manifest, facts)
+    except OSError as error:
+        raise KembaError(f"--out {path}", error.strerror or str(error)) from None
+    dump_yaml(document.data, path / "sweep.yaml")
+    return path
+
+
+def write_results(
+    path: Path, sweep: Sweep, cases: Sequence[Case], records: Mapping[str, Record], status: str
+) -> dict[str, Any]:
+    """Table and summary of a sweep, as far as it came; the summary is returned."""
+    summary = summarise(sweep, cases, records)
+    manifest = read_json(path / MANIFEST)
+    manifest |= {"status": status, "finished": _now(), "sentence": summary["sentence"]}
+    table = _table(cases, records)
+    facts = {key: manifest[key] for key in ("machine", "versions", "started", "finished")}
+    write_json(path / "results.json", {**summary, "status": status, **facts, "cases": table})
+    _write_csv(table, path / "results.csv")
+    write_json(path / MANIFEST, manifest)
+    return summary
+
+
+def _table(cases: Sequence[Case], records: Mapping[str, Record]) -> list[dict[str, Any]]:
+    best = best_known([(case, records.get(case.key)) for case in cases])
+    rows = []
+    for case in cases:
+        record = records.get(case.key)
+        shown = record or {"status": "missing", "good": False, "sentence": "not done yet"}
+        rows.append(
+            {
+                "block": case.block,
+                "case": case.index,
+                "key": case.key,
+                "values": dict(case.values),
+                **{name: shown.get(name) for name in FIGURES},
+                "cost": cost_of(record),
+                "cost_ratio": cost_ratio(case, record, best),
+            }
+        )
+    return rows
+
+
+def _write_csv(table: list[dict[str, Any]], path: Path) -> None:
+    keys = dict.fromkeys(key for row in table for key in row["values"])
+    names = [name for name in table[0] if name != "values"]
+    with atomic_text(path) as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow([*names[:3], *keys, *names[3:]])
+        for row in table:
+            fixed = [row[name] for name in names]
+            writer.writerow([*fixed[:3], *(row["values"].get(key) for key in keys), *fixed[3:]])
+
+
+def _now() -> str:
+    return datetime.now(timezone.utc).isoformat(timespec="seconds")

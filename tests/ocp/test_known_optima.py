@@ -1,0 +1,65 @@
+"""Optima known from the books, found by the classes that plan the robot's jumps."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from ocp.toys import Push, Wire, bead, solve
+from scipy.optimize import brentq
+
+
+def minimum_time(nodes: int) -> tuple[float, float, np.ndarray]:
+    """Duration, switching time and forces of the quickest rest-to-rest metre."""
+    program, point = solve(
+        bead(),
+        [Push()],
+        {"body/x": 0.0, "body/vx": 0.0},
+        end={"body/x": 1.0, "body/vx": 0.0},
+        duration=2.2,
+        nodes=nodes,
+        step_variation=0.5,
+        cost={"duration": 1.0},
+    )
+    force, times = program.layout.full(point.Y, "u")[1:, 0], program.times(point.Y)
+    switch = float(times[1:][force > 0].max())
+    return float(times[-1]), switch, force
+
+
+def test_minimum_time_double_integrator() -> None:
+    """T = 2 sqrt(d/a), switching in the middle, approached at first order."""
+    optimum = 2.0
+    durations, switches, forces = zip(*(minimum_time(n) for n in (20, 40, 80)), strict=True)
+    errors = np.abs(np.array(durations) - optimum)
+    assert np.log2(errors[:-1] / errors[1:]) == pytest.approx(1.0, abs=0.35)
+    assert errors[-1] < 0.03
+    assert switches[-1] == pytest.approx(optimum / 2, abs=0.05)
+    for force in forces:
+        assert np.count_nonzero(np.abs(np.abs(force) - 1.0) > 1e-4) <= 1, "bang-bang, one switch"
+        assert np.count_nonzero(np.diff(np.sign(force))) == 1
+
+
+def brachistochrone(nodes: int) -> tuple[float, float]:
+    """Duration of the quickest slide 1 m forward and 1 m down, and spread of the turning rate."""
+    program, point = solve(
+        bead("xz", gravity=9.81),
+        [Wire()],
+        {"body/x": 0.0, "body/z": 0.0, "body/vx": 0.0, "body/vz": 0.0},
+        end={"body/x": 1.0, "body/z": -1.0},
+        duration=0.6,
+        nodes=nodes,
+        step_variation=0.5,
+        cost={"duration": 1.0},
+    )
+    turn = program.layout.full(point.Y, "u")[2:, 0]
+    return float(program.times(point.Y)[-1]), float(np.ptp(turn) / np.mean(turn))
+
+
+def test_brachistochrone() -> None:
+    """The cycloid through (1, -1): its duration, and its constant turning rate."""
+    phi = brentq(lambda p: (p - math.sin(p)) / (1 - math.cos(p)) - 1.0, 1.0, 4.0)
+    optimum = phi * math.sqrt(1.0 / (1 - math.cos(phi)) / 9.81)
+    coarse, fine = (brachistochrone(nodes)[0] for nodes in (25, 50))
+    assert abs(fine - optimum) < 0.03 * optimum
+    assert abs(coarse - optimum) / abs(fine - optimum) == pytest.approx(2.0, abs=0.5)

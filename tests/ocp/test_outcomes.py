@@ -1,0 +1,108 @@
+"""What solving answers when it fails, is repeated, or is asked to use only half the robot."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from ocp.runs import solved
+
+from kemba.model import load_model
+from kemba.ocp import load_task, plan
+from kemba.ocp.certify import certify
+from kemba.ocp.mirror import find_symmetry
+from kemba.ocp.plan import Planner
+from kemba.ocp.result import to_trajectory
+from kemba.ocp.schedule import find
+from kemba.ocp.wishes import resolve
+
+FILES = [
+    "certificate.json",
+    "controller.csv",
+    "controller.meta.yaml",
+    "manifest.json",
+    "solver.log",
+    "task.yaml",
+    "trajectory.csv",
+    "trajectory.meta.yaml",
+]
+
+
+def test_a_failed_solve_writes_the_same_files() -> None:
+    failed = solved("jump", "solver.max_iterations=3")
+    for run in (failed, solved("jump")):
+        assert sorted(path.name for path in run.run.path.iterdir()) == FILES
+    answer = failed.run.certificate
+    assert failed.exit_code == 1
+    assert answer["status"] == failed.run.manifest["status"] == "limit"
+    assert answer["sentence"].startswith("stopped by a limit before a plan was found: worst: ")
+
+
+def test_the_worst_violation_is_named() -> None:
+    failed = solved("jump", "solver.max_iterations=3")
+    worst = failed.run.certificate["worst"]
+    assert 1 <= len(worst) <= 8
+    first = worst[0]
+    assert set(first) == {"what", "node", "time_s", "violation", "unit"}
+    assert first["violation"] > 0 and first["unit"]
+    plan = failed.plan
+    assert plan.time[first["node"]] == pytest.approx(first["time_s"])
+    named = f"worst: {first['what']} by {first['violation']:.3g} {first['unit']}"
+    assert named in failed.run.certificate["sentence"]
+
+
+def test_a_time_limit_keeps_the_best_iterate() -> None:
+    stopped = solved("jump", "solver.time_limit=0.3 s")
+    assert stopped.run.certificate["status"] == "limit"
+    assert np.isfinite(stopped.plan["body/z"]).all()
+
+
+@pytest.mark.slow
+def test_an_impossible_jump_is_not_solved() -> None:
+    answer = solved("jump", "height=1.6 m", "solver.max_iterations=150", nodes=24).run.certificate
+    assert answer["status"] in ("infeasible", "limit", "stalled")
+    assert answer["worst"]
+
+
+def test_the_same_task_gives_the_same_plan() -> None:
+    task, document = load_task("max_jump.yaml", ["nodes=24"])
+    first, second = plan(task, document), plan(task, document)
+    assert first.status == "solved"
+    assert first.trajectory.names == second.trajectory.names
+    for name in first.trajectory.names:
+        assert np.array_equal(first.trajectory[name], second.trajectory[name]), name
+    assert first.sentence == second.sentence
+    assert first.cost == second.cost
+
+
+def test_half_a_plan_is_a_whole_one() -> None:
+    """The half problem's solution, widened, has the whole model's residuals within tolerance."""
+    task, document = load_task("max_jump.yaml", ["nodes=24"])
+    model = load_model(task.model, supply=task.supply)
+    wishes = resolve(task, model, document)
+    half = find_symmetry(model)
+    assert half is not None
+    search = Planner(task, model, wishes, deadline=math.inf).search(task.nodes, half)
+    transcription = search.transcription
+    point = find(search, Planner(task, model, wishes).guess(transcription))
+    assert point.solved
+    found = certify(model, task, wishes, to_trajectory(transcription, point.Y))
+    assert found.within(task.tolerances), found.worst
+
+
+def test_every_iteration_is_watched_and_every_stage_told() -> None:
+    task, document = load_task("max_jump.yaml", ["nodes=24", "solver.max_iterations=5"])
+    seen: list[tuple[int, float, float]] = []
+    told: list[str] = []
+    plan(task, document, tell=told.append, watch=lambda *values: seen.append(values))
+    assert told and all("nodes)" in text for text in told)
+    assert seen[0][0] == 0 and all(math.isfinite(x) for values in seen for x in values)
+
+
+@pytest.mark.slow
+def test_the_papers_method_runs() -> None:
+    """One penalty solve (eq. 9): it answers in the same form, solved or not."""
+    run = solved("max_jump", "method=penalty", "solver.time_limit=20 s", nodes=24)
+    assert run.run.certificate["status"] in ("solved", "acceptable", "stalled", "limit", "infeasible")
+    assert [a["name"] for a in run.run.certificate["attempts"]] == ["penalty"]

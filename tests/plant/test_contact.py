@@ -1,0 +1,114 @@
+"""Contact and end stops: impacts, penetration, friction, step size."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from kemba.effects.ground import GroundCompliance, GroundFriction
+from kemba.plant import simulate
+from kemba.plant.equations import equations_of
+from kemba.plant.events import CLOSED, Advance
+from kemba.plant.replay import peak
+from kemba.plant.start import initial_values
+from kemba.trajectory import Trajectory
+from tests.plant.scripts import drop, jump, planning
+
+LEGS = ("front", "rear")
+WEIGHT = planning().mechanism.weight + 2.699 * 9.81 * 1.149 / 2.493  # N, with the boom's
+
+
+def penetration(t: Trajectory) -> float:
+    """The deepest that a foot or a piston has gone past its border [m]."""
+    depths = [-t[f"{leg}/foot/z"].min() for leg in LEGS]
+    depths += [-t[f"{leg}/piston/x"].min() for leg in LEGS]
+    return float(max(*depths, *(t[f"{leg}/piston/x"].max() - 0.07 for leg in LEGS)))
+
+
+@settings(max_examples=80, deadline=None)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    feet=st.tuples(st.booleans(), st.booleans()),
+    stops=st.tuples(st.sampled_from([0.0, 0.03, 0.07]), st.sampled_from([0.0, 0.05, 0.07])),
+)
+def test_impacts_are_inelastic_and_never_add_energy(seed, feet, stops) -> None:  # type: ignore[no-untyped-def]
+    model, rng = planning(), np.random.default_rng(seed)
+    values = {f"{leg}/piston/x": x for leg, x in zip(LEGS, stops, strict=True)}
+    q, _, s = initial_values(model, values)
+    q[2:5] += rng.uniform(-0.3, 0.3, 3)
+    v = rng.normal(0.0, 2.0, 7)
+    eq = equations_of(model)
+    place = Advance(eq, 1e-4).stepper.place(0.0, q, v, s, np.zeros(eq.nu))
+    q[1] -= min(place.gap[:2]) if any(feet) else -1.0  # put the lower foot on the ground
+    advance = Advance(eq, 1e-4)
+    after = advance.begin(0.0, q, v, s)
+    touching = after.gap <= CLOSED
+    assert (after.rate[touching] > -1e-9).all()
+    for impact in advance.impacts:
+        assert impact.lost >= -1e-10
+        assert impact.impulse > 0.0
+
+
+@pytest.mark.parametrize("motion", [drop, jump])
+def test_little_penetration_and_little_change_with_the_step(motion) -> None:  # type: ignore[no-untyped-def]
+    coarse, fine = motion(step=1e-4).trajectory, motion(step=5e-5).trajectory
+    assert penetration(coarse) < 1e-5
+    assert np.abs(coarse["body/z"] - fine["body/z"]).max() < 2e-4
+    assert peak(coarse.time, coarse["body/z"])[1] == pytest.approx(
+        peak(fine.time, fine["body/z"])[1], abs=2e-5
+    )
+
+
+def test_no_step_of_a_landing_adds_energy() -> None:
+    done = drop(duration=0.5)
+    assert done.impacts
+    assert all(impact.lost >= 0.0 for impact in done.impacts)
+    assert {label.split(":")[0] for i in done.impacts for label in i.labels} >= {"front/contact"}
+
+
+def test_friction_stays_in_its_cone_and_against_the_slip() -> None:
+    slippery = planning().with_effects([GroundFriction(mu=0.1)])
+    start = {"body/vx": 1.0}
+    t = simulate(slippery, start, duration=0.2)
+    for leg in LEGS:
+        normal, tangential, slip = (t[f"{leg}/foot/{n}"] for n in ("Fz", "Fx", "vx"))
+        assert (np.abs(tangential) <= 0.1 * normal + 1e-9).all()
+        sliding = (np.abs(slip) > 1e-3) & (normal > 1.0)
+        assert sliding.sum() > 20
+        assert np.allclose(tangential[sliding], -0.1 * normal[sliding] * np.sign(slip[sliding]))
+
+
+def test_a_robot_at_rest_stays_at_rest() -> None:
+    t = simulate(planning(), duration=0.2)
+    assert np.abs(t["body/z"] - t["body/z"][0]).max() < 1e-9
+    force = t["front/foot/Fz"] + t["rear/foot/Fz"]
+    assert force == pytest.approx(WEIGHT, rel=1e-6)
+
+
+def test_the_residual_holds_at_every_sample() -> None:
+    """What is written satisfies the model's own residual: same physics as the other readers."""
+    model, t = planning(), jump().trajectory
+    node = model.node
+    eq = equations_of(model)
+    for row in (5, 90, 240, 300, 480):
+        q = np.array([t[c.name][row] for c in model.mechanism.coordinates])
+        v = np.array([t[c.name][row] for c in model.mechanism.velocities])
+        s = np.array([t[x.name][row] for x in model.states.values()])
+        lam = np.array([t[x.name][row] for x in model.forces.values()])
+        u = np.array([t[x.name][row] for x in model.inputs.values()])
+        E = eq.now(q=q, v=v, s=s, u=u)
+        a = np.linalg.solve(E["M"], E["F"] + E["B"] @ lam)
+        dynamics, *_ = node.residual(q, v, a, s, E["f"], lam, u, [])
+        assert np.abs(np.asarray(dynamics)).max() < 1e-8
+        assert a[1] == pytest.approx(t["body/az"][row], abs=1e-6)
+
+
+def test_a_compliant_floor_pushes_only_and_carries_the_weight() -> None:
+    model = planning().with_effects([GroundCompliance(k=2e4)])
+    landing = drop(model).trajectory
+    assert landing["front/foot/Fz"].min() >= 0.0
+    pressed = landing["front/foot/Fz"] > 1.0
+    assert (landing["front/foot/z"][pressed] < 0.0).all()
+    assert np.abs(landing["body/z"] - drop().trajectory["body/z"])[:220].max() < 1e-3
+    standing = simulate(model, duration=0.6)
+    assert standing["front/foot/z"][-1] == pytest.approx(-0.5 * WEIGHT / 2e4, rel=0.02)

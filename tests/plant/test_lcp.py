@@ -1,0 +1,57 @@
+"""Complementarity problems, with those of contact in mind."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from kemba.plant.lcp import NoSolution, lemke, solve_lcp
+
+seeds = st.integers(0, 2**32 - 1)
+
+
+def check(A: np.ndarray, b: np.ndarray, z: np.ndarray) -> None:
+    w = A @ z + b
+    size = 1e-8 * (1.0 + np.abs(A) @ np.abs(z) + np.abs(b))
+    assert (z >= 0.0).all()
+    assert (w >= -size).all()
+    assert (np.abs(w * z) <= size * (1.0 + z)).all()
+
+
+@settings(max_examples=60, deadline=None)
+@given(seed=seeds, n=st.integers(1, 8))
+def test_positive_definite_problems_are_solved_from_any_guess(seed: int, n: int) -> None:
+    rng = np.random.default_rng(seed)
+    root = rng.normal(size=(n, n))
+    A, b = root @ root.T + 0.1 * np.eye(n), rng.normal(size=n)
+    found, active = solve_lcp(A, b, rng.random(n) < 0.5)
+    check(A, b, found)
+    assert np.allclose(found, lemke(A, b), atol=1e-7)
+    assert not found[~active].any()
+
+
+@settings(max_examples=60, deadline=None)
+@given(seed=seeds, mu=st.floats(0.0, 1.5))
+def test_contact_with_friction_is_always_solved(seed: int, mu: float) -> None:
+    """Two feet: normal force, friction forward and backward, slip speed each."""
+    rng = np.random.default_rng(seed)
+    J = rng.normal(size=(4, 6))
+    mobility = J @ np.diag(rng.uniform(1e-3, 1e-1, 6)) @ J.T
+    split = np.zeros((6, 4))
+    for foot in range(2):
+        split[3 * foot, 2 * foot] = 1.0
+        split[3 * foot + 1, 2 * foot + 1], split[3 * foot + 2, 2 * foot + 1] = 1.0, -1.0
+    A, b = np.zeros((8, 8)), np.zeros(8)
+    forces, slips = [0, 1, 2, 4, 5, 6], [3, 7]
+    A[np.ix_(forces, forces)] = split @ mobility @ split.T
+    b[forces] = split @ rng.normal(size=4)
+    for foot, gamma in enumerate(slips):
+        A[gamma, 4 * foot], A[gamma, 4 * foot + 1 : 4 * foot + 3] = mu, -1.0
+        A[4 * foot + 1 : 4 * foot + 3, gamma] = 1.0
+    z, _ = solve_lcp(A, b, rng.random(8) < 0.5)
+    check(A, b, z)
+
+
+def test_a_problem_without_solution_says_so() -> None:
+    with pytest.raises(NoSolution):
+        solve_lcp(np.array([[-1.0]]), np.array([-1.0]), np.array([False]))

@@ -1,0 +1,77 @@
+"""Plans executed: replay of the same model, and the controller of eq. 10."""
+
+import numpy as np
+import pytest
+
+from kemba.effects.motor import Motor
+from kemba.plant import Gains, Profile, execute, replay, run
+from kemba.plant.commands import Commands
+from kemba.plant.controller import saturated
+from kemba.trajectory import Trajectory
+from tests.plant.scripts import jump, planning
+
+
+def planned() -> tuple[Trajectory, Trajectory]:
+    """A jump as a plan of 5 ms nodes, made by the simulator itself, and its fine motion."""
+    taught = jump(duration=0.4).trajectory
+    nodes = np.arange(0.0, 0.4001, 0.005)
+    names = [q.name for q in planning().inputs.values()]
+    inputs = taught.interpolate(nodes, hold=names)
+    profiles = {name: Profile.of(nodes[:-1], inputs[name][:-1]) for name in names}
+    done = run(planning(), {}, Commands(profiles), 0.4, dead_time=False).trajectory
+    plan = done.interpolate(nodes)
+    shifted = {f"{n} [{plan.unit(n)}]": np.r_[0.0, inputs[n][:-1]] for n in names}
+    return plan.with_columns(shifted), done
+
+
+def test_a_plan_that_is_true_replays_exactly() -> None:
+    plan, _ = planned()
+    found = replay(planning(), plan)
+    assert abs(found.apex_error_m) < 2e-4  # the apex lies between nodes
+    assert found.final_error_m < 1e-9
+    assert not found.landed  # it ends in the air
+    assert set(found.summary()) == {
+        "apex_error_m", "touchdown_error_s", "final_error_m", "landed",
+    }  # fmt: skip
+
+
+def test_a_plan_that_is_not_true_is_found_out() -> None:
+    plan, _ = planned()
+    lie = plan.with_columns({"body/z [m]": plan["body/z"] + 0.1 * plan.time})
+    assert replay(planning(), lie).apex_error_m < -0.01
+
+
+def standing_table(lead: float = 0.006) -> Trajectory:
+    time = np.arange(0, 0.1, 1e-3)
+    pose = planning().mechanism.standing
+    columns = {}
+    for leg in ("front", "rear"):
+        columns[f"{leg}/hip/q [rad]"] = np.full(100, pose[f"{leg}/hip/q"])
+        columns[f"{leg}/hip/w [rad.s-1]"] = np.zeros(100)
+        columns[f"{leg}/hip/tau [N.m]"] = np.zeros(100)
+        for chamber in ("extend", "retract"):
+            columns[f"{leg}/valve/{chamber} [1]"] = np.zeros(100)
+    return Trajectory(time, columns, {"lead": lead})
+
+
+def test_the_controller_holds_a_standing_robot() -> None:
+    done = execute(standing_table(), planning())
+    assert done.lead == 0.006
+    assert np.abs(done.trajectory["front/hip/tau"]).max() < 1e-6
+
+
+def test_the_controller_brings_a_hip_back() -> None:
+    start = {"body/z": 1.0, "front/hip/q": planning().mechanism.standing["front/hip/q"] + 0.2}
+    done = execute(standing_table(), planning(), Gains(150.0, 4.0), start=start).trajectory
+    torque, error = done["front/hip/tau"], done["front/hip/q"] - start["front/hip/q"]
+    assert torque[0] == pytest.approx(-24.8)  # 150 * 0.2 saturates
+    assert error[-1] == pytest.approx(-0.2, abs=0.1)
+
+
+def test_the_motor_gives_less_the_faster_it_turns() -> None:
+    motor = Motor()
+    assert saturated(motor, 30.0, 0.0) == 24.8
+    assert saturated(motor, 30.0, 41.9) == pytest.approx(8.3)
+    assert saturated(motor, -30.0, 41.9) == -24.8
+    assert saturated(motor, 30.0, 60.0) == 0.0
+    assert saturated(None, 30.0, 60.0) == 30.0

@@ -1,0 +1,62 @@
+"""The simulator as a user calls it."""
+
+import numpy as np
+import pytest
+
+from kemba.errors import KembaError
+from kemba.model import load_model
+from kemba.plant import Commands, Profile, simulate
+from tests.plant.scripts import jump, planning
+
+
+def test_the_same_again() -> None:
+    first, again = jump(duration=0.1).trajectory, jump(duration=0.1).trajectory
+    assert first.headers == again.headers
+    assert all(np.array_equal(first[name], again[name]) for name in first.names)
+
+
+def test_everything_is_written_down() -> None:
+    t = simulate(planning(), duration=0.01)
+    for name in (
+        *("body/z", "body/az", "front/foot/Fz", "front/foot/Fx", "rear/piston/F"),
+        *("front/chamber/extend/F", "front/valve/extend", "rear/hip/tau", "rear/piston/stop_in"),
+    ):
+        assert name in t
+    assert t.time == pytest.approx(np.arange(11) * 1e-3)
+
+
+def test_samples_where_they_are_wanted() -> None:
+    times = np.array([0.0, 0.00123, 0.0031])
+    assert simulate(planning(), duration=0.01, sample=times).time == pytest.approx(times)
+
+
+def test_valves_are_logged_as_sent() -> None:
+    valve = {"front/valve/extend": Profile.pulses((0.0035, 0.008))}
+    t = simulate(planning(), commands=Commands(valve), duration=0.02)
+    assert np.array_equal(t["front/valve/extend"], (t.time > 0.0035) & (t.time < 0.008 - 1e-9))
+    force = t["front/chamber/extend/F"]
+    assert force[t.time < 0.0095].max() == 0.0
+    assert force[t.time > 0.0099].min() > 0.0
+
+
+def test_a_piston_may_stand_for_its_knee() -> None:
+    t = simulate(planning(), {"front/piston/x": 0.042, "body/z": 1.0}, duration=1e-3)
+    assert t["front/piston/x"][0] == pytest.approx(0.042, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: simulate(planning(), {"body/zz": 1.0}), "did you mean 'body/z'"),
+        (lambda: simulate(planning(), {"front/piston/x": 0.5}), "cannot be reached"),
+        (lambda: simulate(planning(), step=1e-2), "out of range"),
+        (
+            lambda: simulate(planning(), commands=Commands({"x": Profile.constant(1)})),
+            "no input 'x'",
+        ),
+        (lambda: simulate(load_model(rig=True)), "its motion is imposed"),
+    ],
+)
+def test_wrong_calls_say_what_is_wrong(call, message: str) -> None:  # type: ignore[no-untyped-def]
+    with pytest.raises(KembaError, match=message):
+        call()
