@@ -45,7 +45,11 @@ def _print(found: Characteristics) -> None:
     from kemba.plant.tables import check_rows, force_rows, rise_rows
 
     for title, columns, rows in (
-        ("Chamber force rise time", ("chamber", "x", "rise time", "95 %", "paper"), rise_rows(found)),
+        (
+            "Chamber force rise time",
+            ("chamber", "x", "rise time", "95 %", "paper"),
+            rise_rows(found),
+        ),
         (
             "Steady state: F = F_static - c_d v",
             ("mode", "supply", "F_static", "95 %", "paper", "c_d", "95 %", "paper", "R2"),

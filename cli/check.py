@@ -58,5 +58,15 @@ def _yaml(file: Path) -> dict[str, Any]:
 
     document = load_yaml(locate(file, SCHEMAS))
     kind = kind_of(document)
-    parse(document, schema_of(kind))
+    parsed = parse(document, schema_of(kind))
+    if kind == "tasks":
+        _names(parsed, document)
     return {"kind": kind, "sentence": f"one of the {kind}"}
+
+
+def _names(task: Any, document: Any) -> None:
+    """Quantities, costs and solver options that a task names."""
+    from kemba.ocp import task_model
+    from kemba.ocp.wishes import resolve
+
+    resolve(task, task_model(task), document)

@@ -11,9 +11,12 @@ from typing import Annotated
 import typer
 
 import kemba
+from kemba_cli.adopt import adopt
 from kemba_cli.characterise import characterise
 from kemba_cli.check import check
+from kemba_cli.discover import discover
 from kemba_cli.effects import effects
+from kemba_cli.experiment import experiment
 from kemba_cli.failures import guarded
 from kemba_cli.plot import plot
 from kemba_cli.schema import schema
@@ -26,6 +29,9 @@ VERBS = (
     sweep,
     simulate,
     characterise,
+    discover,
+    adopt,
+    experiment,
     check,
     effects,
     plot,

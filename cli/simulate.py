@@ -14,7 +14,9 @@ def simulate(
     source: Annotated[str, typer.Argument(help="Run folder, controller.csv, or rig YAML.")],
     model: Annotated[str, typer.Option(help="Model YAML of the plant.")] = "plant",
     repeat: Annotated[int, typer.Option(min=1, help="How often to execute the run.")] = 1,
-    noise: Annotated[bool, typer.Option("--noise", help="Noisy sensors, scattering valves.")] = False,
+    noise: Annotated[
+        bool, typer.Option("--noise", help="Noisy sensors, scattering valves.")
+    ] = False,
     seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same logs.")] = 0,
     out: Annotated[Path | None, typer.Option(help="Folder for the logs.")] = None,
     json: Json = False,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,10 +20,12 @@ from twin import (
     catalogue,
     figures,
     layout,
+    library,
     loads,
     logs,
     machine,
     measure,
+    motions,
     rigs,
     run,
     scripts,
@@ -178,10 +181,8 @@ def test_effect_shows_on_the_robot(name, hop):
 
 @pytest.mark.parametrize("kind", [n for n in BENCH_EFFECTS if CATALOGUE[n].room == "leg"])
 def test_one_leg_only(kind):
-    from twin.catalogue import tables
-
-    leg, _, _ = tables([hidden(kind, on="front")])
-    neutral, _, _ = tables([])
+    leg, _, _ = catalogue.tables([hidden(kind, on="front")])
+    neutral, _, _ = catalogue.tables([])
     assert (leg[1] == neutral[1]).all()
     assert (leg[0] != neutral[0]).any()
 
@@ -414,13 +415,20 @@ def test_controller_table_is_executed(tmp_path):
     assert truth.y[:, 1].max() > truth.y[0, 1] + 1e-3
 
 
+def test_a_fall_ends_the_log_early(hop):
+    falling = replace(hop, y=hop.y.copy())
+    falling.y[400:, 2] = 1.0
+    kept = motions.upright(falling)
+    assert kept.ticks.size == 400 // hop.split - 20 + 1
+    assert kept.finite
+    assert motions.sane(kept)
+    assert motions.upright(hop) is hop
+
+
 @pytest.mark.slow
 def test_every_motion_can_be_drawn():
-    from twin.library import motion
-    from twin.motions import MOTIONS, sane
-
-    for name in MOTIONS:
-        assert sane(run.simulate(motion(name, 1)))
+    for name in motions.MOTIONS:
+        assert motions.sane(run.simulate(library.motion(name, 1)))
 
 
 def test_state_size():

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal, Protocol
 
 import casadi as ca
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, field_validator
 
 from kemba.quantity import Param, Quantity
 
@@ -120,6 +120,13 @@ class Effect(BaseModel):
     dissipative: ClassVar[bool] = False
     moves: ClassVar[bool] = True  # False: in what is measured only; plans and simulations ignore it
     on_rod: ClassVar[bool] = True  # False: its piston effort is not felt by a rod force sensor
+
+    @field_validator("on")
+    @classmethod
+    def _one_leg(cls, on: str | None) -> str | None:
+        if on is not None and cls.place == "body":
+            raise ValueError("it acts on the whole robot, not on one leg; leave `on` out")
+        return on
 
     def states(self) -> dict[str, Quantity]:
         """Own states by symbol."""

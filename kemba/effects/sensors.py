@@ -55,9 +55,10 @@ class SensorEffect(Effect):
 
     @field_validator("on")
     @classmethod
-    def _nowhere(cls, on: str | None) -> None:
+    def _one_leg(cls, on: str | None) -> str | None:
         if on is not None:
             raise ValueError("a sensor is chosen by `channel`, such as front/piston/x, not by `on`")
+        return on
 
     @property
     def name(self) -> str:

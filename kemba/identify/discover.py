@@ -143,7 +143,7 @@ def ranked(search: Search, best: Hypothesis, holdout: Problem | None) -> list[Ra
                 effect,
                 shares[effect],
                 values(search, hypothesis, effect),
-                equivalents(search, hypothesis, effect),
+                equivalents(search, hypothesis, effect) if effect in best else (),
                 before,
                 error(search, hypothesis, holdout),
                 left_out(search, hypothesis).nats,

@@ -12,7 +12,7 @@ from kemba.identify.linear import is_shape
 from kemba.identify.problem import Array, Parameter, Problem
 from kemba.identify.rank import SLAB, Hypothesis
 
-EVALUATIONS = 14
+EVALUATIONS = 10
 
 
 @dataclass(frozen=True)
@@ -112,8 +112,8 @@ class _Search:
             method="trf",
             x_scale=1.0,
             max_nfev=EVALUATIONS,
-            ftol=1e-6,
-            xtol=1e-5,
+            ftol=3e-6,
+            xtol=1e-4,
         )
         return Fit(self._theta(found.x), float(found.cost), self._columns(found.jac))
 

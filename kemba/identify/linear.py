@@ -102,6 +102,31 @@ def condense(
     return Linear(tuple(names), at, mean, width, *arrays)
 
 
+def moved(linear: Linear, at: Array, jacobian: Array, r: Array, blocks: Array) -> Linear:
+    """The same slopes about another point, where the residual is r (n,)."""
+    labels = np.unique(blocks)
+    slope = np.array([jacobian[blocks == b].T @ r[blocks == b] for b in labels])
+    power = np.array([float(r[blocks == b] @ r[blocks == b]) for b in labels])
+    return replace(linear, at=at, slope=slope, power=power)
+
+
+def within(problem: Problem, theta: Mapping[str, float]) -> dict[str, float]:
+    """Theta with every effect's parameters inside their bounds."""
+    bounds = {k: p for c in problem.candidates.values() for k, p in c.keys().items()}
+    clipped = {
+        k: float(np.clip(v, bounds[k].lower, bounds[k].upper)) if k in bounds else v
+        for k, v in theta.items()
+    }
+    typical = {
+        key: p.typical
+        for c in problem.candidates.values()
+        if is_on(clipped, c.key, c.lead)
+        for key, p in c.keys().items()
+        if key not in clipped
+    }
+    return {**clipped, **typical}
+
+
 def is_shape(problem: Problem, name: str) -> bool:
     effect = name.rsplit(".", 1)[0]
     candidate = problem.candidates.get(effect)

@@ -123,13 +123,13 @@ def secant_jacobian(
     known = {key: p for c in problem.candidates.values() for key, p in c.keys().items()}
     columns = []
     for name in names:
-        steps = list(_steps(problem, known, theta, name))
+        steps = list(parameter_steps(problem, known, theta, name))
         slopes = [(problem.residual({**theta, **step}, runs) - base) / h for step, h in steps]
         columns.append(np.mean(slopes, axis=0))
     return np.stack(columns, axis=1) if columns else np.empty((len(base), 0))
 
 
-def _steps(
+def parameter_steps(
     problem: Problem, known: Mapping[str, Parameter], theta: Theta, name: str
 ) -> Iterable[tuple[dict[str, float], float]]:
     """Changed entries of theta and the step they mean."""

@@ -15,14 +15,19 @@ from kemba.identify.linear import (
     condense,
     estimate,
     linearise,
+    moved,
     names_of,
     priors,
     time_blocks,
+    within,
 )
 from kemba.identify.problem import Array, Problem
 from kemba.identify.rank import FLOOR, NULL, Hypothesis, Ranker, Score, log_prior, probabilities
 
 LEADERS = 6
+SURE = 3  # so many leaders are refitted however far behind they are,
+FAR, FAR_SHARE = 40.0, 0.7  # others when no more nats, or share of the gain, behind
+GLANCES = 2  # evaluations of each single effect before the leaders are refitted
 LARGEST = 3  # effects in one answer; more need another experiment
 GAIN = 3.0  # nats beyond prior odds that a further effect must bring
 
@@ -109,6 +114,26 @@ class Search:
         fit = Fit(dict(theta), 0.5 * float(r @ r))
         self.points = {NULL: Point(NULL, fit, linear, ranker.score(NULL))}
         self.null_table = ranker.table((0, 1, 2))
+        for hypothesis in [h for h in self.null_table if len(h) == 1]:
+            self.null_table[hypothesis] = self._glance(hypothesis)
+
+    def _glance(self, hypothesis: Hypothesis) -> float:
+        """Log evidence where the linear estimate points to, with the true residual there.
+
+        One evaluation tells a delay, which is far from linear, from its rivals.
+        """
+        linear, best = self.points[NULL].linear, self.null_table[hypothesis]
+        for _ in range(GLANCES):
+            z = self.ranker(linear).score(hypothesis).z
+            free = {*self.problem.nuisance, *(self.problem.candidates[e].key for e in hypothesis)}
+            own = np.array([name in free for name in linear.names])
+            at = np.where(own, z, linear.at)
+            theta = within(self.problem, estimate(self.problem, linear, at))
+            r = self.problem.residual(theta)
+            at, mean, width = priors(self.problem, theta, linear.names)
+            linear = moved(linear, at, self.null_jacobian, r, self.blocks)
+            best = max(best, self.ranker(linear).score(hypothesis).log_evidence)
+        return best
 
     def flexible_fit(self) -> Array:
         """z (k,) at the null with every effect free at its full size."""
@@ -126,8 +151,12 @@ class Search:
     def _round(self, given: Hypothesis, leaders: int) -> Hypothesis:
         """Refit the most promising extensions of `given` by one; the best of all points so far."""
         table = self._extensions(given)
-        order = sorted(table, key=lambda h: -table[h])
-        for hypothesis in order[:leaders]:
+        order = sorted(table, key=lambda h: -table[h])[:leaders]
+        promise = table[order[0]] - self.points[given].log_evidence
+        reach = max(FAR, FAR_SHARE * promise)
+        for hypothesis in order:
+            if table[hypothesis] < table[order[0]] - reach and hypothesis not in order[:SURE]:
+                break
             if time.monotonic() > self.deadline:
                 break
             self.visit(hypothesis)

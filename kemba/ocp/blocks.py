@@ -10,9 +10,11 @@ import casadi as ca
 import numpy as np
 from scipy import sparse
 
+from kemba.ocp.compiled import compiled
+
 Entries = tuple[ca.MX, np.ndarray, np.ndarray]  # nonzeros, their rows, their columns
 
-MAP: tuple = ()
+WORTH_COMPILING = 1000  # instructions of a Hessian block
 
 
 @dataclass(frozen=True)
@@ -55,51 +57,43 @@ class BlockProblem:
         x, parameter = ca.MX.sym("x", size), ca.MX.sym("p", p.numel())
         lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", self.rows)
         self.x, self.parameter = x, parameter
-        f, total, gradients, g, rows = ca.MX(0), ca.MX(0), [], [], []
+        f, total, gradients, g, again = ca.MX(0), ca.MX(0), [], [], []
         jac: list[Entries] = []
         hess: list[Entries] = []
         row = 0
         for block in blocks:
             m, n = block.g.numel(), len(block.columns)
-            local = _gather(x, block.columns)
-            many = ca.repmat(parameter, 1, n)
-            value, values = _mapped(block, p, n, "value")(local, many)
-            f += ca.sum2(value)
+            local, many = _gather(x, block.columns), ca.repmat(parameter, 1, n)
+            value, slope_of, first, second = (f_.map(n) for f_ in _functions(block, p))
+            cost, values = value(local, many)
+            f += ca.sum2(cost)
             g.append(ca.vec(values))
-            value, slope = _mapped(block, p, n, "first")(local, many)
-            total += ca.sum2(value)
+            cost, slope = slope_of(local, many)
+            total += ca.sum2(cost)
+            values, j_block = first(local, many)
+            again.append(ca.vec(values))
             gradients.append((ca.vec(slope), block.columns.ravel()))
-            g_block, j_block = _mapped(block, p, n, "rows")(local, many)
-            rows.append(ca.vec(g_block))
             multipliers = ca.reshape(lam_g[row : row + m * n], m, n)
-            h_block = _mapped(block, p, n, "second")(
-                local, many, ca.repmat(lam_f, 1, n), multipliers
-            )
+            h_block = second(local, many, ca.repmat(lam_f, 1, n), multipliers)
             jac.append(_place_jacobian(block, j_block, row))
             hess.append(_place_hessian(block, h_block))
             row += m * n
-        stacked = ca.vertcat(*g)
+        stacked, repeated = ca.vertcat(*g), ca.vertcat(*again)
         jacobian = _scatter(jac, self.rows, size)
         hessian = _scatter(hess, size, size)
-        spread = ca.vertcat(*(nz for nz, _ in gradients))
-        where = np.concatenate([at for _, at in gradients])
-        entries = (np.ones(len(where)), (where, np.arange(len(where))))
-        S = sparse.csc_matrix(entries, (size, len(where)))
-        gradient = ca.densify(ca.mtimes(_dm(S), spread))
+        gradient = _gather_gradient(gradients, size)
         self.nlp = {"x": x, "p": parameter, "f": f, "g": stacked}
-        names = ["x", "p"]
-        self.grad_f = ca.Function("grad_f", [x, parameter], [f, gradient], names, ["f", "grad_f_x"])
-        self.jac_g = ca.Function(
-            "jac_g", [x, parameter], [stacked, jacobian], names, ["g", "jac_g_x"]
-        )
+        names, at = ["x", "p"], [x, parameter]
+        self.grad_f = ca.Function("grad_f", at, [total, gradient], names, ["f", "grad_f_x"])
+        self.jac_g = ca.Function("jac_g", at, [repeated, jacobian], names, ["g", "jac_g_x"])
         self.hess_lag = ca.Function(
             "hess_lag",
-            [x, parameter, lam_f, lam_g],
+            [*at, lam_f, lam_g],
             [hessian],
             [*names, "lam_f", "lam_g"],
             ["triu_hess_gamma_x_x"],
         )
-        self.g = ca.Function("g", [x, parameter], [stacked], names, ["g"])
+        self.g = ca.Function("g", at, [stacked], names, ["g"])
 
 
 def _gather(x: ca.MX, columns: np.ndarray) -> ca.MX:
@@ -107,17 +101,25 @@ def _gather(x: ca.MX, columns: np.ndarray) -> ca.MX:
     return ca.reshape(x[index], columns.shape[1], columns.shape[0])
 
 
-def _mapped(block: Block, p: ca.SX, n: int, order: str) -> ca.Function:
-    z, f, g = block.z, block.f, block.g
-    if order == "value":
-        outputs, inputs = [f, ca.densify(g)], [z, p]
-    elif order == "first":
-        outputs, inputs = [f, ca.densify(ca.gradient(f, z))], [z, p]
-    elif order == "rows":
-        outputs, inputs = [ca.densify(g), _column(block.jacobian)], [z, p]
-    else:
-        outputs, inputs = [_column(block.hessian)], [z, p, *block.multipliers]
-    return ca.Function(order, inputs, ca.cse(outputs)).map(n, *MAP)
+def _functions(block: Block, p: ca.SX) -> list[ca.Function]:
+    """Of one repeat: values, the cost's slope, the rows' Jacobian, the Lagrangian's Hessian."""
+    z, f, g = block.z, block.f, ca.densify(block.g)
+    value = ca.Function("value", [z, p], ca.cse([f, g]))
+    derivatives = [
+        ca.Function("slope", [z, p], ca.cse([f, ca.densify(ca.gradient(f, z))])),
+        ca.Function("first", [z, p], ca.cse([g, _column(block.jacobian)])),
+        ca.Function("second", [z, p, *block.multipliers], ca.cse([_column(block.hessian)])),
+    ]
+    if derivatives[-1].n_instructions() > WORTH_COMPILING:
+        derivatives = compiled(derivatives)  # `value` stays: CasADi wants to differentiate it
+    return [value, *derivatives]
+
+
+def _gather_gradient(parts: list[tuple[ca.MX, np.ndarray]], size: int) -> ca.MX:
+    where = np.concatenate([at for _, at in parts])
+    entries = (np.ones(len(where)), (where, np.arange(len(where))))
+    S = sparse.csc_matrix(entries, (size, len(where)))
+    return ca.densify(ca.mtimes(_dm(S), ca.vertcat(*(nz for nz, _ in parts))))
 
 
 def _column(matrix: ca.SX) -> ca.SX:

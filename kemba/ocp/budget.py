@@ -16,6 +16,7 @@ from kemba.ocp.pose import Poses
 from kemba.ocp.task import Task
 from kemba.ocp.wishes import Wish
 
+HEAVY = 0.2  # of all that is lifted, from which the payload is told
 STROKES = 3  # more pushes than this fit into no planned motion
 
 
@@ -43,9 +44,7 @@ class Flight:
         return float(np.sqrt(2 * max(self.height - from_height, 0.0) / self.fall))
 
 
-def flight_of(
-    task: Task, model: Model, wishes: Sequence[Wish], poses: Poses
-) -> Flight | None:
+def flight_of(task: Task, model: Model, wishes: Sequence[Wish], poses: Poses) -> Flight | None:
     """The flight that the highest wish on the body's height asks for, from a start at rest."""
     highest = [w for w in wishes if w.quantity.name == "body/z" and w.at and np.isfinite(w.lower)]
     start = [w for w in wishes if w.at == 0.0]
@@ -120,13 +119,17 @@ def hip_power(model: Model) -> float:
 
 
 def budget_findings(
-    task: Task, model: Model, flight: Flight | None, document: Document
+    task: Task,
+    model: Model,
+    wishes: Sequence[Wish],
+    flight: Flight | None,
+    document: Document,
 ) -> Iterator[Finding]:
     """Time, energy, valves and friction of a task."""
     if flight is not None:
         yield from _time(task, flight, document)
         yield from _energy(task, model, flight, document)
-    yield from _grip(task, model, document)
+    yield from _grip(model, wishes, document)
 
 
 def _time(task: Task, flight: Flight, document: Document) -> Iterator[Finding]:
@@ -153,32 +156,29 @@ def _time(task: Task, flight: Flight, document: Document) -> Iterator[Finding]:
         return
 
 
-def _energy(
-    task: Task, model: Model, flight: Flight, document: Document
-) -> Iterator[Finding]:
+def _energy(task: Task, model: Model, flight: Flight, document: Document) -> Iterator[Finding]:
     """Work of the air over the stroke against the lift, hips counted generously."""
     air, lift = air_work(model), flight.mass * flight.fall * (flight.height - flight.z0)
     asked = f"`{flight.wish.text}` ({place(document, flight.wish.location)})"
-    if _pistons_off(flight, document, task):
-        air = 0.0
+    off = _pistons_off(task, document)
+    air = 0.0 if off else air
     if lift <= air:
         return
     longest = task.duration * (1 + task.step_variation) * (flight.wish.at or 1.0)
-    certain = lift > STROKES * air + hip_power(model) * longest
+    causes = [f"{off} keeps the pistons without air"] if off else []
+    if task.payload > HEAVY * flight.mass:
+        causes.append(f"{key('payload', document)} adds {number(task.payload, 'kg')}")
+    lifted = f"{asked}: lifting {flight.mass:.1f} kg to {number(flight.height, 'm')}"
     most = flight.z0 + air / (flight.mass * flight.fall)
-    causes = [f"{key('payload', document)}: {number(task.payload, 'kg')} lifted"] * (task.payload > 0)
-    off = _pistons_off(flight, document, task)
-    causes += [f"{off}: the pistons stay without air"] if off else []
-    cause = "; ".join(causes) + "; " if causes else ""
     yield Finding(
-        f"{cause}{asked}: {number(flight.height, 'm')} asked takes {lift:.0f} J, the pistons give "
-        f"{air:.0f} J over their stroke, which lifts the body to {number(most, 'm')}",
-        certain,
+        "; ".join([*causes, f"{lifted} takes {lift:.0f} J, one stroke of the pistons {air:.0f} J"]),
+        lift > STROKES * air + hip_power(model) * longest,
         (relax(document, flight.wish, flight.height, most),),
+        cause=bool(causes),
     )
 
 
-def _pistons_off(flight: Flight, document: Document, task: Task) -> str:
+def _pistons_off(task: Task, document: Document) -> str:
     """The wish that keeps every extend valve shut all the time, if there is one."""
     for pattern, bound in task.bounds.items():
         closed = bound.equals in (0, 0.0) or bound.at_most in (0, 0.0)
@@ -187,21 +187,31 @@ def _pistons_off(flight: Flight, document: Document, task: Task) -> str:
     return ""
 
 
-def _grip(task: Task, model: Model, document: Document) -> Iterator[Finding]:
-    """A forward jump from rest needs friction."""
-    x = {side: getattr(task, side).get("body/x") for side in ("start", "end")}
-    if task.distance is None or x["end"] is None or "rest" not in task.start:
+def _grip(model: Model, wishes: Sequence[Wish], document: Document) -> Iterator[Finding]:
+    """A jump to another place from rest needs friction."""
+    first = [w for w in wishes if w.at == 0.0 and w.quantity.name == "body/x"]
+    last = [w for w in wishes if w.at == 1.0 and w.quantity.name == "body/x"]
+    resting = any(w.at == 0.0 and w.location[-1] == "rest" for w in wishes)
+    if not (first and last and resting):
         return
+    way = max(last[0].lower - first[0].upper, first[0].lower - last[0].upper)
     floors = [e for e in model.effects if e.family == "ground" and "mu" in e.parameters()]
     if not floors or all(float(e.value("mu")) > 0 for e in floors):
         return
-    robot = load_robot(model.mechanism.name)
-    leg = robot.leg.femur.length + robot.leg.tibia.length
-    swing = (model.mechanism.mass - model.mechanism.body_mass) / model.mechanism.mass * 2 * leg
-    where = place(document, ("end", "body/x"))
+    leg = load_robot(model.mechanism.name).leg
+    outer = leg.femur.length + leg.tibia.com
+    rod = leg.piston.mount + leg.piston.retracted + leg.piston.stroke
+    arms = leg.femur.mass * leg.femur.com + leg.tibia.mass * outer
+    arms += leg.cylinder.mass * (leg.piston.mount + leg.cylinder.com) + leg.rod.mass * rod
+    # the body moves at most as far as the legs' masses swing from one side to the other
+    swing = 2 * len(model.mechanism.legs) * arms / model.mechanism.mass
+    if way < 0.01:
+        return
+    where = place(document, last[0].location)
     yield Finding(
-        f"`end.body/x` ({where}): {number(task.distance, 'm')} forward asked, but the ground "
+        f"`{last[0].text}` ({where}): {number(way, 'm')} forward asked, but the ground "
         f"gives no grip: friction coefficient mu is 0 in the model `{model.name}` "
         f"({floors[0].name}), and without it the centre of mass stays where it starts",
-        abs(task.distance) > swing,
+        way > swing,
+        cause=True,
     )

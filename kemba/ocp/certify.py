@@ -108,7 +108,8 @@ def certify(
         note(-pair_b / scale_b, [(b.label, b.unit, b.scale) for _, b in node.pair_rows]),
         note(-limits, [(r.label, "of the limit", 1.0) for r in node.limit_rows]),
     )
-    boxes = [signs, *_boxes(model, x, note), _wishes(wishes, trajectory, found)]
+    acting = {q.name for q in (*model.inputs.values(), *model.forces.values())}
+    boxes = [signs, *_boxes(model, x, note), _wishes(wishes, trajectory, found, acting)]
     binary = [i for i, q in enumerate(model.inputs.values()) if q.binary]
     u = now["u"][:, binary]
     worst = sorted((v for v in found if v.size > 1e-9), key=lambda v: -v.size)[:most]
@@ -136,12 +137,16 @@ def _boxes(model: Model, x: dict[str, np.ndarray], note) -> list[float]:  # type
     return sizes
 
 
-def _wishes(wishes: Sequence[Wish], trajectory: Trajectory, found: list[Violation]) -> float:
+def _wishes(
+    wishes: Sequence[Wish], trajectory: Trajectory, found: list[Violation], acting: set[str]
+) -> float:
     worst = 0.0
     nodes = len(trajectory) - 1
     for wish in wishes:
         values = trajectory[wish.quantity.name]
         over = np.maximum(wish.lower - values, values - wish.upper)
+        if wish.at is None and wish.quantity.name in acting:
+            over[0] = 0.0  # inputs and forces act on the interval before a node
         k = int(np.argmax(over)) if wish.at is None else wish.node(nodes)
         size = float(over[k]) / wish.quantity.scale
         what = f"{wish.text}:{wish.quantity.name}"

@@ -33,8 +33,8 @@ def check_task(
     if found:
         return found
     flight = flight_of(task, model, wishes, poses)
-    found = [*coarse_grid(task, flight, document), *budget_findings(task, model, flight, document)]
-    return sorted(found, key=lambda f: not f.certain)
+    budget = budget_findings(task, model, wishes, flight, document)
+    return sorted([*coarse_grid(task, flight, document), *budget], key=lambda f: not f.certain)
 
 
 def moments(task: Task, wishes: Sequence[Wish]) -> Iterator[tuple[str, list[Wish]]]:
@@ -48,9 +48,7 @@ def moments(task: Task, wishes: Sequence[Wish]) -> Iterator[tuple[str, list[Wish
         yield "every moment", always
 
 
-def contradictions(
-    task: Task, wishes: Sequence[Wish], document: Document
-) -> Iterator[Finding]:
+def contradictions(task: Task, wishes: Sequence[Wish], document: Document) -> Iterator[Finding]:
     """Two wishes on one quantity, or a wish and the quantity's own range, that exclude each
     other."""
     told: set[tuple[Location, Location]] = set()
@@ -99,7 +97,9 @@ def impossible_poses(
             continue
         single = _smallest(poses, here) or together or []
         given = tuple(
-            {g.wish.location: relax(document, g.wish, g.asked, g.reachable) for g in single}.values()
+            {
+                g.wish.location: relax(document, g.wish, g.asked, g.reachable) for g in single
+            }.values()
         )
         why = "; ".join(f"{r} ({r.where})" for r in given) or "the wishes exclude each other"
         reason = "" if together is None else _reason(single)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import casadi as ca
@@ -12,6 +12,7 @@ import numpy as np
 
 from kemba.model import Model
 from kemba.ocp.blocks import Block
+from kemba.ocp.guess import automatic_guess
 from kemba.ocp.ipopt import Ipopt, Parameters, Point
 from kemba.ocp.mirror import Reduction
 from kemba.ocp.pose import SCALE
@@ -143,16 +144,21 @@ def _solve(
     nodes = min(task.nodes, NODES)
     program = Elastic(planner.model, task, planner.wishes, reduction, nodes, soft)
     options = {**task.solver.options, "max_iter": ITERATIONS}
-    ipopt = Ipopt(program, options, planner.log, deadline, planner.watch)
+    ipopt = Ipopt(program, options, planner.log, deadline, planner.watch, planner.stop)
     search = Search(ipopt, task.solver.complementarity, planner.tell, planner.attempts)
-    guess = planner.guess(program)
+    quiet = [w for w in planner.wishes if w.location[0] not in soft]
     converged: list[Point] = []
     try:
-        interior = {"bound_push": 0.3, "bound_frac": 0.3, "mu_init": 0.1, "tol": 1e-3}
-        start = replace(guess, Y=program.start(guess.Y))
-        name = f"without {' and '.join(soft)}: relax"
-        converged.append(search.solve(name, start, Parameters(LOOSE), options=interior))
-        if not converged[0].solved:
+        name = f"soft {' and '.join(soft)}: relax"
+        for wishes, push in ((planner.wishes, 0.3), (quiet, 0.01)):  # the second guess keeps still
+            interior = {"bound_push": push, "bound_frac": push, "mu_init": 0.1, "tol": 1e-3}
+            Y = automatic_guess(planner.model, task, wishes, program.layout, nodes)
+            start = Point(program.start(Y))
+            point = search.solve(name, start, Parameters(LOOSE), options=interior)
+            if point.solved:
+                converged.append(point)
+                break
+        else:
             return None
         binary, name = Parameters(LOOSE, VALVE, SWITCHING), "its valves"
         point = search.solve(name, converged[0], binary, options=warm(1e-3, tol=1e-3))

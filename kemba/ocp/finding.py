@@ -35,11 +35,13 @@ class Relax:
 
 @dataclass(frozen=True)
 class Finding:
-    """What a check found. `certain`: no plan can exist, nothing need be solved."""
+    """What a check found. `certain`: no plan can exist, nothing need be solved. `cause`: it names
+    something else than the wish that fails."""
 
     sentence: str
     certain: bool
     relax: tuple[Relax, ...] = ()
+    cause: bool = False
 
 
 def number(value: float, unit: str) -> str:

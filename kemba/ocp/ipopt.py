@@ -35,28 +35,30 @@ class Point:
 
 @dataclass(frozen=True)
 class Parameters:
-    """What a step of a schedule sets: pair relaxation and the weights of valve penalty,
-    switching and pair penalty."""
+    """What a step of a schedule sets: pair relaxation, the weights of valve penalty and switching
+    (per node of the grid's mean), and of the pair penalty (per pair)."""
 
     eps: float
     valve: float = 0.0
     switching: float = 0.0
     pairs: float = 0.0
 
-    @property
-    def vector(self) -> list[float]:
-        return [self.eps, self.valve, self.switching, self.pairs]
+    def vector(self, nodes: int) -> list[float]:
+        """The program's parameters on a grid of `nodes`."""
+        return [self.eps, self.valve / nodes, self.switching / nodes, self.pairs]
 
 
 Watch = Callable[[int, float, float], None]  # iteration, objective, worst scaled violation
 
 
 class _Watcher(ca.Callback):
-    """Tells `watch` about every iteration."""
+    """Tells `watch` about every iteration, and asks `stop` whether to go on."""
 
-    def __init__(self, transcription: Transcription, watch: Watch) -> None:
+    def __init__(
+        self, transcription: Transcription, watch: Watch | None, stop: Callable[[], bool]
+    ) -> None:
         super().__init__()
-        self.t, self.watch, self.count = transcription, watch, 0
+        self.t, self.watch, self.stop, self.count = transcription, watch, stop, 0
         self.construct("watcher", {})
 
     def get_n_in(self) -> int:
@@ -74,11 +76,12 @@ class _Watcher(ca.Callback):
         return ca.Sparsity.dense(rows.get(ca.nlpsol_out(i), 4))
 
     def eval(self, arguments: Sequence[ca.DM]) -> list[int]:
-        g = np.asarray(arguments[2]).ravel()
-        over = np.maximum(self.t.g_lower - g, g - self.t.g_upper)
-        self.watch(self.count, float(arguments[1]), float(over.max(initial=0.0)))
+        if self.watch is not None:
+            g = np.asarray(arguments[2]).ravel()
+            over = np.maximum(self.t.g_lower - g, g - self.t.g_upper)
+            self.watch(self.count, float(arguments[1]), float(over.max(initial=0.0)))
         self.count += 1
-        return [0]
+        return [int(self.stop())]
 
 
 COMMON: dict[str, Any] = {
@@ -111,9 +114,10 @@ class Ipopt:
         log: Path | None = None,
         deadline: float = np.inf,
         watch: Watch | None = None,
+        stop: Callable[[], bool] | None = None,
     ) -> None:
         self.transcription, self.options = transcription, dict(options or {})
-        self.log, self.deadline, self.watch = log, deadline, watch
+        self.log, self.deadline, self.watch, self.stop = log, deadline, watch, stop
         self.iterations = 0
 
     def solve(
@@ -122,27 +126,33 @@ class Ipopt:
         parameters: Parameters,
         options: Mapping[str, Any] | None = None,
         fixed: Mapping[int, np.ndarray] | None = None,
+        free: Mapping[int, tuple[np.ndarray, np.ndarray]] | None = None,
     ) -> Point:
-        """One solve from `start`; `fixed` maps columns of Y to values (nodes + 1,) they keep."""
+        """One solve from `start`; `fixed` maps columns of Y to values (nodes + 1,) they keep,
+        `free` to bounds in which they stay."""
         t = self.transcription
         remaining = self.deadline - time.monotonic()
+        if self.stop is not None and self.stop():
+            return replace(start, message="User_Requested_Stop", iterations=0)
         if remaining <= 0:
             return replace(start, message="Maximum_CpuTime_Exceeded", iterations=0)
         lower, upper = t.lower.copy(), t.upper.copy()
         for column, values in (fixed or {}).items():
             lower[1:, column] = upper[1:, column] = values[1:]
+        for column, (low, high) in (free or {}).items():
+            lower[1:, column], upper[1:, column] = low[1:], high[1:]
         own = {**COMMON, **self.options, **(options or {})}
         if np.isfinite(remaining):
             own["max_wall_time"] = remaining
         if self.log is not None:
             own |= {"output_file": str(self.log), "file_print_level": 5, "file_append": "yes"}
         plugin = self._plugin(own)
-        if self.watch is not None:
-            plugin["iteration_callback"] = _Watcher(t, self.watch)
+        if self.watch is not None or self.stop is not None:
+            plugin["iteration_callback"] = _Watcher(t, self.watch, self.stop or (lambda: False))
         solver = ca.nlpsol("solver", "ipopt", t.problem.nlp, plugin)
         arguments: dict[str, Any] = {
             "x0": np.clip(start.Y, lower, upper).ravel(),
-            "p": parameters.vector,
+            "p": parameters.vector(t.nodes),
             "lbx": lower.ravel(),
             "ubx": upper.ravel(),
             "lbg": t.g_lower,

@@ -12,6 +12,7 @@ from kemba.model import Model
 from kemba.ocp.mirror import Reduction
 from kemba.quantity import Quantity
 
+STEP = 0.005  # s; scale of the steps, the same for every grid so that all share their code
 GROUPS = ("q", "v", "s", "u", "lam", "h")
 
 
@@ -24,7 +25,7 @@ class Layout:
 
     def __init__(self, model: Model, reduction: Reduction, step: float, variation: float) -> None:
         mechanism = model.mechanism
-        h = Quantity("step", "s", step * (1 - variation), step * (1 + variation), step)
+        h = Quantity("step", "s", step * (1 - variation), step * (1 + variation), STEP)
         full: dict[str, Iterable[Quantity]] = {
             "q": mechanism.coordinates,
             "v": mechanism.velocities,

@@ -18,14 +18,19 @@ GRIP = 0.02  # of body weight; less normal force is no stance
 def active_limits(task: Task, model: Model, trajectory: Trajectory) -> list[str]:
     """Sentence parts such as `front and rear extension valves are open throughout the stance`."""
     found = [*_valves(model, trajectory), *_torques(model, trajectory)]
-    return [*found, *_strokes(model, trajectory), *_grip(model, trajectory), *_steps(task, trajectory)]
+    return [
+        *found,
+        *_strokes(model, trajectory),
+        *_grip(model, trajectory),
+        *_steps(task, trajectory),
+    ]
 
 
 def _stance(model: Model, trajectory: Trajectory) -> np.ndarray:
     """Steps (n,) in which some foot bears load, up to the highest point."""
-    loads = [trajectory[f"{leg}/foot/Fz"] for leg in model.mechanism.legs
-             if f"{leg}/foot/Fz" in trajectory]
-    bears = np.array(sum(loads, np.zeros(len(trajectory)))) > GRIP * model.mechanism.weight
+    names = [f"{leg}/foot/Fz" for leg in model.mechanism.legs]
+    load = np.array([trajectory[name] for name in names if name in trajectory]).sum(axis=0)
+    bears = np.broadcast_to(load > GRIP * model.mechanism.weight, len(trajectory)).copy()
     bears[0] = False
     bears[int(np.argmax(trajectory["body/z"])) + 1 :] = False
     return bears
@@ -55,23 +60,27 @@ def _valves(model: Model, trajectory: Trajectory) -> Iterator[str]:
 
 
 def _torques(model: Model, trajectory: Trajectory) -> Iterator[str]:
-    for quantity in model.inputs.values():
-        if quantity.unit != "N.m" or quantity.upper <= 0:
-            continue
-        share = float(np.mean(np.abs(trajectory[quantity.name][1:]) > 0.95 * quantity.upper))
-        if share >= OFTEN:
-            leg = quantity.name.partition("/")[0]
-            yield (
-                f"{leg} hip torque is at its peak of {quantity.upper:g} N.m (tau_peak) in "
-                f"{share:.0%} of the steps"
-            )
+    share: dict[str, float] = {}
+    peak = 0.0
+    for (leg, _), quantity in model.inputs.items():
+        if quantity.unit == "N.m" and leg is not None:
+            peak = max(peak, quantity.upper)
+            at_peak = np.abs(trajectory[quantity.name][1:]) > 0.95 * quantity.upper
+            share[leg] = float(np.mean(at_peak))
+    legs = _legs(model, {leg: x >= OFTEN for leg, x in share.items()})
+    if legs:
+        most = f"{max(share.values()):.0%} of the steps"
+        yield f"{legs} hip torque is at its peak of {peak:g} N.m (tau_peak) in {most}"
 
 
 def _strokes(model: Model, trajectory: Trajectory) -> Iterator[str]:
-    stance, stroke = _stance(model, trajectory), model.mechanism.stroke
+    stance = np.flatnonzero(_stance(model, trajectory))
+    if not len(stance):
+        return
     full = {
-        leg: bool(stance.any() and trajectory[f"{leg}/piston/x"][: np.flatnonzero(stance)[-1] + 2].max()
-                  > NEAR * stroke)
+        leg: bool(
+            trajectory[f"{leg}/piston/x"][: stance[-1] + 2].max() > NEAR * model.mechanism.stroke
+        )
         for leg in model.mechanism.legs
     }
     if any(full.values()):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,12 +13,18 @@ from kemba.config import Document
 from kemba.effects.load import Payload
 from kemba.model import Model, load_model
 from kemba.ocp.certify import Certificate, certify, costs
+from kemba.ocp.checks import check_task
+from kemba.ocp.elastic import Outcome, elastic
+from kemba.ocp.explain import Explanation, explanation, refusal
+from kemba.ocp.finding import Relax
 from kemba.ocp.guess import automatic_guess
 from kemba.ocp.ipopt import Ipopt, Point, Watch
 from kemba.ocp.mirror import Reduction, find_symmetry, whole, wishes_are_symmetric
 from kemba.ocp.penalty import WEIGHTS, penalise
 from kemba.ocp.result import to_trajectory
-from kemba.ocp.schedule import Attempt, Search, Stopped, confirm, find, refine
+from kemba.ocp.resume import resumed
+from kemba.ocp.schedule import RELAX, Attempt, Search, Stopped, confirm, find, refine
+from kemba.ocp.switching import polish
 from kemba.ocp.task import Task
 from kemba.ocp.transcribe import Transcription
 from kemba.ocp.verdict import verdict
@@ -46,6 +52,7 @@ class Plan:
     build_s: float
     variables: int
     constraints: int
+    relax: tuple[Relax, ...] = ()
 
     @property
     def iterations(self) -> int:
@@ -67,13 +74,16 @@ class Planner:
     build_s: float = 0.0
     build_cpu_s: float = 0.0
     deadline: float = np.inf
+    start: Trajectory | None = None
+    stop: Callable[[], bool] | None = None
+    outcome: Outcome | None = None  # of the elastic solve after a failure
 
     def search(self, nodes: int, reduction: Reduction) -> Search:
         """A fresh program on a grid of `nodes`."""
         started, busy = time.perf_counter(), time.process_time()
         transcription = Transcription(self.model, self.task, self.wishes, reduction, nodes)
         options = {"max_iter": self.task.solver.max_iterations, **self.task.solver.options}
-        ipopt = Ipopt(transcription, options, self.log, self.deadline, self.watch)
+        ipopt = Ipopt(transcription, options, self.log, self.deadline, self.watch, self.stop)
         self.build_s += time.perf_counter() - started
         self.build_cpu_s += time.process_time() - busy
         name = "half" if reduction.symmetric else "whole"
@@ -97,8 +107,10 @@ class Planner:
         yield whole(self.model.node)
 
     def strategies(self) -> Iterator[Callable[[], tuple[Transcription, Point]]]:
-        """Ways to a plan, the quickest first."""
+        """Ways to a plan, the quickest first; from the given start before any guess."""
         nodes = self.task.nodes
+        for reduction in self.reductions() if self.start is not None else ():
+            yield lambda r=reduction: self._continued(r)  # type: ignore[misc]
         for reduction in self.reductions():
             if self.task.solver.coarse and nodes // 2 >= COARSEST:
                 yield lambda r=reduction: self._coarse_to_fine(r)  # type: ignore[misc]
@@ -110,13 +122,21 @@ class Planner:
         if not point.solved:
             return coarse.transcription, point
         fine = self.search(self.task.nodes, reduction)
-        return self._whole(fine, refine(fine, coarse.transcription, point))
+        return self._finish(fine, refine(fine, coarse.transcription, point))
 
     def _direct(self, reduction: Reduction) -> tuple[Transcription, Point]:
         search = self.search(self.task.nodes, reduction)
-        return self._whole(search, find(search, self.guess(search.transcription)))
+        return self._finish(search, find(search, self.guess(search.transcription)))
 
-    def _whole(self, search: Search, point: Point) -> tuple[Transcription, Point]:
+    def _continued(self, reduction: Reduction) -> tuple[Transcription, Point]:
+        assert self.start is not None
+        search = self.search(self.task.nodes, reduction)
+        point = find(search, resumed(search.transcription, self.start), loose=False)
+        return self._finish(search, point)
+
+    def _finish(self, search: Search, point: Point) -> tuple[Transcription, Point]:
+        if point.solved and self.task.solver.polish:
+            point = polish(search, point)
         if not point.solved or not search.transcription.reduction.symmetric:
             return search.transcription, point
         full = self.search(self.task.nodes, whole(self.model.node))
@@ -140,10 +160,21 @@ class Planner:
                 if found[1].solved:
                     return found
                 first = first or found
+                if self.attempts[-1].name == RELAX and self.outcome is None:
+                    self.outcome = elastic(self, next(self.reductions()))
+                    if self.outcome is not None and self.outcome.short:
+                        return first
             assert first is not None
+            self.outcome = self.outcome or elastic(self, next(self.reductions()))
             return first
         except Stopped as stop:
             return stop.transcription, stop.point
+
+    def refuse(self) -> tuple[Transcription, Point]:
+        """Nothing solved: the start guess, for a task that a check refused."""
+        whole_robot = whole(self.model.node)
+        program = Transcription(self.model, self.task, self.wishes, whole_robot, self.task.nodes)
+        return program, replace(self.guess(program), message="Infeasible_Problem_Detected")
 
 
 def task_model(task: Task, name: str | Path | None = None) -> Model:
@@ -159,25 +190,42 @@ def plan(
     log: Path | None = None,
     tell: Callable[[str], None] = lambda text: None,
     watch: Watch | None = None,
+    start: Trajectory | None = None,
+    stop: Callable[[], bool] | None = None,
 ) -> Plan:
     """Solve a task. Never raises for a task that cannot be met: the status says so.
 
     Raises ConfigErrors for wrong names, units and solver options. `log` collects IPOPT's text,
-    `tell` hears what is being done, `watch` every iteration.
+    `tell` hears what is being done, `watch` every iteration; `start` is a trajectory to go on
+    from, `stop` is asked between iterations whether to end with the best one.
     """
     document = document or Document(task.model_dump())
     started = time.perf_counter()
     built = task_model(task, model)
-    planner = Planner(task, built, resolve(task, built, document), log, tell, watch)
+    wishes = resolve(task, built, document)
+    planner = Planner(task, built, wishes, log, tell, watch, start=start, stop=stop)
+    findings = check_task(task, built, wishes, document)
+    refused = refusal(findings)
     planner.build_s = time.perf_counter() - started
     planner.deadline = time.monotonic() + task.solver.time_limit
     started, busy = time.perf_counter(), time.process_time()
     build_before = planner.build_s
-    transcription, point = planner.run()
+    transcription, point = planner.refuse() if refused else planner.run()
     elapsed = time.perf_counter() - started - (planner.build_s - build_before)
     busy = time.process_time() - busy - planner.build_cpu_s
     trajectory = to_trajectory(transcription, point.Y)
-    return judge(planner, transcription, trajectory, point, elapsed, busy)
+    found = judge(planner, transcription, trajectory, point, elapsed, busy)
+    if found.status in ("solved", "acceptable", "interrupted"):
+        return found
+    why = refused or explanation(task, built, planner.outcome, findings, document)
+    return found if why is None else explained(found, why)
+
+
+def explained(found: Plan, why: Explanation) -> Plan:
+    """The same with the reason: what is proven replaces the solver's status and words."""
+    if not why.proven:
+        return replace(found, sentence=f"{found.sentence}; {why.sentence}")
+    return replace(found, status="infeasible", sentence=why.sentence, relax=why.relax)
 
 
 def program_size(

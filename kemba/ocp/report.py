@@ -35,6 +35,10 @@ def answer(plan: Plan, run: str) -> dict[str, Any]:
         },
         "replay": None,
         "plant_replay": None,
+        "relax": [
+            {name: getattr(r, name) for name in ("wish", "where", "asked", "reachable", "unit")}
+            for r in plan.relax
+        ],
         "worst": [
             {key: value for key, value in asdict(v).items() if key != "size"}
             for v in certificate.worst

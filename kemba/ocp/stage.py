@@ -11,7 +11,7 @@ import numpy as np
 from kemba.model import Model
 from kemba.model.node import Row
 from kemba.ocp.costs import COSTS
-from kemba.ocp.layout import Layout
+from kemba.ocp.layout import STEP, Layout
 from kemba.ocp.mirror import Reduction
 
 ANGLE_ARM = 0.2  # m; turns a moment defect into a force defect
@@ -58,9 +58,9 @@ class Stage:
 
 
 def build_stage(
-    model: Model, layout: Layout, reduction: Reduction, cost: dict[str, float], nodes: int
+    model: Model, layout: Layout, reduction: Reduction, cost: dict[str, float]
 ) -> Stage:
-    """The stage of a grid of `nodes` intervals."""
+    """The stage of any grid."""
     y0, y = ca.SX.sym("y0", layout.size), ca.SX.sym("y", layout.size)
     node, h = model.node, layout.half(y, "h")
     now = {group: layout.full(y, group) for group in ("q", "v", "s", "u", "lam")}
@@ -104,8 +104,8 @@ def build_stage(
     u, u0 = y[layout.binary], y0[layout.binary]
     objective = (
         objective / COST_SCALE
-        + weights[0] * ca.sum1(u * (1 - u)) / nodes
-        + weights[1] * ca.sumsqr(u - u0) / nodes
+        + weights[0] * ca.sum1(u * (1 - u))
+        + weights[1] * ca.sumsqr(u - u0)
         + weights[2] * ca.sum1(product)
     )
     kept = tuple(r for r in rows if r.g.numel())
@@ -139,10 +139,9 @@ def _momentum(
 ) -> Rows:
     """Equations of motion times the step, projected on the half robot (virtual work)."""
     kept, rows = layout.quantities["q"], model.node.dynamics_rows
-    nominal = float(layout.scale[layout.slices["h"]][0])
     B = ca.sparsify(ca.DM(reduction.B["q"]))
     scale = [r.scale * (1.0 if r.unit == "N" else ANGLE_ARM) for r in rows]
-    g = ca.mtimes(B.T, dynamics / ca.DM(scale)) * h / nominal
+    g = ca.mtimes(B.T, dynamics / ca.DM(scale)) * h / STEP
     units = ["N" if q.unit == "m" else "N.m" for q in kept]
     size = [model.mechanism.weight * (1.0 if unit == "N" else ANGLE_ARM) for unit in units]
     return _rows("defect", g, [f"dynamics:{q.name}" for q in kept], units, scales=size)

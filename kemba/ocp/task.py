@@ -52,6 +52,7 @@ class Solver(Section):
     max_iterations: Annotated[int, Field(ge=1)] = 3000
     symmetry: bool = True
     coarse: bool = True
+    polish: bool = True
     complementarity: Annotated[float, Param("1", lower=1e-9, upper=1e-3)] = 1e-6
     options: dict[str, float | int | str] = Field(default_factory=dict)
 
@@ -91,6 +92,7 @@ class Task(Section):
     guess: Literal["automatic", "standing"] = "automatic"
     guess_noise: Annotated[float, Param("1", lower=0.0, upper=1.0)] = 0.0
     seed: int = 0
+    min_dwell: Annotated[float, Param("s", lower=0.0, doc="of a valve between switches")] = 0.01
     method: Literal["relaxation", "penalty", "penalty_ramped"] = "relaxation"
     solver: Solver = Field(default_factory=Solver)
     tolerances: Tolerances = Field(default_factory=Tolerances)

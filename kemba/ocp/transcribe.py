@@ -10,7 +10,7 @@ import numpy as np
 
 from kemba.model import Model
 from kemba.ocp.blocks import Block, BlockProblem
-from kemba.ocp.layout import GROUPS, Layout
+from kemba.ocp.layout import GROUPS, STEP, Layout
 from kemba.ocp.mirror import Reduction
 from kemba.ocp.stage import INF, Rows, Stage, as_variable, build_stage
 from kemba.ocp.task import Task
@@ -44,7 +44,7 @@ class Transcription:
         self.model, self.task, self.wishes, self.nodes = model, task, wishes, nodes
         self.reduction = reduction
         self.layout = Layout(model, reduction, task.duration / nodes, task.step_variation)
-        self.stage: Stage = build_stage(model, self.layout, reduction, task.cost, nodes)
+        self.stage: Stage = build_stage(model, self.layout, reduction, task.cost)
         n = self.layout.size
         self.shape = (nodes + 1, n + self.extra_columns())
         self.lower, self.upper = np.zeros(self.shape), np.zeros(self.shape)
@@ -72,7 +72,7 @@ class Transcription:
             part = self.layout.slices[group]
             self.lower[0, part] = self.upper[0, part] = 0.0
         part = self.layout.slices["h"]
-        self.lower[0, part] = self.upper[0, part] = 1.0
+        self.lower[0, part] = self.upper[0, part] = self.task.duration / self.nodes / STEP
 
     def extra_columns(self) -> int:
         """Columns of Y behind the layout's own, kept at zero unless `wish_blocks` frees them."""
@@ -83,9 +83,7 @@ class Transcription:
         blocks = (self.hard(wish, g, where, index) for wish, g, where in self.wish_expressions())
         return [block for block in blocks if block is not None]
 
-    def hard(
-        self, wish: Wish, g: ca.SX, where: list[int], index: np.ndarray
-    ) -> WishBlock | None:
+    def hard(self, wish: Wish, g: ca.SX, where: list[int], index: np.ndarray) -> WishBlock | None:
         """The rows of a wish that holds exactly; None where tighter bounds do it."""
         variable = as_variable(g, self.stage.y)
         if variable is not None:

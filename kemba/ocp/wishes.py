@@ -77,11 +77,11 @@ def resolve(task: Task, model: Model, document: Document) -> list[Wish]:
         try:
             for quantity in _matching(pattern, known, model):
                 wishes.append(_wish(task, location, quantity, at, bound))
-        except (KembaError, ValueError) as error:
-            what, hint = (
-                (error.what, error.hint) if isinstance(error, KembaError) else (str(error), "")
-            )
-            errors.append(document.error(location, f"{written(location)}: {what}", hint=hint))
+        except KembaError as error:
+            place = (*location, "quantity") if isinstance(bound, Goal) else location
+            errors.append(document.error(place, f"{written(place)}: {error.what}", hint=error.hint))
+        except ValueError as error:
+            errors.append(document.error(location, f"{written(location)}: {error}"))
     errors += cost_errors(task.cost, document)
     errors += option_errors(task.solver.options, document)
     if errors:

@@ -79,19 +79,18 @@ def fitted_effects(
     if supplies:
         at = {f"F_{m}": _over(force, m, supplies, getattr(chamber, f"F_{m}"), chamber.pressures)
               for m in ("extend", "retract")}  # fmt: skip
-        chamber = chamber.bind({"pressures": tuple(supplies), **at})
+        chamber = chamber.model_copy(update={"pressures": tuple(supplies), **at})
     if drag:
         known = sorted({p for _, p in drag if p > 0.0}) or list(damping.pressures)
         at = {f"c_{m}": _over(drag, m, known, getattr(damping, f"c_{m}"), damping.pressures)
               for m in ("extend", "retract", "both")}  # fmt: skip
         rest = drag.get(("none", 0.0), damping.c_none)
-        damping = damping.bind({"pressures": tuple(known), **at, "c_none": rest})
+        damping = damping.model_copy(update={"pressures": tuple(known), **at, "c_none": rest})
     if rises:
-        times = {
-            name: tuple(e.value for e in getattr(rises, name)) for name in ("fill", "vent")
-        }
-        chamber = chamber.bind(times)
-        valve = valve.bind({"dead_time": float(np.mean([e.value for e in rises.dead.values()]))})
+        times = {name: tuple(e.value for e in getattr(rises, name)) for name in ("fill", "vent")}
+        chamber = chamber.model_copy(update=times)
+        dead = float(np.mean([e.value for e in rises.dead.values()]))
+        valve = valve.model_copy(update={"dead_time": dead})
     return chamber, damping, valve
 
 
@@ -103,9 +102,7 @@ def _over(
     pressures: tuple[float, ...],
 ) -> tuple[float, ...]:
     """Values of a mode at the supplies, the paper's where a test is missing."""
-    return tuple(
-        found.get((mode, p), float(np.interp(p, pressures, usual))) for p in supplies
-    )
+    return tuple(found.get((mode, p), float(np.interp(p, pressures, usual))) for p in supplies)
 
 
 def _plateaus(rises: Iterable[Rise]) -> dict[tuple[str, float], Estimate]:
@@ -127,9 +124,7 @@ def _compare(effects: tuple[Any, ...], log: Trajectory) -> tuple[float, float]:
 def predict(effects: tuple[Any, ...], log: Trajectory) -> Trajectory:
     """What a piston with `effects` answers to the motion and the valves of a bench log."""
     model = Model(rig_mechanism(), effects, float(log.meta.get("supply", 0.7e6)), "bench")
-    valves = {
-        name: Profile.of(log.time, log[name]) for name in ("valve/extend", "valve/retract")
-    }
+    valves = {name: Profile.of(log.time, log[name]) for name in ("valve/extend", "valve/retract")}
     return drive(model, followed(log), valves, log.time)
 
 

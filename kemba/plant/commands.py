@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from kemba.trajectory import Array
+from kemba.plant.arrays import Array
 
 SAME_TIME = 1e-9  # s; times closer than this are one
 

@@ -8,7 +8,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from kemba.trajectory import Array
+from kemba.plant.arrays import Array
 
 
 class Compiled:
@@ -17,7 +17,9 @@ class Compiled:
     The views are overwritten by the next call.
     """
 
-    def __init__(self, name: str, inputs: Mapping[str, ca.SX], outputs: Mapping[str, ca.SX]) -> None:
+    def __init__(
+        self, name: str, inputs: Mapping[str, ca.SX], outputs: Mapping[str, ca.SX]
+    ) -> None:
         flat = [
             ca.densify(ca.vertcat(*(ca.vec(ca.densify(value)) for value in group.values())))
             for group in (inputs, outputs)
@@ -26,9 +28,11 @@ class Compiled:
         x, y = np.zeros(flat[0].numel()), np.zeros(flat[1].numel())
         self._x = _views(x, {key: value.shape for key, value in inputs.items()})
         self._y = _views(y, {key: value.shape for key, value in outputs.items()})
-        self._buffer, self._call = self.function.buffer()
-        self._buffer.set_arg(0, memoryview(x))
-        self._buffer.set_res(0, memoryview(y))
+        buffer: Any
+        buffer, self._call = self.function.buffer()
+        buffer.set_arg(0, memoryview(x))  # type: ignore[arg-type]
+        buffer.set_res(0, memoryview(y))  # type: ignore[arg-type]
+        self._buffer = buffer  # holds the memory
 
     def __call__(self, **values: Any) -> dict[str, Array]:
         for key, value in values.items():

@@ -11,10 +11,11 @@ import numpy as np
 from kemba.effects.motor import Motor
 from kemba.errors import KembaError
 from kemba.model import Model
+from kemba.plant.arrays import Array
 from kemba.plant.commands import Commands, Feedback, Profile, Sense
 from kemba.plant.replay import Replay, first_row, judge
 from kemba.plant.simulate import STEP, Run, run
-from kemba.trajectory import Array, Trajectory
+from kemba.trajectory import Trajectory
 
 PERIOD = 1e-3  # s; the controller's rate (paper, IV-B)
 
@@ -60,7 +61,8 @@ def execute(
     """Play a controller table (a run folder, `controller.csv`, or its trajectory) on `model`.
 
     The robot starts at rest in the table's first pose, changed by `start`; after the last row the
-    last commands stay for `extra` [s]. `valves` replace the table's. Raises KembaError when the table lacks a column.
+    last commands stay for `extra` [s]. `valves` replace the table's. Raises KembaError when the
+    table lacks a column.
     """
     table = read_controller(controller)
     gains = gains or Gains(*(table.meta.get(k, v) for k, v in vars(Gains()).items()))

@@ -8,11 +8,12 @@ import numpy as np
 
 from kemba.errors import KembaError
 from kemba.model import Model
+from kemba.plant.arrays import Array
 from kemba.plant.commands import SAME_TIME, Commands, Profile
 from kemba.plant.equations import Equations, equations_of
 from kemba.plant.inputs import Inputs, merged
 from kemba.plant.valves import delayed
-from kemba.trajectory import Array, Trajectory
+from kemba.trajectory import Trajectory
 
 Motion = Callable[[Array], tuple[Array, Array]]  # times (m,) -> x [m], v [m/s]
 STEP = 2e-4  # s
@@ -80,9 +81,7 @@ def _given(model: Model, start: Mapping[str, float]) -> Array:
     return np.array([start.get(q.name, q.value) for q in model.states.values()], dtype=float)
 
 
-def _row(
-    eq: Equations, motion: Motion, s: Array, u: Array, sent: Array, time: float
-) -> Array:
+def _row(eq: Equations, motion: Motion, s: Array, u: Array, sent: Array, time: float) -> Array:
     x, v = motion(np.array([time]))
     y = eq.measure(q=x[0], v=v[0], a=0.0, s=s, sd=0.0, lam=0.0, u=u)["y"]
     return np.concatenate([s, sent, y])

@@ -60,12 +60,13 @@ class Forms:
         self.parts = M, F, B, f = _affine(node)
         state = [node.q, node.v, node.s, node.u]
         self.rows = {
-            "W": self.pairs.W, "L": self.pairs.L, "w0": self.pairs.w0, "gap": self.pairs.gap,
+            "W": self.pairs.W,
+            "L": self.pairs.L,
+            "w0": self.pairs.w0,
+            "gap": self.pairs.gap,
         }
         self.smooth = ca.Function("smooth", state, [M, F, B, f])
-        self.stiff = ca.Function(
-            "stiff", state, [ca.jacobian(F, node.v), ca.jacobian(f, node.s)]
-        )
+        self.stiff = ca.Function("stiff", state, [ca.jacobian(F, node.v), ca.jacobian(f, node.s)])
         self.pair_rows = ca.Function("pairs", state, list(self.rows.values()))
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kemba.trajectory import Array
+from kemba.plant.arrays import Array
 
 
 @dataclass(frozen=True)

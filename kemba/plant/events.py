@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import Polynomial
 
+from kemba.plant.arrays import Array
 from kemba.plant.equations import Equations
 from kemba.plant.stepper import State, Stepper
-from kemba.trajectory import Array
 
 CLOSED = 1e-6  # m; a gap below this counts as touching
 MISSED = 1e-8  # m; a touchdown located worse than this is searched again
@@ -72,11 +72,11 @@ class Advance:
         may_hit = (now.gap > reach) & self.eq.pairs.rigid
         through = (new.gap < 0.0) & may_hit
         if not through.any():
-            return new, False
+            return new, bool(((new.gap <= reach) & (new.rate < 0.0) & may_hit).any())
         for _ in range(4):
             length = new.time - now.time
             hits = np.flatnonzero(through)
-            times = [_root(now, new, i, length) for i in hits]
+            times = [_root(now, new, int(i), length) for i in hits]
             first, length = hits[int(np.argmin(times))], max(min(times), 1e-9)
             new = self.stepper.step(now, self.u, length, rows)
             through = (new.gap < -MISSED) & may_hit
@@ -106,7 +106,9 @@ def _root(now: State, new: State, i: int, h: float) -> float:
     """
     gap, rate, end = float(now.gap[i]), float(now.rate[i]), float(new.rate[i])
     slope = (float(new.gap[i]) - gap) / h
-    cubic = Polynomial([gap, rate * h, (3 * slope - 2 * rate - end) * h, (rate + end - 2 * slope) * h])
+    cubic = Polynomial(
+        [gap, rate * h, (3 * slope - 2 * rate - end) * h, (rate + end - 2 * slope) * h]
+    )
     roots = cubic.roots()
     real = roots[np.abs(roots.imag) < 1e-9].real
     inside = real[(real > 0.0) & (real <= 1.5)]

@@ -8,8 +8,8 @@ import numpy as np
 
 from kemba.errors import KembaError, suggest
 from kemba.model import Model
+from kemba.plant.arrays import Array
 from kemba.plant.commands import SAME_TIME, Commands, Feedback, Profile, Sense
-from kemba.trajectory import Array
 
 
 class Inputs:
@@ -39,7 +39,7 @@ class Inputs:
 
     def update(self, time: float, sense: Sense) -> Array:
         """The inputs from `time` [s] on; the controller is asked when its tick has come."""
-        u = self.u.copy()
+        u: Array = self.u.copy()
         for name, profile in self.profiles.items():
             u[self.names.index(name)] = profile(time)
         if self.feedback and time >= self._tick * self.period - SAME_TIME:
@@ -50,7 +50,7 @@ class Inputs:
 
     def sent(self, time: float) -> Array:
         """The inputs as commanded at `time` [s]."""
-        u = self.u.copy()
+        u: Array = self.u.copy()
         for name, profile in self.commanded.items():
             u[self.names.index(name)] = profile(time)
         return u

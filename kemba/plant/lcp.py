@@ -9,20 +9,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from kemba.trajectory import Array
+from kemba.plant.arrays import Array
 
 ROUNDING = 1e-11  # of the terms of a row; a smaller violation is none
 SWAPS = 6  # changes of the active set before Lemke's method takes over
 
 
-class NoSolution(ArithmeticError):
+class NoSolutionError(ArithmeticError):
     """The complementarity problem has no solution that pivoting can reach."""
 
 
 def solve_lcp(A: Array, b: Array, guess: Array) -> tuple[Array, Array]:
     """Solution z (n,) and its active set, starting from the active set `guess` (n,) of booleans.
 
-    Raises NoSolution.
+    Raises NoSolutionError.
     """
     for start in (guess, np.zeros(len(b), dtype=bool)):
         found = _active_set(A, b, start)
@@ -63,7 +63,7 @@ def _active_set(A: Array, b: Array, on: Array) -> tuple[Array, Array] | None:
 
 
 def lemke(A: Array, b: Array) -> Array:
-    """Lemke's complementary pivoting. Raises NoSolution when it ends on a ray."""
+    """Lemke's complementary pivoting. Raises NoSolutionError when it ends on a ray."""
     n = len(b)
     if (b >= 0.0).all():
         return np.zeros(n)
@@ -81,7 +81,7 @@ def lemke(A: Array, b: Array) -> Array:
             return np.maximum(z[n : 2 * n], 0.0)
         entering = leaving + n if leaving < n else leaving - n
         row = _leaving_row(table, entering, basis)
-    raise NoSolution("the contact forces do not settle")
+    raise NoSolutionError("the contact forces do not settle")
 
 
 def _pivot(table: Array, row: int, column: int) -> None:
@@ -96,7 +96,7 @@ def _leaving_row(table: Array, entering: int, basis: Array) -> int:
     column = table[:, entering]
     rows = np.flatnonzero(column > 1e-11 * max(1.0, np.abs(column).max()))
     if not len(rows):
-        raise NoSolution("the contact forces have no solution")
+        raise NoSolutionError("the contact forces have no solution")
     for key in (-1, *range(n)):
         ratio = table[rows, key] / column[rows]
         rows = rows[ratio <= ratio.min() + 1e-12 * (1.0 + abs(ratio.min()))]

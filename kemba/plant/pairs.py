@@ -16,7 +16,7 @@ import casadi as ca
 import numpy as np
 
 from kemba.errors import KembaError
-from kemba.trajectory import Array
+from kemba.plant.arrays import Array
 
 
 @dataclass(frozen=True)
@@ -70,9 +70,7 @@ def read_pairs(node: Any) -> PairTable:
     return _table(node, [rows[i] for i in range(size)])
 
 
-def _split(
-    node: Any, a: ca.SX, b: ca.SX, taken: dict[int, Any], label: str
-) -> tuple[int, ca.SX]:
+def _split(node: Any, a: ca.SX, b: ca.SX, taken: dict[int, Any], label: str) -> tuple[int, ca.SX]:
     for side, other in ((b, a), (a, b)):
         for j in range(node.lam.numel()):
             if j not in taken and ca.is_equal(side, node.lam[j]):
@@ -89,14 +87,12 @@ def _table(node: Any, rows: list[tuple[str, ca.SX]]) -> PairTable:
     base = ca.substitute([w], [node.lam], [ca.SX.zeros(node.lam.numel())])[0]
     moving = ca.vertcat(node.v, node.s, node.u)
     gaps = [
-        i
-        for i in range(len(rows))
-        if _depends(base[i], node.q) and not _depends(base[i], moving)
+        i for i in range(len(rows)) if _depends(base[i], node.q) and not _depends(base[i], moving)
     ]
     rigid = [L[i, :].nnz() == 0 for i in gaps]
     W, w0 = ca.jacobian(base, node.v), base - ca.jtimes(base, node.v, node.v)
-    for i, hard in zip(gaps, rigid, strict=True):
-        if hard:
+    for i, firm in zip(gaps, rigid, strict=True):
+        if firm:
             W[i, :], w0[i] = ca.jacobian(base[i], node.q), 0
     gap = ca.SX(ca.vertcat(*(base[i] for i in gaps))) if gaps else ca.SX.zeros(0, 1)
     instances = [label.rsplit(":", 1)[0] for label in labels]

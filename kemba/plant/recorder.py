@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from kemba.model import Model
+from kemba.plant.arrays import Array
 from kemba.plant.events import Advance
 from kemba.plant.stepper import State
-from kemba.trajectory import Array, Trajectory
+from kemba.trajectory import Trajectory
 
 
 class Recorder:
@@ -43,7 +44,7 @@ class Recorder:
     def trajectory(self) -> Trajectory:
         """All rows as a trajectory; a column named twice is written once."""
         table = np.array(self._rows)
-        columns = {}
+        columns: dict[str, Array] = {}
         for i, quantity in enumerate(self._sources):
             columns.setdefault(quantity.header, table[:, i])
         return Trajectory(np.array(self._times), columns)

@@ -72,9 +72,7 @@ def repeat_run(
     return repeats
 
 
-def _scattered(
-    model: Model, table: Trajectory, rng: np.random.Generator
-) -> dict[str, Profile]:
+def _scattered(model: Model, table: Trajectory, rng: np.random.Generator) -> dict[str, Profile]:
     """The valve commands with every switching moved a little."""
     moved = {}
     for quantity in model.inputs.values():

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from kemba.model import Model
+from kemba.plant.arrays import Array
 from kemba.plant.commands import Commands, Profile
 from kemba.plant.simulate import STEP, Run, run
-from kemba.trajectory import Array, Trajectory
+from kemba.trajectory import Trajectory
 
 ON_GROUND = 1e-3  # m; planned feet below this count as standing
 UPRIGHT = 0.35  # rad; a landing with more pitch has failed

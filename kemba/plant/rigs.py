@@ -9,10 +9,10 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
+from kemba.plant.arrays import Array
 from kemba.plant.commands import Profile
 from kemba.plant.drive import Motion, hermite, locked, stroke
 from kemba.quantity import Param
-from kemba.trajectory import Array
 
 STROKE = 0.07  # m
 Length = Annotated[float, Param("m", lower=0.0, upper=STROKE, doc="rod extension")]
@@ -29,10 +29,10 @@ VALVES: dict[str, tuple[float, float]] = {
 }
 # up to what each mode reaches on its own, m/s
 SPEEDS: dict[Mode, tuple[float, ...]] = {
-    "extend": (0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0),
+    "extend": (0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0, 2.25),
     "retract": (0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0),
     "both": (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8),
-    "none": (0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0),
+    "none": (0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0),
 }
 
 

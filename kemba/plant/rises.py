@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from kemba.errors import KembaError
+from kemba.plant.arrays import Array
 from kemba.plant.estimate import Estimate, linear, mean
-from kemba.trajectory import Array, Trajectory
+from kemba.trajectory import Trajectory
 
 STROKE = 0.07  # m
 STILL = 2e-4  # m; a rod that moves less is locked

@@ -10,7 +10,8 @@ import numpy as np
 
 from kemba.effects import Effect
 from kemba.effects.sensors import CHANNELS, SensorEffect
-from kemba.trajectory import Array, Trajectory
+from kemba.plant.arrays import Array
+from kemba.trajectory import Trajectory
 
 COMMANDS = re.compile(r".*(hip/tau|valve/(extend|retract))")
 CHANNEL = re.compile(
@@ -78,5 +79,6 @@ def _averaged(truth: Trajectory, name: str) -> Array:
     if name not in ("body/ax", "body/az") or len(truth) < 2:
         return truth[name]
     speed = truth[name.replace("/a", "/v")]
-    mean = np.diff(speed) / np.diff(truth.time)
-    return np.r_[mean[0], mean]
+    mean: Array = np.diff(speed, prepend=np.nan) / np.diff(truth.time, prepend=np.nan)
+    mean[0] = mean[1]
+    return mean

@@ -9,6 +9,7 @@ import numpy as np
 
 from kemba.errors import KembaError
 from kemba.model import Model
+from kemba.plant.arrays import Array
 from kemba.plant.commands import SAME_TIME, Commands
 from kemba.plant.equations import equations_of
 from kemba.plant.events import Advance, Impact
@@ -16,7 +17,7 @@ from kemba.plant.inputs import Inputs, merged
 from kemba.plant.recorder import Recorder
 from kemba.plant.start import initial_values
 from kemba.plant.valves import delayed
-from kemba.trajectory import Array, Trajectory
+from kemba.trajectory import Trajectory
 
 STEP, LONGEST = 1e-4, 5e-4  # s
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from kemba.errors import KembaError, suggest
 from kemba.model import Model
-from kemba.trajectory import Array
+from kemba.plant.arrays import Array
 
 PLACE = 1e-12  # m; accuracy of a knee found from its piston
 

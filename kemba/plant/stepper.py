@@ -6,10 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kemba.plant.arrays import Array
 from kemba.plant.equations import Equations
 from kemba.plant.lcp import solve_lcp
-from kemba.trajectory import Array
-
 
 SOFT_REACH = 1e-3  # m; compliant gaps this close take part, whether they push or not
 

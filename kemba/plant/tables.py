@@ -55,8 +55,14 @@ def as_json(found: Characteristics) -> dict[str, Any]:
 
 def rise_rows(found: Characteristics) -> list[tuple[str, ...]]:
     """Table I and the dead times, in ms."""
-    rows = [
-        (name, f"{1e3 * x:.0f} mm", f"{1e3 * e.value:.1f} ms", _interval(e, 1e3), f"{1e3 * paper:.0f}")
+    rows: list[tuple[str, ...]] = [
+        (
+            name,
+            f"{1e3 * x:.0f} mm",
+            f"{1e3 * e.value:.1f} ms",
+            _interval(e, 1e3),
+            f"{1e3 * paper:.0f}",
+        )
         for name, x, e, paper in _rises(found)
     ]
     for name, e in found.rises.dead.items() if found.rises else ():

@@ -60,7 +60,7 @@ def _gather(
         for case in waiting.values()
     }  # fmt: skip
     try:
-        for task in as_completed(tasks, timeout=time_limit):
+        for task in as_completed(tasks, loop=client.loop, timeout=time_limit):
             case = tasks[task]
             record = _record(task)
             if record["status"] != "lost" and not case.path(folder).is_file():

@@ -26,7 +26,7 @@ nodes: many
 start:
   rest: true
 goals:
-  apex: {quantity: body/z, at: top, equals: height}
+  apex: {quantity: body/z, at: midle, equals: height}
 solver: {time_limt: 3 s}
 method: penlty
 """
@@ -41,8 +41,8 @@ mine.yaml:3:1: hieght: unknown key; did you mean 'height'?
 mine.yaml:4:1: nodes: 'many' is of the wrong kind; a whole number was expected
     nodes: many
     ^
-mine.yaml:8:28: goals.apex.at: 'top' is not allowed; did you mean 'start'?
-      apex: {quantity: body/z, at: top, equals: height}
+mine.yaml:8:28: goals.apex.at: 'midle' is not allowed; did you mean 'middle'?
+      apex: {quantity: body/z, at: midle, equals: height}
                                ^
 mine.yaml:9:10: solver.time_limt: unknown key; did you mean 'time_limit'?
     solver: {time_limt: 3 s}
@@ -92,9 +92,9 @@ mine.yaml:10:3: bounds.front/piston/x: asks for nothing; 'equals', 'at_least' or
 expected
       front/piston/x: {}
       ^
-mine.yaml:12:3: goals.apex: unknown quantity 'body/zz'; did you mean 'body/z'?
+mine.yaml:12:10: goals.apex.quantity: unknown quantity 'body/zz'; did you mean 'body/z'?
       apex: {quantity: body/zz, at: middle, equals: 0.4 m}
-      ^
+             ^
 mine.yaml:14:3: cost: unknown cost 'torque_sqared'; did you mean 'torque_squared'?
       torque_sqared: 1
       ^
@@ -135,6 +135,13 @@ def test_all_mistakes_of_a_task_are_told_at_once(text: str, told: str) -> None:
     assert not Path("runs").exists()
 
 
+def test_check_tells_the_same_mistakes() -> None:
+    Path("mine.yaml").write_text(BAD_NAMES)
+    done = CliRunner().invoke(app, ["check", "mine.yaml", "jump.yaml"])
+    assert (done.exit_code, done.stderr) == (2, BAD_NAMES_TOLD)
+    assert done.stdout == "jump.yaml: good: one of the tasks\n"
+
+
 @pytest.mark.parametrize(
     ("option", "told"),
     [
@@ -143,11 +150,11 @@ def test_all_mistakes_of_a_task_are_told_at_once(text: str, told: str) -> None:
         ("height=2 kg", "height: '2 kg' is a mass; a length such as '0.5 m' was expected"),
         ("supply=9 bar", "supply: '9 bar' is out of range; 600000 to 800000 Pa was expected"),
         ("goals.apx.equals=1", "goals.apx.quantity: missing"),
-        ("cost.torqe=1", "cost: unknown cost 'torqe'; did you mean 'torque_squared'?"),
+        ("cost.torque=1", "cost: unknown cost 'torque'; did you mean 'torque_squared'?"),
         ("solver.options.tool=1", "solver.options: unknown option 'tool'; did you mean 'tol'?"),
         (
             "goals.apex.quantity=body/y",
-            "goals.apex: unknown quantity 'body/y'; did you mean 'body/z'?",
+            "goals.apex.quantity: unknown quantity 'body/y'; did you mean 'body/z'?",
         ),
     ],
 )

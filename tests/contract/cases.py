@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from functools import cache
 from typing import Any
 
 import casadi as ca
@@ -45,6 +46,21 @@ def model_of(*effects: Effect, rig: bool = False) -> Model:
         spec = spec.model_copy(update={"chambers": "orifice"})
     model = build_model(spec, rig=rig)
     return model.with_effects(effects)
+
+
+@cache
+def placed(kind: str, rig: bool = False) -> tuple[Effect, Model]:
+    """The example of a kind, and the model that it stands in."""
+    effect = example(kind)
+    return effect, model_of(effect, rig=rig)
+
+
+@cache
+def with_slopes(kind: str, rig: bool = False) -> tuple[ca.Function, list[Any]]:
+    """The `slopes` of that model by the effect's parameters, and their values."""
+    effect, model = placed(kind, rig)
+    names = list(effect.parameters())
+    return slopes(model, [f"{effect.name}.{n}" for n in names]), [effect.value(n) for n in names]
 
 
 def without(model: Model, name: str) -> Model:

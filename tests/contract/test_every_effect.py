@@ -13,9 +13,10 @@ from contract.cases import (
     KINDS,
     example,
     model_of,
+    placed,
     points,
-    slopes,
     values_of,
+    with_slopes,
     without,
 )
 
@@ -26,11 +27,21 @@ from kemba.model.spec import ModelSpec
 from kemba.ocp.mirror import find_symmetry
 from kemba.quantity import is_si
 
-pytestmark = pytest.mark.parametrize("kind", KINDS)
 
-LOPSIDED = {"com_offset", "expression"}  # a mirror image of theirs is another value
+def of(*kinds: str) -> pytest.MarkDecorator:
+    """The test for these kinds."""
+    return pytest.mark.parametrize("kind", kinds)
 
 
+EVERY = of(*KINDS)
+SWITCHED = of(*(k for k in KINDS if BY_KIND[k].off))
+ON_ONE_LEG = of(*(k for k in KINDS if BY_KIND[k].off and BY_KIND[k].place == "leg"))
+DISSIPATIVE = of(*(k for k in KINDS if BY_KIND[k].dissipative))
+BENCH = [k for k in KINDS if set(example(k).ports) <= {"piston"} and k != "end_stop"]
+LOPSIDED = {"com_offset"}  # a mirror image of theirs is another value
+
+
+@EVERY
 def test_is_documented(kind: str) -> None:
     effect = BY_KIND[kind]
     assert effect.__doc__ and effect.__doc__ != effect.__base__.__doc__
@@ -43,6 +54,7 @@ def test_is_documented(kind: str) -> None:
             assert is_si(quantity.unit) and quantity.doc, f"{kind}: {quantity.name}"
 
 
+@EVERY
 def test_off_value_is_admissible(kind: str) -> None:
     effect = BY_KIND[kind]
     assert set(effect.off) <= set(effect.declared())
@@ -54,6 +66,7 @@ def test_off_value_is_admissible(kind: str) -> None:
     assert set(example(kind).shapes()).isdisjoint(effect.off)
 
 
+@EVERY
 def test_yaml_round_trip(kind: str, tmp_path: Path) -> None:
     effect = example(kind)
     dump_yaml({"effects": [effect.listed()]}, tmp_path / "model.yaml")
@@ -61,28 +74,23 @@ def test_yaml_round_trip(kind: str, tmp_path: Path) -> None:
     json.dumps(effect.listed())
 
 
+@EVERY
 def test_schema_names_units(kind: str) -> None:
     schema = json.dumps(BY_KIND[kind].model_json_schema())
     for param in BY_KIND[kind].declared().values():
         assert f'"unit": "{param.unit}"' in schema
 
 
-@pytest.mark.parametrize("rig", [False, True], ids=["robot", "rig"])
+@pytest.mark.parametrize("kind, rig", [*((k, False) for k in KINDS), *((k, True) for k in BENCH)])
 def test_residual_and_gradient_are_finite(kind: str, rig: bool) -> None:
-    effect = example(kind)
-    if rig and not set(effect.ports) <= {"piston"}:
-        pytest.skip("not on the bench")
-    if rig and kind == "end_stop":
-        pytest.skip("the bench imposes the motion")
-    model = model_of(effect, rig=rig)
-    free = [f"{effect.name}.{name}" for name in effect.parameters()]
-    p = [effect.value(name) for name in effect.parameters()]
-    both = slopes(model, free)
+    _, model = placed(kind, rig)
+    both, p = with_slopes(kind, rig)
     for point in points(model):
         for name, value in both(**point, p=p).items():
             assert np.isfinite(np.asarray(value)).all(), f"{kind}: {name} at {point}"
 
 
+@EVERY
 def test_every_parameter_matters(kind: str) -> None:
     effect = example(kind)
     if isinstance(effect, SensorEffect):
@@ -95,20 +103,17 @@ def test_every_parameter_matters(kind: str) -> None:
             later = effect.bind({name: effect.value(name) + 0.001})
             assert later.timing() != effect.timing()
         return
-    model = model_of(effect)
-    free = [f"{effect.name}.{name}" for name in effect.parameters()]
-    p = [effect.value(name) for name in effect.parameters()]
-    both = slopes(model, free)
+    _, model = placed(kind)
+    both, p = with_slopes(kind)
     slope = sum(np.abs(np.asarray(both(**point, p=p)["dp"])) for point in points(model, 12))
     for i, name in enumerate(effect.parameters()):
         bounds = effect.bind({name: 1.1 * effect.value(name)}).inputs() != effect.inputs()
         assert bounds or slope[:, i].max() > 1e-9, f"{kind}.{name} changes nothing"
 
 
+@SWITCHED
 def test_off_is_absent(kind: str) -> None:
     effect = BY_KIND[kind]
-    if not effect.off:
-        pytest.skip("part of the planning model")
     off = example(kind).bind(effect.off)
     model = model_of(off)
     base = without(model, off.name)
@@ -148,11 +153,9 @@ def settled(model, point, kept):
     return s
 
 
+@DISSIPATIVE
 def test_dissipative_ones_dissipate(kind: str) -> None:
-    effect = example(kind)
-    if not effect.dissipative:
-        pytest.skip("may store or feed energy")
-    model = model_of(effect)
+    effect, model = placed(kind)
     base = without(model, effect.name)
     lost = []
     for point in points(model, 12):
@@ -162,24 +165,24 @@ def test_dissipative_ones_dissipate(kind: str) -> None:
     assert max(lost) > 1e-6
 
 
+@EVERY
 def test_order_of_the_list_does_not_matter(kind: str) -> None:
-    effect = example(kind)
-    model = model_of(effect)
+    _, model = placed(kind)
     turned = type(model)(model.mechanism, model.effects[::-1], model.supply)
     for point in points(model, 2):
         for part, value in values_of(model, point).items():
             np.testing.assert_allclose(values_of(turned, point)[part], value, rtol=1e-12)
 
 
+@EVERY
 def test_keeps_the_mirror(kind: str) -> None:
-    symmetric = find_symmetry(model_of(example(kind))) is not None
-    assert symmetric == (kind not in LOPSIDED) or kind == "expression"
+    _, model = placed(kind)
+    assert (find_symmetry(model) is not None) == (kind not in LOPSIDED)
 
 
+@ON_ONE_LEG
 def test_one_leg_only(kind: str) -> None:
     effect = BY_KIND[kind]
-    if effect.place == "body" or not effect.off:
-        pytest.skip("of the whole robot, or part of the planning model on both legs")
     one = example(kind).model_copy(update={"on": "rear"})
     assert one.name == f"{kind}:rear"
     model = model_of(one)

@@ -30,7 +30,9 @@ def test_slope_and_curvature_agree_with_finite_differences() -> None:
     for bend in np.linspace(0.8, 2.4, 9):
         before, after = maps(bend - step, 1.0), maps(bend + step, 1.0)
         _, slope_here, turning = maps(bend, 1.0)
-        assert float(slope_here) == pytest.approx(float(after[0] - before[0]) / (2 * step), rel=1e-6)
+        assert float(slope_here) == pytest.approx(
+            float(after[0] - before[0]) / (2 * step), rel=1e-6
+        )
         assert float(turning) == pytest.approx(float(after[1] - before[1]) / (2 * step), rel=1e-6)
 
 

@@ -60,9 +60,11 @@ def test_rows_know_where_they_come_from(planning: Model) -> None:
         "rate:front/chamber/retract/F",
     ]
     pairs = [a.label for a, _ in node.pair_rows]
-    assert pairs[:4] == [f"front/contact:{n}" for n in ("gap", "cone", "slip forward", "slip backward")]
+    assert pairs[:4] == [
+        f"front/contact:{n}" for n in ("gap", "cone", "slip forward", "slip backward")
+    ]
     assert "rear/end_stop:extended" in pairs and len(pairs) == 12
-    assert [r.label for r in node.limit_rows][0] == "front/motor:speed_forward"
+    assert node.limit_rows[0].label == "front/motor:speed_forward"
     sizes = {"dynamics": "dynamics", "rate": "rate", "pair_a": "pair", "limits": "limit"}
     for part, rows in sizes.items():
         assert getattr(node, part).numel() == len(getattr(node, f"{rows}_rows"))
@@ -105,7 +107,9 @@ def test_a_value_that_nobody_provides() -> None:
 def test_a_signal_that_nobody_reads() -> None:
     with pytest.raises(KembaError) as error:
         _ = Model(rig_mechanism(), [Valve(), SupplyScale(k=1.1)]).node
-    assert "changes the signal 'supply_gain', which no effect of this model reads" in str(error.value)
+    assert "changes the signal 'supply_gain', which no effect of this model reads" in str(
+        error.value
+    )
 
 
 class Loose(Effect):
@@ -165,7 +169,9 @@ def test_payload_is_mass_at_the_body(planning: Model) -> None:
     n = planning.mechanism.n
     a = np.array([1.0, 2.0] + [0.0] * (n - 2))
     zeros = {name: np.zeros(getattr(planning.node, name).numel()) for name in planning.node.NAMES}
-    zeros["q"] = np.array([planning.mechanism.standing[c.name] for c in planning.mechanism.coordinates])
+    zeros["q"] = np.array(
+        [planning.mechanism.standing[c.name] for c in planning.mechanism.coordinates]
+    )
     more = loaded.node.residual(**{**zeros, "a": a})["dynamics"]
     less = planning.node.residual(**{**zeros, "a": a})["dynamics"]
     expected = [0.5 * 1.0, 0.5 * (2.0 + 9.81)] + [0.0] * (n - 2)

@@ -115,6 +115,6 @@ def test_a_guess_is_within_bounds(name: str) -> None:
     model = load_model(task.model)
     t = Transcription(model, task, resolve(task, model, document), whole(model.node), 20)
     Y = guess(t)
-    assert np.all(Y >= t.layout.lower) and np.all(Y <= t.layout.upper)
+    assert np.array_equal(Y, np.clip(Y, t.layout.lower, t.layout.upper))
     z = t.layout.full(Y, "q")[:, 1]
     assert bool(z.max() > 0.4) == (name == "automatic")

@@ -93,7 +93,9 @@ def test_impulse_balances_weight(shipped: Solved) -> None:
     momentum = ca.Function("momentum", [node.q, node.v], [vertical])
     x = arrays(shipped.model, plan)
     gained = float(momentum(x["q"][-1], x["v"][-1]) - momentum(x["q"][0], x["v"][0]))
-    assert impulse - gained == pytest.approx(weight * plan.time[-1], rel=0.07 if shipped.task.name == "max_jump" else 0.02)
+    assert impulse - gained == pytest.approx(
+        weight * plan.time[-1], rel=0.07 if shipped.task.name == "max_jump" else 0.02
+    )
 
 
 def test_jump_is_a_jump() -> None:

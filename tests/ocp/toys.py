@@ -97,8 +97,10 @@ def solve(
     model = Model(mechanism, effects)
     wishes = resolve(wanted, model, document)
     program = Transcription(model, wanted, wishes, whole(model.node), wanted.nodes)
-    ends = {c.name: float(wanted.end[c.name].equals or 0.0) if c.name in wanted.end else start[c.name]
-            for c in mechanism.coordinates}
+    ends = {
+        c.name: float(wanted.end[c.name].equals or 0.0) if c.name in wanted.end else start[c.name]
+        for c in mechanism.coordinates
+    }
     ramp = np.linspace(0.0, 1.0, wanted.nodes + 1)
     q = np.array([start[n] + (ends[n] - start[n]) * ramp for n in ends]).T
     groups = {

@@ -34,9 +34,7 @@ def flight() -> tuple[np.ndarray, np.ndarray]:
     q = np.array([model.mechanism.standing[c.name] for c in model.mechanism.coordinates])
     q += np.array([0.1, 0.5, 0.2, 0.1, -0.3, -0.6, 0.8])
     v = np.array([0.7, 2.0, 1.5, -2.0, 1.0, -3.0, 2.0])
-    found = solve_ivp(
-        rate, (0.0, TIMES[-1]), [*q, *v], "DOP853", TIMES, rtol=1e-11, atol=1e-12
-    )
+    found = solve_ivp(rate, (0.0, TIMES[-1]), [*q, *v], "DOP853", TIMES, rtol=1e-11, atol=1e-12)
     assert found.success
     return found.y[:n].T, found.y[n:].T
 

@@ -14,7 +14,7 @@ from kemba.plant.drive import stroke
 from kemba.plant.rigs import STROKE, DynamometerRig, LockedRig, RandomRig, Rig
 from kemba.trajectory import Trajectory
 
-SPEEDS = {mode: (0.2, 0.5, 0.8) for mode in ("extend", "retract", "both", "none")}
+SPEEDS = dict.fromkeys(("extend", "retract", "both", "none"), (0.2, 0.5, 0.8))
 
 
 @cache

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from plant.scripts import drop, jump, planning
 
 from kemba.effects.ground import GroundCompliance, GroundFriction
 from kemba.plant import simulate
@@ -12,7 +13,6 @@ from kemba.plant.events import CLOSED, Advance
 from kemba.plant.replay import peak
 from kemba.plant.start import initial_values
 from kemba.trajectory import Trajectory
-from tests.plant.scripts import drop, jump, planning
 
 LEGS = ("front", "rear")
 WEIGHT = planning().mechanism.weight + 2.699 * 9.81 * 1.149 / 2.493  # N, with the boom's

@@ -4,6 +4,7 @@ import casadi as ca
 import numpy as np
 import pinocchio as pin
 import pytest
+from plant.scripts import AIRBORNE, planning
 
 from kemba.effects.boom import Boom
 from kemba.mechanism import load_robot, robot_mechanism
@@ -13,7 +14,6 @@ from kemba.model import Model
 from kemba.plant import Commands, Profile, run, simulate
 from kemba.plant.equations import equations_of
 from kemba.trajectory import Trajectory
-from tests.plant.scripts import AIRBORNE, planning
 
 
 def states(model: Model, t: Trajectory) -> tuple[np.ndarray, np.ndarray]:

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from kemba.plant.lcp import NoSolution, lemke, solve_lcp
+from kemba.plant.lcp import NoSolutionError, lemke, solve_lcp
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -53,5 +53,5 @@ def test_contact_with_friction_is_always_solved(seed: int, mu: float) -> None:
 
 
 def test_a_problem_without_solution_says_so() -> None:
-    with pytest.raises(NoSolution):
+    with pytest.raises(NoSolutionError):
         solve_lcp(np.array([[-1.0]]), np.array([-1.0]), np.array([False]))

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
+from plant.scripts import jump, planning
 
 from kemba.effects.motor import Motor
 from kemba.plant import Gains, Profile, execute, replay, run
 from kemba.plant.commands import Commands
 from kemba.plant.controller import saturated
 from kemba.trajectory import Trajectory
-from tests.plant.scripts import jump, planning
 
 
 def planned() -> tuple[Trajectory, Trajectory]:

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from plant.scripts import jump
 
 from kemba.effects.sensors import SensorBias, SensorDelay
 from kemba.plant.sensors import Sensors, take_log
 from kemba.trajectory import Trajectory
-from tests.plant.scripts import jump
 
 
 def truth() -> Trajectory:

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from plant.scripts import jump, planning
 
 from kemba.errors import KembaError
 from kemba.model import load_model
 from kemba.plant import Commands, Profile, simulate
-from tests.plant.scripts import jump, planning
 
 
 def test_the_same_again() -> None:

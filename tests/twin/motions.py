@@ -245,15 +245,27 @@ def sway(rng, duration=1.6, rate=1000.0, jitter=0.0) -> Script:
 
 
 def sane(truth: Truth) -> bool:
-    """A run worth logging: nothing blew up, no knee or belly on the floor, not tipped over."""
-    if not truth.finite:
-        return False
-    return bool(
-        knees(truth.q)[:, :, 1].min() > 0.02
-        and np.abs(truth.y[:, 2]).max() < 0.6
-        and np.abs(truth.y[:, 3:5]).max() < 2.2
-        and truth.y[:, 1].min() > 0.1
+    """A run worth logging from end to end."""
+    return truth.finite and bool(_standing(truth).all())
+
+
+def _standing(truth: Truth) -> np.ndarray:
+    """Per record: no knee or belly on the floor, not tipped over, hips within reason."""
+    return (
+        (knees(truth.q)[:, :, 1].min(axis=1) > 0.02)
+        & (np.abs(truth.y[:, 2]) < 0.6)
+        & (np.abs(truth.y[:, 3:5]).max(axis=1) < 2.2)
+        & (truth.y[:, 1] > 0.1)
     )
+
+
+def upright(truth: Truth) -> Truth:
+    """The run as far as it is worth logging (the whole of it, mostly)."""
+    good = _standing(truth) & np.isfinite(truth.y).all(axis=1)
+    if truth.finite and good.all():
+        return truth
+    records = int(np.argmin(good)) if not good.all() else len(good)
+    return truth.until(max(records // truth.split - 20, 1))
 
 
 MOTIONS = {

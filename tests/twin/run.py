@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -40,6 +40,14 @@ class Truth:
         return len(self.times) == (len(self.ticks) - 1) * self.split + 1 and bool(
             np.isfinite(self.y).all()
         )
+
+    def until(self, tick: int) -> Truth:
+        """The same run, ended at control tick number `tick`."""
+        cut = {f: getattr(self, f)[: tick + 1] for f in ("ticks", "command", "sent")}
+        records = tick * self.split + 1
+        for name in ("times", "q", "v", "y", "w", "air", "supply", "rod", "foot", "acted"):
+            cut[name] = getattr(self, name)[:records]
+        return replace(self, **cut)
 
 
 def initial_state(start, physical: bool) -> np.ndarray:

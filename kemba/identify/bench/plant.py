@@ -17,7 +17,7 @@ from kemba.identify.problem import Array
 from kemba.model.model import Model
 
 LONGEST_STEP = 1.5e-3  # s; the fastest chamber answers in 8 ms
-CHUNK = 1024  # steps per call of a compiled map
+CHUNK = 512  # steps per call of a compiled map
 BLUR = 0.75e-3  # s; no log says on which side of a switching instant its sample was taken
 
 Pulses = tuple[list[tuple[float, float]], list[tuple[float, float]]]  # of both valves
@@ -161,11 +161,10 @@ def _breakpoints(samples: Array, events: Array) -> tuple[Array, Any]:
     Their number depends on the number of events only, so that compiled maps are reused.
     """
     inside = np.clip(events, samples[0], samples[-1])
-    pieces = np.maximum(np.ceil(np.diff(samples) / LONGEST_STEP - 1e-6).astype(int), 1)
+    pieces = np.ceil(np.diff(samples) / LONGEST_STEP - 1e-6).astype(int)
     fill = [
-        np.linspace(a, b, k + 1)[1:-1]
-        for a, b, k in zip(samples[:-1], samples[1:], pieces, strict=True)
-        if k > 1
+        np.linspace(samples[i], samples[i + 1], pieces[i] + 1)[1:-1]
+        for i in np.flatnonzero(pieces > 1)
     ]
     times = np.concatenate([samples, inside, *fill])
     order = np.argsort(times, kind="stable")

@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.ndimage import binary_dilation, binary_erosion
+from scipy.ndimage import binary_dilation, binary_erosion, uniform_filter1d
 from scipy.signal import savgol_filter
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Flags = np.ndarray[Any, np.dtype[np.bool_]]
 
-NEAR_GROUND = 2.0e-3  # m above the level on which feet rest
-NEAR_STOP = 0.4e-3  # m from the level at which pistons rest
-BLUR = 0.004  # s by which contact is thought to begin earlier and end later
+# A piston that reads half a millimetre wrong lifts the foot by three, a late encoder by nine: a
+# foot this near may touch, which costs a few milliseconds of known flight.
+MAY_TOUCH = 9.0e-3  # m
+STANDS = 2.5e-3  # m above the level on which feet rest: may be standing
+TOUCHES = 1.5e-3  # m above the level on which feet rest: for naming the phase only
+NEAR_STOP = 0.6e-3  # m from the furthest reading near an end of the stroke
+STOP_SEARCH = 2.5e-3  # m from an end of the stroke in which a reading may mean the stop
+BLUR, STRIKE, IMPACT = 0.003, 0.025, 0.005  # s: around contact; in which it strikes; of an impact
 SETTLED = 0.010  # s within contact before a foot's height is trusted
 SLOW_FOOT, SLIDING, SLOW_BODY, SLOW_PISTON = 0.15, 0.06, 0.05, 0.02  # m.s-1
+LEAST_LOAD = 6.0  # N: a foot that carries less is not known to stand
 RATE_WINDOW = 0.02  # s
 
 
@@ -50,39 +56,50 @@ def read_schedule(
     feet_rate, piston_rate = slope(feet, dt), slope(pistons, dt)
     speed = np.abs(slope(body, dt)).max(axis=1)
     blur, settle = max(1, round(BLUR / dt)), max(1, round(SETTLED / dt))
-    legs = range(feet.shape[1])
-    touch, settled, struck, slides, low, high, rests = ([] for _ in range(7))
-    for i in legs:
+    legs: list[tuple[Array, ...]] = []
+    for i in range(feet.shape[1]):
         z, vx, vz = feet[:, i, 1], feet_rate[:, i, 0], feet_rate[:, i, 1]
-        raw = z < ground_level(z, vz) + NEAR_GROUND
-        may = _dilate(raw, blur)
-        begin = may & ~np.append(True, may[:-1])
-        inner = _erode(raw, settle) & (np.abs(vz) < SLOW_FOOT)
-        touch.append(may)
-        struck.append(np.convolve(begin, np.ones(3 * blur), mode="full")[: len(z)] > 0)
-        settled.append(inner)
-        slides.append(np.where(inner & (np.abs(vx) > SLIDING), np.sign(vx), 0.0))
+        level = ground_level(z, vz)
+        near, touches = z < level + MAY_TOUCH, z < level + TOUCHES
+        may = _dilate(near, blur)
+        inner = _erode(z < level + STANDS, settle) & (np.abs(vz) < SLOW_FOOT)
+        slides = np.where(inner & (np.abs(vx) > SLIDING), np.sign(vx), 0.0)
         bottom, top = stop_levels(pistons[:, i], stroke)
         at_low, at_high = pistons[:, i] < bottom + NEAR_STOP, pistons[:, i] > top - NEAR_STOP
-        still = np.abs(piston_rate[:, i]) < SLOW_PISTON
-        rests.append(_erode(at_low | at_high, 2 * blur) & still)
-        low.append(_dilate(at_low, 2))
-        high.append(_dilate(at_high, 2))
-    may, hit = np.stack(touch, 1), np.stack(struck, 1)
-    count = may.sum(axis=1)
+        rests = _erode(at_low | at_high, 3 * blur) & (np.abs(piston_rate[:, i]) < SLOW_PISTON)
+        legs.append(
+            (
+                may,
+                inner,
+                _after(may, STRIKE / dt),
+                slides,
+                _dilate(at_low, 2),
+                _dilate(at_high, 2),
+                rests,
+                touches,
+                _dilate(_after(touches, 1), round(IMPACT / dt)),
+            )
+        )
+    *parts, touches, impact = (np.stack(part, axis=1) for part in zip(*legs, strict=True))
+    may, settled, struck, slides, low, high, rests = parts
+    count = touches.sum(axis=1)
     phase = np.array(["flight", "stance1", "stance2"], dtype=object)[np.minimum(count, 2)]
-    phase[(count == may.shape[1]) & (speed < SLOW_BODY)] = "rest"
-    phase[hit.any(axis=1)] = "impact"
-    return Schedule(
-        may,
-        np.stack(settled, 1),
-        hit,
-        np.stack(slides, 1),
-        np.stack(low, 1),
-        np.stack(high, 1),
-        phase,
-        np.stack(rests, 1),
-    )
+    phase[(count == feet.shape[1]) & (speed < SLOW_BODY)] = "rest"
+    phase[impact.any(axis=1)] = "impact"
+    return Schedule(may, settled, struck, slides, low, high, phase, rests)
+
+
+def _after(flags: Flags, steps: float) -> Flags:
+    """So many steps from where each stretch of `flags` begins."""
+    begin = flags & ~np.append(True, flags[:-1])
+    return np.asarray(np.convolve(begin, np.ones(max(1, round(steps))))[: len(flags)] > 0)
+
+
+def loaded(schedule: Schedule, normal: Array, dt: float) -> Schedule:
+    """The same with only those feet settled that carry a load: `normal` (n, legs) in N."""
+    width = max(3, round(RATE_WINDOW / dt))
+    carries = uniform_filter1d(normal, width, axis=0) > LEAST_LOAD
+    return replace(schedule, settled=schedule.settled & carries, slides=schedule.slides * carries)
 
 
 def slope(values: Array, dt: float) -> Array:
@@ -92,20 +109,18 @@ def slope(values: Array, dt: float) -> Array:
 
 
 def ground_level(z: Array, rate: Array) -> float:
-    """Height at which a foot rests: sensors may be off by a millimetre or two."""
-    resting = z[(z < 0.006) & (z > -0.006) & (np.abs(rate) < 0.03)]
-    return float(np.clip(np.median(resting), -0.004, 0.004)) if len(resting) > 20 else 0.0
+    """Height at which a foot rests: sensors may be off by a few millimetres."""
+    resting = z[(np.abs(z) < MAY_TOUCH) & (np.abs(rate) < 0.03)]
+    return float(np.clip(np.median(resting), -4e-3, 4e-3)) if len(resting) > 20 else 0.0
 
 
 def stop_levels(x: Array, stroke: float) -> tuple[float, float]:
-    """Readings at the two stops, as far as the piston ever rests there."""
-    levels = []
-    for end, sign in ((0.0, 1.0), (stroke, -1.0)):
-        from_end = sign * (x - end)
-        resting = from_end[np.abs(from_end) < 0.0025]
-        level = float(np.quantile(resting, 0.1)) if len(resting) > 20 else 0.0
-        levels.append(end + sign * min(level, 0.0015))
-    return levels[0], levels[1]
+    """Readings at the two stops: the furthest ones, where these are near an end at all."""
+    ordered = np.sort(x)
+    few = min(4, len(x) - 1)
+    low, high = float(ordered[few]), float(ordered[-1 - few])
+    low = low if abs(low) < STOP_SEARCH else 0.0
+    return low, high if abs(high - stroke) < STOP_SEARCH else stroke
 
 
 def _dilate(flags: Flags, steps: int) -> Flags:

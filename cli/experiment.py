@@ -1,0 +1,32 @@
+"""`kemba-opt experiment`: the next test that separates the rivals of an answer."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from kemba_cli.common import Json, Quiet, print_json, say
+
+
+def experiment(
+    answer: Annotated[Path, typer.Argument(help="Folder written by discover.")],
+    out: Annotated[Path | None, typer.Option(help="Rig YAML to write.")] = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Write the rig test that best tells the rivals of an answer apart.
+
+    Example: kemba-opt experiment answer --out next.yaml
+    """
+    from kemba.identify.experiment import propose
+
+    path = out or answer / "experiment.yaml"
+    found = propose(answer, path)
+    if json:
+        facts = {"nats": found.nats, "rivals": found.rivals, "sentence": found.sentence}
+        print_json({"experiment": str(path), "rig": found.rig.name, **facts})
+        return
+    typer.echo(path)
+    say(found.sentence, quiet)

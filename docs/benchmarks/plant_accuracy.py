@@ -1,0 +1,75 @@
+"""How exact and how fast the plant is: step halving, penetration, energy, time per second.
+
+    python docs/benchmarks/plant_accuracy.py
+
+A push with both extend valves, the rear one 4 ms longer, the flight after it and the landing, with
+the feet kept under the hips; first on the planning model, then on the full plant. Prints one row per step size.
+"""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from kemba.model import Model, load_model
+from kemba.plant import Commands, Profile, Run, run
+from kemba.plant.commands import Sense
+from kemba.plant.replay import peak
+from kemba.trajectory import Trajectory
+
+LEGS = ("front", "rear")
+FEMUR, TIBIA = 0.242, 0.234  # m
+STEPS = (4e-4, 2e-4, 1e-4, 5e-5, 2.5e-5)
+
+
+def under_the_hips(time: float, sense: Sense) -> dict[str, float]:
+    """Hip torques [N.m] that keep each foot under its hip and the body level."""
+    torques = {}
+    for leg, fold in (("front", 1.0), ("rear", -1.0)):
+        bend = fold * sense[f"{leg}/knee/q"]
+        wanted = -fold * np.arctan2(TIBIA * np.sin(bend), FEMUR + TIBIA * np.cos(bend))
+        torque = 150.0 * (wanted - sense[f"{leg}/hip/q"]) - 3.0 * sense[f"{leg}/hip/w"]
+        torque += 30.0 * sense["body/pitch"] + sense["body/pitch_rate"]
+        torques[f"{leg}/hip/tau"] = float(np.clip(torque, -24.8, 24.8))
+    return torques
+
+
+def push(model: Model, step: float) -> Run:
+    valves = {
+        "front/valve/extend": Profile.pulses((0.02, 0.20), (0.45, 0.70)),
+        "rear/valve/extend": Profile.pulses((0.02, 0.204), (0.45, 0.70)),
+    }
+    return run(model, {}, Commands(valves, under_the_hips), 0.7, step)
+
+
+def deepest(t: Trajectory) -> float:
+    """The largest penetration of a foot or a piston [m]."""
+    past = [-t[f"{leg}/foot/z"].min() for leg in LEGS] + [-t[f"{leg}/piston/x"].min() for leg in LEGS]
+    return float(max(0.0, *past, *(t[f"{leg}/piston/x"].max() - 0.07 for leg in LEGS)))
+
+
+def report(name: str) -> None:
+    model = load_model(name)
+    push(model, STEPS[0])  # compile
+    rows = []
+    for step in STEPS:
+        begin = time.process_time()
+        done = push(model, step)
+        spent = time.process_time() - begin
+        t = done.trajectory
+        rows.append((step, peak(t.time, t["body/z"])[1], t["body/z"][-1], deepest(t), done, spent))
+    print(f"\n{name}: apex {rows[-1][1]:.6f} m")
+    print("step us | apex error mm | end error mm | penetration um | impacts | energy lost J | s/s")
+    for step, apex, end, depth, done, spent in rows:
+        lost = [impact.lost for impact in done.impacts]
+        print(
+            f"{1e6 * step:7.0f} | {1e3 * (apex - rows[-1][1]):13.5f} | "
+            f"{1e3 * (end - rows[-1][2]):12.5f} | {1e6 * depth:14.5f} | {len(lost):7d} | "
+            f"{np.sum(lost):8.3f} (least {min(lost, default=0.0):.1e}) | {spent / 0.7:.2f}"
+        )
+
+
+if __name__ == "__main__":
+    for plant in ("planning", "plant"):
+        report(plant)

@@ -1,0 +1,137 @@
+"""The next test: which of a menu of rig tests would tell the remaining rivals apart."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kemba.config import dump_yaml
+from kemba.errors import KembaError
+from kemba.files import read_json
+from kemba.identify.bench.problem import BenchProblem
+from kemba.identify.bench.run import prepare
+from kemba.identify.linear import linearise, time_blocks
+from kemba.identify.problem import Array
+from kemba.model.spec import load_model
+from kemba.plant.rigs import DynamometerRig, LockedRig, RandomRig, Rig
+from kemba.trajectory import Trajectory
+
+SLOW = (0.01, 0.02, 0.05)  # m.s-1
+NOISE = 1.0  # N, of a usual transducer
+LONGEST = 12  # tests of one rig that are simulated to judge it
+CLEAR = 5.0  # nats that settle a question
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A rig, and how many nats it is expected to put between the rivals that are hardest to tell."""
+
+    rig: Rig
+    nats: float
+    rivals: tuple[str, str]
+
+    @property
+    def sentence(self) -> str:
+        first, second = self.rivals
+        if self.nats < CLEAR:
+            return (
+                f"No test of the menu separates {first} from {second}; "
+                f"the best, {self.rig.name}, would gain {self.nats:.1f} nats."
+            )
+        return f"The test '{self.rig.name}' separates {first} from {second} ({self.nats:.0f} nats)."
+
+
+def menu() -> list[Rig]:
+    """Standard tests of one piston."""
+    modes = ("extend", "retract", "both", "none")
+    slow = DynamometerRig.model_validate(
+        {"name": "slow_stroke", "speeds": {m: list(SLOW) for m in modes}}
+    )
+    fast = DynamometerRig.model_validate(
+        {"name": "dynamometer", "speeds": {m: [0.1, 0.3, 0.6, 1.0] for m in modes}}
+    )
+    both_ends = {"positions": [0.0, 0.035, 0.07]}
+    return [
+        LockedRig.model_validate({"name": "locked_extend", "chamber": "extend", **both_ends}),
+        LockedRig.model_validate({"name": "locked_retract", "chamber": "retract", **both_ends}),
+        slow,
+        fast,
+        RandomRig.model_validate({"name": "random", "duration": 4.0}),
+        RandomRig.model_validate({"name": "random_fast", "duration": 4.0, "speed": 1.2}),
+    ]
+
+
+def propose(folder: str | Path, out: Path) -> Proposal:
+    """The test that best separates the rivals of an answer, written to `out` as a rig YAML."""
+    answer = read_json(Path(folder) / "answer.json")
+    rivals = contenders(answer)
+    model = load_model(str(answer.get("base") or "planning"), rig=True)
+    proposals = [p for rig in menu() if (p := _judge(rig, model, rivals)) is not None]
+    if not proposals:
+        names = ", ".join(rivals)
+        raise KembaError(str(folder), f"no rig test shows a difference between {names}")
+    best = max(proposals, key=lambda p: p.nats)
+    rig = {"kind": best.rig.kind, **best.rig.model_dump(mode="json", exclude_defaults=True)}  # type: ignore[attr-defined]
+    dump_yaml({"rig": {**rig, "notes": best.sentence}}, out)
+    return best
+
+
+def contenders(answer: Mapping[str, Any]) -> dict[str, dict[str, float]]:
+    """Theta of the effects between which an answer leaves doubt: the first and its likeliest rivals."""
+    rows = {row["effect"]: row for row in answer["ranking"]}
+    if not rows:
+        raise KembaError("answer.json", "has no ranking", "nothing is left to be separated")
+    first = next(iter(rows))
+    others = [*rows[first]["equivalent_to"], *(e for e in rows if e != first)]
+    chosen = [first, *dict.fromkeys(e for e in others if e in rows)][:4]
+    return {
+        name: {f"{name}.{p}": v["value"] for p, v in rows[name]["parameters"].items()}
+        for name in chosen
+    }
+
+
+def _judge(rig: Rig, model: Any, rivals: Mapping[str, Mapping[str, float]]) -> Proposal | None:
+    """How well a rig separates the first rival from the one most like it."""
+    runs = [prepare(t.meta["name"], t) for t in _logs(rig)]
+    problem = BenchProblem(runs, model)
+    known = {n: t for n, t in rivals.items() if n in problem.candidates}
+    if len(known) < 2:
+        return None
+    first, *others = known
+    blocks = time_blocks(problem)
+    linear, jacobian, base = linearise(problem, known[first], blocks, tuple(problem.nuisance))
+    found = []
+    for other in others:
+        gap = problem.residual(known[other]) - base
+        found.append((_distance(gap, jacobian, linear.width), other))
+    nats, nearest = min(found)
+    return Proposal(rig, nats, (first, nearest))
+
+
+def _distance(gap: Array, jacobian: Array, width: Array) -> float:
+    """Half the squared gap that nominal figures within their tolerance cannot close."""
+    scaled = jacobian * width
+    h = np.eye(len(width)) + scaled.T @ scaled
+    return 0.5 * float(gap @ gap - (scaled.T @ gap) @ np.linalg.solve(h, scaled.T @ gap))
+
+
+def _logs(rig: Rig) -> Iterator[Trajectory]:
+    """The rig's tests as logs with ideal sensors and no force yet."""
+    rng = np.random.default_rng(0)
+    for number, test in enumerate(rig.tests(rng)):
+        if number >= LONGEST:
+            return
+        times = test.times[:: max(1, round(rig.rate / 1000.0))]
+        x, _ = test.motion(times)
+        noise = NOISE * rng.standard_normal(len(times))
+        columns = {"piston/x [m]": x + 1e-5 * rng.standard_normal(len(times)), "piston/F [N]": noise}
+        for valve in ("extend", "retract"):
+            profile = test.valves.get(f"valve/{valve}")
+            on = np.zeros(len(times)) if profile is None else np.array([profile(t) for t in times])
+            columns[f"valve/{valve} [1]"] = on
+        yield Trajectory(times, columns, {"name": test.name})
+

@@ -1,0 +1,71 @@
+"""Several starts on the cores, the best plan kept."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+
+from kemba.config import Document
+from kemba.ocp.plan import Plan, plan
+from kemba.ocp.task import Task
+from kemba.trajectory import Trajectory
+
+NOISE = 0.25  # of the scaled guess; the first start has the task's own
+
+
+@dataclass(frozen=True)
+class Start:
+    """How one start ended."""
+
+    seed: int
+    status: str
+    cost: float
+    trajectory: Trajectory
+
+
+def plan_best(
+    task: Task,
+    document: Document,
+    starts: int,
+    jobs: int | None = None,
+    log: Path | None = None,
+    tell: Callable[[str], None] = lambda text: None,
+) -> Plan:
+    """The cheapest of `starts` plans from noisy guesses, `jobs` at a time (default: the cores).
+
+    The best one is solved once more from its own trajectory in this process, so that the answer
+    does not depend on what travelled between processes. Raises as `plan` does.
+    """
+    tasks = [
+        task.model_copy(update={"guess_noise": max(task.guess_noise, NOISE * (i > 0)), "seed": i})
+        for i in range(starts)
+    ]
+    found: list[Start] = []
+    workers = min(jobs or os.cpu_count() or 1, starts)
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        futures = [pool.submit(_start, one) for one in tasks]
+        try:
+            for future in as_completed(futures):
+                start = future.result()
+                found.append(start)
+                tell(f"start {start.seed}: {start.status}, cost {start.cost:.4g}")
+        except KeyboardInterrupt:
+            pool.shutdown(wait=False, cancel_futures=True)
+    solved = [s for s in found if s.status == "solved"]
+    if not solved:
+        return plan(task, document, log=log, tell=tell)
+    best = min(solved, key=lambda s: s.cost)
+    return plan(task, document, log=log, tell=tell, start=best.trajectory)
+
+
+def _start(task: Task) -> Start:
+    found = plan(task)
+    cost = sum(w * found.cost.get(COST_KEYS.get(n, n), 0.0) for n, w in task.cost.items())
+    return Start(task.seed, found.status, cost, found.trajectory)
+
+
+COST_KEYS = {"torque_squared": "torque_squared_integral", "air": "valve_open_s"}
