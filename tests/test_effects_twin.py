@@ -134,3 +134,18 @@ def test_a_compliant_floor_catches_both_alike() -> None:
     found = drop.kemba(load_model(extra=[listed("ground_compliance")]))[:, 1]
     assert STANCE_Z - wanted.min() > 0.008
     np.testing.assert_allclose(found, wanted, atol=1e-3)
+
+
+@pytest.mark.parametrize("kind", sorted(k for k, entry in CATALOGUE.items() if entry.known))
+def test_names_units_sizes_and_signs_agree(kind: str) -> None:
+    entry, effect = CATALOGUE[kind], BY_KIND[kind]
+    declared = effect.declared()
+    for name, (_, size) in entry.parameters.items():
+        assert declared[name].unit == entry.unit[name]
+        if name == entry.leading:
+            assert declared[name].size == size
+        else:
+            assert effect.model_fields[name].default == size, "shapes default to a typical value"
+    if kind != "ground_compliance":
+        assert dict(effect.off) == {entry.leading: pytest.approx(entry.neutral, abs=1e-4)}
+        assert (declared[entry.leading].lower < effect.off[entry.leading]) == entry.signed

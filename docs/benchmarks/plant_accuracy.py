@@ -45,7 +45,9 @@ def push(model: Model, step: float) -> Run:
 
 def deepest(t: Trajectory) -> float:
     """The largest penetration of a foot or a piston [m]."""
-    past = [-t[f"{leg}/foot/z"].min() for leg in LEGS] + [-t[f"{leg}/piston/x"].min() for leg in LEGS]
+    past = [-t[f"{leg}/foot/z"].min() for leg in LEGS] + [
+        -t[f"{leg}/piston/x"].min() for leg in LEGS
+    ]
     return float(max(0.0, *past, *(t[f"{leg}/piston/x"].max() - 0.07 for leg in LEGS)))
 
 

@@ -61,7 +61,7 @@ def _parameter(effect: type[Effect], name: str) -> dict[str, Any]:
     off = effect.off.get(name)
     return {
         "name": name,
-        "unit": param.unit,
+        "unit": "channel's" if name in getattr(effect, "in_channel_unit", ()) else param.unit,
         "size": param.size,
         "default": effect.model_fields[name].default,
         "off": "infinity" if off is not None and math.isinf(off) else off,

@@ -40,6 +40,7 @@ class SensorEffect(Effect):
     place: ClassVar[Literal["leg", "body"]] = "body"
     family: ClassVar[str] = "sensors"
     moves: ClassVar[bool] = False
+    in_channel_unit: ClassVar[tuple[str, ...]] = ()
 
     @field_validator("channel")
     @classmethod
@@ -93,6 +94,7 @@ class SensorBias(SensorEffect):
     equation: ClassVar[str] = "measured = true + b"
     source: ClassVar[str] = "encoder and transducer zeros"
     off: ClassVar[dict[str, float]] = {"b": 0.0}
+    in_channel_unit: ClassVar[tuple[str, ...]] = ("b",)
 
     @model_validator(mode="before")
     @classmethod

@@ -6,12 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kemba.identify.linear import estimate, linearise, time_blocks
-from kemba.identify.problem import Problem, Theta
+from scipy.optimize import lsq_linear
+
+from kemba.identify.linear import Linear, estimate, linearise, time_blocks
+from kemba.identify.problem import Array, Problem, Theta
 from kemba.identify.rank import NULL, Hypothesis
 from kemba.identify.search import Point, Search, best_fit
 
 NONE = 1e-6  # a floor that lets nothing through
+TOLERATED = 3.0  # sigma by which a nominal figure may be off
 
 
 @dataclass(frozen=True)
@@ -22,8 +25,9 @@ class Gain:
     error: float
 
     @property
-    def significant(self) -> bool:
-        return self.nats > max(self.error, 2.0)
+    def refuted(self) -> bool:
+        """Whether left-out data speak against it."""
+        return self.nats < -max(self.error, 2.0)
 
 
 def left_out(search: Search, hypothesis: Hypothesis, against: Hypothesis = NULL) -> Gain:
@@ -35,18 +39,34 @@ def left_out(search: Search, hypothesis: Hypothesis, against: Hypothesis = NULL)
     return Gain(float(gains.sum()), float(np.sqrt(count) * gains.std(ddof=1)) if count > 1 else 0.0)
 
 
-def _predicted(search: Search, point: Point) -> np.ndarray:
-    """Log likelihood (b,) of each block under the fit to all others."""
+def _predicted(search: Search, point: Point) -> Array:
+    """Log likelihood (b,) of each block under the fit to all others.
+
+    A left-out block judges the hypothesis itself: nothing else may help at floor level, and no
+    nominal figure may leave its tolerance to do an effect's work.
+    """
     linear, found = point.linear, []
-    # a left-out block judges the hypothesis itself: nothing else may help at floor level
     for block in range(len(linear.count)):
         mask = np.arange(len(linear.count)) == block
-        rest = search.ranker(linear.without(mask), floor=NONE)
-        step = rest.score(point.hypothesis).z - linear.at
+        step = _bounded(search, linear.without(mask), point.hypothesis) - linear.at
         one = linear.only(mask)
         power = one.power[0] + 2 * one.slope[0] @ step + step @ one.gram[0] @ step
         found.append(-0.5 * float(power) / search.heat)
     return np.array(found)
+
+
+def _bounded(search: Search, linear: Linear, hypothesis: Hypothesis) -> Array:
+    """z (k,) of the best fit with the nominal figures within their tolerance."""
+    ranker = search.ranker(linear, floor=NONE)
+    width = ranker.widths(hypothesis, 1.0)
+    gram, slope, _ = linear.total
+    h = gram * np.outer(width, width) / search.heat + np.eye(len(width))
+    shift = (linear.mean - linear.at) / width
+    lower = np.linalg.cholesky(h)
+    target = np.linalg.solve(lower, shift - width * slope / search.heat)
+    reach = np.where(ranker.nuisance, TOLERATED, 1e6)
+    found = lsq_linear(lower.T, target, bounds=(shift - reach, shift + reach), method="bvls")
+    return np.asarray(linear.at + width * found.x)
 
 
 def predicted_error(search: Search, point: Point) -> float:

@@ -76,7 +76,7 @@ def _believed(search: Search, best: Hypothesis, test: NullTest) -> tuple[Hypothe
     while best:
         smaller = [h for h in search.points if len(h) == len(best) - 1 and set(h) < set(best)]
         against = max(smaller, key=lambda h: search.points[h].log_evidence, default=NULL)
-        if left_out(search, best, against).significant:
+        if not left_out(search, best, against).refuted:
             return best, p_value
         best = against
     return NULL, p_value

@@ -24,24 +24,34 @@ STROKES = 3  # more pushes than this fit into no planned motion
 class Flight:
     """A height that asks for a flight, and what is known about it before solving.
 
-    z0, reach, top [m]: heights of the body at the start, on a stretched leg pitched up
-    (generous), and on stretched legs when level; mass [kg], fall [m.s-2] with boom and payload.
+    z0, z1 [m]: heights of the body at the start, and at the landing if there is one; mass [kg],
+    fall [m.s-2] with boom and payload; swing [m]: how far moving legs shift the body against the
+    centre of mass at most; `stays_below`: the height is the highest point.
     """
 
     wish: Wish
     height: float
     z0: float
-    reach: float
-    top: float
+    z1: float | None
     mass: float
     fall: float
-    lands: bool
+    swing: float
     stays_below: bool
 
-    def rise(self, generous: bool) -> float:
-        """Seconds from the last touch of the ground to the apex, at least."""
-        from_height = self.reach + 0.1 if generous else self.top
-        return float(np.sqrt(2 * max(self.height - from_height, 0.0) / self.fall))
+    def least_time(self, other: float, generous: bool) -> float:
+        """Seconds between the apex and the height `other` [m], at least.
+
+        The ground only pushes, so the centre of mass never falls, nor slows while it rises, faster
+        than by `fall`. Generous: the legs' motion lends the body their swing, in height and time.
+        """
+        lent = self.swing if generous else 0.0
+        way = max(self.height - other - lent, 0.0)
+        return float(np.sqrt(2 * way / self.fall) - np.sqrt(2 * lent / self.fall))
+
+    def most(self, other: float, span: float) -> float:
+        """The height [m] that `span` seconds from or to `other` allow, generously."""
+        lent = float(np.sqrt(2 * self.swing / self.fall))
+        return other + self.swing + self.fall * (span + lent) ** 2 / 2
 
 
 def flight_of(task: Task, model: Model, wishes: Sequence[Wish], poses: Poses) -> Flight | None:
@@ -55,22 +65,33 @@ def flight_of(task: Task, model: Model, wishes: Sequence[Wish], poses: Poses) ->
     wish = max(highest, key=lambda w: w.lower)
     robot = load_robot(model.mechanism.name)
     leg = robot.leg.femur.length + robot.leg.tibia.length
-    lever = max(abs(place.hip) for place in robot.legs.values())
     if wish.lower <= leg:
         return None
     mass, weight = inertia_and_weight(model)
-    z0 = poses.highest(start)
+    end = [w for w in wishes if w.at == 1.0]
+    lands = any(w.quantity.name.endswith("foot/z") and w.upper <= 1e-6 for w in end)
+    below = [w for w in wishes if w.quantity.name == "body/z" and w.at is None]
     return Flight(
         wish,
         wish.lower,
-        leg if z0 is None else z0,
-        leg + lever,
-        leg,
+        poses.highest(start) or leg,
+        (poses.highest(end) or leg) if lands else None,
         mass,
         weight / mass,
-        any(w.quantity.name.endswith("foot/z") and w.at == 1.0 and w.upper < 0.1 for w in wishes),
-        any(w.quantity.name == "body/z" and w.at is None and w.upper <= wish.lower for w in wishes),
+        leg_swing(model) / mass,
+        any(w.upper <= wish.lower for w in below),
     )
+
+
+def leg_swing(model: Model) -> float:
+    """How much the legs can move the centre of mass, from one side of the hips to the other,
+    times the mass [kg.m]; at most."""
+    leg = load_robot(model.mechanism.name).leg
+    shank = leg.femur.length + leg.tibia.com
+    rod = leg.piston.mount + leg.piston.retracted + leg.piston.stroke
+    arms = leg.femur.mass * leg.femur.com + leg.tibia.mass * shank
+    arms += leg.cylinder.mass * (leg.piston.mount + leg.cylinder.com) + leg.rod.mass * rod
+    return 2 * len(model.mechanism.legs) * arms
 
 
 def inertia_and_weight(model: Model) -> tuple[float, float]:
@@ -133,26 +154,29 @@ def budget_findings(
 
 
 def _time(task: Task, flight: Flight, document: Document) -> Iterator[Finding]:
-    """Ballistic rise to the apex, and the fall from it, within the steps allowed."""
+    """Rise to the apex and fall from it within the longest steps allowed."""
     longest = task.duration * (1 + task.step_variation)
     before = longest * (flight.wish.at or 0.0)
     spans = []
     if flight.stays_below and before < longest:
-        spans.append(("rise to it", before))
-    if flight.lands and before < longest:
-        spans.append(("fall from it", longest - before))
-    for what, span in spans:
-        needed, surely = flight.rise(generous=False), flight.rise(generous=True)
+        spans.append(("rise", flight.z0, before))
+        if flight.z1 is not None:
+            spans.append(("fall", flight.z1, longest - before))
+    for what, other, span in spans:
+        needed = flight.least_time(other, generous=False)
         if needed <= span:
             continue
-        room = flight.fall * span**2 / 2
-        most = relax(document, flight.wish, flight.height, flight.top + room)
-        yield Finding(
-            f"{key('duration', document)}: {most}: the {what} takes {needed:.2f} s of free "
-            f"flight, {task.duration:g} s in all leave {span:.2f} s for it ({most.where})",
-            surely > span,
-            (most,),
+        certain = flight.least_time(other, generous=True) > span * (1 + 1 / task.nodes)
+        most = relax(document, flight.wish, flight.height, flight.most(other, span))
+        way = number(flight.height - other, "m")
+        reason = (
+            f"{key('duration', document)}: a {what} of {way} takes {needed:.2f} s, "
+            f"{task.duration:g} s in all leave at most {span:.2f} s for it"
         )
+        if certain:
+            yield Finding(f"{most} ({most.where}); {reason}", True, (most,), cause=True)
+        else:
+            yield Finding(reason, False, cause=True)
         return
 
 
@@ -198,13 +222,6 @@ def _grip(model: Model, wishes: Sequence[Wish], document: Document) -> Iterator[
     floors = [e for e in model.effects if e.family == "ground" and "mu" in e.parameters()]
     if not floors or all(float(e.value("mu")) > 0 for e in floors):
         return
-    leg = load_robot(model.mechanism.name).leg
-    outer = leg.femur.length + leg.tibia.com
-    rod = leg.piston.mount + leg.piston.retracted + leg.piston.stroke
-    arms = leg.femur.mass * leg.femur.com + leg.tibia.mass * outer
-    arms += leg.cylinder.mass * (leg.piston.mount + leg.cylinder.com) + leg.rod.mass * rod
-    # the body moves at most as far as the legs' masses swing from one side to the other
-    swing = 2 * len(model.mechanism.legs) * arms / model.mechanism.mass
     if way < 0.01:
         return
     where = place(document, last[0].location)
@@ -212,6 +229,6 @@ def _grip(model: Model, wishes: Sequence[Wish], document: Document) -> Iterator[
         f"`{last[0].text}` ({where}): {number(way, 'm')} forward asked, but the ground "
         f"gives no grip: friction coefficient mu is 0 in the model `{model.name}` "
         f"({floors[0].name}), and without it the centre of mass stays where it starts",
-        way > swing,
+        way > leg_swing(model) / model.mechanism.mass,
         cause=True,
     )

@@ -12,7 +12,7 @@ from kemba.config import Document
 from kemba.document import Location
 from kemba.model import Model
 from kemba.ocp.budget import Flight, budget_findings, flight_of
-from kemba.ocp.finding import Finding, key, number, place, relax, spoken
+from kemba.ocp.finding import Finding, key, number, one_per_wish, place, relax, spoken
 from kemba.ocp.pose import Gap, Poses
 from kemba.ocp.task import Task
 from kemba.ocp.wishes import Wish
@@ -96,11 +96,7 @@ def impossible_poses(
         if together == []:
             continue
         single = _smallest(poses, here) or together or []
-        given = tuple(
-            {
-                g.wish.location: relax(document, g.wish, g.asked, g.reachable) for g in single
-            }.values()
-        )
+        given = one_per_wish(relax(document, g.wish, g.asked, g.reachable) for g in single)
         why = "; ".join(f"{r} ({r.where})" for r in given) or "the wishes exclude each other"
         reason = "" if together is None else _reason(single)
         certain = together is not None

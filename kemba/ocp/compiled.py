@@ -32,7 +32,7 @@ def compiled(functions: Sequence[ca.Function]) -> list[ca.Function]:
     compiler = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
     if compiler is None or os.environ.get("KEMBA_COMPILE") == "0":
         return list(functions)
-    text = "".join(f.serialize() for f in functions) + ca.__version__ + " ".join(FLAGS)
+    text = "".join(f.serialize() for f in functions) + ca.CasadiMeta.version() + " ".join(FLAGS)
     key = hashlib.sha256(text.encode()).hexdigest()[:24]
     library = cache_folder() / f"{key}.so"
     try:

@@ -37,7 +37,9 @@ def controller_table(model: Model, plan: Trajectory) -> Trajectory:
         columns[f"{name} [{plan.unit(name)}]"] = states[name]
     for leg in model.mechanism.legs:
         columns[f"{leg}/piston/x [m]"] = states[f"{leg}/piston/x"]
-    return Trajectory(ticks * PERIOD, columns, {"kind": "controller", "lead": lead * PERIOD})
+    return Trajectory(
+        ticks / round(1 / PERIOD), columns, {"kind": "controller", "lead": lead * PERIOD}
+    )
 
 
 def _early(

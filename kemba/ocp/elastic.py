@@ -1,4 +1,4 @@
-"""The same program with wishes that may give way: slack with an l1 cost, physics as hard as ever."""
+"""The same program with wishes that may give way at an l1 cost; the physics stays hard."""
 
 from __future__ import annotations
 

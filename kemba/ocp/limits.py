@@ -16,10 +16,10 @@ GRIP = 0.02  # of body weight; less normal force is no stance
 
 
 def active_limits(task: Task, model: Model, trajectory: Trajectory) -> list[str]:
-    """Sentence parts such as `front and rear extension valves are open throughout the stance`."""
-    found = [*_valves(model, trajectory), *_torques(model, trajectory)]
+    """Parts of a sentence: `front and rear extension valves are open throughout the push`."""
     return [
-        *found,
+        *_valves(model, trajectory),
+        *_torques(model, trajectory),
         *_strokes(model, trajectory),
         *_grip(model, trajectory),
         *_steps(task, trajectory),
@@ -33,7 +33,7 @@ def _stance(model: Model, trajectory: Trajectory) -> np.ndarray:
     bears = np.broadcast_to(load > GRIP * model.mechanism.weight, len(trajectory)).copy()
     bears[0] = False
     bears[int(np.argmax(trajectory["body/z"])) + 1 :] = False
-    return bears
+    return np.asarray(bears)
 
 
 def _legs(model: Model, holds: dict[str, bool]) -> str:
@@ -90,10 +90,10 @@ def _strokes(model: Model, trajectory: Trajectory) -> Iterator[str]:
 def _grip(model: Model, trajectory: Trajectory) -> Iterator[str]:
     slides = {}
     for leg in model.mechanism.legs:
-        names = [f"{leg}/foot/{part}" for part in ("Fz", "Fx_forward", "Fx_backward", "slip")]
+        names = [f"{leg}/foot/{part}" for part in ("Fz", "slip")]
         if not all(name in trajectory for name in names):
             continue
-        normal, forward, backward, slip = (trajectory[name][1:] for name in names)
+        normal, slip = (trajectory[name][1:] for name in names)
         bears = normal > GRIP * model.mechanism.weight
         slides[leg] = bool(bears.any() and np.mean(slip[bears] > 0.02) > OFTEN)
     if any(slides.values()):

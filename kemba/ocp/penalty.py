@@ -1,4 +1,4 @@
-"""The paper's way (eq. 8, 9): every complementarity in the cost, at one weight or a ramp of them."""
+"""The paper's way (eq. 8, 9): every complementarity in the cost, at one weight or a ramp."""
 
 from __future__ import annotations
 

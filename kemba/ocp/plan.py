@@ -228,9 +228,7 @@ def explained(found: Plan, why: Explanation) -> Plan:
     return replace(found, status="infeasible", sentence=why.sentence, relax=why.relax)
 
 
-def program_size(
-    task: Task, document: Document, model: str | Path | None = None
-) -> dict[str, int]:
+def program_size(task: Task, document: Document, model: str | Path | None = None) -> dict[str, int]:
     """Variables and rows of the whole program of a task, everything checked, nothing solved."""
     built = task_model(task, model)
     wishes = resolve(task, built, document)
@@ -265,4 +263,3 @@ def judge(
         variables=transcription.variables,
         constraints=transcription.constraints,
     )
-

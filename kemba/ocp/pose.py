@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -143,8 +143,12 @@ class Poses:
         for i, name in enumerate(self.names):
             if abs(slack[i]) < MET:
                 continue
-            side: Callable[[Wish], float] = lambda w, up=slack[i] > 0: w.upper if up else -w.lower  # type: ignore[misc]
-            wish = min((w for w in wishes if w.quantity.name == name), key=side)
-            asked = wish.upper if slack[i] > 0 else wish.lower
+            same = [w for w in wishes if w.quantity.name == name]
+            if slack[i] > 0:
+                wish = min(same, key=lambda w: w.upper)
+                asked = wish.upper
+            else:
+                wish = max(same, key=lambda w: w.lower)
+                asked = wish.lower
             gaps.append(Gap(wish, asked, asked + float(slack[i])))
         return gaps

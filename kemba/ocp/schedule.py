@@ -34,7 +34,7 @@ class Attempt:
     iterations: int
 
 
-class Stopped(Exception):
+class Stopped(Exception):  # noqa: N818 (a way out, not an error)
     """The user or a limit ended a solve; the best iterate travels along."""
 
     def __init__(self, transcription: Transcription, point: Point) -> None:

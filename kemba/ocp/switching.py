@@ -18,9 +18,9 @@ def polish(search: Search, point: Point) -> Point:
     """Release every valve switch by a few nodes and round again, as long as the cost falls."""
     for _ in range(ROUNDS):
         free = _release(search, point)
-        options = warm(1e-3, tol=1e-3)
+        how = {"options": warm(1e-3, tol=1e-3), "free": free}
         parameters = Parameters(TIGHT, VALVE, SWITCHING / 5)
-        loose = search.solve("move switches", Point(point.Y), parameters, options=options, free=free)
+        loose = search.solve("move switches", Point(point.Y), parameters, **how)
         better = settle(search, Point(loose.Y))
         if not better.solved or better.objective >= (1 - PAYS) * point.objective:
             break

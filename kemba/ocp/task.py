@@ -71,7 +71,8 @@ class Task(Section):
     """A motion to plan: grid, wishes at start and end, bounds on the way, goals, costs.
 
     `step_variation`: each step lasts duration/nodes within this fraction. `start` and `end` map
-    quantities to values; `rest: true` there means that all rates are zero.
+    quantities to values; `rest: true` there means that all rates are zero,
+    `settled: true` that every state of an effect is at its value at rest.
     """
 
     name: str = "task"

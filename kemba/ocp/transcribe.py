@@ -16,7 +16,6 @@ from kemba.ocp.stage import INF, Rows, Stage, as_variable, build_stage
 from kemba.ocp.task import Task
 from kemba.ocp.wishes import Wish, quantity_expression
 
-
 WishBlock = tuple[Block, Rows, list[int]]  # with the nodes at which its rows hold
 
 

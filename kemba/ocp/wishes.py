@@ -17,6 +17,8 @@ from kemba.ocp.options import cost_errors, option_errors
 from kemba.ocp.task import Bound, Goal, Task
 from kemba.quantity import Quantity, to_si
 
+# `rest`: every rate is zero; `settled`: every state of an effect is where it comes to rest
+SPECIAL = ("rest", "settled")
 MOMENTS = {"start": 0.0, "middle": 0.5, "end": 1.0}
 
 
@@ -106,19 +108,22 @@ def _asked(task: Task) -> Iterator[Asked]:
 def _matching(pattern: str, known: dict[str, Quantity], model: Model) -> list[Quantity]:
     if pattern == "rest":
         return list(model.mechanism.velocities)
+    if pattern == "settled":
+        return list(model.states.values())
     found = [q for name, q in known.items() if fnmatchcase(name, pattern)]
     if not found:
-        raise KembaError("", f"unknown quantity '{pattern}'", hint=suggest(pattern, known))
+        raise KembaError("", f"unknown quantity '{pattern}'", hint=suggest(pattern, (*known, *SPECIAL)))
     return found
 
 
 def _wish(
     task: Task, location: Location, quantity: Quantity, at: float | None, bound: Bound | Goal
 ) -> Wish:
-    if location[-1] == "rest":
+    if location[-1] in SPECIAL:
         if bound.equals is not True and bound.equals != 1:
-            raise ValueError("'rest' is either true or left out")
-        return Wish(location, quantity, at, 0.0, 0.0)
+            raise ValueError(f"'{location[-1]}' is either true or left out")
+        value = 0.0 if location[-1] == "rest" else quantity.value
+        return Wish(location, quantity, at, value, value)
     if bound.equals is not None:
         if bound.at_least is not None or bound.at_most is not None:
             raise ValueError("'equals' does not go with 'at_least' or 'at_most'")

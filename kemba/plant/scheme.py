@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 Symbols = dict[str, ca.SX]
 GAMMA = 1.0 - 0.5**0.5
 PULL_BACK = 0.2  # share of a gap's drift that one step removes
-SHORTEST = 1e-5  # s; pulling back faster would turn rounding into speed
+SHORTEST = 1e-5  # s; pulling back within less would turn rounding into speed
+FASTEST = 0.05  # m/s; a foot that starts below the ground comes out no faster
 
 
 def first_stage(forms: Forms, at: Symbols) -> Symbols:
@@ -60,7 +61,7 @@ def second_stage(forms: Forms, at: Symbols) -> Symbols:
     W, L, w0, gap = _pairs(forms, middle, (q2, v1, s2, u))
     for i, row in enumerate(forms.pairs.gaps):
         if forms.pairs.rigid[i]:
-            w0[int(row)] += PULL_BACK * gap[i] / ca.fmax(h, SHORTEST)
+            w0[int(row)] += ca.fmax(PULL_BACK * gap[i] / ca.fmax(h, SHORTEST), -FASTEST)
     return {
         "q": q2, "v": v2, "s": s2, "T": T, "A": W @ T + L, "b": W @ v2 + w0, "gap": gap, "W": W,
     }  # fmt: skip

@@ -14,12 +14,15 @@ from kemba.plant.commands import SAME_TIME, Commands
 from kemba.plant.equations import equations_of
 from kemba.plant.events import Advance, Impact
 from kemba.plant.inputs import Inputs, merged
+from kemba.plant.lcp import NoSolutionError
 from kemba.plant.recorder import Recorder
 from kemba.plant.start import initial_values
 from kemba.plant.valves import delayed
 from kemba.trajectory import Trajectory
 
 STEP, LONGEST = 1e-4, 5e-4  # s
+DEEP = 5e-3  # m; what starts deeper in the ground or a stop is a mistake
+SMALLER = "try a smaller step, or look for a start that is impossible"
 
 
 @dataclass(frozen=True)
@@ -61,45 +64,73 @@ def run(
     dead_time: bool = True,
 ) -> Run:
     """As `simulate`, with the impacts that happened."""
-    if model.mechanism.imposed:
-        raise KembaError(model.name, "its motion is imposed", hint="use kemba.plant.rigs")
-    if not 0.0 < step <= LONGEST:
-        raise KembaError("step", f"{step:g} s is out of range", f"0 to {LONGEST:g} s was expected")
-    commands = commands or Commands()
     times = _samples(duration, sample)
-    profiles = dict(commands.profiles)
-    inputs = Inputs(model, commands, delayed(model, profiles) if dead_time else profiles)
-    advance = Advance(equations_of(model), step)
-    recorder = Recorder(model, advance)
-    senses = Senses(model)
-    q, v, s = initial_values(model, initial or {})
-    advance.u = inputs.update(0.0, senses.of(q, v, s))
-    now = advance.begin(0.0, q, v, s)
-    marks = merged(np.zeros(1), times, inputs.breaks(duration), np.array([duration]))
+    simulation = Simulation(model, commands or Commands(), step, dead_time)
+    simulation.begin(initial or {})
+    breaks = simulation.inputs.breaks(duration)
+    marks = merged(np.zeros(1), times, breaks, np.array([duration]))
     sampled = np.searchsorted(times, marks - SAME_TIME) < np.searchsorted(times, marks + SAME_TIME)
     for until, wanted in zip(marks, sampled, strict=True):
         if until > 0.0:
-            now = advance.to(now, float(until))
-            advance.u = inputs.update(float(until), senses.of(now.q, now.v, now.s))
+            simulation.to(float(until))
         if wanted:
-            recorder.record(now, inputs.sent(now.time))
-    return Run(recorder.trajectory(), tuple(advance.impacts))
+            simulation.record()
+    return Run(simulation.recorder.trajectory(), tuple(simulation.advance.impacts))
 
 
-class Senses:
-    """What a controller sees: coordinates, velocities and effect states by name."""
+class Simulation:
+    """A model on its way, between times at which its inputs may jump."""
 
-    def __init__(self, model: Model) -> None:
+    def __init__(self, model: Model, commands: Commands, step: float, dead_time: bool) -> None:
+        if model.mechanism.imposed:
+            raise KembaError(model.name, "its motion is imposed", hint="use kemba.plant.rigs")
+        if not 0.0 < step <= LONGEST:
+            expected = f"up to {LONGEST:g} s was expected"
+            raise KembaError("step", f"{step:g} s is out of range", expected)
+        profiles = dict(commands.profiles)
+        acting = delayed(model, profiles) if dead_time else profiles
+        self.model = model
+        self.inputs = Inputs(model, commands, acting)
+        self.advance = Advance(equations_of(model), step)
+        self.recorder = Recorder(model, self.advance)
         mechanism = model.mechanism
-        listed = (*mechanism.coordinates, *mechanism.velocities, *model.states.values())
-        self._names = [quantity.name for quantity in listed]
+        sensed = (*mechanism.coordinates, *mechanism.velocities, *model.states.values())
+        self._sensed = [quantity.name for quantity in sensed]
 
-    def of(self, q: Array, v: Array, s: Array) -> dict[str, float]:
-        return dict(zip(self._names, np.concatenate([q, v, s]).tolist(), strict=True))
+    def begin(self, initial: Mapping[str, float]) -> None:
+        """Start from the values by column name. Raises KembaError where they make no sense."""
+        q, v, s = initial_values(self.model, initial)
+        self.advance.u = self.inputs.update(0.0, self._sense(q, v, s))
+        self.now = self.advance.begin(0.0, q, v, s)
+        for row, gap in zip(self.advance.eq.pairs.gaps, self.now.gap, strict=True):
+            if gap < -DEEP:
+                label = self.advance.eq.pairs.labels[row]
+                raise KembaError("initial", f"{label} starts {-1e3 * gap:.1f} mm too deep")
+
+    def to(self, until: float) -> None:
+        """Go on to `until` [s] and take the inputs that hold from there."""
+        try:
+            self.now = self.advance.to(self.now, until)
+        except NoSolutionError as error:
+            raise KembaError(self.model.name, f"{error} at {until:.4f} s", hint=SMALLER) from None
+        now = self.now
+        if not np.isfinite(now.v).all():
+            raise KembaError(self.model.name, f"the motion explodes at {until:.4f} s", hint=SMALLER)
+        self.advance.u = self.inputs.update(until, self._sense(now.q, now.v, now.s))
+
+    def record(self) -> None:
+        """Write down what holds just after now."""
+        self.recorder.record(self.now, self.inputs.sent(self.now.time))
+
+    def _sense(self, q: Array, v: Array, s: Array) -> dict[str, float]:
+        values = np.concatenate([q, v, s]).tolist()
+        return dict(zip(self._sensed, values, strict=True))
 
 
 def _samples(duration: float, sample: float | Array) -> Array:
     if np.ndim(sample):
         return np.asarray(sample, dtype=float)
-    count = int(np.floor(duration / float(sample) + 1e-9))
-    return np.append(np.arange(count) * float(sample), duration) if count else np.zeros(1)
+    times = np.arange(int(duration / float(sample) + 1e-6) + 1) * float(sample)
+    if duration - times[-1] > SAME_TIME:
+        return np.append(times, duration)
+    return np.append(times[:-1], duration)

@@ -57,8 +57,11 @@ def perform(function: str, work: Work, path: str) -> Record:
     """Do a case's work and keep its result at `path`, at once and whole. Runs in a worker.
 
     What goes wrong in it is an outcome too. Where the folder of `path` is not to be seen, the
-    record is returned only.
+    record is returned only. Work that is done already, by a worker that died since, is not
+    repeated.
     """
+    if Path(path).is_file():
+        return dict(read_json(path))
     wall, cpu = time.perf_counter(), time.process_time()
     try:
         result = resolve(function)(work)

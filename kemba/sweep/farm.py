@@ -13,6 +13,8 @@ from kemba.errors import KembaError
 from kemba.files import write_json
 from kemba.sweep.case import Case, Record, perform
 
+PATIENCE = 30.0  # s; for a result that a worker holds
+
 Tell = Callable[[Case, Record], None]
 
 
@@ -59,10 +61,14 @@ def _gather(
         ): case
         for case in waiting.values()
     }  # fmt: skip
+    ended = as_completed(tasks, loop=client.loop, timeout=time_limit)
     try:
-        for task in as_completed(tasks, loop=client.loop, timeout=time_limit):
+        for task in ended:
             case = tasks[task]
-            record = _record(task)
+            record = case.record(folder) or _record(task)
+            if record is None:  # its result died with the worker that held it
+                ended.add(task)
+                continue
             if record["status"] != "lost" and not case.path(folder).is_file():
                 write_json(case.path(folder), record)  # the worker does not see our files
             found[case.key] = record
@@ -73,13 +79,20 @@ def _gather(
     return found
 
 
-def _record(task: Any) -> Record:
-    """What came of a task; `lost` when its workers died under it."""
-    if task.status == "finished":
-        return dict(task.result())
-    error = task.exception()
-    sentence = f"its worker died, again and again ({type(error).__name__})"
-    return {"status": "lost", "good": False, "sentence": sentence}
+def _record(task: Any) -> Record | None:
+    """What came of a task: `lost` when its workers died under it, None when it is run again."""
+    from distributed import TimeoutError as TimeIsUp
+
+    try:
+        if task.status == "finished":
+            return dict(task.result(timeout=PATIENCE))
+        if task.status == "error":
+            name = type(task.exception(timeout=PATIENCE)).__name__
+            sentence = f"its worker died, again and again ({name})"
+            return {"status": "lost", "good": False, "sentence": sentence}
+    except TimeIsUp:
+        pass
+    return None
 
 
 @contextmanager

@@ -55,6 +55,16 @@ def test_valves_are_binary(shipped: Solved) -> None:
             assert set(shipped.plan[f"{leg}/valve/{chamber}"]) <= {0.0, 1.0}
 
 
+def test_valves_dwell(shipped: Solved) -> None:
+    """No pulse between two switches is shorter than `min_dwell`, on the plan's own times."""
+    plan, least = shipped.plan, shipped.task.min_dwell
+    assert least == 0.01
+    for leg in ("front", "rear"):
+        for chamber in ("extend", "retract"):
+            switches = plan.time[np.flatnonzero(np.diff(plan[f"{leg}/valve/{chamber}"][1:])) + 1]
+            assert np.all(np.diff(switches) >= least - 1e-9)
+
+
 def test_limits_of_the_hardware(shipped: Solved) -> None:
     plan, slack = shipped.plan, 1e-6
     for leg in ("front", "rear"):

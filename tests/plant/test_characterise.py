@@ -12,6 +12,7 @@ from kemba.plant.bench import bench_model, load_rig, run_rig, write_rig
 from kemba.plant.characterise import Characteristics, characterise
 from kemba.plant.drive import stroke
 from kemba.plant.rigs import STROKE, DynamometerRig, LockedRig, RandomRig, Rig
+from kemba.plant.tables import PAPER_FORCE, PAPER_RISE
 from kemba.trajectory import Trajectory
 
 SPEEDS = dict.fromkeys(("extend", "retract", "both", "none"), (0.2, 0.5, 0.8))
@@ -145,3 +146,21 @@ def test_rigs_are_the_same_again_by_seed(tmp_path: Path) -> None:
     first, again, other = (path.read_bytes() for path in paths)
     assert first == again != other
     assert Trajectory.read(paths[0]).meta["kind"] == "bench"
+
+
+def test_the_shipped_plant_shows_the_papers_tables_at_07_mpa() -> None:
+    speeds = {"extend": (0.5, 1.0, 1.5, 2.0), "retract": (0.5, 1.0, 1.5, 2.0)}
+    speeds |= {"both": (0.2, 0.4, 0.6, 0.8), "none": (0.25, 0.5, 0.75, 1.0)}
+    logs = logs_of(LockedRig(name="locked"), "plant")
+    logs |= logs_of(DynamometerRig(name="dynamometer", speeds=speeds), "plant")
+    found = characterise(logs)
+    assert found.rises is not None
+    for name, paper in PAPER_RISE.items():
+        measured = [e.value for e in getattr(found.rises, name)]
+        assert measured == pytest.approx(paper, abs=2e-3)
+    assert [e.value for e in found.rises.dead.values()] == pytest.approx([6e-3, 6e-3], abs=2e-4)
+    for line in found.lines:
+        force, damping = PAPER_FORCE[line.mode, line.supply]
+        assert line.F_static.value == pytest.approx(force, rel=0.05, abs=4.0)
+        assert line.c_d.value == pytest.approx(damping, rel=0.1)
+        assert line.r2 > 0.97

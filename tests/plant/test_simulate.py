@@ -30,6 +30,19 @@ def test_samples_where_they_are_wanted() -> None:
     assert simulate(planning(), duration=0.01, sample=times).time == pytest.approx(times)
 
 
+@pytest.mark.parametrize(("duration", "rows"), [(0.01, 11), (0.0104, 12), (0.0005, 2)])
+def test_the_last_sample_is_the_end(duration: float, rows: int) -> None:
+    t = simulate(planning(), duration=duration)
+    assert (len(t), t.time[-1]) == (rows, duration)
+
+
+def test_feet_that_start_in_the_ground_come_out_gently() -> None:
+    low = planning().mechanism.standing["body/z"] - 2e-3
+    t = simulate(planning(), {"body/z": low}, duration=0.06)
+    assert t["body/vz"].max() <= 0.05 + 1e-6
+    assert t["front/foot/z"][-1] == pytest.approx(0.0, abs=1e-4)
+
+
 def test_valves_are_logged_as_sent() -> None:
     valve = {"front/valve/extend": Profile.pulses((0.0035, 0.008))}
     t = simulate(planning(), commands=Commands(valve), duration=0.02)
@@ -55,6 +68,7 @@ def test_a_piston_may_stand_for_its_knee() -> None:
             "no input 'x'",
         ),
         (lambda: simulate(load_model(rig=True)), "its motion is imposed"),
+        (lambda: simulate(planning(), {"body/z": 0.1}), "contact:gap starts 65.9 mm too deep"),
     ],
 )
 def test_wrong_calls_say_what_is_wrong(call, message: str) -> None:  # type: ignore[no-untyped-def]

@@ -46,7 +46,7 @@ class Rig:
         self._rate = ca.Function("rate", inputs, [rate, ca.jacobian(rate, node.s)])
         force = node.outputs["piston/F"]
         results = ca.vertcat(force, ca.jacobian(force, node.v), ca.jacobian(force, node.u).T)
-        self._output = ca.Function("output", inputs, [results])
+        self._output = ca.Function("output", inputs, [ca.densify(results)])
         self._step = _runge_kutta(node, rate)
         self._maps: dict[tuple[str, int], _Call] = {}
         self._start = np.array([q.value for q in model.states.values()])
@@ -152,7 +152,7 @@ def _runge_kutta(node: Any, rate: ca.SX) -> ca.Function:
     k2 = f(s + h / 2 * k1, d[4], d[5], d[6], u, p)
     k3 = f(s + h / 2 * k2, d[4], d[5], d[6], u, p)
     k4 = f(s + h * k3, d[7], d[8], d[9], u, p)
-    return ca.Function("step", [s, d, p], [s + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)])
+    return ca.Function("step", [s, d, p], [ca.densify(s + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4))])
 
 
 def _breakpoints(samples: Array, events: Array) -> tuple[Array, Any]:

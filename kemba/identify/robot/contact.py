@@ -21,7 +21,8 @@ NEAR_STOP = 0.6e-3  # m from the furthest reading near an end of the stroke
 STOP_SEARCH = 2.5e-3  # m from an end of the stroke in which a reading may mean the stop
 BLUR, STRIKE, IMPACT = 0.003, 0.025, 0.005  # s: around contact; in which it strikes; of an impact
 SETTLED = 0.010  # s within contact before a foot's height is trusted
-SLOW_FOOT, SLIDING, SLOW_BODY, SLOW_PISTON = 0.15, 0.06, 0.05, 0.02  # m.s-1
+SLOW_FOOT, SLIDING, SLOW_BODY, SLOW_PISTON = 0.15, 0.1, 0.05, 0.02  # m.s-1
+STICKING = 0.04  # m.s-1
 LEAST_LOAD = 6.0  # N: a foot that carries less is not known to stand
 RATE_WINDOW = 0.02  # s
 
@@ -40,11 +41,12 @@ class Schedule:
     high: Flags
     phase: np.ndarray[Any, Any]
     rests: Flags  # (n, legs): piston settled on a stop
+    sticks: Flags  # (n, legs): foot that does not move along the ground
 
     @property
     def held(self) -> Flags:
         """(n, 3 legs): places known to stand still; x and z of each foot, then the stops."""
-        feet = np.stack([self.settled & (self.slides == 0.0), self.settled], axis=-1)
+        feet = np.stack([self.settled & self.sticks, self.settled], axis=-1)
         return np.hstack([feet.reshape(len(feet), -1), self.rests])
 
 
@@ -63,7 +65,9 @@ def read_schedule(
         near, touches = z < level + MAY_TOUCH, z < level + TOUCHES
         may = _dilate(near, blur)
         inner = _erode(z < level + STANDS, settle) & (np.abs(vz) < SLOW_FOOT)
-        slides = np.where(inner & (np.abs(vx) > SLIDING), np.sign(vx), 0.0)
+        struck = _after(may, STRIKE / dt)
+        slips = _erode(inner & ~struck & (np.abs(vx) > SLIDING), settle // 2)
+        slides = np.where(slips, np.sign(vx), 0.0)
         bottom, top = stop_levels(pistons[:, i], stroke)
         at_low, at_high = pistons[:, i] < bottom + NEAR_STOP, pistons[:, i] > top - NEAR_STOP
         rests = _erode(at_low | at_high, 3 * blur) & (np.abs(piston_rate[:, i]) < SLOW_PISTON)
@@ -71,22 +75,23 @@ def read_schedule(
             (
                 may,
                 inner,
-                _after(may, STRIKE / dt),
+                struck,
                 slides,
                 _dilate(at_low, 2),
                 _dilate(at_high, 2),
                 rests,
+                _erode(np.abs(vx) < STICKING, settle // 2),
                 touches,
                 _dilate(_after(touches, 1), round(IMPACT / dt)),
             )
         )
     *parts, touches, impact = (np.stack(part, axis=1) for part in zip(*legs, strict=True))
-    may, settled, struck, slides, low, high, rests = parts
+    may, settled, struck, slides, low, high, rests, sticks = parts
     count = touches.sum(axis=1)
     phase = np.array(["flight", "stance1", "stance2"], dtype=object)[np.minimum(count, 2)]
     phase[(count == feet.shape[1]) & (speed < SLOW_BODY)] = "rest"
     phase[impact.any(axis=1)] = "impact"
-    return Schedule(may, settled, struck, slides, low, high, phase, rests)
+    return Schedule(may, settled, struck, slides, low, high, phase, rests, sticks)
 
 
 def _after(flags: Flags, steps: float) -> Flags:

@@ -17,6 +17,7 @@ from kemba.identify.candidates import sensor_candidates
 from kemba.identify.problem import Candidate, Parameter, Rows, Theta, parameter_steps
 from kemba.identify.robot.batch import Batch
 from kemba.identify.robot.contact import loaded
+from kemba.identify.robot.expected import expected_power, predicted_error
 from kemba.identify.robot.filter import gains, innovations
 from kemba.identify.robot.labels import describe
 from kemba.identify.robot.linear import Linearised, linearise, smoothed
@@ -218,6 +219,22 @@ class RobotProblem:
         """What each row of `residual` is."""
         chosen = list(range(len(self.runs)) if runs is None else runs)
         return describe(self.physics, self.batch, self.plan, self.point.states[1], self._mask, chosen)
+
+    def expected_power(self) -> Array:
+        """Mean square (n,) that each row would have if the model were right."""
+        return self.pick(expected_power(self.point.system, self.gain)[..., None])[:, 0]
+
+    def window_errors(self, theta: Theta, length: float = 0.05) -> dict[str, Array]:
+        """Per channel, measured minus predicted (k,) in its unit, over windows of `length` [s]
+        that begin on the measured motion; contact forces are the data's."""
+        steps = max(2, round(length / float(np.median(self.batch.h[self.batch.valid]))))
+        y, g = self._measurement(self.point, theta), self._push(self.point, theta)
+        g = self.point.extend(g[..., None])[..., 0]
+        errors = predicted_error(self.point.system, np.nan_to_num(y), g, steps)
+        return {
+            channel: errors[..., i][self._mask[..., i]]
+            for i, channel in enumerate(self.physics.channels)
+        }
 
     def library(self, theta: Theta) -> Mapping[str, Array]:
         """Terms beyond the catalogue: none yet for robots."""

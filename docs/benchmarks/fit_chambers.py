@@ -1,6 +1,7 @@
-"""Fit the physical chambers of configs/models/plant.yaml to the paper's Tables I and II.
+"""Fit physical chambers to the paper's Tables I and II: where the defaults of orifice_chamber and
+supply_line come from, and what chambers like these can meet (docs/pneumatics.md).
 
-    python docs/benchmarks/fit_plant.py
+    python docs/benchmarks/fit_chambers.py
 
 Locked chambers give the rise times of Table I, constant rates the force-velocity lines of Table
 II; both are read off the bench rig of the model itself. Prints the fitted figures and, entry by
@@ -80,7 +81,8 @@ def at_rest(model: Model) -> dict[str, float]:
 
 def rise_time(model: Model, chamber: int, mode: str, extension: float) -> float:
     """Time [s] to 63 % of the change of the locked chamber's force; its own extension given."""
-    full = model.effect("orifice_chamber").gauge[0]
+    chambers = model.effect("orifice_chamber")
+    full = float(np.interp(model.supply, chambers.pressures, chambers.gauge))
     x = extension if chamber == 0 else STROKE - extension
     name, fills = ("extend", "retract")[chamber], mode == "fill"
     u = np.zeros(2)

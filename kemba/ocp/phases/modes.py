@@ -1,0 +1,93 @@
+"""The mode sequence of an implicit Euler plan: what touches, slides and stands open, and when."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import casadi as ca
+import numpy as np
+
+from kemba.model import Model
+from kemba.ocp.phases.constraints import Constraint
+from kemba.ocp.result import arrays
+from kemba.trajectory import Trajectory
+
+OPEN, HELD, AHEAD, BACK = 0, 1, 2, 3  # open; closed and sticking; sliding forward, backward
+STIFF = 1e-3  # m; body weight over this tells a force from a gap of the relaxation
+SLIDES = 0.05  # m.s-1
+LIGHT = 0.1  # of body weight; a foot that bears less for a step or two does not stand
+BRIEF = 2  # steps
+
+
+@dataclass(frozen=True)
+class Phase:
+    """Intervals first+1 .. last in which constraints keep their mode and valves their place."""
+
+    first: int
+    last: int
+    modes: tuple[int, ...]
+    valves: tuple[float, ...]
+
+    @property
+    def elements(self) -> int:
+        return self.last - self.first
+
+    def active(self, i: int) -> bool:
+        return self.modes[i] != OPEN
+
+
+def read_phases(
+    model: Model,
+    constraints: Sequence[Constraint],
+    plan: Trajectory,
+    valves: np.ndarray,
+    marks: Sequence[int],
+) -> list[Phase]:
+    """Phases of a plan with `valves` (rows, n); a phase ends at every node of `marks` too."""
+    modes = np.column_stack([_modes(model, c, plan) for c in constraints])
+    same = (modes[1:] == modes[:-1]).all(axis=1) & (valves[1:] == valves[:-1]).all(axis=1)
+    borders = sorted({0, len(modes), *(np.flatnonzero(~same[1:]) + 1).tolist(), *marks})
+    borders = [k for k in borders if k <= len(plan) - 1]
+    rows = zip(borders[:-1], borders[1:], strict=True)
+    return [
+        Phase(a, b, tuple(int(m) for m in modes[b]), tuple(float(u) for u in valves[b]))
+        for a, b in rows
+    ]
+
+
+def _modes(model: Model, constraint: Constraint, plan: Trajectory) -> np.ndarray:
+    """Mode of a constraint at every row (rows,)."""
+    x, node = arrays(model, plan), model.node
+    names = [constraint.gap]
+    if constraint.friction is not None:
+        names.append(constraint.friction.slip)
+    evaluate = ca.Function("at", [node.q, node.v], names)
+    values = [np.array(value).ravel() for value in _listed(evaluate.map(len(plan))(x["q"].T, x["v"].T))]
+    force = x["lam"][:, constraint.force] / model.mechanism.weight
+    modes = np.where(force * STIFF > np.maximum(values[0], 0.0), HELD, OPEN)
+    if constraint.friction is not None:
+        light = force < LIGHT
+        slides = np.abs(values[1]) > SLIDES
+        for a, b in _runs(modes):
+            if b - a <= BRIEF and light[a:b].all():
+                modes[a:b] = OPEN
+        closed = modes == HELD
+        modes[closed & slides] = np.where(values[1] > 0, AHEAD, BACK)[closed & slides]
+    return np.asarray(modes)
+
+
+def _runs(modes: np.ndarray) -> list[tuple[int, int]]:
+    """Half-open ranges of rows in which a constraint is closed, the first row aside."""
+    closed = np.r_[0, (modes[1:] != OPEN).astype(int), 0]
+    edges = np.flatnonzero(np.diff(closed))
+    return [(int(a) + 1, int(b) + 1) for a, b in edges.reshape(-1, 2)]
+
+
+def _listed(value: object) -> list[ca.DM]:
+    return list(value) if isinstance(value, tuple | list) else [value]  # type: ignore[list-item]
+
+
+def with_modes(phase: Phase, modes: Sequence[int]) -> Phase:
+    """The same phase with other modes."""
+    return replace(phase, modes=tuple(modes))
