@@ -14,6 +14,7 @@ import kemba
 from kemba_cli.adopt import adopt
 from kemba_cli.characterise import characterise
 from kemba_cli.check import check
+from kemba_cli.compare import compare
 from kemba_cli.discover import discover
 from kemba_cli.effects import effects
 from kemba_cli.experiment import experiment
@@ -29,6 +30,7 @@ VERBS = (
     sweep,
     simulate,
     characterise,
+    compare,
     discover,
     adopt,
     experiment,

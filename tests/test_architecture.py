@@ -37,6 +37,7 @@ ONLY_IN = {
     "matplotlib": {"plotting"},
     "typer": {"cli"},
     "rich": {"cli"},
+    "dask": {"sweep"},
     "distributed": {"sweep"},
     "statsmodels": {"sweep"},
     "pint": {"units"},

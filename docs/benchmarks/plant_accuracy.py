@@ -3,7 +3,8 @@
     python docs/benchmarks/plant_accuracy.py
 
 A push with both extend valves, the rear one 4 ms longer, the flight after it and the landing, with
-the feet kept under the hips; first on the planning model, then on the full plant. Prints one row per step size.
+the feet kept under the hips; first on the planning model, then on the full plant. Prints one row
+per step size.
 """
 
 from __future__ import annotations

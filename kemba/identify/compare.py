@@ -12,7 +12,7 @@ from scipy.stats import chi2, false_discovery_control
 from kemba.identify.compare_hints import Hint, hints
 from kemba.identify.problem import Array, Problem, Rows
 
-FEWEST = 30  # rows that make a cell
+FEWEST = 5  # grains that make a cell
 TOLERATED = 1.15  # error ratio that a good model may have: nobody's nominal figures are exact
 FALSE_DISCOVERIES = 0.01
 GOOD, FAIR = 1.15, 1.5
@@ -73,14 +73,14 @@ def compare(problem: Problem, model: str, logs: Sequence[str] = ()) -> Compariso
     """Compare the logs of `problem` with its model as it stands."""
     rows, r = problem.rows(), problem.residual({})
     expected = _expected(problem, len(r))
-    cells = tuple(_cells(rows, r, expected))
+    z, members = grains(rows, r, expected, getattr(problem, "grain", 1))
     found = Comparison(
         tuple(logs) or problem.runs,
         model,
-        _ratio(r, expected),
-        tuple(_channels(problem, rows, r, expected)),
-        cells,
-        tuple(hints(problem, rows, r, expected)) if len(r) else (),
+        _rms(z),
+        tuple(_channels(problem, rows, r, z, members)),
+        tuple(_cells(rows, z, members)),
+        tuple(hints(problem, rows, r, expected)),
     )
     return Comparison(**{**vars(found), "sentence": phrase(found)})
 
@@ -90,8 +90,24 @@ def _expected(problem: Problem, count: int) -> Array:
     return np.asarray(power()) if power else np.ones(count)
 
 
-def _ratio(r: Array, expected: Array) -> float:
-    return float(np.sqrt(np.sum(r**2) / np.sum(expected))) if len(r) else float("nan")
+def grains(rows: Rows, r: Array, expected: Array, size: int) -> tuple[Array, Array]:
+    """Sums of `size` successive rows of one run, channel, phase and mode over what noise would
+    make of them (k,), and the first row of each (k,).
+
+    A model that is wrong errs for longer than a sample; noise does not.
+    """
+    labels = (rows.run, rows.channel, rows.phase.astype(str), rows.mode.astype(str))
+    fresh = np.ones(len(r), dtype=bool)
+    fresh[1:] = np.any([a[1:] != a[:-1] for a in labels], axis=0)
+    begin = np.flatnonzero(fresh)
+    place = np.arange(len(r)) - np.repeat(begin, np.diff(np.append(begin, len(r))))
+    first = np.flatnonzero(place % size == 0)
+    total, power = np.add.reduceat(r, first), np.add.reduceat(expected, first)
+    return total / np.sqrt(power), first
+
+
+def _rms(z: Array) -> float:
+    return float(np.sqrt(np.mean(z**2))) if len(z) else float("nan")
 
 
 def measured_units(rows: Rows) -> dict[str, str]:
@@ -105,7 +121,9 @@ def measured_units(rows: Rows) -> dict[str, str]:
     return found
 
 
-def _channels(problem: Problem, rows: Rows, r: Array, expected: Array) -> Iterable[ChannelError]:
+def _channels(
+    problem: Problem, rows: Rows, r: Array, z: Array, members: Array
+) -> Iterable[ChannelError]:
     windows = getattr(problem, "window_errors", None)
     errors = windows({}) if windows else {}
     headers = measured_units(rows)
@@ -119,37 +137,32 @@ def _channels(problem: Problem, rows: Rows, r: Array, expected: Array) -> Iterab
             float(np.sqrt(np.mean(error**2))),
             float(np.max(np.abs(error))),
             float(np.median(rows.sigma[own])),
-            _ratio(r[own], expected[own]),
+            _rms(z[own[members]]),
         )
 
 
-def _cells(rows: Rows, r: Array, expected: Array) -> Iterable[Cell]:
-    """Every channel, phase and mode with enough rows; q values over all of them."""
+def _cells(rows: Rows, z: Array, members: Array) -> Iterable[Cell]:
+    """Every channel, phase and mode with enough data; q values over all of them."""
+    channel, phase, mode = (a[members] for a in (rows.channel, rows.phase, rows.mode))
     found = []
-    for k, channel in enumerate(rows.channels):
-        own = rows.channel == k
-        for phase in np.unique(rows.phase[own].astype(str)):
-            for mode in np.unique(rows.mode[own].astype(str)):
-                here = own & (rows.phase == phase) & (rows.mode == mode)
-                if here.sum() >= FEWEST:
-                    p = excess(r[here], expected[here])
-                    found.append((channel, phase, mode, _ratio(r[here], expected[here]), p))
-    if not found:
-        return
-    q = false_discovery_control([p for *_, p in found])
-    for (channel, phase, mode, ratio, _), q_value in zip(found, q, strict=True):
-        yield Cell(channel, str(phase), str(mode), ratio, float(q_value))
+    for k, name in enumerate(rows.channels):
+        for p in np.unique(phase[channel == k].astype(str)):
+            for m in np.unique(mode[channel == k].astype(str)):
+                here = z[(channel == k) & (phase == p) & (mode == m)]
+                if len(here) >= FEWEST:
+                    found.append((name, str(p), str(m), _rms(here), excess(here)))
+    q = false_discovery_control([p for *_, p in found]) if found else ()
+    for (name, p, m, ratio, _), q_value in zip(found, q, strict=True):
+        yield Cell(name, p, m, ratio, float(q_value))
 
 
-def excess(r: Array, expected: Array) -> float:
-    """p value of rows whose power is more than a good model's: correlated rows count for less."""
-    power = r**2 / expected
-    centred = power - power.mean()
-    spread = float(centred @ centred)
-    echo = float(centred[1:] @ centred[:-1]) / spread if spread > 0 else 0.0
-    count = len(r) * (1.0 - max(echo, 0.0)) / (1.0 + max(echo, 0.0))
-    ratio = float(np.sum(r**2) / np.sum(expected)) / TOLERATED**2
-    return float(chi2.sf(ratio * count, count))
+def excess(z: Array) -> float:
+    """p value of errors (n,) larger than a good model's: correlated ones count for less."""
+    power = z**2 - np.mean(z**2)
+    spread = float(power @ power)
+    echo = max(float(power[1:] @ power[:-1]) / spread, 0.0) if spread > 0 else 0.0
+    count = len(z) * (1.0 - echo) / (1.0 + echo)
+    return float(chi2.sf(np.mean(z**2) / TOLERATED**2 * count, count))
 
 
 def phrase(found: Comparison) -> str:

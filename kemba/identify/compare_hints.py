@@ -12,8 +12,8 @@ from kemba.identify.problem import Array, Problem, Rows
 
 LATEST = 0.04  # s between a command and the error that follows it
 CERTAIN = 1e-4
-LEAST = 0.08  # correlation that is worth telling
-PROBES = 12  # parameters tried for a conflict between runs
+LEAST_INFORMATION = 4.0  # in sizes to the -2: a run that tells less about a parameter is mute
+SLACK = 0.1  # sizes by which a parameter may differ between runs without anybody caring
 
 
 @dataclass(frozen=True)
@@ -79,32 +79,31 @@ def _response(
 
 def conflicts(problem: Problem, rows: Rows, r: Array) -> Iterable[Hint]:
     """Parameters whose best value wanders from run to run more than its error allows."""
-    if len(problem.runs) < 2:
-        return
-    leads = [c for c in problem.candidates.values() if not c.sensor][:]
-    keys = [c.key for c in leads]
+    leads = [c for c in problem.candidates.values() if not c.sensor]
     nuisance = list(problem.nuisance)
-    jacobian = problem.jacobian({}, [*keys, *nuisance])
-    size = np.array([c.lead.size for c in leads])
-    sigma = np.array([problem.nuisance[n][1] for n in nuisance])
-    jacobian = jacobian * np.concatenate([size, sigma])
-    k = len(keys)
+    jacobian = problem.jacobian({}, [*(c.key for c in leads), *nuisance])
+    jacobian *= [c.lead.size for c in leads] + [problem.nuisance[n][1] for n in nuisance]
+    per_run = [_alone(jacobian[rows.run == i], r[rows.run == i], len(leads))
+               for i in range(len(problem.runs))]
     for i, c in enumerate(leads):
-        values, errors = [], []
-        for run in range(len(problem.runs)):
-            own = rows.run == run
-            one, others = jacobian[own, i], jacobian[own, k:]
-            gram = others.T @ others + np.eye(len(nuisance))
-            solved = np.linalg.solve(gram, others.T @ np.stack([one, r[own]], axis=1))
-            information = float(one @ one - (one @ others) @ solved[:, 0])
-            if information > 4.0:
-                values.append(-float(one @ r[own] - (one @ others) @ solved[:, 1]) / information)
-                errors.append(information**-0.5)
-        if len(values) < 2:
+        known = [(v[i], w[i]) for v, w in per_run if w[i] > LEAST_INFORMATION]
+        if len(known) < 2:
             continue
-        a, w = np.array(values), 1.0 / (np.array(errors) ** 2 + 0.1**2)
+        a, information = np.array(known).T
+        w = 1.0 / (1.0 / information + SLACK**2)
         spread = float(np.sum(w * (a - np.sum(w * a) / np.sum(w)) ** 2))
         p = float(chi2.sf(spread, len(a) - 1))
         if p < CERTAIN / len(leads):
-            text = f"{c.key} would differ between runs by more than its error"
+            text = f"{c.key} would have to differ from run to run"
             yield Hint("conflict", text, float(-np.log10(max(p, 1e-30))))
+
+
+def _alone(jacobian: Array, r: Array, leads: int) -> tuple[Array, Array]:
+    """Best value (leads,) and information of each parameter by itself, nuisance free."""
+    gram, slope = jacobian.T @ jacobian, jacobian.T @ r
+    other = gram[leads:, leads:] + np.eye(len(gram) - leads)
+    solved = np.linalg.solve(other, np.column_stack([gram[leads:, :leads], slope[leads:]]))
+    cross = gram[:leads, leads:]
+    information = np.diag(gram[:leads, :leads]) - np.sum(cross * solved[:, :leads].T, axis=1)
+    pull = slope[:leads] - cross @ solved[:, leads]
+    return -pull / np.maximum(information, 1e-9), information

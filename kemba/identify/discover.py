@@ -19,6 +19,7 @@ from kemba.identify.unknown import Formula, look
 
 SIGNIFICANT = 0.02
 CLASS = 3.0  # nats within which two explanations are the same to these data
+DEFECT = 0.02  # share of an effect that the model's own imperfection may add or hide, 1 sigma
 FINE = 0.1  # s, blocks whose signs are redrawn
 SHOWN = 8
 
@@ -189,6 +190,8 @@ def values(search: Search, hypothesis: Hypothesis, effect: str) -> dict[str, Val
     for key, parameter in candidate.keys().items():
         i = point.linear.index(key)
         centre, sd = point.score.z[i], float(np.sqrt(point.score.covariance[i, i]))
+        step = 1.0 if is_shape(search.problem, key) else abs(centre - parameter.off)
+        sd = float(np.hypot(sd, DEFECT * step))
         low, high = centre - 1.96 * sd, centre + 1.96 * sd
         triple = np.array([centre, low, high])
         if is_shape(search.problem, key):

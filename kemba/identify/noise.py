@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import solve_toeplitz
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
 from scipy.signal import lfilter
 
 from kemba.identify.problem import Array
 
 ORDER = 4
+SPIKE, AROUND, SPIKY = 7, 151, 5.0  # rows, rows, ratio of mean squares
 TRIM = 5.0  # rows beyond so many sigma are switching instants, not noise
 
 
@@ -20,6 +22,7 @@ class Colour:
 
     phi: Array
     sigma: float
+    weight: Array | None = None  # (n,) below 1 where the residual has a spike
 
     @property
     def spread(self) -> float:
@@ -30,8 +33,14 @@ class Colour:
         return float(self.sigma * np.sqrt(np.sum(response**2)))
 
 
-def learn(residual: Array, order: int = ORDER) -> Colour:
-    """Yule-Walker fit, order by BIC; spikes are cut down first."""
+def learn(residual: Array, order: int = ORDER, careful: bool = False) -> Colour:
+    """Yule-Walker fit, order by BIC; `careful`: spikes get less weight from now on."""
+    weight = caution(residual) if careful else None
+    found = _yule_walker(residual if weight is None else residual * weight, order)
+    return replace(found, weight=weight)
+
+
+def _yule_walker(residual: Array, order: int) -> Colour:
     scale = max(1.4826 * float(np.median(np.abs(residual))), 0.2)
     r = np.clip(residual, -TRIM * scale, TRIM * scale)
     n = len(r)
@@ -48,11 +57,26 @@ def learn(residual: Array, order: int = ORDER) -> Colour:
     return Colour(chosen[0], float(np.sqrt(chosen[1])))
 
 
+def caution(residual: Array) -> Array:
+    """Weights (n,) that silence spikes: a few rows far off amid rows that are not.
+
+    Switching instants and reversals are where the imposed motion is known worst. What is off for
+    long is left alone: it may be physics.
+    """
+    power = residual**2
+    near, around = uniform_filter1d(power, SPIKE), uniform_filter1d(power, AROUND)
+    spike = near > SPIKY * np.maximum(around, 1.0)
+    spike = maximum_filter1d(spike, SPIKE)
+    return np.where(spike, 1.0 / np.sqrt(np.maximum(near, 1.0)), 1.0)
+
+
 def whiten(residual: Array, colour: Colour) -> Array:
     """e_t = (r_t - sum phi_k r_{t-k}) / sigma along the first axis of (n,) or (n, k).
 
     The first rows are scaled by the series' spread instead.
     """
+    if colour.weight is not None:
+        residual = (residual.T * colour.weight).T
     taps = np.concatenate([[1.0], -colour.phi])
     white = lfilter(taps, [1.0], residual, axis=0) / colour.sigma
     p = len(colour.phi)

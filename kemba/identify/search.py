@@ -50,8 +50,9 @@ class Point:
 class Colourable(Protocol):
     """A problem whose noise colour can be learnt from the residuals of a flexible model."""
 
-    def recolour(self, residual: Array | None) -> None:
-        """Learn from residuals (n,) that were not whitened; None: forget."""
+    def recolour(self, residual: Array | None, careful: bool = False) -> None:
+        """Learn from residuals (n,) that were not whitened; None: forget. `careful`: the model
+        behind them is good, so that spikes are no physics and may be silenced."""
 
     def whiten(self, columns: Array) -> Array:
         """Columns (n, k) computed before any colour as they are under the present one."""
@@ -70,6 +71,7 @@ class Search:
     null_table: dict[Hypothesis, float] = field(default_factory=dict)
     null_jacobian: Array = field(init=False)
     null_residual: Array = field(init=False)
+    _settled: bool = False  # whether the noise is seen from a point that fits
 
     def __post_init__(self) -> None:
         self.blocks = time_blocks(self.problem)
@@ -237,7 +239,8 @@ class Search:
             return None
         problem.recolour(None)
         linear, jacobian, r = linearise(problem, theta, self.blocks)
-        problem.recolour(r + jacobian @ (best_fit(linear) - linear.at))
+        left = r + jacobian @ (best_fit(linear) - linear.at)
+        problem.recolour(left, careful=not keep or self._settled)
         return problem.whiten(jacobian) if keep else None
 
     def _recolour(self, best: Hypothesis) -> None:

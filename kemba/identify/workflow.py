@@ -13,6 +13,7 @@ from kemba.identify.adopt import write_model
 from kemba.identify.answer import Answer
 from kemba.identify.checks import BadData, check_logs, sentence
 from kemba.identify.discover import Found, discover
+from kemba.identify.excerpt import excerpts
 from kemba.identify.logs import load_map, read_logs
 from kemba.identify.problem import Problem
 from kemba.trajectory import Trajectory
@@ -42,8 +43,10 @@ def discover_logs(
         _apart(fitted, kept)
         remarks = check_logs([*fitted, *kept])
         say("preparing the logs")
+        fitted, cut = excerpts(fitted)
+        kept, _ = excerpts(kept)
         problem = make_problem(fitted, model)
-        remarks = [*remarks, *plausible(problem)]
+        remarks = [*remarks, *cut, *plausible(problem)]
         judge = make_problem(kept, model) if kept else None
         left = time_limit - (time.monotonic() - started)
         found = discover(problem, judge, left, say)

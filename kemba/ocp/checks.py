@@ -11,8 +11,9 @@ from itertools import groupby
 from kemba.config import Document
 from kemba.document import Location
 from kemba.model import Model
-from kemba.ocp.budget import Flight, budget_findings, flight_of
+from kemba.ocp.budget import budget_findings
 from kemba.ocp.finding import Finding, key, number, one_per_wish, place, relax, spoken
+from kemba.ocp.flight import Flight, flight_of
 from kemba.ocp.pose import Gap, Poses
 from kemba.ocp.task import Task
 from kemba.ocp.wishes import Wish
@@ -32,7 +33,7 @@ def check_task(
     found = list(impossible_poses(task, poses, wishes, document))
     if found:
         return found
-    flight = flight_of(task, model, wishes, poses)
+    flight = flight_of(model, wishes, poses)
     budget = budget_findings(task, model, wishes, flight, document)
     return sorted([*coarse_grid(task, flight, document), *budget], key=lambda f: not f.certain)
 

@@ -112,7 +112,8 @@ def _matching(pattern: str, known: dict[str, Quantity], model: Model) -> list[Qu
         return list(model.states.values())
     found = [q for name, q in known.items() if fnmatchcase(name, pattern)]
     if not found:
-        raise KembaError("", f"unknown quantity '{pattern}'", hint=suggest(pattern, (*known, *SPECIAL)))
+        hint = suggest(pattern, (*known, *SPECIAL))
+        raise KembaError("", f"unknown quantity '{pattern}'", hint=hint)
     return found
 
 

@@ -1,5 +1,6 @@
 """The plant: fine simulation of a model with hard contact, controller, rigs and sensors."""
 
+from kemba.plant.certificate import replays
 from kemba.plant.commands import Commands, Profile
 from kemba.plant.controller import Execution, Gains, execute
 from kemba.plant.events import Impact
@@ -16,6 +17,7 @@ __all__ = [
     "Run",
     "execute",
     "replay",
+    "replays",
     "run",
     "simulate",
 ]

@@ -17,8 +17,9 @@ PLACE = 1e-12  # m; accuracy of a knee found from its piston
 def initial_values(model: Model, values: Mapping[str, float]) -> tuple[Array, Array, Array]:
     """Coordinates, velocities and effect states with the `values` by column name.
 
-    What is missing stands as in the standing pose, at rest, effect states at their nominal value.
-    `LEG/piston/x` may stand for `LEG/knee/q`. Raises KembaError on unknown names.
+    What is missing stands as in the standing pose, at rest, effect states at their nominal value;
+    without `body/z` the lower foot is put on the ground. `LEG/piston/x` may stand for
+    `LEG/knee/q`. Raises KembaError on unknown names.
     """
     mechanism = model.mechanism
     coordinates = [c.name for c in mechanism.coordinates]
@@ -34,11 +35,20 @@ def initial_values(model: Model, values: Mapping[str, float]) -> tuple[Array, Ar
         if piston in values and knee not in values:
             start[knee] = _knee(model, piston, knee, values[piston])
     start.update(values)
-    return (
-        np.array([start.get(name, 0.0) for name in coordinates]),
-        np.array([values.get(name, 0.0) for name in velocities]),
-        np.array([values.get(q.name, q.value) for q in model.states.values()], dtype=float),
-    )
+    q = np.array([start.get(name, 0.0) for name in coordinates])
+    if "body/z" in coordinates and "body/z" not in values:
+        q[coordinates.index("body/z")] -= _lowest_foot(model, q)
+    v = np.array([values.get(name, 0.0) for name in velocities])
+    s = np.array([values.get(x.name, x.value) for x in model.states.values()], dtype=float)
+    return q, v, s
+
+
+def _lowest_foot(model: Model, q: Array) -> float:
+    """Height [m] of the lowest foot."""
+    mechanism = model.mechanism
+    feet = [mechanism.port(f"{leg}/foot/z").phi for leg in mechanism.legs]
+    height = ca.Function("feet", [mechanism.q], [ca.mmin(ca.vertcat(*feet))])
+    return float(height(q))
 
 
 def _knee(model: Model, piston: str, knee: str, x: float) -> float:

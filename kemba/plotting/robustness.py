@@ -28,7 +28,10 @@ def plot_robustness(
     left, right = figure.subplots(1, 2)
     good = np.asarray(landed, dtype=bool)
     edges = np.histogram_bin_edges(apex, bins="auto")
-    groups = {f"landed ({good.sum()})": (good, BLUE), f"fell ({(~good).sum()})": (~good, VERMILLION)}
+    groups = {
+        f"landed ({good.sum()})": (good, BLUE),
+        f"fell ({(~good).sum()})": (~good, VERMILLION),
+    }
     shown = [(label, apex[rows], hue) for label, (rows, hue) in groups.items() if rows.any()]
     left.hist(
         [values for _, values, _ in shown],
@@ -61,7 +64,9 @@ def _size(found: Mapping[str, float | None]) -> float:
 
 @paper_style
 def plot_growth(
-    sizes: Array, seconds: Mapping[str, Array], exponents: Mapping[str, float],
+    sizes: Array,
+    seconds: Mapping[str, Array],
+    exponents: Mapping[str, float],
     figure: Figure | None = None,
 ) -> Figure:
     """Solve times [s] over numbers of nodes by task, with fitted powers of N."""

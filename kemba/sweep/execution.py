@@ -29,9 +29,7 @@ if TYPE_CHECKING:
     from kemba.sweep.expand import Expansion
 
 
-def execute_cases(
-    expansion: Expansion, name: str, block: ExecuteBlock, folder: Path
-) -> list[Case]:
+def execute_cases(expansion: Expansion, name: str, block: ExecuteBlock, folder: Path) -> list[Case]:
     """The cases of a block; its plan is made first when it is not there yet."""
     from kemba.sweep.expand import model_hash, model_name
 
@@ -48,9 +46,7 @@ def execute_cases(
             start_offsets(model, conditions)
     except KembaError as error:
         what = ": ".join(part for part in (error.where, error.what) if part)
-        raise expansion.document.error(
-            ("blocks", name), what, error.expected, error.hint
-        ) from None
+        raise expansion.document.error(("blocks", name), what, error.expected, error.hint) from None
     plan = _plan_folder(expansion, name, block, folder)
     shared = {
         "plan": str(plan.absolute()),

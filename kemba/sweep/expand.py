@@ -110,7 +110,10 @@ def _solve_cases(expansion: Expansion, name: str, block: SolveBlock) -> list[Cas
         task = task.model_copy(update={"model": model_name(expansion, block.model or task.model)})
         if index == 0:  # names of quantities are the same in all
             resolve(task, task_model(task), document)
-        work = {"task": task.model_dump(exclude_none=True), "model": model_hash(task.model)}
+        work: dict[str, Any] = {
+            "task": task.model_dump(exclude_none=True),
+            "model": model_hash(task.model),
+        }
         aim = {key: value for key, value in work["task"].items() if key not in HOW}
         problem = content_hash([aim, work["model"]])
         cases.append(Case(name, index, values, "kemba.sweep.work:solve_case", work, problem))

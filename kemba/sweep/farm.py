@@ -97,7 +97,12 @@ def _record(task: Any) -> Record | None:
 
 @contextmanager
 def _client(scheduler: str | None, jobs: int | None, most: int) -> Iterator[Any]:
-    """A client of the cluster asked for, or of a local one that ends with the block."""
+    """A client of the cluster asked for, or of a local one that ends with the block.
+
+    Our own workers are given one case at a time, so that a case that kills its worker is the
+    only one blamed for it.
+    """
+    import dask
     from distributed import Client, LocalCluster
 
     if scheduler is not None:
@@ -110,12 +115,14 @@ def _client(scheduler: str | None, jobs: int | None, most: int) -> Iterator[Any]
             yield client
         return
     with (
+        dask.config.set({"distributed.scheduler.worker-saturation": 1.0}),
         LocalCluster(
             n_workers=min(jobs or os.cpu_count() or 1, most),
             threads_per_worker=1,
             processes=True,
             dashboard_address=None,
             silence_logs=logging.CRITICAL,
+            preload=["kemba.sweep.preload"],
         ) as cluster,
         Client(cluster, set_as_default=False) as client,
     ):

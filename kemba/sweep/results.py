@@ -38,7 +38,9 @@ def open_folder(out: str | Path | None, sweep: Sweep, document: Document) -> Pat
     if path.is_dir() and any(path.iterdir()):
         known = read_json(manifest) if manifest.is_file() else {}
         if known.get("sweep") != sweep.name:
-            what = f"holds the sweep '{known['sweep']}'" if "sweep" in known else "holds other files"
+            what = (
+                f"holds the sweep '{known['sweep']}'" if "sweep" in known else "holds other files"
+            )
             raise KembaError(f"--out {path}", what, hint="give another --out")
     facts = {
         "sweep": sweep.name,

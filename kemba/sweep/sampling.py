@@ -18,7 +18,9 @@ Values = dict[str, Value]
 
 def sample(block: Block, name: str, seed: int) -> list[Values]:
     """The values of every case: each point of the grid with the same draws of what varies."""
-    points = [dict(zip(block.grid, p, strict=True)) for p in itertools.product(*block.grid.values())]
+    points = [
+        dict(zip(block.grid, p, strict=True)) for p in itertools.product(*block.grid.values())
+    ]
     draws = _draws(block, np.random.default_rng([seed, crc32(name.encode())]))
     return [{**point, **draw} for point in points for draw in draws]
 

@@ -12,9 +12,9 @@ from ocp.impossible import REFUSED, SEARCHED, SWING, Impossible
 from typer.testing import CliRunner
 
 from kemba.ocp import Task, load_task, task_model
-from kemba.ocp.budget import air_work, inertia_and_weight
 from kemba.ocp.checks import check_task
 from kemba.ocp.finding import Finding
+from kemba.ocp.flight import air_work, inertia_and_weight
 from kemba.ocp.wishes import resolve
 from kemba_cli.main import app
 

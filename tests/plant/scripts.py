@@ -40,6 +40,7 @@ def under_the_hips(time: float, sense: Sense) -> dict[str, float]:
     return torques
 
 
+@cache
 def jump(model: Model | None = None, step: float = 1e-4, duration: float = 0.5) -> Run:
     """A push with both extend valves, the rear one 4 ms longer, and the flight after it."""
     valves = {
@@ -49,6 +50,7 @@ def jump(model: Model | None = None, step: float = 1e-4, duration: float = 0.5) 
     return run(model or planning(), {}, Commands(valves, under_the_hips), duration, step)
 
 
+@cache
 def drop(model: Model | None = None, step: float = 1e-4, duration: float = 0.3) -> Run:
     """Half folded legs, a little tilted, dropped from a hand's breadth."""
     start = {"body/z": 0.42, "body/pitch": 0.03, "front/piston/x": 0.03, "rear/piston/x": 0.03}

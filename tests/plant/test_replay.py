@@ -1,18 +1,22 @@
 """Plans executed: replay of the same model, and the controller of eq. 10."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 from plant.scripts import jump, planning
 
 from kemba.effects.motor import Motor
-from kemba.plant import Gains, Profile, execute, replay, run
+from kemba.plant import Gains, Profile, execute, replay, replays, run
+from kemba.plant.certificate import sentence
 from kemba.plant.commands import Commands
 from kemba.plant.controller import saturated
 from kemba.trajectory import Trajectory
 
 
-def planned() -> tuple[Trajectory, Trajectory]:
-    """A jump as a plan of 5 ms nodes, made by the simulator itself, and its fine motion."""
+@cache
+def planned() -> Trajectory:
+    """A jump as a plan of 5 ms nodes, made by the simulator itself."""
     taught = jump(duration=0.4).trajectory
     nodes = np.arange(0.0, 0.4001, 0.005)
     names = [q.name for q in planning().inputs.values()]
@@ -21,11 +25,11 @@ def planned() -> tuple[Trajectory, Trajectory]:
     done = run(planning(), {}, Commands(profiles), 0.4, dead_time=False).trajectory
     plan = done.interpolate(nodes)
     shifted = {f"{n} [{plan.unit(n)}]": np.r_[0.0, inputs[n][:-1]] for n in names}
-    return plan.with_columns(shifted), done
+    return plan.with_columns(shifted)
 
 
 def test_a_plan_that_is_true_replays_exactly() -> None:
-    plan, _ = planned()
+    plan = planned()
     found = replay(planning(), plan)
     assert abs(found.apex_error_m) < 2e-4  # the apex lies between nodes
     assert found.final_error_m < 1e-9
@@ -36,9 +40,19 @@ def test_a_plan_that_is_true_replays_exactly() -> None:
 
 
 def test_a_plan_that_is_not_true_is_found_out() -> None:
-    plan, _ = planned()
+    plan = planned()
     lie = plan.with_columns({"body/z [m]": plan["body/z"] + 0.1 * plan.time})
     assert replay(planning(), lie).apex_error_m < -0.01
+
+
+def test_the_certificate_holds_both_replays() -> None:
+    found = replays(planning(), planned(), standing_table(), planning())
+    assert found["replay"]["final_error_m"] < 1e-9
+    assert found["plant_replay"]["apex_error_m"] < -0.1
+    assert "below the plan" in sentence(found["plant_replay"])
+    assert replays(planning(), planned(), standing_table(), None)["plant_replay"] is None
+    buried = planned().with_columns({"body/z [m]": planned()["body/z"] - 0.1})
+    assert replays(planning(), buried, standing_table(), None)["replay"] is None
 
 
 def standing_table(lead: float = 0.006) -> Trajectory:

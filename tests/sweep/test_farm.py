@@ -104,6 +104,7 @@ def test_the_time_limit_keeps_what_is_done(tmp_path: Path) -> None:
     assert set(records) == {listed[0].key} == finished(tmp_path)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc").is_dir(), reason="reads /proc to find the processes")
 @pytest.mark.parametrize("seed", [1, 2])
 def test_killing_the_client_loses_and_repeats_nothing(tmp_path: Path, seed: int) -> None:
@@ -124,6 +125,7 @@ def test_killing_the_client_loses_and_repeats_nothing(tmp_path: Path, seed: int)
     check_all_done(tmp_path, listed, before)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc").is_dir(), reason="reads /proc to find the processes")
 @pytest.mark.parametrize("seed", [3, 4])
 def test_killing_workers_loses_and_repeats_nothing(tmp_path: Path, seed: int) -> None:
@@ -145,7 +147,8 @@ def test_killing_workers_loses_and_repeats_nothing(tmp_path: Path, seed: int) ->
 @pytest.mark.slow
 def test_a_case_that_kills_its_workers_does_not_end_the_sweep(tmp_path: Path) -> None:
     bad, good = cases(tmp_path, 1, 0.0, "kill_own_worker"), cases(tmp_path, 3, 0.0)
-    records = run_cases([*bad, *good], tmp_path, jobs=1)
+    records = run_cases([good[0], *bad, *good[1:]], tmp_path, jobs=1)
+    assert all(traces(tmp_path)[number] == 1 for number in range(3))
     assert records[bad[0].key]["status"] == "lost"
     assert "worker died" in records[bad[0].key]["sentence"]
     assert finished(tmp_path) == {case.key for case in good}

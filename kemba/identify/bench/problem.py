@@ -23,6 +23,7 @@ from kemba.identify.noise import Colour, learn, whiten
 from kemba.identify.problem import Array, Rows, Theta, secant_jacobian
 from kemba.model.model import Model
 
+EARLY = 0.08  # s that tell whether a valve had just been switched when a log begins
 JITTER = 0.02  # nominal figures are off by 1-3 %
 
 
@@ -45,7 +46,7 @@ class BenchProblem:
             for name in self._rig(()).state_names
         }
         for key, (_, name) in self._starts.items():
-            self.nuisance[key] = (0.0, 0.3 * self._state_scale[name])
+            self.nuisance[key] = (0.0, self._state_scale[name])
         for channel in self.channels[1:]:
             self.nuisance[f"offset:{channel}"] = (0.0, 2e5)
             self.nuisance[f"gain:{channel}"] = (1.0, JITTER)
@@ -190,7 +191,7 @@ class BenchProblem:
             axis=1,
         )
 
-    def recolour(self, residual: Array | None) -> None:
+    def recolour(self, residual: Array | None, careful: bool = False) -> None:
         """Learn each series' colour from residuals (n,) that were not whitened, or forget it."""
         self.colour = {}
         if residual is None:
@@ -199,7 +200,7 @@ class BenchProblem:
         for i in range(len(self._runs)):
             for k in np.unique(rows.channel[rows.run == i]):
                 own = (rows.run == i) & (rows.channel == k)
-                self.colour[i, int(k)] = learn(residual[own])
+                self.colour[i, int(k)] = learn(residual[own], careful=careful)
 
     def whiten(self, columns: Array) -> Array:
         """Columns (n, k) of not whitened slopes as `jacobian` would now return them."""
@@ -233,12 +234,12 @@ class BenchProblem:
             trials = [(e, r) for e in options[0] for r in options[1]]
             if len(trials) == 1:
                 continue
-            early = run.motion.time[run.keep["piston/F"]] < run.motion.time[0] + 0.1
+            early = run.motion.time[run.keep["piston/F"]] < run.motion.time[0] + EARLY
             costs = []
             for trial in trials:
                 self._runs[i] = replace(run, commands=trial)
                 r = self.standardised({}, i)["piston/F"][early]
-                costs.append(float(np.median(np.abs(r))))
+                costs.append(float(np.mean(np.abs(r))))
             self._runs[i] = replace(run, commands=trials[int(np.argmin(costs))])
 
 

@@ -4,17 +4,24 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d
 
 from kemba.effects.friction import V_COULOMB
 from kemba.identify.bench.motion import Motion, difference_sigma, smooth_motion
 from kemba.identify.bench.plant import Pulses
 from kemba.identify.bench.switching import pulses
+from kemba.identify.excerpt import held
 from kemba.identify.problem import Array
 from kemba.trajectory import Trajectory
 
+Flags = np.ndarray[Any, np.dtype[np.bool_]]
+
 PRESSURES = ("chamber/extend/P", "chamber/retract/P")
+GAP, FORGET = 0.012, 0.12  # s
+NEIGHBOURS = 9  # samples over which the worst error of the velocity counts
 DAMPING, FRICTION = 60.0, 10.0  # N.s.m-1, N: usual figures of a cylinder of this size
 
 
@@ -34,21 +41,34 @@ class Run:
     def blunt(self) -> Array:
         """Force error (n,) [N] that the error of the velocity makes: damping, and a friction of
         usual size where the direction of motion is in doubt. Alike for every hypothesis."""
-        v = self.motion.v
-        slope = DAMPING + FRICTION / V_COULOMB / np.cosh(np.clip(v / V_COULOMB, -30, 30)) ** 2
-        return np.asarray(slope * self.motion.v_sigma)
+        v, sigma = self.motion.v, maximum_filter1d(self.motion.v_sigma, NEIGHBOURS)
+        high, low = np.tanh((v + 2 * sigma) / V_COULOMB), np.tanh((v - 2 * sigma) / V_COULOMB)
+        return np.asarray(DAMPING * self.motion.v_sigma + 0.5 * FRICTION * (high - low))
 
 
 def prepare(name: str, log: Trajectory) -> Run:
     """Smooth the motion and learn each channel's white noise from its fastest differences."""
     v = log["piston/v"] if "piston/v" in log else None
     motion = smooth_motion(log.time, log["piston/x"], v)
-    extend, retract = (pulses(log.time, log[f"valve/{c}"]) for c in ("extend", "retract"))
-    channels = ["piston/F", *(p for p in PRESSURES if p in log)]
-    measured = {c: log[c] for c in channels}
+    sent = [held(log[f"valve/{c}"]) for c in ("extend", "retract")]
+    measured = {c: log[c] for c in ("piston/F", *PRESSURES) if c in log}
     floor = {"piston/F": 0.05, **dict.fromkeys(PRESSURES, 50.0)}
     sigma = {c: max(difference_sigma(y), floor[c]) for c, y in measured.items()}
-    on = [log[f"valve/{c}"] > 0.5 for c in ("extend", "retract")]
-    mode = np.char.add(on[0].astype(int).astype(str), on[1].astype(int).astype(str))
-    keep = {c: np.isfinite(y) for c, y in measured.items()}
-    return Run(name, motion, (extend, retract), measured, sigma, mode, keep)
+    on = [(u > 0.5).astype(int).astype(str) for u in sent]
+    seen = ~blind(log.time, np.isfinite(log["piston/x"]), np.stack(sent))
+    keep = {c: np.isfinite(y) & seen for c, y in measured.items()}
+    commands = (pulses(log.time, sent[0]), pulses(log.time, sent[1]))
+    return Run(name, motion, commands, measured, sigma, np.char.add(*on), keep)
+
+
+def blind(time: Array, good: Flags, sent: Array) -> Flags:
+    """Rows (n,) in and just after gaps of the position, and of the time itself; when a valve has
+    switched meanwhile, until the chambers have forgotten when."""
+    known = np.flatnonzero(good)
+    wide = np.flatnonzero(np.diff(time[known]) > GAP)
+    hidden = np.zeros(len(time), dtype=bool)
+    for begin, end in zip(known[wide], known[wide + 1], strict=True):
+        switched = np.any(sent[:, begin] != sent[:, end])
+        after = time[end] + (FORGET if switched else GAP)
+        hidden |= (time > time[begin]) & (time < after)
+    return hidden

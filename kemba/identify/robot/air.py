@@ -31,7 +31,7 @@ class StateRunner:
         slope, stiff = f(q, v, middle, u, p)
         slope = slope - stiff * (middle - s)
         after, mean = s + _grown(h, slope, stiff), s + _mean_growth(h, slope, stiff)
-        self._step = ca.Function("step", [s, h, q, v, u, p], [after, mean])
+        self._step = ca.Function("step", [s, h, q, v, u, p], [after, mean], {"cse": True})
         self._runs: dict[int, ca.Function] = {}
 
     def run(self, h: Array, q: Array, v: Array, u: Array, p: Array) -> Array:

@@ -56,9 +56,11 @@ class Batch:
         return whole
 
     def flat(self, values: Array) -> Array:
-        """(n, L, .) -> (n L, .)."""
-        return values.reshape(-1, *values.shape[2:])
+        """(n, L, .) -> (N, .): the nodes that are."""
+        return np.asarray(values[self.valid])
 
-    def deep(self, values: Array) -> Array:
-        """(n L, .) -> (n, L, .)."""
-        return values.reshape(self.n, len(self.tracks), *values.shape[1:])
+    def deep(self, values: Array, fill: float = 0.0) -> Array:
+        """(N, .) -> (n, L, .)."""
+        whole = np.full((*self.valid.shape, *values.shape[1:]), fill)
+        whole[self.valid] = values
+        return whole

@@ -97,3 +97,31 @@ def smooth(system: System, gain: Gains, y: Array, g: Array) -> tuple[Array, Arra
         pull = Ht[k] @ (solved[k] - gain.K[k].swapaxes(-1, -2) @ carried) + carried
         x[k] = (states[k] + gain.P[k] @ pull)[..., 0]
     return x, w
+
+
+def smooth_with_band(system: System, gain: Gains, y: Array, g: Array) -> tuple[Array, Array]:
+    """(smoothed x, its variances), both (n, L, d), of one column; `g` (n, L, j) pushes the first
+    j channels of G."""
+    s = system
+    n, runs, _, d = s.H.shape
+    whole = np.zeros((n, runs, s.G.shape[-1]))
+    whole[..., : g.shape[-1]] = g
+    states, errors = innovations(s, gain, y[..., None], whole[..., None])
+    solved = gain.whitener.swapaxes(-1, -2) @ (gain.whitener @ errors)
+    known = np.isfinite(s.R)[..., None]
+    whitened = gain.whitener @ np.where(known, s.H, 0.0)
+    Ft, Ht = s.F.swapaxes(-1, -2), np.where(known, s.H, 0.0).swapaxes(-1, -2)
+    x, variance = np.empty((n, runs, d)), np.empty((n, runs, d))
+    pull, certainty = np.zeros((runs, d, 1)), np.zeros((runs, d, d))
+    eye = np.eye(d)
+    for k in reversed(range(n)):
+        keep = eye - gain.K[k] @ s.H[k]
+        carried = Ft[k] @ pull
+        pull = Ht[k] @ solved[k] + keep.swapaxes(-1, -2) @ carried
+        certainty = keep.swapaxes(-1, -2) @ (Ft[k] @ certainty @ s.F[k]) @ keep
+        certainty += whitened[k].swapaxes(-1, -2) @ whitened[k]
+        P = gain.P[k]
+        x[k] = (states[k] + P @ pull)[..., 0]
+        spread = np.diagonal(P - P @ certainty @ P, axis1=1, axis2=2)
+        variance[k] = np.maximum(spread, 0.0)
+    return x, variance

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -47,6 +47,7 @@ class Linearised:
     less_grip: Array  # (n, L, k) generalised force per unit of friction coefficient, missing
     shift: Array  # (n, L, k) acceleration of the model beyond the reference's
     A: tuple[Array, Array]
+    channels: Array  # (n, L, k, c) generalised force per unknown force: channels, then feet
 
     def force(self, physics: Physics, batch: Batch, states: tuple[Array, Array], p: Array) -> Array:
         """Force (n, L, k) that the motion needs beyond model and contact."""
@@ -61,6 +62,13 @@ class Linearised:
         """Acceleration that the model adds to the reference's, (n, L, k)."""
         live = np.any(self.inverse != 0.0, axis=(2, 3))[..., None]
         return np.where(live, self.shift, 0.0) + self.response(force)
+
+    def system_with(self, density: Array, h: Array) -> System:
+        """The filter's system with other densities of unknown force."""
+        k = self.ref.q.shape[2]
+        W = self.system.W.copy()
+        W[..., :k, :k] = scatter(self.inverse @ self.channels, density, h)
+        return replace(self.system, W=W)
 
     def extend(self, g: Array) -> Array:
         """`g` (n, L, k, c) with the feet's places, which nothing pushes."""
@@ -88,7 +96,7 @@ def linearise(
     k, legs = physics.mechanism.n, len(physics.legs)
     mid = tuple(batch.flat(a) for a in ref.middle(batch.h))
     s, u = (batch.flat(a) for a in states)
-    inverse = np.linalg.inv(batch.deep(physics.call("mass", *mid, s, u, p=p)[0]))
+    inverse = batch.deep(np.linalg.inv(physics.call("mass", *mid, s, u, p=p)[0]))
     force = batch.deep(physics.call("residual", *mid, s, u, p=p)[0])
     at_nodes = [batch.flat(ref.q), batch.flat(ref.v)]
     y, rate, Jy = (batch.deep(a) for a in physics.call("measured", *at_nodes))
@@ -118,10 +126,9 @@ def linearise(
     F[..., :k, k : 2 * k] += h**2 / 2 * A_v
     F[..., k : 2 * k, :k] += h * A_q
     F[..., k : 2 * k, k : 2 * k] += h * A_v
-    pushed = inverse @ channels
     places = 3 * legs  # where each foot stands (x, z), and the stop on which each piston rests
     W = np.zeros((*batch.h.shape, k + places, k + places))
-    W[..., :k, :k] = (pushed * (density[..., None, :] / h)) @ pushed.swapaxes(-1, -2)
+    W[..., :k, :k] = scatter(inverse @ channels, density, batch.h)
     held = batch.pad([x.held.astype(float) for x in plan], 0.0) > 0.5
     wander = np.array([GROUND_WANDER] * 2 * legs + [STOP_WANDER] * legs)
     free = np.array([ANCHOR_FREE, GROUND_WANDER] * legs + [ANCHOR_FREE] * legs)
@@ -149,8 +156,13 @@ def linearise(
     masses = batch.deep(physics.call("masses", *mid)[0])
     return Linearised(
         ref, mid, states, system, inverse, contact, normal, y, rate,
-        np.concatenate([feet, y[..., k - legs :]], axis=2), -feet_rate[..., 1::2], masses, less_grip, shift, (A_q, A_v),
+        np.concatenate([feet, y[..., k - legs :]], axis=2), -feet_rate[..., 1::2], masses, less_grip, shift, (A_q, A_v), channels,
     )
+
+
+def scatter(pushed: Array, density: Array, h: Array) -> Array:
+    """Covariance (n, L, k, k) of the acceleration over a step that unknown forces make."""
+    return (pushed * (density / h[..., None])[..., None, :]) @ pushed.swapaxes(-1, -2)
 
 
 def contact_force(

@@ -36,8 +36,10 @@ class Physics:
         self.inputs = tuple(q.name for q in self.model.inputs.values())
         rate = -ca.substitute(node.rate, node.sd, ca.SX.zeros(node.sd.numel()))
         start = np.array([q.value for q in self.model.states.values()])
-        self.states = StateRunner([node.q, node.v, node.s, node.u, self.p], rate, start)
-        self.moving = [n for n, used in zip(self.names, ca.which_depends(rate, self.p, 1), strict=True) if used]
+        self.moves = np.array(ca.which_depends(rate, self.p, 1), dtype=bool)
+        self.moving = [n for n, moves in zip(self.names, self.moves, strict=True) if moves]
+        p = ca.vertcat(*(self.p[int(i)] for i in np.flatnonzero(self.moves)))
+        self.states = StateRunner([node.q, node.v, node.s, node.u, p], rate, start)
         self.grip = grip
         self._maps: dict[tuple[str, int], ca.Function] = {}
 
@@ -64,7 +66,7 @@ class Physics:
             "measured": (motion, [y, ca.jtimes(y, m.q, m.v), ca.jacobian(y, m.q)]),
             "feet": (motion, [feet, ca.jtimes(feet, m.q, m.v), ca.jacobian(feet, m.q)]),
         }
-        made = {k: ca.Function(k, a, b, {"allow_free": False}) for k, (a, b) in named.items()}
+        made = {k: ca.Function(k, a, b, {"cse": True}) for k, (a, b) in named.items()}
         self.masses, made["masses"] = mass_regressors(self.base)
         return made
 

@@ -49,6 +49,7 @@ from kemba.trajectory import Trajectory
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
+SIDES = ("extend", "retract")
 ROUNDS = 2
 LEAD_IN = 4  # nodes whose innovations only tell where the run starts
 
@@ -58,6 +59,8 @@ class RobotProblem:
 
     `base`: theta at which the motion is smoothed and the model linearised.
     """
+
+    grain = 20  # rows over which a comparison sums: innovations are one-step errors
 
     def __init__(
         self, logs: Sequence[Trajectory], model: Model, floor: Floor | None = None
@@ -122,8 +125,7 @@ class RobotProblem:
 
     def _states(self, point: Linearised, p: Array, delays: Array) -> tuple[Array, Array]:
         """Effect states and inputs, kept for as long as nothing that moves them changes."""
-        moving = np.isin(self.physics.names, self.physics.moving)
-        key = (id(point), p[moving].tobytes(), delays.tobytes())
+        key = (id(point), p[self.physics.moves].tobytes(), delays.tobytes())
         if self._kept[0] != key:
             self._kept = (key, air_states(self.physics, self.batch, point.ref, p, delays))
         states: tuple[Array, Array] = self._kept[1]
@@ -235,6 +237,19 @@ class RobotProblem:
             channel: errors[..., i][self._mask[..., i]]
             for i, channel in enumerate(self.physics.channels)
         }
+
+    def defects(self, theta: Theta) -> tuple[Array, Array]:
+        """Measurement (n, L, m) and acceleration (n, L, k) of the model at theta, both beyond the
+        reference's."""
+        return self._measurement(self.point, theta), self._push(self.point, theta)
+
+    def commands(self) -> list[dict[str, tuple[Array, Array]]]:
+        """Per run: name -> times and sizes of what was switched."""
+        sides = [f"{leg}/valve/{side}" for leg in self.physics.legs for side in SIDES]
+        return [
+            {n: (times, change) for n, (times, change, _) in zip(sides, t.switches, strict=True)}
+            for t in self.batch.tracks
+        ]
 
     def library(self, theta: Theta) -> Mapping[str, Array]:
         """Terms beyond the catalogue: none yet for robots."""

