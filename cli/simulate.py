@@ -40,11 +40,10 @@ def simulate(
 def _run(
     source: str, model: str, out: Path | None, seed: int, noise: bool, repeat: int
 ) -> dict[str, Any]:
-    from kemba.model import load_model
-    from kemba.plant.repeat import repeat_run
+    from kemba.plant.repeat import plant_of, repeat_run
 
     folder = Path(source) if Path(source).is_dir() else Path(source).parent
-    plant = load_model(model)
+    plant = plant_of(source, model)
     repeats = repeat_run(source, plant, out or folder / "logs", repeat, noise, seed)
     runs = [r.summary for r in repeats]
     apex = ", ".join(f"{r['apex_m']:.3f}" for r in runs)

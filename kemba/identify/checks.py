@@ -9,12 +9,14 @@ import numpy as np
 
 from kemba.errors import ConfigErrors, KembaError, suggest
 from kemba.identify.logs import NEEDED
+from kemba.identify.noise import difference_sigma
 from kemba.trajectory import TIME, Array, Trajectory
 
 SHORTEST = 0.15  # s
 FEWEST = 60  # rows
 LONGEST_BURST = 0.1  # s without a value that interpolation may bridge
 MISSING_SHARE = 0.3
+QUIET = 1e-4  # noise as a share of the range, below which a channel counts as noiseless
 FROZEN = 40  # equal readings in a row where noise is seen elsewhere
 # by the last part of the name: smallest and largest value that can be, and what a mistake would be
 RANGES = {
@@ -152,6 +154,8 @@ def _frozen(log: Trajectory, name: str, y: Array) -> Iterator[KembaError]:
     elsewhere = np.delete(equal, np.s_[start : start + length])
     if length < FROZEN or not len(elsewhere) or elsewhere.mean() > 0.2:
         return
+    if difference_sigma(values) < QUIET * np.ptp(values):
+        return  # a simulation without noise may well stand still
     value, row = values[start], int(good[start])
     at_end = value in (values.max(), values.min())
     what = f"{length + 1} readings in a row are exactly {value:.6g} {log.unit(name)}"

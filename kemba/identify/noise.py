@@ -16,6 +16,18 @@ SPIKE, AROUND, SPIKY = 7, 151, 5.0  # rows, rows, ratio of mean squares
 TRIM = 5.0  # rows beyond so many sigma are switching instants, not noise
 
 
+def difference_sigma(values: Array) -> float:
+    """White noise per sample, robustly from third differences (smooth motion cancels)."""
+    d = np.diff(values[np.isfinite(values)], n=3)
+    if len(d) < 8:
+        return 0.0
+    # the mean of |d| as well as its median: a quantised signal has a median of zero
+    median = float(np.median(np.abs(d))) / 0.6745
+    trimmed = np.sort(np.abs(d))[: int(0.9 * len(d))]
+    mean = float(np.mean(trimmed)) / 0.6287  # E|d| of a normal below its 90 % point
+    return max(median, mean) / np.sqrt(20.0)
+
+
 @dataclass(frozen=True)
 class Colour:
     """AR model r_t = sum phi_k r_{t-k} + sigma e_t of a standardised residual."""

@@ -38,7 +38,7 @@ def _tried(attempt: Callable[[], Replay]) -> dict[str, Any] | None:
 
 def sentence(found: Replay | dict[str, Any]) -> str:
     """A replay in words: `replay reaches 3.2 mm above the plan and lands 1.5 ms late`."""
-    facts = found.summary() if isinstance(found, Replay) else found
+    facts: dict[str, Any] = found.summary() if isinstance(found, Replay) else found
     apex, late = 1e3 * facts["apex_error_m"], facts["touchdown_error_s"]
     text = f"replay reaches {abs(apex):.1f} mm {'above' if apex >= 0 else 'below'} the plan"
     if late is not None:

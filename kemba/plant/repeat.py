@@ -8,12 +8,15 @@ from typing import Any
 
 import numpy as np
 
+from kemba.config import load_yaml
+from kemba.effects.load import Payload
 from kemba.errors import KembaError
-from kemba.model import Model
+from kemba.model import Model, load_model
 from kemba.plant.commands import Profile
 from kemba.plant.controller import Execution, Gains, execute, read_controller
 from kemba.plant.replay import Replay
 from kemba.plant.sensors import Sensors, take_log
+from kemba.quantity import to_si
 from kemba.trajectory import Trajectory
 
 VALVE_SCATTER = 1e-4  # s, 1 sigma of every switching on hardware; Fig. 3 shows less than 1 ms
@@ -70,6 +73,16 @@ def repeat_run(
         log.write(path)
         repeats.append(Repeat(path, done, done.against(model, plan) if plan else None))
     return repeats
+
+
+def plant_of(run: str | Path, name: str) -> Model:
+    """The model `name` under the supply and the payload of the task that a run was made for."""
+    file = (Path(run) if Path(run).is_dir() else Path(run).parent) / "task.yaml"
+    task = load_yaml(file).data if file.is_file() else {}
+    payload = to_si(task.get("payload") or 0.0, "kg")
+    supply = task.get("supply")
+    extra = [Payload(m=payload)] if payload else []
+    return load_model(name, extra, None if supply is None else to_si(supply, "Pa"))
 
 
 def _scattered(model: Model, table: Trajectory, rng: np.random.Generator) -> dict[str, Profile]:

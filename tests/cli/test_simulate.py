@@ -57,6 +57,15 @@ def test_three_noisy_logs_of_a_run(folder: Path) -> None:
     assert not np.array_equal(logs[0]["body/z"], logs[1]["body/z"])
 
 
+def test_the_plant_meets_the_supply_and_payload_of_the_task(folder: Path) -> None:
+    heights = []
+    for task in ("supply: 0.6 MPa\n", "supply: 800000.0\n", "supply: 0.8 MPa\npayload: 2 kg\n"):
+        (folder / "task.yaml").write_text(task)
+        done = run("simulate", str(folder), "--model", "planning", "--json")
+        heights.append(Trajectory.read(json.loads(done.stdout)["logs"][0])["body/vz"][-1])
+    assert heights[0] < heights[1] > heights[2]
+
+
 def test_the_same_seed_writes_the_same_log(folder: Path) -> None:
     texts = []
     for out, seed in (("a", "4"), ("b", "4"), ("c", "5")):

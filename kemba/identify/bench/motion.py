@@ -7,6 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from kemba.identify.noise import difference_sigma
 from kemba.identify.problem import Array
 
 HALF_WIDTHS = (5, 8, 11, 15, 20, 27, 40, 60, 90, 135)  # samples
@@ -22,18 +23,6 @@ class Motion:
     a: Array
     v_sigma: Array
     x_sigma: float
-
-
-def difference_sigma(values: Array) -> float:
-    """White noise per sample, robustly from third differences (smooth motion cancels)."""
-    d = np.diff(values[np.isfinite(values)], n=3)
-    if len(d) < 8:
-        return 0.0
-    # the mean of |d| as well as its median: a quantised signal has a median of zero
-    median = float(np.median(np.abs(d))) / 0.6745
-    trimmed = np.sort(np.abs(d))[: int(0.9 * len(d))]
-    mean = float(np.mean(trimmed)) / 0.6287  # E|d| of a normal below its 90 % point
-    return max(median, mean) / np.sqrt(20.0)
 
 
 def smooth_motion(time: Array, x: Array, v: Array | None = None) -> Motion:

@@ -10,10 +10,11 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from kemba.effects.friction import V_COULOMB
-from kemba.identify.bench.motion import Motion, difference_sigma, smooth_motion
+from kemba.identify.bench.motion import Motion, smooth_motion
 from kemba.identify.bench.plant import Pulses
 from kemba.identify.bench.switching import pulses
 from kemba.identify.excerpt import held
+from kemba.identify.noise import difference_sigma
 from kemba.identify.problem import Array
 from kemba.trajectory import Trajectory
 

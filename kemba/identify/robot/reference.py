@@ -18,7 +18,7 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 # Spectral densities (variance per Hz times s): force of body x, z [N2.s], then moments.
 KINEMATIC = {"body/x": 30.0, "body/z": 60.0, "body/pitch": 300.0, "hip": 2e3, "knee": 2e5}
-GROUND_SIGMA, GROUND_PRIOR, GROUND_WANDER = 1e-4, 5e-4, 1e-4 / np.sqrt(0.02)
+GROUND_SIGMA, GROUND_PRIOR, GROUND_WANDER = 1e-4, 2.5e-4, 6e-5 / np.sqrt(0.02)
 STOP_SIGMA, STOP_WANDER = 1e-4, 1e-4 / np.sqrt(0.02)
 ANCHOR_PRIOR, ANCHOR_FREE = 3.0, 1.0  # m, m.s-1/2: where along the ground a foot stands
 CONTACT, IMPACT = 300.0, 3e4  # N2.s

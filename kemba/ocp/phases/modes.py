@@ -15,6 +15,7 @@ from kemba.trajectory import Trajectory
 
 OPEN, HELD, AHEAD, BACK = 0, 1, 2, 3  # open; closed and sticking; sliding forward, backward
 STIFF = 1e-3  # m; body weight over this tells a force from a gap of the relaxation
+CLOSED = 1e-6  # m
 SLIDES = 0.05  # m.s-1
 LIGHT = 0.1  # of body weight; a foot that bears less for a step or two does not stand
 BRIEF = 2  # steps
@@ -62,17 +63,18 @@ def _modes(model: Model, constraint: Constraint, plan: Trajectory) -> np.ndarray
     if constraint.friction is not None:
         names.append(constraint.friction.slip)
     evaluate = ca.Function("at", [node.q, node.v], names)
-    values = [np.array(value).ravel() for value in _listed(evaluate.map(len(plan))(x["q"].T, x["v"].T))]
+    found = _listed(evaluate.map(len(plan))(x["q"].T, x["v"].T))
+    values = [np.array(value).ravel() for value in found]
     force = x["lam"][:, constraint.force] / model.mechanism.weight
     modes = np.where(force * STIFF > np.maximum(values[0], 0.0), HELD, OPEN)
+    if values[0][0] < CLOSED and modes[1] == OPEN:
+        modes[1] = HELD  # what touches at the start leaves no sooner than its force is gone
     if constraint.friction is not None:
         light = force < LIGHT
         slides = np.abs(values[1]) > SLIDES
         for a, b in _runs(modes):
             if b - a <= BRIEF and light[a:b].all():
                 modes[a:b] = OPEN
-        if __import__("os").environ.get("TRIM"):
-            modes[light & slides] = OPEN  # a foot about to leave
         closed = modes == HELD
         modes[closed & slides] = np.where(values[1] > 0, AHEAD, BACK)[closed & slides]
     return np.asarray(modes)

@@ -55,6 +55,15 @@ class Columns:
         self.size += count
         return np.arange(self.size - count, self.size)
 
+    def nodes(self) -> np.ndarray:
+        """The node that every column belongs to (size,); 0 for what phases share."""
+        found = np.zeros(self.size, dtype=int)
+        for e, stages in enumerate(self.stages):
+            for stage in stages:
+                for index in stage.values():
+                    found[index] = e + 1
+        return found
+
     def end(self, node: int) -> dict[str, np.ndarray]:
         """q, v, s at a node, before its impact."""
         return self.first if node == 0 else self.stages[node - 1][-1]
@@ -73,15 +82,26 @@ class Columns:
 
 
 @dataclass(frozen=True)
-class Rule:
-    """One kind of row: an expression of z, its bounds, and where it holds (repeats, len(z))."""
+class Part:
+    """Rows g and cost f of z between bounds, and where they hold (repeats, len(z))."""
 
-    label: str
+    labels: tuple[str, ...]
     z: ca.SX
     g: ca.SX
+    f: ca.SX
     lower: float
     upper: float
     columns: np.ndarray
+
+
+@dataclass(frozen=True)
+class Row:
+    """One row of the program: its meaning, the node it is about, its bounds."""
+
+    label: str
+    node: int
+    lower: float
+    upper: float
 
 
 class Program:
@@ -108,7 +128,7 @@ class Program:
         self.lower, self.upper = self._bounds()
         self.element = element(model, self.layout, reduction, task.cost, scheme)
         self.jump = impact(model, self.layout, reduction)
-        self.rules: list[Rule] = []
+        self.rules: list[Part] = []
 
     def _closes(self, p: int) -> bool:
         """Whether a constraint that was open is closed from phase p on."""
@@ -163,44 +183,50 @@ class Program:
         """Column of a force of the whole robot among the half's."""
         return int(np.flatnonzero(self.reduction.B["lam"][force])[0])
 
-    def rule(self, label: str, z: ca.SX, g: ca.SX, low: float, high: float, columns: list[np.ndarray]) -> None:
+    def rule(
+        self, label: str, z: ca.SX, g: ca.SX, low: float, high: float, columns: list[np.ndarray]
+    ) -> None:
         """Add a row wherever `columns` say."""
         if columns:
-            self.rules.append(Rule(label, z, ca.SX(g), low, high, np.array(columns)))
+            part = Part((label,), z, ca.SX(g), ca.SX(0), low, high, np.array(columns))
+            self.rules.append(part)
 
     @cached_property
     def problem(self) -> BlockProblem:
         """The functions for IPOPT."""
-        blocks = [Block(z, g, f, columns) for z, g, f, columns, *_ in self._all()]
-        return BlockProblem(blocks, self.columns.size, ca.SX.sym("p", 4))
+        blocks = [Block(part.z, part.g, part.f, part.columns) for part in self._parts]
+        return BlockProblem(blocks, self.columns.size, ca.SX(0, 1))
 
-    def _all(self) -> list[tuple[ca.SX, ca.SX, ca.SX, np.ndarray, float, float, tuple[str, ...]]]:
+    @cached_property
+    def _parts(self) -> list[Part]:
         c, zero = self.columns, ca.SX(0)
         every = np.array([c.element(e) for e in range(self.nodes)])
-        found = [(self.element.z, self.element.g, self.element.f, every, 0.0, 0.0, self.element.labels)]
+        body = self.element
+        found = [Part(body.labels, body.z, body.g, body.f, 0.0, 0.0, every)]
         hits = []
         for p in self.impacts:
             before = c.end(self.phases[p].first)
             hits.append(np.concatenate([*(before[g] for g in STATE), c.after[p], c.impulse[p]]))
         if hits:
-            found.append((self.jump.z, self.jump.g, zero, np.array(hits), 0.0, 0.0, self.jump.labels))
-        found += [(r.z, r.g, zero, r.columns, r.lower, r.upper, (r.label,)) for r in self.rules]
-        return found
+            jump = self.jump
+            found.append(Part(jump.labels, jump.z, jump.g, zero, 0.0, 0.0, np.array(hits)))
+        return found + self.rules
 
     @cached_property
-    def rows(self) -> list[tuple[float, float, str]]:
-        """Lower bound, upper bound and label of every row."""
+    def rows(self) -> list[Row]:
+        """What every row means and where it holds."""
+        nodes = self.columns.nodes()
         return [
-            (low, high, label)
-            for _, g, _, columns, low, high, labels in self._all()
-            for _ in range(len(columns))
-            for label in (labels if len(labels) == g.numel() else labels * g.numel())
+            Row(label, int(nodes[columns].max()), part.lower, part.upper)
+            for part in self._parts
+            for columns in part.columns
+            for label in part.labels
         ]
 
     @property
     def g_lower(self) -> np.ndarray:
-        return np.array([low for low, _, _ in self.rows])
+        return np.array([row.lower for row in self.rows])
 
     @property
     def g_upper(self) -> np.ndarray:
-        return np.array([high for _, high, _ in self.rows])
+        return np.array([row.upper for row in self.rows])

@@ -157,9 +157,8 @@ def _durations(program: Program) -> None:
     low, high = 1 - task.step_variation, 1 + task.step_variation
     program.rule("duration", h, sum(lasting), low, high, columns)
     for valve in range(len(phases[0].valves)):
-        switches = [
-            p for p in range(1, len(phases)) if phases[p].valves[valve] != phases[p - 1].valves[valve]
-        ]
-        for a, b in [] if __import__("os").environ.get("NODW") else itertools.pairwise(switches):
+        places = [phase.valves[valve] for phase in phases]
+        switches = [p for p in range(1, len(phases)) if places[p] != places[p - 1]]
+        for a, b in itertools.pairwise(switches):
             dwell = sum(lasting[a:b], ca.SX(0))
             program.rule("dwell", h, dwell, task.min_dwell / task.duration, INF, columns)

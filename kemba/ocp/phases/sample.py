@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import casadi as ca
 import numpy as np
 
 from kemba.ocp.certify import Certificate, Violation
 from kemba.ocp.layout import STEP
 from kemba.ocp.phases.program import Program
+from kemba.ocp.result import arrays
 from kemba.trajectory import Trajectory
+
+PHYSICS = ("kinematics", "dynamics", "rate", "impact")  # first words of their rows
+WORST = 8
 
 
 def to_trajectory(program: Program, x: np.ndarray) -> Trajectory:
@@ -66,8 +71,6 @@ def _slip_speeds(
     program: Program, q: np.ndarray, v: np.ndarray, lam: np.ndarray
 ) -> np.ndarray:
     """Forces with every slip speed that the pairs ask for: its size."""
-    import casadi as ca
-
     node, B = program.model.node, program.reduction.B["lam"]
     lam = lam.copy()
     for constraint in program.constraints:
@@ -81,26 +84,34 @@ def _slip_speeds(
     return lam
 
 
-def certificate(program: Program, x: np.ndarray, trajectory: Trajectory, most: int = 8) -> Certificate:
-    """What the solution violates of the collocation, the impacts and the modes."""
-    g = np.array(program.problem.g(x, [0.0] * 4)).ravel()
+def certificate(program: Program, x: np.ndarray, trajectory: Trajectory) -> Certificate:
+    """What the solution violates: collocation and impacts (dynamics), modes, bounds and wishes
+    (bounds), forces times gaps at the element ends (complementarity)."""
+    g = np.array(program.problem.g(x, [])).ravel()
     over = np.maximum(np.maximum(program.g_lower - g, g - program.g_upper), 0.0)
-    labels = program.labels
-    nodes = program.row_nodes
-    found = [
-        Violation(labels[i], nodes[i], float(trajectory.time[nodes[i]]), float(over[i]), "1", float(over[i]))
-        for i in np.argsort(-over)[:most]
-        if over[i] > 1e-9
-    ]
-    physics = np.array([label.split(":")[0] in PHYSICS for label in labels])
-    boxes = float(np.max(np.maximum(program.lower - x, x - program.upper), initial=0.0))
+    rows = program.rows
+    found = []
+    for i in np.argsort(-over)[:WORST]:
+        node, size = rows[i].node, float(over[i])
+        if size > 1e-9:
+            time = float(trajectory.time[node])
+            found.append(Violation(rows[i].label, node, time, size, "of its scale", size))
+    physics = np.array([row.label.split(":")[0] in PHYSICS for row in rows])
+    boxes = np.maximum(program.lower - x, x - program.upper)
     return Certificate(
-        complementarity=0.0,
-        binary=0.0,
+        complementarity=_complementarity(program, trajectory),
+        binary=0.0,  # valves are rounded constants of their phase
         dynamics=float(np.max(over[physics], initial=0.0)),
-        bounds=max(boxes, float(np.max(over[~physics], initial=0.0))),
+        bounds=float(max(np.max(boxes, initial=0.0), np.max(over[~physics], initial=0.0))),
         worst=tuple(found),
     )
 
 
-PHYSICS = ("kinematics", "dynamics", "rate", "impact")
+def _complementarity(program: Program, trajectory: Trajectory) -> float:
+    model, node = program.model, program.model.node
+    x = arrays(model, trajectory)
+    q, v, s, lam, u = (x[name][1:].T for name in ("q", "v", "s", "lam", "u"))
+    zero_a, zero_s = np.zeros_like(v), np.zeros_like(s)
+    _, _, a, b, _ = node.residual.map(q.shape[1])(q, v, zero_a, s, zero_s, lam, u, [])
+    scale = np.array([[row.scale] for _, row in node.pair_rows])
+    return float(np.max(np.abs(np.array(a) * np.array(b) / scale), initial=0.0))

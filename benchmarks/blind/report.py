@@ -1,0 +1,178 @@
+"""Scores of a blind study: what was right, what was claimed wrongly, and how surely."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+Record = dict[str, Any]
+OUTSIDE = ("magnet", "negative_stiffness", "hysteresis", "check_valve", "temperature_drift",
+           "cogging", "gear_loss", "cable_pull", "boom_drag")
+SURE = 0.95
+
+
+def read(path: Path) -> list[Record]:
+    """Records so far."""
+    if not path.is_file():
+        return []
+    return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines() if line]
+
+
+def append(path: Path, record: Record) -> None:
+    """One more record; NumPy numbers become plain."""
+    text = json.dumps(record, default=lambda o: o.tolist() if hasattr(o, "tolist") else str(o))
+    with path.open("a", encoding="utf-8") as stream:
+        stream.write(text + "\n")
+
+
+def wilson(hits: int, count: int) -> tuple[float, float]:
+    """95 % interval of a share."""
+    if not count:
+        return 0.0, 1.0
+    z, p = 1.96, hits / count
+    middle = (p + z * z / (2 * count)) / (1 + z * z / count)
+    half = z / (1 + z * z / count) * math.sqrt(p * (1 - p) / count + z * z / (4 * count**2))
+    return middle - half, middle + half
+
+
+def hidden(record: Record) -> list[str]:
+    """Names of what was hidden."""
+    return [effect["kind"] for effect in record["truth"]]
+
+
+def kind(record: Record) -> str:
+    """null, single, sensor, pair or outside."""
+    names = hidden(record)
+    if not names:
+        return "null"
+    if any(name in OUTSIDE for name in names):
+        return "outside"
+    if len(names) > 1:
+        return "pair"
+    return "sensor" if names[0].startswith("sensor") else "single"
+
+
+def named(record: Record) -> list[str]:
+    """Effects that were added."""
+    return list(record["answer"]["added"])
+
+
+def in_class(record: Record) -> bool:
+    """Whether every hidden effect is named, or stands among what a named one cannot be told from."""
+    rows = [r for r in record["answer"]["ranking"] if r["effect"] in named(record)]
+    known = {name for r in rows for name in (r["effect"], *r["equivalent_to"])}
+    return bool(rows) and set(hidden(record)) <= known
+
+
+def right(record: Record) -> bool:
+    """Whether exactly the hidden effects are named."""
+    return set(named(record)) == set(hidden(record))
+
+
+def sure_and_wrong(record: Record) -> bool:
+    """Whether an effect that is not hidden was named with 95 % or more, and with no alternative."""
+    rows = {r["effect"]: r for r in record["answer"]["ranking"]}
+    return any(
+        rows[e]["probability"] >= SURE
+        and e not in hidden(record)
+        and not set(rows[e]["equivalent_to"]) & set(hidden(record))
+        for e in named(record)
+    )
+
+
+def parameters(records: Iterable[Record]) -> tuple[list[float], list[bool]]:
+    """Relative errors of leading parameters that were identified, and whether intervals cover."""
+    errors, covered = [], []
+    for record in records:
+        for effect in record["truth"]:
+            row = next((r for r in record["answer"]["ranking"] if r["effect"] == effect["kind"]), None)
+            if row is None or effect["kind"] not in named(record):
+                continue
+            for i, (name, true) in enumerate(effect["parameters"].items()):
+                if name not in row["parameters"]:
+                    continue
+                value = row["parameters"][name]
+                off = 1.0 if name in ("k", "mu") and 0.3 < true < 3 and abs(true - 1) < 0.7 else 0.0
+                if i == 0:
+                    errors.append(abs(value["value"] - true) / max(abs(true - off), 1e-12))
+                covered.append(value["low"] <= true <= value["high"])
+    return errors, covered
+
+
+def table(records: Sequence[Record]) -> str:
+    """The whole report as Markdown."""
+    groups = {name: [r for r in records if kind(r) == name] for name in
+              ("single", "sensor", "pair", "outside", "null")}
+    known = [*groups["single"], *groups["sensor"]]
+    errors, covered = parameters([*known, *groups["pair"]])
+    rows = [
+        _row("right effect first, physics", groups["single"], right),
+        _row("right effect first, sensors", groups["sensor"], right),
+        _row("in the named class, physics and sensors", known, in_class),
+        _row("both effects of a pair", groups["pair"], right),
+        _row("at least one of a pair, none wrong", groups["pair"],
+             lambda r: bool(named(r)) and set(named(r)) <= set(hidden(r))),
+        _row("outside the catalogue: flagged unknown", groups["outside"],
+             lambda r: r["answer"]["verdict"] == "unknown"),
+        _row("false alarms on nulls", groups["null"], lambda r: r["answer"]["verdict"] != "nothing"),
+        _row("sure and wrong, all cases", records, sure_and_wrong),
+        _share("95 % intervals that cover", sum(covered), len(covered)),
+        f"| median parameter error | {100 * _median(errors):.1f} % | {len(errors)} |",
+        _row("error falls 3 x or to 1.3 x noise, where right", [r for r in known if right(r)], _falls),
+        f"| median time | {_median([r['seconds'] for r in records]):.0f} s | {len(records)} |",
+    ]
+    for name, label in (("one_by_bic", "one term by BIC"),
+                        ("all_by_least_squares", "all by least squares")):
+        rows.append(_row(f"baseline, {label}: right first", known,
+                         lambda r, n=name: r["baselines"][n] in hidden(r)))
+        rows.append(_row(f"baseline, {label}: false alarms", groups["null"],
+                         lambda r, n=name: r["baselines"][n] is not None))
+    head = ["| | share (95 % Wilson) | of |", "|---|---|---|"]
+    return "\n".join([*head, *rows, "", *misses(records)])
+
+
+def misses(records: Iterable[Record]) -> list[str]:
+    """Hidden and answered, by pair, most frequent first."""
+    wrong = Counter(
+        (" + ".join(hidden(r)) or "nothing", " + ".join(named(r)) or r["answer"]["verdict"])
+        for r in records
+        if not (right(r) or (kind(r) == "outside" and r["answer"]["verdict"] == "unknown"))
+    )
+    if not wrong:
+        return ["No misses."]
+    lines = ["| hidden | answered | times |", "|---|---|---|"]
+    return lines + [f"| {a} | {b} | {n} |" for (a, b), n in wrong.most_common()]
+
+
+def line(record: Record) -> str:
+    """One case on one line."""
+    answer = record["answer"]
+    mark = "ok " if right(record) else "cls" if in_class(record) else "-- "
+    said = " + ".join(named(record)) or answer["verdict"]
+    return (f"{mark} {' + '.join(hidden(record)) or 'nothing':32s} -> {said:40s} "
+            f"p {answer['p_value_nothing']:.3f} error {answer['error_before']:.2f} -> "
+            f"{answer['error_after']:.2f}  {record['seconds']:.0f} s")
+
+
+def _falls(record: Record) -> bool:
+    before, after = record["answer"]["error_before"], record["answer"]["error_after"]
+    return bool(after <= 1.3 or before / after >= 3.0)
+
+
+def _row(label: str, records: Sequence[Record], test: Any) -> str:
+    return _share(label, sum(bool(test(r)) for r in records), len(records))
+
+
+def _share(label: str, hits: int, count: int) -> str:
+    low, high = wilson(hits, count)
+    share = f"{100 * hits / count:.0f} % ({100 * low:.0f} to {100 * high:.0f})" if count else "none"
+    return f"| {label} | {share} | {count} |"
+
+
+def _median(values: Sequence[float]) -> float:
+    ordered = sorted(values)
+    return ordered[len(ordered) // 2] if ordered else float("nan")
