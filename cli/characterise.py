@@ -42,23 +42,17 @@ def characterise(
 def _print(found: Characteristics) -> None:
     from rich.table import Table
 
-    from kemba.plant.tables import check_rows, force_rows, rise_rows
+    from kemba.plant import tables
 
     for title, columns, rows in (
-        (
-            "Chamber force rise time",
-            ("chamber", "x", "rise time", "95 %", "paper"),
-            rise_rows(found),
-        ),
-        (
-            "Steady state: F = F_static - c_d v",
-            ("mode", "supply", "F_static", "95 %", "paper", "c_d", "95 %", "paper", "R2"),
-            force_rows(found),
-        ),
-        ("Fitted model against logs", ("log", "R2", "RMS"), check_rows(found)),
+        ("Chamber force rise time", tables.RISE_COLUMNS, tables.rise_rows(found)),
+        ("Steady state: F = F_static - c_d v", tables.FORCE_COLUMNS, tables.force_rows(found)),
+        ("Fitted model against logs", tables.CHECK_COLUMNS, tables.check_rows(found)),
     ):
         if rows:
-            table = Table(*columns, title=title, title_justify="left")
+            table = Table(title=title, title_justify="left", box=None)
+            for number, column in enumerate(columns):
+                table.add_column(column, justify="right" if number else "left")
             for row in rows:
                 table.add_row(*row)
             results().print(table)

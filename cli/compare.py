@@ -56,7 +56,9 @@ def _print(found: Comparison) -> None:
         table.add_row(c.name.replace("[", r"\["), *numbers)
     results().print(table)
     for cell in sorted(found.cells, key=lambda c: c.q_value)[:SHOWN]:
-        text = f"{cell.channel} in {cell.phase}, valves {cell.mode}: {cell.ratio:.2g} times the noise"
+        text = (
+            f"{cell.channel} in {cell.phase}, valves {cell.mode}: {cell.ratio:.2g} times the noise"
+        )
         typer.echo(f"  {text} (q = {cell.q_value:.1g})")
     for header, error in found.plan.items():
         typer.echo(f"  plan missed by up to {error:.3g} in {header}")

@@ -10,7 +10,7 @@ import typer
 from kemba_cli.common import Json, Quiet, print_json, say
 
 if TYPE_CHECKING:
-    from kemba.ocp import Plan, Task
+    from kemba.ocp import Task
     from kemba.trajectory import Trajectory
 
 Set = Annotated[
@@ -32,6 +32,9 @@ def solve(
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Check the task and say its size; solve nothing.")
     ] = False,
+    starts: Annotated[int, typer.Option(min=1, help="Guesses to try; the best is kept.")] = 1,
+    jobs: Annotated[int | None, typer.Option(min=1, help="Starts at a time.")] = None,
+    replay: Annotated[bool, typer.Option(help="Execute the plan in simulation.")] = True,
     figure: Annotated[bool, typer.Option(help="Draw the plan.")] = True,
     json: Json = False,
     quiet: Quiet = False,
@@ -42,7 +45,11 @@ def solve(
     """
     from kemba.config import find_config
     from kemba.ocp import load_task, task_model
+    from kemba.ocp.interrupt import Interrupt
     from kemba.ocp.wishes import resolve
+    from kemba.report import Listener, solve_into
+    from kemba.runs import RunFolder
+    from kemba_cli.progress import Progress
 
     start = None
     if resume is not None:
@@ -58,8 +65,13 @@ def solve(
         return
     resolved = resolved.model_copy(update={"model": model or resolved.model})
     resolve(resolved, task_model(resolved), document)
-    source = find_config(task, "tasks")
-    answer = _solve(resolved, document, source, out, figure, quiet or json, start)
+    inputs = [find_config(task, "tasks"), find_config(resolved.model, "models")]
+    folder = RunFolder.create(out, resolved.name, inputs)
+    with Progress(quiet or json) as progress, Interrupt(lambda text: say(text, quiet)) as stop:
+        listener = Listener(progress.tell, progress.watch, stop)
+        answer = solve_into(
+            folder, resolved, document, listener, start, starts, jobs, replay, figure
+        )
     if json:
         print_json(answer)
     else:
@@ -81,61 +93,6 @@ def _resumed(
     unfinished = found.manifest.get("status") == "running"
     start = found.trajectory if (found.path / "trajectory.csv").is_file() else None
     return task or str(found.task), out or (found.path if unfinished else None), start
-
-
-def _solve(
-    task: Task,
-    document: Any,
-    source: Path,
-    out: Path | None,
-    figure: bool,
-    quiet: bool,
-    start: Trajectory | None = None,
-) -> dict[str, Any]:
-    from kemba.config import dump_yaml, find_config
-    from kemba.ocp import plan
-    from kemba.ocp.interrupt import Interrupt
-    from kemba.ocp.report import answer
-    from kemba.runs import RunFolder
-    from kemba_cli.progress import Progress
-
-    model_file = find_config(task.model, "models")
-    folder = RunFolder.create(out, task.name, inputs=[source, model_file])
-    dump_yaml(task.model_dump(exclude_none=True), folder / "task.yaml")
-    try:
-        with Progress(quiet) as progress, Interrupt(lambda text: say(text, quiet)) as stop:
-            found = plan(
-                task,
-                document,
-                log=folder / "solver.log",
-                tell=progress.tell,
-                watch=progress.watch,
-                start=start,
-                stop=stop,
-            )
-            result = answer(found, str(folder.path))
-            _write(found, result, folder, figure)
-    except BaseException:
-        folder.finish("failed")
-        raise
-    folder.finish(found.status, sentence=found.sentence)
-    return result
-
-
-def _write(found: Plan, result: dict[str, Any], folder: Any, figure: bool) -> None:
-    from kemba.ocp import controller_table
-    from kemba.runs import write_json
-
-    write_json(folder / "certificate.json", result)
-    if not found.attempts:
-        return  # refused before solving: there is no motion to write
-    found.trajectory.write(folder / "trajectory.csv")
-    controller_table(found.model, found.trajectory).write(folder / "controller.csv")
-    if figure:
-        from kemba import plotting
-
-        sources = plotting.load_sources([folder.path])
-        plotting.save_figure(plotting.draw(sources), folder / "figure.png")
 
 
 def _dry_run(task: Task, document: Any, model: str | None, json: bool) -> None:

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import sys
 
+from kemba.plant import tables
 from kemba.plant.bench import bench_model, load_rig, run_rig
 from kemba.plant.characterise import characterise
-from kemba.plant.tables import check_rows, force_rows, rise_rows
 
 RIGS = ("locked", "dynamometer", "random")
 
@@ -24,16 +24,13 @@ def main(model: str) -> None:
         for test, log in run_rig(load_rig(name), lambda supply: bench_model(model, supply))
     }
     found = characterise(logs)
-    for heading, rows in (
-        ("chamber | x | rise time | 95 % | paper ms", rise_rows(found)),
-        (
-            "mode | supply | F_static | 95 % | paper | c_d | 95 % | paper | R2",
-            force_rows(found),
-        ),
-        ("fitted first-order model on | R2 | RMS", check_rows(found)),
+    for columns, rows in (
+        (tables.RISE_COLUMNS, tables.rise_rows(found)),
+        (tables.FORCE_COLUMNS, tables.force_rows(found)),
+        (tables.CHECK_COLUMNS, tables.check_rows(found)),
     ):
-        print(f"\n{heading}")
-        for row in rows:
+        print()
+        for row in (columns, *rows):
             print(" | ".join(row))
     if found.rises:
         print(f"\nfirst-order answer R2 {found.rises.r2:.4f}, eq. 5 R2 {found.rises.r2_linear:.4f}")

@@ -130,7 +130,8 @@ def _range(log: Trajectory, name: str, y: Array) -> Iterator[KembaError]:
         return
     low, high, expected = known[0]
     outside = np.isfinite(y) & ((y < low) | (y > high))
-    if outside.mean() > 0.002 or outside.sum() > 20:
+    few = 0.002 if name in NEEDED[log.meta["kind"]] else 0.05
+    if outside.mean() > few:
         i = int(np.argmax(outside))
         what = f"the reading {y[i]:.6g} {log.unit(name)} cannot be ({int(outside.sum())} rows)"
         yield _fault(

@@ -55,7 +55,9 @@ class Comparison:
 
     @property
     def good(self) -> bool:
-        return self.noise_ratio <= GOOD and not any(c.q_value < FALSE_DISCOVERIES for c in self.cells)
+        return self.noise_ratio <= GOOD and not any(
+            c.q_value < FALSE_DISCOVERIES for c in self.cells
+        )
 
     def json(self) -> dict[str, Any]:
         """The object that `--json` prints."""

@@ -83,8 +83,10 @@ def conflicts(problem: Problem, rows: Rows, r: Array) -> Iterable[Hint]:
     nuisance = list(problem.nuisance)
     jacobian = problem.jacobian({}, [*(c.key for c in leads), *nuisance])
     jacobian *= [c.lead.size for c in leads] + [problem.nuisance[n][1] for n in nuisance]
-    per_run = [_alone(jacobian[rows.run == i], r[rows.run == i], len(leads))
-               for i in range(len(problem.runs))]
+    per_run = [
+        _alone(jacobian[rows.run == i], r[rows.run == i], len(leads))
+        for i in range(len(problem.runs))
+    ]
     for i, c in enumerate(leads):
         known = [(v[i], w[i]) for v, w in per_run if w[i] > LEAST_INFORMATION]
         if len(known) < 2:

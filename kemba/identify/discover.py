@@ -19,6 +19,7 @@ from kemba.identify.unknown import Formula, look
 
 SIGNIFICANT = 0.02
 CLASS = 3.0  # nats within which two explanations are the same to these data
+MATTERS = 0.2  # an effect below this share of its size is no finding
 DEFECT = 0.02  # share of an effect that the model's own imperfection may add or hide, 1 sigma
 FINE = 0.1  # s, blocks whose signs are redrawn
 SHOWN = 8
@@ -77,10 +78,20 @@ def _believed(search: Search, best: Hypothesis, test: NullTest) -> tuple[Hypothe
     while best:
         smaller = [h for h in search.points if len(h) == len(best) - 1 and set(h) < set(best)]
         against = max(smaller, key=lambda h: search.points[h].log_evidence, default=NULL)
-        if not left_out(search, best, against).refuted:
+        if matters(search, best) and not left_out(search, best, against).refuted:
             return best, p_value
         best = against
     return NULL, p_value
+
+
+def matters(search: Search, hypothesis: Hypothesis) -> bool:
+    """Whether each of its effects is large enough to be more than an imperfection."""
+    score, linear = search.points[hypothesis].score, search.points[hypothesis].linear
+    leads = {e: search.problem.candidates[e] for e in hypothesis}
+    return all(
+        abs(score.z[linear.index(c.key)] - c.lead.off) >= MATTERS * c.lead.size
+        for c in leads.values()
+    )
 
 
 def _answer(

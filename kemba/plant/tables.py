@@ -53,45 +53,40 @@ def as_json(found: Characteristics) -> dict[str, Any]:
     }
 
 
+RISE_COLUMNS = ("chamber", "x mm", "rise time ms", "+-95 %", "paper")
+FORCE_COLUMNS = (
+    *("mode", "supply MPa", "F_static N", "+-95 %", "paper"),
+    *("c_d N s/m", "+-95 %", "paper", "R2"),
+)
+CHECK_COLUMNS = ("log", "R2", "RMS N")
+
+
 def rise_rows(found: Characteristics) -> list[tuple[str, ...]]:
-    """Table I and the dead times, in ms."""
+    """Table I and the dead times; columns as in `RISE_COLUMNS`."""
     rows: list[tuple[str, ...]] = [
-        (
-            name,
-            f"{1e3 * x:.0f} mm",
-            f"{1e3 * e.value:.1f} ms",
-            _interval(e, 1e3),
-            f"{1e3 * paper:.0f}",
-        )
+        (name, _text(1e3 * x), _text(1e3 * e.value, 1), _width(e, 1e3, 1), _text(1e3 * paper))
         for name, x, e, paper in _rises(found)
     ]
     for name, e in found.rises.dead.items() if found.rises else ():
-        paper = f"{1e3 * PAPER_DEAD_TIME:.0f}"
-        rows.append((f"dead time {name}", "", f"{1e3 * e.value:.2f} ms", _interval(e, 1e3), paper))
+        paper = _text(1e3 * PAPER_DEAD_TIME)
+        rows.append((f"dead time {name}", "", _text(1e3 * e.value, 2), _width(e, 1e3, 2), paper))
     return rows
 
 
 def force_rows(found: Characteristics) -> list[tuple[str, ...]]:
-    """Table II."""
-    return [
-        (
-            line.mode,
-            f"{line.supply / 1e6:.1f} MPa",
-            f"{line.F_static.value:.0f} N",
-            _interval(line.F_static),
-            "" if paper[0] is None else f"{paper[0]:.0f}",
-            f"{line.c_d.value:.0f} N s/m",
-            _interval(line.c_d),
-            "" if paper[1] is None else f"{paper[1]:.0f}",
-            f"{line.r2:.3f}",
-        )
-        for line, paper in _forces(found)
-    ]
+    """Table II; columns as in `FORCE_COLUMNS`."""
+    rows: list[tuple[str, ...]] = []
+    for line, (force, damping) in _forces(found):
+        F, c = line.F_static, line.c_d
+        left = (line.mode, _text(line.supply / 1e6, 1), _text(F.value), _width(F, 1.0, 1))
+        right = (_text(c.value), _width(c, 1.0, 1), _text(damping), _text(line.r2, 3))
+        rows.append((*left, _text(force), *right))
+    return rows
 
 
 def check_rows(found: Characteristics) -> list[tuple[str, ...]]:
-    """How well the fitted model predicts moving logs."""
-    return [(name, f"{r2:.4f}", f"{rms:.1f} N") for name, (r2, rms) in found.check.items()]
+    """How well the fitted model predicts moving logs; columns as in `CHECK_COLUMNS`."""
+    return [(name, _text(r2, 4), _text(rms, 1)) for name, (r2, rms) in found.check.items()]
 
 
 def _rises(found: Characteristics) -> list[tuple[str, float, Estimate, float]]:
@@ -113,5 +108,10 @@ def _forces(found: Characteristics) -> list[tuple[Any, tuple[float | None, float
     ]
 
 
-def _interval(e: Estimate, scale: float = 1.0) -> str:
-    return f"{scale * e.low:.1f} .. {scale * e.high:.1f}" if e.low == e.low else ""
+def _text(value: float | None, digits: int = 0) -> str:
+    return "" if value is None else f"{round(value, digits) + 0.0:.{digits}f}"
+
+
+def _width(e: Estimate, scale: float, digits: int) -> str:
+    """Half the interval; nothing where too few data tell."""
+    return _text(0.5 * scale * (e.high - e.low), digits) if e.low == e.low else ""

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from plant.scripts import drop, jump, planning
 
 from kemba.effects.ground import GroundCompliance, GroundFriction
-from kemba.plant import simulate
+from kemba.plant import Commands, Profile, run, simulate
 from kemba.plant.equations import equations_of
 from kemba.plant.events import CLOSED, Advance
 from kemba.plant.replay import peak
@@ -112,3 +112,21 @@ def test_a_compliant_floor_pushes_only_and_carries_the_weight() -> None:
     assert np.abs(landing["body/z"] - drop().trajectory["body/z"])[:220].max() < 1e-3
     standing = simulate(model, duration=0.6)
     assert standing["front/foot/z"][-1] == pytest.approx(-0.5 * WEIGHT / 2e4, rel=0.02)
+
+
+@settings(max_examples=8, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_tumbling_with_random_valves_and_torques_stays_physical(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    start = {"body/z": rng.uniform(0.45, 0.6), "body/pitch": rng.normal(0.0, 0.4)}
+    start |= {"body/vx": rng.normal(), "body/vz": rng.normal(-1.0), "body/pitch_rate": rng.normal()}
+    for leg in LEGS:
+        start |= {f"{leg}/piston/x": rng.uniform(0.0, 0.07), f"{leg}/hip/w": rng.normal(0.0, 8.0)}
+    times = np.arange(0.0, 0.15, 0.02)
+    inputs = {
+        q.name: Profile.of(times, rng.integers(0, 2, 8) if q.binary else rng.normal(0, 8, 8))
+        for q in planning().inputs.values()
+    }
+    done = run(planning(), start, Commands(inputs), 0.15, 2e-4)
+    assert penetration(done.trajectory) < 2e-5
+    assert all(impact.lost >= -1e-9 for impact in done.impacts)

@@ -23,7 +23,9 @@ Flags = np.ndarray[Any, np.dtype[np.bool_]]
 PRESSURES = ("chamber/extend/P", "chamber/retract/P")
 GAP, FORGET = 0.012, 0.12  # s
 NEIGHBOURS = 9  # samples over which the worst error of the velocity counts
-DAMPING, FRICTION = 60.0, 10.0  # N.s.m-1, N: usual figures of a cylinder of this size
+# usual figures of a cylinder of this size: N.s.m-1, N; and what friction adds below CREEP m.s-1
+DAMPING, FRICTION = 60.0, 10.0
+CREEPING, CREEP = 200.0, 0.08
 
 
 @dataclass(frozen=True)
@@ -44,7 +46,8 @@ class Run:
         usual size where the direction of motion is in doubt. Alike for every hypothesis."""
         v, sigma = self.motion.v, maximum_filter1d(self.motion.v_sigma, NEIGHBOURS)
         high, low = np.tanh((v + 2 * sigma) / V_COULOMB), np.tanh((v - 2 * sigma) / V_COULOMB)
-        return np.asarray(DAMPING * self.motion.v_sigma + 0.5 * FRICTION * (high - low))
+        slope = DAMPING + CREEPING * np.exp(-((v / CREEP) ** 2))
+        return np.asarray(slope * self.motion.v_sigma + 0.5 * FRICTION * (high - low))
 
 
 def prepare(name: str, log: Trajectory) -> Run:

@@ -50,9 +50,7 @@ class Schedule:
         return np.hstack([feet.reshape(len(feet), -1), self.rests])
 
 
-def read_schedule(
-    time: Array, feet: Array, pistons: Array, stroke: float, body: Array
-) -> Schedule:
+def read_schedule(time: Array, feet: Array, pistons: Array, stroke: float, body: Array) -> Schedule:
     """The schedule of one run from feet (n, legs, [x, z]), pistons (n, legs) and body (n, k)."""
     dt = max(float(np.median(np.diff(time))), 1e-4)
     feet_rate, piston_rate = slope(feet, dt), slope(pistons, dt)

@@ -72,7 +72,9 @@ class Linearised:
 
     def extend(self, g: Array) -> Array:
         """`g` (n, L, k, c) with the feet's places, which nothing pushes."""
-        return np.concatenate([g, np.zeros((*g.shape[:2], 3 * self.normal.shape[2], g.shape[3]))], 2)
+        return np.concatenate(
+            [g, np.zeros((*g.shape[:2], 3 * self.normal.shape[2], g.shape[3]))], 2
+        )
 
     def penetration(self, softness: float, d: float) -> Array:
         """Depth (n, L, places) of the feet in a floor of stiffness 1/softness."""
@@ -118,7 +120,9 @@ def linearise(
     mid = (mid[0], mid[1], mid[2] + batch.flat(shift))
     stiffness = (batch.deep(a) for a in physics.call("stiffness", *mid, s, u, p=p))
     A_q, A_v = (-inverse @ a for a in stiffness)
-    less_grip = (slip[..., None] * np.maximum(normal, 0.0)[..., None] * Jf[..., 0::2, :]).sum(axis=2)
+    less_grip = (slip[..., None] * np.maximum(normal, 0.0)[..., None] * Jf[..., 0::2, :]).sum(
+        axis=2
+    )
 
     h = batch.h[..., None, None]
     F, G = integrator(batch.h, k, 3 * legs)
@@ -155,8 +159,22 @@ def linearise(
     inverse = np.where(ends[..., None, None], 0.0, inverse)
     masses = batch.deep(physics.call("masses", *mid)[0])
     return Linearised(
-        ref, mid, states, system, inverse, contact, normal, y, rate,
-        np.concatenate([feet, y[..., k - legs :]], axis=2), -feet_rate[..., 1::2], masses, less_grip, shift, (A_q, A_v), channels,
+        ref,
+        mid,
+        states,
+        system,
+        inverse,
+        contact,
+        normal,
+        y,
+        rate,
+        np.concatenate([feet, y[..., k - legs :]], axis=2),
+        -feet_rate[..., 1::2],
+        masses,
+        less_grip,
+        shift,
+        (A_q, A_v),
+        channels,
     )
 
 

@@ -87,7 +87,9 @@ class Physics:
 
     def knees(self, pistons: Array) -> Array:
         """Knee coordinates (n, legs) of piston extensions (n, legs)."""
-        return np.column_stack([np.interp(pistons[:, i], *self._knee(i)) for i in range(len(self.legs))])
+        return np.column_stack(
+            [np.interp(pistons[:, i], *self._knee(i)) for i in range(len(self.legs))]
+        )
 
     def _knee(self, i: int) -> tuple[Array, Array]:
         """Piston extension and knee angle on a fine grid, the extension increasing."""

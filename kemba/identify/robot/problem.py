@@ -86,7 +86,7 @@ class RobotProblem:
         }
         self.nuisance: dict[str, tuple[float, float]] = dict(self.physics.nuisance)
         self.relinearise({})
-        self.nuisance |= {n: (0.0, SHARE) for n in self.physics.masses}
+        self.nuisance |= dict.fromkeys(self.physics.masses, (0.0, SHARE))
 
     def relinearise(self, base: Theta) -> None:
         """Smooth and linearise anew with the model at `base`."""
@@ -161,9 +161,7 @@ class RobotProblem:
     def pick(self, columns: Array, runs: Collection[int] | None = None) -> Array:
         """(n, L, m, ...) -> rows: run by run, channel by channel, in the order of time."""
         chosen = range(len(self.runs)) if runs is None else runs
-        return np.concatenate(
-            [columns[:, i].swapaxes(0, 1)[self._mask[:, i].T] for i in chosen]
-        )
+        return np.concatenate([columns[:, i].swapaxes(0, 1)[self._mask[:, i].T] for i in chosen])
 
     def residual(self, theta: Theta, runs: Collection[int] | None = None) -> Array:
         """Whitened (predicted - measured), rows as `rows` describes them."""
@@ -193,8 +191,8 @@ class RobotProblem:
         if name in self.physics.moving or name in DELAYS:
             return False
         lead = any(name == c.key for c in self.candidates.values())
-        return name in self._linear or name in self.physics.names and (
-            lead or name in self.nuisance
+        return name in self._linear or (
+            name in self.physics.names and (lead or name in self.nuisance)
         )
 
     def _direct(self, theta: Theta, names: Sequence[str]) -> dict[str, Array]:
@@ -220,7 +218,8 @@ class RobotProblem:
     def rows(self, runs: Collection[int] | None = None) -> Rows:
         """What each row of `residual` is."""
         chosen = list(range(len(self.runs)) if runs is None else runs)
-        return describe(self.physics, self.batch, self.plan, self.point.states[1], self._mask, chosen)
+        inputs = self.point.states[1]
+        return describe(self.physics, self.batch, self.plan, inputs, self._mask, chosen)
 
     def expected_power(self) -> Array:
         """Mean square (n,) that each row would have if the model were right."""

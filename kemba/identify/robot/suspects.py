@@ -54,5 +54,3 @@ def ground_of(model: Model) -> tuple[float, dict[str, float]]:
 def without_delay(name: str, value: float) -> float:
     """A lag too short to matter as the model should have it: none."""
     return SHORTEST if name in LAGS and value < LAGS[name] else value
-
-

@@ -1,4 +1,4 @@
-"""What is never exactly as drawn: nominal figures that every fit leaves free within a few percent."""
+"""What is never exactly as drawn: nominal figures that every fit leaves free by a few percent."""
 
 from __future__ import annotations
 

@@ -44,9 +44,13 @@ def read_phases(
     plan: Trajectory,
     valves: np.ndarray,
     marks: Sequence[int],
+    trim: bool = False,
 ) -> list[Phase]:
-    """Phases of a plan with `valves` (rows, n); a phase ends at every node of `marks` too."""
-    modes = np.column_stack([_modes(model, c, plan) for c in constraints])
+    """Phases of a plan with `valves` (rows, n); a phase ends at every node of `marks` too.
+
+    `trim`: a foot that slides under little load has left the ground.
+    """
+    modes = np.column_stack([_modes(model, c, plan, trim) for c in constraints])
     same = (modes[1:] == modes[:-1]).all(axis=1) & (valves[1:] == valves[:-1]).all(axis=1)
     borders = sorted({0, len(plan) - 1, *(np.flatnonzero(~same[1:]) + 1).tolist(), *marks})
     rows = zip(borders[:-1], borders[1:], strict=True)
@@ -56,7 +60,7 @@ def read_phases(
     ]
 
 
-def _modes(model: Model, constraint: Constraint, plan: Trajectory) -> np.ndarray:
+def _modes(model: Model, constraint: Constraint, plan: Trajectory, trim: bool) -> np.ndarray:
     """Mode of a constraint at every row (rows,)."""
     x, node = arrays(model, plan), model.node
     names = [constraint.gap]
@@ -75,6 +79,8 @@ def _modes(model: Model, constraint: Constraint, plan: Trajectory) -> np.ndarray
         for a, b in _runs(modes):
             if b - a <= BRIEF and light[a:b].all():
                 modes[a:b] = OPEN
+        if trim:
+            modes[light & slides] = OPEN
         closed = modes == HELD
         modes[closed & slides] = np.where(values[1] > 0, AHEAD, BACK)[closed & slides]
     return np.asarray(modes)

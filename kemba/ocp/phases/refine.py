@@ -113,13 +113,14 @@ def build(
     plan: Trajectory,
     reduction: Reduction,
     scheme: Scheme,
+    trim: bool = False,
 ) -> tuple[Program, np.ndarray]:
     """The program of a plan's phases and its start. Raises ValueError for other models."""
     constraints = read_constraints(model, reduction)
     valves = np.round(reduction.restrict("u", arrays(model, plan)["u"]))[:, _binary(model, reduction)]
     last = len(plan) - 1
     marks = [wish.node(last) for wish in wishes if wish.at is not None]
-    phases = read_phases(model, constraints, plan, valves, marks)
+    phases = read_phases(model, constraints, plan, valves, marks, trim)
     program = Program(model, task, reduction, phases, constraints, scheme)
     x = start_vector(program, plan)
     first, end = program.columns.first, program.columns.end(last)

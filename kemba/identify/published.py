@@ -1,0 +1,67 @@
+"""What the paper's own tables already tell: friction, a supply that falls short, tube volume.
+
+Table II gives the steady force of a cylinder of known area at known pressure; what is missing to
+pressure times area is physics that eq. 4 to 7 have no name for. Table I gives how rise times grow
+with the volume to be filled; where the line through them meets zero is the volume of the tubes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from kemba.effects.numbers import AREA_E, AREA_R
+from kemba.identify.problem import Array
+from kemba.plant.tables import PAPER_FORCE, PAPER_RISE
+
+STROKE = 0.070  # m
+AREAS = {"extend": AREA_E, "retract": -AREA_R, "both": AREA_E - AREA_R}
+
+
+@dataclass(frozen=True)
+class Published:
+    """Losses [N] by mode at `pressures` [Pa]; what they and the rise times imply."""
+
+    pressures: Array
+    losses: dict[str, Array]
+    seal_friction: tuple[float, float]  # N, smallest and largest
+    shortfall: dict[str, Array]  # share of the supply that is missing while air flows
+    dead_volume: dict[str, float]  # m3, by filling and venting
+
+    @property
+    def sentence(self) -> str:
+        low, high = self.seal_friction
+        growing = ", ".join(
+            f"{mode} {100 * s[0]:.0f} to {100 * s[-1]:.0f} %" for mode, s in self.shortfall.items()
+        )
+        volumes = sorted(1e6 * v for v in self.dead_volume.values())
+        return (
+            f"Tables I and II imply seal friction of {low:.0f} to {high:.0f} N, a supply that falls "
+            f"short as it is drawn from ({growing} from 0.6 to 0.8 MPa), and tubes of "
+            f"{volumes[0]:.0f} to {volumes[-1]:.0f} cm3 beside the stroke of "
+            f"{1e6 * AREA_E * STROKE:.0f} cm3."
+        )
+
+
+def published() -> Published:
+    """The findings, computed from Tables I and II."""
+    pressures = np.array(sorted({p for mode, p in PAPER_FORCE if mode == "extend"}))
+    losses = {
+        mode: np.array([abs(p * area) - abs(PAPER_FORCE[mode, p][0]) for p in pressures])
+        for mode, area in AREAS.items()
+    }
+    # With both valves on the chambers' shortfalls cancel nearly; at 0.6 MPa nothing falls short.
+    bare = np.array([*losses["both"], losses["extend"][0], losses["retract"][0]])
+    friction = float(np.median(bare))
+    shortfall = {
+        mode: np.maximum(losses[mode] - friction, 0.0) / (pressures * abs(AREAS[mode]))
+        for mode in ("extend", "retract")
+    }
+    volume = {
+        name: AREA_E * STROKE / (full / empty - 1.0) for name, (empty, full) in PAPER_RISE.items()
+    }
+    spread = np.percentile(bare, [25, 75])
+    return Published(
+        pressures, losses, (float(spread[0]), float(spread[1])), shortfall, volume
+    )

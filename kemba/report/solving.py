@@ -1,0 +1,87 @@
+"""`solve` as a whole: plan, execute on the fine simulation, write the run folder."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from kemba.config import Document, dump_yaml
+from kemba.errors import KembaError
+from kemba.ocp import Plan, Task, controller_table, plan
+from kemba.ocp.ipopt import Watch
+from kemba.ocp.report import answer
+from kemba.ocp.starts import plan_best
+from kemba.plant.certificate import replays, sentence
+from kemba.runs import RunFolder, write_json
+from kemba.trajectory import Trajectory
+
+WORTH_REPLAYING = ("solved", "acceptable")
+
+
+@dataclass(frozen=True)
+class Listener:
+    """Who hears about stages and iterations, and who may ask to stop."""
+
+    tell: Callable[[str], None] = lambda text: None
+    watch: Watch | None = None
+    stop: Callable[[], bool] | None = None
+
+
+def solve_into(
+    folder: RunFolder,
+    task: Task,
+    document: Document,
+    listener: Listener,
+    start: Trajectory | None = None,
+    starts: int = 1,
+    jobs: int | None = None,
+    replay: bool = True,
+    figure: bool = True,
+) -> dict[str, Any]:
+    """Solve `task` and fill its run folder; returns the JSON of `solve`.
+
+    `start`: a trajectory to go on from; `starts`, `jobs`: several guesses on the cores; `replay`:
+    execute the plan on the same model and on the plant. The manifest says `failed` when this
+    raises.
+    """
+    dump_yaml(task.model_dump(exclude_none=True), folder / "task.yaml")
+    log = folder / "solver.log"
+    try:
+        if starts > 1 and start is None:
+            found = plan_best(task, document, starts, jobs, log, listener.tell)
+        else:
+            how = {"tell": listener.tell, "watch": listener.watch, "stop": listener.stop}
+            found = plan(task, document, log=log, start=start, **how)  # type: ignore[arg-type]
+        result = answer(found, str(folder.path))
+        if replay and found.status in WORTH_REPLAYING:
+            listener.tell("replay")
+            result |= _replayed(found)
+        _write(found, result, folder, figure)
+    except BaseException:
+        folder.finish("failed")
+        raise
+    folder.finish(found.status, sentence=result["sentence"])
+    return result
+
+
+def _replayed(found: Plan) -> dict[str, Any]:
+    table = controller_table(found.model, found.trajectory)
+    try:
+        executed = replays(found.model, found.trajectory, table)
+    except KembaError as error:  # a model that the simulator cannot execute still has its plan
+        return {"sentence": f"{found.sentence}; no replay: {error}"}
+    return {**executed, "sentence": f"{found.sentence}; {sentence(executed['replay'])}"}
+
+
+def _write(found: Plan, result: dict[str, Any], folder: RunFolder, figure: bool) -> None:
+    write_json(folder / "certificate.json", result)
+    if not found.attempts:
+        return  # refused before solving: there is no motion to write
+    found.trajectory.write(folder / "trajectory.csv")
+    controller_table(found.model, found.trajectory).write(folder / "controller.csv")
+    if figure:
+        from kemba import plotting
+
+        sources = plotting.load_sources([folder.path])
+        plotting.save_figure(plotting.draw(sources), folder / "figure.png")
