@@ -93,6 +93,7 @@ def main() -> None:
     parser.add_argument("--nulls", type=int, default=60)
     parser.add_argument("--out", type=Path, default=Path("bench.jsonl"))
     parser.add_argument("--share", default="0/1", help="i/n: every n-th case only")
+    parser.add_argument("--write", action="store_true", help="put the report into the docs")
     options = parser.parse_args()
     done = {json.dumps(r["case"], sort_keys=True) for r in report.read(options.out)}
     part, parts = (int(p) for p in options.share.split("/"))
@@ -101,7 +102,10 @@ def main() -> None:
             record = run(setting)
             report.append(options.out, record)
             print(report.line(record), flush=True)
-    print(report.table(report.read(options.out)))
+    text = report.table(report.read(options.out))
+    print(text)
+    if options.write:
+        report.write(ROOT / "docs" / "discovery.md", "bench", text)
 
 
 if __name__ == "__main__":

@@ -135,6 +135,14 @@ def table(records: Sequence[Record]) -> str:
     return "\n".join([*head, *rows, "", *misses(records)])
 
 
+def write(page: Path, name: str, text: str) -> None:
+    """Replace the generated section `name` of a page."""
+    old = page.read_text(encoding="utf-8")
+    begin = old.index("-->", old.index(f"<!-- {name}:")) + 3
+    end = old.index(f"<!-- end of {name} -->")
+    page.write_text(f"{old[:begin]}\n{text}\n{old[end:]}", encoding="utf-8")
+
+
 def misses(records: Iterable[Record]) -> list[str]:
     """Hidden and answered, by pair, most frequent first."""
     wrong = Counter(

@@ -12,6 +12,8 @@ from scipy.stats import chi2, false_discovery_control
 from kemba.identify.compare_hints import Hint, hints
 from kemba.identify.problem import Array, Problem, Rows
 
+Index = np.ndarray[Any, np.dtype[np.int_]]
+
 FEWEST = 5  # grains that make a cell
 TOLERATED = 1.15  # error ratio that a good model may have: nobody's nominal figures are exact
 FALSE_DISCOVERIES = 0.01
@@ -92,7 +94,7 @@ def _expected(problem: Problem, count: int) -> Array:
     return np.asarray(power()) if power else np.ones(count)
 
 
-def grains(rows: Rows, r: Array, expected: Array, size: int) -> tuple[Array, Array]:
+def grains(rows: Rows, r: Array, expected: Array, size: int) -> tuple[Array, Index]:
     """Sums of `size` successive rows of one run, channel, phase and mode over what noise would
     make of them (k,), and the first row of each (k,).
 
@@ -124,7 +126,7 @@ def measured_units(rows: Rows) -> dict[str, str]:
 
 
 def _channels(
-    problem: Problem, rows: Rows, r: Array, z: Array, members: Array
+    problem: Problem, rows: Rows, r: Array, z: Array, members: Index
 ) -> Iterable[ChannelError]:
     windows = getattr(problem, "window_errors", None)
     errors = windows({}) if windows else {}
@@ -143,7 +145,7 @@ def _channels(
         )
 
 
-def _cells(rows: Rows, z: Array, members: Array) -> Iterable[Cell]:
+def _cells(rows: Rows, z: Array, members: Index) -> Iterable[Cell]:
     """Every channel, phase and mode with enough data; q values over all of them."""
     channel, phase, mode = (a[members] for a in (rows.channel, rows.phase, rows.mode))
     found = []

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kemba.effects.numbers import AREA_E, AREA_R
+from kemba.effects.air import AREA_E, AREA_R
 from kemba.identify.problem import Array
 from kemba.plant.tables import PAPER_FORCE, PAPER_RISE
 

@@ -74,7 +74,7 @@ def with_forces(problem: RobotProblem, density: Array, sigma: Array) -> System:
     """The filter's system with a lagged force of strength `sigma` (k,) per channel as states."""
     base = problem.point.system_with(density, problem.batch.h)
     h, k = problem.batch.h, len(sigma)
-    n, runs, d, m = *base.F.shape[:3], base.H.shape[2]
+    n, runs, m, d = base.H.shape
     pushes = problem.point.channels[..., :k]  # generalised force per channel force
     F = np.zeros((n, runs, d + k, d + k))
     F[..., :d, :d] = base.F

@@ -10,13 +10,13 @@ from kemba.ocp.schedule import SWITCHING, TIGHT, VALVE, Search, settle, warm
 from kemba.trajectory import Trajectory
 
 REACH = 4  # nodes by which a switch may move at a time
-ROUNDS = 3
+ROUNDS = {True: 3, False: 1}  # half a robot; a whole one takes five times as long
 PAYS = 0.02  # relative fall of the cost that makes another round worth while
 
 
 def polish(search: Search, point: Point) -> Point:
     """Release every valve switch by a few nodes and round again, as long as the cost falls."""
-    for _ in range(ROUNDS):
+    for _ in range(ROUNDS[search.transcription.reduction.symmetric]):
         free = _release(search, point)
         how = {"options": warm(1e-3, tol=1e-3), "free": free}
         parameters = Parameters(TIGHT, VALVE, SWITCHING / 5)

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import numpy as np
-
+from kemba.effects.air import AREA_E, AREA_R, ATMOSPHERE
 from kemba.identify.problem import Array
 
-BORE, ROD = 0.025, 0.010  # m
-AREA = {"extend": np.pi / 4 * BORE**2, "retract": np.pi / 4 * (BORE**2 - ROD**2)}
-ATMOSPHERE = 101325.0
+AREA = {"extend": AREA_E, "retract": AREA_R}
 
 
 def absolute_pressure(channel: str, states: Mapping[str, Array]) -> Array:

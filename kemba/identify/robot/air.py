@@ -1,4 +1,4 @@
-"""Effect states along measured motion: chambers, hoses, supply, motors; exact switching instants."""
+"""Effect states along measured motion: chambers, hoses, supply, motors; exact switching."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 from kemba.identify.robot.track import Track
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
+Index = np.ndarray[Any, np.dtype[np.int_]]
 
 SETTLING = np.full(40, 0.01)  # s: steps at the first command before the log starts
 
@@ -61,7 +62,7 @@ def _mean_growth(h: ca.SX, slope: ca.SX, stiff: ca.SX) -> ca.SX:
     return h * slope * ca.if_else(small, 0.5 + z / 6, (ca.exp(z) - 1 - z) / safe**2)
 
 
-def substeps(track: Track, delays: Array) -> tuple[Array, Array, Array]:
+def substeps(track: Track, delays: Array) -> tuple[Array, Array, Index]:
     """(times (N + 1,), valves (valves, N), index of each node) with a time at every switching.
 
     `delays` (valves, 2): seconds from the command to switching on and off. As many times come back

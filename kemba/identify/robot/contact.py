@@ -56,7 +56,7 @@ def read_schedule(time: Array, feet: Array, pistons: Array, stroke: float, body:
     feet_rate, piston_rate = slope(feet, dt), slope(pistons, dt)
     speed = np.abs(slope(body, dt)).max(axis=1)
     blur, settle = max(1, round(BLUR / dt)), max(1, round(SETTLED / dt))
-    legs: list[tuple[Array, ...]] = []
+    legs: list[tuple[Any, ...]] = []
     for i in range(feet.shape[1]):
         z, vx, vz = feet[:, i, 1], feet_rate[:, i, 0], feet_rate[:, i, 1]
         level = ground_level(z, vz)
@@ -127,8 +127,8 @@ def stop_levels(x: Array, stroke: float) -> tuple[float, float]:
 
 
 def _dilate(flags: Flags, steps: int) -> Flags:
-    return binary_dilation(flags, np.ones(2 * steps + 1, bool))
+    return np.asarray(binary_dilation(flags, np.ones(2 * steps + 1, bool)))
 
 
 def _erode(flags: Flags, steps: int) -> Flags:
-    return binary_erosion(flags, np.ones(2 * steps + 1, bool), border_value=1)
+    return np.asarray(binary_erosion(flags, np.ones(2 * steps + 1, bool), border_value=1))

@@ -29,7 +29,7 @@ def expected_power(system: System, gain: Gains, seed: int = 0) -> Array:
     padded = np.pad(power, ((width // 2, width // 2), (0, 0), (0, 0)), mode="edge")
     total = np.cumsum(padded, axis=0)
     total = np.concatenate([np.zeros((1, *total.shape[1:])), total])
-    return np.maximum((total[width:] - total[:-width]) / width, 0.02)
+    return np.asarray(np.maximum((total[width:] - total[:-width]) / width, 0.02))
 
 
 def predicted_error(system: System, y: Array, g: Array, steps: int) -> Array:

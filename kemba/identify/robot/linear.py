@@ -98,7 +98,7 @@ def linearise(
     k, legs = physics.mechanism.n, len(physics.legs)
     mid = tuple(batch.flat(a) for a in ref.middle(batch.h))
     s, u = (batch.flat(a) for a in states)
-    inverse = batch.deep(np.linalg.inv(physics.call("mass", *mid, s, u, p=p)[0]))
+    inverse = batch.deep(np.asarray(np.linalg.inv(physics.call("mass", *mid, s, u, p=p)[0])))
     force = batch.deep(physics.call("residual", *mid, s, u, p=p)[0])
     at_nodes = [batch.flat(ref.q), batch.flat(ref.v)]
     y, rate, Jy = (batch.deep(a) for a in physics.call("measured", *at_nodes))
@@ -180,7 +180,7 @@ def linearise(
 
 def scatter(pushed: Array, density: Array, h: Array) -> Array:
     """Covariance (n, L, k, k) of the acceleration over a step that unknown forces make."""
-    return (pushed * (density / h[..., None])[..., None, :]) @ pushed.swapaxes(-1, -2)
+    return np.asarray((pushed * (density / h[..., None])[..., None, :]) @ pushed.swapaxes(-1, -2))
 
 
 def contact_force(

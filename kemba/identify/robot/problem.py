@@ -69,7 +69,7 @@ class RobotProblem:
         found = robot_candidates(model)
         effects = in_the_air(found)
         grip, self._soft = ground_of(model)
-        free = tuple(key for c in effects for key in c.keys())
+        free = tuple(key for c in effects for key, _ in c.keys().items())
         self.physics = Physics(extended(model, effects), free, grip)
         channels, legs = self.physics.channels, self.physics.legs
         names = [str(log.meta.get("name", i)) for i, log in enumerate(logs)]

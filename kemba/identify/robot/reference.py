@@ -146,7 +146,8 @@ def air_states(
     physics: Physics, batch: Batch, ref: Reference, p: Array, delays: Array
 ) -> tuple[Array, Array]:
     """Effect states (n, L, ns) and inputs (n, L, nu), both the mean over each step."""
-    states, inputs = [], []
+    states: list[Array] = []
+    inputs: list[Array] = []
     for i, track in enumerate(batch.tracks):
         n = len(track.time)
         times, valves, index = substeps(track, delays)
@@ -157,8 +158,8 @@ def air_states(
         u = physics.arrange(track.torque[held].T, valves)
         k = len(SETTLING)
         lead = [np.repeat(a[:, :1], k, axis=1) for a in (q, 0 * v, u)]
-        joined = [np.hstack(pair) for pair in zip(lead, (q, v, u), strict=True)]
-        s = physics.states.run(np.append(SETTLING, h), *joined, p[physics.moves])[:, k:]
+        q, v, led = (np.hstack(pair) for pair in zip(lead, (q, v, u), strict=True))
+        s = physics.states.run(np.append(SETTLING, h), q, v, led, p[physics.moves])[:, k:]
         width = np.append(np.diff(track.time), 1.0)
         for values, store in ((s, states), (u, inputs)):
             sums = np.add.reduceat(np.append(values * h, 0 * values[:, :1], axis=1), index, axis=1)
@@ -170,4 +171,4 @@ def _at(time: Array, values: Array, times: Array) -> Array:
     """Linear interpolation of (n, k) at times: (k, m)."""
     right = np.clip(np.searchsorted(time, times), 1, len(time) - 1)
     share = ((times - time[right - 1]) / (time[right] - time[right - 1]))[:, None]
-    return (values[right - 1] + share * (values[right] - values[right - 1])).T
+    return np.asarray((values[right - 1] + share * (values[right] - values[right - 1])).T)

@@ -27,4 +27,4 @@ def sensed(
             seen[:n, j, i] = curve(np.maximum(track.time - delay, start))
         seen[..., i] *= 1.0 + theta.get(f"sensor_scale:{channel}.k", 0.0)
         seen[..., i] += theta.get(f"sensor_bias:{channel}.b", 0.0)
-    return seen
+    return np.asarray(seen)

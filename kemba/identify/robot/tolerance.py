@@ -69,7 +69,7 @@ def with_tolerances(model: Model) -> tuple[Model, ca.SX, dict[str, tuple[float, 
     nuisance: dict[str, tuple[float, float]] = {}
     if any(e.kind == "chamber" or "F_e" in e.states() for e in model.effects):
         for leg in model.mechanism.legs:
-            tolerance = AirTolerance(on=leg)  # type: ignore[arg-type]
+            tolerance = AirTolerance.model_validate({"on": leg})
             effects.append(tolerance)
             for name, param in tolerance.parameters().items():
                 nuisance[f"{tolerance.name}.{name}"] = (0.0, param.size)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -19,6 +20,7 @@ CLOSED = 1e-6  # m
 SLIDES = 0.05  # m.s-1
 LIGHT = 0.1  # of body weight; a foot that bears less for a step or two does not stand
 BRIEF = 2  # steps
+HOP = 5e-3  # m; a foot that rises less for a step or two stays down
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,7 @@ def read_phases(
     `trim`: a foot that slides under little load has left the ground.
     """
     modes = np.column_stack([_modes(model, c, plan, trim) for c in constraints])
+    _valves_first(modes, valves)
     same = (modes[1:] == modes[:-1]).all(axis=1) & (valves[1:] == valves[:-1]).all(axis=1)
     borders = sorted({0, len(plan) - 1, *(np.flatnonzero(~same[1:]) + 1).tolist(), *marks})
     rows = zip(borders[:-1], borders[1:], strict=True)
@@ -81,9 +84,27 @@ def _modes(model: Model, constraint: Constraint, plan: Trajectory, trim: bool) -
                 modes[a:b] = OPEN
         if trim:
             modes[light & slides] = OPEN
-        closed = modes == HELD
+        _fill_hops(modes, values[0])
+        closed = modes != OPEN
         modes[closed & slides] = np.where(values[1] > 0, AHEAD, BACK)[closed & slides]
     return np.asarray(modes)
+
+
+def _fill_hops(modes: np.ndarray, gap: np.ndarray) -> None:
+    """Keep feet down that rise a little and briefly between two stances."""
+    runs = _runs(modes)
+    for (_, a), (b, _) in itertools.pairwise(runs):
+        if b - a <= BRIEF and gap[a:b].max() < HOP:
+            modes[a:b] = HELD
+
+
+def _valves_first(modes: np.ndarray, valves: np.ndarray) -> None:
+    """Where modes and valves change at one node, let the modes follow a step later: the
+    program shall be free to tell one from the other."""
+    for k in range(2, len(modes) - 1):
+        both = (modes[k] != modes[k - 1]).any() and (valves[k] != valves[k - 1]).any()
+        if both and (modes[k + 1] == modes[k]).all():
+            modes[k] = modes[k - 1]
 
 
 def _runs(modes: np.ndarray) -> list[tuple[int, int]]:

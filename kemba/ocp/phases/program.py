@@ -19,7 +19,8 @@ from kemba.ocp.phases.radau import STATE, Scheme, element, impact, width
 from kemba.ocp.task import Task
 
 INF = np.inf
-SHORT, LONG = 0.15, 2.5  # times the nominal step: bounds of an element
+SLACK = 0.01  # of a state's range: a vented chamber stays exactly at its bound
+SHORT, LONG = 0.03, 2.5  # times the nominal step: bounds of an element
 
 
 class Columns:
@@ -148,10 +149,12 @@ class Program:
 
         for g in STATE:
             put(c.first[g], g)
+        vented = layout.lower[layout.slices["s"]] - SLACK * layout.upper[layout.slices["s"]]
         for e, stages in enumerate(c.stages):
             for stage in stages:
                 for g in STATE:
                     put(stage[g], g)
+                lower[stage["s"]] = vented
                 self._forces(lower, upper, stage["lam"], self.phases[c.phase_of[e]].modes)
             put(c.u[e], "u")
         nominal = self.task.duration / self.nodes / layout.scale[layout.slices["h"]]

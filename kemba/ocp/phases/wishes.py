@@ -29,7 +29,7 @@ def add_wishes(
         g = view.of(quantity_expression(program.model, wish.quantity.name))
         z = view.z("q v s u lam")
         key = (wish.at, str(g), wish.lower, wish.upper)
-        if ca.jacobian(g, z).nnz() == 0 or key in seen:
+        if ca.jacobian(g, z).nnz() == 0 or key in seen or _about_valves(program, view, g):
             continue
         seen.add(key)
         last = program.nodes
@@ -40,6 +40,14 @@ def add_wishes(
             if moment is not None and not moment.adds(g, view):
                 continue
         _put(program, view, wish, g, list(nodes))
+
+
+def _about_valves(program: Program, view: View, g: ca.SX) -> bool:
+    """Whether a wish is about valves alone: phases keep them as the plan has them."""
+    inputs = view.layout.slices["u"].start
+    valves = [view.symbols["u"][c - inputs] for c in view.layout.binary]
+    own = {str(symbol) for symbol in ca.symvar(g)}
+    return own <= {str(symbol) for symbol in valves}
 
 
 def _put(program: Program, view: View, wish: Wish, g: ca.SX, nodes: list[int]) -> None:

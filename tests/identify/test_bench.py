@@ -1,0 +1,124 @@
+"""The bench problem: prediction, event times, chambers, and the loop from logs to a model."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from kemba.effects import BY_KIND
+from kemba.effects.base import Effect
+from kemba.identify.adopt import adopt_effect
+from kemba.identify.bench import bench_problem
+from kemba.identify.bench.switching import delayed, is_on, pulses
+from kemba.identify.experiment import propose
+from kemba.identify.published import published
+from kemba.identify.workflow import discover_logs
+from kemba.model.spec import load_model, load_spec
+from kemba.trajectory import Trajectory
+
+BenchLog = Callable[..., Trajectory]
+
+
+def effect(kind: str, **values: float) -> Effect:
+    return BY_KIND[kind](**values)  # type: ignore[arg-type]
+
+
+def test_the_true_model_leaves_white_noise(bench_log: BenchLog) -> None:
+    problem = bench_problem([bench_log()], load_model(rig=True))
+    r = problem.residual({})
+    assert np.sqrt(np.mean(r[200:] ** 2)) == pytest.approx(1.0, abs=0.1)
+    assert len(problem.rows()) == len(r)
+
+
+@pytest.mark.parametrize(
+    ("kind", "values"),
+    [
+        ("hose_lag", {"T": 0.004}),
+        ("supply_droop", {"D": 0.05, "T": 0.3}),
+        ("valve_delay", {"dt": 0.002}),
+        ("pressure_friction", {"mu": 0.04}),
+    ],
+)
+def test_effects_join_by_theta(bench_log: BenchLog, kind: str, values: dict[str, float]) -> None:
+    log = bench_log((effect(kind, **values),), seed=3)
+    problem = bench_problem([log], load_model(rig=True))
+    theta = {f"{kind}.{name}": value for name, value in values.items()}
+    with_it, without = problem.residual(theta), problem.residual({})
+    assert np.mean(with_it[200:] ** 2) < 1.3
+    assert np.mean(without[200:] ** 2) > 2 * np.mean(with_it[200:] ** 2)
+
+
+def test_a_delay_has_a_slope(bench_log: BenchLog) -> None:
+    problem = bench_problem([bench_log()], load_model(rig=True))
+    small = (problem.residual({"valve_delay.dt": 1e-5}) - problem.residual({})) / 1e-5
+    large = (problem.residual({"valve_delay.dt": 1e-4}) - problem.residual({})) / 1e-4
+    assert np.linalg.norm(small) > 0
+    assert np.linalg.norm(small - large) < 0.5 * np.linalg.norm(large)
+
+
+def test_switching_instants_merge_when_pulses_overlap() -> None:
+    time = np.arange(100) / 1e3
+    sent = ((time >= 0.010) & (time < 0.030) | (time >= 0.032)).astype(float)
+    acting = delayed(pulses(time, sent), 0.006, 0.010)
+    assert acting.tolist() == [[pytest.approx(0.016), np.inf]]
+    assert is_on(acting, np.array([0.0159, 0.0161])).tolist() == [0.0, 1.0]
+
+
+def test_pressures_are_read_when_there_are_any(bench_log: BenchLog) -> None:
+    log = bench_log()
+    model = load_model(rig=True)
+    bare = bench_problem([log], model)
+    states = bare._rig(()).predict(
+        bare._runs[0].motion, bare._runs[0].commands, dict.fromkeys(bare._scaled, 1.0)
+    ).states
+    from kemba.identify.bench.pressure import absolute_pressure
+
+    columns = {
+        f"{c} [Pa]": absolute_pressure(c, states) + 500 * np.random.default_rng(0).standard_normal(len(log))
+        for c in ("chamber/extend/P", "chamber/retract/P")
+    }
+    problem = bench_problem([log.with_columns(columns)], model)
+    assert problem.channels == ("piston/F", "chamber/extend/P", "chamber/retract/P")
+    assert np.sqrt(np.mean(problem.residual({}) ** 2)) == pytest.approx(1.0, abs=0.15)
+
+
+def test_from_logs_to_a_model_and_the_next_test(bench_log: BenchLog, tmp_path: Path) -> None:
+    paths = []
+    for seed in range(3):
+        log = bench_log((effect("seal_friction", F_c=9.0),), duration=2.0, seed=seed)
+        paths.append(tmp_path / f"run_{seed}.csv")
+        Trajectory(log.time, dict(zip(log.headers, (log[n] for n in log.names), strict=True))).write(
+            paths[-1]
+        )
+    out = tmp_path / "answer"
+    answer, _ = discover_logs(paths[:2], paths[2:], out=out)
+    assert answer.added == ("seal_friction",)
+    value = answer.ranking[0].parameters["F_c"]
+    assert value.low < 9.0 < value.high
+    assert answer.error_after < 1.3 < 3.0 < answer.error_before
+    written = json.loads((out / "answer.json").read_text())
+    assert written["verdict"] == "missing" and written["model"] == str(out / "model.yaml")
+    spec = load_spec(out / "model.yaml")
+    assert any(e.kind == "seal_friction" for e in spec.effects)
+
+    # what was found is no longer missing
+    again, _ = discover_logs(paths, model=str(out / "model.yaml"))
+    assert again.verdict == "nothing"
+
+    other = written["ranking"][1]["effect"]
+    assert adopt_effect(out, other, tmp_path / "other.yaml").is_file()
+    proposal = propose(out, tmp_path / "next.yaml")
+    assert proposal.nats > 0 and (tmp_path / "next.yaml").is_file()
+
+
+def test_the_papers_tables_tell_of_friction_supply_and_tubes() -> None:
+    found = published()
+    low, high = found.seal_friction
+    assert 5.5 < low < high < 8.5
+    assert found.losses["both"] == pytest.approx([6.1, 5.0, 7.8], abs=0.05)
+    assert all(s[-1] > 0.08 > 0.01 > s[0] for s in found.shortfall.values())
+    assert all(16e-6 < v < 19e-6 for v in found.dead_volume.values())

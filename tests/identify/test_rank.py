@@ -1,0 +1,105 @@
+"""Evidence, doubt and left-out data on a problem small enough to know the answer."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping
+
+import numpy as np
+import pytest
+
+from kemba.identify.discover import discover
+from kemba.identify.problem import Array, Candidate, Parameter, Rows, Theta, secant_jacobian
+from kemba.identify.rank import probabilities
+
+EFFECTS = ("bend", "drag", "kick", "twin", "wave")
+
+
+class Toy:
+    """y(t) = gain * u(t) + effects; `twin` is nearly `drag`, so the two cannot be told apart."""
+
+    def __init__(self, truth: Mapping[str, float], seed: int = 0, runs: int = 3) -> None:
+        rng = np.random.default_rng(seed)
+        self.runs = tuple(f"run {i}" for i in range(runs))
+        self.nuisance = {"gain": (1.0, 0.02), "slope": (0.0, 0.5)}
+        self.candidates = {
+            name: Candidate(name, Parameter("a", "N", 0.0, 10.0, 0.0 if name == "drag" else -np.inf))
+            for name in EFFECTS
+        }
+        t = np.arange(800) / 1e3
+        self._time = np.tile(t, runs)
+        v = np.concatenate([np.sin(7 * t + i) for i in range(runs)])
+        u = np.sign(np.sin(31 * self._time))
+        self._shapes = {
+            "bend": v**3, "drag": np.tanh(5 * v), "twin": np.tanh(5.0001 * v),
+            "kick": u * v, "wave": np.sin(50 * self._time),
+        }  # fmt: skip
+        self._u = 100.0 * u
+        self.measured = np.zeros(len(v))
+        self.measured = self.residual({"gain": 1.01, **truth}) + rng.standard_normal(len(v))
+
+    def residual(self, theta: Theta, runs: Collection[int] | None = None) -> Array:
+        y = theta.get("gain", 1.0) * self._u + theta.get("slope", 0.0) * self._time
+        for name, shape in self._shapes.items():
+            y = y + theta.get(f"{name}.a", 0.0) * shape
+        return np.asarray(y - self.measured)
+
+    def jacobian(
+        self, theta: Theta, names: Iterable[str], runs: Collection[int] | None = None
+    ) -> Array:
+        return secant_jacobian(self, theta, names, runs)
+
+    def rows(self, runs: Collection[int] | None = None) -> Rows:
+        n = len(self._time)
+        run = np.repeat(np.arange(len(self.runs)), n // len(self.runs))
+        label = np.full(n, "moving")
+        return Rows(run, np.zeros(n, int), self._time, label, label, ("F",), np.ones(n))
+
+    def library(self, theta: Theta) -> Mapping[str, Array]:
+        return {"step": np.sign(self._time - 0.4)}
+
+
+def test_the_right_effect_is_named_with_its_value() -> None:
+    answer = discover(Toy({"kick.a": 8.0})).answer
+    assert answer.verdict == "missing" and answer.added == ("kick",)
+    value = answer.ranking[0].parameters["a"]
+    assert value.low < 8.0 < value.high
+    assert answer.ranking[0].probability > 0.95
+    assert answer.error_before > 3 * answer.error_after
+    assert answer.error_after == pytest.approx(1.0, abs=0.1)
+
+
+def test_twins_are_named_together() -> None:
+    answer = discover(Toy({"drag.a": 8.0})).answer
+    first = answer.ranking[0]
+    assert {first.effect, *first.equivalent_to} >= {"drag", "twin"}
+    assert first.probability < 0.95
+
+
+def test_two_effects_are_both_found() -> None:
+    answer = discover(Toy({"kick.a": -9.0, "wave.a": 7.0})).answer
+    assert set(answer.added) == {"kick", "wave"}
+
+
+def test_nothing_is_found_when_nothing_is_missing() -> None:
+    answers = [discover(Toy({}, seed)).answer for seed in range(12)]
+    assert sum(a.verdict != "nothing" for a in answers) == 0
+    assert all(a.p_value_nothing > 0.02 for a in answers)
+    assert 0.5 < answers[0].smallest_detectable["kick"]["a"] < 6.0
+
+
+def test_a_small_imperfection_is_nothing() -> None:
+    assert discover(Toy({"kick.a": 0.5, "bend.a": -0.5})).answer.verdict == "nothing"
+
+
+def test_what_the_catalogue_lacks_is_unknown() -> None:
+    problem = Toy({})
+    problem.measured += 6.0 * np.sign(problem._time - 0.4)
+    answer = discover(problem).answer
+    assert answer.verdict == "unknown"
+    assert answer.formula is not None and "step" in answer.formula
+
+
+def test_probabilities_prefer_the_simpler_of_equals() -> None:
+    found = probabilities({(): -100.0, ("a",): -50.0, ("a", "b"): -50.0}, count=10)
+    assert sum(found.values()) == pytest.approx(1.0)
+    assert found["a",] > 0.9 > found["a", "b"]
