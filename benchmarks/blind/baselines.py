@@ -9,6 +9,8 @@ from scipy.linalg import lstsq
 
 from kemba.identify.problem import Problem
 
+NAMES = ("one_by_bic", "all_by_least_squares")
+
 
 def all_of(problem: Problem) -> dict[str, Any]:
     """Answers of every baseline: the effect named, or null for nothing."""

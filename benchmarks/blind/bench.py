@@ -29,8 +29,9 @@ from twin.cases import bench_case
 from twin.catalogue import CATALOGUE
 from twin.measure import Sensors
 
+from kemba.identify.answer import Answer
 from kemba.identify.bench import bench_problem
-from kemba.identify.checks import check_logs
+from kemba.identify.checks import BadData, check_logs
 from kemba.identify.discover import discover
 from kemba.identify.logs import read_logs
 from kemba.model.spec import load_model
@@ -77,13 +78,19 @@ def run(setting: dict[str, Any]) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         paths, truth = bench_case(Path(folder), setting["effect"], sensors=sensors, **options)
         logs = read_logs(paths)
-        check_logs(logs)
     started = time.monotonic()
-    problem = bench_problem(logs, load_model(rig=True))
-    answer = discover(problem).answer.json()
+    record: dict[str, Any] = {"case": setting, "truth": truth["effects"]}
+    try:
+        check_logs(logs)
+        problem = bench_problem(logs, load_model(rig=True))
+        problem.plausible()
+        answer = discover(problem).answer
+    except BadData as error:
+        answer = Answer("bad-data", sentence=str(error))
+        problem = None
     seconds = time.monotonic() - started
-    record = {"case": setting, "truth": truth["effects"], "answer": answer, "seconds": seconds}
-    return {**record, "baselines": baselines.all_of(problem)}
+    simple = baselines.all_of(problem) if problem else dict.fromkeys(baselines.NAMES)
+    return {**record, "answer": answer.json(), "seconds": seconds, "baselines": simple}
 
 
 def main() -> None:

@@ -79,10 +79,8 @@ def phrase(answer: Answer) -> str:
         )
     if answer.verdict == "unknown":
         more = f" A formula that fits: {answer.formula}." if answer.formula else ""
-        return (
-            "Something is missing that no effect of the catalogue explains "
-            f"(error {answer.error_before:.2f} times the noise).{more}"
-        )
+        why = f": {answer.remarks[0]}" if answer.remarks else ""
+        return f"Something is missing that no effect of the catalogue explains{why}.{more}"
     parts = [r for r in answer.ranking if r.effect in answer.added]
     named = " and ".join(_named(r) for r in parts)
     falls = f"the held-out error falls from {answer.error_before:.2f} to {answer.error_after:.2f}"

@@ -169,6 +169,10 @@ def excess(z: Array) -> float:
     return float(chi2.sf(np.mean(z**2) / TOLERATED**2 * count, count))
 
 
+def _first(hints: Sequence[Hint], kind: str) -> Sequence[Hint]:
+    return [hint for hint in hints if hint.kind == kind][:1]
+
+
 def phrase(found: Comparison) -> str:
     """The answer in plain words."""
     ratio = f"{found.noise_ratio:.2g} times the noise"
@@ -184,6 +188,6 @@ def phrase(found: Comparison) -> str:
     parts = [
         f"The model {grade} the logs: its error is {ratio}",
         f"worst is {worst.channel} in {worst.phase} with {mode} ({worst.ratio:.2g} times)",
-        *(hint.text for hint in found.hints[:3]),
+        *(h.text for kind in ("command", "conflict") for h in _first(found.hints, kind)),
     ]
     return "; ".join(parts) + "."

@@ -26,12 +26,12 @@ class Hint:
 
 
 def hints(problem: Problem, rows: Rows, r: Array, expected: Array) -> Iterable[Hint]:
-    """The plainest hints first."""
+    """Switchings that an error follows, then parameters in conflict; the plainest first."""
     white = r / np.sqrt(expected)
     commands = getattr(problem, "commands", None)
     found = list(lagged(rows, white, commands())) if commands else []
     found += list(conflicts(problem, rows, r))
-    return sorted(found, key=lambda h: -h.weight)
+    return sorted(found, key=lambda h: (h.kind != "command", -h.weight))
 
 
 def lagged(

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from kemba.identify.answer import Answer, Ranked, Value, phrase
+from kemba.identify.conflict import Drift, drifting
 from kemba.identify.confirm import left_out, predicted_error, rms
 from kemba.identify.linear import is_shape, time_blocks
 from kemba.identify.null import NullTest, bootstrap, smallest_detectable
 from kemba.identify.problem import Array, Candidate, Problem
 from kemba.identify.rank import NULL, Hypothesis
 from kemba.identify.search import Search, share_of
-from kemba.identify.unknown import Formula, look
+from kemba.identify.unknown import Formula, look, unfinished
 
 SIGNIFICANT = 0.02
 CLASS = 3.0  # nats within which two explanations are the same to these data
@@ -50,7 +51,11 @@ def discover(
     test = null_test(search)
     best, p_value = _believed(search, best, test)
     formula = look(search, best)
-    answer = _answer(search, best, p_value, test, formula, holdout)
+    drift = drifting(search, best)
+    if drift is not None and formula is not None and drift.nats > formula.gain:
+        formula = None
+    doubts = [] if formula else doubts_about(search, best, drift)
+    answer = _answer(search, best, p_value, test, formula, holdout, doubts)
     answer.runtime_s = time.monotonic() - started
     return Found(answer, search, best)
 
@@ -94,6 +99,15 @@ def matters(search: Search, hypothesis: Hypothesis) -> bool:
     )
 
 
+def doubts_about(search: Search, best: Hypothesis, drift: Drift | None) -> list[str]:
+    """Why the best answer cannot be the whole of it."""
+    if drift is not None:
+        return [str(drift)]
+    if unfinished(search, best):
+        return ["the error that is left repeats itself with motion and valves"]
+    return []
+
+
 def _answer(
     search: Search,
     best: Hypothesis,
@@ -101,12 +115,13 @@ def _answer(
     test: NullTest,
     formula: Formula | None,
     holdout: Problem | None,
+    doubts: Sequence[str] = (),
 ) -> Answer:
     problem = search.problem
     ranking = ranked(search, best, holdout)
     before = error(search, NULL, holdout)
     after = error(search, best, holdout) if best else before
-    verdict = "unknown" if formula else "missing" if best else "nothing"
+    verdict = "unknown" if formula or doubts else "missing" if best else "nothing"
     ranker = search.ranker(search.points[NULL].linear)
     sizes = smallest_detectable(ranker, test.threshold)
     answer = Answer(
@@ -123,6 +138,7 @@ def _answer(
         split_by="held-out logs" if holdout else "runs" if len(problem.runs) > 3 else "time blocks",
         ladder=_ladder(search, best, holdout),
     )
+    answer.remarks = list(doubts)
     answer.sentence = phrase(answer)
     return answer
 

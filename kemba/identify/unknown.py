@@ -4,17 +4,74 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
 from kemba.identify.linear import Linear, condense
-from kemba.identify.problem import Array, Candidate, Parameter
+from kemba.identify.problem import Array, Candidate, Parameter, Theta
 from kemba.identify.rank import NULL, Hypothesis, Ranker
 from kemba.identify.search import Search
 
 WIDTH = 10.0  # prior of a term: so many sigma where it acts most
 AHEAD = 6.0  # nats by which a formula must beat the catalogue
-LEFT = 0.25  # share of what the catalogue explains that may be left to a formula
+STRUCTURE = 1.0  # repeatable mean square, in noise units, that an imperfect model may leave,
+LEFT = 0.1  # and as a share of what the answer explains
+CLIP, RIDGES, FOLDS = 30.0, (1e-4, 1e-2, 1.0), 5
+
+
+@runtime_checkable
+class Examinable(Protocol):
+    """A problem that can say what its residual may depend on."""
+
+    def leftover(self, theta: Theta) -> tuple[Array, Array, Array]:
+        """Residual over its white noise (n,), regressors (n, m), and the run of each row (n,)."""
+
+
+def structured(search: Search, hypothesis: Hypothesis) -> tuple[float, float]:
+    """Mean square of the residual in noise units, and the part of it that repeats itself.
+
+    A regression on everything a force could depend on is learnt on some blocks and judged on the
+    others: what it predicts there is structure, and no noise, however coloured.
+    """
+    if not isinstance(search.problem, Examinable):
+        return 1.0, 0.0
+    r, columns, run = search.problem.leftover(search.points[hypothesis].fit.theta)
+    r = np.clip(r, -CLIP, CLIP)
+    columns = columns / np.maximum(np.sqrt(np.mean(columns**2, axis=0)), 1e-9)
+    folds = _folds(run)
+    power = float(np.mean(r**2))
+    left = min(float(np.mean((r - _foretold(r, columns, folds, k)) ** 2)) for k in RIDGES)
+    return power, max(power - left, 0.0)
+
+
+def _foretold(r: Array, columns: Array, folds: Array, ridge: float) -> Array:
+    """Each fold as the regression on the others foretells it."""
+    predicted = np.zeros(len(r))
+    for fold in np.unique(folds):
+        out = folds == fold
+        a, b = columns[~out], r[~out]
+        h = a.T @ a + ridge * len(a) * np.eye(a.shape[1])
+        predicted[out] = columns[out] @ np.linalg.solve(h, a.T @ b)
+    return predicted
+
+
+def _folds(run: Array) -> Array:
+    """Blocks of time, FOLDS of them per run, dealt out in turn."""
+    labels = np.zeros(len(run), dtype=int)
+    for i in np.unique(run):
+        own = np.flatnonzero(run == i)
+        labels[own] = np.arange(len(own)) * 2 * FOLDS // len(own) % FOLDS
+    return labels
+
+
+def unfinished(search: Search, best: Hypothesis) -> bool:
+    """Whether so much structure is left that the answer cannot be the whole of it."""
+    power, structure = structured(search, best)
+    if not best:
+        return structure > STRUCTURE
+    before, _ = structured(search, NULL)
+    return structure > max(STRUCTURE, LEFT * max(before - power, 0.0))
 
 
 @dataclass(frozen=True)
@@ -85,6 +142,8 @@ def _grow(ranker: Ranker, names: Mapping[str, str], start: Hypothesis) -> Formul
     chosen, reached = start, base
     for _ in range(2):
         table = {n: ranker.score((*chosen, n)).log_evidence for n in names if n not in chosen}
+        if not table:
+            break
         name = max(table, key=table.__getitem__)
         if table[name] < reached + AHEAD + 2.0:
             break

@@ -51,7 +51,7 @@ def discover_logs(
         left = time_limit - (time.monotonic() - started)
         found = discover(problem, judge, left, say)
         answer = found.answer
-        answer.remarks = remarks
+        answer.remarks = [*answer.remarks, *remarks]
     except BadData as error:
         answer = Answer("bad-data", sentence=sentence(error.errors))
         answer.remarks = [str(e) for e in error.errors]

@@ -21,6 +21,7 @@ from kemba.ocp.guess import automatic_guess
 from kemba.ocp.ipopt import Ipopt, Point, Watch
 from kemba.ocp.mirror import Reduction, find_symmetry, whole, wishes_are_symmetric
 from kemba.ocp.penalty import WEIGHTS, penalise
+from kemba.ocp.phases import refine as solve_phases
 from kemba.ocp.result import to_trajectory
 from kemba.ocp.resume import resumed
 from kemba.ocp.schedule import RELAX, Attempt, Search, Stopped, confirm, find, refine
@@ -215,10 +216,41 @@ def plan(
     busy = time.process_time() - busy - planner.build_cpu_s
     trajectory = to_trajectory(transcription, point.Y)
     found = judge(planner, transcription, trajectory, point, elapsed, busy)
+    if found.status == "solved" and task.refine == "radau":
+        return on_phases(planner, found)
     if found.status in ("solved", "acceptable", "interrupted"):
         return found
     why = refused or explanation(task, built, planner.outcome, findings, document)
     return found if why is None else explained(found, why)
+
+
+def on_phases(planner: Planner, found: Plan) -> Plan:
+    """The plan solved again on its own phases; where that fails, the same with the reason."""
+    started, busy = time.perf_counter(), time.process_time()
+    task, model = found.task, found.model
+    planner.tell("phases")
+    answer = solve_phases(
+        model, task, found.wishes, found.trajectory, deadline=planner.deadline, log=planner.log
+    )
+    found = replace(
+        found,
+        attempts=(*found.attempts, Attempt("phases", answer.message, answer.iterations)),
+        solve_s=found.solve_s + time.perf_counter() - started,
+        solve_cpu_s=found.solve_cpu_s + time.process_time() - busy,
+    )
+    new, certificate = answer.trajectory, answer.certificate
+    if new is None or certificate is None or not certificate.within(task.tolerances):
+        kept = f"not refined ({answer.message}), the implicit Euler plan is kept"
+        return replace(found, sentence=f"{found.sentence}; {kept}")
+    status, sentence = verdict(task, certificate, new, answer.message)
+    return replace(
+        found,
+        trajectory=new,
+        certificate=certificate,
+        status=status,
+        sentence=f"{sentence}, refined on {len(answer.phases)} phases",
+        cost=costs(model, new),
+    )
 
 
 def explained(found: Plan, why: Explanation) -> Plan:

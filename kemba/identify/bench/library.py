@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from scipy.signal import lfilter
 
 from kemba.effects.friction import V_COULOMB
 from kemba.identify.bench.motion import Motion
@@ -12,6 +13,7 @@ from kemba.identify.problem import Array
 
 STROKE = 0.070  # m
 RANGES = (0.003, 0.005, 0.008, 0.013, 0.02)  # m, reach of a force at an end of the stroke
+MEMORIES = (0.001, 0.006, 0.02, 0.06, 0.2)  # s
 CREEPS = (0.002, 0.006, 0.015)  # m, travel over which a hysteresis turns round
 
 
@@ -44,6 +46,20 @@ def terms(motion: Motion, u: Array) -> Iterator[tuple[str, Array]]:
     yield "u_r", u_r
     for travel in CREEPS:
         yield f"dahl(x, {travel:g})", dahl(x, travel)
+
+
+def features(motion: Motion, u: Array) -> Array:
+    """Whatever a missing force could depend on (n, m): where, how fast, and since when which
+    valve is on, each with each."""
+    step = float(np.median(np.diff(motion.time)))
+    x, v = motion.x / STROKE - 0.5, motion.v / 0.3
+    places = [np.ones(len(x)), x, x**2, v, np.abs(v), v * x, np.tanh(motion.v / V_COULOMB)]
+    histories = [np.ones(len(x)), u[:, 0] * u[:, 1]]
+    for valve in u.T:
+        for memory in MEMORIES:
+            keep = np.exp(-step / memory)
+            histories.append(lfilter([1 - keep], [1, -keep], valve, zi=[keep * valve[0]])[0])
+    return np.stack([p * h for p in places for h in histories], axis=1)
 
 
 def dahl(x: Array, travel: float) -> Array:

@@ -10,7 +10,7 @@ import numpy as np
 
 from kemba.effects import BY_KIND
 from kemba.effects.base import Effect
-from kemba.identify.bench.library import terms
+from kemba.identify.bench.library import features, terms
 from kemba.identify.bench.motion import Motion
 from kemba.identify.bench.plant import Prediction, Rig, share
 from kemba.identify.bench.plausible import contradictions
@@ -181,6 +181,17 @@ class BenchProblem:
                     parts.setdefault(formula, []).append((column / np.sqrt(variance))[keep])
         columns = np.stack([np.concatenate(p) for p in parts.values()], axis=1)
         return dict(zip(parts, self.whiten(columns).T, strict=True))
+
+    def leftover(self, theta: Theta) -> tuple[Array, Array, Array]:
+        """Residual of the force over its white noise (n,), what it may depend on (n, m), run (n,)."""
+        parts = []
+        for i, run in enumerate(self._runs):
+            keep = run.keep["piston/F"]
+            r = self.standardised(theta, i)["piston/F"]
+            seen = features(_true_motion(run.motion, theta), self._acting(theta, i))[keep]
+            parts.append((r, seen, np.full(len(r), i)))
+        residual, columns, index = (np.concatenate(p) for p in zip(*parts, strict=True))
+        return residual, columns, index
 
     def _acting(self, theta: Theta, index: int) -> Array:
         """Share of each sample's neighbourhood in which the valves act (n, 2)."""

@@ -6,7 +6,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.ndimage import binary_dilation, binary_erosion, uniform_filter1d
+from scipy.ndimage import (
+    binary_dilation,
+    binary_erosion,
+    binary_opening,
+    minimum_filter1d,
+    uniform_filter1d,
+)
 from scipy.signal import savgol_filter
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -23,6 +29,7 @@ BLUR, STRIKE, IMPACT = 0.003, 0.025, 0.005  # s: around contact; in which it str
 SETTLED = 0.010  # s within contact before a foot's height is trusted
 SLOW_FOOT, SLIDING, SLOW_BODY, SLOW_PISTON = 0.15, 0.1, 0.05, 0.02  # m.s-1
 STICKING = 0.04  # m.s-1
+FIRM_LOAD = 15.0  # N: of a foot whose sliding friction means something
 LEAST_LOAD = 6.0  # N: a foot that carries less is not known to stand
 RATE_WINDOW = 0.02  # s
 
@@ -64,7 +71,7 @@ def read_schedule(time: Array, feet: Array, pistons: Array, stroke: float, body:
         may = _dilate(near, blur)
         inner = _erode(z < level + STANDS, settle) & (np.abs(vz) < SLOW_FOOT)
         struck = _after(may, STRIKE / dt)
-        slips = _erode(inner & ~struck & (np.abs(vx) > SLIDING), settle // 2)
+        slips = inner & touches & ~struck & (np.abs(vx) > SLIDING)
         slides = np.where(slips, np.sign(vx), 0.0)
         bottom, top = stop_levels(pistons[:, i], stroke)
         at_low, at_high = pistons[:, i] < bottom + NEAR_STOP, pistons[:, i] > top - NEAR_STOP
@@ -101,8 +108,12 @@ def _after(flags: Flags, steps: float) -> Flags:
 def loaded(schedule: Schedule, normal: Array, dt: float) -> Schedule:
     """The same with only those feet settled that carry a load: `normal` (n, legs) in N."""
     width = max(3, round(RATE_WINDOW / dt))
-    carries = uniform_filter1d(normal, width, axis=0) > LEAST_LOAD
-    return replace(schedule, settled=schedule.settled & carries, slides=schedule.slides * carries)
+    mean = uniform_filter1d(normal, width, axis=0)
+    firm = minimum_filter1d(mean, width, axis=0) > FIRM_LOAD
+    slides = schedule.slides * firm
+    for leg in slides.T:  # a slip that lasts: a foot that just lifts off drags along for a moment
+        leg *= binary_opening(leg != 0.0, np.ones(width, bool))
+    return replace(schedule, settled=schedule.settled & (mean > LEAST_LOAD), slides=slides)
 
 
 def slope(values: Array, dt: float) -> Array:

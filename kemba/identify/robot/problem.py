@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from kemba.identify.candidates import sensor_candidates
+from kemba.identify.checks import BadData
 from kemba.identify.problem import Candidate, Parameter, Rows, Theta, parameter_steps
 from kemba.identify.robot.batch import Batch
 from kemba.identify.robot.contact import loaded
@@ -22,6 +23,7 @@ from kemba.identify.robot.filter import gains, innovations
 from kemba.identify.robot.labels import describe
 from kemba.identify.robot.linear import Linearised, linearise, smoothed
 from kemba.identify.robot.physics import Physics
+from kemba.identify.robot.plausible import contradictions
 from kemba.identify.robot.reference import (
     LOOSE,
     Floor,
@@ -249,6 +251,13 @@ class RobotProblem:
             {n: (times, change) for n, (times, change, _) in zip(sides, t.switches, strict=True)}
             for t in self.batch.tracks
         ]
+
+    def plausible(self) -> list[str]:
+        """Raise BadData where a log contradicts itself or any model; no remarks."""
+        faults = list(contradictions(self))
+        if faults:
+            raise BadData(faults)
+        return []
 
     def library(self, theta: Theta) -> Mapping[str, Array]:
         """Terms beyond the catalogue: none yet for robots."""

@@ -22,7 +22,7 @@ GROUND_SIGMA, GROUND_PRIOR, GROUND_WANDER = 1e-4, 2.5e-4, 6e-5 / np.sqrt(0.02)
 STOP_SIGMA, STOP_WANDER = 1e-4, 1e-4 / np.sqrt(0.02)
 ANCHOR_PRIOR, ANCHOR_FREE = 3.0, 1.0  # m, m.s-1/2: where along the ground a foot stands
 CONTACT, IMPACT = 300.0, 3e4  # N2.s
-SLIPPING = 0.05  # N2.s: friction of a sliding foot beyond Coulomb's
+SLIPPING = 1.0  # N2.s: friction of a sliding foot beyond Coulomb's
 UNKNOWN_AIR, AIR_FADES = 100.0, 0.025  # N2.s at the start of a log that does not begin at rest
 
 

@@ -37,7 +37,9 @@ def extended(model: Model, candidates: tuple[Candidate, ...]) -> Model:
     """The model without its ground, and with every candidate on its list, switched off."""
     kept = [e for e in model.effects if e.kind not in GROUND]
     bare = Model(model.mechanism, kept, model.supply, model.name)
-    return bare.with_effects(BY_KIND[c.effect].model_validate({"kind": c.effect}) for c in candidates)
+    return bare.with_effects(
+        BY_KIND[c.effect].model_validate({"kind": c.effect}) for c in candidates
+    )
 
 
 def ground_of(model: Model) -> tuple[float, dict[str, float]]:

@@ -25,7 +25,7 @@ class Independent:
         z = view.z("q v s")
         slope = ca.Function("slope", [z], [ca.densify(ca.jacobian(g, z))])
         row = np.array(slope(np.concatenate([self.guess[x] for x in ("q", "v", "s")]))).ravel()
-        size = np.linalg.norm(row)
+        size = float(np.linalg.norm(row))
         for b in self.basis:
             row = row - (row @ b) * b
         if np.linalg.norm(row) <= SMALL * max(size, SMALL):

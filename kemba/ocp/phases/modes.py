@@ -56,7 +56,7 @@ def read_phases(
     _valves_first(modes, valves)
     same = (modes[1:] == modes[:-1]).all(axis=1) & (valves[1:] == valves[:-1]).all(axis=1)
     borders = sorted({0, len(plan) - 1, *(np.flatnonzero(~same[1:]) + 1).tolist(), *marks})
-    rows = zip(borders[:-1], borders[1:], strict=True)
+    rows = itertools.pairwise(borders)
     return [
         Phase(a, b, tuple(int(m) for m in modes[b]), tuple(float(u) for u in valves[b]))
         for a, b in rows

@@ -159,7 +159,7 @@ class Program:
             put(c.u[e], "u")
         nominal = self.task.duration / self.nodes / layout.scale[layout.slices["h"]]
         lower[c.h[:, 0]], upper[c.h[:, 0]] = SHORT * nominal, LONG * nominal
-        for p, phase in enumerate(self.phases):
+        for phase in self.phases:
             where = c.u[phase.first][[i - layout.slices["u"].start for i in layout.binary]]
             lower[where] = upper[where] = phase.valves
         for p in self.impacts:

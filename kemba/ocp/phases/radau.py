@@ -70,7 +70,7 @@ class Jump:
 def width(layout: Layout, group: str) -> int:
     """Number of columns of a group."""
     part = layout.slices[group]
-    return part.stop - part.start
+    return int(part.stop - part.start)
 
 
 def scaled(layout: Layout, group: str, name: str) -> ca.SX:
@@ -101,7 +101,8 @@ def element(
     def slope(i: int, group: str, view: str) -> ca.SX:
         read = getattr(layout, view)
         before = read(start, group)
-        return sum(d * (read(y, group) - before) for d, y in zip(scheme.slopes[i], at, strict=True))
+        terms = (d * (read(y, group) - before) for d, y in zip(scheme.slopes[i], at, strict=True))
+        return ca.SX(sum(terms, ca.SX(0)))
 
     q_scale, s_rows = [c.scale for c in layout.quantities["q"]], model.node.rate_rows
     rows, labels = [], []

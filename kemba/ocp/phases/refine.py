@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +32,7 @@ from kemba.trajectory import Trajectory
 MIRRORED = 1e-6  # scaled; a plan that differs less from its mirror image is solved by half
 # one scheme after the other: the coarser one finds the way, the finer one makes it exact
 STEPS: tuple[tuple[Scheme, dict[str, Any]], ...] = (
-    (RADAU3, {"mu_init": 1e-2, "bound_push": 1e-4, "bound_frac": 1e-4, "max_iter": 150}),
+    (RADAU3, {"mu_init": 1e-2, "bound_push": 1e-4, "bound_frac": 1e-4, "max_iter": 100}),
     (RADAU5, {"mu_init": 1e-3, "bound_push": 1e-6, "bound_frac": 1e-6, "max_iter": 100}),
 )
 EXACT = {"tol": 1e-4, "constr_viol_tol": 1e-8, "acceptable_iter": 0}
@@ -72,12 +72,33 @@ def refine(
     is in time.monotonic(). `log` collects IPOPT's text.
     """
     reduction = reduction or reduction_of(model, task, wishes, plan)
-    iterations, x, program = 0, None, None
-    for scheme, options in STEPS:
+    iterations = 0
+    for trim in (False, True):
         try:
-            finer, start = build(model, task, wishes, plan, reduction, scheme)
+            found = _steps(model, task, wishes, plan, reduction, trim, deadline, log)
         except ValueError as error:
-            return Refined(None, None, f"the model {error}", iterations)
+            return Refined(None, None, f"the model {error}", 0)
+        iterations += found.iterations
+        if found.solved:
+            break
+    return replace(found, iterations=iterations)
+
+
+def _steps(
+    model: Model,
+    task: Task,
+    wishes: Sequence[Wish],
+    plan: Trajectory,
+    reduction: Reduction,
+    trim: bool,
+    deadline: float,
+    log: Path | None,
+) -> Refined:
+    """One reading of the modes, one scheme after the other."""
+    iterations, message, x = 0, "", None
+    program: Program | None = None
+    for scheme, options in STEPS:
+        finer, start = build(model, task, wishes, plan, reduction, scheme, trim)
         if program is not None and x is not None:
             start = carried(finer, program, x)
         program = finer
@@ -91,9 +112,7 @@ def refine(
     return Refined(trajectory, found, message, iterations, tuple(program.phases))
 
 
-def reduction_of(
-    model: Model, task: Task, wishes: Sequence[Wish], plan: Trajectory
-) -> Reduction:
+def reduction_of(model: Model, task: Task, wishes: Sequence[Wish], plan: Trajectory) -> Reduction:
     """Half the robot where model, task and plan are their own mirror images, else the whole."""
     half = find_symmetry(model) if task.solver.symmetry else None
     if half is None or not wishes_are_symmetric(model, wishes):
@@ -117,7 +136,8 @@ def build(
 ) -> tuple[Program, np.ndarray]:
     """The program of a plan's phases and its start. Raises ValueError for other models."""
     constraints = read_constraints(model, reduction)
-    valves = np.round(reduction.restrict("u", arrays(model, plan)["u"]))[:, _binary(model, reduction)]
+    inputs = reduction.restrict("u", arrays(model, plan)["u"])
+    valves = np.round(inputs[:, _binary(model, reduction)])
     last = len(plan) - 1
     marks = [wish.node(last) for wish in wishes if wish.at is not None]
     phases = read_phases(model, constraints, plan, valves, marks, trim)

@@ -67,9 +67,7 @@ def _split_friction(program: Program, Y: np.ndarray) -> None:
             Y[:, forward], Y[:, backward] = np.maximum(force, 0.0), np.maximum(-force, 0.0)
 
 
-def _slip_speeds(
-    program: Program, q: np.ndarray, v: np.ndarray, lam: np.ndarray
-) -> np.ndarray:
+def _slip_speeds(program: Program, q: np.ndarray, v: np.ndarray, lam: np.ndarray) -> np.ndarray:
     """Forces with every slip speed that the pairs ask for: its size."""
     node, B = program.model.node, program.reduction.B["lam"]
     lam = lam.copy()

@@ -1,0 +1,62 @@
+"""Does a parameter wander from run to run? One that does points at the defect, not at its value."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from kemba.identify.problem import Array
+from kemba.identify.rank import FLOOR, Hypothesis
+from kemba.identify.search import Search
+
+CLEAR = 50.0  # nats that separate values per run must bring over one value for all
+SHARE = 0.1  # and as a share of what the answer itself brings
+SPREAD = 0.8  # sizes between the smallest and the largest value
+
+
+@dataclass(frozen=True)
+class Drift:
+    """A parameter whose values per run contradict each other."""
+
+    effect: str
+    key: str
+    values: tuple[float, ...]
+    nats: float
+
+    def __str__(self) -> str:
+        listed = ", ".join(f"{v:.3g}" for v in self.values)
+        return f"{self.key} differs from run to run: {listed}"
+
+
+def drifting(search: Search, best: Hypothesis) -> Drift | None:
+    """The clearest case of a parameter that wanders, in what the best answer leaves over."""
+    problem, point = search.problem, search.points[best]
+    if len(problem.runs) < 2:
+        return None
+    run = problem.rows().run
+    residual = problem.residual(point.fit.theta)
+    gained = point.log_evidence - search.points[()].log_evidence
+    found: list[Drift] = []
+    for effect, candidate in problem.candidates.items():
+        column = search.null_jacobian[:, search.points[()].linear.index(candidate.key)]
+        gram, slope = _sums(column * column, run), _sums(column * residual, run)
+        keep = gram > 1e-12
+        if keep.sum() < 2:
+            continue
+        gram, slope = gram[keep], slope[keep]
+        narrow = 1.0 / gram + (FLOOR * candidate.lead.size) ** 2
+        own = -slope / gram
+        shared = float(np.sum(own / narrow) / np.sum(1.0 / narrow))
+        nats = 0.5 * float(np.sum((own - shared) ** 2 / narrow))
+        if np.ptp(own) > SPREAD * candidate.lead.size:
+            values = tuple(float(candidate.lead.off + a) for a in own)
+            found.append(Drift(effect, candidate.key, values, nats))
+    clearest = max(found, key=lambda d: d.nats, default=None)
+    if clearest is None or clearest.nats < max(CLEAR, SHARE * gained):
+        return None
+    return clearest
+
+
+def _sums(values: Array, run: Array) -> Array:
+    return np.bincount(run, weights=values)
