@@ -80,7 +80,7 @@ def test_fitted_chambers_meet_tables_1_and_2_as_documented() -> None:
     losses = [SupplyLine(), HoseLag(T=1e-3), SealFriction(F_c=5.9), PistonDamping(c=20.0)]
     rig = Model(rig_mechanism(), [Valve(), OrificeChamber(), *losses])
     allowed = {"[ms]": lambda paper: 0.07 * paper + 0.1, "[N]": lambda _: 13.5}
-    script = runpy.run_path(str(DOCS / "benchmarks" / "fit_chambers.py"))
+    script = runpy.run_path(str(DOCS.parent / "benchmarks" / "fit_chambers.py"))
     for entry, paper, found, _ in script["table"](rig):
         width = allowed.get(entry.split()[-1], lambda _: 10.0)(paper)
         assert found == pytest.approx(paper, abs=width), entry

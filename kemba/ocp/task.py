@@ -95,7 +95,7 @@ class Task(Section):
     seed: int = 0
     min_dwell: Annotated[float, Param("s", lower=0.0, doc="of a valve between switches")] = 0.01
     method: Literal["relaxation", "penalty", "penalty_ramped"] = "relaxation"
-    refine: Literal["none", "radau"] = "none"
+    refine: Literal["none", "radau"] = "radau"
     solver: Solver = Field(default_factory=Solver)
     tolerances: Tolerances = Field(default_factory=Tolerances)
 

@@ -53,6 +53,7 @@ def solved(name: str, *options: str, nodes: int = 40) -> Solved:
     """A shipped task solved through the command line, on a coarse grid."""
     folder = Path(tempfile.mkdtemp(prefix=f"kemba-test-{name}-")) / "run"
     words = ["solve", f"{name}.yaml", "--set", f"nodes={nodes}", "--no-figure", "-q"]
+    words += ["--no-replay", "--set", "refine=none"]  # what implicit Euler itself gives
     for option in options:
         words += ["--set", option]
     done = CliRunner().invoke(app, [*words, "--out", str(folder)])

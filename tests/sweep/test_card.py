@@ -7,7 +7,7 @@ import pytest
 
 from kemba.sweep import expand, load_sweep, open_folder, write_results
 
-GENERATOR = Path(__file__).parents[2] / "docs" / "benchmarks" / "reliability.py"
+GENERATOR = Path(__file__).parents[2] / "benchmarks" / "reliability.py"
 SWEEP = """\
 name: made-up
 blocks:

@@ -60,6 +60,8 @@ def floor_effects(fraction: float, rng, bench_only: bool, skip=()) -> list[dict]
         ):  # small compliance = larger stiffness: the ground stays hard
             continue
         amount = fraction * rng.standard_normal()
+        if name == "hose_lag" and abs(amount) < 0.025:
+            continue  # shorter than 0.1 ms is none, and too stiff to integrate
         out.append(hidden(name, amount if entry.signed else abs(amount)))
     return out
 

@@ -1,6 +1,6 @@
 """The paper's penalty, one shot and ramped, beside relaxation, from the same cold start.
 
-    python docs/benchmarks/methods.py [TASK] [--nodes N] [--time-limit S]
+    python benchmarks/methods.py [TASK] [--nodes N] [--time-limit S]
 
 Prints one row per method: how it ended, time, size, cost as a time integral, what is violated,
 and how often valves switch. All methods start from the same automatic guess on the same grid.

@@ -1,6 +1,6 @@
 """Tables I and II as the bench rigs of configs/rigs measure them on a model of the piston.
 
-    python docs/benchmarks/plant_tables.py [MODEL]
+    python benchmarks/plant_tables.py [MODEL]
 
 Prints what `kemba-opt characterise` reads off the locked chamber, the dynamometer and the random
 test, beside the paper's values. MODEL is `plant` unless given.

@@ -1,6 +1,6 @@
 """Solve time against the number of nodes, with the fitted exponent.
 
-    python docs/benchmarks/scaling.py [--save docs/scaling.png] [--repeats 3]
+    python benchmarks/scaling.py [--save docs/scaling.png] [--repeats 3]
 
 Prints the median CPU time of cold solves from slightly different guesses, and the exponent p of
 time ~ N^p. Aim: p at most 1.5.

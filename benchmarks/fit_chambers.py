@@ -1,7 +1,7 @@
 """Fit physical chambers to the paper's Tables I and II: where the defaults of orifice_chamber and
 supply_line come from, and what chambers like these can meet (docs/pneumatics.md).
 
-    python docs/benchmarks/fit_chambers.py
+    python benchmarks/fit_chambers.py
 
 Locked chambers give the rise times of Table I, constant rates the force-velocity lines of Table
 II; both are read off the bench rig of the model itself. Prints the fitted figures and, entry by

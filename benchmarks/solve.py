@@ -1,6 +1,6 @@
 """Time the shipped tasks: program sizes, build and solve times, iterations, all from a cold start.
 
-    python docs/benchmarks/solve.py --repeats 5 --save docs/benchmarks.md
+    python benchmarks/solve.py --repeats 5 --save docs/benchmarks.md
 
 Every case is a fresh process of `kemba-opt solve`, one after the other; the cases take turns, so
 that a slow minute of the machine meets all of them. Prints a table in Markdown; `--save` replaces
@@ -26,7 +26,7 @@ from kemba.runs import versions
 
 TASKS = ("jump", "max_jump", "hop", "jump_forward", "stand", "drop")
 HEAD = "| task | status | variables | rows | iterations | build s | solve s | CPU s | process s |"
-MARK = "<!-- figures: written by docs/benchmarks/solve.py, do not edit below -->"
+MARK = "<!-- figures: written by benchmarks/solve.py, do not edit below -->"
 VERB = "from kemba_cli.main import main; main()"
 
 

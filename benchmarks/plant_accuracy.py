@@ -1,6 +1,6 @@
 """How exact and how fast the plant is: step halving, penetration, energy, time per second.
 
-    python docs/benchmarks/plant_accuracy.py
+    python benchmarks/plant_accuracy.py
 
 A push with both extend valves, the rear one 4 ms longer, the flight after it and the landing, with
 the feet kept under the hips; first on the planning model, then on the full plant. Prints one row
