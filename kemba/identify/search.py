@@ -27,7 +27,7 @@ from kemba.identify.rank import FLOOR, NULL, Hypothesis, Ranker, Score, log_prio
 LEADERS = 6
 SURE = 3  # so many leaders are refitted however far behind they are,
 FAR, FAR_SHARE = 40.0, 0.7  # others when no more nats, or share of the gain, behind
-GLANCES = 2  # evaluations of each single effect before the leaders are refitted
+GLANCES = 1  # evaluations of each single effect before the leaders are refitted
 LARGEST = 3  # effects in one answer; more need another experiment
 GAIN = 3.0  # nats beyond prior odds that a further effect must bring
 
@@ -71,6 +71,7 @@ class Search:
     null_table: dict[Hypothesis, float] = field(default_factory=dict)
     null_jacobian: Array = field(init=False)
     null_residual: Array = field(init=False)
+    _thetas: dict[Hypothesis, dict[str, float]] = field(default_factory=dict)
     _settled: bool = False  # whether the noise is seen from a point that fits
 
     def __post_init__(self) -> None:
@@ -85,7 +86,10 @@ class Search:
         best = self._round(NULL, LEADERS)
         self.say(f"first guess: {' + '.join(best) or 'nothing'}")
         if best != NULL:
+            promising = self._promising()
             self._recolour(best)
+            for hypothesis in promising:
+                self.visit(hypothesis)
             best = self._round(NULL, LEADERS)
             best = self._grow(best)
         return best
@@ -122,19 +126,30 @@ class Search:
     def _glance(self, hypothesis: Hypothesis) -> float:
         """Log evidence where the linear estimate points to, with the true residual there.
 
-        One evaluation tells a delay, which is far from linear, from its rivals.
+        Times are far from linear, so they are looked at from both sides of their size as well.
         """
-        linear, best = self.points[NULL].linear, self.null_table[hypothesis]
-        for _ in range(GLANCES):
-            z = self.ranker(linear).score(hypothesis).z
-            free = {*self.problem.nuisance, *(self.problem.candidates[e].key for e in hypothesis)}
-            own = np.array([name in free for name in linear.names])
-            at = np.where(own, z, linear.at)
+        (effect,) = hypothesis
+        candidate, theta = self.problem.candidates[effect], self.points[NULL].fit.theta
+        starts: list[dict[str, float]] = [dict(theta)]
+        if candidate.lead.unit == "s":
+            signs = (1.0, -1.0) if candidate.lead.signed else (1.0,)
+            starts += [{**theta, **within(self.problem, candidate.typical(s))} for s in signs]
+        return max(self._descend(hypothesis, start) for start in starts)
+
+    def _descend(self, hypothesis: Hypothesis, theta: dict[str, float]) -> float:
+        """The best log evidence on a few Newton steps from theta with the slopes of the null."""
+        free = {*self.problem.nuisance, *(self.problem.candidates[e].key for e in hypothesis)}
+        linear, best = self.points[NULL].linear, -np.inf
+        own = np.array([name in free for name in linear.names])
+        for step in range(GLANCES + 1):
+            if step or theta != self.points[NULL].fit.theta:
+                r = self.problem.residual(theta)
+                at, _, _ = priors(self.problem, theta, linear.names)
+                linear = moved(linear, at, self.null_jacobian, r, self.blocks)
+            score = self.ranker(linear).score(hypothesis)
+            best = max(best, score.log_evidence)
+            at = np.where(own, score.z, linear.at)
             theta = within(self.problem, estimate(self.problem, linear, at))
-            r = self.problem.residual(theta)
-            at, mean, width = priors(self.problem, theta, linear.names)
-            linear = moved(linear, at, self.null_jacobian, r, self.blocks)
-            best = max(best, self.ranker(linear).score(hypothesis).log_evidence)
         return best
 
     def flexible_fit(self) -> Array:
@@ -187,6 +202,7 @@ class Search:
             linear = self._near(fit)
             score = self.ranker(linear).score(hypothesis)
             self.points[hypothesis] = Point(hypothesis, fit, linear, score)
+            self._thetas[hypothesis] = fit.theta
         return self.points[hypothesis]
 
     def _near(self, fit: Fit) -> Linear:
@@ -202,7 +218,10 @@ class Search:
         return condense(names, at, mean, width, np.stack(columns, axis=1), r, self.blocks)
 
     def _guess(self, hypothesis: Hypothesis) -> dict[str, float]:
-        """Start from the largest part that was refitted, moved by the linear estimate there."""
+        """Where it was before, or the largest part that was refitted, moved by the linear
+        estimate there."""
+        if hypothesis in self._thetas:
+            return self._thetas[hypothesis]
         parts = [h for h in self.points if set(h) < set(hypothesis)]
         part = max(parts, key=lambda h: (len(h), self.points[h].log_evidence))
         point = self.points[part]
@@ -242,6 +261,12 @@ class Search:
         left = r + jacobian @ (best_fit(linear) - linear.at)
         problem.recolour(left, careful=not keep or self._settled)
         return problem.whiten(jacobian) if keep else None
+
+    def _promising(self) -> list[Hypothesis]:
+        """What was refitted and gained at least half of what the best gained."""
+        null = self.points[NULL].log_evidence
+        gains = {h: p.log_evidence - null for h, p in self.points.items() if h}
+        return [h for h, gain in gains.items() if gain > 0.5 * max(gains.values())]
 
     def _recolour(self, best: Hypothesis) -> None:
         """The same, seen from the best point so far; all points are then refitted."""

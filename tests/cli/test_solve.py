@@ -196,7 +196,9 @@ def test_the_path_on_stdout_and_talk_on_stderr() -> None:
     assert (done.exit_code, done.stdout) == (0, "runs/max_jump-1\n")
     lines = done.stderr.splitlines()
     assert lines[-1].startswith("solved: apex 1.000 m, ")
-    assert all("nodes)" in line for line in lines[:-1])
+    stages = [line for line in lines[:-1] if not line.endswith(("phases", "replay"))]
+    assert stages
+    assert all("nodes)" in line for line in stages)
     files = {path.name for path in Path("runs/max_jump-1").iterdir()}
     assert {"task.yaml", "trajectory.csv", "controller.csv", "figure.png", "solver.log"} <= files
     again = load_task("runs/max_jump-1/task.yaml")[0]

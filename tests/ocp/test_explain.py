@@ -11,6 +11,7 @@ import pytest
 from ocp.impossible import REFUSED, SEARCHED, SWING, Impossible
 from typer.testing import CliRunner
 
+from kemba.config import find_config
 from kemba.ocp import Task, load_task, task_model
 from kemba.ocp.checks import check_task
 from kemba.ocp.finding import Finding
@@ -72,7 +73,9 @@ def test_the_apex_within_reach_is_told(tmp_path: Path) -> None:
     assert apex["asked"] == pytest.approx(1.45)
     assert 1.0 < apex["reachable"] < 1.4
     assert "front and rear extension valves are open throughout the push" in answer["sentence"]
-    assert apex["where"].endswith("jump.yaml:29:3")
+    lines = find_config("jump.yaml", "tasks").read_text("utf-8").splitlines()
+    line = next(i for i, text in enumerate(lines, 1) if text.startswith("  apex:"))
+    assert apex["where"].endswith(f"jump.yaml:{line}:3")
     assert answer["iterations"] < 2000
 
 
