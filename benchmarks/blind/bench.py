@@ -1,3 +1,4 @@
+# ruff: noqa: E402  (the twin is found first)
 """Blind test of `discover` on bench logs made by the independent twin in tests/twin.
 
     python benchmarks/blind/bench.py --cases 150 --nulls 60 --out bench.jsonl
@@ -24,11 +25,11 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "benchmarks")]
 
 import numpy as np
-from blind import baselines, report
 from twin.cases import bench_case
 from twin.catalogue import CATALOGUE
 from twin.measure import Sensors
 
+from blind import baselines, report
 from kemba.identify.answer import Answer
 from kemba.identify.bench import bench_problem
 from kemba.identify.checks import BadData, check_logs
@@ -43,8 +44,12 @@ SENSORS = [
     for kind in ("sensor_bias", "sensor_scale", "sensor_delay")
     for channel in ("piston/F", "piston/x")
 ]
-PAIRS = [("seal_friction", "valve_delay"), ("supply_droop", "piston_damping"),
-         ("gas_spring", "hose_lag"), ("end_cushion", "supply_scale")]
+PAIRS = [
+    ("seal_friction", "valve_delay"),
+    ("supply_droop", "piston_damping"),
+    ("gas_spring", "hose_lag"),
+    ("end_cushion", "supply_scale"),
+]
 
 
 def cases(count: int, nulls: int) -> Iterator[dict[str, Any]]:

@@ -10,8 +10,17 @@ from pathlib import Path
 from typing import Any
 
 Record = dict[str, Any]
-OUTSIDE = ("magnet", "negative_stiffness", "hysteresis", "check_valve", "temperature_drift",
-           "cogging", "gear_loss", "cable_pull", "boom_drag")
+OUTSIDE = (
+    "magnet",
+    "negative_stiffness",
+    "hysteresis",
+    "check_valve",
+    "temperature_drift",
+    "cogging",
+    "gear_loss",
+    "cable_pull",
+    "boom_drag",
+)
 SURE = 0.95
 
 
@@ -62,7 +71,7 @@ def named(record: Record) -> list[str]:
 
 
 def in_class(record: Record) -> bool:
-    """Whether every hidden effect is named, or stands among what a named one cannot be told from."""
+    """Whether every hidden effect is named, or is one that a named one cannot be told from."""
     rows = [r for r in record["answer"]["ranking"] if r["effect"] in named(record)]
     known = {name for r in rows for name in (r["effect"], *r["equivalent_to"])}
     return bool(rows) and set(hidden(record)) <= known
@@ -74,7 +83,7 @@ def right(record: Record) -> bool:
 
 
 def sure_and_wrong(record: Record) -> bool:
-    """Whether an effect that is not hidden was named with 95 % or more, and with no alternative."""
+    """Whether an effect that is not hidden was named with 95 % or more and no alternative."""
     rows = {r["effect"]: r for r in record["answer"]["ranking"]}
     return any(
         rows[e]["probability"] >= SURE
@@ -89,7 +98,9 @@ def parameters(records: Iterable[Record]) -> tuple[list[float], list[bool]]:
     errors, covered = [], []
     for record in records:
         for effect in record["truth"]:
-            row = next((r for r in record["answer"]["ranking"] if r["effect"] == effect["kind"]), None)
+            row = next(
+                (r for r in record["answer"]["ranking"] if r["effect"] == effect["kind"]), None
+            )
             if row is None or effect["kind"] not in named(record):
                 continue
             for i, (name, true) in enumerate(effect["parameters"].items()):
@@ -105,8 +116,10 @@ def parameters(records: Iterable[Record]) -> tuple[list[float], list[bool]]:
 
 def table(records: Sequence[Record]) -> str:
     """The whole report as Markdown."""
-    groups = {name: [r for r in records if kind(r) == name] for name in
-              ("single", "sensor", "pair", "outside", "null")}
+    groups = {
+        name: [r for r in records if kind(r) == name]
+        for name in ("single", "sensor", "pair", "outside", "null")
+    }
     known = [*groups["single"], *groups["sensor"]]
     errors, covered = parameters([*known, *groups["pair"]])
     rows = [
@@ -114,23 +127,45 @@ def table(records: Sequence[Record]) -> str:
         _row("right effect first, sensors", groups["sensor"], right),
         _row("in the named class, physics and sensors", known, in_class),
         _row("both effects of a pair", groups["pair"], right),
-        _row("at least one of a pair, none wrong", groups["pair"],
-             lambda r: bool(named(r)) and set(named(r)) <= set(hidden(r))),
-        _row("outside the catalogue: flagged unknown", groups["outside"],
-             lambda r: r["answer"]["verdict"] == "unknown"),
-        _row("false alarms on nulls", groups["null"], lambda r: r["answer"]["verdict"] != "nothing"),
+        _row(
+            "at least one of a pair, none wrong",
+            groups["pair"],
+            lambda r: bool(named(r)) and set(named(r)) <= set(hidden(r)),
+        ),
+        _row(
+            "outside the catalogue: flagged unknown",
+            groups["outside"],
+            lambda r: r["answer"]["verdict"] == "unknown",
+        ),
+        _row(
+            "false alarms on nulls", groups["null"], lambda r: r["answer"]["verdict"] != "nothing"
+        ),
         _row("sure and wrong, all cases", records, sure_and_wrong),
         _share("95 % intervals that cover", sum(covered), len(covered)),
         f"| median parameter error | {100 * _median(errors):.1f} % | {len(errors)} |",
-        _row("error falls 3 x or to 1.3 x noise, where right", [r for r in known if right(r)], _falls),
+        _row(
+            "error falls 3 x or to 1.3 x noise, where right", [r for r in known if right(r)], _falls
+        ),
         f"| median time | {_median([r['seconds'] for r in records]):.0f} s | {len(records)} |",
     ]
-    for name, label in (("one_by_bic", "one term by BIC"),
-                        ("all_by_least_squares", "all by least squares")):
-        rows.append(_row(f"baseline, {label}: right first", known,
-                         lambda r, n=name: r["baselines"][n] in hidden(r)))
-        rows.append(_row(f"baseline, {label}: false alarms", groups["null"],
-                         lambda r, n=name: r["baselines"][n] is not None))
+    for name, label in (
+        ("one_by_bic", "one term by BIC"),
+        ("all_by_least_squares", "all by least squares"),
+    ):
+        rows.append(
+            _row(
+                f"baseline, {label}: right first",
+                known,
+                lambda r, n=name: r["baselines"][n] in hidden(r),
+            )
+        )
+        rows.append(
+            _row(
+                f"baseline, {label}: false alarms",
+                groups["null"],
+                lambda r, n=name: r["baselines"][n] is not None,
+            )
+        )
     head = ["| | share (95 % Wilson) | of |", "|---|---|---|"]
     return "\n".join([*head, *rows, "", *misses(records)])
 
@@ -161,9 +196,11 @@ def line(record: Record) -> str:
     answer = record["answer"]
     mark = "ok " if right(record) else "cls" if in_class(record) else "-- "
     said = " + ".join(named(record)) or answer["verdict"]
-    return (f"{mark} {' + '.join(hidden(record)) or 'nothing':32s} -> {said:40s} "
-            f"p {answer['p_value_nothing']:.3f} error {answer['error_before']:.2f} -> "
-            f"{answer['error_after']:.2f}  {record['seconds']:.0f} s")
+    return (
+        f"{mark} {' + '.join(hidden(record)) or 'nothing':32s} -> {said:40s} "
+        f"p {answer['p_value_nothing']:.3f} error {answer['error_before']:.2f} -> "
+        f"{answer['error_after']:.2f}  {record['seconds']:.0f} s"
+    )
 
 
 def _falls(record: Record) -> bool:

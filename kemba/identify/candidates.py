@@ -25,6 +25,11 @@ def effect_candidates(model: Model) -> dict[str, Candidate]:
     return found
 
 
+def by_default(kind: str) -> Effect:
+    """The effect of a kind as its defaults have it: absent."""
+    return BY_KIND[kind](kind=kind)
+
+
 def candidate(effect: type[Effect]) -> Candidate:
     """What `effect` declares: the parameter in `off` switches it, the others are shapes."""
     fields, declared = effect.model_fields, effect.declared()

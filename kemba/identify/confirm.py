@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
 from scipy.optimize import lsq_linear
 
 from kemba.identify.linear import Linear, estimate, linearise, time_blocks

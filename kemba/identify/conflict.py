@@ -6,13 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kemba.identify.problem import Array
+from kemba.identify.problem import Array, Labels
 from kemba.identify.rank import FLOOR, Hypothesis
 from kemba.identify.search import Search
 
-CLEAR = 50.0  # nats that separate values per run must bring over one value for all
+CLEAR = 100.0  # nats that separate values per run must bring over one value for all
 SHARE = 0.1  # and as a share of what the answer itself brings
-SPREAD = 0.8  # sizes between the smallest and the largest value
+SPREAD = 1.2  # sizes between the smallest and the largest value
+INFORMED = 0.2  # sizes, one sigma of a value that a run must give to be asked
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,7 @@ def drifting(search: Search, best: Hypothesis) -> Drift | None:
     for effect, candidate in problem.candidates.items():
         column = search.null_jacobian[:, search.points[()].linear.index(candidate.key)]
         gram, slope = _sums(column * column, run), _sums(column * residual, run)
-        keep = gram > 1e-12
+        keep = gram > 1.0 / (INFORMED * candidate.lead.size) ** 2
         if keep.sum() < 2:
             continue
         gram, slope = gram[keep], slope[keep]
@@ -58,5 +59,5 @@ def drifting(search: Search, best: Hypothesis) -> Drift | None:
     return clearest
 
 
-def _sums(values: Array, run: Array) -> Array:
-    return np.bincount(run, weights=values)
+def _sums(values: Array, run: Labels) -> Array:
+    return np.asarray(np.bincount(run, weights=values), dtype=float)

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from kemba.identify.answer import Answer, Ranked, Value, phrase
-from kemba.identify.conflict import Drift, drifting
 from kemba.identify.confirm import left_out, predicted_error, rms
+from kemba.identify.conflict import Drift, drifting
 from kemba.identify.linear import is_shape, time_blocks
 from kemba.identify.null import NullTest, bootstrap, smallest_detectable
 from kemba.identify.problem import Array, Candidate, Problem
@@ -20,7 +20,8 @@ from kemba.identify.unknown import Formula, look, unfinished
 
 SIGNIFICANT = 0.02
 CLASS = 3.0  # nats within which two explanations are the same to these data
-MATTERS = 0.2  # an effect below this share of its size is no finding
+MATTERS = 0.2  # an effect below this share of its size is no finding,
+MATTERS_TOO = 0.3  # nor is one beside a stronger one
 DEFECT = 0.02  # share of an effect that the model's own imperfection may add or hide, 1 sigma
 FINE = 0.1  # s, blocks whose signs are redrawn
 SHOWN = 8
@@ -81,21 +82,32 @@ def _believed(search: Search, best: Hypothesis, test: NullTest) -> tuple[Hypothe
     if not best or p_value > SIGNIFICANT:
         return NULL, p_value
     while best:
+        grave = material(search, best)
+        if grave != best:
+            best = grave
+            if best:
+                search.visit(best)
+            continue
         smaller = [h for h in search.points if len(h) == len(best) - 1 and set(h) < set(best)]
         against = max(smaller, key=lambda h: search.points[h].log_evidence, default=NULL)
-        if matters(search, best) and not left_out(search, best, against).refuted:
+        if not left_out(search, best, against).refuted:
             return best, p_value
         best = against
     return NULL, p_value
 
 
-def matters(search: Search, hypothesis: Hypothesis) -> bool:
-    """Whether each of its effects is large enough to be more than an imperfection."""
+def material(search: Search, hypothesis: Hypothesis) -> Hypothesis:
+    """Those of its effects that are large enough to be more than an imperfection."""
     score, linear = search.points[hypothesis].score, search.points[hypothesis].linear
-    leads = {e: search.problem.candidates[e] for e in hypothesis}
-    return all(
-        abs(score.z[linear.index(c.key)] - c.lead.off) >= MATTERS * c.lead.size
-        for c in leads.values()
+    least = MATTERS if len(hypothesis) == 1 else MATTERS_TOO
+
+    def share(effect: str) -> float:
+        c = search.problem.candidates[effect]
+        return float(abs(score.z[linear.index(c.key)] - c.lead.off) / c.lead.size)
+
+    strongest = max(hypothesis, key=lambda e: _strength(search, e, hypothesis))
+    return tuple(
+        e for e in hypothesis if share(e) >= (MATTERS if e == strongest else least)
     )
 
 
@@ -225,12 +237,13 @@ def values(search: Search, hypothesis: Hypothesis, effect: str) -> dict[str, Val
             triple = np.exp(np.clip(triple, -50, 50))
         triple = np.clip(triple, parameter.lower, parameter.upper)
         name, unit, triple = reported(candidate, parameter.name, parameter.unit, triple)
-        found[name] = Value(*(float(t) for t in triple), unit)
+        value, low, high = (float(t) for t in triple)
+        found[name] = Value(value, low, high, unit)
     return found
 
 
 def reported(candidate: Candidate, name: str, unit: str, triple: Array) -> tuple[str, str, Array]:
-    """A parameter under the catalogue's name: searched reciprocally, reported as it stands there."""
+    """A parameter as the catalogue names it, also where it was searched reciprocally."""
     if name not in candidate.reciprocal:
         return name, unit, triple
     name, unit = candidate.reciprocal[name]

@@ -28,7 +28,7 @@ CLEAR = 5.0  # nats that settle a question
 
 @dataclass(frozen=True)
 class Proposal:
-    """A rig, and how many nats it is expected to put between the rivals that are hardest to tell."""
+    """A rig, and how many nats it should put between the rivals hardest to tell apart."""
 
     rig: Rig
     nats: float
@@ -81,7 +81,7 @@ def propose(folder: str | Path, out: Path) -> Proposal:
 
 
 def contenders(answer: Mapping[str, Any]) -> dict[str, dict[str, float]]:
-    """Theta of the effects between which an answer leaves doubt: the first and its likeliest rivals."""
+    """Theta of the first effect of an answer and of its likeliest rivals."""
     rows = {row["effect"]: row for row in answer["ranking"]}
     if not rows:
         raise KembaError("answer.json", "has no ranking", "nothing is left to be separated")
@@ -128,10 +128,12 @@ def _logs(rig: Rig) -> Iterator[Trajectory]:
         times = test.times[:: max(1, round(rig.rate / 1000.0))]
         x, _ = test.motion(times)
         noise = NOISE * rng.standard_normal(len(times))
-        columns = {"piston/x [m]": x + 1e-5 * rng.standard_normal(len(times)), "piston/F [N]": noise}
+        columns = {
+            "piston/x [m]": x + 1e-5 * rng.standard_normal(len(times)),
+            "piston/F [N]": noise,
+        }
         for valve in ("extend", "retract"):
             profile = test.valves.get(f"valve/{valve}")
             on = np.zeros(len(times)) if profile is None else np.array([profile(t) for t in times])
             columns[f"valve/{valve} [1]"] = on
         yield Trajectory(times, columns, {"name": test.name})
-

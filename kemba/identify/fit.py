@@ -13,6 +13,7 @@ from kemba.identify.problem import Array, Parameter, Problem
 from kemba.identify.rank import SLAB, Hypothesis
 
 EVALUATIONS = 10
+ABSURD = 1e6  # noise units
 
 
 @dataclass(frozen=True)
@@ -167,7 +168,7 @@ class _Search:
 
     def _residual(self, x: Array) -> Array:
         r = self.problem.residual(self._theta(x)) * self.scale
-        return np.concatenate([np.clip(r, -1e6, 1e6), x])
+        return np.concatenate([np.nan_to_num(np.clip(r, -ABSURD, ABSURD), nan=ABSURD), x])
 
     def _jacobian(self, x: Array) -> Array:
         base = self._residual(x)

@@ -7,7 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kemba.identify.problem import Array, Parameter, Problem, Theta
+from kemba.identify.problem import Array, Flags, Labels, Parameter, Problem, Theta
+
+FARTHEST = 4.0  # sizes
 
 
 @dataclass(frozen=True)
@@ -32,11 +34,11 @@ class Linear:
     def total(self) -> tuple[Array, Array, float]:
         return self.gram.sum(axis=0), self.slope.sum(axis=0), float(self.power.sum())
 
-    def without(self, blocks: Array) -> Linear:
+    def without(self, blocks: Flags) -> Linear:
         """The same with the blocks where `blocks` (b,) is true left out."""
         return self.only(~blocks)
 
-    def only(self, keep: Array) -> Linear:
+    def only(self, keep: Flags) -> Linear:
         return replace(
             self,
             gram=self.gram[keep],
@@ -55,7 +57,7 @@ def names_of(problem: Problem, theta: Theta) -> tuple[str, ...]:
         key
         for c in problem.candidates.values()
         if is_on(theta, c.key, c.lead)
-        for key in c.keys()
+        for key in tuple(c.keys())
         if key != c.key
     ]
     return (*problem.nuisance, *(c.key for c in problem.candidates.values()), *shapes)
@@ -66,7 +68,7 @@ def is_on(theta: Theta, key: str, lead: Parameter) -> bool:
 
 
 def linearise(
-    problem: Problem, theta: Theta, blocks: Array, names: Iterable[str] | None = None
+    problem: Problem, theta: Theta, blocks: Labels, names: Iterable[str] | None = None
 ) -> tuple[Linear, Array, Array]:
     """The problem at theta, with J (n, k) and the residual (n,); `blocks` (n,) labels the rows."""
     names = names_of(problem, theta) if names is None else tuple(names)
@@ -86,7 +88,7 @@ def condense(
     width: Array,
     jacobian: Array,
     r: Array,
-    blocks: Array,
+    blocks: Labels,
 ) -> Linear:
     """Sums over each block."""
     labels = np.unique(blocks)
@@ -102,7 +104,7 @@ def condense(
     return Linear(tuple(names), at, mean, width, *arrays)
 
 
-def moved(linear: Linear, at: Array, jacobian: Array, r: Array, blocks: Array) -> Linear:
+def moved(linear: Linear, at: Array, jacobian: Array, r: Array, blocks: Labels) -> Linear:
     """The same slopes about another point, where the residual is r (n,)."""
     labels = np.unique(blocks)
     slope = np.array([jacobian[blocks == b].T @ r[blocks == b] for b in labels])
@@ -113,10 +115,7 @@ def moved(linear: Linear, at: Array, jacobian: Array, r: Array, blocks: Array) -
 def within(problem: Problem, theta: Mapping[str, float]) -> dict[str, float]:
     """Theta with every effect's parameters inside their bounds."""
     bounds = {k: p for c in problem.candidates.values() for k, p in c.keys().items()}
-    clipped = {
-        k: float(np.clip(v, bounds[k].lower, bounds[k].upper)) if k in bounds else v
-        for k, v in theta.items()
-    }
+    clipped = {k: _sane(v, bounds[k]) if k in bounds else v for k, v in theta.items()}
     typical = {
         key: p.typical
         for c in problem.candidates.values()
@@ -125,6 +124,14 @@ def within(problem: Problem, theta: Mapping[str, float]) -> dict[str, float]:
         if key not in clipped
     }
     return {**clipped, **typical}
+
+
+def _sane(value: float, parameter: Parameter) -> float:
+    """Within the bounds, and within a few sizes of off where it is a switch."""
+    if np.isnan(parameter.typical):
+        reach = FARTHEST * parameter.size
+        value = float(np.clip(value, parameter.off - reach, parameter.off + reach))
+    return float(np.clip(value, parameter.lower, parameter.upper))
 
 
 def is_shape(problem: Problem, name: str) -> bool:
@@ -150,7 +157,7 @@ def priors(problem: Problem, theta: Theta, names: Iterable[str]) -> tuple[Array,
     return at, mean, width
 
 
-def time_blocks(problem: Problem, wanted: int = 4, shortest: float = 0.0) -> Array:
+def time_blocks(problem: Problem, wanted: int = 4, shortest: float = 0.0) -> Labels:
     """A label per row: every run, cut in time where there are fewer runs than `wanted`."""
     rows = problem.rows()
     pieces = max(1, int(np.ceil(wanted / max(len(problem.runs), 1))))
@@ -177,6 +184,6 @@ def _clean(problem: Problem, theta: Mapping[str, float]) -> dict[str, float]:
         key
         for c in problem.candidates.values()
         if not is_on(theta, c.key, c.lead)
-        for key in c.keys()
+        for key in tuple(c.keys())
     }
     return {k: v for k, v in theta.items() if k not in off}

@@ -25,7 +25,7 @@ def difference_sigma(values: Array) -> float:
     median = float(np.median(np.abs(d))) / 0.6745
     trimmed = np.sort(np.abs(d))[: int(0.9 * len(d))]
     mean = float(np.mean(trimmed)) / 0.6287  # E|d| of a normal below its 90 % point
-    return max(median, mean) / np.sqrt(20.0)
+    return max(median, mean) / float(np.sqrt(20.0))
 
 
 @dataclass(frozen=True)

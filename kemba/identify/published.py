@@ -37,8 +37,8 @@ class Published:
         )
         volumes = sorted(1e6 * v for v in self.dead_volume.values())
         return (
-            f"Tables I and II imply seal friction of {low:.0f} to {high:.0f} N, a supply that falls "
-            f"short as it is drawn from ({growing} from 0.6 to 0.8 MPa), and tubes of "
+            f"Tables I and II imply seal friction of {low:.0f} to {high:.0f} N, a supply that "
+            f"falls short as it is drawn from ({growing} from 0.6 to 0.8 MPa), and tubes of "
             f"{volumes[0]:.0f} to {volumes[-1]:.0f} cm3 beside the stroke of "
             f"{1e6 * AREA_E * STROKE:.0f} cm3."
         )
@@ -62,6 +62,4 @@ def published() -> Published:
         name: AREA_E * STROKE / (full / empty - 1.0) for name, (empty, full) in PAPER_RISE.items()
     }
     spread = np.percentile(bare, [25, 75])
-    return Published(
-        pressures, losses, (float(spread[0]), float(spread[1])), shortfall, volume
-    )
+    return Published(pressures, losses, (float(spread[0]), float(spread[1])), shortfall, volume)

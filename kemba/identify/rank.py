@@ -32,7 +32,7 @@ class Score:
 
 
 class Ranker:
-    """Scores hypotheses on one linearisation; `heat` > 1 tempers a likelihood too sure of itself."""
+    """Scores hypotheses on one linearisation; `heat` > 1 tempers too sure a likelihood."""
 
     def __init__(
         self,
@@ -48,7 +48,9 @@ class Ranker:
         self.nuisance = np.array([name in free for name in linear.names])
         self.lead = {c.effect: linear.index(c.key) for c in candidates.values()}
         self._shape = {
-            effect: [linear.index(key) for key in c.keys() if key != c.key and key in linear.names]
+            effect: [
+                linear.index(key) for key in tuple(c.keys()) if key != c.key and key in linear.names
+            ]
             for effect, c in candidates.items()
         }
         gram, slope, power = linear.total
@@ -85,7 +87,7 @@ class Ranker:
             floor = 1e-6 if effect in self.silent else self.floor
             share = np.hypot(SLAB, floor) if effect in hypothesis else floor
             width[i] *= share
-        return np.maximum(width, 1e-12)
+        return np.asarray(np.maximum(width, 1e-12))
 
     def _sides(self, hypothesis: Hypothesis, z: Array, covariance: Array) -> float:
         """A switch that cannot be negative halves its prior, and may rule out its posterior."""
@@ -116,7 +118,7 @@ class Ranker:
 
 def log_prior(hypothesis: Hypothesis, count: int) -> float:
     """Nothing is missing half of the time; each further effect is rarer, and all are alike."""
-    share = {0: 0.5, 1: 0.4, 2: 0.08, 3: 0.02}[min(len(hypothesis), 3)]
+    share = {0: 0.5, 1: 0.4, 2: 0.01, 3: 0.001}[min(len(hypothesis), 3)]
     ways = {0: 1.0, 1: count, 2: count * (count - 1) / 2}.get(
         len(hypothesis), count * (count - 1) * (count - 2) / 6
     )

@@ -21,13 +21,14 @@ from kemba.identify.linear import (
     time_blocks,
     within,
 )
-from kemba.identify.problem import Array, Problem
+from kemba.identify.problem import Array, Labels, Problem
 from kemba.identify.rank import FLOOR, NULL, Hypothesis, Ranker, Score, log_prior, probabilities
 
 LEADERS = 6
 SURE = 3  # so many leaders are refitted however far behind they are,
 FAR, FAR_SHARE = 40.0, 0.7  # others when no more nats, or share of the gain, behind
 GLANCES = 1  # evaluations of each single effect before the leaders are refitted
+ABSURD = 1e5  # noise units
 LARGEST = 3  # effects in one answer; more need another experiment
 GAIN = 3.0  # nats beyond prior odds that a further effect must bring
 
@@ -66,7 +67,7 @@ class Search:
     deadline: float = np.inf
     say: Callable[[str], None] = lambda text: None
     heat: float = 1.0
-    blocks: Array = field(init=False)
+    blocks: Labels = field(init=False)
     points: dict[Hypothesis, Point] = field(default_factory=dict)
     null_table: dict[Hypothesis, float] = field(default_factory=dict)
     null_jacobian: Array = field(init=False)
@@ -144,6 +145,8 @@ class Search:
         for step in range(GLANCES + 1):
             if step or theta != self.points[NULL].fit.theta:
                 r = self.problem.residual(theta)
+                if not np.all(np.abs(r) < ABSURD):
+                    break  # a linear estimate may point to where nothing can be predicted
                 at, _, _ = priors(self.problem, theta, linear.names)
                 linear = moved(linear, at, self.null_jacobian, r, self.blocks)
             score = self.ranker(linear).score(hypothesis)
@@ -184,7 +187,7 @@ class Search:
         if given != NULL:
             ranker = self.ranker(self.points[given].linear)
             return ranker.table((len(given) + 1,), given=given)
-        single = {h: e for h, e in self.null_table.items() if len(h) == 1}
+        single: dict[Hypothesis, float] = {h: e for h, e in self.null_table.items() if len(h) == 1}
         base = max(single.values())
         best_pair = max(
             (h for h in self.null_table if len(h) == 2), key=self.null_table.__getitem__

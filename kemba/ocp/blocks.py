@@ -14,7 +14,7 @@ from kemba.ocp.compiled import compiled
 
 Entries = tuple[ca.MX, np.ndarray, np.ndarray]  # nonzeros, their rows, their columns
 
-WORTH_COMPILING = 1000  # instructions of a Hessian block
+LARGE = 1000  # instructions of a Hessian block that make compiling worth while
 
 
 @dataclass(frozen=True)
@@ -48,52 +48,85 @@ class Block:
 class BlockProblem:
     """min sum f, g stacked block by block, with Jacobian and Hessian given exactly.
 
-    Functions of (x, p): `f`, `grad_f`, `g`, `jac_g`, `hess_lag`, ready for `ca.nlpsol`.
+    Functions of (x, p): `g`, `grad_f`, `jac_g`, `hess_lag`, ready for `ca.nlpsol`; the derivatives
+    are made when first asked for, as compiled code where `worth_compiling` (many solves ahead).
     """
 
-    def __init__(self, blocks: Sequence[Block], size: int, p: ca.SX) -> None:
+    def __init__(
+        self, blocks: Sequence[Block], size: int, p: ca.SX, worth_compiling: bool = False
+    ) -> None:
         self.blocks, self.size, self.p = list(blocks), size, p
+        self.worth_compiling = worth_compiling
         self.rows = sum(len(b.columns) * b.g.numel() for b in blocks)
         x, parameter = ca.MX.sym("x", size), ca.MX.sym("p", p.numel())
-        lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", self.rows)
         self.x, self.parameter = x, parameter
-        f, total, gradients, g, again = ca.MX(0), ca.MX(0), [], [], []
+        f, g = ca.MX(0), []
+        for block in blocks:
+            z, rows = block.z, ca.densify(block.g)
+            value = ca.Function("value", [z, p], ca.cse([block.f, rows])).map(len(block.columns))
+            cost, values = value(*self._local(block))
+            f += ca.sum2(cost)
+            g.append(ca.vec(values))
+        self.nlp = {"x": x, "p": parameter, "f": f, "g": ca.vertcat(*g)}
+        self.g = ca.Function("g", [x, parameter], [self.nlp["g"]], ["x", "p"], ["g"])
+
+    def _local(self, block: Block) -> tuple[ca.MX, ca.MX]:
+        """Local variables and parameters of every repeat, side by side."""
+        local = _gather(self.x, block.columns)
+        return local, ca.repmat(self.parameter, 1, len(block.columns))
+
+    @cached_property
+    def grad_f(self) -> ca.Function:
+        """(x, p) -> f and its gradient."""
+        return self._derivatives[0]
+
+    @cached_property
+    def jac_g(self) -> ca.Function:
+        """(x, p) -> g and its Jacobian."""
+        return self._derivatives[1]
+
+    @cached_property
+    def hess_lag(self) -> ca.Function:
+        """(x, p, lam_f, lam_g) -> upper triangle of the Lagrangian's Hessian."""
+        return self._derivatives[2]
+
+    @cached_property
+    def _derivatives(self) -> tuple[ca.Function, ca.Function, ca.Function]:
+        lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", self.rows)
+        f, gradients, g = ca.MX(0), [], []
         jac: list[Entries] = []
         hess: list[Entries] = []
         row = 0
-        for block in blocks:
+        for block in self.blocks:
             m, n = block.g.numel(), len(block.columns)
-            local, many = _gather(x, block.columns), ca.repmat(parameter, 1, n)
-            value, slope_of, first, second = (f_.map(n) for f_ in _functions(block, p))
-            cost, values = value(local, many)
+            here = self._local(block)
+            functions = _functions(block, self.p, self.worth_compiling)
+            slope_of, first, second = (function.map(n) for function in functions)
+            cost, slope = slope_of(*here)
             f += ca.sum2(cost)
-            g.append(ca.vec(values))
-            cost, slope = slope_of(local, many)
-            total += ca.sum2(cost)
-            values, j_block = first(local, many)
-            again.append(ca.vec(values))
             gradients.append((ca.vec(slope), block.columns.ravel()))
+            values, j_block = first(*here)
+            g.append(ca.vec(values))
             multipliers = ca.reshape(lam_g[row : row + m * n], m, n)
-            h_block = second(local, many, ca.repmat(lam_f, 1, n), multipliers)
+            h_block = second(*here, ca.repmat(lam_f, 1, n), multipliers)
             jac.append(_place_jacobian(block, j_block, row))
             hess.append(_place_hessian(block, h_block))
             row += m * n
-        stacked, repeated = ca.vertcat(*g), ca.vertcat(*again)
-        jacobian = _scatter(jac, self.rows, size)
-        hessian = _scatter(hess, size, size)
-        gradient = _gather_gradient(gradients, size)
-        self.nlp = {"x": x, "p": parameter, "f": f, "g": stacked}
-        names, at = ["x", "p"], [x, parameter]
-        self.grad_f = ca.Function("grad_f", at, [total, gradient], names, ["f", "grad_f_x"])
-        self.jac_g = ca.Function("jac_g", at, [repeated, jacobian], names, ["g", "jac_g_x"])
-        self.hess_lag = ca.Function(
-            "hess_lag",
-            [*at, lam_f, lam_g],
-            [hessian],
-            [*names, "lam_f", "lam_g"],
-            ["triu_hess_gamma_x_x"],
+        names, at = ["x", "p"], [self.x, self.parameter]
+        gradient = _gather_gradient(gradients, self.size)
+        jacobian = [ca.vertcat(*g), _scatter(jac, self.rows, self.size)]
+        hessian = [_scatter(hess, self.size, self.size)]
+        return (
+            ca.Function("grad_f", at, [f, gradient], names, ["f", "grad_f_x"]),
+            ca.Function("jac_g", at, jacobian, names, ["g", "jac_g_x"]),
+            ca.Function(
+                "hess_lag",
+                [*at, lam_f, lam_g],
+                hessian,
+                [*names, "lam_f", "lam_g"],
+                ["triu_hess_gamma_x_x"],
+            ),
         )
-        self.g = ca.Function("g", at, [stacked], names, ["g"])
 
 
 def _gather(x: ca.MX, columns: np.ndarray) -> ca.MX:
@@ -101,18 +134,16 @@ def _gather(x: ca.MX, columns: np.ndarray) -> ca.MX:
     return ca.reshape(x[index], columns.shape[1], columns.shape[0])
 
 
-def _functions(block: Block, p: ca.SX) -> list[ca.Function]:
-    """Of one repeat: values, the cost's slope, the rows' Jacobian, the Lagrangian's Hessian."""
+def _functions(block: Block, p: ca.SX, worth_compiling: bool) -> list[ca.Function]:
+    """Of one repeat: the cost's slope, the rows' Jacobian, the Lagrangian's Hessian."""
     z, f, g = block.z, block.f, ca.densify(block.g)
-    value = ca.Function("value", [z, p], ca.cse([f, g]))
-    derivatives = [
+    functions = [
         ca.Function("slope", [z, p], ca.cse([f, ca.densify(ca.gradient(f, z))])),
         ca.Function("first", [z, p], ca.cse([g, _column(block.jacobian)])),
         ca.Function("second", [z, p, *block.multipliers], ca.cse([_column(block.hessian)])),
     ]
-    if derivatives[-1].n_instructions() > WORTH_COMPILING:
-        derivatives = compiled(derivatives)  # `value` stays: CasADi wants to differentiate it
-    return [value, *derivatives]
+    large = functions[-1].n_instructions() > LARGE
+    return compiled(functions) if worth_compiling and large else functions
 
 
 def _gather_gradient(parts: list[tuple[ca.MX, np.ndarray]], size: int) -> ca.MX:

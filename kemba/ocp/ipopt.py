@@ -129,7 +129,7 @@ class Ipopt:
         free: Mapping[int, tuple[np.ndarray, np.ndarray]] | None = None,
     ) -> Point:
         """One solve from `start`; `fixed` maps columns of Y to values (nodes + 1,) they keep,
-        `free` to bounds in which they stay."""
+        `free` to bounds that hold as well."""
         t = self.transcription
         remaining = self.deadline - time.monotonic()
         if self.stop is not None and self.stop():
@@ -140,7 +140,8 @@ class Ipopt:
         for column, values in (fixed or {}).items():
             lower[1:, column] = upper[1:, column] = values[1:]
         for column, (low, high) in (free or {}).items():
-            lower[1:, column], upper[1:, column] = low[1:], high[1:]
+            lower[1:, column] = np.maximum(lower[1:, column], low[1:])
+            upper[1:, column] = np.minimum(upper[1:, column], high[1:])
         own = {**COMMON, **self.options, **(options or {})}
         if np.isfinite(remaining):
             own["max_wall_time"] = remaining

@@ -78,10 +78,12 @@ class Search:
         return replace(point, Y=start.Y)
 
     def valves(self, point: Point) -> dict[int, np.ndarray]:
-        """Columns of the valves, rounded, without pulses shorter than the task's dwell."""
+        """Columns of the valves, rounded, without pulses shorter than the task's dwell, as the
+        task's own bounds on them allow."""
         t = self.transcription
         least, h = t.task.min_dwell, t.h(point.Y)
-        return {c: dwelling(point.Y[:, c], h, least) for c in t.layout.binary}
+        rounded = {c: dwelling(point.Y[:, c], h, least) for c in t.layout.binary}
+        return {c: np.clip(u, t.lower[:, c], t.upper[:, c]) for c, u in rounded.items()}
 
 
 def warm(mu: float, **more: Any) -> dict[str, Any]:

@@ -63,7 +63,7 @@ class Transcription:
             g_bounds += [(rows.lower, rows.upper)] * len(where)
         self.meanings = meanings
         self.g_lower, self.g_upper = (np.array(b) for b in zip(*g_bounds, strict=True))
-        self.problem = BlockProblem(blocks, index.size, p)
+        self.problem = BlockProblem(blocks, index.size, p, worth_compiling=True)
 
     def _rest_before_start(self) -> None:
         """Node 0 has no interval before it: its inputs and forces are dummies at zero."""

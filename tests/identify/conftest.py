@@ -39,7 +39,9 @@ def bench_log() -> BenchLog:
         switched = rng.random((int(duration / 0.11) + 1, 2)) < 0.5
         sent = switched[(path.time / 0.11).astype(int)].T.astype(float)
         rig = Rig(load_model(extra=effects, rig=True), (), ())
-        force = rig.predict(path, (pulses(path.time, sent[0]), pulses(path.time, sent[1])), {}).force
+        force = rig.predict(
+            path, (pulses(path.time, sent[0]), pulses(path.time, sent[1])), {}
+        ).force
         noise = rng.standard_normal((2, len(force)))
         columns = {
             "piston/x [m]": path.x + 3e-5 * noise[0],
@@ -57,5 +59,7 @@ def log_file(tmp_path: Path, bench_log: BenchLog) -> Path:
     """A clean bench log on disk."""
     log = bench_log()
     path = tmp_path / "log.csv"
-    Trajectory(log.time, {h: log[n] for h, n in zip(log.headers, log.names, strict=True)}).write(path)
+    Trajectory(log.time, {h: log[n] for h, n in zip(log.headers, log.names, strict=True)}).write(
+        path
+    )
     return path

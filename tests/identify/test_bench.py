@@ -72,13 +72,16 @@ def test_pressures_are_read_when_there_are_any(bench_log: BenchLog) -> None:
     log = bench_log()
     model = load_model(rig=True)
     bare = bench_problem([log], model)
-    states = bare._rig(()).predict(
-        bare._runs[0].motion, bare._runs[0].commands, dict.fromkeys(bare._scaled, 1.0)
-    ).states
+    states = (
+        bare._rig(())
+        .predict(bare._runs[0].motion, bare._runs[0].commands, dict.fromkeys(bare._scaled, 1.0))
+        .states
+    )
     from kemba.identify.bench.pressure import absolute_pressure
 
     columns = {
-        f"{c} [Pa]": absolute_pressure(c, states) + 500 * np.random.default_rng(0).standard_normal(len(log))
+        f"{c} [Pa]": absolute_pressure(c, states)
+        + 500 * np.random.default_rng(0).standard_normal(len(log))
         for c in ("chamber/extend/P", "chamber/retract/P")
     }
     problem = bench_problem([log.with_columns(columns)], model)
@@ -91,9 +94,9 @@ def test_from_logs_to_a_model_and_the_next_test(bench_log: BenchLog, tmp_path: P
     for seed in range(3):
         log = bench_log((effect("seal_friction", F_c=9.0),), duration=2.0, seed=seed)
         paths.append(tmp_path / f"run_{seed}.csv")
-        Trajectory(log.time, dict(zip(log.headers, (log[n] for n in log.names), strict=True))).write(
-            paths[-1]
-        )
+        Trajectory(
+            log.time, dict(zip(log.headers, (log[n] for n in log.names), strict=True))
+        ).write(paths[-1])
     out = tmp_path / "answer"
     answer, _ = discover_logs(paths[:2], paths[2:], out=out)
     assert answer.added == ("seal_friction",)

@@ -49,9 +49,7 @@ def swapped(one: int, other: int) -> Damage:
 def late_force(lines: list[str], rows: int = 80) -> list[str]:
     cells = [line.split(",") for line in lines[1:]]
     force = [c[4] for c in cells]
-    return [lines[0]] + [
-        ",".join([*c[:4], f]) for c, f in zip(cells[rows:], force, strict=False)
-    ]
+    return [lines[0]] + [",".join([*c[:4], f]) for c, f in zip(cells[rows:], force, strict=False)]
 
 
 def frozen(lines: list[str]) -> list[str]:
@@ -144,7 +142,9 @@ def test_small_damage_is_borne(kind: str, log_file: Path) -> None:
 def test_mixed_line_ends_change_nothing(log_file: Path) -> None:
     clean = read_log(log_file)
     lines = log_file.read_bytes().split(b"\n")
-    log_file.write_bytes(b"".join(line + (b"\r\n" if i % 3 else b"\n") for i, line in enumerate(lines)))
+    log_file.write_bytes(
+        b"".join(line + (b"\r\n" if i % 3 else b"\n") for i, line in enumerate(lines))
+    )
     again = read_log(log_file)
     assert np.array_equal(clean["piston/F"], again["piston/F"])
 

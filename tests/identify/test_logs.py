@@ -59,7 +59,7 @@ def test_a_lagging_column_is_brought_forward(tmp_path: Path) -> None:
 def test_a_missing_foreign_column_is_named(tmp_path: Path) -> None:
     path = tmp_path / "foreign.csv"
     path.write_text(FOREIGN.replace("loadcell", "load"))
-    with pytest.raises(KembaError, match="has no column 'loadcell'.*did you mean 'load'"):
+    with pytest.raises(KembaError, match=r"has no column 'loadcell'.*did you mean 'load'"):
         read_log(path, load_map("example_bench"))
 
 

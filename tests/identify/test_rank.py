@@ -22,7 +22,9 @@ class Toy:
         self.runs = tuple(f"run {i}" for i in range(runs))
         self.nuisance = {"gain": (1.0, 0.02), "slope": (0.0, 0.5)}
         self.candidates = {
-            name: Candidate(name, Parameter("a", "N", 0.0, 10.0, 0.0 if name == "drag" else -np.inf))
+            name: Candidate(
+                name, Parameter("a", "N", 0.0, 10.0, 0.0 if name == "drag" else -np.inf)
+            )
             for name in EFFECTS
         }
         t = np.arange(800) / 1e3

@@ -42,8 +42,8 @@ def smooth_motion(time: Array, x: Array, v: Array | None = None) -> Motion:
     if v is not None and np.isfinite(v).sum() > 0.5 * len(v):
         rate, spread = _weigh_in(grid, rate, spread, half, time, v)
     a = np.gradient(_mean(rate, 3), step)
-    columns = (np.interp(time, grid, c) for c in (position, rate, a, spread))
-    return Motion(time, *columns, sigma)
+    x, v, a, spread = (np.interp(time, grid, c) for c in (position, rate, a, spread))
+    return Motion(time, x, v, a, spread, sigma)
 
 
 def _adaptive(values: Array, sigma: float, step: float) -> tuple[Array, Array, Array, Array]:

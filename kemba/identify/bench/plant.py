@@ -117,7 +117,7 @@ class Rig:
             s = s - move
             if np.all(np.abs(move) <= 1e-9 * (1.0 + np.abs(s))):
                 break
-        return s
+        return np.asarray(s)
 
     def _mapped(self, kind: str, n: int) -> _Call:
         if (kind, n) not in self._maps:
@@ -140,9 +140,9 @@ class _Call:
     def __call__(self, *arguments: Array) -> Array:
         kept = [np.asfortranarray(a, dtype=float).reshape(-1, order="F") for a in arguments]
         for i, a in enumerate(kept):
-            self._buffer.set_arg(i, memoryview(a))
+            self._buffer.set_arg(i, memoryview(a))  # type: ignore[call-arg, arg-type]
         out = np.zeros(self._shape[0] * self._shape[1])
-        self._buffer.set_res(0, memoryview(out))
+        self._buffer.set_res(0, memoryview(out))  # type: ignore[call-arg, arg-type]
         self._evaluate()
         return out.reshape(self._shape, order="F")
 
@@ -187,11 +187,9 @@ def share(intervals: Array, times: Array) -> Array:
     knots = np.concatenate([[times[0] - 1.5], flat, [times[-1] + 1.5]])
     slope = np.arange(len(knots) - 1) % 2
     on_time = np.concatenate([[0.0], np.cumsum(slope * np.diff(knots))])
-    later, earlier = (
-        np.interp(times + BLUR, knots, on_time),
-        np.interp(times - BLUR, knots, on_time),
-    )
-    return np.clip((later - earlier) / (2 * BLUR), 0.0, 1.0)
+    later = np.interp(times + BLUR, knots, on_time)
+    earlier = np.interp(times - BLUR, knots, on_time)
+    return np.asarray(np.clip((later - earlier) / (2 * BLUR), 0.0, 1.0))
 
 
 def _columns(motion: Motion) -> tuple[Array, Array, Array]:

@@ -81,7 +81,9 @@ def _misfit(run: Run, predict: Predict) -> tuple[float, float]:
     """Median error of the nominal prediction and spread of the measured force."""
     keep = run.keep["piston/F"]
     force = run.measured["piston/F"][keep]
-    error = float(np.sqrt(np.mean((predict(run)[keep] - force) ** 2)))
+    with np.errstate(over="ignore", invalid="ignore"):  # a mix-up may lead anywhere
+        error = float(np.sqrt(np.mean((predict(run)[keep] - force) ** 2)))
+    error = error if np.isfinite(error) else np.inf
     return error, max(float(np.std(force)), float(np.sqrt(np.mean(force**2))), 1.0)
 
 

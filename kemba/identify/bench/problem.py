@@ -8,7 +8,6 @@ from functools import cached_property
 
 import numpy as np
 
-from kemba.effects import BY_KIND
 from kemba.effects.base import Effect
 from kemba.identify.bench.library import features, terms
 from kemba.identify.bench.motion import Motion
@@ -17,13 +16,15 @@ from kemba.identify.bench.plausible import contradictions
 from kemba.identify.bench.pressure import absolute_pressure
 from kemba.identify.bench.run import PRESSURES, Run
 from kemba.identify.bench.switching import delayed
-from kemba.identify.candidates import effect_candidates, sensor_candidates
+from kemba.identify.candidates import by_default, effect_candidates, sensor_candidates
 from kemba.identify.checks import BadData
 from kemba.identify.noise import Colour, learn, whiten
 from kemba.identify.problem import Array, Rows, Theta, secant_jacobian
 from kemba.model.model import Model
 
 EARLY = 0.08  # s that tell whether a valve had just been switched when a log begins
+REMEASURED = 0.1  # what an earlier discovery put on the model's list is known less well
+REMEASURED = 0.1  # what an earlier discovery put on the model's list is known less well
 JITTER = 0.02  # nominal figures are off by 1-3 %
 
 
@@ -38,7 +39,9 @@ class BenchProblem:
         if sensors:
             self.candidates |= sensor_candidates(self._sensor_sigmas())
         self._scaled = _scaled(model)
-        self.nuisance = dict.fromkeys(self._scaled, (1.0, JITTER))
+        self.nuisance = {
+            name: (1.0, REMEASURED if _found(model, name) else JITTER) for name in self._scaled
+        }
         self._rigs: dict[tuple[str, ...], Rig] = {}
         self._starts = {
             f"start:{name}[{i}]": (i, name)
@@ -71,14 +74,10 @@ class BenchProblem:
     def _rig(self, active: tuple[str, ...]) -> Rig:
         """The model with these effects on its list, compiled once."""
         if active not in self._rigs:
-            extra = [BY_KIND[self.candidates[name].effect]() for name in active]
+            extra = [by_default(self.candidates[name].effect) for name in active]
             model = self.model.with_effects(_unlike(self.model, extra))
-            free = tuple(
-                key
-                for name in active
-                for key in self.candidates[name].keys()
-                if key in model.parameters
-            )
+            keys = (key for name in active for key in tuple(self.candidates[name].keys()))
+            free = tuple(key for key in keys if key in model.parameters)
             self._rigs[active] = Rig(model, free, self._scaled)
         return self._rigs[active]
 
@@ -143,13 +142,12 @@ class BenchProblem:
             return {}
         at = self.rows(runs).run
         base = self.residual(theta, runs)
-        columns = {}
+        columns: dict[str, Array] = {}
         for state in {self._starts[n][1] for n in names}:
             own = {n: self._starts[n][0] for n in names if self._starts[n][1] == state}
             step = {n: theta.get(n, 0.0) + 0.1 * self._state_scale[state] for n in own}
-            slope = (self.residual({**theta, **step}, runs) - base) / (
-                0.1 * self._state_scale[state]
-            )
+            change = self.residual({**theta, **step}, runs) - base
+            slope = change / (0.1 * self._state_scale[state])
             columns |= {n: np.where(at == i, slope, 0.0) for n, i in own.items()}
         return columns
 
@@ -169,7 +167,7 @@ class BenchProblem:
         return Rows(run_, channel, time, phase, mode, self.channels, sigma)
 
     def library(self, theta: Theta) -> Mapping[str, Array]:
-        """Columns per newton, or per the coefficient's unit, of simple terms beyond the catalogue."""
+        """Columns per unit of the coefficient, of simple terms beyond the catalogue."""
         parts: dict[str, list[Array]] = {}
         for i, run in enumerate(self._runs):
             predicted = self.predict(theta, i)
@@ -183,7 +181,7 @@ class BenchProblem:
         return dict(zip(parts, self.whiten(columns).T, strict=True))
 
     def leftover(self, theta: Theta) -> tuple[Array, Array, Array]:
-        """Residual of the force over its white noise (n,), what it may depend on (n, m), run (n,)."""
+        """Force residual over white noise (n,), what it may depend on (n, m), and run (n,)."""
         parts = []
         for i, run in enumerate(self._runs):
             keep = run.keep["piston/F"]
@@ -219,7 +217,7 @@ class BenchProblem:
         for (i, k), colour in self.colour.items():
             own = (rows.run == i) & (rows.channel == k)
             out[own] = whiten(columns[own], colour)
-        return out
+        return np.asarray(out)
 
     def plausible(self) -> list[str]:
         """Raise BadData when columns must be mixed up; returns remarks."""
@@ -272,7 +270,14 @@ def _scaled(model: Model) -> tuple[str, ...]:
             names += [f"{effect.name}.{f}" for f in known[effect.kind]]
         elif effect.kind.startswith("orifice"):
             names += [f"{effect.name}.{f}" for f in effect.parameters()]
+        elif effect.off and all(p.unit != "s" for p in effect.parameters().values()):
+            names += [f"{effect.name}.{f}" for f in effect.off]
     return tuple(names)
+
+
+def _found(model: Model, name: str) -> bool:
+    """Whether a number belongs to an effect that the plain machine would not have."""
+    return bool(model.effect(name.rsplit(".", 1)[0]).off)
 
 
 def _unlike(model: Model, extra: list[Effect]) -> list[Effect]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from scipy.ndimage import maximum_filter1d
@@ -15,10 +14,8 @@ from kemba.identify.bench.plant import Pulses
 from kemba.identify.bench.switching import pulses
 from kemba.identify.excerpt import held
 from kemba.identify.noise import difference_sigma
-from kemba.identify.problem import Array
+from kemba.identify.problem import Array, Flags
 from kemba.trajectory import Trajectory
-
-Flags = np.ndarray[Any, np.dtype[np.bool_]]
 
 PRESSURES = ("chamber/extend/P", "chamber/retract/P")
 GAP, FORGET = 0.012, 0.12  # s
@@ -52,8 +49,8 @@ class Run:
 
 def prepare(name: str, log: Trajectory) -> Run:
     """Smooth the motion and learn each channel's white noise from its fastest differences."""
-    v = log["piston/v"] if "piston/v" in log else None
-    motion = smooth_motion(log.time, log["piston/x"], v)
+    speeds = [log[name] for name in ("piston/v",) if name in log]
+    motion = smooth_motion(log.time, log["piston/x"], *speeds)
     sent = [held(log[f"valve/{c}"]) for c in ("extend", "retract")]
     measured = {c: log[c] for c in ("piston/F", *PRESSURES) if c in log}
     floor = {"piston/F": 0.05, **dict.fromkeys(PRESSURES, 50.0)}
