@@ -1,3 +1,4 @@
+# ruff: noqa: E402  (the twin is found first)
 """Blind test of `discover` on robot logs made by the independent twin in tests/twin.
 
     python benchmarks/blind/robot.py --cases 150 --nulls 60 --out robot.jsonl
@@ -24,11 +25,11 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "benchmarks")]
 
 import numpy as np
-from blind import baselines, report
 from twin.cases import robot_case
 from twin.catalogue import CATALOGUE
 from twin.measure import Sensors, fault_channels
 
+from blind import baselines, report
 from kemba.identify.checks import check_logs
 from kemba.identify.discover import discover
 from kemba.identify.logs import read_logs

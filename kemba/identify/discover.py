@@ -106,9 +106,7 @@ def material(search: Search, hypothesis: Hypothesis) -> Hypothesis:
         return float(abs(score.z[linear.index(c.key)] - c.lead.off) / c.lead.size)
 
     strongest = max(hypothesis, key=lambda e: _strength(search, e, hypothesis))
-    return tuple(
-        e for e in hypothesis if share(e) >= (MATTERS if e == strongest else least)
-    )
+    return tuple(e for e in hypothesis if share(e) >= (MATTERS if e == strongest else least))
 
 
 def doubts_about(search: Search, best: Hypothesis, drift: Drift | None) -> list[str]:
