@@ -109,7 +109,9 @@ def main() -> None:
     options = parser.parse_args()
     done = {json.dumps(r["case"], sort_keys=True) for r in report.read(options.out)}
     part, parts = (int(p) for p in options.share.split("/"))
-    for number, setting in enumerate(cases(options.cases, options.nulls)):
+    settings = list(cases(options.cases, options.nulls))
+    for number in np.random.default_rng(0).permutation(len(settings)):
+        setting = settings[number]
         if number % parts == part and json.dumps(setting, sort_keys=True) not in done:
             record = run(setting)
             report.append(options.out, record)

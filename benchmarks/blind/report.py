@@ -194,7 +194,8 @@ def misses(records: Iterable[Record]) -> list[str]:
 def line(record: Record) -> str:
     """One case on one line."""
     answer = record["answer"]
-    mark = "ok " if right(record) else "cls" if in_class(record) else "-- "
+    flagged = kind(record) == "outside" and answer["verdict"] == "unknown"
+    mark = "ok " if right(record) or flagged else "cls" if in_class(record) else "-- "
     said = " + ".join(named(record)) or answer["verdict"]
     return (
         f"{mark} {' + '.join(hidden(record)) or 'nothing':32s} -> {said:40s} "

@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+SIGNIFICANT = 0.02  # p-value of nothing below which something differs
 Verdict = Literal["missing", "nothing", "unknown", "bad-data"]
 
 
@@ -21,13 +22,8 @@ class Value:
     unit: str
 
     def __str__(self) -> str:
-        digits = max(
-            2,
-            1
-            + int(
-                np.ceil(np.log10(max(abs(self.value), 1e-12) / max(self.high - self.low, 1e-12)))
-            ),
-        )
+        width = max(self.high - self.low, 1e-12 * max(abs(self.value), 1e-12))
+        digits = 2 + int(np.ceil(np.log10(max(abs(self.value) / width, 1.0))))
         digits = min(digits, 5)
         unit = "" if self.unit == "1" else f" {self.unit}"
         return f"{self.value:.{digits}g}{unit} ({self.low:.{digits}g} to {self.high:.{digits}g})"
@@ -73,8 +69,11 @@ class Answer:
 def phrase(answer: Answer) -> str:
     """The verdict in one plain sentence."""
     if answer.verdict == "nothing":
+        what = "Nothing is missing as far as these data can tell"
+        if answer.p_value_nothing <= SIGNIFICANT:
+            what = "What differs is too small to matter"
         return (
-            f"Nothing is missing as far as these data can tell (p = {answer.p_value_nothing:.2g}); "
+            f"{what} (p = {answer.p_value_nothing:.2g}); "
             f"the error is {answer.error_after:.2f} times the noise."
         )
     if answer.verdict == "unknown":

@@ -47,14 +47,14 @@ def _predicted(search: Search, point: Point) -> Array:
     linear, found = point.linear, []
     for block in range(len(linear.count)):
         mask = np.arange(len(linear.count)) == block
-        step = _bounded(search, linear.without(mask), point.hypothesis) - linear.at
+        step = within_tolerance(search, linear.without(mask), point.hypothesis) - linear.at
         one = linear.only(mask)
         power = one.power[0] + 2 * one.slope[0] @ step + step @ one.gram[0] @ step
         found.append(-0.5 * float(power) / search.heat)
     return np.array(found)
 
 
-def _bounded(search: Search, linear: Linear, hypothesis: Hypothesis) -> Array:
+def within_tolerance(search: Search, linear: Linear, hypothesis: Hypothesis) -> Array:
     """z (k,) of the best fit with the nominal figures within their tolerance."""
     ranker = search.ranker(linear, floor=NONE)
     width = ranker.widths(hypothesis, 1.0)

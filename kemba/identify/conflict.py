@@ -6,13 +6,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kemba.identify.confirm import within_tolerance
 from kemba.identify.problem import Array, Labels
-from kemba.identify.rank import FLOOR, Hypothesis
+from kemba.identify.rank import FLOOR, NULL, Hypothesis
 from kemba.identify.search import Search
 
 CLEAR = 100.0  # nats that separate values per run must bring over one value for all
+SHARE_OF_ROWS = 0.01  # per row
 SHARE = 0.1  # and as a share of what the answer itself brings
 SPREAD = 1.2  # sizes between the smallest and the largest value
+FORGIVEN = 0.15  # noise units of force that a run may be off by, whatever the reason
 INFORMED = 0.2  # sizes, one sigma of a value that a run must give to be asked
 
 
@@ -36,17 +39,19 @@ def drifting(search: Search, best: Hypothesis) -> Drift | None:
     if len(problem.runs) < 2:
         return None
     run = problem.rows().run
-    residual = problem.residual(point.fit.theta)
+    residual = problem.residual(point.fit.theta) if best else _tolerant(search)
     gained = point.log_evidence - search.points[()].log_evidence
+    count = np.bincount(run)
     found: list[Drift] = []
     for effect, candidate in problem.candidates.items():
         column = search.null_jacobian[:, search.points[()].linear.index(candidate.key)]
         gram, slope = _sums(column * column, run), _sums(column * residual, run)
-        keep = gram > 1.0 / (INFORMED * candidate.lead.size) ** 2
+        error = (1.0 + FORGIVEN**2 * count) / np.maximum(gram, 1e-12)
+        keep = error < (INFORMED * candidate.lead.size) ** 2
         if keep.sum() < 2:
             continue
         gram, slope = gram[keep], slope[keep]
-        narrow = 1.0 / gram + (FLOOR * candidate.lead.size) ** 2
+        narrow = error[keep] + (FLOOR * candidate.lead.size) ** 2
         own = -slope / gram
         shared = float(np.sum(own / narrow) / np.sum(1.0 / narrow))
         nats = 0.5 * float(np.sum((own - shared) ** 2 / narrow))
@@ -54,9 +59,17 @@ def drifting(search: Search, best: Hypothesis) -> Drift | None:
             values = tuple(float(candidate.lead.off + a) for a in own)
             found.append(Drift(effect, candidate.key, values, nats))
     clearest = max(found, key=lambda d: d.nats, default=None)
-    if clearest is None or clearest.nats < max(CLEAR, SHARE * gained):
+    least = max(CLEAR, SHARE * gained, SHARE_OF_ROWS * len(residual))
+    if clearest is None or clearest.nats < least:
         return None
     return clearest
+
+
+def _tolerant(search: Search) -> Array:
+    """Residual of the model as it is, its nominal figures within their tolerance."""
+    linear = search.points[NULL].linear
+    z = within_tolerance(search, linear, NULL)
+    return search.null_residual + search.null_jacobian @ (z - linear.at)
 
 
 def _sums(values: Array, run: Labels) -> Array:

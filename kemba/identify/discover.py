@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kemba.identify.answer import Answer, Ranked, Value, phrase
+from kemba.identify.answer import SIGNIFICANT, Answer, Ranked, Value, phrase
 from kemba.identify.confirm import left_out, predicted_error, rms
 from kemba.identify.conflict import Drift, drifting
 from kemba.identify.linear import is_shape, time_blocks
@@ -18,7 +18,6 @@ from kemba.identify.rank import NULL, Hypothesis
 from kemba.identify.search import Search, share_of
 from kemba.identify.unknown import Formula, look, unfinished
 
-SIGNIFICANT = 0.02
 CLASS = 3.0  # nats within which two explanations are the same to these data
 MATTERS = 0.2  # an effect below this share of its size is no finding,
 MATTERS_TOO = 0.3  # nor is one beside a stronger one

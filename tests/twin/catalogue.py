@@ -163,7 +163,8 @@ def tables(effects: list[dict]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Effects -> (leg table, body table, valve[2, 2] = extra on-delay and off-delay per leg)."""
     leg, body = neutral_tables()
     valve = np.zeros((2, 2))
-    for effect in effects:
+    # the drift adds to the damping that another effect may set
+    for effect in sorted(effects, key=lambda e: e["kind"] == "temperature_drift"):
         entry = CATALOGUE[effect["kind"]]
         rows = {"both": [0, 1], "front": [0], "rear": [1]}[effect.get("on", "both")]
         for name, value in effect["parameters"].items():

@@ -1,0 +1,94 @@
+"""`kemba-opt discover`, `adopt` and `experiment`, as scripts see them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner, Result
+
+from kemba_cli.main import app
+
+FIELDS = {
+    *("verdict", "p_value_nothing", "sentence", "ranking", "added", "error_before", "error_after"),
+    *("noise_floor", "smallest_detectable", "formula", "split_by", "model", "runtime_s"),
+}
+RANKED = {
+    *("effect", "probability", "parameters", "equivalent_to", "error_before", "error_after"),
+    "holdout_gain_nats",
+}
+
+
+def run(*arguments: str | Path) -> Result:
+    return CliRunner().invoke(app, [str(a) for a in arguments])
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two bench logs of a rig whose force sensor reads 8 N too much."""
+    home = tmp_path_factory.mktemp("bench")
+    for number in range(2):
+        write_log(home / f"run_{number}.csv", seed=number, bias=8.0)
+    return home
+
+
+def write_log(path: Path, seed: int, bias: float) -> None:
+    """A locked rod at 30 mm whose valves are switched, by the closed form of eq. 4."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(1500) / 1e3
+    sent = (rng.random((2, 16)) < 0.5).repeat(100, axis=1)[:, : len(time)].astype(float)
+    force = np.zeros((2, len(time)))
+    for i, (static, x) in enumerate(((324.0, 0.03), (260.0, 0.04))):
+        for k in range(1, len(time)):
+            u = sent[i, k - 7] if k >= 7 else 0.0
+            tau = 0.013 - 0.005 * u + x / 0.07 * (0.024 - 0.007 * u)
+            target = static * u
+            force[i, k] = target + (force[i, k - 1] - target) * np.exp(-1e-3 / tau)
+    measured = force[0] - force[1] + bias + rng.standard_normal(len(time))
+    x = 0.03 + 2e-5 * rng.standard_normal(len(time))
+    table = np.column_stack([time, x, *sent, measured])
+    header = "time [s],piston/x [m],valve/extend [1],valve/retract [1],piston/F [N]"
+    lines = [",".join(f"{value:.7g}" for value in row) for row in table]
+    path.write_text("\n".join([header, *lines]) + "\n")
+
+
+def test_json_has_every_field_and_files_are_written(folder: Path, tmp_path: Path) -> None:
+    out = tmp_path / "answer"
+    shown = run("discover", folder / "run_0.csv", folder / "run_1.csv", "--out", out, "--json")
+    assert shown.exit_code == 0, shown.output
+    answer = json.loads(shown.stdout)
+    assert set(answer) >= FIELDS
+    assert all(set(row) == RANKED for row in answer["ranking"])
+    assert answer["verdict"] == "missing" and answer["added"] == ["sensor_bias:piston/F"]
+    value = answer["ranking"][0]["parameters"]["b"]
+    assert value["low"] < 8.0 < value["high"] and value["unit"] == "N"
+    assert json.loads((out / "answer.json").read_text())["verdict"] == "missing"
+    for name in ("model.yaml", "heat_map.png", "residual.png", "ladder.png"):
+        assert (out / name).stat().st_size > 50
+
+    adopted = run("adopt", out, "sensor_bias:piston/F", "--out", tmp_path / "mine.yaml")
+    assert adopted.exit_code == 0 and "channel: piston/F" in (tmp_path / "mine.yaml").read_text()
+    wrong = run("adopt", out, "seal_frictio")
+    assert wrong.exit_code == 2 and "is not in the ranking" in wrong.stderr
+
+
+def test_bad_data_is_a_verdict(folder: Path, tmp_path: Path) -> None:
+    log = tmp_path / "bad.csv"
+    lines = (folder / "run_0.csv").read_text().splitlines()
+    log.write_text("\n".join([*lines[:900], *lines[700:]]) + "\n")
+    shown = run("discover", log, "--out", tmp_path / "answer", "--json")
+    assert shown.exit_code == 1
+    answer = json.loads(shown.stdout)
+    assert answer["verdict"] == "bad-data" and "bad.csv:901:1" in answer["sentence"]
+
+
+def test_wrong_usage_is_told_apart(folder: Path, tmp_path: Path) -> None:
+    missing = run("discover", tmp_path / "none.csv", "--out", tmp_path)
+    assert missing.exit_code == 2 and "none.csv" in missing.stderr
+    log = folder / "run_0.csv"
+    both = run("discover", log, "--holdout", log, "--out", tmp_path)
+    assert both.exit_code == 2 and "also among the logs" in both.stderr
+    model = run("discover", log, "--model", "planing", "--out", tmp_path)
+    assert model.exit_code == 2 and "planning" in model.stderr
