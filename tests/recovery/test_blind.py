@@ -14,7 +14,13 @@ from kemba.identify.answer import Answer
 from kemba.identify.workflow import discover_logs
 
 FAST = {"seal_friction": 3, "valve_delay": 1}
-SLOW = {"supply_droop": 2, "hose_lag": 1, "end_cushion": 2, "gas_spring": 3, "sensor_delay:piston/F": 4}
+SLOW = {
+    "supply_droop": 2,
+    "hose_lag": 1,
+    "end_cushion": 2,
+    "gas_spring": 3,
+    "sensor_delay:piston/F": 4,
+}
 
 
 def answer(folder: Path, effect: str | None, seed: int) -> tuple[Answer, dict]:
