@@ -26,7 +26,7 @@ class Gain:
     @property
     def refuted(self) -> bool:
         """Whether left-out data speak against it."""
-        return self.nats < -max(self.error, 2.0)
+        return self.nats < -2.0
 
 
 def left_out(search: Search, hypothesis: Hypothesis, against: Hypothesis = NULL) -> Gain:

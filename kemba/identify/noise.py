@@ -13,6 +13,7 @@ from kemba.identify.problem import Array
 
 ORDER = 4
 SPIKE, AROUND, SPIKY = 7, 151, 5.0  # rows, rows, ratio of mean squares
+LEAST = 0.6  # of the white noise: what a flexible model leaves is never believed to be less
 TRIM = 5.0  # rows beyond so many sigma are switching instants, not noise
 
 
@@ -57,7 +58,7 @@ def _yule_walker(residual: Array, order: int) -> Colour:
     r = np.clip(residual, -TRIM * scale, TRIM * scale)
     n = len(r)
     if n < 50:
-        return Colour(np.zeros(0), max(float(np.sqrt(np.mean(r**2))), 0.2))
+        return Colour(np.zeros(0), max(float(np.sqrt(np.mean(r**2))), LEAST))
     c = np.array([np.dot(r[: n - k], r[k:]) / n for k in range(order + 1)])
     best, chosen = np.inf, (np.zeros(0), float(c[0]))
     for p in range(order + 1):
@@ -66,7 +67,7 @@ def _yule_walker(residual: Array, order: int) -> Colour:
         bic = n * np.log(power) + p * np.log(n)
         if bic < best - 1e-9:
             best, chosen = bic, (phi, power)
-    return Colour(chosen[0], float(np.sqrt(chosen[1])))
+    return Colour(chosen[0], max(float(np.sqrt(chosen[1])), LEAST))
 
 
 def caution(residual: Array) -> Array:

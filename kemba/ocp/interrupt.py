@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import signal
+import sys
 import threading
 from collections.abc import Callable
 from types import FrameType, TracebackType
 from typing import Any
 
+SHOW_CURSOR = "\x1b[?25h"
+
 
 class Interrupt:
     """While it stands, SIGINT only sets a flag that solvers look at between iterations.
 
-    Call it to ask whether to stop. `tell` hears of the first Ctrl-C; the second raises
-    KeyboardInterrupt. Outside the main thread it changes nothing.
+    Call it to ask whether to stop. `tell` hears of the first Ctrl-C; the second ends the process
+    as if nobody had listened, since an exception would be lost inside a solver's callback.
+    Outside the main thread it changes nothing.
     """
 
     def __init__(self, tell: Callable[[str], None] = lambda text: None) -> None:
@@ -40,6 +44,10 @@ class Interrupt:
 
     def _on_signal(self, number: int, frame: FrameType | None) -> None:
         if self.asked:
-            raise KeyboardInterrupt
+            if sys.stderr.isatty():
+                sys.stderr.write(SHOW_CURSOR)  # a progress bar may have hidden it
+                sys.stderr.flush()
+            signal.signal(signal.SIGINT, signal.SIG_DFL)
+            signal.raise_signal(signal.SIGINT)
         self.asked = True
         self.tell("interrupted: writing the best iterate; press Ctrl-C again to quit at once")

@@ -81,7 +81,7 @@ def test_second_interrupt_quits_at_once(tmp_path: Path) -> None:
     time.sleep(0.02)
     process.send_signal(signal.SIGINT)
     process.communicate(timeout=30)
-    assert process.returncode in (130, -signal.SIGINT)
+    assert process.returncode == -signal.SIGINT
 
 
 @posix
@@ -92,9 +92,6 @@ def test_interrupt_outside_the_solver() -> None:
     with Interrupt(told.append) as stop:
         os.kill(os.getpid(), signal.SIGINT)
         found = plan(task, document, stop=stop)
-        with pytest.raises(KeyboardInterrupt):
-            os.kill(os.getpid(), signal.SIGINT)
-            time.sleep(1)
     assert found.status == "interrupted" and found.iterations == 0
     assert len(told) == 1
 

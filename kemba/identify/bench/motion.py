@@ -10,6 +10,7 @@ import numpy as np
 from kemba.identify.noise import difference_sigma
 from kemba.identify.problem import Array
 
+FINEST = 2e-6  # m, noise that is never undercut
 HALF_WIDTHS = (5, 8, 11, 15, 20, 27, 40, 60, 90, 135)  # samples
 
 
@@ -37,7 +38,7 @@ def smooth_motion(time: Array, x: Array, v: Array | None = None) -> Motion:
     grid = np.linspace(time[0], time[-1], count)
     step = float(grid[1] - grid[0])
     values = np.interp(grid, time[good], x[good])
-    sigma = max(difference_sigma(x[good]), 1e-9)
+    sigma = max(difference_sigma(x[good]), FINEST)
     position, rate, spread, half = _adaptive(values, sigma, step)
     if v is not None and np.isfinite(v).sum() > 0.5 * len(v):
         rate, spread = _weigh_in(grid, rate, spread, half, time, v)

@@ -18,6 +18,7 @@ from kemba.identify.problem import Array, Flags
 from kemba.trajectory import Trajectory
 
 PRESSURES = ("chamber/extend/P", "chamber/retract/P")
+FINEST_FORCE, FINEST_PRESSURE = 0.2, 100.0  # N, Pa: noise that is never undercut
 GAP, FORGET = 0.012, 0.12  # s
 NEIGHBOURS = 9  # samples over which the worst error of the velocity counts
 # usual figures of a cylinder of this size: N.s.m-1, N; and what friction adds below CREEP m.s-1
@@ -53,13 +54,19 @@ def prepare(name: str, log: Trajectory) -> Run:
     motion = smooth_motion(log.time, log["piston/x"], *speeds)
     sent = [held(log[f"valve/{c}"]) for c in ("extend", "retract")]
     measured = {c: log[c] for c in ("piston/F", *PRESSURES) if c in log}
-    floor = {"piston/F": 0.05, **dict.fromkeys(PRESSURES, 50.0)}
-    sigma = {c: max(difference_sigma(y), floor[c]) for c, y in measured.items()}
+    sigma = {c: noise_of(c, y) for c, y in measured.items()}
     on = [(u > 0.5).astype(int).astype(str) for u in sent]
     seen = ~blind(log.time, np.isfinite(log["piston/x"]), np.stack(sent))
     keep = {c: np.isfinite(y) & seen for c, y in measured.items()}
     commands = (pulses(log.time, sent[0]), pulses(log.time, sent[1]))
     return Run(name, motion, commands, measured, sigma, np.char.add(*on), keep)
+
+
+def noise_of(channel: str, y: Array) -> float:
+    """White noise per sample; a simulation without any is still no better than its own steps."""
+    least = FINEST_FORCE if channel == "piston/F" else FINEST_PRESSURE
+    spread = float(np.ptp(y[np.isfinite(y)]))
+    return max(difference_sigma(y), least + 5e-4 * spread)
 
 
 def blind(time: Array, good: Flags, sent: Array) -> Flags:
