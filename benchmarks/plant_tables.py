@@ -1,29 +1,30 @@
 """Tables I and II as the bench rigs of configs/rigs measure them on a model of the piston.
 
-    python benchmarks/plant_tables.py [MODEL]
+    python benchmarks/plant_tables.py [MODEL] [--figures FOLDER]
 
 Prints what `kemba-opt characterise` reads off the locked chamber, the dynamometer and the random
-test, beside the paper's values. MODEL is `plant` unless given.
+test, beside the paper's values. MODEL is `plant` unless given. `--figures docs/images` draws each
+rig as the paper's Fig. 3, 4, 6 and 7 do, with the fitted model in the last.
 """
 
 from __future__ import annotations
 
-import sys
+import argparse
+from pathlib import Path
 
 from kemba.plant import tables
 from kemba.plant.bench import bench_model, load_rig, run_rig
 from kemba.plant.characterise import characterise
+from kemba.plotting import plot_rig, save_figure
+from kemba.trajectory import Trajectory
 
-RIGS = ("locked", "dynamometer", "random")
+RIGS = ("locked", "volumes", "dynamometer", "random")
 
 
-def main(model: str) -> None:
-    logs = {
-        f"{name}/{test}": log
-        for name in RIGS
-        for test, log in run_rig(load_rig(name), lambda supply: bench_model(model, supply))
-    }
-    found = characterise(logs)
+def main(model: str, figures: Path | None) -> None:
+    data = {name: _logs(name, model) for name in RIGS}
+    told = (name for name in RIGS if name != "volumes")  # the same tests as `locked`, in between
+    found = characterise({f"{n}/{test}": log for n in told for test, log in data[n].items()})
     for columns, rows in (
         (tables.RISE_COLUMNS, tables.rise_rows(found)),
         (tables.FORCE_COLUMNS, tables.force_rows(found)),
@@ -34,7 +35,19 @@ def main(model: str) -> None:
             print(" | ".join(row))
     if found.rises:
         print(f"\nfirst-order answer R2 {found.rises.r2:.4f}, eq. 5 R2 {found.rises.r2_linear:.4f}")
+    for name in RIGS if figures else ():
+        assert figures is not None
+        drawn = plot_rig(data[name], effects=found.effects())
+        print(save_figure(drawn, figures / f"plant-{name}.png"))
+
+
+def _logs(rig: str, model: str) -> dict[str, Trajectory]:
+    return dict(run_rig(load_rig(rig), lambda supply: bench_model(model, supply)))
 
 
 if __name__ == "__main__":
-    main(sys.argv[1] if len(sys.argv) > 1 else "plant")
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("model", nargs="?", default="plant")
+    parser.add_argument("--figures", type=Path)
+    asked = parser.parse_args()
+    main(asked.model, asked.figures)

@@ -7,13 +7,14 @@ from typing import Annotated
 
 import typer
 
-from kemba_cli.common import Quiet
+from kemba_cli.common import Json, Quiet, print_json
 
 
 def adopt(
     answer: Annotated[Path, typer.Argument(help="Folder written by discover.")],
     effect: Annotated[str, typer.Argument(help="Effect of its ranking, such as seal_friction.")],
     out: Annotated[Path | None, typer.Option(help="Model YAML to write.")] = None,
+    json: Json = False,
     quiet: Quiet = False,
 ) -> None:
     """Write a model YAML with the chosen effect of an answer added.
@@ -23,4 +24,5 @@ def adopt(
     from kemba.identify.adopt import adopt_effect
 
     path = out or answer / f"model_{effect.replace(':', '_').replace('/', '_')}.yaml"
-    typer.echo(adopt_effect(answer, effect, path))
+    adopt_effect(answer, effect, path)
+    print_json({"model": str(path), "added": effect}) if json else typer.echo(path)

@@ -11,11 +11,15 @@ from kemba_cli.common import Json, Quiet, print_json, results, say
 
 if TYPE_CHECKING:
     from kemba.plant.characterise import Characteristics
+    from kemba.trajectory import Trajectory
 
 
 def characterise(
     logs: Annotated[list[Path], typer.Argument(help="Bench logs (CSV), or folders of them.")],
     out: Annotated[Path | None, typer.Option(help="Model YAML to write.")] = None,
+    figures: Annotated[
+        Path | None, typer.Option(help="Folder for the paper's figure of each rig.")
+    ] = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -28,15 +32,34 @@ def characterise(
     from kemba.trajectory import Trajectory
 
     files = [f for item in logs for f in (sorted(item.glob("*.csv")) if item.is_dir() else [item])]
-    found = fit({str(file): Trajectory.read(file) for file in files})
+    read = {str(file): Trajectory.read(file) for file in files}
+    found = fit(read)
     if out:
         found.write_model(out, out.stem)
+    drawn = _draw(found, read, figures) if figures else []
     answer: dict[str, Any] = {"logs": len(files), **as_json(found), "model": out and str(out)}
+    answer["figures"] = drawn
     if json:
         print_json(answer)
         return
     _print(found)
+    for path in drawn:
+        say(f"wrote {path}", quiet)
     say(f"wrote {out}" if out else "write a model with --out MODEL.yaml", quiet)
+
+
+def _draw(found: Characteristics, logs: dict[str, Trajectory], folder: Path) -> list[str]:
+    """The figure of each rig among the logs; what was fitted predicts random motion."""
+    from kemba.plotting import plot_rig, save_figure
+
+    rigs: dict[str, dict[str, Trajectory]] = {}
+    for name, log in logs.items():
+        rig = str(log.meta.get("rig") or Path(name).resolve().parent.name)
+        rigs.setdefault(rig, {})[Path(name).stem] = log
+    return [
+        str(save_figure(plot_rig(own, effects=found.effects()), folder / f"{rig}.png"))
+        for rig, own in rigs.items()
+    ]
 
 
 def _print(found: Characteristics) -> None:

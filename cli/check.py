@@ -13,6 +13,9 @@ from kemba_cli.failures import BAD_INPUT
 
 def check(
     files: Annotated[list[Path], typer.Argument(help="YAML files, and logs as CSV.")],
+    column_map: Annotated[
+        str | None, typer.Option("--map", help="Column map YAML for foreign logs.")
+    ] = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -25,7 +28,7 @@ def check(
     answers = []
     for file in files:
         try:
-            answer = _log(file) if file.suffix == ".csv" else _yaml(file)
+            answer = _log(file, column_map) if file.suffix == ".csv" else _yaml(file)
             answers.append({"file": str(file), "good": True, **answer})
         except KembaError as error:
             answers.append({"file": str(file), "good": False, "sentence": str(error)})
@@ -44,10 +47,11 @@ def _tell(answers: list[dict[str, Any]], json: bool, quiet: bool) -> None:
             typer.echo(f"{answer['file']}: good: {answer['sentence']}")
 
 
-def _log(file: Path) -> dict[str, Any]:
+def _log(file: Path, column_map: str | None) -> dict[str, Any]:
+    from kemba.identify.logs import load_map, read_log
     from kemba.trajectory import Trajectory
 
-    log = Trajectory.read(file)
+    log = read_log(file, load_map(column_map)) if column_map else Trajectory.read(file)
     sentence = f"{len(log)} rows, {len(log.names)} columns, {log.time[-1] - log.time[0]:.3g} s"
     return {"kind": "table", "rows": len(log), "columns": log.headers, "sentence": sentence}
 

@@ -19,7 +19,7 @@ def compare(
     logs: Annotated[list[Path], typer.Argument(help="Logs (CSV) of one machine, any order.")],
     model: Annotated[str, typer.Option(help="Model YAML to judge.")] = "planning",
     run: Annotated[Path | None, typer.Option(help="Run folder that was executed.")] = None,
-    figure: Annotated[Path | None, typer.Option(help="Where to save the heat map.")] = None,
+    figure: Annotated[Path | None, typer.Option(help="Where to save the figure.")] = None,
     column_map: Annotated[
         str | None, typer.Option("--map", help="Column map YAML for foreign logs.")
     ] = None,
@@ -55,10 +55,14 @@ def _print(found: Comparison) -> None:
         numbers = (f"{x:.3g}" for x in (c.rmse, c.max, c.noise_sigma, c.ratio))
         table.add_row(c.name.replace("[", r"\["), *numbers)
     results().print(table)
-    for cell in sorted(found.cells, key=lambda c: c.q_value)[:SHOWN]:
-        text = (
-            f"{cell.channel} in {cell.phase}, valves {cell.mode}: {cell.ratio:.2g} times the noise"
-        )
-        typer.echo(f"  {text} (q = {cell.q_value:.1g})")
+    for cell in sorted((c for c in found.cells if c.significant), key=lambda c: c.q_value)[:SHOWN]:
+        where = f"{cell.channel} in {cell.phase}, valves {cell.mode}, piston {cell.region}"
+        typer.echo(f"  {where}: {cell.ratio:.2g} times the noise (q = {cell.q_value:.1g})")
+    for hint in found.hints[:SHOWN]:
+        typer.echo(f"  {hint.text}")
+    for peak in found.peaks:
+        if peak.low * peak.high > 0 and not found.good:
+            size = f"{peak.value:+.3g} {peak.unit} ({peak.low:.3g} to {peak.high:.3g})"
+            typer.echo(f"  missing at {peak.channel}: {size} at {peak.time_s:.3f} s of {peak.run}")
     for header, error in found.plan.items():
         typer.echo(f"  plan missed by up to {error:.3g} in {header}")

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from kemba_cli.common import Json, print_json, results
+from kemba_cli.common import Json, Quiet, print_json, results
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -18,6 +18,7 @@ def effects(
     markdown: Annotated[
         bool, typer.Option("--markdown", help="The catalogue as a page of the documentation.")
     ] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Show the catalogue: equation, parameters with unit and size, source.
 

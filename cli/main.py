@@ -18,12 +18,15 @@ from kemba_cli.compare import compare
 from kemba_cli.discover import discover
 from kemba_cli.effects import effects
 from kemba_cli.experiment import experiment
+from kemba_cli.export import export
 from kemba_cli.failures import guarded
 from kemba_cli.plot import plot
+from kemba_cli.report import report
 from kemba_cli.schema import schema
 from kemba_cli.simulate import simulate
 from kemba_cli.solve import solve
 from kemba_cli.sweep import sweep
+from kemba_cli.view import view
 
 VERBS = (
     solve,
@@ -37,6 +40,9 @@ VERBS = (
     check,
     effects,
     plot,
+    view,
+    report,
+    export,
     schema,
 )
 

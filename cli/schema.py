@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from kemba_cli.common import print_json
+from kemba_cli.common import Json, Quiet, print_json
 
 
 def schema(
@@ -15,6 +15,8 @@ def schema(
     out: Annotated[
         Path | None, typer.Option(help="Write KIND.schema.json files into this folder.")
     ] = None,
+    json: Json = False,
+    quiet: Quiet = False,
 ) -> None:
     """JSON Schema of the YAML files, so that editors complete and check them.
 
@@ -28,6 +30,7 @@ def schema(
     if out is None:
         print_json(found[kind] if kind else found)
         return
+    paths = {name: out / f"{name}.schema.json" for name in found}
     for name, content in found.items():
-        write_json(out / f"{name}.schema.json", content)
-        typer.echo(str(out / f"{name}.schema.json"))
+        write_json(paths[name], content)
+    print_json(paths) if json else typer.echo("\n".join(map(str, paths.values())))

@@ -41,6 +41,9 @@ def solve(
 ) -> None:
     """Plan a motion; write trajectory, controller table, certificate and figure to a run folder.
 
+    Exit code 1 when it is not solved, or when its replay or the plant misses the task's
+    tolerances.
+
     Example: kemba-opt solve jump.yaml --set "height=0.6 m"
     """
     from kemba.config import find_config
@@ -64,8 +67,12 @@ def solve(
         _dry_run(resolved, document, model, json)
         return
     resolved = resolved.model_copy(update={"model": model or resolved.model})
-    resolve(resolved, task_model(resolved), document)
-    inputs = [find_config(task, "tasks"), find_config(resolved.model, "models")]
+    built = task_model(resolved)
+    resolve(resolved, built, document)
+    if built.ignored:
+        say(f"no plan can use {', '.join(built.ignored)}: it changes what is measured only", quiet)
+    models = [find_config(name, "models") for name in (resolved.model, resolved.plant)]
+    inputs = [find_config(task, "tasks"), *models]
     folder = RunFolder.create(out, resolved.name, inputs)
     with Progress(quiet or json) as progress, Interrupt(lambda text: say(text, quiet)) as stop:
         listener = Listener(progress.tell, progress.watch, stop)
@@ -79,7 +86,7 @@ def solve(
         say(answer["sentence"], quiet)
     if answer["status"] == "interrupted":
         raise typer.Exit(130)
-    if answer["status"] != "solved":
+    if not answer["good"]:
         raise typer.Exit(1)
 
 

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Document",
     "apply_overrides",
+    "beside",
     "dump_yaml",
     "find_config",
     "load_yaml",
@@ -72,6 +73,12 @@ def find_config(name: str | Path, folder: str) -> Path:
     Raises KembaError with the nearest shipped names.
     """
     return locate(name, (folder,))
+
+
+def beside(name: str, folder: Path) -> str:
+    """The whole path of the file `name` in `folder` where there is one, else `name` as given."""
+    near = folder / name
+    return str(near.resolve()) if near.is_file() else name
 
 
 def locate(name: str | Path, folders: Collection[str]) -> Path:

@@ -1,11 +1,13 @@
 # ruff: noqa: E402  (the twin is found first)
 """Blind test of `discover` on bench logs made by the independent twin in tests/twin.
 
-    python benchmarks/blind/bench.py --cases 150 --nulls 60 --out bench.jsonl
+    python benchmarks/blind/bench.py --out bench.jsonl --part 1/2
 
-Every effect of the catalogue that a rig can show, every sensor fault, pairs, and effects outside
-the catalogue; sizes, noise, jitter of the nominal figures, coloured disturbances and seeds drawn.
-Finished cases are kept in the file, so an interrupted study goes on where it stopped.
+Every effect of the catalogue that a rig can show, every sensor fault, pairs, effects outside the
+catalogue, and logs in which nothing is missing; sizes and noise in turn, jitter of the nominal
+figures, coloured disturbances and seeds drawn; first-order and orifice chambers, with and without
+chamber pressures. The cases come in an order of which any beginning is a fair sample; those in
+the file are not run again, so an interrupted study goes on where it stopped.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ import os
 import sys
 import tempfile
 import time
+import traceback
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -45,77 +48,105 @@ SENSORS = [
     for channel in ("piston/F", "piston/x")
 ]
 PAIRS = [
-    ("seal_friction", "valve_delay"),
-    ("supply_droop", "piston_damping"),
-    ("gas_spring", "hose_lag"),
-    ("end_cushion", "supply_scale"),
+    ["seal_friction", "valve_delay"],
+    ["supply_droop", "piston_damping"],
+    ["gas_spring", "hose_lag"],
+    ["end_cushion", "supply_scale"],
+    ["cross_leak", "stribeck_friction"],
+    ["sensor_delay:piston/F", "seal_friction"],
 ]
+REPEATS = ((EFFECTS, 6), (SENSORS, 4), (UNKNOWN, 4), (PAIRS, 3), ([None], 30))
+SIZES, NOISES = (1.0, 0.7, 1.5), (1.0, 2.0, 0.5)
+RIGS = (  # chambers of the rig and of the model, and whether their pressures are measured
+    ("first_order", False),
+    ("orifice", False),
+    ("first_order", True),
+    ("first_order", False),
+    ("orifice", True),
+    ("first_order", False),
+)
+MODELS = {"first_order": "planning", "orifice": str(Path(__file__).parent / "orifice_rig.yaml")}
 
 
-def cases(count: int, nulls: int) -> Iterator[dict[str, Any]]:
-    """Settings of `count` cases with something hidden, then of `nulls` without."""
+def cases() -> list[dict[str, Any]]:
+    """Settings of all cases; each kind is spread evenly over the whole order."""
     rng = np.random.default_rng(20)
-    kinds: list[Any] = [*EFFECTS * 5, *SENSORS * 2, *UNKNOWN * 3, *(list(p) for p in PAIRS)]
-    order = [kinds[i] for i in rng.permutation(len(kinds))]
-    for number in range(count):
-        yield _setting(order[number % len(order)], number, rng)
-    for number in range(nulls):
-        yield _setting(None, 10_000 + number, rng)
+    placed = []
+    for kinds, repeats in REPEATS:
+        for effect in kinds:
+            start, turn = rng.random(), int(rng.integers(6))
+            places = (np.arange(repeats) + start) / repeats
+            placed += [(p, effect, turn + i) for i, p in enumerate(places)]
+    placed.sort(key=lambda item: item[0])
+    return [_setting(effect, turn, seed, rng) for seed, (_, effect, turn) in enumerate(placed)]
 
 
-def _setting(effect: Any, seed: int, rng: np.random.Generator) -> dict[str, Any]:
+def _setting(effect: Any, turn: int, seed: int, rng: np.random.Generator) -> dict[str, Any]:
+    chambers, pressures = RIGS[turn % len(RIGS)]
+    # what drifts from run to run is seen only where two runs can show it
+    runs = (4, 5) if effect == "temperature_drift" else (3, 4, 5)
     return {
         "effect": effect,
         "seed": seed,
-        "size": float(rng.choice([0.7, 1.0, 1.5])),
-        "noise": float(rng.choice([0.5, 1.0, 2.0])),
+        "size": SIZES[turn % 3],
+        "noise": NOISES[(turn + turn // 3) % 3],
+        "chambers": chambers,
+        "pressures": pressures,
         "figures_off": float(rng.choice([0.01, 0.02, 0.03])),
         "floor": float(rng.choice([0.0, 0.03])),
-        "runs": int(rng.choice([3, 4, 5])),
+        "runs": int(rng.choice(runs)),
         "duration": 4.0,
     }
 
 
 def run(setting: dict[str, Any]) -> dict[str, Any]:
     """One case: logs made, answered, and compared with the truth."""
-    options = {k: v for k, v in setting.items() if k not in ("effect", "noise")}
-    sensors = Sensors(noise=setting["noise"])
+    options = {k: v for k, v in setting.items() if k not in ("effect", "noise", "pressures")}
+    sensors = Sensors(noise=setting["noise"], pressures=setting["pressures"])
     with tempfile.TemporaryDirectory() as folder:
         paths, truth = bench_case(Path(folder), setting["effect"], sensors=sensors, **options)
         logs = read_logs(paths)
-    started = time.monotonic()
-    record: dict[str, Any] = {"case": setting, "truth": truth["effects"]}
+    started = time.process_time()
+    simple: dict[str, Any] = dict.fromkeys(baselines.NAMES)
     try:
         check_logs(logs)
-        problem = bench_problem(logs, load_model(rig=True))
+        problem = bench_problem(logs, load_model(MODELS[setting["chambers"]], rig=True))
         problem.plausible()
         answer = discover(problem).answer
+        seconds = time.process_time() - started
+        simple = baselines.all_of(problem)
     except BadData as error:
-        answer = Answer("bad-data", sentence=str(error))
-        problem = None
-    seconds = time.monotonic() - started
-    simple = baselines.all_of(problem) if problem else dict.fromkeys(baselines.NAMES)
-    return {**record, "answer": answer.json(), "seconds": seconds, "baselines": simple}
+        answer, seconds = Answer("bad-data", sentence=str(error)), time.process_time() - started
+    except Exception:  # a study goes on; the case counts as a miss
+        traceback.print_exc()
+        text = traceback.format_exc(limit=-1)
+        answer, seconds = Answer("bad-data", sentence=text), time.process_time() - started
+    record = {"case": setting, "truth": truth["effects"], "answer": answer.json()}
+    return {**record, "seconds": seconds, "baselines": simple}
+
+
+def pending(options: argparse.Namespace) -> Iterator[dict[str, Any]]:
+    """What this part has to do and the file does not have."""
+    done = {json.dumps(r["case"], sort_keys=True) for r in report.read(options.out)}
+    part, parts = (int(p) for p in options.part.split("/"))
+    for setting in cases()[: options.cases][part - 1 :: parts]:
+        if json.dumps(setting, sort_keys=True) not in done:
+            yield setting
 
 
 def main() -> None:
     """Run what is not yet in the file, then print the report."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--cases", type=int, default=150)
-    parser.add_argument("--nulls", type=int, default=60)
+    parser.add_argument("--cases", type=int, default=None, help="so many of the beginning only")
     parser.add_argument("--out", type=Path, default=Path("bench.jsonl"))
-    parser.add_argument("--share", default="0/1", help="i/n: every n-th case only")
+    parser.add_argument("--part", default="1/1", help="i/n: every n-th case, from the i-th on")
     parser.add_argument("--write", action="store_true", help="put the report into the docs")
+    parser.add_argument("--report", action="store_true", help="run nothing, only report the file")
     options = parser.parse_args()
-    done = {json.dumps(r["case"], sort_keys=True) for r in report.read(options.out)}
-    part, parts = (int(p) for p in options.share.split("/"))
-    settings = list(cases(options.cases, options.nulls))
-    for number in np.random.default_rng(0).permutation(len(settings)):
-        setting = settings[number]
-        if number % parts == part and json.dumps(setting, sort_keys=True) not in done:
-            record = run(setting)
-            report.append(options.out, record)
-            print(report.line(record), flush=True)
+    for setting in () if options.report else pending(options):
+        record = run(setting)
+        report.append(options.out, record)
+        print(report.line(record), flush=True)
     text = report.table(report.read(options.out))
     print(text)
     if options.write:

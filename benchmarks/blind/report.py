@@ -78,7 +78,9 @@ def in_class(record: Record) -> bool:
 
 
 def right(record: Record) -> bool:
-    """Whether exactly the hidden effects are named."""
+    """Whether exactly the hidden effects are named; nothing, where nothing is hidden."""
+    if not hidden(record):
+        return bool(record["answer"]["verdict"] == "nothing")
     return set(named(record)) == set(hidden(record))
 
 

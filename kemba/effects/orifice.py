@@ -5,11 +5,9 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, ClassVar, Literal
 
-import numpy as np
-
 from kemba.effects.air import AREA_E, AREA_R, ATMOSPHERE, GAS, KAPPA, TEMPERATURE
 from kemba.effects.base import At, Contribution, Effect
-from kemba.effects.chamber import TABLE_PRESSURES, Pascal
+from kemba.effects.chamber import TABLE_PRESSURES, Pascal, at_supply
 from kemba.effects.flow import CHOKED, mass_flow, phi
 from kemba.quantity import Param, Quantity
 
@@ -72,7 +70,7 @@ class OrificeChamber(Effect):
     def evaluate(self, at: At) -> Contribution:
         x, v = at.piston.x, at.piston.v
         V_e, V_r = self.V_e + AREA_E * x, self.V_r + AREA_R * (at.stroke - x)
-        full = at.supply_gain * float(np.interp(at.supply, self.pressures, self.gauge))
+        full = at.supply_gain * at_supply(at.supply, self.pressures, self.gauge)
         P_s = ATMOSPHERE + at.droop * full
         a_fill, a_vent = self.a_fill / at.rise_gain, self.a_vent / at.rise_gain
         draw_e = at.u_e * mass_flow(a_fill, P_s, at.P_e)

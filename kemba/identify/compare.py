@@ -1,22 +1,23 @@
-"""Where a model fails: noise ratios by channel, phase and valve mode, and one plain sentence."""
+"""Where a model fails: noise ratios by channel and condition, what the error goes with, how much
+force is missing, and one plain sentence."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from scipy.stats import chi2, false_discovery_control
 
-from kemba.identify.compare_hints import Hint, hints
-from kemba.identify.problem import Array, Problem, Rows
+from kemba.identify.cells import Cell, Grains, cells, grains
+from kemba.identify.compare_hints import Hint, Response, conflicts, lacking, lagged
+from kemba.identify.laws import Law, laws
+from kemba.identify.missing import Missing, Peak, peaks
+from kemba.identify.problem import Array, Labels, Problem, Rows, Theta
+from kemba.identify.smoother import missing_force
+from kemba.identify.surroundings import region_labels
+from kemba.identify.tolerance import free_starts, slopes, within_tolerance
 
-Index = np.ndarray[Any, np.dtype[np.int_]]
-
-FEWEST = 5  # grains that make a cell
-TOLERATED = 1.15  # error ratio that a good model may have: nobody's nominal figures are exact
-FALSE_DISCOVERIES = 0.01
 GOOD, FAIR = 1.15, 1.5
 
 
@@ -32,34 +33,35 @@ class ChannelError:
 
 
 @dataclass(frozen=True)
-class Cell:
-    """One channel in one phase of motion and valve mode; `q_value` controls false discoveries."""
-
-    channel: str
-    phase: str
-    mode: str
-    ratio: float
-    q_value: float
-
-
-@dataclass(frozen=True)
 class Comparison:
-    """What `compare` says; `good` where the error is within the noise."""
+    """What `compare` says; `good` where the error is within the noise.
+
+    `tolerant_ratio`: what the error would be if the model's nominal figures were off by their
+    usual tolerance, in the best way; `tolerable`: that would be within the noise everywhere.
+    """
 
     logs: tuple[str, ...]
     model: str
     noise_ratio: float
     channels: tuple[ChannelError, ...]
     cells: tuple[Cell, ...]
+    tolerant_ratio: float = float("nan")
+    tolerable: bool = False
     hints: tuple[Hint, ...] = ()
+    responses: tuple[Response, ...] = ()
+    laws: tuple[Law, ...] = ()
+    missing: tuple[Missing, ...] = ()
     plan: Mapping[str, float] = field(default_factory=dict)
     sentence: str = ""
 
     @property
     def good(self) -> bool:
-        return self.noise_ratio <= GOOD and not any(
-            c.q_value < FALSE_DISCOVERIES for c in self.cells
-        )
+        return self.noise_ratio <= GOOD and not any(c.significant for c in self.cells)
+
+    @property
+    def peaks(self) -> list[Peak]:
+        """Per channel the moment at which the missing force stands out most."""
+        return peaks(list(self.missing)) if self.missing else []
 
     def json(self) -> dict[str, Any]:
         """The object that `--json` prints."""
@@ -67,26 +69,45 @@ class Comparison:
             "logs": list(self.logs),
             "model": self.model,
             "noise_ratio": self.noise_ratio,
-            "channels": [vars(c) for c in self.channels],
-            "cells": [vars(c) for c in self.cells],
+            "tolerant_ratio": self.tolerant_ratio,
+            "channels": [asdict(c) for c in self.channels],
+            "cells": [asdict(c) for c in self.cells],
+            "hints": [asdict(h) for h in self.hints],
+            "missing_force": [asdict(p) for p in self.peaks],
             "sentence": self.sentence,
         }
 
 
 def compare(problem: Problem, model: str, logs: Sequence[str] = ()) -> Comparison:
-    """Compare the logs of `problem` with its model as it stands."""
-    rows, r = problem.rows(), problem.residual({})
+    """Compare the logs of `problem` with its model as it stands; only how each log begins is
+    fitted."""
+    start = free_starts(problem)
+    rows, r = problem.rows(), problem.residual(start)
     expected = _expected(problem, len(r))
-    z, members = grains(rows, r, expected, getattr(problem, "grain", 1))
+    _, region = region_labels(problem, rows)
+    grain = grains(rows, region, r, expected, getattr(problem, "grain", 1))
+    known = slopes(problem, start)
+    responses = tuple(lagged(problem, rows, r / np.sqrt(expected)))
+    forces = tuple(laws(problem, r))
+    sent = [s.hint for s in responses if s.certain]
+    left = within_tolerance(r, known)
+    ratio, clean = _tolerant(rows, region, left, expected, grain)
     found = Comparison(
         tuple(logs) or problem.runs,
         model,
-        _rms(z),
-        tuple(_channels(problem, rows, r, z, members)),
-        tuple(_cells(rows, z, members)),
-        tuple(hints(problem, rows, r, expected)),
+        grain.ratio,
+        tuple(_channels(problem, rows, r, grain, start)),
+        tuple(cells(rows, region, grain)),
+        ratio,
+        clean and not any(law.matters for law in laws(problem, left)),
+        (*sent, *conflicts(problem, rows, r, known)),
+        responses,
+        forces,
+        tuple(missing_force(problem, start)),
     )
-    return Comparison(**{**vars(found), "sentence": phrase(found)})
+    if not found.good and not found.tolerable:
+        found = replace(found, hints=(*lacking(forces), *found.hints))
+    return replace(found, sentence=phrase(found))
 
 
 def _expected(problem: Problem, count: int) -> Array:
@@ -94,24 +115,14 @@ def _expected(problem: Problem, count: int) -> Array:
     return np.asarray(power()) if power else np.ones(count)
 
 
-def grains(rows: Rows, r: Array, expected: Array, size: int) -> tuple[Array, Index]:
-    """Sums of `size` successive rows of one run, channel, phase and mode over what noise would
-    make of them (k,), and the first row of each (k,).
-
-    A model that is wrong errs for longer than a sample; noise does not.
-    """
-    labels = (rows.run, rows.channel, rows.phase.astype(str), rows.mode.astype(str))
-    fresh = np.ones(len(r), dtype=bool)
-    fresh[1:] = np.any([a[1:] != a[:-1] for a in labels], axis=0)
-    begin = np.flatnonzero(fresh)
-    place = np.arange(len(r)) - np.repeat(begin, np.diff(np.append(begin, len(r))))
-    first = np.flatnonzero(place % size == 0)
-    total, power = np.add.reduceat(r, first), np.add.reduceat(expected, first)
-    return total / np.sqrt(power), first
-
-
-def _rms(z: Array) -> float:
-    return float(np.sqrt(np.mean(z**2))) if len(z) else float("nan")
+def _tolerant(
+    rows: Rows, region: Labels, left: Array, expected: Array, grain: Grains
+) -> tuple[float, bool]:
+    """Error ratio of what the figures' tolerance leaves, and whether it is within the noise."""
+    z = np.add.reduceat(left, grain.first) / np.sqrt(np.add.reduceat(expected, grain.first))
+    better = Grains(z, grain.first)
+    clean = not any(c.significant for c in cells(rows, region, better))
+    return better.ratio, clean and better.ratio <= GOOD
 
 
 def measured_units(rows: Rows) -> dict[str, str]:
@@ -126,10 +137,10 @@ def measured_units(rows: Rows) -> dict[str, str]:
 
 
 def _channels(
-    problem: Problem, rows: Rows, r: Array, z: Array, members: Index
+    problem: Problem, rows: Rows, r: Array, grain: Grains, start: Theta
 ) -> Iterable[ChannelError]:
     windows = getattr(problem, "window_errors", None)
-    errors = windows({}) if windows else {}
+    errors = windows(start) if windows else {}
     headers = measured_units(rows)
     for k, channel in enumerate(rows.channels):
         own = rows.channel == k
@@ -141,32 +152,8 @@ def _channels(
             float(np.sqrt(np.mean(error**2))),
             float(np.max(np.abs(error))),
             float(np.median(rows.sigma[own])),
-            _rms(z[own[members]]),
+            grain.of(own),
         )
-
-
-def _cells(rows: Rows, z: Array, members: Index) -> Iterable[Cell]:
-    """Every channel, phase and mode with enough data; q values over all of them."""
-    channel, phase, mode = (a[members] for a in (rows.channel, rows.phase, rows.mode))
-    found = []
-    for k, name in enumerate(rows.channels):
-        for p in np.unique(phase[channel == k].astype(str)):
-            for m in np.unique(mode[channel == k].astype(str)):
-                here = z[(channel == k) & (phase == p) & (mode == m)]
-                if len(here) >= FEWEST:
-                    found.append((name, str(p), str(m), _rms(here), excess(here)))
-    q = false_discovery_control([p for *_, p in found]) if found else ()
-    for (name, p, m, ratio, _), q_value in zip(found, q, strict=True):
-        yield Cell(name, p, m, ratio, float(q_value))
-
-
-def excess(z: Array) -> float:
-    """p value of errors (n,) larger than a good model's: correlated ones count for less."""
-    power = z**2 - np.mean(z**2)
-    spread = float(power @ power)
-    echo = max(float(power[1:] @ power[:-1]) / spread, 0.0) if spread > 0 else 0.0
-    count = len(z) * (1.0 - echo) / (1.0 + echo)
-    return float(chi2.sf(np.mean(z**2) / TOLERATED**2 * count, count))
 
 
 def _first(hints: Sequence[Hint], kind: str) -> Sequence[Hint]:
@@ -176,18 +163,25 @@ def _first(hints: Sequence[Hint], kind: str) -> Sequence[Hint]:
 def phrase(found: Comparison) -> str:
     """The answer in plain words."""
     ratio = f"{found.noise_ratio:.2g} times the noise"
-    bad = sorted((c for c in found.cells if c.q_value < FALSE_DISCOVERIES), key=lambda c: -c.ratio)
+    bad = sorted((c for c in found.cells if c.significant), key=lambda c: -c.ratio)
     if found.good:
         return f"The model explains the logs to within the noise: its error is {ratio}."
     if not bad:
         return f"The model's error is {ratio}; no single condition stands out."
-    worst = bad[0]
+    worst = f"worst is {_place(bad[0])} ({bad[0].ratio:.2g} times)"
+    if found.tolerable:
+        return (
+            f"As it stands the model errs by {ratio}; {worst}; but figures off by no more than "
+            f"their usual tolerance would explain the logs ({found.tolerant_ratio:.2g} times)."
+        )
     grade = "nearly explains" if found.noise_ratio < FAIR else "does not explain"
-    valves = {"00": "valves off", "10": "extend valve on", "01": "retract valve on"}
-    mode = valves.get(worst.mode, "both valves on")
-    parts = [
-        f"The model {grade} the logs: its error is {ratio}",
-        f"worst is {worst.channel} in {worst.phase} with {mode} ({worst.ratio:.2g} times)",
-        *(h.text for kind in ("command", "conflict") for h in _first(found.hints, kind)),
-    ]
+    hints = [h for kind in ("law", "command", "conflict") for h in _first(found.hints, kind)]
+    parts = [f"The model {grade} the logs: its error is {ratio}", worst, *(h.text for h in hints)]
     return "; ".join(parts) + "."
+
+
+def _place(cell: Cell) -> str:
+    valves = {"00": "valves off", "10": "extend valve on", "01": "retract valve on"}
+    stroke = {"in": ", piston retracted", "mid": ", piston mid-stroke", "out": ", piston extended"}
+    mode = valves.get(cell.mode, "both valves on")
+    return f"{cell.channel} in {cell.phase} with {mode}{stroke.get(cell.region, '')}"

@@ -1,111 +1,144 @@
-"""What the error goes with: commands sent before it, and parameters that wander between runs."""
+"""What the error goes with: a force by speed, position or load, commands sent before it, and
+parameters that wander between runs or between valve modes."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import chi2, norm
 
-from kemba.identify.problem import Array, Problem, Rows
+from kemba.identify.cells import codes
+from kemba.identify.laws import LAGS, PLAIN, Law, middle, risen
+from kemba.identify.problem import Array, Labels, Problem, Rows
+from kemba.identify.tolerance import Slopes
 
-LATEST = 0.04  # s between a command and the error that follows it
 CERTAIN = 1e-4
+DEPENDENT = 1.5  # rows are not quite independent: z scores count for so much less
 LEAST_INFORMATION = 4.0  # in sizes to the -2: a run that tells less about a parameter is mute
 SLACK = 0.1  # sizes by which a parameter may differ between runs without anybody caring
+
+Changes = Mapping[str, tuple[Array, Array]]
 
 
 @dataclass(frozen=True)
 class Hint:
-    """One finding in words; `kind`: command, conflict; the larger `weight`, the plainer."""
+    """One finding in words; `kind`: law, command, conflict; the larger `weight`, the plainer."""
 
     kind: str
     text: str
     weight: float
 
 
-def hints(problem: Problem, rows: Rows, r: Array, expected: Array) -> Iterable[Hint]:
-    """Switchings that an error follows, then parameters in conflict; the plainest first."""
-    white = r / np.sqrt(expected)
-    commands = getattr(problem, "commands", None)
-    found = list(lagged(rows, white, commands())) if commands else []
-    found += list(conflicts(problem, rows, r))
-    return sorted(found, key=lambda h: (h.kind != "command", -h.weight))
+@dataclass(frozen=True)
+class Response:
+    """Cross-correlation of a channel's error with the changes of a command before it: z score
+    (k,) per `lag` (k,) [s]; `tests`: how many were tried for this one."""
+
+    channel: str
+    command: str
+    lag: Array
+    z: Array
+    tests: int
+
+    @property
+    def peak(self) -> int:
+        return int(np.argmax(np.abs(self.z)))
+
+    @property
+    def certain(self) -> bool:
+        return bool(np.abs(self.z[self.peak]) > norm.isf(CERTAIN / (2 * self.tests)))
+
+    @property
+    def hint(self) -> Hint:
+        late = f"{self.lag[self.peak] * 1e3:.0f} ms after {self.command}"
+        verb = "switches" if "valve/" in self.command else "changes"
+        return Hint("command", f"{self.channel} errs {late} {verb}", float(abs(self.z[self.peak])))
 
 
-def lagged(
-    rows: Rows, white: Array, commands: list[dict[str, tuple[Array, Array]]]
-) -> Iterable[Hint]:
-    """Error power after each command's change: the lag at which it peaks, per channel.
+def lacking(found: Sequence[Law]) -> list[Hint]:
+    """The missing force that explains most, if it is plain."""
+    best = max(found, key=lambda law: law.gain, default=None)
+    return [Hint("law", str(best), best.gain)] if best and best.gain > PLAIN else []
 
-    `commands`: per run, name -> (times of its changes, size of each change).
+
+def lagged(problem: Problem, rows: Rows, white: Array) -> list[Response]:
+    """Of every command the channel whose error follows its changes most plainly; these first.
+
+    `white` (n,) has unit variance where the model is right.
     """
-    for name in sorted({n for run in commands for n in run}):
-        best: tuple[float, float, str] | None = None
-        for k, channel in enumerate(rows.channels):
-            lag, score = _response(rows, white, rows.channel == k, commands, name)
-            if best is None or score > best[1]:
-                best = (lag, score, channel)
-        if best and best[1] > norm.isf(CERTAIN / (2 * len(rows.channels))):
-            text = f"{best[2]} errs {best[0] * 1e3:.0f} ms after {name} switches"
-            yield Hint("command", text, best[1])
+    source = getattr(problem, "commands", None)
+    if source is None:
+        return []
+    runs: list[Changes] = source()
+    names = sorted({n for run in runs for n in run})
+    found = [_strongest(rows, white, runs, name, len(names)) for name in names]
+    return sorted(found, key=lambda s: -abs(s.z[s.peak]))
 
 
-def _response(
-    rows: Rows,
-    white: Array,
-    own: np.ndarray,
-    commands: list[dict[str, tuple[Array, Array]]],
-    name: str,
-) -> tuple[float, float]:
-    """(lag [s], z score) of the mean error, signed by the change, after switchings."""
-    edges = np.arange(0.0, LATEST + 1e-9, 0.004)
-    total, count = np.zeros(len(edges) - 1), np.zeros(len(edges) - 1)
-    for run, own_commands in enumerate(commands):
-        if name not in own_commands:
-            continue
-        here = own & (rows.run == run)
-        time, values = rows.time[here], white[here]
-        for at, change in zip(*own_commands[name], strict=True):
-            place = np.digitize(time - at, edges) - 1
-            good = (place >= 0) & (place < len(total))
-            np.add.at(total, place[good], np.sign(change) * values[good])
-            np.add.at(count, place[good], 1.0)
-    z = np.abs(total) / np.sqrt(np.maximum(count, 1.0))
-    best = int(np.argmax(z))
-    return float(edges[best] + 0.002), float(z[best]) / 2.0  # rows are not quite independent
+def _strongest(
+    rows: Rows, white: Array, runs: Sequence[Changes], name: str, commands: int
+) -> Response:
+    """A command's rise within each lag, as a regressor of every channel's error."""
+    rise = np.zeros((len(rows), len(LAGS) - 1))
+    for i, changes in enumerate(runs):
+        if name in changes:
+            own = rows.run == i
+            rise[own] = risen(*changes[name], rows.time[own])
+    best, tests = None, commands * len(rows.channels)
+    for k, channel in enumerate(rows.channels):
+        own = rows.channel == k
+        power = np.sum(rise[own] ** 2, axis=0)
+        z = white[own] @ rise[own] / np.sqrt(np.maximum(power, 1e-12)) / DEPENDENT
+        z = np.where(power > 1e-9 * np.max(power, initial=1e-12), z, 0.0)
+        this = Response(channel, name, middle(LAGS), z, tests)
+        if best is None or np.max(np.abs(z)) > np.max(np.abs(best.z)):
+            best = this
+    assert best is not None
+    return best
 
 
-def conflicts(problem: Problem, rows: Rows, r: Array) -> Iterable[Hint]:
-    """Parameters whose best value wanders from run to run more than its error allows."""
-    leads = [c for c in problem.candidates.values() if not c.sensor]
-    nuisance = list(problem.nuisance)
-    jacobian = problem.jacobian({}, [*(c.key for c in leads), *nuisance])
-    jacobian *= [c.lead.size for c in leads] + [problem.nuisance[n][1] for n in nuisance]
-    per_run = [
-        _alone(jacobian[rows.run == i], r[rows.run == i], len(leads))
-        for i in range(len(problem.runs))
+def conflicts(problem: Problem, rows: Rows, r: Array, known: Slopes) -> list[Hint]:
+    """Parameters whose best value wanders more than its error allows, the clearest first: from run
+    to run, or from one valve mode to another."""
+    groups = {"from run to run": rows.run, "between valve modes": codes(rows.mode)}
+    found = [
+        hint
+        for text, group in groups.items()
+        for hint in _wandering(r, known, np.asarray(group), text)
     ]
-    for i, c in enumerate(leads):
-        known = [(v[i], w[i]) for v, w in per_run if w[i] > LEAST_INFORMATION]
-        if len(known) < 2:
-            continue
-        a, information = np.array(known).T
-        w = 1.0 / (1.0 / information + SLACK**2)
-        spread = float(np.sum(w * (a - np.sum(w * a) / np.sum(w)) ** 2))
-        p = float(chi2.sf(spread, len(a) - 1))
-        if p < CERTAIN / len(leads):
-            text = f"{c.key} would have to differ from run to run"
-            yield Hint("conflict", text, float(-np.log10(max(p, 1e-30))))
+    return sorted(found, key=lambda h: -h.weight)
 
 
-def _alone(jacobian: Array, r: Array, leads: int) -> tuple[Array, Array]:
-    """Best value (leads,) and information of each parameter by itself, nuisance free."""
-    gram, slope = jacobian.T @ jacobian, jacobian.T @ r
-    other = gram[leads:, leads:] + np.eye(len(gram) - leads)
-    solved = np.linalg.solve(other, np.column_stack([gram[leads:, :leads], slope[leads:]]))
-    cross = gram[:leads, leads:]
-    information = np.diag(gram[:leads, :leads]) - np.sum(cross * solved[:, :leads].T, axis=1)
-    pull = slope[:leads] - cross @ solved[:, leads]
-    return -pull / np.maximum(information, 1e-9), information
+def _wandering(r: Array, known: Slopes, group: Labels, text: str) -> Iterable[Hint]:
+    """Each effect's switch with a value per group against one value for all; the nuisance
+    parameters, free within their priors, are the same in all groups."""
+    parts = [group == i for i in np.unique(group)]
+    by_part = [(known.by_lead[own], known.by_nuisance[own], r[own]) for own in parts]
+    power = np.stack([np.sum(j * j, axis=0) for j, _, _ in by_part])
+    cross = np.stack([j.T @ n for j, n, _ in by_part])
+    slope = np.stack([j.T @ own for j, _, own in by_part])
+    n = known.by_nuisance
+    solve = np.linalg.inv(n.T @ n + np.eye(n.shape[1]))
+    for i, c in enumerate(known.leads):
+        told = np.flatnonzero(power[:, i] > LEAST_INFORMATION)
+        own = cross[told, i]
+        information = np.diag(power[told, i]) - own @ solve @ own.T
+        p = _agreement(information, own @ solve @ (n.T @ r) - slope[told, i])
+        if p < CERTAIN / len(known.leads):
+            weight = float(-np.log10(max(p, 1e-300)))
+            yield Hint("conflict", f"{c.key} would have to differ {text}", weight)
+
+
+def _agreement(information: Array, pull: Array) -> float:
+    """p value of one value for all groups, from the information (g, g) on a value for each and the
+    slope (g,) of the log likelihood at nought."""
+    if len(pull) < 2:
+        return 1.0
+    spread = np.linalg.pinv(information, rcond=1e-9, hermitian=True)
+    a = spread @ pull
+    certainty = np.linalg.inv(spread + SLACK**2 * np.eye(len(a)))
+    ones = np.ones(len(a))
+    apart = a - ones @ certainty @ a / (ones @ certainty @ ones)
+    return float(chi2.sf(apart @ certainty @ apart, len(a) - 1))

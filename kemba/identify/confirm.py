@@ -71,7 +71,13 @@ def within_tolerance(search: Search, linear: Linear, hypothesis: Hypothesis) -> 
 def predicted_error(search: Search, point: Point) -> float:
     """RMS of whitened residuals, each block predicted from all others."""
     power = -2.0 * search.heat * float(_predicted(search, point).sum())
-    return float(np.sqrt(max(power, 0.0) / point.linear.count.sum()))
+    return float(np.sqrt(max(power, 0.0) / expected(search.problem).sum()))
+
+
+def expected(problem: Problem) -> Array:
+    """Mean square (n,) of each row if the model were right: one, or what the problem knows."""
+    known = getattr(problem, "expected_power", None)
+    return np.asarray(known() if known else np.ones(len(problem.rows())))
 
 
 def rms(problem: Problem, theta: Theta) -> float:
@@ -82,4 +88,4 @@ def rms(problem: Problem, theta: Theta) -> float:
         linear, _, _ = linearise(problem, theta, time_blocks(problem), names)
         theta = theta | estimate(problem, linear, best_fit(linear))
     r = problem.residual(theta)
-    return float(np.sqrt(np.mean(r**2)))
+    return float(np.sqrt(np.sum(r**2) / expected(problem).sum()))

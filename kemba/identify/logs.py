@@ -94,7 +94,17 @@ def read_logs(paths: Sequence[str | Path], columns: ColumnMap | None = None) -> 
     if len(kinds) > 1:
         named = ", ".join(f"{log.meta['name']}: {log.meta['kind']}" for log in logs)
         raise KembaError("", "robot and bench logs cannot be fitted together", named)
+    _tell_apart(logs)
     return logs
+
+
+def _tell_apart(logs: Sequence[Trajectory]) -> None:
+    """Logs of one name get their folder's name before it."""
+    names = [log.meta["name"] for log in logs]
+    for log in logs:
+        if names.count(log.meta["name"]) > 1:
+            path = Path(log.meta["path"]).resolve()
+            log.meta["name"] = f"{path.parent.name}/{path.stem}"
 
 
 def kind_of(log: Trajectory, where: str | Path = "") -> Kind:

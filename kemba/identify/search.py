@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -29,6 +29,7 @@ SURE = 3  # so many leaders are refitted however far behind they are,
 FAR, FAR_SHARE = 40.0, 0.7  # others when no more nats, or share of the gain, behind
 GLANCES = 1  # evaluations of each single effect before the leaders are refitted
 ABSURD = 1e5  # noise units
+FOLLOWED = 2  # times that the motion is found again with the best guess
 LARGEST = 3  # effects in one answer; more need another experiment
 GAIN = 3.0  # nats beyond prior odds that a further effect must bring
 
@@ -59,6 +60,17 @@ class Colourable(Protocol):
         """Columns (n, k) computed before any colour as they are under the present one."""
 
 
+@runtime_checkable
+class Movable(Protocol):
+    """A problem that is linearised along a motion, which depends on the model."""
+
+    def relinearise(self, base: Mapping[str, float]) -> None:
+        """Find the motion again with the model at `base`; rows may be others than before."""
+
+    def is_straight(self, name: str) -> bool:
+        """Whether residuals are linear in this parameter, so that slopes tell all."""
+
+
 @dataclass
 class Search:
     """State of one search on one problem; `run` fills it."""
@@ -72,6 +84,7 @@ class Search:
     null_table: dict[Hypothesis, float] = field(default_factory=dict)
     null_jacobian: Array = field(init=False)
     null_residual: Array = field(init=False)
+    among: frozenset[Hypothesis] | None = None  # singles that deserve more than a linear look
     _thetas: dict[Hypothesis, dict[str, float]] = field(default_factory=dict)
     _settled: bool = False  # whether the noise is seen from a point that fits
 
@@ -86,6 +99,8 @@ class Search:
         self.start()
         best = self._round(NULL, LEADERS)
         self.say(f"first guess: {' + '.join(best) or 'nothing'}")
+        if isinstance(self.problem, Movable):
+            return self._follow(self.problem, best)
         if best != NULL:
             promising = self._promising()
             self._recolour(best)
@@ -95,20 +110,70 @@ class Search:
             best = self._grow(best)
         return best
 
+    def _follow(self, problem: Movable, best: Hypothesis) -> Hypothesis:
+        """Look again along the motion that the best guess makes of the data, until it stays.
+
+        A guess far from the first motion looks bad only for being far: what the slopes promise
+        counts as well as what the refit found.
+        """
+        for _ in range(FOLLOWED):
+            guess = best or self._promised()
+            if guess == NULL or time.monotonic() > self.deadline:
+                return best
+            point = self.points[guess]
+            self.say(f"looking again as if {' + '.join(guess)} were there")
+            self.among = self._contenders()
+            problem.relinearise(point.fit.theta)
+            self.blocks = time_blocks(self.problem)
+            self.start()
+            self.visit(guess)
+            best = self._round(NULL, LEADERS)
+            if best in (guess, NULL):
+                break
+        return self._grow(best) if best else best
+
+    def _contenders(self) -> frozenset[Hypothesis]:
+        """Single effects that were refitted, or promise half of what the best one does."""
+        null = self.points[NULL].log_evidence
+        gains = {h: e - null for h, e in self.null_table.items() if len(h) == 1}
+        least = 0.5 * max(gains.values())
+        return frozenset(h for h, gain in gains.items() if gain > least or h in self.points)
+
+    def _promised(self) -> Hypothesis:
+        """The refitted single effect that the table puts first, if it pays there."""
+        count = len(self.problem.candidates)
+        null = self.points[NULL].log_evidence + log_prior(NULL, count)
+        tables: dict[Hypothesis, float] = {
+            h: e for h, e in self.null_table.items() if h in self.points and len(h) == 1
+        }
+        first = max(tables, key=tables.__getitem__, default=NULL)
+        pays = first and tables[first] + log_prior(first, count) > null
+        return first if pays else NULL
+
     def start(self) -> None:
         """Null fit, noise colour, and the linear table at the null."""
-        names = tuple(self.problem.nuisance)
-        linear, jacobian, _ = linearise(self.problem, {}, self.blocks, names)
-        theta = estimate(self.problem, linear, best_fit(linear))
-        r = self.problem.residual(theta)
-        at, mean, width = priors(self.problem, theta, names)
-        again = condense(names, at, mean, width, jacobian, r, self.blocks)
-        theta = estimate(self.problem, again, best_fit(again))
-        self._null(theta, theta)
+        free = tuple(self.problem.nuisance)
+        moving = isinstance(self.problem, Movable)  # its slopes hold as far as tolerances reach
+        names = names_of(self.problem, {}) if moving else free
+        known = self.problem.jacobian({}, names)
+        jacobian = known[:, [names.index(n) for n in free]]
+        theta: dict[str, float] = {}
+        for _ in range(2):
+            r = self.problem.residual(theta)
+            at, mean, width = priors(self.problem, theta, free)
+            linear = condense(free, at, mean, width, jacobian, r, self.blocks)
+            theta = estimate(self.problem, linear, best_fit(linear))
+        self._null(theta, theta, known if moving else None)
 
-    def _null(self, theta: Mapping[str, float], seen_from: Mapping[str, float]) -> None:
+    def _null(
+        self,
+        theta: Mapping[str, float],
+        seen_from: Mapping[str, float],
+        jacobian: Array | None = None,
+    ) -> None:
         """Linear at the null, whitened by what is left over as seen from another point."""
-        jacobian = self._learn_noise(seen_from, keep=theta is seen_from)
+        if jacobian is None:
+            jacobian = self._learn_noise(seen_from, keep=theta is seen_from)
         if jacobian is None:
             names = names_of(self.problem, theta)
             jacobian = self.problem.jacobian(theta, names)
@@ -120,9 +185,10 @@ class Search:
         ranker = self.ranker(linear)
         fit = Fit(dict(theta), 0.5 * float(r @ r))
         self.points = {NULL: Point(NULL, fit, linear, ranker.score(NULL))}
-        self.null_table = ranker.table((0, 1, 2))
+        self.null_table = ranker.table((0, 1, 2) if self.among is None else (0, 1))
         for hypothesis in [h for h in self.null_table if len(h) == 1]:
-            self.null_table[hypothesis] = self._glance(hypothesis)
+            if self.among is None or hypothesis in self.among:
+                self.null_table[hypothesis] = self._glance(hypothesis)
 
     def _glance(self, hypothesis: Hypothesis) -> float:
         """Log evidence where the linear estimate points to, with the true residual there.
@@ -131,6 +197,8 @@ class Search:
         """
         (effect,) = hypothesis
         candidate, theta = self.problem.candidates[effect], self.points[NULL].fit.theta
+        if isinstance(self.problem, Movable) and self.problem.is_straight(candidate.key):
+            return self.null_table[hypothesis]
         starts: list[dict[str, float]] = [dict(theta)]
         if candidate.lead.unit == "s":
             signs = (1.0, -1.0) if candidate.lead.signed else (1.0,)
@@ -175,6 +243,8 @@ class Search:
         promise = table[order[0]] - self.points[given].log_evidence
         reach = max(FAR, FAR_SHARE * promise)
         for hypothesis in order:
+            if given and table[hypothesis] < self.points[given].log_evidence:
+                break  # not even the slopes promise anything
             if table[hypothesis] < table[order[0]] - reach and hypothesis not in order[:SURE]:
                 break
             if time.monotonic() > self.deadline:
@@ -189,10 +259,9 @@ class Search:
             return ranker.table((len(given) + 1,), given=given)
         single: dict[Hypothesis, float] = {h: e for h, e in self.null_table.items() if len(h) == 1}
         base = max(single.values())
-        best_pair = max(
-            (h for h in self.null_table if len(h) == 2), key=self.null_table.__getitem__
-        )
-        if self.null_table[best_pair] > base + GAIN:
+        pairs = [h for h in self.null_table if len(h) == 2]
+        best_pair = max(pairs, key=self.null_table.__getitem__, default=NULL)
+        if best_pair and self.null_table[best_pair] > base + GAIN:
             for name in best_pair:
                 single[(name,)] = max(single[(name,)], base)
         return single
@@ -203,10 +272,23 @@ class Search:
             self.say(f"refitting {' + '.join(hypothesis)}")
             fit = refit(self.problem, hypothesis, self._guess(hypothesis), self.frozen, self.heat)
             linear = self._near(fit)
-            score = self.ranker(linear).score(hypothesis)
+            score = self._compared(linear, hypothesis)
             self.points[hypothesis] = Point(hypothesis, fit, linear, score)
             self._thetas[hypothesis] = fit.theta
         return self.points[hypothesis]
+
+    def _compared(self, linear: Linear, hypothesis: Hypothesis) -> Score:
+        """Score on `linear`, measured against nothing on the same slopes.
+
+        The floor lets every effect help "nothing" as well, by slopes that promise too much far
+        from where they hold: only promises of the same slopes may be compared.
+        """
+        ranker = self.ranker(linear)
+        score = ranker.score(hypothesis)
+        if not isinstance(self.problem, Movable):
+            return score
+        gain = score.log_evidence - ranker.score(NULL).log_evidence
+        return replace(score, log_evidence=self.points[NULL].log_evidence + gain)
 
     def _near(self, fit: Fit) -> Linear:
         """Linear at a refitted point: its own slopes are fresh, the others are the null's."""

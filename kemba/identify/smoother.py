@@ -1,98 +1,27 @@
-"""How much force is missing: d(t) per physical channel with its 95 % band.
-
-Every channel's unknown force is a first-order lag driven by noise, as part of the filter's state.
-How strong each is, is learnt from the data; a channel that does not need one is left with almost
-none. In stance the contact forces are unknown too, so only what they cannot explain is told.
-"""
+"""How much force is missing, for robot and bench logs alike."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-import numpy as np
-
-from kemba.identify.problem import Array, Theta
+from kemba.identify.bench import BenchProblem
+from kemba.identify.bench.missing import bench_missing
+from kemba.identify.missing import Missing
+from kemba.identify.problem import Array, Problem, Theta
 from kemba.identify.robot import RobotProblem
-from kemba.identify.robot.filter import System, gains, smooth_with_band
-from kemba.identify.robot.reference import Floor, densities
-
-MEMORY = 0.025  # s, of the missing force
-ROUNDS = 6
-# N and N.m (1 sigma): where the search for a channel's strength begins, and what is as good as none
-BEGIN = {"body": 5.0, "pitch": 0.5, "hip": 0.5, "piston": 10.0}
-NEGLIGIBLE = {"body": 0.1, "pitch": 0.01, "hip": 0.01, "piston": 0.1}
-QUIET = Floor(body=1e-5, pitch=1e-6, hip=1e-6, rod=1e-5)
+from kemba.identify.robot.missing import robot_missing
 
 
-@dataclass(frozen=True)
-class Missing:
-    """Missing force in one run: `force` and its 1 sigma (n, k) at `time` (n,), per channel."""
+def missing_force(
+    problem: Problem, theta: Theta | None = None, strength: Array | None = None
+) -> list[Missing]:
+    """d(t) of every run with its 95 % band: on a robot per body, hip and rod, on a bench the
+    force on its rod.
 
-    run: str
-    time: Array
-    channels: tuple[str, ...]
-    units: tuple[str, ...]
-    force: Array
-    sigma: Array
-
-    def band(self) -> tuple[Array, Array]:
-        """Low and high ends of the 95 % interval."""
-        return self.force - 1.96 * self.sigma, self.force + 1.96 * self.sigma
-
-
-def missing_force(problem: RobotProblem, theta: Theta | None = None) -> list[Missing]:
-    """d(t) per run: force on the body, moments at pitch and hips, force on the rods."""
-    theta = theta or {}
-    names = problem.physics.channels
-    kinds = [_kind(name) for name in names]
-    sigma = np.array([BEGIN[kind] for kind in kinds])
-    least = np.array([NEGLIGIBLE[kind] for kind in kinds])
-    quiet = densities(problem.physics, problem.batch, problem.plan, QUIET)
-    y, g = problem.defects(theta)
-    valid = problem.batch.valid
-    for _ in range(ROUNDS):
-        system = with_forces(problem, quiet, sigma)
-        x, variance = smooth_with_band(system, gains(system), y, g)
-        k = len(names)
-        power = (x[..., -k:] ** 2 + variance[..., -k:])[valid].mean(axis=0)
-        sigma = np.maximum(np.sqrt(power), least)
-    units = tuple("N.m" if kind in ("pitch", "hip") else "N" for kind in kinds)
-    found = []
-    for i, track in enumerate(problem.batch.tracks):
-        n = len(track.time)
-        force, spread = x[:n, i, -k:], np.sqrt(variance[:n, i, -k:])
-        found.append(Missing(track.name, track.time, names, units, force, spread))
-    return found
-
-
-def _kind(channel: str) -> str:
-    last = channel.split("/")[1] if channel.count("/") > 1 else channel
-    return {"body/pitch": "pitch", "hip": "hip", "piston": "piston"}.get(last, "body")
-
-
-def with_forces(problem: RobotProblem, density: Array, sigma: Array) -> System:
-    """The filter's system with a lagged force of strength `sigma` (k,) per channel as states."""
-    base = problem.point.system_with(density, problem.batch.h)
-    h, k = problem.batch.h, len(sigma)
-    n, runs, m, d = base.H.shape
-    pushes = problem.point.channels[..., :k]  # generalised force per channel force
-    F = np.zeros((n, runs, d + k, d + k))
-    F[..., :d, :d] = base.F
-    accelerations = base.G[..., : pushes.shape[2]] @ problem.point.inverse @ pushes
-    F[..., :d, d:] = accelerations
-    keep = np.exp(-h / MEMORY)
-    i = np.arange(k)
-    F[..., d + i, d + i] = np.where(problem.batch.valid, keep, 1.0)[..., None]
-    j = base.G.shape[3]
-    G = np.zeros((n, runs, d + k, j + k))
-    G[..., :d, :j] = base.G
-    G[..., d + i, j + i] = 1.0
-    W = np.zeros((n, runs, j + k, j + k))
-    W[..., :j, :j] = base.W
-    W[..., j + i, j + i] = (1.0 - keep**2)[..., None] * sigma**2
-    H = np.zeros((n, runs, m, d + k))
-    H[..., :d] = base.H
-    P0 = np.zeros((runs, d + k, d + k))
-    P0[:, :d, :d] = base.P0
-    P0[:, d + i, d + i] = sigma**2
-    return System(F, G, W, H, base.R, P0)
+    `strength` (k,): 1 sigma of each channel's force, learnt when not given. With the same strength
+    estimates at two thetas differ by what the change of theta explains. Raises TypeError for other
+    problems.
+    """
+    if isinstance(problem, RobotProblem):
+        return robot_missing(problem, theta, strength)
+    if isinstance(problem, BenchProblem):
+        return bench_missing(problem, theta, strength)
+    raise TypeError(f"no force is defined for a {type(problem).__name__}")

@@ -17,6 +17,7 @@ WIDTH = 10.0  # prior of a term: so many sigma where it acts most
 AHEAD = 6.0  # nats by which a formula must beat the catalogue
 STRUCTURE = 1.0  # repeatable mean square, in noise units, that an imperfect model may leave,
 LEFT = 0.1  # and as a share of what the answer explains
+MATTERS = 0.2  # a formula whose force stays below this share of an effect's size is no finding
 CLIP, RIDGES, FOLDS = 30.0, (1e-4, 1e-2, 1.0), 5
 
 
@@ -26,6 +27,14 @@ class Examinable(Protocol):
 
     def leftover(self, theta: Theta) -> tuple[Array, Array, Array]:
         """Residual over its white noise (n,), regressors (n, m), and the run of each row (n,)."""
+
+
+@runtime_checkable
+class Weighing(Protocol):
+    """A problem that can say how much a term of its library would matter."""
+
+    def weight(self, theta: Theta, formula: str, coefficient: float) -> float:
+        """Its largest force as a share of what matters in practice."""
 
 
 def structured(search: Search, hypothesis: Hypothesis) -> tuple[float, float]:
@@ -131,9 +140,18 @@ def look(search: Search, best: Hypothesis) -> Formula | None:
     )
     alone = _grow(ranker, names, ())
     catalogue = search.points[best].log_evidence - null.log_evidence if best else 0.0
-    if alone is not None and alone.gain > catalogue + AHEAD:
+    if alone is not None and alone.gain > catalogue + AHEAD and _matters(search, alone):
         return replace(alone, gain=alone.gain - catalogue)
     return None
+
+
+def _matters(search: Search, formula: Formula) -> bool:
+    """Whether a formula is more than the imperfection that every model has."""
+    problem, theta = search.problem, search.points[NULL].fit.theta
+    if not isinstance(problem, Weighing):
+        return True
+    parts = zip(formula.terms, formula.coefficients, strict=True)
+    return any(problem.weight(theta, term, c) > MATTERS for term, (c, _) in parts)
 
 
 def _grow(ranker: Ranker, names: Mapping[str, str], start: Hypothesis) -> Formula | None:

@@ -16,7 +16,7 @@ from kemba.ocp.guess import automatic_guess
 from kemba.ocp.ipopt import Ipopt, Parameters, Point
 from kemba.ocp.mirror import Reduction
 from kemba.ocp.pose import SCALE
-from kemba.ocp.schedule import LOOSE, SWITCHING, VALVE, Search, Stopped, settle, warm
+from kemba.ocp.schedule import LOOSE, SWITCHING, VALVE, Search, Stopped, fix, tighten, warm
 from kemba.ocp.stage import Rows
 from kemba.ocp.task import Task
 from kemba.ocp.transcribe import Transcription, WishBlock
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 BUDGET = 30.0  # s
 NODES = 40  # a coarser grid is enough to say what is too much
 ITERATIONS = 500
-PRICE = 10.0  # of one unit of scaled slack, against a cost near one
+PRICE = 100.0  # of one unit of scaled slack, against a cost of 0.01 to 10
 SHORT = 0.05  # scaled slack (5 mm, 0.6 deg) from which a wish counts as out of reach
 
 # Who gives way: goals first, as people would; then everything but the start, whose pose is judged
@@ -163,7 +163,7 @@ def _solve(
         binary, name = Parameters(LOOSE, VALVE, SWITCHING), "its valves"
         point = search.solve(name, converged[0], binary, options=warm(1e-3, tol=1e-3))
         converged.append(point)
-        converged.append(settle(search, point))
+        converged.append(tighten(search, fix(search, point)))
     except Stopped as stop:
         if stop.point.message == "User_Requested_Stop":
             raise

@@ -6,11 +6,12 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import casadi as ca
 import numpy as np
 
+from kemba.ocp.blocks import BlockProblem
 from kemba.ocp.transcribe import Transcription
 
 SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
@@ -51,14 +52,23 @@ class Parameters:
 Watch = Callable[[int, float, float], None]  # iteration, objective, worst scaled violation
 
 
-class _Watcher(ca.Callback):
+class Watched(Protocol):
+    """A program whose rows and their bounds a watcher may ask for."""
+
+    @property
+    def problem(self) -> BlockProblem: ...
+    @property
+    def g_lower(self) -> np.ndarray: ...
+    @property
+    def g_upper(self) -> np.ndarray: ...
+
+
+class Watcher(ca.Callback):
     """Tells `watch` about every iteration, and asks `stop` whether to go on."""
 
-    def __init__(
-        self, transcription: Transcription, watch: Watch | None, stop: Callable[[], bool]
-    ) -> None:
+    def __init__(self, program: Watched, watch: Watch | None, stop: Callable[[], bool]) -> None:
         super().__init__()
-        self.t, self.watch, self.stop, self.count = transcription, watch, stop, 0
+        self.t, self.watch, self.stop, self.count = program, watch, stop, 0
         self.construct("watcher", {})
 
     def get_n_in(self) -> int:
@@ -73,7 +83,7 @@ class _Watcher(ca.Callback):
     def get_sparsity_in(self, i: int) -> ca.Sparsity:
         rows = {"x": self.t.problem.size, "lam_x": self.t.problem.size, "f": 1}
         rows |= {"g": self.t.problem.rows, "lam_g": self.t.problem.rows}
-        return ca.Sparsity.dense(rows.get(ca.nlpsol_out(i), 4))
+        return ca.Sparsity.dense(rows.get(ca.nlpsol_out(i), self.t.problem.p.numel()))
 
     def eval(self, arguments: Sequence[ca.DM]) -> list[int]:
         if self.watch is not None:
@@ -149,7 +159,7 @@ class Ipopt:
             own |= {"output_file": str(self.log), "file_print_level": 5, "file_append": "yes"}
         plugin = self._plugin(own)
         if self.watch is not None or self.stop is not None:
-            plugin["iteration_callback"] = _Watcher(t, self.watch, self.stop or (lambda: False))
+            plugin["iteration_callback"] = Watcher(t, self.watch, self.stop or (lambda: False))
         solver = ca.nlpsol("solver", "ipopt", t.problem.nlp, plugin)
         arguments: dict[str, Any] = {
             "x0": np.clip(start.Y, lower, upper).ravel(),

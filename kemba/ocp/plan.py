@@ -24,7 +24,17 @@ from kemba.ocp.penalty import WEIGHTS, penalise
 from kemba.ocp.phases import refine as solve_phases
 from kemba.ocp.result import to_trajectory
 from kemba.ocp.resume import resumed
-from kemba.ocp.schedule import RELAX, Attempt, Search, Stopped, confirm, find, refine
+from kemba.ocp.schedule import (
+    RELAX,
+    Attempt,
+    Search,
+    Stopped,
+    binary,
+    confirm,
+    find,
+    refine,
+    tighten,
+)
 from kemba.ocp.switching import polish
 from kemba.ocp.task import Task
 from kemba.ocp.transcribe import Transcription
@@ -119,7 +129,7 @@ class Planner:
 
     def _coarse_to_fine(self, reduction: Reduction) -> tuple[Transcription, Point]:
         coarse = self.search(self.task.nodes // 2, reduction)
-        point = find(coarse, self.guess(coarse.transcription))
+        point = self._polished(coarse, find(coarse, self.guess(coarse.transcription)))
         if not point.solved:
             return coarse.transcription, point
         fine = self.search(self.task.nodes, reduction)
@@ -127,17 +137,20 @@ class Planner:
 
     def _direct(self, reduction: Reduction) -> tuple[Transcription, Point]:
         search = self.search(self.task.nodes, reduction)
-        return self._finish(search, find(search, self.guess(search.transcription)))
+        point = find(search, self.guess(search.transcription))
+        return self._finish(search, self._polished(search, point))
 
     def _continued(self, reduction: Reduction) -> tuple[Transcription, Point]:
         assert self.start is not None
         search = self.search(self.task.nodes, reduction)
-        point = find(search, resumed(search.transcription, self.start), loose=False)
-        return self._finish(search, point)
+        point = binary(search, resumed(search.transcription, self.start))
+        return self._finish(search, self._polished(search, point))
+
+    def _polished(self, search: Search, point: Point) -> Point:
+        return polish(search, point) if point.solved and self.task.solver.polish else point
 
     def _finish(self, search: Search, point: Point) -> tuple[Transcription, Point]:
-        if point.solved and self.task.solver.polish:
-            point = polish(search, point)
+        point = tighten(search, point) if point.solved else point
         if not point.solved or not search.transcription.reduction.symmetric:
             return search.transcription, point
         full = self.search(self.task.nodes, whole(self.model.node))
@@ -230,7 +243,14 @@ def on_phases(planner: Planner, found: Plan) -> Plan:
     task, model = found.task, found.model
     planner.tell("phases")
     answer = solve_phases(
-        model, task, found.wishes, found.trajectory, deadline=planner.deadline, log=planner.log
+        model,
+        task,
+        found.wishes,
+        found.trajectory,
+        deadline=planner.deadline,
+        log=planner.log,
+        watch=planner.watch,
+        stop=planner.stop,
     )
     found = replace(
         found,
@@ -239,6 +259,9 @@ def on_phases(planner: Planner, found: Plan) -> Plan:
         solve_cpu_s=found.solve_cpu_s + time.process_time() - busy,
     )
     new, certificate = answer.trajectory, answer.certificate
+    if answer.stopped:
+        kept = "interrupted while refining, the implicit Euler plan is kept"
+        return replace(found, status="interrupted", sentence=f"{found.sentence}; {kept}")
     if new is None or certificate is None or not certificate.within(task.tolerances):
         kept = f"not refined ({answer.message}), the implicit Euler plan is kept"
         return replace(found, sentence=f"{found.sentence}; {kept}")

@@ -35,6 +35,8 @@ def answer(plan: Plan, run: str) -> dict[str, Any]:
         },
         "replay": None,
         "plant_replay": None,
+        "good": plan.status == "solved",
+        "ignored": plan.model.ignored,
         "relax": [
             {name: getattr(r, name) for name in ("wish", "where", "asked", "reachable", "unit")}
             for r in plan.relax

@@ -6,46 +6,56 @@ import numpy as np
 
 from kemba.model import Model
 from kemba.ocp.transcribe import Transcription
+from kemba.quantity import Quantity
 from kemba.trajectory import Trajectory
 
 
 def to_trajectory(transcription: Transcription, Y: np.ndarray) -> Trajectory:
     """Every quantity of the model at the nodes. Inputs and forces of a row act on the interval
     before it (implicit Euler); at the first node they are zero."""
-    model, layout = transcription.model, transcription.layout
-    q, v, s, u, lam = (layout.full(Y, g) for g in ("q", "v", "s", "u", "lam"))
-    h = transcription.h(Y)
-    a, sd = np.zeros_like(v), np.zeros_like(s)
-    a[1:], sd[1:] = np.diff(v, axis=0) / h[:, None], np.diff(s, axis=0) / h[:, None]
-    columns: dict[str, np.ndarray] = {}
-    node = model.node
-    measured = np.array(node.measure.map(len(Y))(q.T, v.T, a.T, s.T, sd.T, lam.T, u.T, [])).T
+    layout, h = transcription.layout, transcription.h(Y)[:, None]
+    x = {g: layout.full(Y, g) for g in ("q", "v", "s", "u", "lam")}
+    a, sd = np.zeros_like(x["v"]), np.zeros_like(x["s"])
+    a[1:], sd[1:] = np.diff(x["v"], axis=0) / h, np.diff(x["s"], axis=0) / h
+    name = transcription.task.name
+    return written(transcription.model, name, transcription.times(Y), x, a, sd)
+
+
+def written(
+    model: Model,
+    run: str,
+    time: np.ndarray,
+    x: dict[str, np.ndarray],
+    a: np.ndarray,
+    sd: np.ndarray,
+) -> Trajectory:
+    """A plan at `time` (rows,) [s] with q, v, s, u, lam (rows, n) in x, rates `a` of v and `sd` of
+    s: with every output of the model, then the groups themselves."""
+    node, columns = model.node, {}
+    at = [x["q"], x["v"], a, x["s"], sd, x["lam"], x["u"]]
+    measured = np.array(node.measure.map(len(time))(*(values.T for values in at), [])).T
     for quantity, values in zip(node.output_quantities, measured.T, strict=True):
         columns[quantity.header] = values
-    groups = [
-        (model.mechanism.coordinates, q),
-        (model.mechanism.velocities, v),
-        (model.states.values(), s),
-        (model.inputs.values(), u),
-        (model.forces.values(), lam),
-    ]
-    for group, values in groups:
-        columns |= {c.header: values[:, i] for i, c in enumerate(group)}
-    meta = {"kind": "plan", "run": transcription.task.name}
-    return Trajectory(transcription.times(Y), columns, meta)
+    for name, group in groups(model).items():
+        columns |= {q.header: values for q, values in zip(group, x[name].T, strict=True)}
+    return Trajectory(time, columns, {"kind": "plan", "run": run})
+
+
+def groups(model: Model) -> dict[str, list[Quantity]]:
+    """The quantities of q, v, s, u and lam."""
+    return {
+        "q": list(model.mechanism.coordinates),
+        "v": list(model.mechanism.velocities),
+        "s": list(model.states.values()),
+        "u": list(model.inputs.values()),
+        "lam": list(model.forces.values()),
+    }
 
 
 def arrays(model: Model, trajectory: Trajectory) -> dict[str, np.ndarray]:
     """q, v, s, u, lam (rows, n) of a trajectory that names them all. Raises KembaError."""
-    groups = {
-        "q": model.mechanism.coordinates,
-        "v": model.mechanism.velocities,
-        "s": model.states.values(),
-        "u": model.inputs.values(),
-        "lam": model.forces.values(),
-    }
     rows = len(trajectory)
     return {
         name: np.column_stack([trajectory[q.name] for q in group]) if group else np.zeros((rows, 0))
-        for name, group in groups.items()
+        for name, group in groups(model).items()
     }

@@ -21,8 +21,9 @@ MARGIN = 0.8  # the last relaxation stays this much below what the certificate a
 VALVE, SWITCHING = 0.1, 0.05
 STOPS = ("User_Requested_Stop", "Maximum_CpuTime_Exceeded", "Maximum_WallTime_Exceeded")
 CONFIRMED = 1e-7  # scaled violation
+PROLONGED = 1e-3  # off the bounds: a plan between the nodes of its grid is far from feasible
 # feasible to the last digit, optimal to a few: the certificate measures the former
-EXACT: dict[str, Any] = {"tol": 1e-4, "constr_viol_tol": 1e-8, "acceptable_iter": 0}
+EXACT: dict[str, Any] = {"tol": 1e-2, "constr_viol_tol": 1e-8, "acceptable_iter": 0}
 
 
 @dataclass(frozen=True)
@@ -86,41 +87,48 @@ class Search:
         return {c: np.clip(u, t.lower[:, c], t.upper[:, c]) for c, u in rounded.items()}
 
 
-def warm(mu: float, **more: Any) -> dict[str, Any]:
-    """IPOPT options of a warm start at barrier parameter `mu`."""
-    return {**WARM, "mu_init": mu, **more}
+def warm(mu: float, push: float = 1e-6, **more: Any) -> dict[str, Any]:
+    """IPOPT options of a warm start at barrier parameter `mu`, `push` off the bounds."""
+    pushed = {name: push for name in WARM if name.endswith(("_push", "_frac"))}
+    return {**WARM, **pushed, "mu_init": mu, **more}
 
 
-def find(search: Search, start: Point, loose: bool = True) -> Point:
-    """From a guess to a plan with binary valves and tight pairs, on one grid."""
-    point = start
-    if loose:
-        most = min(PATIENCE, int(search.ipopt.options.get("max_iter", PATIENCE)))
-        interior = {"bound_push": 0.3, "bound_frac": 0.3, "mu_init": 0.1, "tol": 1e-3}
-        interior["max_iter"] = most
-        point = search.solve(RELAX, start, Parameters(LOOSE), options=interior)
-        if point.message in HOPELESS:
-            return point  # what the relaxed pairs forbid, tighter ones do not allow
-    binary = Parameters(LOOSE, VALVE, SWITCHING)
-    point = search.solve("binary valves", point, binary, options=warm(1e-3, tol=1e-3))
-    return settle(search, point)
+def find(search: Search, start: Point) -> Point:
+    """From a guess to a plan with binary valves, its pairs still a little loose."""
+    most = min(PATIENCE, int(search.ipopt.options.get("max_iter", PATIENCE)))
+    interior = {"bound_push": 0.3, "bound_frac": 0.3, "mu_init": 0.1, "tol": 1e-3}
+    interior["max_iter"] = most
+    point = search.solve(RELAX, start, Parameters(LOOSE), options=interior)
+    if point.message in HOPELESS:
+        return point  # what the relaxed pairs forbid, tighter ones do not allow
+    return binary(search, point)
 
 
-def settle(search: Search, point: Point) -> Point:
-    """Fix the rounded valves and tighten the pairs."""
+def binary(search: Search, point: Point) -> Point:
+    """Push the valves towards 0 and 1, then round and fix them."""
+    parameters = Parameters(LOOSE, VALVE, SWITCHING)
+    point = search.solve("binary valves", point, parameters, options=warm(1e-3, tol=1e-3))
+    return fix(search, point)
+
+
+def fix(search: Search, point: Point, push: float = 1e-6) -> Point:
+    """Round and fix the valves, the pairs still a little loose."""
+    options = warm(1e-3, push, tol=1e-3)
     fixed = search.valves(point)
-    for name, eps, mu, tol in (
-        ("fix valves", TIGHT, 1e-3, 1e-4),
-        ("tighten", MARGIN * search.final_eps, 1e-5, None),
-    ):
-        options = warm(mu, **(EXACT if tol is None else {"tol": tol}))
-        point = search.solve(name, point, Parameters(eps), options=options, fixed=fixed)
-    return point
+    return search.solve("fix valves", point, Parameters(TIGHT), options=options, fixed=fixed)
+
+
+def tighten(search: Search, point: Point) -> Point:
+    """Tighten the pairs to what the certificate asks, with the valves fixed."""
+    parameters = Parameters(MARGIN * search.final_eps)
+    options = warm(1e-5, **EXACT)
+    fixed = search.valves(point)
+    return search.solve("tighten", point, parameters, options=options, fixed=fixed)
 
 
 def refine(search: Search, coarse: Transcription, point: Point) -> Point:
     """A coarse plan on the finer grid of `search`, with its valves kept."""
-    return settle(search, Point(prolong(coarse, search.transcription, point.Y)))
+    return fix(search, Point(prolong(coarse, search.transcription, point.Y)), PROLONGED)
 
 
 def prolong(coarse: Transcription, fine: Transcription, Y: np.ndarray) -> np.ndarray:

@@ -15,7 +15,8 @@ from kemba.ocp.layout import STEP, Layout
 from kemba.ocp.mirror import Reduction
 
 ANGLE_ARM = 0.2  # m; turns a moment defect into a force defect
-COST_SCALE = 100.0  # N2.m2.s; puts a typical cost near one
+COST_SCALE = 10.0  # N2.m2.s; makes a plan's cost 0.01 to 10 beside penalties near one
+FORCES = 3e-5  # of squared scaled forces; without it IPOPT wanders where the cost is flat
 
 INF = np.inf
 
@@ -104,6 +105,7 @@ def build_stage(
     u, u0 = y[layout.binary], y0[layout.binary]
     objective = (
         objective / COST_SCALE
+        + FORCES * ca.sumsqr(y[layout.slices["lam"]]) * h / STEP
         + weights[0] * ca.sum1(u * (1 - u))
         + weights[1] * ca.sumsqr(u - u0)
         + weights[2] * ca.sum1(product)

@@ -6,22 +6,21 @@ import numpy as np
 
 from kemba.model import Model
 from kemba.ocp.ipopt import Parameters, Point
-from kemba.ocp.schedule import SWITCHING, TIGHT, VALVE, Search, settle, warm
+from kemba.ocp.schedule import SWITCHING, TIGHT, VALVE, Search, fix, warm
 from kemba.trajectory import Trajectory
 
 REACH = 4  # nodes by which a switch may move at a time
-ROUNDS = {True: 3, False: 1}  # half a robot; a whole one takes five times as long
+ROUNDS = 2
 PAYS = 0.02  # relative fall of the cost that makes another round worth while
 
 
 def polish(search: Search, point: Point) -> Point:
     """Release every valve switch by a few nodes and round again, as long as the cost falls."""
-    for _ in range(ROUNDS[search.transcription.reduction.symmetric]):
-        free = _release(search, point)
-        how = {"options": warm(1e-3, tol=1e-3), "free": free}
+    for _ in range(ROUNDS):
+        how = {"options": warm(1e-3, tol=1e-3), "free": _release(search, point)}
         parameters = Parameters(TIGHT, VALVE, SWITCHING / 5)
         loose = search.solve("move switches", Point(point.Y), parameters, **how)
-        better = settle(search, Point(loose.Y))
+        better = fix(search, Point(loose.Y))
         if not better.solved or better.objective >= (1 - PAYS) * point.objective:
             break
         point = better

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from kemba.config import Document, apply_overrides, find_config, load_yaml, parse
+from kemba.config import Document, apply_overrides, beside, find_config, load_yaml, parse
 from kemba.quantity import Param
 
 Value = float | str
@@ -58,13 +58,19 @@ class Solver(Section):
 
 
 class Tolerances(Section):
-    """What the certificate accepts."""
+    """What the certificate accepts: residuals of the plan, and how far its executions may miss.
+
+    `apex`, `touchdown` and `final` hold for the replay on the same model, `plant_apex` on the
+    plant; a plan that ends standing must land upright on both.
+    """
 
     complementarity: Annotated[float, Param("1", lower=0.0)] = 1e-6
     dynamics: Annotated[float, Param("1", lower=0.0)] = 1e-6
     bounds: Annotated[float, Param("1", lower=0.0)] = 1e-6
-    apex: Annotated[float, Param("m", lower=0.0, doc="replayed apex against plan")] = 0.03
-    touchdown: Annotated[float, Param("s", lower=0.0, doc="replayed touchdown")] = 0.02
+    apex: Annotated[float, Param("m", lower=0.0, doc="replayed apex against plan")] = 0.002
+    touchdown: Annotated[float, Param("s", lower=0.0, doc="replayed touchdown")] = 0.002
+    final: Annotated[float, Param("m", lower=0.0, doc="where the replay ends")] = 0.03
+    plant_apex: Annotated[float, Param("m", lower=0.0, doc="apex on the plant")] = 0.05
 
 
 class Task(Section):
@@ -78,6 +84,7 @@ class Task(Section):
     name: str = "task"
     notes: str = ""
     model: str = "planning"
+    plant: str = "plant"
     height: Annotated[float, Param("m", lower=0.0, doc="of the body's centre")] | None = None
     distance: Annotated[float, Param("m", doc="forward")] | None = None
     supply: Annotated[float, Param("Pa", lower=0.6e6, upper=0.8e6, doc="supply")] | None = None
@@ -111,4 +118,14 @@ def load_task(name: str | Path, overrides: list[str] | None = None) -> tuple[Tas
     Raises KembaError with every mistake at its line.
     """
     document = apply_overrides(load_yaml(find_config(name, "tasks")), overrides or [])
-    return parse(document, Task), document
+    return parse_task(document), document
+
+
+def parse_task(document: Document) -> Task:
+    """The task of a document; its own models are looked for beside it first. Raises KembaError."""
+    task = parse(document, Task)
+    if not document.source:
+        return task
+    folder = Path(document.source).parent
+    models = {key: beside(getattr(task, key), folder) for key in ("model", "plant")}
+    return task.model_copy(update=models)

@@ -8,10 +8,11 @@ from typing import Any
 from kemba.errors import KembaError
 from kemba.model import Model, load_model
 from kemba.plant.controller import execute
-from kemba.plant.replay import Replay, replay
+from kemba.plant.replay import Replay, ends_standing, replay
 from kemba.trajectory import Trajectory
 
 PLANT = "plant"
+SETTLE = 0.3  # s; the last commands are held before a landing is judged
 
 
 def replays(
@@ -19,14 +20,22 @@ def replays(
 ) -> dict[str, Any]:
     """The entries `replay` and `plant_replay` of the certificate.
 
-    The latter is None without a plant; either is None where a plan that was not solved cannot
-    even be started.
+    On the plant a plan that ends standing, with its valves closed, has a moment to come to rest
+    before its landing is judged. `plant_replay` is None without a plant; either is None where a
+    plan that was not solved cannot even be started.
     """
     full = load_model(plant) if isinstance(plant, str) else plant
+    rest = SETTLE if ends_standing(model, plan) and _closed(controller) else 0.0
     return {
         "replay": _tried(lambda: replay(model, plan)),
-        "plant_replay": full and _tried(lambda: execute(controller, full).against(full, plan)),
+        "plant_replay": full
+        and _tried(lambda: execute(controller, full, extra=rest).against(full, plan)),
     }
+
+
+def _closed(controller: Trajectory) -> bool:
+    """Whether the last command leaves every valve closed: with one open the robot would go on."""
+    return not any(controller[name][-1] for name in controller.names if "/valve/" in name)
 
 
 def _tried(attempt: Callable[[], Replay]) -> dict[str, Any] | None:
@@ -34,14 +43,3 @@ def _tried(attempt: Callable[[], Replay]) -> dict[str, Any] | None:
         return attempt().summary()
     except KembaError:
         return None
-
-
-def sentence(found: Replay | dict[str, Any]) -> str:
-    """A replay in words: `replay reaches 3.2 mm above the plan and lands 1.5 ms late`."""
-    facts: dict[str, Any] = found.summary() if isinstance(found, Replay) else found
-    apex, late = 1e3 * facts["apex_error_m"], facts["touchdown_error_s"]
-    text = f"replay reaches {abs(apex):.1f} mm {'above' if apex >= 0 else 'below'} the plan"
-    if late is not None:
-        text += f", touches down {abs(1e3 * late):.1f} ms {'late' if late >= 0 else 'early'}"
-        text += " and lands" if facts["landed"] else " and falls"
-    return text

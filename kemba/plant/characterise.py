@@ -114,8 +114,11 @@ def _plateaus(rises: Iterable[Rise]) -> dict[tuple[str, float], Estimate]:
 
 
 def _compare(effects: tuple[Any, ...], log: Trajectory) -> tuple[float, float]:
-    """R2 and RMS [N] of the first-order model's force on a log."""
-    predicted = predict(effects, log)
+    return agreement(predict(effects, log), log)
+
+
+def agreement(predicted: Trajectory, log: Trajectory) -> tuple[float, float]:
+    """R2 and RMS [N] of a predicted force on a log of the same times."""
     error = predicted["piston/F"] - log["piston/F"]
     spread = float(np.var(log["piston/F"]))
     return 1.0 - float(np.mean(error**2)) / spread, float(np.sqrt(np.mean(error**2)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +12,10 @@ from kemba.config import load_yaml
 from kemba.effects.load import Payload
 from kemba.errors import KembaError
 from kemba.model import Model, load_model
-from kemba.plant.commands import Profile
 from kemba.plant.controller import Execution, Gains, execute, read_controller
 from kemba.plant.replay import Replay
 from kemba.plant.sensors import Sensors, take_log
+from kemba.plant.valves import scattered
 from kemba.quantity import to_si
 from kemba.trajectory import Trajectory
 
@@ -64,9 +64,9 @@ def repeat_run(
     for number in range(1, count + 1):
         rng = np.random.default_rng([seed, number])
         sensors = Sensors.usual() if noise else Sensors()
-        scattered = _scattered(model, table, rng) if noise else None
+        valves = scattered(model, table, VALVE_SCATTER, rng) if noise else None
         sample = sensors.times(float(table.time[-1]), rng)
-        done = execute(table, model, gains, valves=scattered, sample=sample)
+        done = execute(table, model, gains, valves=valves, sample=sample)
         log = take_log(done.trajectory, sensors, rng, model.effects)
         log.meta |= {"run": number, "repeat_of": controller.parent.name, "plant": model.name}
         path = Path(out) / f"log-{number}.csv"
@@ -83,15 +83,3 @@ def plant_of(run: str | Path, name: str) -> Model:
     supply = task.get("supply")
     extra = [Payload(m=payload)] if payload else []
     return load_model(name, extra, None if supply is None else to_si(supply, "Pa"))
-
-
-def _scattered(model: Model, table: Trajectory, rng: np.random.Generator) -> dict[str, Profile]:
-    """The valve commands with every switching moved a little."""
-    moved = {}
-    for quantity in model.inputs.values():
-        if quantity.binary:
-            profile = Profile.of(table.time, table[quantity.name])
-            times = profile.times.copy()
-            times[1:] += rng.normal(0.0, VALVE_SCATTER, len(times) - 1)
-            moved[quantity.name] = replace(profile, times=np.maximum.accumulate(times))
-    return moved

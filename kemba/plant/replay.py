@@ -20,24 +20,30 @@ UPRIGHT = 0.35  # rad; a landing with more pitch has failed
 class Replay:
     """How far an executed plan ends from the plan; errors are executed minus planned.
 
-    `touchdown_error_s` is None when either does not touch down after its apex. `landed`: at the
-    end the feet stand where the plan has them stand, the body is upright, and neither hip nor
-    knee met the ground.
+    `touchdown_error_s` is None when either does not touch down after its apex. `fault`: what is
+    wrong with the landing; none if at the end the feet stand where the plan has them stand, the
+    body is upright, and neither hip nor knee met the ground.
     """
 
     apex_error_m: float
     touchdown_error_s: float | None
     final_error_m: float
-    landed: bool
+    fault: str | None
     trajectory: Trajectory
 
-    def summary(self) -> dict[str, float | bool | None]:
+    @property
+    def landed(self) -> bool:
+        """Whether nothing is wrong with the landing."""
+        return self.fault is None
+
+    def summary(self) -> dict[str, float | bool | str | None]:
         """The figures of the certificate."""
         return {
             "apex_error_m": self.apex_error_m,
             "touchdown_error_s": self.touchdown_error_s,
             "final_error_m": self.final_error_m,
             "landed": self.landed,
+            "fault": self.fault,
         }
 
 
@@ -82,7 +88,7 @@ def judge(model: Model, plan: Trajectory, clock: Array, done: Run) -> Replay:
         apex_error_m=apex - float(plan["body/z"][planned]),
         touchdown_error_s=None if was is None or now is None else now - was,
         final_error_m=float(np.hypot(*final)),
-        landed=_landed(model, plan, real, apex_time),
+        fault=_fault(model, plan, real, apex_time),
         trajectory=real,
     )
 
@@ -108,18 +114,25 @@ def touchdown(t: Trajectory, clock: Array, after: float, low: float) -> float | 
     return min(times, default=None)
 
 
-def _landed(model: Model, plan: Trajectory, real: Trajectory, apex_time: float) -> bool:
-    end = {name: real[name][-1] for name in real.names}
-    standing = [
+def ends_standing(model: Model, plan: Trajectory) -> list[str]:
+    """The legs on which a plan stands at its end."""
+    return [
         leg
         for leg in model.mechanism.legs
         if f"{leg}/foot/z" not in plan or plan[f"{leg}/foot/z"][-1] <= ON_GROUND
     ]
+
+
+def _fault(model: Model, plan: Trajectory, real: Trajectory, apex_time: float) -> str | None:
+    standing = ends_standing(model, plan)
+    if not standing:
+        return "the plan ends in the air"
+    if abs(real["body/pitch"][-1]) > UPRIGHT:
+        return "tips over"
     late = real.time > apex_time
-    clear = all(
-        (real[f"{leg}/{point}/z"][late] > 0.0).all()
-        for leg in model.mechanism.legs
-        for point in ("hip", "knee")
-    )
-    feet = all(end[f"{leg}/foot/z"] <= 5 * ON_GROUND for leg in standing)
-    return bool(standing and feet and clear and abs(end["body/pitch"]) <= UPRIGHT)
+    for point in ("hip", "knee"):
+        for leg in model.mechanism.legs:
+            if (real[f"{leg}/{point}/z"][late] <= 0.0).any():
+                return f"the {leg} {point} meets the ground"
+    up = [leg for leg in standing if real[f"{leg}/foot/z"][-1] > 5 * ON_GROUND]
+    return f"the {up[0]} foot does not stand" if up else None

@@ -100,6 +100,14 @@ def _crossing(time: Array, level: Array, share: float) -> float:
     return float(np.interp(share, level[i - 1 : i + 1], time[i - 1 : i + 1]))
 
 
+def dead_times(rises: Iterable[Rise]) -> dict[str, Estimate]:
+    """Dead times [s] of switching `on` and `off`, as far as the tests have them."""
+    found: dict[str, list[float]] = {}
+    for rise in rises:
+        found.setdefault("on" if rise.u else "off", []).append(rise.dead)
+    return {name: mean(np.array(values)) for name, values in found.items()}
+
+
 def rise_table(rises: Iterable[Rise]) -> RiseTable:
     """Dead times and the bilinear time constants of eq. 5. Raises KembaError on too few tests."""
     rises = list(rises)
@@ -109,10 +117,7 @@ def rise_table(rises: Iterable[Rise]) -> RiseTable:
             "the locked tests do not cover filling and venting at two positions",
             "tests as in configs/rigs/locked.yaml were expected",
         )
-    dead = {
-        name: mean(np.array([r.dead for r in rises if r.u == u]))
-        for name, u in (("on", 1.0), ("off", 0.0))
-    }
+    dead = dead_times(rises)
     fits = [r.fit(dead["on" if r.u else "off"].value) for r in rises]
     taus = np.array([tau for tau, _ in fits])
     level = np.concatenate([r.level for r in rises])

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from kemba.model import Model
 from kemba.plant.commands import Profile
+from kemba.trajectory import Trajectory
 
 
 def acting(sent: Profile, on: float, off: float) -> Profile:
@@ -33,6 +36,20 @@ def delayed(model: Model, profiles: dict[str, Profile]) -> dict[str, Profile]:
         if quantity.binary and quantity.name in profiles:
             late[quantity.name] = acting(profiles[quantity.name], *model.timing(leg))
     return late
+
+
+def scattered(
+    model: Model, table: Trajectory, sigma: float, rng: np.random.Generator
+) -> dict[str, Profile]:
+    """The valve commands of a controller table, every switching moved by chance (`sigma` [s])."""
+    moved = {}
+    for quantity in model.inputs.values():
+        if quantity.binary:
+            profile = Profile.of(table.time, table[quantity.name])
+            times = profile.times.copy()
+            times[1:] += rng.normal(0.0, sigma, len(times) - 1)
+            moved[quantity.name] = replace(profile, times=np.maximum.accumulate(times))
+    return moved
 
 
 def _pulses(sent: Profile) -> list[tuple[float, float]]:

@@ -6,19 +6,22 @@ function to have one that `pyplot.show` opens.
 
 from kemba.plotting.animation import animate, save_animation
 from kemba.plotting.bench import plot_bench, plot_force_velocity, valve_modes
-from kemba.plotting.diagnosis import Band, plot_bands, plot_heat_map, plot_ladder
+from kemba.plotting.diagnosis import Band, plot_bands, plot_ladder
 from kemba.plotting.draw import draw, machine_of
+from kemba.plotting.heat import plot_heat_map
 from kemba.plotting.machine import Machine, load_machine
 from kemba.plotting.motion import plot_motion
+from kemba.plotting.rig import bench_logs, plot_rig
 from kemba.plotting.robustness import plot_growth, plot_robustness
 from kemba.plotting.source import Source, default_path, load_source, load_sources
-from kemba.plotting.style import paper_figure, paper_style, save_figure
+from kemba.plotting.style import paper_figure, paper_style, save_figure, svg_text
 
 __all__ = [
     "Band",
     "Machine",
     "Source",
     "animate",
+    "bench_logs",
     "default_path",
     "draw",
     "load_machine",
@@ -34,8 +37,10 @@ __all__ = [
     "plot_heat_map",
     "plot_ladder",
     "plot_motion",
+    "plot_rig",
     "plot_robustness",
     "save_animation",
     "save_figure",
+    "svg_text",
     "valve_modes",
 ]

@@ -109,6 +109,12 @@ def plot_force_velocity(
         velocity = points[mode][0]
         ends = np.array([np.nanmin(velocity), np.nanmax(velocity)])
         axes.plot(ends, rest - damping * ends, color=LOOKS[mode][0], zorder=4)
+        middle = float(ends.mean())
+        axes.annotate(
+            f"{rest:.0f} - {damping:.0f} v", (middle, rest - damping * middle),
+            (5, -12 if mode == "none" else 5),
+            textcoords="offset points", fontsize=7, color=LOOKS[mode][0],
+        )  # fmt: skip
     axes.axhline(0.0, color=GREY, lw=0.6)
     axes.set_xlabel("piston v [m/s]")
     axes.set_ylabel("piston F [N]")

@@ -1,4 +1,5 @@
-"""Figures of a discovery: where the error was and is, and how it fell."""
+"""Figures of a discovery: where the error was and is, the missing force and what explains it, and
+how the error fell."""
 
 from __future__ import annotations
 
@@ -8,10 +9,15 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from kemba.identify.cells import cells, grains
+from kemba.identify.confirm import rms
 from kemba.identify.discover import Found
 from kemba.identify.problem import Array, Rows
 from kemba.identify.rank import NULL
-from kemba.plotting.diagnosis import plot_heat_map, plot_ladder
+from kemba.identify.smoother import missing_force
+from kemba.plotting.comparison import bands_of, place_of
+from kemba.plotting.diagnosis import plot_bands, plot_ladder
+from kemba.plotting.heat import plot_heat_map
 from kemba.plotting.style import (
     BLUE,
     GREY,
@@ -22,41 +28,43 @@ from kemba.plotting.style import (
     save_figure,
 )
 
-FEWEST = 30  # rows that make a cell of the heat map
+FEWEST = 30  # rows that make a span of the residual
 SHOWN = 2.0  # s of residual drawn
 
 
 def draw_discovery(found: Found, folder: Path) -> list[Path]:
-    """Heat map before and after, the residual in time, and the ladder of errors, into `folder`."""
-    paths = [
-        save_figure(plot_cells(found), folder / "heat_map.png"),
-        save_figure(plot_residual(found), folder / "residual.png"),
-    ]
-    steps = found.answer.ladder
-    if len(steps) > 1:
-        names, errors = zip(*steps, strict=True)
-        ladder = plot_ladder(names, errors)
-        paths.append(save_figure(ladder, folder / "ladder.png"))
-    return [Path(str(p)) for p in paths if p is not None]
+    """Into `folder`: heat map before and after, the residual in time, the missing force and what
+    was found of it, and the ladder of errors."""
+    figures = {"heat_map": plot_cells(found), "residual": plot_residual(found)}
+    figures["missing_force"] = plot_explained(found)
+    if len(found.answer.ladder) > 1:
+        figures["ladder"] = plot_steps(found)
+    return [save_figure(f, folder / f"{name}.png") for name, f in figures.items()]
 
 
 def plot_cells(found: Found) -> Figure:
-    """RMS of the whitened residual by channel and by motion and valve mode."""
+    """Error by noise, by channel and by motion and valve mode, before and after."""
+    problem = found.search.problem
     rows, residuals = _residuals(found)
-    conditions = np.char.add(np.char.add(rows.phase.astype(str), " "), rows.mode.astype(str))
-    names = [str(c) for c in np.unique(conditions)]
-    tables = {
-        title: np.array(
-            [
-                [_cell(r[(rows.channel == k) & (conditions == name)]) for name in names]
-                for k in range(len(rows.channels))
-            ]
-        )
+    power = getattr(problem, "expected_power", None)
+    expected = np.asarray(power()) if power else np.ones(len(rows))
+    whole = np.full(len(rows), "", dtype=object)
+    size = getattr(problem, "grain", 1)
+    listed = {
+        title: list(cells(rows, whole, grains(rows, whole, r, expected, size)))
         for title, r in residuals.items()
     }
-    seen = np.isfinite(next(iter(tables.values()))).any(axis=1)
-    channels = [c for c, s in zip(rows.channels, seen, strict=True) if s]
-    return plot_heat_map({t: v[seen] for t, v in tables.items()}, channels, names)
+    first = next(iter(listed.values()))
+    channels = list(dict.fromkeys(c.channel for c in first))
+    columns = sorted({(c.phase, c.mode, c.region) for c in first}, key=place_of)
+    tables, bold = {}, {}
+    for title, group in listed.items():
+        tables[title] = np.full((len(channels), len(columns)), np.nan)
+        bold[title] = np.zeros(tables[title].shape, bool)
+        for c in group:
+            at = channels.index(c.channel), columns.index((c.phase, c.mode, c.region))
+            tables[title][at], bold[title][at] = c.ratio, c.significant
+    return plot_heat_map(tables, channels, [c[:2] for c in columns], bold)
 
 
 def _residuals(found: Found) -> tuple[Rows, dict[str, Array]]:
@@ -68,8 +76,23 @@ def _residuals(found: Found) -> tuple[Rows, dict[str, Array]]:
     return search.problem.rows(), tables
 
 
-def _cell(r: Array) -> float:
-    return float(np.sqrt(np.mean(r**2))) if len(r) >= FEWEST else float("nan")
+def plot_explained(found: Found) -> Figure:
+    """d(t) of the model as it was, with its 95 % band, and what the answer makes of it."""
+    problem, points = found.search.problem, found.search.points
+    before = missing_force(problem, points[NULL].fit.theta)
+    if not found.best:
+        return plot_bands(bands_of(before))
+    after = missing_force(problem, points[found.best].fit.theta, before[0].strength)
+    return plot_bands(bands_of(before, after), " + ".join(found.best))
+
+
+def plot_steps(found: Found) -> Figure:
+    """Errors of fitted and held-out runs as effects are added."""
+    names, held_out = zip(*found.answer.ladder, strict=True)
+    problem, points = found.search.problem, found.search.points
+    steps = [tuple(sorted(names[1 : i + 1])) for i in range(len(names))]
+    fitted = [rms(problem, points[step].fit.theta) for step in steps]
+    return plot_ladder(names, fitted, held_out)
 
 
 @paper_style

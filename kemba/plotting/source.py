@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from kemba.errors import KembaError
+from kemba.identify.logs import ColumnMap, read_log
 from kemba.trajectory import Array, Trajectory
 
 PLAN_FILE = "trajectory.csv"
@@ -57,8 +58,11 @@ def is_plan(trajectory: Trajectory, path: Path | None = None) -> bool:
     return kind == "plan" if kind else path is not None and path.name == PLAN_FILE
 
 
-def load_source(path: str | Path) -> Source:
-    """The plan in a run folder, or the trajectory in a CSV. Raises KembaError."""
+def load_source(path: str | Path, columns: ColumnMap | None = None) -> Source:
+    """The plan in a run folder, or the trajectory in a CSV, whose foreign `columns` a map tells.
+
+    Raises KembaError.
+    """
     path = Path(path)
     file = path / PLAN_FILE if path.is_dir() else path
     if not file.is_file():
@@ -66,15 +70,15 @@ def load_source(path: str | Path) -> Source:
         runs = ", ".join(str(found.parent) for found in sorted(Path("runs").glob(f"*/{PLAN_FILE}")))
         expected = "a run folder or a CSV in the log format was expected"
         raise KembaError(str(path), what, expected, f"runs here: {runs}" if runs else "")
-    trajectory = Trajectory.read(file)
+    trajectory = Trajectory.read(file) if columns is None else read_log(file, columns)
     if len(trajectory) < 2:
         raise KembaError(str(file), "has one row only", "at least two were expected")
     return Source(_name(file), trajectory, is_plan(trajectory, file), file)
 
 
-def load_sources(paths: Iterable[str | Path]) -> list[Source]:
+def load_sources(paths: Iterable[str | Path], columns: ColumnMap | None = None) -> list[Source]:
     """Several of them, with names that differ."""
-    sources = [load_source(path) for path in paths]
+    sources = [load_source(path, columns) for path in paths]
     counts = Counter(source.name for source in sources)
     return [
         replace(source, name=str(path)) if counts[source.name] > 1 else source

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+import re
 from pathlib import Path
 from typing import Any
 
@@ -85,6 +87,17 @@ def save_figure(figure: Figure, path: str | Path) -> Path:
     except OSError as error:
         raise KembaError(str(path), error.strerror or str(error)) from None
     return path
+
+
+def svg_text(figure: Figure) -> str:
+    """The figure as an `<svg>` element that fills the width it is given."""
+    picture = io.StringIO()
+    with matplotlib.rc_context(RC):
+        figure.savefig(picture, format="svg")
+    text = picture.getvalue()
+    start = text.index("<svg")
+    end = text.index(">", start)
+    return re.sub(r' (?:width|height)="[^"]*"', "", text[start:end]) + text[end:]
 
 
 def key_above(axes: Axes, columns: int = 4) -> None:

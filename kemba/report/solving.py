@@ -12,7 +12,10 @@ from kemba.ocp import Plan, Task, controller_table, plan
 from kemba.ocp.ipopt import Watch
 from kemba.ocp.report import answer
 from kemba.ocp.starts import plan_best
-from kemba.plant.certificate import replays, sentence
+from kemba.plant.certificate import replays
+from kemba.plant.counterpart import counterpart
+from kemba.plant.replay import ends_standing
+from kemba.report.verdict import verdicts
 from kemba.runs import RunFolder, write_json
 from kemba.trajectory import Trajectory
 
@@ -42,8 +45,9 @@ def solve_into(
     """Solve `task` and fill its run folder; returns the JSON of `solve`.
 
     `start`: a trajectory to go on from; `starts`, `jobs`: several guesses on the cores; `replay`:
-    execute the plan on the same model and on the plant. The manifest says `failed` when this
-    raises.
+    execute the plan on the same model and on the plant, and hold both against the task's
+    tolerances: `good` tells whether the plan is solved and they do. The manifest says `failed`
+    when this raises.
     """
     dump_yaml(task.model_dump(exclude_none=True), folder / "task.yaml")
     log = folder / "solver.log"
@@ -56,22 +60,31 @@ def solve_into(
         result = answer(found, str(folder.path))
         if replay and found.status in WORTH_REPLAYING:
             listener.tell("replay")
-            result |= _replayed(found)
+            result |= _replayed(found, result["good"])
         _write(found, result, folder, figure)
     except BaseException:
         folder.finish("failed")
         raise
-    folder.finish(found.status, sentence=result["sentence"])
+    folder.finish(found.status, sentence=result["sentence"], good=result["good"])
     return result
 
 
-def _replayed(found: Plan) -> dict[str, Any]:
+def _replayed(found: Plan, good: bool) -> dict[str, Any]:
+    """The executions of a plan, and the verdict: good only if both come near enough."""
+    task = found.task
     table = controller_table(found.model, found.trajectory)
     try:
-        executed = replays(found.model, found.trajectory, table)
+        plant = counterpart(task.model, task.payload, task.supply, task.plant)
+        executed = replays(found.model, found.trajectory, table, plant)
     except KembaError as error:  # a model that the simulator cannot execute still has its plan
-        return {"sentence": f"{found.sentence}; no replay: {error}"}
-    return {**executed, "sentence": f"{found.sentence}; {sentence(executed['replay'])}"}
+        return {"good": False, "sentence": f"{found.sentence}; but there is no replay: {error}"}
+    lands = bool(ends_standing(found.model, found.trajectory))
+    told = verdicts(executed, task.tolerances, lands).values()
+    return {
+        **executed,
+        "good": good and all(verdict.good for verdict in told),
+        "sentence": "; ".join([found.sentence, *(verdict.sentence for verdict in told)]),
+    }
 
 
 def _write(found: Plan, result: dict[str, Any], folder: RunFolder, figure: bool) -> None:

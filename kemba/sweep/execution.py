@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kemba.config import Document, parse
+from kemba.config import Document, load_yaml, parse
 from kemba.effects import Effect
 from kemba.effects.catalogue import BY_KIND
 from kemba.effects.load import Payload
 from kemba.errors import KembaError, suggest
 from kemba.model import Model, load_model
-from kemba.plant import Gains, Profile, Replay, execute
+from kemba.plant import Gains, Replay, execute
 from kemba.plant.controller import read_controller
 from kemba.plant.replay import first_row
+from kemba.plant.valves import scattered
 from kemba.quantity import to_si
 from kemba.runs import load_run, sha256
 from kemba.sweep.case import Case, Work, content_hash
@@ -34,7 +34,7 @@ def execute_cases(expansion: Expansion, name: str, block: ExecuteBlock, folder: 
     from kemba.sweep.expand import model_hash, model_name
 
     plant = model_name(expansion, block.plant)
-    base = Document(block.conditions.model_dump(exclude_none=True))
+    base = Document({**_planned(expansion, name, block), **_given(block.conditions)})
     works = []
     for values in sample(block, name, expansion.sweep.seed):
         conditions = parse(expansion.varied(base, name, values), Conditions)
@@ -61,17 +61,36 @@ def execute_cases(expansion: Expansion, name: str, block: ExecuteBlock, folder: 
     ]  # fmt: skip
 
 
+def _given(conditions: Conditions) -> dict[str, Any]:
+    return conditions.model_dump(exclude_none=True, exclude_unset=True)
+
+
+def _planned(expansion: Expansion, name: str, block: ExecuteBlock) -> dict[str, Any]:
+    """Supply and payload that the plan was made for: conditions unless the sweep says others."""
+    if block.run is None:
+        task = expansion.task_document(name).data
+    else:
+        file = _run_folder(expansion, block.run) / "task.yaml"
+        task = load_yaml(file).data if file.is_file() else {}
+    return {key: task[key] for key in ("supply", "payload") if task.get(key) is not None}
+
+
+def _run_folder(expansion: Expansion, run: str) -> Path:
+    near = expansion.beside / run
+    return near if near.is_dir() else Path(run)
+
+
 def _plan_folder(expansion: Expansion, name: str, block: ExecuteBlock, folder: Path) -> Path:
     """The folder of the plan to execute. Raises KembaError when there is no good plan."""
-    from kemba.ocp import Task, controller_table, plan
+    from kemba.ocp import controller_table, plan
+    from kemba.ocp.task import parse_task
 
     if block.run is not None:
-        near = expansion.beside / block.run
-        run = load_run(near if near.is_dir() else block.run)
+        run = load_run(_run_folder(expansion, block.run))
         assert len(run.controller) and len(run.trajectory)
         return run.path
     document = expansion.task_document(name)
-    task = parse(document, Task)
+    task = parse_task(document)
     path = folder / "plans" / content_hash(task.model_dump(exclude_none=True))
     if not (path / "controller.csv").is_file():
         found = plan(task, document)
@@ -89,13 +108,14 @@ def run_on_plant(work: Work) -> Replay:
     plain = load_model(work["plant"])
     model = load_model(work["plant"], changed_effects(plain, conditions), conditions.supply)
     table = read_controller(work["plan"])
+    rng = np.random.default_rng(conditions.seed)
     done = execute(
         table,
         model,
         Gains(conditions.gains.K_p, conditions.gains.K_d),
         extra=conditions.after,
         start=standing(model, table, start_offsets(model, conditions)),
-        valves=_scattered(model, table, conditions) if conditions.jitter else None,
+        valves=scattered(model, table, conditions.jitter, rng) if conditions.jitter else None,
     )
     return done.against(model, Trajectory.read(Path(work["plan"]) / "trajectory.csv"))
 
@@ -148,16 +168,3 @@ def standing(model: Model, table: Trajectory, offsets: Mapping[str, float]) -> d
     lowest = float(ca.mmin(ca.Function("feet", [mechanism.q], [feet])(q)))
     height = q[[c.name for c in mechanism.coordinates].index("body/z")]
     return moved | {"body/z": float(height - lowest)}
-
-
-def _scattered(model: Model, table: Trajectory, conditions: Conditions) -> dict[str, Any]:
-    """The valves' commands with every switching moved by chance."""
-    rng = np.random.default_rng(conditions.seed)
-    moved = {}
-    for quantity in model.inputs.values():
-        if quantity.binary:
-            profile = Profile.of(table.time, table[quantity.name])
-            times = profile.times.copy()
-            times[1:] += rng.normal(0.0, conditions.jitter, len(times) - 1)
-            moved[quantity.name] = replace(profile, times=np.maximum.accumulate(times))
-    return moved

@@ -12,7 +12,7 @@ from kemba.config import Document, apply_overrides, find_config, load_yaml, pars
 from kemba.document import Location
 from kemba.errors import ConfigErrors, KembaError
 from kemba.model.spec import load_spec
-from kemba.ocp.task import Task
+from kemba.ocp.task import parse_task
 from kemba.runs import sha256
 from kemba.sweep.case import Case, content_hash
 from kemba.sweep.sampling import sample
@@ -106,7 +106,7 @@ def _solve_cases(expansion: Expansion, name: str, block: SolveBlock) -> list[Cas
     cases = []
     for index, values in enumerate(sample(block, name, expansion.sweep.seed)):
         document = expansion.varied(base, name, values)
-        task = parse(document, Task)
+        task = parse_task(document)
         task = task.model_copy(update={"model": model_name(expansion, block.model or task.model)})
         if index == 0:  # names of quantities are the same in all
             resolve(task, task_model(task), document)

@@ -16,15 +16,16 @@ CHANCE = 0.05  # p-value above which it may be chance
 def influence(rows: list[tuple[Case, Record | None]]) -> dict[str, Any]:
     """Spearman's rank correlations of each varied number with apex and landing.
 
-    `costs_most`: the condition with the strongest one, landing first, apex where all or none
-    landed; None when each may be chance.
+    What varies about zero may cost as much on either side, which ranks cannot tell: its size
+    stands beside it as `|start.body/pitch|`. `costs_most`: the condition with the strongest one,
+    landing first, apex where all or none landed; None when each may be chance.
     """
     done = [(case, record) for case, record in rows if record and "apex_m" in record]
     landed = np.array([float(record["good"]) for _, record in done])
     apex = np.array([record["apex_m"] for _, record in done], dtype=float)
     ranks = {
         key: {"landing": rank(values, landed), "apex": rank(values, apex)}
-        for key, values in numbers([case for case, _ in done]).items()
+        for key, values in with_sizes(numbers([case for case, _ in done])).items()
     }
     return {"ranks": ranks, "costs_most": costliest(ranks)}
 
@@ -50,6 +51,12 @@ def rank(x: np.ndarray, y: np.ndarray) -> dict[str, float] | None:
         return None
     found = spearmanr(x, y)
     return {"correlation": float(found.statistic), "p_value": float(found.pvalue)}
+
+
+def with_sizes(columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """The columns, and `|key|` for those with numbers on both sides of zero."""
+    both = {key: values for key, values in columns.items() if values.min() < 0.0 < values.max()}
+    return columns | {f"|{key}|": np.abs(values) for key, values in both.items()}
 
 
 def numbers(cases: list[Case]) -> dict[str, np.ndarray]:

@@ -21,7 +21,7 @@ from kemba.sweep.summary import best_known, cost_of, cost_ratio, summarise
 MANIFEST = "manifest.json"
 FIGURES = (
     "status", "good", "sentence", "apex_m", "apex_error_m", "touchdown_error_s", "final_error_m",
-    "pitch_rad", "duration_s", "solve_s", "solve_cpu_s", "build_s", "wall_s", "cpu_s",
+    "fault", "pitch_rad", "duration_s", "solve_s", "solve_cpu_s", "build_s", "wall_s", "cpu_s",
     "iterations", "variables",
 )  # fmt: skip
 

@@ -30,6 +30,8 @@ def execute_case(work: Work) -> Record:
     apex = float(max(replay.trajectory["body/z"]))
     status = "landed" if replay.landed else "fell"
     sentence = f"{status}: apex {apex:.3f} m, {1e3 * replay.apex_error_m:+.0f} mm against the plan"
+    if replay.fault:
+        sentence += f", {replay.fault}"
     return {
         "status": status,
         "good": replay.landed,

@@ -17,6 +17,7 @@ from kemba.trajectory import Trajectory
 from kemba_cli.main import app
 
 COARSE = ("--set", "nodes=24")
+PLAIN = (*COARSE, "--no-replay")  # plans as coarse as this solve, but do not come true
 
 BAD_KEYS = """\
 name: mine
@@ -173,11 +174,11 @@ def test_a_task_that_is_not_there() -> None:
 
 
 def test_json_is_one_object_with_the_promised_keys() -> None:
-    done = run("max_jump.yaml", *COARSE, "--out", "here", "--no-figure", "--json")
+    done = run("max_jump.yaml", *PLAIN, "--out", "here", "--no-figure", "--json")
     found = answer(done)
     assert (done.exit_code, done.stderr) == (0, "")
     promised = "status sentence run task apex_m duration_s cost solve_s build_s iterations"
-    promised += " variables constraints residuals replay worst"
+    promised += " variables constraints residuals replay plant_replay worst good"
     assert set(promised.split()) <= set(found)
     assert set(found["residuals"]) == {"complementarity", "binary", "dynamics", "bounds"}
     assert found["cost"]["torque_squared_integral"] > 0
@@ -192,7 +193,7 @@ def test_the_path_on_stdout_and_talk_on_stderr() -> None:
     """A run of one's own task, in a folder of its own, with its figure."""
     task, _ = load_task("max_jump.yaml")
     assert task.nodes == 100
-    done = run("max_jump.yaml", *COARSE)
+    done = run("max_jump.yaml", *PLAIN)
     assert (done.exit_code, done.stdout) == (0, "runs/max_jump-1\n")
     lines = done.stderr.splitlines()
     assert lines[-1].startswith("solved: apex 1.000 m, ")
@@ -258,7 +259,7 @@ def test_a_task_of_ones_own_beside_a_model_of_ones_own(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_from_a_fresh_process_in_another_folder(tmp_path: Path) -> None:
-    words = ["solve", "max_jump.yaml", "--set", "nodes=24", "--no-figure", "--out", "there"]
+    words = ["solve", "max_jump.yaml", *PLAIN, "--no-figure", "--out", "there"]
     code = "from kemba_cli.main import main; main()"
     done = subprocess.run(
         [sys.executable, "-W", "error", "-c", code, *words],

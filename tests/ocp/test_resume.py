@@ -31,7 +31,7 @@ posix = pytest.mark.skipif(os.name != "posix", reason="sends SIGINT")
 
 
 def solve(*arguments: str) -> Result:
-    return CliRunner().invoke(app, ["solve", "--no-figure", *arguments])
+    return CliRunner().invoke(app, ["solve", "--no-figure", "--no-replay", *arguments])
 
 
 def started(folder: Path, *arguments: str) -> subprocess.Popen[str]:

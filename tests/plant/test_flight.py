@@ -4,6 +4,8 @@ import casadi as ca
 import numpy as np
 import pinocchio as pin
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from plant.scripts import AIRBORNE, planning
 
 from kemba.effects.boom import Boom
@@ -41,9 +43,14 @@ def energies(model: Model, t: Trajectory, lift: float = 0.0) -> np.ndarray:
     return np.array(total)
 
 
-def test_free_flight_conserves_energy_and_momentum() -> None:
-    bare = Model(robot_mechanism(), [])
-    t = simulate(bare, AIRBORNE, duration=0.3, sample=0.01)
+@settings(max_examples=6, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_free_flight_conserves_energy_and_momentum(seed: int) -> None:
+    bare, rng = Model(robot_mechanism(), []), np.random.default_rng(seed)
+    rates = {
+        c.name: rng.normal(0.0, 1.0) for c in bare.mechanism.velocities if "knee" not in c.name
+    }
+    t = simulate(bare, {**AIRBORNE, **rates}, duration=0.2, sample=0.01)
     total = energies(bare, t)
     assert np.ptp(total) < 1e-6 * total[0]
     forward = [inertia(bare, q, v)[0] @ v for q, v in zip(*states(bare, t), strict=True)]

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from kemba.effects.air import AREA_E, AREA_R, ATMOSPHERE
 from kemba.effects.orifice import OrificeChamber
@@ -16,12 +18,14 @@ STROKE = 0.07
 
 
 @pytest.mark.parametrize("n", [1.0, 1.32, 1.4])
-def test_a_sealed_chamber_keeps_p_v_to_the_n(n: float) -> None:
+@settings(max_examples=4, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_a_sealed_chamber_keeps_p_v_to_the_n(n: float, seed: int) -> None:
     chamber = OrificeChamber(a_fill=0.0, a_vent=0.0, n=n)
     rig = Model(rig_mechanism(), [Valve(), chamber])
-    knots, rng = np.arange(0.0, 1.01, 0.1), np.random.default_rng(3)
+    knots, rng = np.arange(0.0, 1.01, 0.1), np.random.default_rng(seed)
     motion = hermite(knots, rng.uniform(0.01, 0.06, 11), rng.uniform(-0.3, 0.3, 11))
-    pressure = {"chamber/extend/P": 5e5, "chamber/retract/P": 2e5}
+    pressure = {f"chamber/{name}/P": rng.uniform(1e5, 7e5) for name in ("extend", "retract")}
     t = drive(rig, motion, {}, np.arange(0, 1.0, 1e-3), start=pressure)
     V_e = chamber.V_e + AREA_E * t["piston/x"]
     V_r = chamber.V_r + AREA_R * (STROKE - t["piston/x"])

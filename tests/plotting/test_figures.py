@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from matplotlib.text import Annotation
 
 from kemba.errors import KembaError
 from kemba.plotting import (
@@ -69,10 +70,18 @@ def test_heat_map_tells_its_numbers() -> None:
     bold = {"before": before > 3}
     figure = plot_heat_map(tables, ["body/z [m]", "front/piston/x [m]"], ["rest", "flight"], bold)
     first, second, _ = figure.axes
-    assert [text.get_text() for text in first.texts] == ["1.0", "45.0", "130"]
+    assert [text.get_text() for text in first.texts] == ["1.0", "45", "130"]
     assert [text.get_fontweight() for text in first.texts] == ["normal", "bold", "bold"]
     assert len(second.texts) == 3
     assert [label.get_text() for label in second.get_xticklabels()] == ["rest", "flight"]
+
+
+def test_conditions_of_several_levels_are_named_once() -> None:
+    conditions = [("flight", "00", "in"), ("flight", "00", "out"), ("flight", "10", "in")]
+    (axes, _) = plot_heat_map({"": np.ones((1, 3))}, ["body/z"], conditions).axes
+    assert [label.get_text() for label in axes.get_xticklabels()] == ["in", "out", "in"]
+    outer = {t.get_text(): t.xy[0] for t in axes.texts if isinstance(t, Annotation)}
+    assert outer == {"flight": 1.0, "00": 0.5, "10": 2.0}
 
 
 def test_bands_show_estimate_and_explanation() -> None:
@@ -95,3 +104,4 @@ def test_ladder_goes_down_effect_by_effect() -> None:
     assert names == ["planning", "+ supply_droop"]
     assert axes.yaxis_inverted()
     assert axes.get_legend_handles_labels()[1] == ["fitted runs", "held-out runs", "noise"]
+    assert [text.get_text() for text in axes.texts] == ["9.00", "1.30"]

@@ -5,9 +5,17 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from kemba.ocp import load_task
+import pytest
+from typer.testing import CliRunner
+
+from kemba.ocp import load_task, task_model
+from kemba.plant import execute, replay
+from kemba.plant.certificate import SETTLE
+from kemba.plant.counterpart import counterpart
 from kemba.report import Listener, solve_into
 from kemba.runs import RunFolder
+from kemba.trajectory import Trajectory
+from kemba_cli.main import app
 
 OPTIONS = ["nodes=30", "solver.time_limit=120 s"]
 
@@ -17,10 +25,33 @@ def test_the_certificate_tells_what_execution_gave(tmp_path: Path) -> None:
     folder = RunFolder.create(tmp_path / "run", task.name)
     answer = solve_into(folder, task, document, Listener(), figure=False)
     assert answer == json.loads((folder / "certificate.json").read_text())
-    for executed in (answer["replay"], answer["plant_replay"]):
-        assert abs(executed["apex_error_m"]) < 0.1
-        assert isinstance(executed["landed"], bool)
-    assert "replay reaches" in answer["sentence"]
+    again = replay(task_model(task), Trajectory.read(folder / "trajectory.csv")).summary()
+    assert answer["replay"] == pytest.approx(again, abs=1e-9)
+    full = counterpart(task.model, task.payload, task.supply)
+    plan = Trajectory.read(folder / "trajectory.csv")
+    there = execute(folder.path, full, extra=SETTLE).against(full, plan).summary()
+    assert answer["plant_replay"] == pytest.approx(there, abs=1e-6)
+    allowed, found = task.tolerances, (answer["replay"], answer["plant_replay"])
+    near = abs(found[0]["apex_error_m"]) <= allowed.apex
+    near &= abs(found[1]["apex_error_m"]) <= allowed.plant_apex
+    assert near or not answer["good"]
+    assert "replay reaches" in answer["sentence"] and "plant reaches" in answer["sentence"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["jump", "max_jump", "drop", "hop", "stand"])
+def test_shipped_jumps_come_true(tmp_path: Path, name: str) -> None:
+    """As planned on the same model, upright and within 5 cm on the plant; valves exactly binary."""
+    words = ["solve", f"{name}.yaml", "--no-figure", "--json", "--out", str(tmp_path / "run")]
+    done = CliRunner().invoke(app, words)
+    answer = json.loads(done.stdout)
+    assert (done.exit_code, answer["good"]) == (0, True), answer["sentence"]
+    replay, plant = answer["replay"], answer["plant_replay"]
+    assert abs(replay["apex_error_m"]) <= 2e-3
+    assert abs(replay["touchdown_error_s"] or 0.0) <= 2e-3
+    assert replay["landed"] == plant["landed"] == (name != "max_jump")
+    assert abs(plant["apex_error_m"]) <= 0.05
+    assert answer["residuals"]["binary"] == 0.0
 
 
 def test_the_best_of_several_starts_is_kept(tmp_path: Path) -> None:

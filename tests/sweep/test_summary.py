@@ -70,6 +70,15 @@ def test_influence_names_what_costs_most() -> None:
     assert costliest({"x": {"landing": None, "apex": None}}) is None
 
 
+def test_what_costs_on_either_side_of_zero_is_found() -> None:
+    cases = [case(i, **{"start.body/pitch": f"{i - 14.5} deg"}) for i in range(30)]
+    rows = [(c, {"good": 8 <= c.index < 22, "apex_m": 0.5}) for c in cases]
+    found = influence(rows)
+    assert abs(found["ranks"]["start.body/pitch"]["landing"]["correlation"]) < 0.1
+    assert found["ranks"]["|start.body/pitch|"]["landing"]["correlation"] < -0.8
+    assert found["costs_most"] == "|start.body/pitch|"
+
+
 def test_table_and_summary_are_written(tmp_path: Path) -> None:
     asked, cases = sweep(), [case(0, height="0.4 m"), case(1, height="0.5 m")]
     folder = open_folder(tmp_path / "out", asked, Document({"name": "made-up"}))

@@ -60,7 +60,7 @@ def floor_effects(fraction: float, rng, bench_only: bool, skip=()) -> list[dict]
         ):  # small compliance = larger stiffness: the ground stays hard
             continue
         amount = fraction * rng.standard_normal()
-        if name == "hose_lag" and abs(amount) < 0.025:
+        if name in ("hose_lag", "motor_lag") and abs(amount) < 0.025:
             continue  # shorter than 0.1 ms is none, and too stiff to integrate
         out.append(hidden(name, amount if entry.signed else abs(amount)))
     return out
@@ -130,7 +130,9 @@ def robot_case(
 def _survivor(execute, name: str, seed: int, rate: float, jitter: float) -> tuple[Truth, str]:
     """Run a motion.  Where the hidden effect topples the robot, try another; else end early."""
     best: tuple[Truth, str] | None = None
-    for attempt in range(3):
+    for attempt in range(8):
+        if attempt > 2 and best[0].ticks.size >= 0.25 * rate:
+            break
         number = seed + 1000 * attempt
         truth = upright(execute(motion(name, number, rate, jitter)))
         share = truth.ticks.size / motion(name, number, rate, jitter).ticks.size

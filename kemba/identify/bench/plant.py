@@ -19,7 +19,7 @@ from kemba.model.model import Model
 LONGEST_STEP = 1.5e-3  # s; the fastest chamber answers in 8 ms
 CHUNK = 512  # steps per call of a compiled map
 # The velocity is known within v_sigma: the force is its mean over three Gauss-Hermite nodes
-V_NODES = ((-np.sqrt(3.0), 1 / 6), (np.sqrt(3.0), 1 / 6), (0.0, 2 / 3))  # sigma, weight
+V_NODES, V_MIDDLE = ((-np.sqrt(3.0), 1 / 6), (np.sqrt(3.0), 1 / 6)), 2 / 3  # sigma, weight
 BLUR = 0.75e-3  # s; no log says on which side of a switching instant its sample was taken
 
 Pulses = tuple[list[tuple[float, float]], list[tuple[float, float]]]  # of both valves
@@ -48,8 +48,11 @@ class Rig:
         self._rate = ca.Function("rate", inputs, [rate, ca.jacobian(rate, node.s)])
         force = node.outputs["piston/F"]
         results = ca.vertcat(force, ca.jacobian(force, node.v), ca.jacobian(force, node.u).T)
-        self._output = ca.Function("output", inputs, [ca.densify(results)])
-        self._step = _runge_kutta(node, rate)
+        self._functions = {
+            "step": _runge_kutta(node, rate),
+            "force": ca.Function("force", inputs, [ca.densify(force)]),
+            "output": ca.Function("output", inputs, [ca.densify(results)]),
+        }
         self._maps: dict[tuple[str, int], _Call] = {}
         self._start = np.array([q.value for q in model.states.values()])
 
@@ -82,11 +85,11 @@ class Rig:
         n = len(motion.time)
         fixed = np.repeat(p[:, None], n, axis=1)
         states = dict(zip(self._state_names, s, strict=True))
-        force = np.zeros(n)
+        out = self._mapped("output", n)(s, motion.x, motion.v, motion.a, blurred, fixed)
+        force = V_MIDDLE * out[0]
         for place, weight in V_NODES:
             v = motion.v + place * motion.v_sigma
-            out = self._mapped("output", n)(s, motion.x, v, motion.a, blurred, fixed)
-            force += weight * out[0]
+            force += weight * self._mapped("force", n)(s, motion.x, v, motion.a, blurred, fixed)[0]
         return Prediction(force, out[1], out[2:4].T, blurred.T, states)
 
     def _integrate(
@@ -121,7 +124,7 @@ class Rig:
 
     def _mapped(self, kind: str, n: int) -> _Call:
         if (kind, n) not in self._maps:
-            one = self._step if kind == "step" else self._output
+            one = self._functions[kind]
             self._maps[kind, n] = _Call(one.mapaccum(n) if kind == "step" else one.map(n))
         return self._maps[kind, n]
 

@@ -14,17 +14,27 @@ from kemba.identify.bench.motion import Motion
 from kemba.identify.bench.plant import Prediction, Rig, share
 from kemba.identify.bench.plausible import contradictions
 from kemba.identify.bench.pressure import absolute_pressure
-from kemba.identify.bench.run import PRESSURES, Run
+from kemba.identify.bench.run import FRICTION, PRESSURES, Run
+from kemba.identify.bench.surroundings import (
+    Switchings,
+    bench_port,
+    bench_surroundings,
+    switchings,
+)
 from kemba.identify.bench.switching import delayed
 from kemba.identify.candidates import by_default, effect_candidates, sensor_candidates
 from kemba.identify.checks import BadData
+from kemba.identify.laws import Port
+from kemba.identify.linear import within
 from kemba.identify.noise import Colour, learn, whiten
 from kemba.identify.problem import Array, Rows, Theta, secant_jacobian
+from kemba.identify.rank import FLOOR
+from kemba.identify.surroundings import Surroundings
 from kemba.model.model import Model
 
 EARLY = 0.08  # s that tell whether a valve had just been switched when a log begins
 REMEASURED = 0.1  # what an earlier discovery put on the model's list is known less well
-REMEASURED = 0.1  # what an earlier discovery put on the model's list is known less well
+PEAK = 99.5  # per cent of the rows below which a force counts as its largest
 JITTER = 0.02  # nominal figures are off by 1-3 %
 
 
@@ -55,6 +65,11 @@ class BenchProblem:
             self.nuisance[f"gain:{channel}"] = (1.0, JITTER)
         self.colour: dict[tuple[int, int], Colour] = {}
         self._settle_starts()
+
+    @property
+    def logs(self) -> tuple[Run, ...]:
+        """The prepared logs, in the order of `runs`."""
+        return tuple(self._runs)
 
     @cached_property
     def channels(self) -> tuple[str, ...]:
@@ -166,6 +181,18 @@ class BenchProblem:
         )
         return Rows(run_, channel, time, phase, mode, self.channels, sigma)
 
+    def surroundings(self) -> Surroundings:
+        """The piston at every row."""
+        return bench_surroundings(self)
+
+    def commands(self) -> list[Switchings]:
+        """Per run: valve -> instants and signs of its switchings."""
+        return [switchings(run) for run in self._runs]
+
+    def ports(self) -> list[Port]:
+        """Where a force may be missing: on the rod."""
+        return [bench_port(self)]
+
     def library(self, theta: Theta) -> Mapping[str, Array]:
         """Columns per unit of the coefficient, of simple terms beyond the catalogue."""
         parts: dict[str, list[Array]] = {}
@@ -180,16 +207,40 @@ class BenchProblem:
         columns = np.stack([np.concatenate(p) for p in parts.values()], axis=1)
         return dict(zip(parts, self.whiten(columns).T, strict=True))
 
+    def weight(self, theta: Theta, formula: str, coefficient: float) -> float:
+        """Largest force of a term of the library as a share of what matters in practice."""
+        peaks = []
+        for i, run in enumerate(self._runs):
+            found = dict(terms(_true_motion(run.motion, theta), self._acting(theta, i)))
+            peaks.append(np.percentile(np.abs(found[formula]), PEAK))
+        return abs(coefficient) * float(max(peaks)) / FRICTION
+
     def leftover(self, theta: Theta) -> tuple[Array, Array, Array]:
-        """Force residual over white noise (n,), what it may depend on (n, m), and run (n,)."""
+        """Force residual over its noise and over what every model leaves (n,), what it may depend
+        on (n, m), and run (n,)."""
         parts = []
         for i, run in enumerate(self._runs):
             keep = run.keep["piston/F"]
-            r = self.standardised(theta, i)["piston/F"]
+            r = self.standardised(theta, i)["piston/F"] / self._imperfect[i]
             seen = features(_true_motion(run.motion, theta), self._acting(theta, i))[keep]
             parts.append((r, seen, np.full(len(r), i)))
         residual, columns, index = (np.concatenate(p) for p in zip(*parts, strict=True))
         return residual, columns, index
+
+    @cached_property
+    def _imperfect(self) -> list[Array]:
+        """Per run: spread (n,) of the force residual, in noise units, when every effect of the
+        catalogue may be there at floor level."""
+        found = []
+        for i in range(len(self._runs)):
+            base = self.standardised({}, i)["piston/F"]
+            power = np.ones(len(base))
+            for c in self.candidates.values():
+                small = {c.key: c.lead.off + FLOOR * c.lead.size}
+                there = self.standardised(within(self, small), i)["piston/F"]
+                power += (there - base) ** 2
+            found.append(np.sqrt(power))
+        return found
 
     def _acting(self, theta: Theta, index: int) -> Array:
         """Share of each sample's neighbourhood in which the valves act (n, 2)."""
@@ -263,13 +314,12 @@ def _scaled(model: Model) -> tuple[str, ...]:
     known = {
         "chamber": ("F_extend", "F_retract", "fill[0]", "fill[1]", "vent[0]", "vent[1]"),
         "mode_damping": ("c_extend", "c_retract", "c_both", "c_none"),
+        "orifice_chamber": ("gauge", "a_fill", "a_vent", "V_e", "V_r"),
     }
     names = []
     for effect in model.effects:
         if effect.kind in known:
             names += [f"{effect.name}.{f}" for f in known[effect.kind]]
-        elif effect.kind.startswith("orifice"):
-            names += [f"{effect.name}.{f}" for f in effect.parameters()]
         elif effect.off and all(p.unit != "s" for p in effect.parameters().values()):
             names += [f"{effect.name}.{f}" for f in effect.off]
     return tuple(names)

@@ -35,16 +35,18 @@ class StateRunner:
         self._step = ca.Function("step", [s, h, q, v, u, p], [after, mean], {"cse": True})
         self._runs: dict[int, ca.Function] = {}
 
-    def run(self, h: Array, q: Array, v: Array, u: Array, p: Array) -> Array:
-        """Mean of the states (ns, N) over steps h (N,) with q, v, u (., N) held over each."""
-        count = len(h)
+    def run(self, h: ca.DM, q: ca.DM, v: ca.DM, u: ca.DM, p: Array) -> Array:
+        """Mean of the states (ns, N) over steps h (1, N) with q, v, u (., N) held over each."""
+        count = h.shape[1]
         if not len(self.start):
             return np.empty((0, count))
         if count not in self._runs:
-            self._runs[count] = self._step.mapaccum(count)
-        held = np.repeat(p[:, None], count, axis=1)
-        _, mean = self._runs[count](self.start, h[None, :], q, v, u, held)
-        return np.asarray(mean.full())
+            whole = self._step.mapaccum(count)
+            args = [ca.MX.sym(f"i{i}", *whole.size_in(i)) for i in range(5)]
+            one = ca.MX.sym("p", self._step.size1_in(5))
+            means = whole(*args, ca.repmat(one, 1, count))[1]
+            self._runs[count] = ca.Function("means", [*args, one], [means])
+        return np.asarray(self._runs[count](self.start, h, q, v, u, p).full())
 
 
 def _grown(h: ca.SX, slope: ca.SX, stiff: ca.SX) -> ca.SX:

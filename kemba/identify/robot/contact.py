@@ -21,6 +21,7 @@ Flags = np.ndarray[Any, np.dtype[np.bool_]]
 # A piston that reads half a millimetre wrong lifts the foot by three, a late encoder by nine: a
 # foot this near may touch, which costs a few milliseconds of known flight.
 MAY_TOUCH = 9.0e-3  # m
+LEVEL_SEARCH = 20e-3  # m from nought in which a foot at rest may mean the ground
 STANDS = 2.5e-3  # m above the level on which feet rest: may be standing
 TOUCHES = 1.5e-3  # m above the level on which feet rest: for naming the phase only
 NEAR_STOP = 0.6e-3  # m from the furthest reading near an end of the stroke
@@ -123,9 +124,12 @@ def slope(values: Array, dt: float) -> Array:
 
 
 def ground_level(z: Array, rate: Array) -> float:
-    """Height at which a foot rests: sensors may be off by a few millimetres."""
-    resting = z[(np.abs(z) < MAY_TOUCH) & (np.abs(rate) < 0.03)]
-    return float(np.clip(np.median(resting), -4e-3, 4e-3)) if len(resting) > 20 else 0.0
+    """Height at which a foot rests: sensors may be off by more than a centimetre."""
+    resting = z[(np.abs(z) < LEVEL_SEARCH) & (np.abs(rate) < 0.03)]
+    if len(resting) <= 20:
+        return 0.0
+    low = float(np.quantile(resting, 0.1))
+    return float(np.median(resting[resting < low + STANDS]))
 
 
 def stop_levels(x: Array, stroke: float) -> tuple[float, float]:

@@ -30,11 +30,13 @@ class System:
 
 @dataclass(frozen=True)
 class Gains:
-    """What the filter makes of a System: gains, whiteners of the innovations, predicted P."""
+    """What the filter makes of a System: gains, whiteners of the innovations, predicted P, and
+    what becomes of a predicted state in a step that corrects it."""
 
     K: Array
     whitener: Array
     P: Array
+    turn: Array
 
 
 def gains(system: System) -> Gains:
@@ -62,23 +64,22 @@ def gains(system: System) -> Gains:
         P = A @ P @ A.swapaxes(-1, -2) + (K[k] * R[k][:, None, :]) @ K[k].swapaxes(-1, -2)
         P = s.F[k] @ P @ Ft[k] + noise[k]
         P = 0.5 * (P + P.swapaxes(-1, -2))
-    return Gains(K, np.linalg.inv(L), P_all)
+    return Gains(K, np.linalg.inv(L), P_all, s.F @ (eye - K @ s.H))
 
 
 def innovations(system: System, gain: Gains, y: Array, g: Array) -> tuple[Array, Array]:
     """(predicted x (n, L, d, c), innovations (n, L, m, c)) of columns y (n, L, m, c), g."""
     s = system
-    n, runs, m, d = s.H.shape
+    n, runs, _, d = s.H.shape
     y = np.where(np.isfinite(y) & np.isfinite(s.R)[..., None], y, 0.0)
-    push = s.G @ g
+    # one step at a time only what must be: x' = F (1 - K H) x + (F K y + G g)
+    push = s.F @ (gain.K @ y) + s.G @ g
     states = np.empty((n, runs, d, y.shape[-1]))
-    errors = np.empty((n, runs, m, y.shape[-1]))
-    x = np.zeros((runs, d, y.shape[-1]))
-    for k in range(n):
-        states[k] = x
-        errors[k] = y[k] - s.H[k] @ x
-        x = s.F[k] @ (x + gain.K[k] @ errors[k]) + push[k]
-    return states, errors
+    states[0] = 0.0
+    for k in range(n - 1):
+        np.matmul(gain.turn[k], states[k], out=states[k + 1])
+        states[k + 1] += push[k]
+    return states, y - s.H @ states
 
 
 def smooth(system: System, gain: Gains, y: Array, g: Array) -> tuple[Array, Array]:

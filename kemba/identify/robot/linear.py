@@ -49,11 +49,6 @@ class Linearised:
     A: tuple[Array, Array]
     channels: Array  # (n, L, k, c) generalised force per unknown force: channels, then feet
 
-    def force(self, physics: Physics, batch: Batch, states: tuple[Array, Array], p: Array) -> Array:
-        """Force (n, L, k) that the motion needs beyond model and contact."""
-        s, u = (batch.flat(a) for a in states)
-        return batch.deep(physics.call("residual", *self.middle, s, u, p=p)[0]) - self.contact
-
     def response(self, force: Array) -> Array:
         """Acceleration (n, L, k) by which a missing force pushes."""
         return -(self.inverse @ force[..., None])[..., 0]

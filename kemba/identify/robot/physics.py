@@ -13,6 +13,7 @@ from kemba.identify.robot.tolerance import mass_regressors, with_tolerances
 from kemba.model.model import Model
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
+Flags = np.ndarray[Any, np.dtype[np.bool_]]
 
 
 class Physics:
@@ -70,13 +71,27 @@ class Physics:
         self.masses, made["masses"] = mass_regressors(self.base)
         return made
 
-    def call(self, name: str, *args: Array, p: Array | None = None) -> list[Array]:
-        """Function `name` over samples (N, .): arrays (N, rows) or (N, rows, columns)."""
-        function, count = self.functions[name], len(args[0])
+    @cached_property
+    def straight(self) -> tuple[Flags, Flags]:
+        """Parameters (k,) in which the force at given effect states is linear, and pairs (k, k)
+        of parameters that multiply each other."""
+        r = ca.substitute(self.node.dynamics, self.node.lam, 0 * self.node.lam)
+        slopes = ca.jacobian(r, self.p)
+        rows, _, count = *slopes.shape, self.p.numel()
+        second = ca.jacobian_sparsity(ca.vec(ca.densify(slopes)), self.p)
+        bends = np.zeros((count, count), bool)
+        for row, column in zip(*second.get_triplet(), strict=True):
+            bends[row // rows, column] = True
+        return ~(np.diag(bends) | self.moves), bends
+
+    def call(self, name: str, *args: Array | ca.DM, p: Array | None = None) -> list[Array]:
+        """Function `name` over samples (N, .), or (., N) as `prepared` makes them: arrays
+        (N, rows) or (N, rows, columns)."""
+        given = [a if isinstance(a, ca.DM) else prepared(a) for a in args]
+        function, count = self.functions[name], given[0].shape[1]
         if (name, count) not in self._maps:
             fixed = [len(args)] if p is not None else []
             self._maps[name, count] = function.map(f"{name}_map", "serial", count, fixed, [])
-        given = [ca.DM(np.ascontiguousarray(a.T)) for a in args]
         answers = self._maps[name, count].call(given + ([ca.DM(p)] if p is not None else []))
         blocks = []
         for i, answer in enumerate(answers):
@@ -108,3 +123,8 @@ class Physics:
         for i, leg in enumerate(self.legs):
             rows[f"{leg}/valve/extend"], rows[f"{leg}/valve/retract"] = valves[2 * i : 2 * i + 2]
         return np.stack([rows[name] for name in self.inputs])
+
+
+def prepared(samples: Array) -> ca.DM:
+    """Samples (N, .) as the functions take them."""
+    return ca.DM(np.ascontiguousarray(samples.T))

@@ -6,8 +6,10 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from kemba.errors import KembaError
+from kemba.identify.problem import Array, Flags, Rows
 
 if TYPE_CHECKING:
     from kemba.identify.robot.problem import RobotProblem
@@ -17,12 +19,14 @@ DEEP, OFTEN = (
     0.03,
 )  # m below the ground, in this share of the rows: no sensor fault is so large
 ABSURD = 15.0  # one-step errors in units of noise, rms, that no missing effect makes
+FAULTY = 4.0  # sizes that a sensor's fault may have and still be one
 
 
 def contradictions(problem: RobotProblem) -> Iterator[KembaError]:
     """What cannot be, run by run."""
     legs = problem.physics.legs
     rows, r = problem.rows(), problem.residual({})
+    forgiven: Array | None = None
     for i, track in enumerate(problem.batch.tracks):
         n = len(track.time)
         sunk = False
@@ -41,11 +45,10 @@ def contradictions(problem: RobotProblem) -> Iterator[KembaError]:
                     f"is a sign of body/pitch or {leg}/hip/q turned, or are columns swapped?",
                 )
         own = rows.run == i
-        power = {
-            c: float(np.sqrt(np.mean(r[own & (rows.channel == k)] ** 2)))
-            for k, c in enumerate(problem.physics.channels)
-            if (own & (rows.channel == k)).any()
-        }
+        power = _power(problem, r, rows, own)
+        if max(power.values(), default=0.0) > ABSURD:
+            forgiven = _forgiven(problem, r) if forgiven is None else forgiven
+            power = _power(problem, forgiven, rows, own)
         worst = max(power, key=power.__getitem__, default="")
         if worst and power[worst] > ABSURD and not sunk:
             yield KembaError(
@@ -54,3 +57,25 @@ def contradictions(problem: RobotProblem) -> Iterator[KembaError]:
                 "motion that follows from the commands was expected",
                 "are columns swapped, a sign turned, or clocks apart?",
             )
+
+
+def _power(problem: RobotProblem, r: Array, rows: Rows, own: Flags) -> dict[str, float]:
+    """Root mean square of the residual by channel."""
+    found = {}
+    for k, channel in enumerate(problem.physics.channels):
+        at = own & (rows.channel == k)
+        if at.any():
+            found[channel] = float(np.sqrt(np.mean(r[at] ** 2)))
+    return found
+
+
+def _forgiven(problem: RobotProblem, r: Array) -> Array:
+    """The residual less what faults of sensors can explain: these are to be found, not refused."""
+    faults = [c for c in problem.candidates.values() if c.sensor]
+    jacobian = problem.jacobian({}, [c.key for c in faults])
+    jacobian *= [c.lead.size for c in faults]
+    gram = jacobian.T @ jacobian + 1e-9 * np.eye(len(faults))
+    lower = np.linalg.cholesky(gram)
+    wanted = np.linalg.solve(lower, -jacobian.T @ r)
+    found = lsq_linear(lower.T, wanted, bounds=(-FAULTY, FAULTY))
+    return np.asarray(r + jacobian @ found.x)

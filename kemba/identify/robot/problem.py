@@ -15,25 +15,30 @@ import numpy as np
 
 from kemba.identify.candidates import sensor_candidates
 from kemba.identify.checks import BadData
+from kemba.identify.laws import Port
 from kemba.identify.problem import Candidate, Parameter, Rows, Theta, parameter_steps
 from kemba.identify.robot.batch import Batch
 from kemba.identify.robot.contact import loaded
+from kemba.identify.robot.drive import air_states, drives
 from kemba.identify.robot.expected import expected_power, predicted_error
 from kemba.identify.robot.filter import gains, innovations
+from kemba.identify.robot.forces import Forces
 from kemba.identify.robot.labels import describe
+from kemba.identify.robot.library import library
 from kemba.identify.robot.linear import Linearised, linearise, smoothed
 from kemba.identify.robot.physics import Physics
 from kemba.identify.robot.plausible import contradictions
+from kemba.identify.robot.ports import robot_ports
 from kemba.identify.robot.reference import (
     LOOSE,
     Floor,
     Reference,
-    air_states,
     densities,
     first_reference,
     schedules,
 )
 from kemba.identify.robot.sensing import sensed
+from kemba.identify.robot.surroundings import changes, robot_surroundings
 from kemba.identify.robot.suspects import (
     DELAYS,
     GRIP,
@@ -46,12 +51,12 @@ from kemba.identify.robot.suspects import (
 )
 from kemba.identify.robot.tolerance import SHARE
 from kemba.identify.robot.track import read_track
+from kemba.identify.surroundings import Surroundings
 from kemba.model.model import Model
 from kemba.trajectory import Trajectory
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
-SIDES = ("extend", "retract")
 ROUNDS = 2
 LEAD_IN = 4  # nodes whose innovations only tell where the run starts
 
@@ -93,7 +98,6 @@ class RobotProblem:
     def relinearise(self, base: Theta) -> None:
         """Smooth and linearise anew with the model at `base`."""
         self.base = dict(base)
-        self._kept: tuple[Any, Any] = (None, None)
         self._linear: dict[str, tuple[Array, float]] = {}
         physics, batch = self.physics, self.batch
         ref = first_reference(physics, batch)
@@ -101,10 +105,14 @@ class RobotProblem:
         dt = float(np.median(batch.h[batch.valid]))
         for _ in range(ROUNDS):
             point = self._linearise(ref, densities(physics, batch, self.plan, LOOSE))
-            ref = smoothed(point, self._measurement(point, base), self._push(point, base))
+            forces = Forces(physics, batch, point)
+            ref = smoothed(point, self._measurement(point, base), self._push(point, base, forces))
+            if any(name.startswith("sensor") for name in base):
+                self.plan = schedules(physics, batch, ref)  # as true sensors would have seen it
             normal = [point.normal[: len(s.phase), i] for i, s in enumerate(self.plan)]
             self.plan = [loaded(s, f, dt) for s, f in zip(self.plan, normal, strict=True)]
         self.point = self._linearise(ref, densities(physics, batch, self.plan, self.floor))
+        self._forces = Forces(physics, batch, self.point)
         masses = zip(physics.masses, np.moveaxis(self.point.masses, -1, 0), strict=True)
         self._linear = {name: (column, 0.0) for name, column in masses}
         self._linear[GRIP] = (self.point.less_grip, 1.0)
@@ -114,7 +122,8 @@ class RobotProblem:
 
     def _linearise(self, ref: Reference, density: Array) -> Linearised:
         p, delays = self._values(self.base)
-        states = air_states(self.physics, self.batch, ref, p, delays)
+        driven = drives(self.physics, self.batch, ref, delays)
+        states = air_states(self.physics, self.batch, driven, p)
         return linearise(self.physics, self.batch, self.plan, ref, density, states, p)
 
     def _values(self, theta: Theta) -> tuple[Array, Array]:
@@ -125,18 +134,9 @@ class RobotProblem:
         own = [self.physics.base.timing(leg) for leg in self.physics.legs for _ in range(2)]
         return p, np.array([(a + both, b + both + off) for a, b in own])
 
-    def _states(self, point: Linearised, p: Array, delays: Array) -> tuple[Array, Array]:
-        """Effect states and inputs, kept for as long as nothing that moves them changes."""
-        key = (id(point), p[self.physics.moves].tobytes(), delays.tobytes())
-        if self._kept[0] != key:
-            self._kept = (key, air_states(self.physics, self.batch, point.ref, p, delays))
-        states: tuple[Array, Array] = self._kept[1]
-        return states
-
-    def _push(self, point: Linearised, theta: Theta) -> Array:
+    def _push(self, point: Linearised, theta: Theta, forces: Forces | None = None) -> Array:
         """Acceleration (n, L, k) that the model at theta adds to the reference's."""
-        p, delays = self._values(theta)
-        force = point.force(self.physics, self.batch, self._states(point, p, delays), p)
+        force = (forces or self._forces).at(*self._values(theta))
         for name, (column, nominal) in self._linear.items():
             if name in theta:
                 force = force + (theta[name] - nominal) * column
@@ -197,14 +197,16 @@ class RobotProblem:
             name in self.physics.names and (lead or name in self.nuisance)
         )
 
+    def is_straight(self, name: str) -> bool:
+        """Whether residuals are linear in it: effects without memory, bias and scale of sensors."""
+        return self._is_direct(name) or name.startswith(("sensor_bias:", "sensor_scale:"))
+
     def _direct(self, theta: Theta, names: Sequence[str]) -> dict[str, Array]:
         """Columns (n, L, m) of parameters in which the force is linear."""
         if not names:
             return {}
         typical = {k: v.typical for k, v in self._parameters().items() if np.isfinite(v.typical)}
-        p, delays = self._values({**typical, **theta})
-        s, u = (self.batch.flat(a) for a in self._states(self.point, p, delays))
-        slopes = self.physics.call("by_parameter", *self.point.middle, s, u, p=p)[0]
+        slopes = self._forces.slopes(*self._values({**typical, **theta}))
         place = {n: i for i, n in enumerate(self.physics.names)}
         forces = [
             self._linear[n][0] if n in self._linear else self.batch.deep(slopes[:, :, place[n]])
@@ -245,12 +247,16 @@ class RobotProblem:
         return self._measurement(self.point, theta), self._push(self.point, theta)
 
     def commands(self) -> list[dict[str, tuple[Array, Array]]]:
-        """Per run: name -> times and sizes of what was switched."""
-        sides = [f"{leg}/valve/{side}" for leg in self.physics.legs for side in SIDES]
-        return [
-            {n: (times, change) for n, (times, change, _) in zip(sides, t.switches, strict=True)}
-            for t in self.batch.tracks
-        ]
+        """Per run: command -> times and sizes of its changes."""
+        return [changes(track, self.physics.legs) for track in self.batch.tracks]
+
+    def surroundings(self) -> Surroundings:
+        """The piston of each row's leg."""
+        return robot_surroundings(self)
+
+    def ports(self) -> list[Port]:
+        """Where a force may be missing: on rods, hips and the body."""
+        return robot_ports(self)
 
     def plausible(self) -> list[str]:
         """Raise BadData where a log contradicts itself or any model; no remarks."""
@@ -260,8 +266,8 @@ class RobotProblem:
         return []
 
     def library(self, theta: Theta) -> Mapping[str, Array]:
-        """Terms beyond the catalogue: none yet for robots."""
-        return {}
+        """Columns per unit of the coefficient, of simple terms beyond the catalogue."""
+        return library(self)
 
 
 def robot_problem(

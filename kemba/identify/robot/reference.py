@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from kemba.identify.robot.air import SETTLING, substeps
 from kemba.identify.robot.batch import Batch
 from kemba.identify.robot.contact import Schedule, read_schedule
 from kemba.identify.robot.filter import System, gains, smooth
@@ -140,35 +139,3 @@ def _edges(flags: np.ndarray[Any, Any]) -> Array:
     for shift in range(1, 8):
         wide[shift:] |= change[:-shift]
     return np.where(wide, IMPACT, 0.0)
-
-
-def air_states(
-    physics: Physics, batch: Batch, ref: Reference, p: Array, delays: Array
-) -> tuple[Array, Array]:
-    """Effect states (n, L, ns) and inputs (n, L, nu), both the mean over each step."""
-    states: list[Array] = []
-    inputs: list[Array] = []
-    for i, track in enumerate(batch.tracks):
-        n = len(track.time)
-        times, valves, index = substeps(track, delays)
-        h = np.diff(times)
-        middle = 0.5 * (times[1:] + times[:-1])
-        q, v = (_at(track.time, a[:n, i], middle) for a in (ref.q, ref.v))
-        held = np.clip(np.searchsorted(track.time, middle, side="right") - 1, 0, n - 1)
-        u = physics.arrange(track.torque[held].T, valves)
-        k = len(SETTLING)
-        lead = [np.repeat(a[:, :1], k, axis=1) for a in (q, 0 * v, u)]
-        q, v, led = (np.hstack(pair) for pair in zip(lead, (q, v, u), strict=True))
-        s = physics.states.run(np.append(SETTLING, h), q, v, led, p[physics.moves])[:, k:]
-        width = np.append(np.diff(track.time), 1.0)
-        for values, store in ((s, states), (u, inputs)):
-            sums = np.add.reduceat(np.append(values * h, 0 * values[:, :1], axis=1), index, axis=1)
-            store.append(np.vstack([(sums / width).T[:-1], values[:, -1:].T]))
-    return batch.pad(states, 0.0), batch.pad(inputs, 0.0)
-
-
-def _at(time: Array, values: Array, times: Array) -> Array:
-    """Linear interpolation of (n, k) at times: (k, m)."""
-    right = np.clip(np.searchsorted(time, times), 1, len(time) - 1)
-    share = ((times - time[right - 1]) / (time[right] - time[right - 1]))[:, None]
-    return np.asarray((values[right - 1] + share * (values[right] - values[right - 1])).T)

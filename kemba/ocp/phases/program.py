@@ -13,73 +13,30 @@ from kemba.model import Model
 from kemba.ocp.blocks import Block, BlockProblem
 from kemba.ocp.layout import Layout
 from kemba.ocp.mirror import Reduction
+from kemba.ocp.phases.columns import Columns
 from kemba.ocp.phases.constraints import Constraint
 from kemba.ocp.phases.modes import OPEN, Phase
-from kemba.ocp.phases.radau import STATE, Scheme, element, impact, width
+from kemba.ocp.phases.radau import STATE, Scheme, element, impact
 from kemba.ocp.task import Task
 
 INF = np.inf
 SLACK = 0.01  # of a state's range: a vented chamber stays exactly at its bound
-SHORT, LONG = 0.03, 2.5  # times the nominal step: bounds of an element
+SHORT, LONG = 0.03, 3.0  # times the nominal step: bounds of an element
+LEEWAY = 1e-4  # of slack at the start, scaled
+Where = list[tuple[int, np.ndarray]]  # phases and the columns of z there
 
 
-class Columns:
-    """Where everything stands in the vector: indices by group, for nodes, stages and phases."""
+@dataclass(frozen=True)
+class Soft:
+    """One rule of a mode that may give way: which constraint it is about, what it asks, in which
+    phases it holds (repeats,), and how far it gives way: `above` and `below` its bounds, columns
+    (repeats,) or None."""
 
-    def __init__(
-        self, layout: Layout, phases: Sequence[Phase], impacts: Sequence[int], stages: int
-    ) -> None:
-        self.size = 0
-        elements = phases[-1].last
-        binary = [c - layout.slices["u"].start for c in layout.binary]
-        n = {group: width(layout, group) for group in layout.slices}
-        self.first = {g: self._new(n[g]) for g in STATE}
-        stage_groups = (*STATE, "lam")
-        self.stages = [
-            [{g: self._new(n[g]) for g in stage_groups} for _ in range(stages)]
-            for _ in range(elements)
-        ]
-        smooth = [i for i in range(n["u"]) if i not in binary]
-        self.u = np.empty((elements, n["u"]), dtype=int)
-        self.h = np.empty((len(phases), 1), dtype=int)
-        for p, phase in enumerate(phases):
-            self.u[phase.first : phase.last, binary] = self._new(len(binary))
-            self.h[p] = self._new(1)
-        for e in range(elements):
-            self.u[e, smooth] = self._new(len(smooth))
-        self.after = {p: self._new(n["v"]) for p in impacts}
-        self.impulse = {p: self._new(n["lam"]) for p in impacts}
-        self.phase_of = [p for p, phase in enumerate(phases) for _ in range(phase.elements)]
-        self.starts = {phase.first: p for p, phase in enumerate(phases)}
-
-    def _new(self, count: int) -> np.ndarray:
-        self.size += count
-        return np.arange(self.size - count, self.size)
-
-    def nodes(self) -> np.ndarray:
-        """The node that every column belongs to (size,); 0 for what phases share."""
-        found = np.zeros(self.size, dtype=int)
-        for e, stages in enumerate(self.stages):
-            for stage in stages:
-                for index in stage.values():
-                    found[index] = e + 1
-        return found
-
-    def end(self, node: int) -> dict[str, np.ndarray]:
-        """q, v, s at a node, before its impact."""
-        return self.first if node == 0 else self.stages[node - 1][-1]
-
-    def begin(self, e: int) -> dict[str, np.ndarray]:
-        """q, v, s at the start of element e, after an impact."""
-        before, p = self.end(e), self.starts.get(e, -1)
-        return {**before, "v": self.after[p]} if p in self.after else before
-
-    def element(self, e: int) -> np.ndarray:
-        """Columns of an element's z."""
-        start = self.begin(e)
-        parts = [start[g] for g in STATE]
-        parts += [stage[g] for stage in self.stages[e] for g in (*STATE, "lam")]
-        return np.concatenate([*parts, self.u[e], self.h[self.phase_of[e]]])
+    constraint: int
+    kind: str
+    phases: np.ndarray
+    above: np.ndarray | None
+    below: np.ndarray | None
 
 
 @dataclass(frozen=True)
@@ -93,6 +50,7 @@ class Part:
     lower: float
     upper: float
     columns: np.ndarray
+    soft: Soft | None = None
 
 
 @dataclass(frozen=True)
@@ -107,7 +65,11 @@ class Row:
 
 class Program:
     """The program of a phase sequence; `lower`, `upper`, `g_lower`, `g_upper` and `problem` as a
-    Transcription has them."""
+    Transcription has them.
+
+    `elastic`: 0 where modes hold exactly, else the price of every rule of a mode giving way by
+    its scale.
+    """
 
     def __init__(
         self,
@@ -117,15 +79,15 @@ class Program:
         phases: Sequence[Phase],
         constraints: Sequence[Constraint],
         scheme: Scheme,
+        elastic: float = 0.0,
     ) -> None:
-        self.scheme = scheme
+        self.scheme, self.elastic = scheme, elastic
         self.model, self.task, self.reduction = model, task, reduction
         self.phases, self.constraints = list(phases), list(constraints)
         self.nodes = phases[-1].last
         self.layout = Layout(model, reduction, task.duration / self.nodes, task.step_variation)
         self.impacts = [p for p in range(1, len(phases)) if self._closes(p)]
         self.columns = Columns(self.layout, phases, self.impacts, scheme.stages)
-        self.shape = (self.columns.size,)
         self.lower, self.upper = self._bounds()
         self.element = element(model, self.layout, reduction, task.cost, scheme)
         self.jump = impact(model, self.layout, reduction)
@@ -194,6 +156,64 @@ class Program:
             part = Part((label,), z, ca.SX(g), ca.SX(0), low, high, np.array(columns))
             self.rules.append(part)
 
+    def mode_rule(
+        self, i: int, kind: str, z: ca.SX, g: ca.SX, low: float, high: float, where: Where
+    ) -> None:
+        """Add what a mode of constraint i asks; it gives way for a price in an elastic program."""
+        label, columns = f"{self.constraints[i].label} {kind}", [at for _, at in where]
+        if not self.elastic or not columns:
+            self.rule(label, z, g, low, high, columns)
+            return
+        slack = ca.SX.sym("slack", int(high < INF) + int(low > -INF))
+        own = self.columns.more(len(columns), slack.numel())
+        self.lower = np.concatenate([self.lower, np.zeros(own.size)])
+        self.upper = np.concatenate([self.upper, np.full(own.size, INF)])
+        above, below = (
+            own[:, j] if used else None for j, used in ((0, high < INF), (-1, low > -INF))
+        )
+        g = g - slack[0] * float(high < INF) + slack[-1] * float(low > -INF)
+        soft = Soft(i, kind, np.array([p for p, _ in where]), above, below)
+        at, price = np.hstack([np.array(columns), own]), self.elastic * ca.sum1(slack)
+        self.rules.append(Part((label,), ca.vertcat(z, slack), g, price, low, high, at, soft))
+
+    def anchor(self, x: np.ndarray, weight: float) -> np.ndarray:
+        """Draw states, inputs and durations to where they are in x (size,), by weight / 2 times
+        the square of the scaled distance; x with the anchors behind it."""
+        c = self.columns
+        stages = [stage for element in c.stages for stage in element]
+        drawn = [at[g] for at in (c.first, *stages) for g in STATE]
+        index = np.concatenate([*drawn, np.unique(c.u), c.h.ravel()])
+        index = index[self.lower[index] < self.upper[index]]
+        fixed = c.more(len(index), 1)
+        self.lower = np.concatenate([self.lower, x[index]])
+        self.upper = np.concatenate([self.upper, x[index]])
+        z, nothing = ca.SX.sym("z", 2), ca.SX(0, 1)
+        pull, at = weight / 2 * (z[0] - z[1]) ** 2, np.column_stack([index, fixed])
+        self.rules.append(Part((), z, nothing, pull, 0.0, 0.0, at))
+        return np.concatenate([x, x[index]])
+
+    @property
+    def soft(self) -> list[Soft]:
+        """The rules that may give way."""
+        return [part.soft for part in self.rules if part.soft is not None]
+
+    def loosened(self, x: np.ndarray) -> np.ndarray:
+        """The same with every rule giving way as far as it must, and a little more."""
+        x, row = x.copy(), 0
+        g = np.array(self.problem.g(x, [])).ravel()
+        for part in self._parts:
+            values = g[row : row + len(part.columns) * len(part.labels)]
+            row += len(values)
+            if part.soft is None:
+                continue
+            for way, over in (
+                (part.soft.above, values - part.upper),
+                (part.soft.below, part.lower - values),
+            ):
+                if way is not None:
+                    x[way] = np.maximum(over, 0.0) + LEEWAY
+        return x
+
     @cached_property
     def problem(self) -> BlockProblem:
         """The functions for IPOPT."""
@@ -226,10 +246,10 @@ class Program:
             for label in part.labels
         ]
 
-    @property
+    @cached_property
     def g_lower(self) -> np.ndarray:
         return np.array([row.lower for row in self.rows])
 
-    @property
+    @cached_property
     def g_upper(self) -> np.ndarray:
         return np.array([row.upper for row in self.rows])

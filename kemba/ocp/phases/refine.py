@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
 from kemba.model import Model
 from kemba.ocp.certify import Certificate
-from kemba.ocp.ipopt import COMMON, SOLVED
+from kemba.ocp.ipopt import SOLVED, Watch
 from kemba.ocp.mirror import Reduction, find_symmetry, whole, wishes_are_symmetric
 from kemba.ocp.phases.constraints import read_constraints
 from kemba.ocp.phases.independent import Independent
 from kemba.ocp.phases.modes import Phase, read_phases
 from kemba.ocp.phases.program import Program
 from kemba.ocp.phases.radau import RADAU3, RADAU5, STATE, Scheme
+from kemba.ocp.phases.repair import FITS, misfit, repaired, simplified
 from kemba.ocp.phases.rules import add_rules
 from kemba.ocp.phases.sample import certificate, to_trajectory
+from kemba.ocp.phases.solve import GAVE_UP, STOPPED, Control, Found, solve
 from kemba.ocp.phases.start import carried, start_vector
 from kemba.ocp.phases.wishes import add_wishes
 from kemba.ocp.result import arrays
@@ -29,13 +29,18 @@ from kemba.ocp.task import Task
 from kemba.ocp.wishes import Wish
 from kemba.trajectory import Trajectory
 
+STOPS = (STOPPED, "Maximum_WallTime_Exceeded")
 MIRRORED = 1e-6  # scaled; a plan that differs less from its mirror image is solved by half
-# one scheme after the other: the coarser one finds the way, the finer one makes it exact
-STEPS: tuple[tuple[Scheme, dict[str, Any]], ...] = (
-    (RADAU3, {"mu_init": 1e-2, "bound_push": 1e-4, "bound_frac": 1e-4, "max_iter": 100}),
-    (RADAU5, {"mu_init": 1e-3, "bound_push": 1e-6, "bound_frac": 1e-6, "max_iter": 100}),
-)
-EXACT = {"tol": 1e-4, "constr_viol_tol": 1e-8, "acceptable_iter": 0}
+PRICE = 30.0  # of a rule giving way by its scale
+# weights of staying near the start: without, short steps of free duration wander off
+NEAR, NEAR_ELASTIC, NEAR_FINE = 10.0, 1.0, 0.1
+ROUNDS = 4  # repairs of one reading
+ITERATIONS = {True: 300, False: 450}  # of all solves together, of half a robot and of a whole one
+WARM: dict[str, Any] = {"mu_init": 1e-4, "bound_push": 1e-6, "bound_frac": 1e-6}
+# the coarser scheme finds the way and which modes fit, the finer one makes it exact
+ROUGH = {**WARM, "max_iter": 60, "tol": 1e-3, "constr_viol_tol": 1e-6}
+ELASTIC = {**ROUGH, "max_iter": 100}
+FINE = {**WARM, "max_iter": 60}
 
 
 @dataclass(frozen=True)
@@ -56,6 +61,11 @@ class Refined:
         """Whether the finest scheme converged."""
         return self.trajectory is not None
 
+    @property
+    def stopped(self) -> bool:
+        """Whether the user ended it."""
+        return self.message == STOPPED
+
 
 def refine(
     model: Model,
@@ -65,51 +75,148 @@ def refine(
     reduction: Reduction | None = None,
     deadline: float = np.inf,
     log: Path | None = None,
+    watch: Watch | None = None,
+    stop: Callable[[], bool] | None = None,
 ) -> Refined:
     """The plan with its modes kept, phase durations free, and events where they happen.
 
     `reduction`: half or whole robot; by default the half where plan and task allow it. `deadline`
-    is in time.monotonic(). `log` collects IPOPT's text.
+    is in time.monotonic(). `log` collects IPOPT's text. `watch` hears every iteration, `stop` is
+    asked whether to end: the message then is IPOPT's for a user's stop.
     """
     reduction = reduction or reduction_of(model, task, wishes, plan)
-    iterations = 0
-    for trim in (False, True):
-        try:
-            found = _steps(model, task, wishes, plan, reduction, trim, deadline, log)
-        except ValueError as error:
-            return Refined(None, None, f"the model {error}", 0)
-        iterations += found.iterations
-        if found.solved:
-            break
-    return replace(found, iterations=iterations)
+    refiner = Refiner(model, task, wishes, plan, reduction, Control(deadline, log, watch, stop))
+    try:
+        return refiner.run()
+    except ValueError as error:
+        return Refined(None, None, f"the model {error}", 0)
 
 
-def _steps(
-    model: Model,
-    task: Task,
-    wishes: Sequence[Wish],
-    plan: Trajectory,
-    reduction: Reduction,
-    trim: bool,
-    deadline: float,
-    log: Path | None,
-) -> Refined:
-    """One reading of the modes, one scheme after the other."""
-    iterations, message, x = 0, "", None
-    program: Program | None = None
-    for scheme, options in STEPS:
-        finer, start = build(model, task, wishes, plan, reduction, scheme, trim)
-        if program is not None and x is not None:
-            start = carried(finer, program, x)
-        program = finer
-        x, message, count = _solve(program, start, options, deadline, log)
-        iterations += count
-        if message not in SOLVED:
-            return Refined(None, None, message, iterations, tuple(program.phases))
-    assert program is not None and x is not None
-    trajectory = to_trajectory(program, x)
-    found = certificate(program, x, trajectory)
-    return Refined(trajectory, found, message, iterations, tuple(program.phases))
+@dataclass
+class Refiner:
+    """Readings of a plan's modes, each repaired where it does not fit, until one solves."""
+
+    model: Model
+    task: Task
+    wishes: Sequence[Wish]
+    plan: Trajectory
+    reduction: Reduction
+    control: Control
+    iterations: int = 0
+
+    @property
+    def marks(self) -> list[int]:
+        """Nodes at which the task asks for something: phases end there."""
+        return [w.node(len(self.plan) - 1) for w in self.wishes if w.at is not None]
+
+    @property
+    def left(self) -> int:
+        """Iterations that may still be spent."""
+        return ITERATIONS[self.reduction.symmetric] - self.iterations
+
+    def run(self) -> Refined:
+        """The first reading that solves, else how the last one ended."""
+        constraints = read_constraints(self.model, self.reduction)
+        inputs = self.reduction.restrict("u", arrays(self.model, self.plan)["u"])
+        valves = np.round(inputs[:, _binary(self.model, self.reduction)])
+        seen: list[list[Phase]] = []
+        found = Refined(None, None, GAVE_UP, 0)
+        for trim in (False, True):
+            phases = read_phases(self.model, constraints, self.plan, valves, self.marks, trim)
+            start = self.plan
+            for _ in range(ROUNDS):
+                if phases in seen or self.left <= 0:
+                    break
+                seen.append(phases)
+                found = self.exact(phases, start)
+                if found.solved or found.message in STOPS:
+                    return found
+                program, rough = self.rough(phases, start)
+                if rough.message in STOPS:
+                    return self._ended(program, rough.message)
+                if misfit(program, rough.x).max(initial=0.0) <= FITS:
+                    found = self.finish(program, rough.x)
+                    if found.solved or found.message in STOPS:
+                        return found
+                better = repaired(program, rough.x, self.marks)
+                if better is None:
+                    break
+                phases, start = better, to_trajectory(program, rough.x)
+        return found
+
+    def exact(self, phases: Sequence[Phase], start: Trajectory) -> Refined:
+        """The nearest solution on some phases by the coarser scheme, then the best by both."""
+        program, x = self.build(phases, start, RADAU3)
+        found = self._solve(program, program.anchor(x, NEAR), ROUGH)
+        if found.message not in SOLVED:
+            return self._ended(program, found.message)
+        return self.simpler(program, found.x) or self.finish(program, found.x)
+
+    def simpler(self, program: Program, x: np.ndarray) -> Refined | None:
+        """The solution without the phases that collapsed in x; None where it has none."""
+        phases = simplified(program, x, self.marks)
+        if phases is None or self.left <= 0:
+            return None
+        found = self.exact(phases, to_trajectory(program, x))
+        return found if found.solved or found.message in STOPS else None
+
+    def finish(self, near: Program, x: np.ndarray) -> Refined:
+        """From the nearest solution x by the coarser scheme to a good one, to an exact one."""
+        program, start = self.build(near.phases, self.plan, RADAU3)
+        best = self._solve(program, x[: len(start)], ROUGH)
+        found = self._ended(program, best.message)
+        if best.message in SOLVED:
+            simpler = self.simpler(program, best.x)
+            if simpler is not None:
+                return simpler
+        for way in [best.x] * (best.message in SOLVED) + [x] * (best.message not in STOPS):
+            found = self.fine(program, way)
+            if found.solved or found.message in STOPS:
+                break
+        return found
+
+    def rough(self, phases: Sequence[Phase], start: Trajectory) -> tuple[Program, Found]:
+        """The elastic program of the coarser scheme, solved."""
+        program, x = self.build(phases, start, RADAU3, PRICE)
+        x = program.loosened(program.anchor(x, NEAR_ELASTIC))
+        return program, self._solve(program, x, ELASTIC)
+
+    def fine(self, rough: Program, x: np.ndarray) -> Refined:
+        """The exact program of the finer scheme, from a solution x of the coarser one."""
+        program, _ = self.build(rough.phases, self.plan, RADAU5)
+        start = program.anchor(carried(program, rough, x), NEAR_FINE)
+        found = self._solve(program, start, FINE)
+        if found.message not in SOLVED:
+            return self._ended(program, found.message)
+        trajectory = to_trajectory(program, found.x)
+        measured = certificate(program, found.x, trajectory)
+        phases = tuple(program.phases)
+        return Refined(trajectory, measured, found.message, self.iterations, phases)
+
+    def build(
+        self, phases: Sequence[Phase], start: Trajectory, scheme: Scheme, elastic: float = 0.0
+    ) -> tuple[Program, np.ndarray]:
+        """The program of some phases and its start. Raises ValueError for other models."""
+        constraints = read_constraints(self.model, self.reduction)
+        program = Program(
+            self.model, self.task, self.reduction, phases, constraints, scheme, elastic
+        )
+        x = start_vector(program, start)
+        first, end = program.columns.first, program.columns.end(program.nodes)
+        at_first = Independent({g: x[first[g]] for g in STATE})
+        add_wishes(program, self.wishes, at_first, Independent({g: x[end[g]] for g in STATE}))
+        add_rules(program, at_first)
+        x = np.concatenate([x, np.zeros(program.columns.size - len(x))])
+        return program, np.clip(x, program.lower, program.upper)
+
+    def _solve(self, program: Program, start: np.ndarray, options: dict[str, Any]) -> Found:
+        options = {**options, "max_iter": max(0, min(options["max_iter"], self.left))}
+        found = solve(program, start, options, self.control)
+        self.iterations += found.iterations
+        return found
+
+    def _ended(self, program: Program, message: str) -> Refined:
+        return Refined(None, None, message, self.iterations, tuple(program.phases))
 
 
 def reduction_of(model: Model, task: Task, wishes: Sequence[Wish], plan: Trajectory) -> Reduction:
@@ -125,71 +232,7 @@ def reduction_of(model: Model, task: Task, wishes: Sequence[Wish], plan: Traject
     return half
 
 
-def build(
-    model: Model,
-    task: Task,
-    wishes: Sequence[Wish],
-    plan: Trajectory,
-    reduction: Reduction,
-    scheme: Scheme,
-    trim: bool = False,
-) -> tuple[Program, np.ndarray]:
-    """The program of a plan's phases and its start. Raises ValueError for other models."""
-    constraints = read_constraints(model, reduction)
-    inputs = reduction.restrict("u", arrays(model, plan)["u"])
-    valves = np.round(inputs[:, _binary(model, reduction)])
-    last = len(plan) - 1
-    marks = [wish.node(last) for wish in wishes if wish.at is not None]
-    phases = read_phases(model, constraints, plan, valves, marks, trim)
-    program = Program(model, task, reduction, phases, constraints, scheme)
-    x = start_vector(program, plan)
-    first, end = program.columns.first, program.columns.end(last)
-    at_first = Independent({g: x[first[g]] for g in STATE})
-    add_wishes(program, wishes, at_first, Independent({g: x[end[g]] for g in STATE}))
-    add_rules(program, at_first)
-    return program, np.clip(x, program.lower, program.upper)
-
-
 def _binary(model: Model, reduction: Reduction) -> list[int]:
     places = [i for i, q in enumerate(model.inputs.values()) if q.binary]
     B = reduction.B["u"]
     return [j for j in range(B.shape[1]) if B[places, j].any()]
-
-
-def _solve(
-    program: Program,
-    start: np.ndarray,
-    options: dict[str, Any],
-    deadline: float,
-    log: Path | None,
-) -> tuple[np.ndarray, str, int]:
-    remaining = deadline - time.monotonic()
-    if remaining <= 0:
-        return start, "Maximum_WallTime_Exceeded", 0
-    own = {**COMMON, **program.task.solver.options, **EXACT, **options}
-    if np.isfinite(remaining):
-        own["max_wall_time"] = remaining
-    if log is not None:
-        own |= {"output_file": str(log), "file_print_level": 5, "file_append": "yes"}
-    problem = program.problem
-    plugin = {
-        "print_time": False,
-        "error_on_fail": False,
-        "grad_f": problem.grad_f,
-        "jac_g": problem.jac_g,
-        "hess_lag": problem.hess_lag,
-        "calc_lam_p": False,
-        **{f"ipopt.{name}": value for name, value in own.items()},
-    }
-    solver = ca.nlpsol("refine", "ipopt", problem.nlp, plugin)
-    found = solver(
-        x0=start,
-        p=[],
-        lbx=program.lower,
-        ubx=program.upper,
-        lbg=program.g_lower,
-        ubg=program.g_upper,
-    )
-    stats = solver.stats()
-    x = np.array(found["x"]).ravel()
-    return x, str(stats["return_status"]), int(stats["iter_count"])

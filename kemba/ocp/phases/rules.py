@@ -10,11 +10,12 @@ import numpy as np
 from kemba.ocp.phases.constraints import Constraint
 from kemba.ocp.phases.independent import Independent
 from kemba.ocp.phases.modes import AHEAD, BACK, HELD, OPEN
-from kemba.ocp.phases.program import Program
+from kemba.ocp.phases.program import Program, Where
 from kemba.ocp.phases.radau import node_vector, scaled
 
 INF = np.inf
 LENGTH, SPEED = 0.1, 1.0  # m, m.s-1: scales of gaps and their rates
+LANDS = 0.1  # m.s-1; a foot that comes down slower touches at no certain time
 
 
 class View:
@@ -52,50 +53,52 @@ def add_rules(program: Program, start: Independent) -> None:
 
 
 def _gaps(program: Program, view: View, i: int, constraint: Constraint) -> None:
-    """Open gaps stay open; where one closes it is zero."""
+    """Open gaps stay open; where one closes it is zero, and a foot comes down."""
     c, phases = program.columns, program.phases
-    closing = {phases[p].first for p in program.impacts if program.closes(p, i)}
-    apart = [
-        c.stages[e][stage]["q"]
+    closing = {phases[p].first: p for p in program.impacts if program.closes(p, i)}
+    apart: Where = [
+        (c.phase_of[e], c.stages[e][stage]["q"])
         for e in range(program.nodes)
         for stage in range(len(c.stages[e]))
-        if not phases[c.phase_of[e]].active(i) and not (stage and e + 1 in closing)
+        if not phases[c.phase_of[e]].active(i)
+        and not (stage == len(c.stages[e]) - 1 and e + 1 in closing)
     ]
     g = view.of(constraint.gap) / LENGTH
-    program.rule(f"{constraint.label} gap", view.z("q"), g, 0.0, INF, apart)
-    touching = [c.end(node)["q"] for node in sorted(closing)]
-    program.rule(f"{constraint.label} touch", view.z("q"), g, 0.0, 0.0, touching)
+    program.mode_rule(i, "gap", view.z("q"), g, 0.0, INF, apart)
+    touching = [(closing[node], c.end(node)["q"]) for node in sorted(closing)]
+    program.mode_rule(i, "touch", view.z("q"), g, 0.0, 0.0, touching)
+    if constraint.friction is not None:
+        rate = view.of(constraint.rate) / SPEED
+        before = [(p, np.concatenate([c.end(n)["q"], c.end(n)["v"]])) for n, p in closing.items()]
+        program.mode_rule(i, "approach", view.z("q v"), rate, -INF, -LANDS / SPEED, before)
 
 
 def _held(program: Program, view: View, i: int, constraint: Constraint) -> None:
     """The rate of a closed gap is zero, and the slip of a sticking contact."""
     c, phases = program.columns, program.phases
     rate = view.of(constraint.rate) / SPEED
-    states = [
-        (phases[c.phase_of[e]].modes[i], np.concatenate([stage["q"], stage["v"]]))
+    states: Where = [
+        (c.phase_of[e], np.concatenate([stage["q"], stage["v"]]))
         for e in range(program.nodes)
         for stage in c.stages[e]
     ]
-    states += [
-        (phases[p].modes[i], np.concatenate([c.end(phases[p].first)["q"], c.after[p]]))
-        for p in program.impacts
-    ]
-    closed = [z for mode, z in states if mode != OPEN]
-    program.rule(f"{constraint.label} rate", view.z("q v"), rate, 0.0, 0.0, closed)
+    states += [(p, np.concatenate([c.end(phases[p].first)["q"], c.after[p]])) for p in c.after]
+    closed = [(p, z) for p, z in states if phases[p].active(i)]
+    program.mode_rule(i, "rate", view.z("q v"), rate, 0.0, 0.0, closed)
     if constraint.friction is None:
         return
     slip = view.of(constraint.friction.slip) / SPEED
     settling = [
-        np.concatenate([c.end(phases[p].first)["q"], c.end(phases[p].first)["v"]])
+        (p, np.concatenate([c.end(phases[p].first)["q"], c.end(phases[p].first)["v"]]))
         for p in range(1, len(phases))
         if phases[p].modes[i] == HELD and phases[p - 1].modes[i] in (AHEAD, BACK)
         and p not in c.after
     ]  # fmt: skip
     sets = [(HELD, 0.0, 0.0), (AHEAD, 0.0, INF), (BACK, -INF, 0.0)]
     for wanted, low, high in sets:
-        where = [z for mode, z in states if mode == wanted]
-        program.rule(f"{constraint.label} slip", view.z("q v"), slip, low, high, where)
-    program.rule(f"{constraint.label} settles", view.z("q v"), slip, 0.0, 0.0, settling)
+        where = [(p, z) for p, z in states if phases[p].modes[i] == wanted]
+        program.mode_rule(i, "slip", view.z("q v"), slip, low, high, where)
+    program.mode_rule(i, "settles", view.z("q v"), slip, 0.0, 0.0, settling)
 
 
 def _friction(program: Program, view: View, i: int, constraint: Constraint) -> None:
@@ -103,19 +106,18 @@ def _friction(program: Program, view: View, i: int, constraint: Constraint) -> N
     if constraint.friction is None:
         return
     c, phases = program.columns, program.phases
-    forces = [
-        (phases[c.phase_of[e]].modes[i], stage["lam"])
-        for e in range(program.nodes)
-        for stage in c.stages[e]
+    forces: Where = [
+        (c.phase_of[e], stage["lam"]) for e in range(program.nodes) for stage in c.stages[e]
     ]
-    forces += [(phases[p].modes[i], c.impulse[p]) for p in program.impacts]
+    forces += list(c.impulse.items())
     weight = program.model.mechanism.weight
-    edges = ((constraint.friction.cone_forward, BACK), (constraint.friction.cone_backward, AHEAD))
-    for cone, sliding in edges:
+    edges = (("forward", constraint.friction.cone_forward, BACK),
+             ("backward", constraint.friction.cone_backward, AHEAD))  # fmt: skip
+    for way, cone, sliding in edges:
         g = view.of(cone) / weight
         for wanted, high in ((HELD, INF), (sliding, 0.0)):
-            where = [lam for mode, lam in forces if mode == wanted]
-            program.rule(f"{constraint.label} cone", view.z("lam"), g, 0.0, high, where)
+            where = [(p, lam) for p, lam in forces if phases[p].modes[i] == wanted]
+            program.mode_rule(i, f"cone {way}", view.z("lam"), g, 0.0, high, where)
 
 
 def _start(

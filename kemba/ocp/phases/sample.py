@@ -8,7 +8,7 @@ import numpy as np
 from kemba.ocp.certify import Certificate, Violation
 from kemba.ocp.layout import STEP
 from kemba.ocp.phases.program import Program
-from kemba.ocp.result import arrays
+from kemba.ocp.result import arrays, written
 from kemba.trajectory import Trajectory
 
 PHYSICS = ("kinematics", "dynamics", "rate", "impact")  # first words of their rows
@@ -18,7 +18,7 @@ WORST = 8
 def to_trajectory(program: Program, x: np.ndarray) -> Trajectory:
     """Every quantity of the model at element ends, just before an impact there. Inputs and
     forces of a row act on the interval before it; at the first node they are zero."""
-    model, layout, c = program.model, program.layout, program.columns
+    layout, c = program.layout, program.columns
     nodes = program.nodes
     Y = np.zeros((nodes + 1, layout.size))
     rates = np.zeros_like(Y)
@@ -36,24 +36,11 @@ def to_trajectory(program: Program, x: np.ndarray) -> Trajectory:
         Y[e + 1, part["u"]] = x[c.u[e]]
     Y[:, layout.binary] = np.round(Y[:, layout.binary])
     _split_friction(program, Y)
-    q, v, s, u, lam = (layout.full(Y, g) for g in ("q", "v", "s", "u", "lam"))
+    values = {g: layout.full(Y, g) for g in ("q", "v", "s", "u", "lam")}
+    values["lam"] = _slip_speeds(program, values["q"], values["v"], values["lam"])
+    times = np.concatenate([[0.0], np.cumsum(h)])
     a, sd = layout.full(rates, "v"), layout.full(rates, "s")
-    lam = _slip_speeds(program, q, v, lam)
-    node, columns = model.node, {}
-    measured = np.array(node.measure.map(len(Y))(q.T, v.T, a.T, s.T, sd.T, lam.T, u.T, [])).T
-    for quantity, values in zip(node.output_quantities, measured.T, strict=True):
-        columns[quantity.header] = values
-    groups = [
-        (model.mechanism.coordinates, q),
-        (model.mechanism.velocities, v),
-        (model.states.values(), s),
-        (model.inputs.values(), u),
-        (model.forces.values(), lam),
-    ]
-    for group, values in groups:
-        columns |= {quantity.header: values[:, i] for i, quantity in enumerate(group)}
-    meta = {"kind": "plan", "run": program.task.name}
-    return Trajectory(np.concatenate([[0.0], np.cumsum(h)]), columns, meta)
+    return written(program.model, program.task.name, times, values, a, sd)
 
 
 def _split_friction(program: Program, Y: np.ndarray) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,7 +12,9 @@ pytest.importorskip("numba")
 from robot_logs import hops
 from twin import catalogue
 
-from kemba.identify.compare import Comparison, compare, excess
+from kemba.identify.cells import excess
+from kemba.identify.compare import Comparison, compare
+from kemba.identify.laws import Law
 from kemba.identify.robot import robot_problem
 from kemba.identify.smoother import missing_force
 from kemba.model.spec import load_model
@@ -47,23 +48,77 @@ def test_a_wrong_model_is_told_where_it_fails(wrong: Comparison) -> None:
 
 def test_its_json_is_the_contract(wrong: Comparison) -> None:
     data = json.loads(json.dumps(wrong.json()))
-    assert list(data) == ["logs", "model", "noise_ratio", "channels", "cells", "sentence"]
+    assert {"logs", "model", "noise_ratio", "channels", "cells", "sentence"} <= set(data)
     assert list(data["channels"][0]) == ["name", "rmse", "max", "noise_sigma", "ratio"]
-    assert list(data["cells"][0]) == ["channel", "phase", "mode", "ratio", "q_value"]
+    assert {"channel", "phase", "mode", "ratio", "q_value"} <= set(data["cells"][0])
     assert "body/z [m]" in {c["name"] for c in data["channels"]}
     assert {c["phase"] for c in data["cells"]} <= {"flight", "stance2", "stance1", "impact", "rest"}
     assert {c["mode"] for c in data["cells"]} <= {"00", "10", "01", "11"}
+    assert {"in", "mid"} <= {c["region"] for c in data["cells"]} <= {"in", "mid", "out"}
+    assert {p["channel"] for p in data["missing_force"]} >= {"body/z", "front/piston/x"}
 
 
-def test_its_figure_has_every_channel(wrong: Comparison, tmp_path: Path) -> None:
+def test_its_figure_has_every_channel_and_region(wrong: Comparison) -> None:
     figure = plot_comparison(wrong)
-    labels = {text.get_text() for axes in figure.axes for text in axes.get_yticklabels()}
-    assert {c.channel for c in wrong.cells} <= labels
+    texts = [t for axes in figure.axes for t in (*axes.get_yticklabels(), *axes.get_xticklabels())]
+    shown = {text.get_text() for text in texts}
+    assert {c.channel for c in wrong.cells} <= shown
+    assert {"in", "mid", "flight", "stance2"} <= shown | {
+        text.get_text() for axes in figure.axes for text in axes.texts
+    }
+    labels = {axes.get_xlabel() for axes in figure.axes}
+    assert {"time [s]", "speed [m/s]", "position [mm]", "air force [N]"} <= labels
+
+
+def test_friction_shows_as_a_force_against_speed() -> None:
+    found = compared(catalogue.hidden("seal_friction", 1.0))
+    law = law_of(found, "rods", "speed [m/s]")
+    fast = np.abs(law.centre) > 0.05
+    assert np.all(law.force[fast] * law.centre[fast] < 0)
+    usual = np.average(np.abs(law.force[fast]), weights=1.0 / law.sigma[fast] ** 2)
+    assert usual == pytest.approx(10.0, abs=2.0)
+    assert next(h for h in found.hints if h.kind == "law").text.startswith("a force on the rods")
+    assert "goes with speed" in found.sentence
+
+
+@pytest.mark.slow
+def test_a_weak_motor_shows_against_its_torque() -> None:
+    found = compared(catalogue.hidden("torque_scale", 1.0))
+    law = law_of(found, "hips", "torque [N.m]")
+    assert law.gain == max(law.gain for law in found.laws)
+    sent = {hint.text.partition(" ms after ")[2] for hint in found.hints if hint.kind == "command"}
+    assert {"front/hip/tau changes", "rear/hip/tau changes"} & sent
+
+
+@pytest.mark.slow
+def test_a_late_valve_shows_after_it_switches() -> None:
+    found = compared(catalogue.hidden("valve_delay", 1.0))
+    after = law_of(found, "rods", "after retract [ms]")
+    usual = law_of(compared(), "rods", "after retract [ms]")
+    assert after.gain > 100 > 20 > usual.gain
+
+
+def law_of(found: Comparison, port: str, quantity: str) -> Law:
+    return next(law for law in found.laws if (law.port, law.quantity) == (port, quantity))
+
+
+@pytest.mark.slow
+def test_runs_that_contradict_each_other_are_told() -> None:
+    """Two runs with a payload and two without: no payload explains them all."""
+    light, _ = hops(runs=2)
+    heavy, _ = hops(catalogue.hidden("payload", 1.5), runs=2, seed=2)
+    for number, log in enumerate([*light, *heavy]):
+        log.meta["name"] = f"hop{number}"
+    found = compare(robot_problem([*light, *heavy], load_model("planning")), "planning")
+    alike = compare(robot_problem(heavy, load_model("planning")), "planning")
+    assert any("payload.m would have to differ from run to run" in h.text for h in found.hints)
+    assert not any("payload.m" in h.text for h in alike.hints)
 
 
 def test_noise_alone_is_no_excess() -> None:
     rng = np.random.default_rng(0)
     assert excess(rng.standard_normal(400)) > 0.05
+    assert excess(np.array([0.5, -0.4, 9.0, 0.3, 0.1])) > 0.05  # one moment convicts nobody
     assert excess(2.0 * rng.standard_normal(400)) < 1e-6
 
 

@@ -1,0 +1,26 @@
+"""`kemba-opt report`: a run as one HTML page."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from kemba_cli.common import Json, Quiet, print_json
+
+
+def report(
+    run: Annotated[Path, typer.Argument(help="Run folder, as solve writes it.")],
+    out: Annotated[Path | None, typer.Option(help="HTML to write [report.html in RUN].")] = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Write a run as one self-contained HTML page: verdict, numbers, motion, figures, origin.
+
+    Example: kemba-opt report runs/jump-1
+    """
+    from kemba.report.page import report_run
+
+    path = report_run(run, out)
+    print_json({"report": str(path)}) if json else typer.echo(path)

@@ -1,0 +1,34 @@
+"""`kemba-opt view`: a motion in 3-D."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from kemba_cli.common import Json, Quiet, print_json
+
+
+def view(
+    run: Annotated[Path, typer.Argument(help="Run folder, or the CSV of a motion.")],
+    out: Annotated[Path | None, typer.Option(help="HTML to write [view.html beside it].")] = None,
+    model: Annotated[
+        str | None, typer.Option(help="Model YAML with the robot, not the run's own.")
+    ] = None,
+    show: Annotated[bool, typer.Option("--show", help="Open it in the browser.")] = False,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Write a motion in 3-D as a self-contained HTML page, to turn, zoom and play.
+
+    Example: kemba-opt view runs/jump-1 --show
+    """
+    from kemba.report.stage import view_run
+
+    path = view_run(run, out, model)
+    print_json({"view": str(path)}) if json else typer.echo(path)
+    if show:
+        import webbrowser
+
+        webbrowser.open(path.resolve().as_uri())

@@ -1,0 +1,98 @@
+"""A motion in 3-D as a page of its own: what the viewer draws, and the page around it."""
+
+from __future__ import annotations
+
+import json
+from html import escape
+from pathlib import Path
+from string import Template
+from typing import Any
+
+import numpy as np
+
+import kemba
+from kemba.errors import KembaError
+from kemba.files import atomic_text, plain
+from kemba.plotting.draw import machine_of
+from kemba.plotting.source import Source, load_source
+from kemba.plotting.sticks import CYLINDER, Pose, poses
+
+PAGES = Path(__file__).parent / "pages"
+RATE = 250.0  # poses per second of motion
+SLOWER = 5.0  # times slower than life
+
+
+def write_view(source: Source, path: str | Path, model: str | None = None) -> Path:
+    """Write a page with the motion of a source in 3-D; it needs nothing else.
+
+    Raises KembaError when columns are missing or the file cannot be written.
+    """
+    return write_page(path, source.name, stage(source, model))
+
+
+def view_run(run: str | Path, out: str | Path | None = None, model: str | None = None) -> Path:
+    """The page of a run folder or a CSV; it lies beside the motion unless told. KembaError."""
+    source = load_source(run)
+    assert source.path is not None
+    return write_view(source, out or source.path.with_name("view.html"), model)
+
+
+def stage(source: Source, model: str | None = None) -> str:
+    """The viewer with its scene as HTML. Raises KembaError when columns are missing."""
+    shown = scene(source, model)
+    text = json.dumps(plain(shown), separators=(",", ":"), allow_nan=False)
+    return fill("stage.html", slower=f"{SLOWER:g}", viewer=page_text("viewer.js"), scene=text)
+
+
+def scene(source: Source, model: str | None = None) -> dict[str, Any]:
+    """Times [s], points [m], valves and contacts of every pose, and how large it all is."""
+    machine, time = machine_of(source, model), source.trajectory.time
+    count = max(2, round((time[-1] - time[0]) * RATE) + 1)
+    shown = [] if source.bench else poses(source, machine, np.linspace(time[0], time[-1], count))
+    if not shown:
+        expected = "body/z, hip/q and piston/x or knee/q of every leg were expected"
+        raise KembaError(source.name, "cannot be shown", expected)
+    places = np.array([list(pose.points.values()) for pose in shown])
+    low, high = places.min(axis=(0, 1)), places.max(axis=(0, 1))
+    legs = machine.mechanism.legs
+    return {
+        "time": [round(pose.time, 4) for pose in shown],
+        "points": {name: _rounded(shown, name) for name in shown[0].points},
+        "valves": {leg: ["".join(map(str, pose.valves[leg])) for pose in shown] for leg in legs},
+        "stands": {leg: [int(pose.stands[leg]) for pose in shown] for leg in legs},
+        "centres": [pose.centre.round(4) for pose in shown],
+        "legs": legs,
+        "cylinder": CYLINDER,
+        "range": [low[0], high[0]],
+        "centre": [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2],
+        "size": float(max(high - low)),
+        "slower": SLOWER,
+    }
+
+
+def write_page(path: str | Path, title: str, body: str) -> Path:
+    """Write one whole HTML page. Raises KembaError."""
+    path = Path(path)
+    text = fill(
+        "page.html", title=escape(title), css=page_text("page.css"), body=body,
+        version=kemba.__version__,
+    )  # fmt: skip
+    try:
+        with atomic_text(path) as stream:
+            stream.write(text)
+    except OSError as error:
+        raise KembaError(str(path), error.strerror or str(error)) from None
+    return path
+
+
+def fill(name: str, **values: str) -> str:
+    """A page of this room with its `$names` replaced."""
+    return Template(page_text(name)).substitute(values)
+
+
+def page_text(name: str) -> str:
+    return (PAGES / name).read_text(encoding="utf-8")
+
+
+def _rounded(shown: list[Pose], name: str) -> list[Any]:
+    return [pose.points[name].round(4) for pose in shown]

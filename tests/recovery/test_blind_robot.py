@@ -1,0 +1,50 @@
+"""A few blind robot cases, fixed: jumps of the twin, which shares no code with the fit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("numba")
+
+from twin.cases import robot_case
+
+from kemba.identify.answer import Answer
+from kemba.identify.workflow import discover_logs
+
+
+def answer(folder: Path, effect: str | None, seed: int, runs: int) -> tuple[Answer, dict]:
+    """What is answered about all logs but the last, which is held out, and the truth."""
+    paths, truth = robot_case(folder, effect, seed=seed, runs=runs, figures_off=0.02)
+    found, _ = discover_logs(paths[:-1], paths[-1:], out=folder / "answer")
+    return found, truth
+
+
+def check(found: Answer, truth: dict) -> None:
+    (hidden,) = truth["effects"]
+    assert found.verdict == "missing" and found.added == (hidden["kind"],), found.sentence
+    name, value = next(iter(hidden["parameters"].items()))
+    estimate = found.ranking[0].parameters[name]
+    assert estimate.value == pytest.approx(value, rel=0.2)
+    assert found.error_after < min(1.3, found.error_before)
+
+
+def test_friction_is_named_on_two_jumps(tmp_path: Path) -> None:
+    check(*answer(tmp_path, "seal_friction", 3, 3))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("effect", "seed"), [("valve_delay", 4), ("supply_droop", 6), ("sensor_delay:body/z", 1)]
+)
+def test_more_hidden_effects_are_named(effect: str, seed: int, tmp_path: Path) -> None:
+    check(*answer(tmp_path, effect, seed, 5))
+
+
+@pytest.mark.slow
+def test_nothing_is_found_where_nothing_is_hidden(tmp_path: Path) -> None:
+    found, _ = answer(tmp_path, None, 5, 5)
+    assert found.verdict == "nothing" and not found.added, found.sentence
+    assert found.error_after < 1.3
+    assert not (tmp_path / "answer" / "model.yaml").exists()

@@ -1,0 +1,81 @@
+"""The loop closed: an effect adopted from an answer brings the error down on a run that was never
+fitted, and the next plan is made with it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+pytest.importorskip("numba")
+
+from robot_logs import hops
+from twin import catalogue
+
+from kemba.identify.comparing import compare_logs
+from kemba.identify.discover import discover
+from kemba.identify.robot import robot_problem
+from kemba.identify.workflow import write_answer
+from kemba.model.spec import load_model
+from kemba_cli.main import app
+
+HIDDEN, SIZE = "seal_friction", 1.0
+SUSPECTS = (HIDDEN, "piston_damping", "valve_delay", "boom_force")
+
+
+def run(*arguments: str | Path) -> str:
+    shown = CliRunner().invoke(app, [str(a) for a in arguments])
+    assert shown.exit_code == 0, shown.output
+    return shown.stdout
+
+
+@pytest.fixture(scope="module")
+def answered(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Three hops of a machine with friction, the answer to two of them, the third on disk."""
+    home = tmp_path_factory.mktemp("loop")
+    logs, _ = hops(catalogue.hidden(HIDDEN, SIZE), figures_off=0.01)
+    logs[-1].write(home / "kept.csv")
+    problem = robot_problem(logs[:2], load_model("planning"), SUSPECTS)
+    judge = robot_problem(logs[2:], load_model("planning"), SUSPECTS)
+    write_answer(discover(problem, judge).answer, home / "answer", "planning")
+    return home
+
+
+@pytest.mark.slow
+def test_the_error_falls_on_the_run_that_was_kept(answered: Path) -> None:
+    answer = json.loads((answered / "answer" / "answer.json").read_text("utf-8"))
+    assert answer["added"] == [HIDDEN], answer["sentence"]
+    before, _ = compare_logs([answered / "kept.csv"])
+    after, _ = compare_logs([answered / "kept.csv"], str(answered / "answer" / "model.yaml"))
+    assert not before.good and before.noise_ratio > 1.1 * after.noise_ratio
+    assert sum(c.significant for c in after.cells) < 0.3 * sum(c.significant for c in before.cells)
+
+
+@pytest.mark.slow
+def test_a_rival_is_adopted_and_does_worse(answered: Path) -> None:
+    answer = json.loads((answered / "answer" / "answer.json").read_text("utf-8"))
+    rival = answer["ranking"][1]["effect"]
+    model = answered / "rival.yaml"
+    run("adopt", answered / "answer", rival, "--out", model)
+    found = json.loads(run("compare", answered / "kept.csv", "--model", model, "--json"))
+    winner = answered / "answer" / "model.yaml"
+    best = json.loads(run("compare", answered / "kept.csv", "--model", winner, "--json"))
+    assert found["noise_ratio"] > best["noise_ratio"]
+
+
+@pytest.mark.slow
+def test_the_next_plan_has_the_effect_in_it(answered: Path) -> None:
+    """The same hop costs more torque on the machine found than on the machine as drawn."""
+    found = answered / "answer" / "model.yaml"
+    model = load_model(str(found))
+    assert model.effect(HIDDEN).F_c == pytest.approx(10.0, rel=0.15)  # type: ignore[attr-defined]
+    told = {}
+    for name, used in (("drawn", "planning"), ("found", found)):
+        options = ("--set", "nodes=40", "--out", answered / name, "--no-replay", "--json")
+        told[name] = json.loads(run("solve", "hop.yaml", "--model", used, *options))
+        assert told[name]["status"] == "solved"
+        assert told[name]["apex_m"] == pytest.approx(0.35, abs=1e-3)
+    cost = {name: t["cost"]["torque_squared_integral"] for name, t in told.items()}
+    assert cost["found"] > 1.02 * cost["drawn"]
