@@ -15,11 +15,16 @@ if TYPE_CHECKING:
 
 
 def characterise(
-    logs: Annotated[list[Path], typer.Argument(help="Bench logs (CSV), or folders of them.")],
+    logs: Annotated[
+        list[Path] | None, typer.Argument(help="Bench logs (CSV), or folders of them.")
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="Model YAML to write.")] = None,
     figures: Annotated[
         Path | None, typer.Option(help="Folder for the paper's figure of each rig.")
     ] = None,
+    paper: Annotated[
+        bool, typer.Option("--paper", help="No logs: what the paper's own tables imply.")
+    ] = False,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -27,6 +32,11 @@ def characterise(
 
     Example: kemba-opt characterise bench/locked bench/dynamometer --out cylinder.yaml
     """
+    if paper:
+        _print_paper(json, quiet)
+        return
+    if not logs:
+        raise typer.BadParameter("logs are missing: give CSV files, or --paper", param_hint="LOGS")
     from kemba.plant.characterise import characterise as fit
     from kemba.plant.tables import as_json
     from kemba.trajectory import Trajectory
@@ -46,6 +56,24 @@ def characterise(
     for path in drawn:
         say(f"wrote {path}", quiet)
     say(f"wrote {out}" if out else "write a model with --out MODEL.yaml", quiet)
+
+
+def _print_paper(json: bool, quiet: bool) -> None:
+    """Tables I and II of the paper against pressure times area and volume."""
+    from rich.table import Table
+
+    from kemba.identify.published import LOSS_COLUMNS, published
+
+    found = published()
+    if json:
+        print_json(found.json())
+        return
+    typer.echo(found.sentence)
+    table = Table("mode", *LOSS_COLUMNS, title="Pressure x area - F_static, N", box=None)
+    for mode, losses in found.losses.items():
+        table.add_row(mode, *(f"{loss:.1f}" for loss in losses))
+    if not quiet:
+        results().print(table)
 
 
 def _draw(found: Characteristics, logs: dict[str, Trajectory], folder: Path) -> list[str]:

@@ -30,6 +30,10 @@ def compare(
 
     Example: kemba-opt compare jump_1.csv jump_2.csv --figure heat_map.png
     """
+    import os
+
+    # many small products: more BLAS threads only wait for each other
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from kemba.identify.comparing import compare_logs
 
     found, _ = compare_logs(logs, model, column_map, run)

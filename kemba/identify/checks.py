@@ -17,6 +17,7 @@ FEWEST = 60  # rows
 LONGEST_BURST = 0.1  # s without a value that interpolation may bridge
 MISSING_SHARE = 0.3
 QUIET = 1e-4  # noise as a share of the range, below which a channel counts as noiseless
+FASTEST, LEAP = 8.0, 0.004  # m.s-1, m: no piston goes farther between two rows
 FROZEN = 40  # equal readings in a row where noise is seen elsewhere
 # by the last part of the name: smallest and largest value that can be, and what a mistake would be
 RANGES = {
@@ -121,6 +122,8 @@ def _values(log: Trajectory) -> Iterator[KembaError]:
         yield from _range(log, name, y)
         if name in needed:
             yield from _frozen(log, name, y)
+        if name.endswith("piston/x"):
+            yield from _leap(log, name, y)
     yield from _excitation(log)
 
 
@@ -162,6 +165,20 @@ def _frozen(log: Trajectory, name: str, y: Array) -> Iterator[KembaError]:
     what = f"{length + 1} readings in a row are exactly {value:.6g} {log.unit(name)}"
     hint = "is the sensor saturated?" if at_end else "is the sensor stuck?"
     yield _fault(log, what, "the channel is noisy elsewhere", hint, row=row, column=name)
+
+
+def _leap(log: Trajectory, name: str, y: Array) -> Iterator[KembaError]:
+    """A position that is elsewhere from one row to the next, and stays there."""
+    good = np.flatnonzero(np.isfinite(y))
+    step, passed = np.diff(y[good]), np.diff(log.time[good])
+    far = np.abs(step) > FASTEST * passed + LEAP
+    calm = np.abs(step) < 0.3 * np.max(np.abs(step), initial=0.0)
+    far[1:-1] &= calm[:-2] & calm[2:]  # a spike returns at once: a bad reading, which is borne
+    if far.any():
+        i = int(np.argmax(far))
+        what = f"leaps by {1e3 * step[i]:.1f} mm within {1e3 * passed[i]:.1f} ms"
+        hint = "are two logs joined?"
+        yield _fault(log, what, "a piston that moves", hint, row=int(good[i + 1]), column=name)
 
 
 def _longest(flags: np.ndarray) -> tuple[int, int]:

@@ -115,6 +115,18 @@ def _expected(problem: Problem, count: int) -> Array:
     return np.asarray(power()) if power else np.ones(count)
 
 
+def conditions(
+    problem: Problem, theta: Theta | None = None, regions: bool = False
+) -> tuple[float, list[Cell]]:
+    """Error ratio and cells of the model with `theta` added, told apart by region or not."""
+    rows, r = problem.rows(), problem.residual(free_starts(problem, theta))
+    region = np.full(len(rows), "", dtype=object)
+    if regions:
+        _, region = region_labels(problem, rows)
+    grain = grains(rows, region, r, _expected(problem, len(r)), getattr(problem, "grain", 1))
+    return grain.ratio, list(cells(rows, region, grain))
+
+
 def _tolerant(
     rows: Rows, region: Labels, left: Array, expected: Array, grain: Grains
 ) -> tuple[float, bool]:

@@ -35,6 +35,7 @@ class Found:
     answer: Answer
     search: Search
     best: Hypothesis
+    holdout: Problem | None = None
 
 
 def discover(
@@ -57,7 +58,7 @@ def discover(
     doubts = [] if formula else doubts_about(search, best, drift)
     answer = _answer(search, best, p_value, test, formula, holdout, doubts)
     answer.runtime_s = time.monotonic() - started
-    return Found(answer, search, best)
+    return Found(answer, search, best, holdout)
 
 
 def null_test(search: Search) -> NullTest:

@@ -8,6 +8,7 @@ with the volume to be filled; where the line through them meets zero is the volu
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from kemba.identify.problem import Array
 from kemba.plant.tables import PAPER_FORCE, PAPER_RISE
 
 STROKE = 0.070  # m
+LOSS_COLUMNS = ("0.6 MPa", "0.7 MPa", "0.8 MPa")
 AREAS = {"extend": AREA_E, "retract": -AREA_R, "both": AREA_E - AREA_R}
 
 
@@ -28,6 +30,17 @@ class Published:
     seal_friction: tuple[float, float]  # N, smallest and largest
     shortfall: dict[str, Array]  # share of the supply that is missing while air flows
     dead_volume: dict[str, float]  # m3, by filling and venting
+
+    def json(self) -> dict[str, Any]:
+        """Everything found, SI."""
+        return {
+            "sentence": self.sentence,
+            "pressures_pa": self.pressures.tolist(),
+            "losses_n": {mode: losses.tolist() for mode, losses in self.losses.items()},
+            "seal_friction_n": list(self.seal_friction),
+            "supply_shortfall": {mode: s.tolist() for mode, s in self.shortfall.items()},
+            "tube_volume_m3": self.dead_volume,
+        }
 
     @property
     def sentence(self) -> str:

@@ -41,12 +41,13 @@ def within_tolerance(residual: Array, known: Slopes) -> Array:
     return np.asarray(residual + known.by_nuisance @ step)
 
 
-def free_starts(problem: Problem) -> dict[str, float]:
-    """Theta at which each log begins as its data say, all else nominal."""
+def free_starts(problem: Problem, at: Theta | None = None) -> dict[str, float]:
+    """Theta `at` with each log beginning as its data say, all else nominal."""
+    theta = dict(at or {})
     names = [n for n in problem.nuisance if n.startswith(START)]
     if not names:
-        return {}
+        return theta
     sigma = np.array([problem.nuisance[n][1] for n in names])
-    j, r = problem.jacobian({}, names) * sigma, problem.residual({})
+    j, r = problem.jacobian(theta, names) * sigma, problem.residual(theta)
     step = np.linalg.solve(j.T @ j + np.eye(len(names)), -j.T @ r)
-    return dict(zip(names, (sigma * step).tolist(), strict=True))
+    return theta | dict(zip(names, (sigma * step).tolist(), strict=True))

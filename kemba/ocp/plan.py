@@ -32,6 +32,7 @@ from kemba.ocp.schedule import (
     binary,
     confirm,
     find,
+    fix,
     refine,
     tighten,
 )
@@ -147,7 +148,9 @@ class Planner:
         return self._finish(search, self._polished(search, point))
 
     def _polished(self, search: Search, point: Point) -> Point:
-        return polish(search, point) if point.solved and self.task.solver.polish else point
+        if not point.solved:
+            return point
+        return polish(search, point) if self.task.solver.polish else fix(search, point)
 
     def _finish(self, search: Search, point: Point) -> tuple[Transcription, Point]:
         point = tighten(search, point) if point.solved else point

@@ -21,7 +21,8 @@ MARGIN = 0.8  # the last relaxation stays this much below what the certificate a
 VALVE, SWITCHING = 0.1, 0.05
 STOPS = ("User_Requested_Stop", "Maximum_CpuTime_Exceeded", "Maximum_WallTime_Exceeded")
 CONFIRMED = 1e-7  # scaled violation
-PROLONGED = 1e-3  # off the bounds: a plan between the nodes of its grid is far from feasible
+# off the bounds: a plan with rounded valves, or between the nodes of its grid, is not feasible
+ROUNDED, PROLONGED = 1e-2, 1e-3
 # feasible to the last digit, optimal to a few: the certificate measures the former
 EXACT: dict[str, Any] = {"tol": 1e-2, "constr_viol_tol": 1e-8, "acceptable_iter": 0}
 
@@ -105,16 +106,16 @@ def find(search: Search, start: Point) -> Point:
 
 
 def binary(search: Search, point: Point) -> Point:
-    """Push the valves towards 0 and 1, then round and fix them."""
+    """Push the valves towards 0 and 1, then round and fix them, the pairs as loose as before."""
     parameters = Parameters(LOOSE, VALVE, SWITCHING)
     point = search.solve("binary valves", point, parameters, options=warm(1e-3, tol=1e-3))
-    return fix(search, point)
+    options, fixed = warm(1e-2, ROUNDED, tol=1e-3), search.valves(point)
+    return search.solve("round valves", point, Parameters(LOOSE), options=options, fixed=fixed)
 
 
 def fix(search: Search, point: Point, push: float = 1e-6) -> Point:
-    """Round and fix the valves, the pairs still a little loose."""
-    options = warm(1e-3, push, tol=1e-3)
-    fixed = search.valves(point)
+    """Round and fix the valves, the pairs tighter."""
+    options, fixed = warm(1e-3, push, tol=1e-3), search.valves(point)
     return search.solve("fix valves", point, Parameters(TIGHT), options=options, fixed=fixed)
 
 

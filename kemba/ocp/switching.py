@@ -10,21 +10,22 @@ from kemba.ocp.schedule import SWITCHING, TIGHT, VALVE, Search, fix, warm
 from kemba.trajectory import Trajectory
 
 REACH = 4  # nodes by which a switch may move at a time
-ROUNDS = 2
+ROUNDS = {True: 2, False: 1}  # half a robot; a whole one takes four times as long
 PAYS = 0.02  # relative fall of the cost that makes another round worth while
 
 
 def polish(search: Search, point: Point) -> Point:
     """Release every valve switch by a few nodes and round again, as long as the cost falls."""
-    for _ in range(ROUNDS):
+    best: Point | None = None
+    for _ in range(ROUNDS[search.transcription.reduction.symmetric]):
         how = {"options": warm(1e-3, tol=1e-3), "free": _release(search, point)}
         parameters = Parameters(TIGHT, VALVE, SWITCHING / 5)
         loose = search.solve("move switches", Point(point.Y), parameters, **how)
         better = fix(search, Point(loose.Y))
-        if not better.solved or better.objective >= (1 - PAYS) * point.objective:
+        if not better.solved or (best and better.objective >= (1 - PAYS) * best.objective):
             break
-        point = better
-    return point
+        point = best = better
+    return best or fix(search, point)
 
 
 def _release(search: Search, point: Point) -> dict[int, tuple[np.ndarray, np.ndarray]]:

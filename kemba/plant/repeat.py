@@ -67,12 +67,23 @@ def repeat_run(
         valves = scattered(model, table, VALVE_SCATTER, rng) if noise else None
         sample = sensors.times(float(table.time[-1]), rng)
         done = execute(table, model, gains, valves=valves, sample=sample)
-        log = take_log(done.trajectory, sensors, rng, model.effects)
+        log = _as_sent(take_log(done.trajectory, sensors, rng, model.effects), table)
         log.meta |= {"run": number, "repeat_of": controller.parent.name, "plant": model.name}
         path = Path(out) / f"log-{number}.csv"
         log.write(path)
         repeats.append(Repeat(path, done, done.against(model, plan) if plan else None))
     return repeats
+
+
+def _as_sent(log: Trajectory, table: Trajectory) -> Trajectory:
+    """The log with valves as the table sends them: how late each of them acts no log can show."""
+    row = np.maximum(np.searchsorted(table.time, log.time + 1e-9, side="right") - 1, 0)
+    valves = {
+        header: table[name][row]
+        for header, name in zip(log.headers, log.names, strict=True)
+        if "/valve/" in name and name in table
+    }
+    return log.with_columns(valves)
 
 
 def plant_of(run: str | Path, name: str) -> Model:

@@ -23,8 +23,8 @@ ENCODERS = {"pitch": 2e-4, "q": 2 * np.pi / 2**14}  # rad; smallest step
 
 @dataclass(frozen=True)
 class Sensors:
-    """How a log is taken: `rate` [Hz], `jitter` of the sample times [s, 1 sigma], noise [1 sigma]
-    and smallest step by channel ending, in the channel's SI unit."""
+    """How a log is taken: `rate` [Hz], `jitter` by which samples come late [s, 1 sigma], noise
+    [1 sigma] and smallest step by channel ending, in the channel's SI unit."""
 
     rate: float = 1000.0
     jitter: float = 0.0
@@ -38,10 +38,11 @@ class Sensors:
                    steps=ENCODERS)  # fmt: skip
 
     def times(self, duration: float, rng: np.random.Generator) -> Array:
-        """Sample times (m,) [s] from 0 to `duration`, strictly increasing."""
+        """Sample times (m,) [s] from 0 to `duration`, strictly increasing. None comes early: a row
+        is written after its tick's commands were sent, and shows them."""
         period = 1.0 / self.rate
         times = np.arange(int(duration * self.rate + 1e-9) + 1) * period
-        shift = np.clip(rng.normal(0.0, self.jitter, len(times)), -0.4 * period, 0.4 * period)
+        shift = np.clip(np.abs(rng.normal(0.0, self.jitter, len(times))), 0.0, 0.4 * period)
         shift[[0, -1]] = 0.0
         return times + shift if self.jitter else times
 

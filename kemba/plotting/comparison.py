@@ -21,7 +21,7 @@ from kemba.trajectory import Array
 PHASES = ("rest", "stance2", "stance1", "impact", "flight", "moving")
 REGIONS = ("", "in", "mid", "out")
 WIDEST = 26  # columns of one heat map; more are shown in two, one below the other
-BANDS, LAWS = 3, 4
+BANDS = 3
 Column = tuple[str, str, str]  # phase, mode, region
 
 
@@ -31,7 +31,7 @@ def plot_comparison(found: Comparison, figure: Figure | None = None) -> Figure:
     lacks most; the missing force against what it goes with."""
     tables = columns_of(found.cells)
     bands = bands_of(found.missing)
-    panels = found.laws[:LAWS]
+    panels = panels_of(found.laws)
     channels = list(dict.fromkeys(c.channel for c in found.cells))
     heights = [len(channels) * ROW + 3 * LEVEL + 0.3] * len(tables)
     parts = [sum(heights), 0.85 * len(bands) + 0.35, 1.75 if panels else 0.0]
@@ -114,6 +114,14 @@ def _bands(room: SubFigure, bands: Sequence[Band]) -> None:
     grid[0].set_title("missing force", loc="left")
     grid[-1].set_xlabel("time [s]")
     room.align_ylabels()
+
+
+def panels_of(found: Sequence[Law]) -> list[Law]:
+    """Of the port that lacks most: its quantities, and the command that tells most."""
+    own = [law for law in found if law.port == found[0].port]
+    sent = [law for law in own if law.quantity.startswith("after ")]
+    best = max(sent, key=lambda law: law.gain, default=None)
+    return [law for law in own if law not in sent or law is best]
 
 
 def _laws(room: SubFigure, panels: Sequence[Law]) -> None:

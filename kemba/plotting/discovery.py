@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from kemba.identify.cells import cells, grains
-from kemba.identify.confirm import rms
+from kemba.identify.compare import conditions
 from kemba.identify.discover import Found
 from kemba.identify.problem import Array, Rows
-from kemba.identify.rank import NULL
+from kemba.identify.rank import NULL, Hypothesis
 from kemba.identify.smoother import missing_force
+from kemba.identify.tolerance import free_starts
 from kemba.plotting.comparison import bands_of, place_of
 from kemba.plotting.diagnosis import plot_bands, plot_ladder
 from kemba.plotting.heat import plot_heat_map
@@ -42,18 +42,20 @@ def draw_discovery(found: Found, folder: Path) -> list[Path]:
     return [save_figure(f, folder / f"{name}.png") for name, f in figures.items()]
 
 
+def theta_of(found: Found, hypothesis: Hypothesis) -> dict[str, float]:
+    """What a model with these effects added would have: their figures, all others nominal."""
+    search = found.search
+    fitted = search.points[hypothesis].fit.theta
+    listed = (search.problem.candidates[effect].keys() for effect in hypothesis)
+    return {key: fitted[key] for keys in listed for key in keys}
+
+
 def plot_cells(found: Found) -> Figure:
-    """Error by noise, by channel and by motion and valve mode, before and after."""
+    """Error by noise, by channel and by motion and valve mode: of the model as it stood, and with
+    what was found."""
+    steps = {"before": NULL, "after": found.best} if found.best else {"": NULL}
     problem = found.search.problem
-    rows, residuals = _residuals(found)
-    power = getattr(problem, "expected_power", None)
-    expected = np.asarray(power()) if power else np.ones(len(rows))
-    whole = np.full(len(rows), "", dtype=object)
-    size = getattr(problem, "grain", 1)
-    listed = {
-        title: list(cells(rows, whole, grains(rows, whole, r, expected, size)))
-        for title, r in residuals.items()
-    }
+    listed = {t: conditions(problem, theta_of(found, h))[1] for t, h in steps.items()}
     first = next(iter(listed.values()))
     channels = list(dict.fromkeys(c.channel for c in first))
     columns = sorted({(c.phase, c.mode, c.region) for c in first}, key=place_of)
@@ -67,6 +69,28 @@ def plot_cells(found: Found) -> Figure:
     return plot_heat_map(tables, channels, [c[:2] for c in columns], bold)
 
 
+def plot_explained(found: Found) -> Figure:
+    """d(t) of the model as it stood, with its 95 % band, and what was found of it."""
+    problem = found.search.problem
+    before = missing_force(problem, free_starts(problem))
+    if not found.best:
+        return plot_bands(bands_of(before))
+    theta = free_starts(problem, theta_of(found, found.best))
+    after = missing_force(problem, theta, before[0].strength)
+    return plot_bands(bands_of(before, after), " + ".join(found.best))
+
+
+def plot_steps(found: Found) -> Figure:
+    """Errors of fitted and held-out runs as effects are added, all other figures nominal."""
+    names = [name for name, _ in found.answer.ladder]
+    thetas = [theta_of(found, tuple(sorted(names[1 : i + 1]))) for i in range(len(names))]
+    fitted = [conditions(found.search.problem, theta)[0] for theta in thetas]
+    held_out = None
+    if found.holdout is not None:
+        held_out = [conditions(found.holdout, theta)[0] for theta in thetas]
+    return plot_ladder(names, fitted, held_out)
+
+
 def _residuals(found: Found) -> tuple[Rows, dict[str, Array]]:
     search = found.search
     before = search.problem.residual(search.points[NULL].fit.theta)
@@ -74,25 +98,6 @@ def _residuals(found: Found) -> tuple[Rows, dict[str, Array]]:
     if found.best:
         tables["after"] = search.problem.residual(search.points[found.best].fit.theta)
     return search.problem.rows(), tables
-
-
-def plot_explained(found: Found) -> Figure:
-    """d(t) of the model as it was, with its 95 % band, and what the answer makes of it."""
-    problem, points = found.search.problem, found.search.points
-    before = missing_force(problem, points[NULL].fit.theta)
-    if not found.best:
-        return plot_bands(bands_of(before))
-    after = missing_force(problem, points[found.best].fit.theta, before[0].strength)
-    return plot_bands(bands_of(before, after), " + ".join(found.best))
-
-
-def plot_steps(found: Found) -> Figure:
-    """Errors of fitted and held-out runs as effects are added."""
-    names, held_out = zip(*found.answer.ladder, strict=True)
-    problem, points = found.search.problem, found.search.points
-    steps = [tuple(sorted(names[1 : i + 1])) for i in range(len(names))]
-    fitted = [rms(problem, points[step].fit.theta) for step in steps]
-    return plot_ladder(names, fitted, held_out)
 
 
 @paper_style

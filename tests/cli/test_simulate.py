@@ -8,6 +8,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from kemba.mechanism import robot_mechanism
+from kemba.plant.controller import read_controller
 from kemba.trajectory import Trajectory
 from kemba_cli.main import app
 
@@ -64,6 +65,15 @@ def test_the_plant_meets_the_supply_and_payload_of_the_task(folder: Path) -> Non
         done = run("simulate", str(folder), "--model", "planning", "--json")
         heights.append(Trajectory.read(json.loads(done.stdout)["logs"][0])["body/vz"][-1])
     assert heights[0] < heights[1] > heights[2]
+
+
+def test_a_noisy_log_shows_the_valves_as_they_are_sent(folder: Path) -> None:
+    """However late each of them acts, and whenever the row was written."""
+    shown = run("simulate", str(folder), "--noise", "--out", "noisy", "--json")
+    log = Trajectory.read(json.loads(shown.stdout)["logs"][0])
+    table = read_controller(folder)
+    valves = [name for name in table.names if "/valve/" in name]
+    assert valves and all(np.array_equal(log[name], table[name][: len(log)]) for name in valves)
 
 
 def test_the_same_seed_writes_the_same_log(folder: Path) -> None:

@@ -13,10 +13,11 @@ from kemba.errors import KembaError
 from kemba.identify.answer import Answer
 from kemba.identify.checks import check_logs
 from kemba.identify.excerpt import excerpts
-from kemba.identify.logs import read_log
+from kemba.identify.logs import load_map, read_log
 from kemba.identify.workflow import discover_logs
 from kemba.trajectory import Trajectory
 
+DATA = Path(__file__).parent / "data"
 Damage = Callable[[list[str]], list[str]]
 
 
@@ -90,6 +91,7 @@ REFUSED: dict[str, tuple[Damage, str]] = {
         lambda t: [t[0]] + [line.rsplit(",", 1)[0] + "," for line in t[1:2000]] + t[2000:],
         "readings are missing",
     ),
+    "two logs joined": (column(X, lambda x: 0.07 - x, first=1000), r"log.csv:1002:2.*leaps by"),
     "nothing happens": (
         lambda t: [t[0]] + [f"{i / 1e3},0.02,0,0,{i % 7}" for i in range(1000)],
         "nothing moves",
@@ -109,6 +111,37 @@ def test_damage_is_refused_in_words(kind: str, log_file: Path) -> None:
         assert answer.verdict == "bad-data" and found is None
         text = answer.sentence
     assert re.search(words, text.replace("\n", " ")), text
+
+
+def test_another_encoding_is_no_matter_or_is_named(log_file: Path) -> None:
+    clean, text = read_log(log_file), log_file.read_text()
+    log_file.write_text(text, encoding="utf-8-sig")
+    assert np.array_equal(read_log(log_file)["piston/F"], clean["piston/F"])
+    log_file.write_text(text.replace("piston/F [N]", "piston/F [N],Öl [K]"), encoding="latin-1")
+    with pytest.raises(KembaError, match="not a UTF-8 text"):
+        read_log(log_file)
+
+
+LEGS = {"front": "rear", "rear": "front"}
+MIXED_UP: dict[str, Callable[[str, np.ndarray], tuple[str, np.ndarray]]] = {
+    "swapped legs": lambda header, y: (
+        "/".join(LEGS.get(part, part) for part in header.split("/")),
+        y,
+    ),
+    "hips counted the other way": lambda header, y: (header, -y if "hip/q" in header else y),
+    "hips in degrees": lambda header, y: (header, np.degrees(y) if "hip/q" in header else y),
+}
+
+
+@pytest.mark.parametrize("kind", MIXED_UP)
+def test_mixed_up_columns_of_a_robot_are_refused(kind: str, tmp_path: Path) -> None:
+    log = read_log(DATA / "authors_jump_land.csv", load_map("authors"))
+    columns = [MIXED_UP[kind](h, log[n]) for h, n in zip(log.headers, log.names, strict=True)]
+    meta = {"kind": "robot", "noise": log.meta["noise"]}
+    Trajectory(log.time, dict(columns), meta).write(tmp_path / "jump.csv")
+    answer, found = discover_logs([tmp_path / "jump.csv"])
+    assert answer.verdict == "bad-data" and found is None
+    assert re.search("columns swapped|a sign|in degrees", answer.sentence), answer.sentence
 
 
 def test_binary_is_refused(log_file: Path) -> None:

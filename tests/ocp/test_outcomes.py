@@ -14,7 +14,7 @@ from kemba.ocp.certify import certify
 from kemba.ocp.mirror import find_symmetry
 from kemba.ocp.plan import Planner
 from kemba.ocp.result import to_trajectory
-from kemba.ocp.schedule import find
+from kemba.ocp.schedule import find, fix, tighten
 from kemba.ocp.wishes import resolve
 
 FILES = [
@@ -86,6 +86,7 @@ def test_half_a_plan_is_a_whole_one() -> None:
     search = Planner(task, model, wishes, deadline=math.inf).search(task.nodes, half)
     transcription = search.transcription
     point = find(search, Planner(task, model, wishes).guess(transcription))
+    point = tighten(search, fix(search, point))
     assert point.solved
     found = certify(model, task, wishes, to_trajectory(transcription, point.Y))
     assert found.within(task.tolerances), found.worst

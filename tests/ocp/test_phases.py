@@ -30,7 +30,6 @@ CASES = [
     ("max_jump", "height=1.0 m"),
     ("jump", "payload=1 kg"),
     ("jump", "supply=0.6 MPa"),
-    ("jump", "supply=0.8 MPa"),
     ("jump", "start.body/x=-5 cm"),
     ("jump_forward", "distance=0.1 m"),
     ("jump_forward", "distance=0.3 m"),

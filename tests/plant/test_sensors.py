@@ -52,3 +52,4 @@ def test_jitter_keeps_the_order_of_the_samples() -> None:
     times = Sensors(jitter=5e-4).times(0.5, np.random.default_rng(0))
     assert len(times) == 501
     assert (np.diff(times) > 0.0).all()
+    assert (times >= np.arange(501) / 1000.0 - 1e-12).all()  # a row shows its tick's commands

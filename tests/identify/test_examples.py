@@ -1,0 +1,69 @@
+"""The worked examples of the documents: their commands run, and find what the pages say."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from kemba_cli.main import app
+
+ROOT = Path(__file__).parents[2]
+
+
+def commands(page: str) -> list[list[str]]:
+    """Arguments of every kemba-opt call of a page, in order."""
+    text = (ROOT / "docs" / page).read_text(encoding="utf-8")
+    return [shlex.split(line) for line in re.findall(r"^\$ kemba-opt (.+)$", text, re.MULTILINE)]
+
+
+def run(arguments: list[str]) -> str:
+    found = CliRunner().invoke(app, arguments)
+    assert found.exit_code == 0, found.output
+    return found.stdout
+
+
+def test_the_tables_tell_of_friction_supply_and_tubes() -> None:
+    page = (ROOT / "docs" / "example-tables.md").read_text(encoding="utf-8")
+    tables, *others = commands("example-tables.md")
+    said = run(tables)
+    assert said.splitlines()[0] in page
+    found = json.loads(run([*tables, "--json"]))
+    for mode, losses in found["losses_n"].items():
+        assert f"| {mode} | {' | '.join(f'{loss:.1f}' for loss in losses)} |" in page
+    low, high = found["seal_friction_n"]
+    assert 5.5 < low < high < 8.5
+    assert all(shortfall[-1] > 0.08 for shortfall in found["supply_shortfall"].values())
+    assert all(16e-6 < volume < 19e-6 for volume in found["tube_volume_m3"].values())
+    for arguments in others:
+        assert arguments[-1] in run(arguments)
+
+
+@pytest.fixture
+def at_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A folder in which the paths of the page lead to the repository's files."""
+    (tmp_path / "tests").symlink_to(ROOT / "tests")
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.mark.usefixtures("at_home")
+def test_a_foreign_plan_lacks_the_weight_of_the_boom() -> None:
+    compare, discover, adopt = commands("example-foreign.md")
+    cells = json.loads(run([*compare, "--json"]))["cells"]
+    worst = max(
+        (c for c in cells if c["phase"] == "flight" and c["mode"] == "00"), key=lambda c: c["ratio"]
+    )
+    assert worst["channel"] == "body/z" and worst["ratio"] > 10 and worst["q_value"] < 1e-6
+
+    answer = json.loads(run([*discover, "--json"]))
+    assert answer["verdict"] == "missing" and "boom_force" in answer["added"]
+    (force,) = [r["parameters"]["F"] for r in answer["ranking"] if r["effect"] == "boom_force"]
+    assert force["low"] < 12.2 < force["high"] and force["high"] - force["low"] < 4.0
+    assert answer["error_after"] < 1.3 < answer["error_before"]
+
+    run(adopt)
+    assert "boom_force" in Path("with_boom_force.yaml").read_text(encoding="utf-8")
