@@ -12,14 +12,11 @@ the file are not run again, so an interrupted study goes on where it stopped.
 
 from __future__ import annotations
 
-import argparse
-import json
 import os
 import sys
 import tempfile
 import time
 import traceback
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +29,7 @@ from twin.cases import bench_case
 from twin.catalogue import CATALOGUE
 from twin.measure import Sensors
 
-from blind import baselines, report
+from blind import baselines, study
 from kemba.identify.answer import Answer
 from kemba.identify.bench import bench_problem
 from kemba.identify.checks import BadData, check_logs
@@ -71,14 +68,8 @@ MODELS = {"first_order": "planning", "orifice": str(Path(__file__).parent / "ori
 def cases() -> list[dict[str, Any]]:
     """Settings of all cases; each kind is spread evenly over the whole order."""
     rng = np.random.default_rng(20)
-    placed = []
-    for kinds, repeats in REPEATS:
-        for effect in kinds:
-            start, turn = rng.random(), int(rng.integers(6))
-            places = (np.arange(repeats) + start) / repeats
-            placed += [(p, effect, turn + i) for i, p in enumerate(places)]
-    placed.sort(key=lambda item: item[0])
-    return [_setting(effect, turn, seed, rng) for seed, (_, effect, turn) in enumerate(placed)]
+    turns = study.spread(REPEATS, rng)
+    return [_setting(effect, turn, seed, rng) for seed, (effect, turn) in enumerate(turns)]
 
 
 def _setting(effect: Any, turn: int, seed: int, rng: np.random.Generator) -> dict[str, Any]:
@@ -125,33 +116,5 @@ def run(setting: dict[str, Any]) -> dict[str, Any]:
     return {**record, "seconds": seconds, "baselines": simple}
 
 
-def pending(options: argparse.Namespace) -> Iterator[dict[str, Any]]:
-    """What this part has to do and the file does not have."""
-    done = {json.dumps(r["case"], sort_keys=True) for r in report.read(options.out)}
-    part, parts = (int(p) for p in options.part.split("/"))
-    for setting in cases()[: options.cases][part - 1 :: parts]:
-        if json.dumps(setting, sort_keys=True) not in done:
-            yield setting
-
-
-def main() -> None:
-    """Run what is not yet in the file, then print the report."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--cases", type=int, default=None, help="so many of the beginning only")
-    parser.add_argument("--out", type=Path, default=Path("bench.jsonl"))
-    parser.add_argument("--part", default="1/1", help="i/n: every n-th case, from the i-th on")
-    parser.add_argument("--write", action="store_true", help="put the report into the docs")
-    parser.add_argument("--report", action="store_true", help="run nothing, only report the file")
-    options = parser.parse_args()
-    for setting in () if options.report else pending(options):
-        record = run(setting)
-        report.append(options.out, record)
-        print(report.line(record), flush=True)
-    text = report.table(report.read(options.out))
-    print(text)
-    if options.write:
-        report.write(ROOT / "docs" / "discovery.md", "bench", text)
-
-
 if __name__ == "__main__":
-    main()
+    study.main("bench", __doc__, cases(), run)

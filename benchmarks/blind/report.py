@@ -148,7 +148,8 @@ def table(records: Sequence[Record]) -> str:
         _row(
             "error falls 3 x or to 1.3 x noise, where right", [r for r in known if right(r)], _falls
         ),
-        f"| median time | {_median([r['seconds'] for r in records]):.0f} s | {len(records)} |",
+        f"| median CPU seconds of discover | {_median([r['seconds'] for r in records]):.0f} "
+        f"| {len(records)} |",
     ]
     for name, label in (
         ("one_by_bic", "one term by BIC"),

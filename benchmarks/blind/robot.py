@@ -11,14 +11,11 @@ Finished cases are kept in the file: an interrupted study goes on where it stopp
 
 from __future__ import annotations
 
-import argparse
-import json
 import os
 import sys
 import tempfile
 import time
 import traceback
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +28,7 @@ from twin.cases import robot_case
 from twin.catalogue import CATALOGUE
 from twin.measure import Sensors, fault_channels
 
-from blind import baselines, report
+from blind import baselines, study
 from kemba.identify.answer import Answer
 from kemba.identify.checks import BadData, check_logs
 from kemba.identify.discover import discover
@@ -62,14 +59,8 @@ SIZES, NOISES = (1.0, 0.7, 1.5), (1.0, 2.0, 0.5)
 def cases() -> list[dict[str, Any]]:
     """Settings of all cases; each kind is spread evenly over the whole order."""
     rng = np.random.default_rng(21)
-    placed = []
-    for kinds, repeats in REPEATS:
-        for effect in kinds:
-            start, turn = rng.random(), int(rng.integers(6))
-            places = (np.arange(repeats) + start) / repeats
-            placed += [(p, effect, turn + i) for i, p in enumerate(places)]
-    placed.sort(key=lambda item: item[0])
-    return [_setting(effect, turn, seed, rng) for seed, (_, effect, turn) in enumerate(placed)]
+    turns = study.spread(REPEATS, rng)
+    return [_setting(effect, turn, seed, rng) for seed, (effect, turn) in enumerate(turns)]
 
 
 def _setting(effect: Any, turn: int, seed: int, rng: np.random.Generator) -> dict[str, Any]:
@@ -122,37 +113,5 @@ def _standing(folder: Path, effect: Any, size: float, **options: Any) -> tuple[l
     return robot_case(folder, effect, size=size, **options)
 
 
-def pending(options: argparse.Namespace) -> Iterator[dict[str, Any]]:
-    """What this part has to do and the file does not have."""
-    done = {json.dumps(r["case"], sort_keys=True) for r in report.read(options.out)}
-    part, parts = (int(p) for p in options.part.split("/"))
-    for setting in cases()[: options.cases][part - 1 :: parts]:
-        if json.dumps(setting, sort_keys=True) not in done:
-            yield setting
-
-
-def main() -> None:
-    """Run what is not yet in the file, then print the report."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--cases", type=int, default=None, help="so many of the beginning only")
-    parser.add_argument("--out", type=Path, default=Path("robot.jsonl"))
-    parser.add_argument("--part", default="1/1", help="i/n: every n-th case, from the i-th on")
-    parser.add_argument("--write", action="store_true", help="put the report into the docs")
-    parser.add_argument("--report", action="store_true", help="run nothing, only report the file")
-    options = parser.parse_args()
-    for setting in () if options.report else pending(options):
-        try:
-            record = run(setting)
-        except RuntimeError as error:  # no motion of the twin survives this case
-            print(f"left out: {setting['effect']} {setting['seed']}: {error}", flush=True)
-            continue
-        report.append(options.out, record)
-        print(report.line(record), flush=True)
-    text = report.table(report.read(options.out))
-    print(text)
-    if options.write:
-        report.write(ROOT / "docs" / "discovery.md", "robot", text)
-
-
 if __name__ == "__main__":
-    main()
+    study.main("robot", __doc__, cases(), run)

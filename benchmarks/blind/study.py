@@ -1,0 +1,69 @@
+"""Running a blind study: cases in a fair order, resumed from a file, reported into the docs."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from blind import report
+
+Setting = dict[str, Any]
+DOCS = Path(__file__).resolve().parents[2] / "docs" / "discovery.md"
+
+
+def spread(
+    repeats: Sequence[tuple[Sequence[Any], int]], rng: np.random.Generator
+) -> list[tuple[Any, int]]:
+    """(effect, turn) of all cases, each kind evenly over the whole order, so that the beginning
+    of a study is a fair sample of it."""
+    placed = []
+    for kinds, count in repeats:
+        for effect in kinds:
+            start, turn = rng.random(), int(rng.integers(6))
+            places = (np.arange(count) + start) / count
+            placed += [(p, effect, turn + i) for i, p in enumerate(places)]
+    placed.sort(key=lambda item: item[0])
+    return [(effect, turn) for _, effect, turn in placed]
+
+
+def main(
+    name: str, text: str | None, cases: Sequence[Setting], run: Callable[[Setting], dict[str, Any]]
+) -> None:
+    """The command line of a study: run what is not yet in the file, then print the report."""
+    parser = argparse.ArgumentParser(description=text)
+    parser.add_argument("--cases", type=int, default=None, help="so many of the beginning only")
+    parser.add_argument("--out", type=Path, default=Path(f"{name}.jsonl"))
+    parser.add_argument("--part", default="1/1", help="i/n: every n-th case, from the i-th on")
+    parser.add_argument("--write", action="store_true", help="put the report into the docs")
+    parser.add_argument("--report", action="store_true", help="run nothing, only report the file")
+    options = parser.parse_args()
+    for setting in () if options.report else _pending(cases, options):
+        try:
+            record = run(setting)
+        except RuntimeError as error:  # the twin cannot do this case, as when every motion topples
+            report.append(options.out, {"case": setting, "left_out": str(error)})
+            print(f"left out: {setting['effect']} {setting['seed']}: {error}", flush=True)
+            continue
+        report.append(options.out, record)
+        print(report.line(record), flush=True)
+    records = report.read(options.out)
+    done = [record for record in records if "left_out" not in record]
+    found = f"{len(done)} of {len(cases)} cases run, {len(records) - len(done)} left out because "
+    found += f"the twin cannot do them.\n\n{report.table(done)}"
+    print(found)
+    if options.write:
+        report.write(DOCS, name, found)
+
+
+def _pending(cases: Sequence[Setting], options: argparse.Namespace) -> Iterator[Setting]:
+    """What this part has to do and the file does not have."""
+    done = {json.dumps(r["case"], sort_keys=True) for r in report.read(options.out)}
+    part, parts = (int(p) for p in options.part.split("/"))
+    for setting in cases[: options.cases][part - 1 :: parts]:
+        if json.dumps(setting, sort_keys=True) not in done:
+            yield setting
