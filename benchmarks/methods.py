@@ -61,7 +61,7 @@ def main() -> None:
     parser.add_argument("--nodes", type=int, default=100)
     parser.add_argument("--time-limit", type=float, default=600.0)
     asked = parser.parse_args()
-    common = [f"nodes={asked.nodes}", f"solver.time_limit={asked.time_limit}"]
+    common = ["refine=none", f"nodes={asked.nodes}", f"solver.time_limit={asked.time_limit}"]
     print(f"{asked.task}, N = {asked.nodes}, {machine()}\n")
     print(HEAD)
     print("|---|---" + "|---:" * 8 + "|")

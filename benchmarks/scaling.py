@@ -2,8 +2,8 @@
 
     python benchmarks/scaling.py [--save docs/scaling.png] [--repeats 3]
 
-Prints the median CPU time of cold solves from slightly different guesses, and the exponent p of
-time ~ N^p. Aim: p at most 1.5.
+Prints the median CPU time of cold solves from slightly different guesses, not refined, and the
+exponent p of time ~ N^p. Aim: p at most 1.5.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ def seconds(name: str, nodes: int, repeats: int, limit: float) -> float:
     times = []
     for seed in range(repeats):
         noise = ["guess_noise=0.02", f"seed={seed}"] if seed else []
-        options = [f"nodes={nodes}", f"solver.time_limit={limit}", *noise]
+        options = ["refine=none", f"nodes={nodes}", f"solver.time_limit={limit}", *noise]
         found = plan(*load_task(name, options))
         print(
             f"{name:20s} N = {nodes:4d}  {found.solve_cpu_s:7.2f} s  {found.sentence}", flush=True

@@ -12,7 +12,7 @@ from kemba_cli.common import Json, Quiet, print_json
 
 def report(
     run: Annotated[Path, typer.Argument(help="Run folder, as solve writes it.")],
-    out: Annotated[Path | None, typer.Option(help="HTML to write [report.html in RUN].")] = None,
+    out: Annotated[Path | None, typer.Option(help="HTML to write (report.html in RUN).")] = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:

@@ -18,7 +18,7 @@ EVERY = 10.0  # s between lines where no one watches
 def sweep(
     file: Annotated[str, typer.Argument(metavar="SWEEP", help="Sweep YAML, here or shipped.")],
     out: Annotated[
-        Path | None, typer.Option(help="Folder to write or to continue [sweeps/NAME].")
+        Path | None, typer.Option(help="Folder to write or to continue (sweeps/NAME).")
     ] = None,
     overrides: Annotated[
         list[str] | None, typer.Option("--set", help="Override a key: --set seed=2.")
@@ -26,7 +26,9 @@ def sweep(
     scheduler: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="A Dask scheduler instead of our own.")
     ] = None,
-    jobs: Annotated[int | None, typer.Option(min=1, help="Processes of our own [cores].")] = None,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="Processes of our own (as many as cores).")
+    ] = None,
     time_limit: Annotated[
         float | None, typer.Option(min=0.1, help="Seconds after which to stop.")
     ] = None,

@@ -12,7 +12,7 @@ from kemba_cli.common import Json, Quiet, print_json
 
 def view(
     run: Annotated[Path, typer.Argument(help="Run folder, or the CSV of a motion.")],
-    out: Annotated[Path | None, typer.Option(help="HTML to write [view.html beside it].")] = None,
+    out: Annotated[Path | None, typer.Option(help="HTML to write (view.html beside it).")] = None,
     model: Annotated[
         str | None, typer.Option(help="Model YAML with the robot, not the run's own.")
     ] = None,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import casadi as ca
@@ -11,6 +11,7 @@ import numpy as np
 from scipy import sparse
 
 from kemba.ocp.compiled import compiled
+from kemba.ocp.lifted import lifted
 
 Entries = tuple[ca.MX, np.ndarray, np.ndarray]  # nonzeros, their rows, their columns
 
@@ -22,12 +23,20 @@ class Block:
     """Rows `g` (m,) and cost `f` of the local variables `z`, repeated over `columns`.
 
     `columns` (repeats, len(z)): where each repeat's local variables stand in the full vector.
+    `constants` (k,): symbols in g and f that stand for `numbers` (k,).
     """
 
     z: ca.SX
     g: ca.SX
     f: ca.SX
     columns: np.ndarray
+    constants: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
+    numbers: np.ndarray = field(default_factory=lambda: np.zeros(0))
+
+    def lifted(self, p: ca.SX) -> Block:
+        """The same with its numbers as constants, so that others can share its code."""
+        (f, g), constants, numbers = lifted([self.z, p], [self.f, ca.densify(self.g)])
+        return replace(self, g=g, f=f, constants=constants, numbers=numbers)
 
     @cached_property
     def multipliers(self) -> tuple[ca.SX, ca.SX]:
@@ -55,15 +64,15 @@ class BlockProblem:
     def __init__(
         self, blocks: Sequence[Block], size: int, p: ca.SX, worth_compiling: bool = False
     ) -> None:
-        self.blocks, self.size, self.p = list(blocks), size, p
-        self.worth_compiling = worth_compiling
+        self.blocks = [b.lifted(p) for b in blocks] if worth_compiling else list(blocks)
+        self.size, self.p, self.worth_compiling = size, p, worth_compiling
         self.rows = sum(len(b.columns) * b.g.numel() for b in blocks)
         x, parameter = ca.MX.sym("x", size), ca.MX.sym("p", p.numel())
         self.x, self.parameter = x, parameter
         f, g = ca.MX(0), []
-        for block in blocks:
-            z, rows = block.z, ca.densify(block.g)
-            value = ca.Function("value", [z, p], ca.cse([block.f, rows])).map(len(block.columns))
+        for block in self.blocks:
+            at, rows = [block.z, ca.vertcat(p, block.constants)], ca.densify(block.g)
+            value = ca.Function("value", at, ca.cse([block.f, rows])).map(len(block.columns))
             cost, values = value(*self._local(block))
             f += ca.sum2(cost)
             g.append(ca.vec(values))
@@ -71,9 +80,9 @@ class BlockProblem:
         self.g = ca.Function("g", [x, parameter], [self.nlp["g"]], ["x", "p"], ["g"])
 
     def _local(self, block: Block) -> tuple[ca.MX, ca.MX]:
-        """Local variables and parameters of every repeat, side by side."""
-        local = _gather(self.x, block.columns)
-        return local, ca.repmat(self.parameter, 1, len(block.columns))
+        """Local variables, parameters and constants of every repeat, side by side."""
+        given = ca.vertcat(self.parameter, ca.DM(block.numbers))
+        return _gather(self.x, block.columns), ca.repmat(given, 1, len(block.columns))
 
     @cached_property
     def grad_f(self) -> ca.Function:
@@ -137,10 +146,11 @@ def _gather(x: ca.MX, columns: np.ndarray) -> ca.MX:
 def _functions(block: Block, p: ca.SX, worth_compiling: bool) -> list[ca.Function]:
     """Of one repeat: the cost's slope, the rows' Jacobian, the Lagrangian's Hessian."""
     z, f, g = block.z, block.f, ca.densify(block.g)
+    at = [z, ca.vertcat(p, block.constants)]
     functions = [
-        ca.Function("slope", [z, p], ca.cse([f, ca.densify(ca.gradient(f, z))])),
-        ca.Function("first", [z, p], ca.cse([g, _column(block.jacobian)])),
-        ca.Function("second", [z, p, *block.multipliers], ca.cse([_column(block.hessian)])),
+        ca.Function("slope", at, ca.cse([f, ca.densify(ca.gradient(f, z))])),
+        ca.Function("first", at, ca.cse([g, _column(block.jacobian)])),
+        ca.Function("second", [*at, *block.multipliers], ca.cse([_column(block.hessian)])),
     ]
     large = functions[-1].n_instructions() > LARGE
     return compiled(functions) if worth_compiling and large else functions

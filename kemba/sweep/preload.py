@@ -1,6 +1,5 @@
 """Loaded by our own workers: Ctrl-C reaches the whole terminal, but only the client answers it."""
 
-import os
 import signal
 from typing import Any
 
@@ -8,5 +7,3 @@ from typing import Any
 def dask_setup(_: Any) -> None:
     """Called by dask when a worker starts."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    # every case has other figures in its functions: compiling each once takes longer than it saves
-    os.environ.setdefault("KEMBA_COMPILE", "0")

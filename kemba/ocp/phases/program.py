@@ -218,7 +218,7 @@ class Program:
     def problem(self) -> BlockProblem:
         """The functions for IPOPT."""
         blocks = [Block(part.z, part.g, part.f, part.columns) for part in self._parts]
-        return BlockProblem(blocks, self.columns.size, ca.SX(0, 1))
+        return BlockProblem(blocks, self.columns.size, ca.SX(0, 1), worth_compiling=True)
 
     @cached_property
     def _parts(self) -> list[Part]:
