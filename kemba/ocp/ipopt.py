@@ -37,16 +37,17 @@ class Point:
 @dataclass(frozen=True)
 class Parameters:
     """What a step of a schedule sets: pair relaxation, the weights of valve penalty and switching
-    (per node of the grid's mean), and of the pair penalty (per pair)."""
+    (per node of the grid's mean), of the pair penalty (per pair), and of squared scaled forces."""
 
     eps: float
     valve: float = 0.0
     switching: float = 0.0
     pairs: float = 0.0
+    forces: float = 0.0
 
     def vector(self, nodes: int) -> list[float]:
         """The program's parameters on a grid of `nodes`."""
-        return [self.eps, self.valve / nodes, self.switching / nodes, self.pairs]
+        return [self.eps, self.valve / nodes, self.switching / nodes, self.pairs, self.forces]
 
 
 Watch = Callable[[int, float, float], None]  # iteration, objective, worst scaled violation

@@ -44,6 +44,7 @@ from kemba.ocp.wishes import Wish, resolve
 from kemba.trajectory import Trajectory
 
 COARSEST = 24  # nodes below which a coarser grid no longer helps
+NUDGE = 0.05  # guess noise of the second start where the first plan does not refine
 
 
 @dataclass(frozen=True)
@@ -65,6 +66,7 @@ class Plan:
     variables: int
     constraints: int
     relax: tuple[Relax, ...] = ()
+    refined: bool = False
 
     @property
     def iterations(self) -> int:
@@ -225,19 +227,50 @@ def plan(
     refused = refusal(findings)
     planner.build_s = time.perf_counter() - started
     planner.deadline = time.monotonic() + task.solver.time_limit
-    started, busy = time.perf_counter(), time.process_time()
-    build_before = planner.build_s
-    transcription, point = planner.refuse() if refused else planner.run()
-    elapsed = time.perf_counter() - started - (planner.build_s - build_before)
-    busy = time.process_time() - busy - planner.build_cpu_s
-    trajectory = to_trajectory(transcription, point.Y)
-    found = judge(planner, transcription, trajectory, point, elapsed, busy)
+    found = searched(planner, refused is not None)
     if found.status == "solved" and task.refine == "radau":
-        return on_phases(planner, found)
+        return refined(planner, found)
     if found.status in ("solved", "acceptable", "interrupted"):
         return found
     why = refused or explanation(task, built, planner.outcome, findings, document)
     return found if why is None else explained(found, why)
+
+
+def searched(planner: Planner, refused: bool) -> Plan:
+    """What the strategies find, judged; the start guess for a task that a check refused."""
+    started, busy = time.perf_counter(), time.process_time()
+    build_before = planner.build_s
+    build_cpu_before = planner.build_cpu_s
+    transcription, point = planner.refuse() if refused else planner.run()
+    elapsed = time.perf_counter() - started - (planner.build_s - build_before)
+    busy = time.process_time() - busy - (planner.build_cpu_s - build_cpu_before)
+    trajectory = to_trajectory(transcription, point.Y)
+    return judge(planner, transcription, trajectory, point, elapsed, busy)
+
+
+def refined(planner: Planner, found: Plan) -> Plan:
+    """The plan on its own phases; where that fails, another start's, which often differs little
+    and yet refines. Not on a whole robot, where one failure takes long enough."""
+    first = on_phases(planner, found)
+    half = next(planner.reductions()).symmetric and planner.start is None
+    if first.refined or first.status != "solved" or not half:
+        return first
+    task = planner.task
+    nudged = {"guess_noise": max(task.guess_noise, NUDGE), "seed": task.seed + 1}
+    planner.task = task.model_copy(update=nudged)
+    second = searched(planner, False)
+    planner.task = task
+    if second.status == "solved":
+        second = on_phases(planner, replace(second, task=task))
+    if second.status == "interrupted":
+        first = replace(first, status="interrupted")
+    best = second if second.refined else first
+    return replace(
+        best,
+        attempts=tuple(planner.attempts),
+        solve_s=first.solve_s + second.solve_s,
+        solve_cpu_s=first.solve_cpu_s + second.solve_cpu_s,
+    )
 
 
 def on_phases(planner: Planner, found: Plan) -> Plan:
@@ -255,9 +288,10 @@ def on_phases(planner: Planner, found: Plan) -> Plan:
         watch=planner.watch,
         stop=planner.stop,
     )
+    planner.attempts.append(Attempt("phases", answer.message, answer.iterations))
     found = replace(
         found,
-        attempts=(*found.attempts, Attempt("phases", answer.message, answer.iterations)),
+        attempts=tuple(planner.attempts),
         solve_s=found.solve_s + time.perf_counter() - started,
         solve_cpu_s=found.solve_cpu_s + time.process_time() - busy,
     )
@@ -276,6 +310,7 @@ def on_phases(planner: Planner, found: Plan) -> Plan:
         status=status,
         sentence=f"{sentence}, refined on {len(answer.phases)} phases",
         cost=costs(model, new),
+        refined=True,
     )
 
 

@@ -19,6 +19,7 @@ HOPELESS = ("Infeasible_Problem_Detected", "Maximum_Iterations_Exceeded")
 LOOSE, TIGHT = 1e-3, 1e-4  # relaxation of the pairs: body weights times metres
 MARGIN = 0.8  # the last relaxation stays this much below what the certificate asks
 VALVE, SWITCHING = 0.1, 0.05
+FORCES = 3e-5  # while valves are sought; without it IPOPT wanders where the cost is flat
 STOPS = ("User_Requested_Stop", "Maximum_CpuTime_Exceeded", "Maximum_WallTime_Exceeded")
 CONFIRMED = 1e-7  # scaled violation
 # off the bounds: a plan with rounded valves, or between the nodes of its grid, is not feasible
@@ -99,7 +100,7 @@ def find(search: Search, start: Point) -> Point:
     most = min(PATIENCE, int(search.ipopt.options.get("max_iter", PATIENCE)))
     interior = {"bound_push": 0.3, "bound_frac": 0.3, "mu_init": 0.1, "tol": 1e-3}
     interior["max_iter"] = most
-    point = search.solve(RELAX, start, Parameters(LOOSE), options=interior)
+    point = search.solve(RELAX, start, Parameters(LOOSE, forces=FORCES), options=interior)
     if point.message in HOPELESS:
         return point  # what the relaxed pairs forbid, tighter ones do not allow
     return binary(search, point)
@@ -107,16 +108,18 @@ def find(search: Search, start: Point) -> Point:
 
 def binary(search: Search, point: Point) -> Point:
     """Push the valves towards 0 and 1, then round and fix them, the pairs as loose as before."""
-    parameters = Parameters(LOOSE, VALVE, SWITCHING)
+    parameters = Parameters(LOOSE, VALVE, SWITCHING, forces=FORCES)
     point = search.solve("binary valves", point, parameters, options=warm(1e-3, tol=1e-3))
     options, fixed = warm(1e-2, ROUNDED, tol=1e-3), search.valves(point)
-    return search.solve("round valves", point, Parameters(LOOSE), options=options, fixed=fixed)
+    parameters = Parameters(LOOSE, forces=FORCES)
+    return search.solve("round valves", point, parameters, options=options, fixed=fixed)
 
 
-def fix(search: Search, point: Point, push: float = 1e-6) -> Point:
+def fix(search: Search, point: Point, push: float = 1e-6, forces: float = FORCES) -> Point:
     """Round and fix the valves, the pairs tighter."""
     options, fixed = warm(1e-3, push, tol=1e-3), search.valves(point)
-    return search.solve("fix valves", point, Parameters(TIGHT), options=options, fixed=fixed)
+    parameters = Parameters(TIGHT, forces=forces)
+    return search.solve("fix valves", point, parameters, options=options, fixed=fixed)
 
 
 def tighten(search: Search, point: Point) -> Point:
@@ -129,7 +132,8 @@ def tighten(search: Search, point: Point) -> Point:
 
 def refine(search: Search, coarse: Transcription, point: Point) -> Point:
     """A coarse plan on the finer grid of `search`, with its valves kept."""
-    return fix(search, Point(prolong(coarse, search.transcription, point.Y)), PROLONGED)
+    start = Point(prolong(coarse, search.transcription, point.Y))
+    return fix(search, start, PROLONGED, forces=0.0)
 
 
 def prolong(coarse: Transcription, fine: Transcription, Y: np.ndarray) -> np.ndarray:

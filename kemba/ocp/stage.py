@@ -16,7 +16,6 @@ from kemba.ocp.mirror import Reduction
 
 ANGLE_ARM = 0.2  # m; turns a moment defect into a force defect
 COST_SCALE = 10.0  # N2.m2.s; makes a plan's cost 0.01 to 10 beside penalties near one
-FORCES = 3e-5  # of squared scaled forces; without it IPOPT wanders where the cost is flat
 
 INF = np.inf
 
@@ -41,7 +40,8 @@ class Rows:
 class Stage:
     """Symbols and rows of one interval between the nodes y0 and y.
 
-    Parameters: `eps` relaxes the pairs; `weights` = (valve penalty, switching, pair penalty).
+    Parameters: `eps` relaxes the pairs; `weights` = (valve penalty, switching, pair
+    penalty, squared forces).
     """
 
     layout: Layout
@@ -78,7 +78,7 @@ def build_stage(
             ca.SX(0, 1),
         ]
     )
-    eps, weights = ca.SX.sym("eps"), ca.SX.sym("weights", 3)
+    eps, weights = ca.SX.sym("eps"), ca.SX.sym("weights", 4)
     labels = [node.pair_rows[i][0].label for i in reduction.pairs]
     a_rows = [node.pair_rows[i][0] for i in reduction.pairs]
     b_rows = [node.pair_rows[i][1] for i in reduction.pairs]
@@ -105,10 +105,10 @@ def build_stage(
     u, u0 = y[layout.binary], y0[layout.binary]
     objective = (
         objective / COST_SCALE
-        + FORCES * ca.sumsqr(y[layout.slices["lam"]]) * h / STEP
         + weights[0] * ca.sum1(u * (1 - u))
         + weights[1] * ca.sumsqr(u - u0)
         + weights[2] * ca.sum1(product)
+        + weights[3] * ca.sumsqr(y[layout.slices["lam"]]) * h / STEP
     )
     kept = tuple(r for r in rows if r.g.numel())
     return Stage(layout, y0, y, eps, weights, kept, ca.densify(ca.SX(objective)))

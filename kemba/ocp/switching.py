@@ -6,7 +6,7 @@ import numpy as np
 
 from kemba.model import Model
 from kemba.ocp.ipopt import Parameters, Point
-from kemba.ocp.schedule import SWITCHING, TIGHT, VALVE, Search, fix, warm
+from kemba.ocp.schedule import FORCES, SWITCHING, TIGHT, VALVE, Search, fix, warm
 from kemba.trajectory import Trajectory
 
 REACH = 4  # nodes by which a switch may move at a time
@@ -19,7 +19,7 @@ def polish(search: Search, point: Point) -> Point:
     best: Point | None = None
     for _ in range(ROUNDS[search.transcription.reduction.symmetric]):
         how = {"options": warm(1e-3, tol=1e-3), "free": _release(search, point)}
-        parameters = Parameters(TIGHT, VALVE, SWITCHING / 5)
+        parameters = Parameters(TIGHT, VALVE, SWITCHING / 5, forces=FORCES)
         loose = search.solve("move switches", Point(point.Y), parameters, **how)
         better = fix(search, Point(loose.Y))
         if not better.solved or (best and better.objective >= (1 - PAYS) * best.objective):

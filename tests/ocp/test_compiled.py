@@ -64,7 +64,7 @@ def test_compiled_is_the_same_to_the_last_bit(
     assert [path.suffix for path in tmp_path.iterdir()] == [".so"]
     assert fast.class_name() != plain.class_name()
     z = np.random.default_rng(0).normal(0.5, 0.1, block.z.numel())
-    values = np.concatenate([[1e-3, 0.1, 0.1, 0.1], block.numbers])
+    values = np.concatenate([[1e-3, 0.1, 0.1, 0.1, 1e-5], block.numbers])
     assert np.array_equal(np.array(fast(z, values)), np.array(plain(z, values)))
 
 
