@@ -5,14 +5,13 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing import get_context
 from pathlib import Path
 
 from kemba.config import Document
 from kemba.ocp.plan import Plan, plan
 from kemba.ocp.task import Task
-from kemba.trajectory import Trajectory
 
 NOISE = 0.25  # of the scaled guess; the first start has the task's own
 
@@ -24,7 +23,6 @@ class Start:
     seed: int
     status: str
     cost: float
-    trajectory: Trajectory
 
 
 def plan_best(
@@ -37,8 +35,8 @@ def plan_best(
 ) -> Plan:
     """The cheapest of `starts` plans from noisy guesses, `jobs` at a time (default: the cores).
 
-    The best one is solved once more from its own trajectory in this process, so that the answer
-    does not depend on what travelled between processes. Raises as `plan` does.
+    The best one is solved once more from its own guess in this process: a plan's functions do not
+    travel between processes. Raises as `plan` does.
     """
     tasks = [
         task.model_copy(update={"guess_noise": max(task.guess_noise, NOISE * (i > 0)), "seed": i})
@@ -59,13 +57,13 @@ def plan_best(
     if not solved:
         return plan(task, document, log=log, tell=tell)
     best = min(solved, key=lambda s: s.cost)
-    return plan(task, document, log=log, tell=tell, start=best.trajectory)
+    return replace(plan(tasks[best.seed], document, log=log, tell=tell), task=task)
 
 
 def _start(task: Task) -> Start:
     found = plan(task)
     cost = sum(w * found.cost.get(COST_KEYS.get(n, n), 0.0) for n, w in task.cost.items())
-    return Start(task.seed, found.status, cost, found.trajectory)
+    return Start(task.seed, found.status, cost)
 
 
 COST_KEYS = {"torque_squared": "torque_squared_integral", "air": "valve_open_s"}

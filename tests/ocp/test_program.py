@@ -16,7 +16,7 @@ from kemba.ocp.schedule import prolong, widen
 from kemba.ocp.transcribe import Transcription
 from kemba.ocp.wishes import resolve
 
-PARAMETERS = [1e-3, 0.1, 0.05, 0.02]
+PARAMETERS = [1e-3, 0.1, 0.05, 0.02, 1e-2]
 STEP = 1e-6
 
 
