@@ -53,14 +53,15 @@ PAIRS = [
     ["sensor_delay:body/z", "seal_friction"],
 ]
 REPEATS = ((EFFECTS, 4), (SENSORS, 1), (UNKNOWN, 2), (PAIRS, 2), ([None], 60))
+SEED = 1000  # cases of other seeds were looked at while the method was built
 SIZES, NOISES = (1.0, 0.7, 1.5), (1.0, 2.0, 0.5)
 
 
 def cases() -> list[dict[str, Any]]:
     """Settings of all cases; each kind is spread evenly over the whole order."""
-    rng = np.random.default_rng(21)
+    rng = np.random.default_rng(SEED)
     turns = study.spread(REPEATS, rng)
-    return [_setting(effect, turn, seed, rng) for seed, (effect, turn) in enumerate(turns)]
+    return [_setting(effect, turn, SEED + i, rng) for i, (effect, turn) in enumerate(turns)]
 
 
 def _setting(effect: Any, turn: int, seed: int, rng: np.random.Generator) -> dict[str, Any]:

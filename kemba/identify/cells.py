@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import chi2, false_discovery_control
 
+from kemba.identify.grains import codes, rms
 from kemba.identify.problem import Array, Labels, Rows
 
 FEWEST = 5  # grains that make a cell
@@ -35,55 +36,15 @@ class Cell:
         return self.q_value < FALSE_DISCOVERIES
 
 
-@dataclass(frozen=True)
-class Grains:
-    """Sums `z` (k,) of successive rows in units of what noise would make of them, and the index
-    `first` (k,) of the row at which each begins."""
-
-    z: Array
-    first: Labels
-
-    @property
-    def ratio(self) -> float:
-        return rms(self.z)
-
-    def of(self, own: np.ndarray[Any, Any]) -> float:
-        """Ratio over the grains of the rows that `own` (n,) chooses."""
-        return rms(self.z[own[self.first]])
-
-
-def grains(rows: Rows, region: Labels, r: Array, expected: Array, size: int) -> Grains:
-    """Sums of `size` successive rows of one run, channel and condition over what noise would make
-    of them. A model that is wrong errs for longer than a sample; noise does not.
-    """
-    begin = np.flatnonzero(changes(rows, region))
-    place = np.arange(len(r)) - np.repeat(begin, np.diff(np.append(begin, len(r))))
-    first = np.flatnonzero(place % size == 0)
-    total, power = np.add.reduceat(r, first), np.add.reduceat(expected, first)
-    return Grains(total / np.sqrt(power), first)
-
-
-def changes(rows: Rows, region: Labels) -> np.ndarray[Any, np.dtype[np.bool_]]:
-    """Rows (n,) whose run, channel or condition differs from that of the row before."""
-    fresh = np.ones(len(rows), dtype=bool)
-    labels = (rows.run, rows.channel, *(codes(x) for x in (rows.phase, rows.mode, region)))
-    fresh[1:] = np.any([a[1:] != a[:-1] for a in labels], axis=0)
-    return fresh
-
-
-def codes(labels: np.ndarray[Any, Any]) -> Labels:
-    """Labels as whole numbers."""
-    return np.asarray(np.unique(labels.astype(str), return_inverse=True)[1])
-
-
-def cells(rows: Rows, region: Labels, grain: Grains) -> Iterable[Cell]:
-    """Every condition with enough data; q values over all of them."""
+def cells(rows: Rows, region: Labels, first: Labels, sums: Array) -> Iterable[Cell]:
+    """Every condition with enough data, of grains that begin at row `first` (k,) and sum to `sums`
+    (k,) in units of noise; q values over all of them."""
     parts = (rows.phase, rows.mode, region)
     names = [np.unique(a.astype(str)) for a in parts]
-    table = np.stack([rows.channel, *(codes(a) for a in parts)], axis=1)[grain.first]
-    sound = ~doubtful(rows)[grain.first]
+    table = np.stack([rows.channel, *(codes(a) for a in parts)], axis=1)[first]
+    sound = ~doubtful(rows)[first]
     kinds, own = np.unique(table[sound], axis=0, return_inverse=True)
-    groups = [grain.z[sound][own.ravel() == i] for i in range(len(kinds))]
+    groups = [sums[sound][own.ravel() == i] for i in range(len(kinds))]
     known = [i for i, z in enumerate(groups) if len(z) >= FEWEST]
     q = false_discovery_control([excess(groups[i]) for i in known]) if known else ()
     for i, q_value in zip(known, q, strict=True):
@@ -110,8 +71,3 @@ def excess(z: Array) -> float:
     echo = max(float(power[1:] @ power[:-1]) / spread, 0.0) if spread > 0 else 0.0
     count = len(z) * (1.0 - echo) / (1.0 + echo)
     return float(chi2.sf(np.mean(z**2) / TOLERATED**2 * count, count))
-
-
-def rms(z: Array) -> float:
-    """Root mean square; NaN of nothing."""
-    return float(np.sqrt(np.mean(z**2))) if len(z) else float("nan")

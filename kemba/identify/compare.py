@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from kemba.identify.cells import Cell, Grains, cells, grains
+from kemba.identify.cells import Cell, cells
 from kemba.identify.compare_hints import Hint, Response, conflicts, lacking, lagged
+from kemba.identify.grains import Grains, expected, grains, rms
 from kemba.identify.laws import Law, laws
 from kemba.identify.missing import Missing, Peak, peaks
 from kemba.identify.problem import Array, Labels, Problem, Rows, Theta
@@ -83,21 +84,21 @@ def compare(problem: Problem, model: str, logs: Sequence[str] = ()) -> Compariso
     fitted."""
     start = free_starts(problem)
     rows, r = problem.rows(), problem.residual(start)
-    expected = _expected(problem, len(r))
     _, region = region_labels(problem, rows)
-    grain = grains(rows, region, r, expected, getattr(problem, "grain", 1))
+    grain = grains(problem, rows, region)
+    sums = grain.sums(r)
     known = slopes(problem, start)
-    responses = tuple(lagged(problem, rows, r / np.sqrt(expected)))
+    responses = tuple(lagged(problem, rows, r / np.sqrt(expected(problem, len(r)))))
     forces = tuple(laws(problem, r))
     sent = [s.hint for s in responses if s.certain]
     left = within_tolerance(r, known)
-    ratio, clean = _tolerant(rows, region, left, expected, grain)
+    ratio, clean = _tolerant(rows, region, grain, left)
     found = Comparison(
         tuple(logs) or problem.runs,
         model,
-        grain.ratio,
+        rms(sums),
         tuple(_channels(problem, rows, r, grain, start)),
-        tuple(cells(rows, region, grain)),
+        tuple(cells(rows, region, grain.first, sums)),
         ratio,
         clean and not any(law.matters for law in laws(problem, left)),
         (*sent, *conflicts(problem, rows, r, known)),
@@ -110,11 +111,6 @@ def compare(problem: Problem, model: str, logs: Sequence[str] = ()) -> Compariso
     return replace(found, sentence=phrase(found))
 
 
-def _expected(problem: Problem, count: int) -> Array:
-    power = getattr(problem, "expected_power", None)
-    return np.asarray(power()) if power else np.ones(count)
-
-
 def conditions(
     problem: Problem, theta: Theta | None = None, regions: bool = False
 ) -> tuple[float, list[Cell]]:
@@ -123,18 +119,16 @@ def conditions(
     region = np.full(len(rows), "", dtype=object)
     if regions:
         _, region = region_labels(problem, rows)
-    grain = grains(rows, region, r, _expected(problem, len(r)), getattr(problem, "grain", 1))
-    return grain.ratio, list(cells(rows, region, grain))
+    grain = grains(problem, rows, region)
+    sums = grain.sums(r)
+    return rms(sums), list(cells(rows, region, grain.first, sums))
 
 
-def _tolerant(
-    rows: Rows, region: Labels, left: Array, expected: Array, grain: Grains
-) -> tuple[float, bool]:
+def _tolerant(rows: Rows, region: Labels, grain: Grains, left: Array) -> tuple[float, bool]:
     """Error ratio of what the figures' tolerance leaves, and whether it is within the noise."""
-    z = np.add.reduceat(left, grain.first) / np.sqrt(np.add.reduceat(expected, grain.first))
-    better = Grains(z, grain.first)
-    clean = not any(c.significant for c in cells(rows, region, better))
-    return better.ratio, clean and better.ratio <= GOOD
+    sums = grain.sums(left)
+    clean = not any(c.significant for c in cells(rows, region, grain.first, sums))
+    return rms(sums), clean and rms(sums) <= GOOD
 
 
 def measured_units(rows: Rows) -> dict[str, str]:
@@ -153,6 +147,7 @@ def _channels(
 ) -> Iterable[ChannelError]:
     windows = getattr(problem, "window_errors", None)
     errors = windows(start) if windows else {}
+    sums = grain.sums(r)
     headers = measured_units(rows)
     for k, channel in enumerate(rows.channels):
         own = rows.channel == k
@@ -164,7 +159,7 @@ def _channels(
             float(np.sqrt(np.mean(error**2))),
             float(np.max(np.abs(error))),
             float(np.median(rows.sigma[own])),
-            grain.of(own),
+            rms(sums[own[grain.first]]),
         )
 
 

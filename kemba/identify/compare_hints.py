@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2, norm
 
-from kemba.identify.cells import codes
+from kemba.identify.grains import codes
 from kemba.identify.laws import LAGS, PLAIN, Law, middle, risen
 from kemba.identify.problem import Array, Labels, Problem, Rows
 from kemba.identify.tolerance import Slopes

@@ -7,10 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import lsq_linear
 
+from kemba.identify.baseline import best_fit
+from kemba.identify.grains import grains_of, rms
 from kemba.identify.linear import Linear, estimate, linearise, time_blocks
+from kemba.identify.point import Point
 from kemba.identify.problem import Array, Problem, Theta
 from kemba.identify.rank import NULL, Hypothesis
-from kemba.identify.search import Point, Search, best_fit
+from kemba.identify.search import Search
 
 NONE = 1e-6  # a floor that lets nothing through
 TOLERATED = 3.0  # sigma by which a nominal figure may be off
@@ -39,7 +42,12 @@ def left_out(search: Search, hypothesis: Hypothesis, against: Hypothesis = NULL)
 
 
 def _predicted(search: Search, point: Point) -> Array:
-    """Log likelihood (b,) of each block under the fit to all others.
+    """Log likelihood (b,) of each block under the fit to all others."""
+    return -0.5 * _powers(search, point, point.linear) / search.heat
+
+
+def _powers(search: Search, point: Point, judged: Linear) -> Array:
+    """Sum of squares (b,) that `judged` has of each block under the fit to all others.
 
     A left-out block judges the hypothesis itself: nothing else may help at floor level, and no
     nominal figure may leave its tolerance to do an effect's work.
@@ -48,15 +56,14 @@ def _predicted(search: Search, point: Point) -> Array:
     for block in range(len(linear.count)):
         mask = np.arange(len(linear.count)) == block
         step = within_tolerance(search, linear.without(mask), point.hypothesis) - linear.at
-        one = linear.only(mask)
-        power = one.power[0] + 2 * one.slope[0] @ step + step @ one.gram[0] @ step
-        found.append(-0.5 * float(power) / search.heat)
+        one = judged.only(mask)
+        found.append(one.power[0] + 2 * one.slope[0] @ step + step @ one.gram[0] @ step)
     return np.array(found)
 
 
 def within_tolerance(search: Search, linear: Linear, hypothesis: Hypothesis) -> Array:
     """z (k,) of the best fit with the nominal figures within their tolerance."""
-    ranker = search.ranker(linear, floor=NONE)
+    ranker = search.base.ranker(linear, floor=NONE)
     width = ranker.widths(hypothesis, 1.0)
     gram, slope, _ = linear.total
     h = gram * np.outer(width, width) / search.heat + np.eye(len(width))
@@ -69,23 +76,17 @@ def within_tolerance(search: Search, linear: Linear, hypothesis: Hypothesis) -> 
 
 
 def predicted_error(search: Search, point: Point) -> float:
-    """RMS of whitened residuals, each block predicted from all others."""
-    power = -2.0 * search.heat * float(_predicted(search, point).sum())
-    return float(np.sqrt(max(power, 0.0) / expected(search.problem).sum()))
+    """RMS of whitened residuals summed over grains, each block predicted from all others."""
+    power = float(_powers(search, point, point.coarse).sum())
+    return float(np.sqrt(max(power, 0.0) / point.coarse.count.sum()))
 
 
-def expected(problem: Problem) -> Array:
-    """Mean square (n,) of each row if the model were right: one, or what the problem knows."""
-    known = getattr(problem, "expected_power", None)
-    return np.asarray(known() if known else np.ones(len(problem.rows())))
-
-
-def rms(problem: Problem, theta: Theta) -> float:
-    """RMS of whitened residuals on other logs; only how their runs start is fitted to them."""
+def heldout_error(problem: Problem, theta: Theta) -> float:
+    """RMS of whitened residuals summed over grains on other logs; only how their runs start is
+    fitted to them."""
     names = tuple(n for n in problem.nuisance if n not in theta or n.startswith("start:"))
     theta = {k: v for k, v in theta.items() if not k.startswith("start:")}
     if names:
         linear, _, _ = linearise(problem, theta, time_blocks(problem), names)
         theta = theta | estimate(problem, linear, best_fit(linear))
-    r = problem.residual(theta)
-    return float(np.sqrt(np.sum(r**2) / expected(problem).sum()))
+    return rms(grains_of(problem).sums(problem.residual(theta)))

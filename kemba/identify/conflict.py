@@ -44,7 +44,7 @@ def drifting(search: Search, best: Hypothesis) -> Drift | None:
     count = np.bincount(run)
     found: list[Drift] = []
     for effect, candidate in problem.candidates.items():
-        column = search.null_jacobian[:, search.points[()].linear.index(candidate.key)]
+        column = search.base.jacobian[:, search.points[()].linear.index(candidate.key)]
         gram, slope = _sums(column * column, run), _sums(column * residual, run)
         error = (1.0 + FORGIVEN**2 * count) / np.maximum(gram, 1e-12)
         keep = error < (INFORMED * candidate.lead.size) ** 2
@@ -69,7 +69,7 @@ def _tolerant(search: Search) -> Array:
     """Residual of the model as it is, its nominal figures within their tolerance."""
     linear = search.points[NULL].linear
     z = within_tolerance(search, linear, NULL)
-    return search.null_residual + search.null_jacobian @ (z - linear.at)
+    return search.base.residual + search.base.jacobian @ (z - linear.at)
 
 
 def _sums(values: Array, run: Labels) -> Array:

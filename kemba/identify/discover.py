@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kemba.identify.answer import SIGNIFICANT, Answer, Ranked, Value, phrase
-from kemba.identify.confirm import left_out, predicted_error, rms
+from kemba.identify.confirm import heldout_error, left_out, predicted_error
 from kemba.identify.conflict import Drift, drifting
 from kemba.identify.linear import is_shape, time_blocks
 from kemba.identify.null import NullTest, bootstrap, smallest_detectable
@@ -63,15 +63,15 @@ def discover(
 
 def null_test(search: Search) -> NullTest:
     """The bootstrap of the search, with the noise these data have."""
-    point = search.points[NULL]
+    base = search.base
     blocks = time_blocks(search.problem, shortest=FINE)
-    left = search.null_residual + search.null_jacobian @ (search.flexible_fit() - point.linear.at)
-    pieces = search.null_jacobian * left[:, None]
+    left = base.residual + base.jacobian @ (base.flexible_fit() - base.point.linear.at)
+    pieces = base.jacobian * left[:, None]
     order = np.argsort(blocks, kind="stable")
     edges = np.flatnonzero(np.diff(blocks[order], prepend=-1))
     noise = np.add.reduceat(pieces[order], edges, axis=0)
     singles = [(name,) for name in search.problem.candidates]
-    return bootstrap(search.ranker(point.linear), noise, singles)
+    return bootstrap(base.ranker(base.point.linear), noise, singles)
 
 
 def _believed(search: Search, best: Hypothesis, test: NullTest) -> tuple[Hypothesis, float]:
@@ -132,7 +132,7 @@ def _answer(
     before = error(search, NULL, holdout)
     after = error(search, best, holdout) if best else before
     verdict = "unknown" if formula or doubts else "missing" if best else "nothing"
-    ranker = search.ranker(search.points[NULL].linear)
+    ranker = search.base.ranker(search.points[NULL].linear)
     sizes = smallest_detectable(ranker, test.threshold)
     answer = Answer(
         verdict=verdict,  # type: ignore[arg-type]
@@ -158,7 +158,7 @@ def error(search: Search, hypothesis: Hypothesis, holdout: Problem | None) -> fl
     point = search.points[hypothesis]
     if holdout is None:
         return predicted_error(search, point)
-    return rms(holdout, point.fit.theta)
+    return heldout_error(holdout, point.fit.theta)
 
 
 def ranked(search: Search, best: Hypothesis, holdout: Problem | None) -> list[Ranked]:

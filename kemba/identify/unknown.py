@@ -120,7 +120,7 @@ def extended(
         np.concatenate([linear.width, widths]),
         np.concatenate([jacobian, columns], axis=1),
         r,
-        search.blocks,
+        search.base.division.blocks,
     )
     ranker = Ranker(
         joined, {**search.problem.candidates, **candidates}, search.problem.nuisance, search.heat
@@ -136,7 +136,7 @@ def look(search: Search, best: Hypothesis) -> Formula | None:
     if not library:
         return None
     ranker, names = extended(
-        search, null.linear, search.null_jacobian, search.null_residual, library
+        search, null.linear, search.base.jacobian, search.base.residual, library
     )
     alone = _grow(ranker, names, ())
     catalogue = search.points[best].log_evidence - null.log_evidence if best else 0.0

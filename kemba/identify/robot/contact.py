@@ -10,8 +10,8 @@ from scipy.ndimage import (
     binary_dilation,
     binary_erosion,
     binary_opening,
+    gaussian_filter1d,
     minimum_filter1d,
-    uniform_filter1d,
 )
 from scipy.signal import savgol_filter
 
@@ -33,6 +33,7 @@ STICKING = 0.04  # m.s-1
 FIRM_LOAD = 15.0  # N: of a foot whose sliding friction means something
 LEAST_LOAD = 6.0  # N: a foot that carries less is not known to stand
 RATE_WINDOW = 0.02  # s
+STEADY = 0.008  # s: the push of a leg changes no faster
 
 
 @dataclass(frozen=True)
@@ -107,14 +108,18 @@ def _after(flags: Flags, steps: float) -> Flags:
 
 
 def loaded(schedule: Schedule, normal: Array, dt: float) -> Schedule:
-    """The same with only those feet settled that carry a load: `normal` (n, legs) in N."""
+    """The same with only those feet settled that carry a load: `normal` (n, legs) in N, steady."""
     width = max(3, round(RATE_WINDOW / dt))
-    mean = uniform_filter1d(normal, width, axis=0)
-    firm = minimum_filter1d(mean, width, axis=0) > FIRM_LOAD
+    firm = minimum_filter1d(normal, width, axis=0) > FIRM_LOAD
     slides = schedule.slides * firm
     for leg in slides.T:  # a slip that lasts: a foot that just lifts off drags along for a moment
         leg *= binary_opening(leg != 0.0, np.ones(width, bool))
-    return replace(schedule, settled=schedule.settled & (mean > LEAST_LOAD), slides=slides)
+    return replace(schedule, settled=schedule.settled & (normal > LEAST_LOAD), slides=slides)
+
+
+def steady(values: Array, dt: float) -> Array:
+    """Forces or rates (n, ...) without what changes from sample to sample, which is noise."""
+    return np.asarray(gaussian_filter1d(values, STEADY / dt, axis=0))
 
 
 def slope(values: Array, dt: float) -> Array:

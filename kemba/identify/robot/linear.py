@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from kemba.identify.robot.batch import Batch
-from kemba.identify.robot.contact import Schedule
+from kemba.identify.robot.contact import Schedule, steady
 from kemba.identify.robot.filter import System, gains, smooth
 from kemba.identify.robot.physics import Physics
 from kemba.identify.robot.reference import (
@@ -38,11 +38,11 @@ class Linearised:
     system: System
     inverse: Array  # (n, L, k, k) of the mass matrix
     contact: Array  # (n, L, k) generalised contact and stop force found in the data
-    normal: Array  # (n, L, legs) contact force, up
+    normal: Array  # (n, L, legs) contact force, up, steady
     y: Array
     rate: Array
     places: Array  # (n, L, 3 legs): x and z of each foot, pistons
-    sinking: Array
+    sinking: Array  # (n, L, legs) speed of the feet, down, steady
     masses: Array
     less_grip: Array  # (n, L, k) generalised force per unit of friction coefficient, missing
     shift: Array  # (n, L, k) acceleration of the model beyond the reference's
@@ -73,7 +73,7 @@ class Linearised:
 
     def penetration(self, softness: float, d: float) -> Array:
         """Depth (n, L, places) of the feet in a floor of stiffness 1/softness."""
-        growth = np.maximum(1.0 + d * self.sinking, 0.05)
+        growth = np.maximum(1.0 + d * self.sinking, 0.5)
         legs = self.normal.shape[2]
         depth = np.zeros_like(self.places)
         depth[..., 1 : 2 * legs : 2] = softness * np.maximum(self.normal, 0.0) / growth
@@ -108,7 +108,8 @@ def linearise(
     Jf_force[..., 1::2, :] -= grip
     channels = np.concatenate([Jy, Jf_force], axis=2).swapaxes(-1, -2)
     contact, feet_force = contact_force(channels, density, force, k, legs)
-    normal = feet_force[..., 1::2]
+    dt = float(np.median(batch.h[batch.valid]))
+    normal = steady(feet_force[..., 1::2], dt)
     # inertia effects are judged at the model's acceleration: the data's own is noise for the most
     # part, and noise in a regressor passes for a smaller mass
     shift = -(inverse @ (force - contact)[..., None])[..., 0]
@@ -164,7 +165,7 @@ def linearise(
         y,
         rate,
         np.concatenate([feet, y[..., k - legs :]], axis=2),
-        -feet_rate[..., 1::2],
+        steady(-feet_rate[..., 1::2], dt),
         masses,
         less_grip,
         shift,
