@@ -15,8 +15,6 @@ from __future__ import annotations
 import os
 import sys
 import tempfile
-import time
-import traceback
 from pathlib import Path
 from typing import Any
 
@@ -29,11 +27,9 @@ from twin.cases import bench_case
 from twin.catalogue import CATALOGUE
 from twin.measure import Sensors
 
-from blind import baselines, study
-from kemba.identify.answer import Answer
-from kemba.identify.bench import bench_problem
-from kemba.identify.checks import BadData, check_logs
-from kemba.identify.discover import discover
+from blind import study
+from kemba.identify.bench import BenchProblem, bench_problem
+from kemba.identify.checks import check_logs
 from kemba.identify.logs import read_logs
 from kemba.model.spec import load_model
 
@@ -97,23 +93,14 @@ def run(setting: dict[str, Any]) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         paths, truth = bench_case(Path(folder), setting["effect"], sensors=sensors, **options)
         logs = read_logs(paths)
-    started = time.process_time()
-    simple: dict[str, Any] = dict.fromkeys(baselines.NAMES)
-    try:
+
+    def problem() -> BenchProblem:
         check_logs(logs)
-        problem = bench_problem(logs, load_model(MODELS[setting["chambers"]], rig=True))
-        problem.plausible()
-        answer = discover(problem).answer
-        seconds = time.process_time() - started
-        simple = baselines.all_of(problem)
-    except BadData as error:
-        answer, seconds = Answer("bad-data", sentence=str(error)), time.process_time() - started
-    except Exception:  # a study goes on; the case counts as a miss
-        traceback.print_exc()
-        text = traceback.format_exc(limit=-1)
-        answer, seconds = Answer("bad-data", sentence=text), time.process_time() - started
-    record = {"case": setting, "truth": truth["effects"], "answer": answer.json()}
-    return {**record, "seconds": seconds, "baselines": simple}
+        found = bench_problem(logs, load_model(MODELS[setting["chambers"]], rig=True))
+        found.plausible()
+        return found
+
+    return {"case": setting, "truth": truth["effects"], **study.answered(problem)}
 
 
 if __name__ == "__main__":

@@ -14,8 +14,6 @@ from __future__ import annotations
 import os
 import sys
 import tempfile
-import time
-import traceback
 from pathlib import Path
 from typing import Any
 
@@ -28,12 +26,10 @@ from twin.cases import robot_case
 from twin.catalogue import CATALOGUE
 from twin.measure import Sensors, fault_channels
 
-from blind import baselines, study
-from kemba.identify.answer import Answer
-from kemba.identify.checks import BadData, check_logs
-from kemba.identify.discover import discover
+from blind import study
+from kemba.identify.checks import check_logs
 from kemba.identify.logs import read_logs
-from kemba.identify.robot import robot_problem
+from kemba.identify.robot import RobotProblem, robot_problem
 from kemba.model.spec import load_model
 
 EFFECTS = [name for name, entry in CATALOGUE.items() if entry.known]
@@ -85,23 +81,14 @@ def run(setting: dict[str, Any]) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         paths, truth = _standing(Path(folder), setting["effect"], sensors=sensors, **options)
         logs = read_logs(paths)
-    started = time.process_time()
-    simple: dict[str, Any] = dict.fromkeys(baselines.NAMES)
-    try:
+
+    def problem() -> RobotProblem:
         check_logs(logs)
-        problem = robot_problem(logs, load_model())
-        problem.plausible()
-        simple = baselines.all_of(problem)
-        started = time.process_time()
-        answer = discover(problem).answer
-    except BadData as error:
-        answer = Answer("bad-data", sentence=str(error))
-    except Exception:  # a study goes on; the case counts as a miss
-        traceback.print_exc()
-        answer = Answer("bad-data", sentence=traceback.format_exc(limit=-1))
-    seconds = time.process_time() - started
-    record = {"case": setting, "truth": truth["effects"], "answer": answer.json()}
-    return {**record, "seconds": seconds, "baselines": simple}
+        found = robot_problem(logs, load_model())
+        found.plausible()
+        return found
+
+    return {"case": setting, "truth": truth["effects"], **study.answered(problem)}
 
 
 def _standing(folder: Path, effect: Any, size: float, **options: Any) -> tuple[list[Path], Any]:

@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import argparse
 import json
+import time
+import traceback
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from blind import report
+from blind import baselines, report
+from kemba.identify.answer import Answer
+from kemba.identify.checks import BadData
+from kemba.identify.discover import discover
+from kemba.identify.problem import Problem
 
 Setting = dict[str, Any]
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "discovery.md"
@@ -29,6 +35,25 @@ def spread(
             placed += [(p, effect, turn + i) for i, p in enumerate(places)]
     placed.sort(key=lambda item: item[0])
     return [(effect, turn) for _, effect, turn in placed]
+
+
+def answered(make: Callable[[], Problem]) -> dict[str, Any]:
+    """What `discover` and the baselines say of a problem, and the CPU seconds of the former.
+
+    Whatever goes wrong counts as a miss: a study goes on.
+    """
+    simple: dict[str, Any] = dict.fromkeys(baselines.NAMES)
+    started = time.process_time()
+    try:
+        problem = make()
+        answer = discover(problem).answer
+        seconds = time.process_time() - started
+        simple = baselines.all_of(problem)
+    except Exception as error:
+        if not isinstance(error, BadData):
+            traceback.print_exc()
+        answer, seconds = Answer("bad-data", sentence=str(error)), time.process_time() - started
+    return {"answer": answer.json(), "seconds": seconds, "baselines": simple}
 
 
 def main(

@@ -113,7 +113,7 @@ class Problem(Protocol):
     def rows(self, runs: Collection[int] | None = None) -> Rows:
         """What each row of `residual` is."""
 
-    def library(self, theta: Theta) -> Mapping[str, Array]:
+    def formulas(self, theta: Theta) -> Mapping[str, Array]:
         """Whitened columns (n,) of simple terms beyond the catalogue, by formula; may be empty."""
 
 

@@ -1,4 +1,4 @@
-"""What no effect of the catalogue explains: terms of a library, judged by the same evidence."""
+"""What no effect of the catalogue explains: simple terms, judged by the same evidence."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Examinable(Protocol):
 
 @runtime_checkable
 class Weighing(Protocol):
-    """A problem that can say how much a term of its library would matter."""
+    """A problem that can say how much a term would matter."""
 
     def weight(self, theta: Theta, formula: str, coefficient: float) -> float:
         """Its largest force as a share of what matters in practice."""
@@ -99,11 +99,11 @@ class Formula:
 
 
 def extended(
-    search: Search, linear: Linear, jacobian: Array, r: Array, library: Mapping[str, Array]
+    search: Search, linear: Linear, jacobian: Array, r: Array, formulas: Mapping[str, Array]
 ) -> tuple[Ranker, dict[str, str]]:
-    """A ranker that knows the library's terms as further candidates; their names by formula."""
-    names = {f"term{i}": formula for i, formula in enumerate(library)}
-    columns = np.stack([library[f] for f in names.values()], axis=1)
+    """A ranker that knows these terms as further candidates; their names by formula."""
+    names = {f"term{i}": formula for i, formula in enumerate(formulas)}
+    columns = np.stack([formulas[f] for f in names.values()], axis=1)
     reach = np.percentile(np.abs(columns), 99, axis=0)
     widths = WIDTH / np.maximum(reach, 1e-9)
     keep = [i for i in range(len(names)) if reach[i] > 1e-9]
@@ -132,11 +132,11 @@ def extended(
 def look(search: Search, best: Hypothesis) -> Formula | None:
     """The formula that explains what the best catalogue answer cannot, if there is one."""
     null = search.points[NULL]
-    library = search.problem.library(null.fit.theta)
-    if not library:
+    formulas = search.problem.formulas(null.fit.theta)
+    if not formulas:
         return None
     ranker, names = extended(
-        search, null.linear, search.base.jacobian, search.base.residual, library
+        search, null.linear, search.base.jacobian, search.base.residual, formulas
     )
     alone = _grow(ranker, names, ())
     catalogue = search.points[best].log_evidence - null.log_evidence if best else 0.0

@@ -72,11 +72,7 @@ def test_pressures_are_read_when_there_are_any(bench_log: BenchLog) -> None:
     log = bench_log()
     model = load_model(rig=True)
     bare = bench_problem([log], model)
-    states = (
-        bare._rig(())
-        .predict(bare._runs[0].motion, bare._runs[0].commands, dict.fromkeys(bare._scaled, 1.0))
-        .states
-    )
+    states = bare.predictor.predict(bare.logs[0], {}).states
     from kemba.identify.bench.pressure import absolute_pressure
 
     columns = {

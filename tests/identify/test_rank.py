@@ -56,7 +56,7 @@ class Toy:
         label = np.full(n, "moving")
         return Rows(run, np.zeros(n, int), self._time, label, label, ("F",), np.ones(n))
 
-    def library(self, theta: Theta) -> Mapping[str, Array]:
+    def formulas(self, theta: Theta) -> Mapping[str, Array]:
         return {"step": np.sign(self._time - 0.4)}
 
 

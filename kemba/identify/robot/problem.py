@@ -23,8 +23,8 @@ from kemba.identify.robot.drive import air_states, drives
 from kemba.identify.robot.expected import expected_power, predicted_error
 from kemba.identify.robot.filter import gains, innovations
 from kemba.identify.robot.forces import Forces
+from kemba.identify.robot.formulas import formula_columns
 from kemba.identify.robot.labels import describe
-from kemba.identify.robot.library import library
 from kemba.identify.robot.linear import Linearised, linearise, smoothed
 from kemba.identify.robot.physics import Physics
 from kemba.identify.robot.plausible import contradictions
@@ -265,9 +265,9 @@ class RobotProblem:
             raise BadData(faults)
         return []
 
-    def library(self, theta: Theta) -> Mapping[str, Array]:
+    def formulas(self, theta: Theta) -> Mapping[str, Array]:
         """Columns per unit of the coefficient, of simple terms beyond the catalogue."""
-        return library(self)
+        return formula_columns(self)
 
 
 def robot_problem(

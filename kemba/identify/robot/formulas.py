@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kemba.effects.friction import V_COULOMB
-from kemba.identify.bench.library import RANGES, STROKE, dahl
+from kemba.identify.bench.formulas import RANGES, STROKE, dahl
 from kemba.identify.robot.ports import port_columns
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ TEETH = (6, 8, 10, 12, 14, 16, 18, 20, 24)  # ripples of a motor per turn at the
 ROPES = (0.26, 0.28, 0.30, 0.32, 0.35)  # m, heights from which a cable pulls
 
 
-def library(problem: RobotProblem) -> dict[str, Array]:
+def formula_columns(problem: RobotProblem) -> dict[str, Array]:
     """Columns (rows,) per unit of the coefficient, by the formula a model's YAML would hold."""
     y, rate = problem.point.y, problem.point.rate
     legs = len(problem.physics.legs)
