@@ -205,3 +205,12 @@ def solve(a, y):
         for k in range(i + 1, NC):
             total -= a[k, i] * y[k]
         y[i] = total / a[i, i]
+
+
+def masses(robot):
+    """Mass or inertia (NQ,) of every coordinate, the boom's included, the hip rotors' not."""
+    m = np.zeros(NQ)
+    m[0::3], m[1::3], m[2::3] = robot.mass, robot.mass, robot.inertia
+    m[0] += robot.boom_mx
+    m[1] += robot.boom_mz
+    return m

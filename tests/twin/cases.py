@@ -17,9 +17,9 @@ import numpy as np
 from . import bench, logs, measure, rigs
 from .catalogue import CATALOGUE, hidden, is_sensor
 from .figures import Robot
-from .library import motion
 from .measure import Sensors, sensor_fault
 from .motions import upright
+from .repertoire import motion
 from .run import Truth, simulate
 
 ROBOT_MOTIONS = ("jump", "swing", "heave", "forward", "drop", "squat", "sway", "jump")

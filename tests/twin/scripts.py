@@ -85,6 +85,14 @@ def with_start(motion: Script, **changes) -> Script:
     return replace(motion, start=replace(motion.start, **changes))
 
 
+def short_hop(duration=0.4) -> Script:
+    """A push, a flight and a landing, for tests."""
+    pulses = [(FRONT_E, 0.0, 0.14), (REAR_E, 0.004, 0.147)]
+    pulses += [(FRONT_R, 0.2, 0.3), (REAR_R, 0.2, 0.25), (FRONT_E, 0.25, 0.3)]
+    knots = [(0.0, 0.0, 0.0), (0.15, -0.05, -0.08), (0.4, 0.1, 0.0)]
+    return script("hop", clock(duration), pulses, offsets=knots)
+
+
 def from_table(path: str | Path, name: str | None = None, kp=KP, kd=KD, start=None) -> Script:
     """A controller table: time, hip q, w (or qd) and tau, valves as sent; names of the log format.
 
