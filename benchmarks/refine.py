@@ -11,7 +11,8 @@ import time
 
 from kemba.ocp.certify import costs
 from kemba.ocp.phases import Refined, refine
-from kemba.ocp.plan import Plan, plan
+from kemba.ocp.plan import plan
+from kemba.ocp.planned import Plan
 from kemba.ocp.task import load_task
 from kemba.plant.replay import Replay, replay
 

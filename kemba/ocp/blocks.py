@@ -10,7 +10,9 @@ import casadi as ca
 import numpy as np
 from scipy import sparse
 
+from kemba.ocp.abreast import abreast
 from kemba.ocp.compiled import compiled
+from kemba.ocp.folded import folded
 from kemba.ocp.lifted import lifted
 
 Entries = tuple[ca.MX, np.ndarray, np.ndarray]  # nonzeros, their rows, their columns
@@ -34,8 +36,10 @@ class Block:
     numbers: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     def lifted(self, p: ca.SX) -> Block:
-        """The same with its numbers as constants, so that others can share its code."""
+        """The same with its numbers as constants, so that others can share its code, and mirrored
+        halves written once."""
         (f, g), constants, numbers = lifted([self.z, p], [self.f, ca.densify(self.g)])
+        f, g = folded([self.z, p, constants], [f, g])
         return replace(self, g=g, f=f, constants=constants, numbers=numbers)
 
     @cached_property
@@ -57,8 +61,8 @@ class Block:
 class BlockProblem:
     """min sum f, g stacked block by block, with Jacobian and Hessian given exactly.
 
-    Functions of (x, p): `g`, `grad_f`, `jac_g`, `hess_lag`, ready for `ca.nlpsol`; the derivatives
-    are made when first asked for, as compiled code where `worth_compiling` (many solves ahead).
+    `nlp`, `grad_f`, `jac_g`, `hess_lag` are what `ca.nlpsol` asks for, made when first asked for,
+    as compiled code where `worth_compiling` (many solves ahead); `g`: (x, p) -> (rows,).
     """
 
     def __init__(
@@ -67,75 +71,76 @@ class BlockProblem:
         self.blocks = [b.lifted(p) for b in blocks] if worth_compiling else list(blocks)
         self.size, self.p, self.worth_compiling = size, p, worth_compiling
         self.rows = sum(len(b.columns) * b.g.numel() for b in blocks)
-        x, parameter = ca.MX.sym("x", size), ca.MX.sym("p", p.numel())
-        self.x, self.parameter = x, parameter
-        f, g = ca.MX(0), []
-        for block in self.blocks:
-            at, rows = [block.z, ca.vertcat(p, block.constants)], ca.densify(block.g)
-            value = ca.Function("value", at, ca.cse([block.f, rows])).map(len(block.columns))
-            cost, values = value(*self._local(block))
-            f += ca.sum2(cost)
-            g.append(ca.vec(values))
-        self.nlp = {"x": x, "p": parameter, "f": f, "g": ca.vertcat(*g)}
-        self.g = ca.Function("g", [x, parameter], [self.nlp["g"]], ["x", "p"], ["g"])
+        self.x, self.parameter = ca.MX.sym("x", size), ca.MX.sym("p", p.numel())
 
-    def _local(self, block: Block) -> tuple[ca.MX, ca.MX]:
-        """Local variables, parameters and constants of every repeat, side by side."""
-        given = ca.vertcat(self.parameter, ca.DM(block.numbers))
-        return _gather(self.x, block.columns), ca.repmat(given, 1, len(block.columns))
+    @cached_property
+    def g(self) -> ca.Function:
+        """(x, p) -> every row."""
+        rows = [_repeated(b, _value(b, self.p))(*self._local(b)) for b in self.blocks]
+        at = [self.x, self.parameter]
+        return ca.Function("g", at, [ca.vertcat(*map(ca.vec, rows))], ["x", "p"], ["g"])
+
+    @cached_property
+    def nlp(self) -> dict[str, ca.MX]:
+        """x, p, f and g as expressions."""
+        f, g = ca.MX(0), []
+        for block, (cost, value, *_) in zip(self.blocks, self._functions, strict=True):
+            here = self._local(block)
+            f += ca.sum2(cost(*here))
+            g.append(ca.vec(value(*here)))
+        return {"x": self.x, "p": self.parameter, "f": f, "g": ca.vertcat(*g)}
 
     @cached_property
     def grad_f(self) -> ca.Function:
         """(x, p) -> f and its gradient."""
-        return self._derivatives[0]
+        f, gradients = ca.MX(0), []
+        for block, (_, _, slope, _, _) in zip(self.blocks, self._functions, strict=True):
+            cost, gradient = slope(*self._local(block))
+            f += ca.sum2(cost)
+            gradients.append((ca.vec(gradient), block.columns.ravel()))
+        return self._named("grad_f", [f, _gather_gradient(gradients, self.size)], "f", "grad_f_x")
 
     @cached_property
     def jac_g(self) -> ca.Function:
         """(x, p) -> g and its Jacobian."""
-        return self._derivatives[1]
+        g, parts, row = [], [], 0
+        for block, (_, _, _, first, _) in zip(self.blocks, self._functions, strict=True):
+            values, nonzeros = first(*self._local(block))
+            g.append(ca.vec(values))
+            parts.append(_place_jacobian(block, nonzeros, row))
+            row += values.numel()
+        jacobian = _scatter(parts, self.rows, self.size)
+        return self._named("jac_g", [ca.vertcat(*g), jacobian], "g", "jac_g_x")
 
     @cached_property
     def hess_lag(self) -> ca.Function:
         """(x, p, lam_f, lam_g) -> upper triangle of the Lagrangian's Hessian."""
-        return self._derivatives[2]
+        lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", self.rows)
+        parts, row = [], 0
+        for block, (*_, second) in zip(self.blocks, self._functions, strict=True):
+            m, n = block.g.numel(), len(block.columns)
+            multipliers = ca.reshape(lam_g[row : row + m * n], m, n)
+            nonzeros = second(*self._local(block), lam_f, multipliers)
+            parts.append(_place_hessian(block, nonzeros))
+            row += m * n
+        at = {"x": self.x, "p": self.parameter, "lam_f": lam_f, "lam_g": lam_g}
+        hessian = _scatter(parts, self.size, self.size)
+        result = ["triu_hess_gamma_x_x"]
+        return ca.Function("hess_lag", list(at.values()), [hessian], list(at), result)
+
+    def _named(self, name: str, results: list[ca.MX], *names: str) -> ca.Function:
+        return ca.Function(name, [self.x, self.parameter], results, ["x", "p"], list(names))
+
+    def _local(self, block: Block) -> tuple[ca.MX, ca.MX]:
+        """Local variables of every repeat, side by side; parameters and constants of all."""
+        given = ca.vertcat(self.parameter, ca.DM(block.numbers))
+        return _gather(self.x, block.columns), given
 
     @cached_property
-    def _derivatives(self) -> tuple[ca.Function, ca.Function, ca.Function]:
-        lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", self.rows)
-        f, gradients, g = ca.MX(0), [], []
-        jac: list[Entries] = []
-        hess: list[Entries] = []
-        row = 0
-        for block in self.blocks:
-            m, n = block.g.numel(), len(block.columns)
-            here = self._local(block)
-            functions = _functions(block, self.p, self.worth_compiling)
-            slope_of, first, second = (function.map(n) for function in functions)
-            cost, slope = slope_of(*here)
-            f += ca.sum2(cost)
-            gradients.append((ca.vec(slope), block.columns.ravel()))
-            values, j_block = first(*here)
-            g.append(ca.vec(values))
-            multipliers = ca.reshape(lam_g[row : row + m * n], m, n)
-            h_block = second(*here, ca.repmat(lam_f, 1, n), multipliers)
-            jac.append(_place_jacobian(block, j_block, row))
-            hess.append(_place_hessian(block, h_block))
-            row += m * n
-        names, at = ["x", "p"], [self.x, self.parameter]
-        gradient = _gather_gradient(gradients, self.size)
-        jacobian = [ca.vertcat(*g), _scatter(jac, self.rows, self.size)]
-        hessian = [_scatter(hess, self.size, self.size)]
-        return (
-            ca.Function("grad_f", at, [f, gradient], names, ["f", "grad_f_x"]),
-            ca.Function("jac_g", at, jacobian, names, ["g", "jac_g_x"]),
-            ca.Function(
-                "hess_lag",
-                [*at, lam_f, lam_g],
-                hessian,
-                [*names, "lam_f", "lam_g"],
-                ["triu_hess_gamma_x_x"],
-            ),
-        )
+    def _functions(self) -> list[list[ca.Function]]:
+        """Of every block, over its repeats: see `_functions`."""
+        made = [_functions(b, self.p, self.worth_compiling) for b in self.blocks]
+        return [[_repeated(b, f) for f in fs] for b, fs in zip(self.blocks, made, strict=True)]
 
 
 def _gather(x: ca.MX, columns: np.ndarray) -> ca.MX:
@@ -143,17 +148,29 @@ def _gather(x: ca.MX, columns: np.ndarray) -> ca.MX:
     return ca.reshape(x[index], columns.shape[1], columns.shape[0])
 
 
+def _value(block: Block, p: ca.SX) -> ca.Function:
+    rows = ca.cse(ca.densify(block.g))
+    return ca.Function("value", [block.z, ca.vertcat(p, block.constants)], [rows])
+
+
 def _functions(block: Block, p: ca.SX, worth_compiling: bool) -> list[ca.Function]:
-    """Of one repeat: the cost's slope, the rows' Jacobian, the Lagrangian's Hessian."""
+    """Of one repeat: cost, rows, the cost's slope, the rows' Jacobian, the Lagrangian's Hessian."""
     z, f, g = block.z, block.f, ca.densify(block.g)
     at = [z, ca.vertcat(p, block.constants)]
+    plain = [ca.Function("cost", at, [ca.cse(f)]), _value(block, p)]
     functions = [
         ca.Function("slope", at, ca.cse([f, ca.densify(ca.gradient(f, z))])),
         ca.Function("first", at, ca.cse([g, _column(block.jacobian)])),
         ca.Function("second", [*at, *block.multipliers], ca.cse([_column(block.hessian)])),
     ]
     large = functions[-1].n_instructions() > LARGE
-    return compiled(functions) if worth_compiling and large else functions
+    return plain + (compiled(functions) if worth_compiling and large else functions)
+
+
+def _repeated(block: Block, function: ca.Function) -> ca.Function:
+    """(z side by side, parameters and constants; lam_f, lam_g side by side) -> results alike."""
+    shared = [1, 2] if function.n_in() > 2 else [1]
+    return abreast(function, len(block.columns), shared)
 
 
 def _gather_gradient(parts: list[tuple[ca.MX, np.ndarray]], size: int) -> ca.MX:

@@ -23,7 +23,7 @@ from kemba.ocp.transcribe import Transcription, WishBlock
 from kemba.ocp.wishes import Wish
 
 if TYPE_CHECKING:
-    from kemba.ocp.plan import Planner
+    from kemba.ocp.planner import Planner
 
 BUDGET = 30.0  # s
 NODES = 40  # a coarser grid is enough to say what is too much

@@ -5,12 +5,14 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Protocol
 
 import casadi as ca
 import numpy as np
 
+from kemba.ocp.anchor import Anchored
 from kemba.ocp.blocks import BlockProblem
 from kemba.ocp.transcribe import Transcription
 
@@ -37,13 +39,15 @@ class Point:
 @dataclass(frozen=True)
 class Parameters:
     """What a step of a schedule sets: pair relaxation, the weights of valve penalty and switching
-    (per node of the grid's mean), of the pair penalty (per pair), and of squared scaled forces."""
+    (per node of the grid's mean), of the pair penalty (per pair), of squared scaled forces, and of
+    the way from the start (half its square in scaled variables)."""
 
     eps: float
     valve: float = 0.0
     switching: float = 0.0
     pairs: float = 0.0
     forces: float = 0.0
+    anchor: float = 0.0
 
     def vector(self, nodes: int) -> list[float]:
         """The program's parameters on a grid of `nodes`."""
@@ -67,9 +71,16 @@ class Watched(Protocol):
 class Watcher(ca.Callback):
     """Tells `watch` about every iteration, and asks `stop` whether to go on."""
 
-    def __init__(self, program: Watched, watch: Watch | None, stop: Callable[[], bool]) -> None:
+    def __init__(
+        self,
+        program: Watched,
+        watch: Watch | None,
+        stop: Callable[[], bool],
+        parameters: int | None = None,
+    ) -> None:
         super().__init__()
         self.t, self.watch, self.stop, self.count = program, watch, stop, 0
+        self.parameters = program.problem.p.numel() if parameters is None else parameters
         self.construct("watcher", {})
 
     def get_n_in(self) -> int:
@@ -84,7 +95,7 @@ class Watcher(ca.Callback):
     def get_sparsity_in(self, i: int) -> ca.Sparsity:
         rows = {"x": self.t.problem.size, "lam_x": self.t.problem.size, "f": 1}
         rows |= {"g": self.t.problem.rows, "lam_g": self.t.problem.rows}
-        return ca.Sparsity.dense(rows.get(ca.nlpsol_out(i), self.t.problem.p.numel()))
+        return ca.Sparsity.dense(rows.get(ca.nlpsol_out(i), self.parameters))
 
     def eval(self, arguments: Sequence[ca.DM]) -> list[int]:
         if self.watch is not None:
@@ -158,13 +169,15 @@ class Ipopt:
             own["max_wall_time"] = remaining
         if self.log is not None:
             own |= {"output_file": str(self.log), "file_print_level": 5, "file_append": "yes"}
-        plugin = self._plugin(own)
+        problem, p = self._posed(parameters, start)
+        plugin = self._plugin(problem, own)
         if self.watch is not None or self.stop is not None:
-            plugin["iteration_callback"] = Watcher(t, self.watch, self.stop or (lambda: False))
-        solver = ca.nlpsol("solver", "ipopt", t.problem.nlp, plugin)
+            stop = self.stop or (lambda: False)
+            plugin["iteration_callback"] = Watcher(t, self.watch, stop, len(p))
+        solver = ca.nlpsol("solver", "ipopt", problem.nlp, plugin)
         arguments: dict[str, Any] = {
             "x0": np.clip(start.Y, lower, upper).ravel(),
-            "p": parameters.vector(t.nodes),
+            "p": p,
             "lbx": lower.ravel(),
             "ubx": upper.ravel(),
             "lbg": t.g_lower,
@@ -184,8 +197,21 @@ class Ipopt:
             iterations=int(stats["iter_count"]),
         )
 
-    def _plugin(self, options: Mapping[str, Any]) -> dict[str, Any]:
-        problem = self.transcription.problem
+    def _posed(
+        self, parameters: Parameters, start: Point
+    ) -> tuple[BlockProblem | Anchored, list[float]]:
+        """The problem, anchored where asked, and its parameters."""
+        problem, p = self.transcription.problem, parameters.vector(self.transcription.nodes)
+        if not parameters.anchor:
+            return problem, p
+        return self._anchored, [*p, parameters.anchor, *start.Y.ravel()]
+
+    @cached_property
+    def _anchored(self) -> Anchored:
+        return Anchored(self.transcription.problem)
+
+    @staticmethod
+    def _plugin(problem: BlockProblem | Anchored, options: Mapping[str, Any]) -> dict[str, Any]:
         return {
             "print_time": False,
             "error_on_fail": False,
@@ -193,5 +219,6 @@ class Ipopt:
             "jac_g": problem.jac_g,
             "hess_lag": problem.hess_lag,
             "calc_lam_p": False,
+            "no_nlp_grad": True,
             **{f"ipopt.{name}": value for name, value in options.items()},
         }

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
-from kemba.ocp.plan import Plan
+from kemba.ocp.planned import Plan
 
 
 def answer(plan: Plan, run: str) -> dict[str, Any]:

@@ -22,6 +22,9 @@ VALVE, SWITCHING = 0.1, 0.05
 FORCES = 3e-5  # while valves are sought; without it IPOPT wanders where the cost is flat
 STOPS = ("User_Requested_Stop", "Maximum_CpuTime_Exceeded", "Maximum_WallTime_Exceeded")
 CONFIRMED = 1e-7  # scaled violation
+ANCHOR = 3e-4  # in the last solve, which else wanders too
+REACH = 4  # nodes by which a switch may move at a time
+MISFIT = 200  # iterations; valves that fit the finer grid take 20 to 100
 # off the bounds: a plan with rounded valves, or between the nodes of its grid, is not feasible
 ROUNDED, PROLONGED = 1e-2, 1e-3
 # feasible to the last digit, optimal to a few: the certificate measures the former
@@ -80,6 +83,10 @@ class Search:
             return point
         return replace(point, Y=start.Y)
 
+    def at_most(self, iterations: int) -> int:
+        """As many iterations, or the user's limit if that is less."""
+        return min(iterations, int(self.ipopt.options.get("max_iter", iterations)))
+
     def valves(self, point: Point) -> dict[int, np.ndarray]:
         """Columns of the valves, rounded, without pulses shorter than the task's dwell, as the
         task's own bounds on them allow."""
@@ -97,9 +104,8 @@ def warm(mu: float, push: float = 1e-6, **more: Any) -> dict[str, Any]:
 
 def find(search: Search, start: Point) -> Point:
     """From a guess to a plan with binary valves, its pairs still a little loose."""
-    most = min(PATIENCE, int(search.ipopt.options.get("max_iter", PATIENCE)))
     interior = {"bound_push": 0.3, "bound_frac": 0.3, "mu_init": 0.1, "tol": 1e-3}
-    interior["max_iter"] = most
+    interior["max_iter"] = search.at_most(PATIENCE)
     point = search.solve(RELAX, start, Parameters(LOOSE, forces=FORCES), options=interior)
     if point.message in HOPELESS:
         return point  # what the relaxed pairs forbid, tighter ones do not allow
@@ -115,25 +121,50 @@ def binary(search: Search, point: Point) -> Point:
     return search.solve("round valves", point, parameters, options=options, fixed=fixed)
 
 
-def fix(search: Search, point: Point, push: float = 1e-6, forces: float = FORCES) -> Point:
-    """Round and fix the valves, the pairs tighter."""
-    options, fixed = warm(1e-3, push, tol=1e-3), search.valves(point)
+def fix(
+    search: Search, point: Point, push: float = 1e-6, forces: float = FORCES, **more: Any
+) -> Point:
+    """Round and fix the valves, the pairs tighter; `more` options to IPOPT."""
+    options, fixed = warm(1e-3, push, tol=1e-3, **more), search.valves(point)
     parameters = Parameters(TIGHT, forces=forces)
     return search.solve("fix valves", point, parameters, options=options, fixed=fixed)
 
 
 def tighten(search: Search, point: Point) -> Point:
     """Tighten the pairs to what the certificate asks, with the valves fixed."""
-    parameters = Parameters(MARGIN * search.final_eps)
+    parameters = Parameters(MARGIN * search.final_eps, anchor=ANCHOR)
     options = warm(1e-5, **EXACT)
     fixed = search.valves(point)
     return search.solve("tighten", point, parameters, options=options, fixed=fixed)
 
 
+def move(search: Search, point: Point, push: float = 1e-6) -> Point:
+    """Release every valve switch by a few nodes and push the valves towards 0 and 1 again."""
+    options, free = warm(1e-3, push, tol=1e-3), _released(search.valves(point))
+    parameters = Parameters(TIGHT, VALVE, SWITCHING / 5, forces=FORCES)
+    return search.solve("move switches", Point(point.Y), parameters, options=options, free=free)
+
+
+def _released(valves: dict[int, np.ndarray]) -> dict[int, tuple[np.ndarray, np.ndarray]]:
+    """Bounds of the valve columns: free near their switches, fixed elsewhere."""
+    bounds = {}
+    for column, u in valves.items():
+        near = np.zeros(len(u), dtype=bool)
+        for k in np.flatnonzero(np.diff(u)):
+            near[max(k + 1 - REACH, 1) : k + 1 + REACH] = True
+        bounds[column] = (np.where(near, 0.0, u), np.where(near, 1.0, u))
+    return bounds
+
+
 def refine(search: Search, coarse: Transcription, point: Point) -> Point:
-    """A coarse plan on the finer grid of `search`, with its valves kept."""
+    """A coarse plan on the finer grid of `search`, with its valves kept; where that takes too
+    long, as where they no longer fit, with their switches moved."""
     start = Point(prolong(coarse, search.transcription, point.Y))
-    return fix(search, start, PROLONGED, forces=0.0)
+    kept = fix(search, start, PROLONGED, forces=0.0, max_iter=search.at_most(MISFIT))
+    if kept.solved:
+        return kept
+    moved = move(search, start, PROLONGED)
+    return fix(search, Point(moved.Y), PROLONGED, forces=0.0)
 
 
 def prolong(coarse: Transcription, fine: Transcription, Y: np.ndarray) -> np.ndarray:

@@ -10,7 +10,8 @@ from multiprocessing import get_context
 from pathlib import Path
 
 from kemba.config import Document
-from kemba.ocp.plan import Plan, plan
+from kemba.ocp.plan import plan
+from kemba.ocp.planned import Plan
 from kemba.ocp.task import Task
 
 NOISE = 0.25  # of the scaled guess; the first start has the task's own

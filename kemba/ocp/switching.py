@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from kemba.model import Model
-from kemba.ocp.ipopt import Parameters, Point
-from kemba.ocp.schedule import FORCES, SWITCHING, TIGHT, VALVE, Search, fix, warm
+from kemba.ocp.ipopt import Point
+from kemba.ocp.schedule import Search, fix, move
 from kemba.trajectory import Trajectory
 
-REACH = 4  # nodes by which a switch may move at a time
 ROUNDS = {True: 2, False: 1}  # half a robot; a whole one takes four times as long
+ENOUGH = 80  # iterations; where moved switches take more, the plan is seldom better
 PAYS = 0.02  # relative fall of the cost that makes another round worth while
 
 
@@ -18,25 +18,11 @@ def polish(search: Search, point: Point) -> Point:
     """Release every valve switch by a few nodes and round again, as long as the cost falls."""
     best: Point | None = None
     for _ in range(ROUNDS[search.transcription.reduction.symmetric]):
-        how = {"options": warm(1e-3, tol=1e-3), "free": _release(search, point)}
-        parameters = Parameters(TIGHT, VALVE, SWITCHING / 5, forces=FORCES)
-        loose = search.solve("move switches", Point(point.Y), parameters, **how)
-        better = fix(search, Point(loose.Y))
+        better = fix(search, Point(move(search, point).Y), max_iter=search.at_most(ENOUGH))
         if not better.solved or (best and better.objective >= (1 - PAYS) * best.objective):
             break
         point = best = better
     return best or fix(search, point)
-
-
-def _release(search: Search, point: Point) -> dict[int, tuple[np.ndarray, np.ndarray]]:
-    """Bounds of the valve columns: free near their switches, fixed elsewhere."""
-    bounds = {}
-    for column, u in search.valves(point).items():
-        near = np.zeros(len(u), dtype=bool)
-        for k in np.flatnonzero(np.diff(u)):
-            near[max(k + 1 - REACH, 1) : k + 1 + REACH] = True
-        bounds[column] = (np.where(near, 0.0, u), np.where(near, 1.0, u))
-    return bounds
 
 
 def switching(model: Model, plan: Trajectory) -> dict[str, float | int]:

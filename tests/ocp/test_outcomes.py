@@ -12,7 +12,7 @@ from kemba.model import load_model
 from kemba.ocp import load_task, plan
 from kemba.ocp.certify import certify
 from kemba.ocp.mirror import find_symmetry
-from kemba.ocp.plan import Planner
+from kemba.ocp.planner import Planner
 from kemba.ocp.result import to_trajectory
 from kemba.ocp.schedule import find, fix, tighten
 from kemba.ocp.wishes import resolve

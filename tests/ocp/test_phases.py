@@ -7,6 +7,7 @@ from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
+import casadi as ca
 import numpy as np
 import pytest
 
@@ -17,21 +18,26 @@ from kemba.ocp.phases.modes import OPEN, Phase
 from kemba.ocp.phases.radau import RADAU3, RADAU5, Scheme
 from kemba.ocp.phases.refine import ITERATIONS, Refiner, reduction_of
 from kemba.ocp.phases.repair import FITS, merged, misfit, repaired
+from kemba.ocp.phases.rules import AWAY, CLEAR
 from kemba.ocp.phases.solve import STOPPED, Control
+from kemba.ocp.result import arrays
 from kemba.ocp.switching import switching
 from kemba.plant.replay import replay
 
 CASES = [
     ("jump", "height=0.35 m"),
     ("jump", "height=0.5 m"),
+    ("jump", "height=0.65 m"),
     ("jump", "height=0.7 m"),
     ("jump", "height=0.8 m"),
     ("jump", "height=0.9 m"),
     ("max_jump", "height=1.0 m"),
     ("jump", "payload=1 kg"),
     ("jump", "supply=0.6 MPa"),
+    ("jump", "supply=0.8 MPa"),
     ("jump", "start.body/x=-5 cm"),
     ("jump_forward", "distance=0.1 m"),
+    ("jump_forward", "distance=0.2 m"),
     ("jump_forward", "distance=0.3 m"),
     ("jump_forward", "distance=0.6 m"),
 ]
@@ -108,6 +114,20 @@ def test_phases_cover_the_motion_and_touch_down_once_for_a_clean_jump() -> None:
     firsts = [phase.first for phase in found.phases]
     assert firsts[0] == 0 and found.phases[-1].last == len(euler.trajectory) - 1
     assert firsts[1:] == [phase.last for phase in found.phases[:-1]]
+
+
+@pytest.mark.parametrize(("name", "override"), QUICK)
+def test_open_gaps_keep_clear_away_from_touches(name: str, override: str) -> None:
+    euler, found = both(name, override)
+    assert found.trajectory is not None
+    half = reduction_of(euler.model, euler.task, euler.wishes, euler.trajectory)
+    x, node = arrays(euler.model, found.trajectory), euler.model.node
+    for i, constraint in enumerate(read_constraints(euler.model, half)):
+        gap = ca.Function("gap", [node.q], [constraint.gap]).map(len(x["q"]))
+        values = np.array(gap(x["q"].T)).ravel()[1:]
+        closed = np.array([p.active(i) for p in found.phases for _ in range(p.elements)])
+        clear = [not closed[max(e - AWAY, 0) : e + AWAY + 1].any() for e in range(len(closed))]
+        assert values[clear].min(initial=np.inf) >= CLEAR - 1e-9
 
 
 def test_the_half_robot_has_one_foot_and_two_stops() -> None:

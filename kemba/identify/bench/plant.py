@@ -17,6 +17,8 @@ from kemba.identify.problem import Array
 from kemba.model.model import Model
 
 LONGEST_STEP = 1.5e-3  # s; the fastest chamber answers in 8 ms
+NEWTON, STILL = 12, 1e-9  # steps to equilibrium, and share of a state per second that is rest
+WAITING = 0.5e-3  # s, steps in which chambers are left to settle
 CHUNK = 512  # steps per call of a compiled map
 # The velocity is known within v_sigma: the force is its mean over three Gauss-Hermite nodes
 V_NODES, V_MIDDLE = ((-np.sqrt(3.0), 1 / 6), (np.sqrt(3.0), 1 / 6)), 2 / 3  # sigma, weight
@@ -113,14 +115,29 @@ class Rig:
 
     def _equilibrium(self, motion: Array, u: Array, p: Array) -> Array:
         """Where the states come to rest under constant commands."""
-        s = self._start.copy()
-        for _ in range(12):
-            rate, slope = self._rate(s, *motion, u, p)
-            move = np.linalg.lstsq(np.asarray(slope), np.asarray(rate).ravel(), rcond=None)[0]
-            s = s - move
-            if np.all(np.abs(move) <= 1e-9 * (1.0 + np.abs(s))):
+        s, done = self._newton(self._start, motion, u, p)
+        if (
+            not done
+        ):  # the flow through an orifice is steep: wait until the chambers are nearly there
+            drive = np.concatenate([[WAITING], motion, motion, motion, u])
+            still = np.repeat(drive[:, None], CHUNK, axis=1)
+            waited = self._mapped("step", CHUNK)(
+                self._start, still, np.repeat(p[:, None], CHUNK, 1)
+            )
+            s, done = self._newton(waited[:, -1], motion, u, p)
+            s = s if done else waited[:, -1]
+        return s
+
+    def _newton(self, s: Array, motion: Array, u: Array, p: Array) -> tuple[Array, bool]:
+        """States at rest near s, and whether they were found."""
+        for _ in range(NEWTON):
+            rate, slope = (np.asarray(part) for part in self._rate(s, *motion, u, p))
+            if np.all(np.abs(rate.ravel()) <= STILL * (1.0 + np.abs(s))):
+                return s, True
+            if not (np.all(np.isfinite(rate)) and np.all(np.isfinite(slope))):
                 break
-        return np.asarray(s)
+            s = s - np.linalg.lstsq(slope, rate.ravel(), rcond=None)[0]
+        return s, False
 
     def _mapped(self, kind: str, n: int) -> _Call:
         if (kind, n) not in self._maps:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
@@ -19,6 +19,7 @@ STIFF = 1e-3  # m; body weight over this tells a force from a gap of the relaxat
 CLOSED = 1e-6  # m
 SLIDES = 0.05  # m.s-1
 LIGHT = 0.1  # of body weight; a foot that bears less for a step or two does not stand
+SHUDDER = 5e-5  # m; what opens less for a step or two stays closed
 BRIEF = 2  # steps
 HOP = 5e-3  # m; a foot that rises less for a step or two stays down
 
@@ -57,10 +58,23 @@ def read_phases(
     same = (modes[1:] == modes[:-1]).all(axis=1) & (valves[1:] == valves[:-1]).all(axis=1)
     borders = sorted({0, len(plan) - 1, *(np.flatnonzero(~same[1:]) + 1).tolist(), *marks})
     rows = itertools.pairwise(borders)
-    return [
+    phases = [
         Phase(a, b, tuple(int(m) for m in modes[b]), tuple(float(u) for u in valves[b]))
         for a, b in rows
     ]
+    return [*phases[:-2], *_settling(phases[-3:])] if len(phases) > 2 else phases
+
+
+def _settling(phases: Sequence[Phase]) -> list[Phase]:
+    """The last two of three phases. Where a stop or a foot closes one interval before the last
+    valve switch, the switch comes first: implicit Euler spreads an impact over two intervals, and
+    air that still flows pushes a piston off the stop on which the motion shall end at rest."""
+    before, hit, last = phases
+    closes = any(a == OPEN != b for a, b in zip(before.modes, hit.modes, strict=True))
+    between = hit.modes == last.modes and hit.valves == before.valves != last.valves
+    if closes and between and hit.elements == 1:
+        hit = replace(hit, modes=before.modes, valves=last.valves)
+    return [hit, last]
 
 
 def _modes(model: Model, constraint: Constraint, plan: Trajectory, trim: bool) -> np.ndarray:
@@ -76,6 +90,7 @@ def _modes(model: Model, constraint: Constraint, plan: Trajectory, trim: bool) -
     modes = np.where(force * STIFF > np.maximum(values[0], 0.0), HELD, OPEN)
     if values[0][0] < CLOSED and modes[1] == OPEN:
         modes[1] = HELD  # what touches at the start leaves no sooner than its force is gone
+    _fill_hops(modes, values[0], SHUDDER)
     if constraint.friction is not None:
         light = force < LIGHT
         slides = np.abs(values[1]) > SLIDES
@@ -84,17 +99,17 @@ def _modes(model: Model, constraint: Constraint, plan: Trajectory, trim: bool) -
                 modes[a:b] = OPEN
         if trim:
             modes[light & slides] = OPEN
-        _fill_hops(modes, values[0])
+        _fill_hops(modes, values[0], HOP)
         closed = modes != OPEN
         modes[closed & slides] = np.where(values[1] > 0, AHEAD, BACK)[closed & slides]
     return np.asarray(modes)
 
 
-def _fill_hops(modes: np.ndarray, gap: np.ndarray) -> None:
-    """Keep feet down that rise a little and briefly between two stances."""
+def _fill_hops(modes: np.ndarray, gap: np.ndarray, hop: float) -> None:
+    """Keep closed what opens less than `hop` [m], and briefly, between two touches."""
     runs = _runs(modes)
     for (_, a), (b, _) in itertools.pairwise(runs):
-        if b - a <= BRIEF and gap[a:b].max() < HOP:
+        if b - a <= BRIEF and gap[a:b].max() < hop:
             modes[a:b] = HELD
 
 

@@ -192,6 +192,11 @@ class Program:
         self.rules.append(Part((), z, nothing, pull, 0.0, 0.0, at))
         return np.concatenate([x, x[index]])
 
+    def keep_short(self, x: np.ndarray, steps: float) -> None:
+        """Bound elements by `steps` times the nominal one, but for those that x has longer."""
+        index = self.columns.h[:, 0]
+        self.upper[index] = np.maximum(self.upper[index] * steps / LONG, x[index])
+
     @property
     def soft(self) -> list[Soft]:
         """The rules that may give way."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -31,15 +31,17 @@ from kemba.trajectory import Trajectory
 
 STOPS = (STOPPED, "Maximum_WallTime_Exceeded")
 MIRRORED = 1e-6  # scaled; a plan that differs less from its mirror image is solved by half
-PRICE = 30.0  # of a rule giving way by its scale
+PRICE = 1000.0  # of a rule giving way by its scale; cheaper, rules that could hold give way too
 # weights of staying near the start: without, short steps of free duration wander off
-NEAR, NEAR_ELASTIC, NEAR_FINE = 10.0, 1.0, 0.1
-ROUNDS = 4  # repairs of one reading
+NEAR, NEAR_ELASTIC, NEAR_FINE = 10.0, 1.0, 1.0
+FAIR = 2.0  # times the nominal step; on longer elements two stages err, for lower costs
+ROUNDS = 6  # elastic solves of one reading
 ITERATIONS = {True: 300, False: 450}  # of all solves together, of half a robot and of a whole one
 WARM: dict[str, Any] = {"mu_init": 1e-4, "bound_push": 1e-6, "bound_frac": 1e-6}
 # the coarser scheme finds the way and which modes fit, the finer one makes it exact
 ROUGH = {**WARM, "max_iter": 60, "tol": 1e-3, "constr_viol_tol": 1e-6}
-ELASTIC = {**ROUGH, "max_iter": 100}
+NEAREST = {True: {**ROUGH, "max_iter": 50}, False: ROUGH}  # of half and whole robot
+ELASTIC = {**ROUGH, "max_iter": 100, "mu_init": 0.1}
 FINE = {**WARM, "max_iter": 60}
 
 
@@ -103,6 +105,7 @@ class Refiner:
     reduction: Reduction
     control: Control
     iterations: int = 0
+    seen: list[list[Phase]] = field(default_factory=list)  # whose modes were put to the test
 
     @property
     def marks(self) -> list[int]:
@@ -119,35 +122,42 @@ class Refiner:
         constraints = read_constraints(self.model, self.reduction)
         inputs = self.reduction.restrict("u", arrays(self.model, self.plan)["u"])
         valves = np.round(inputs[:, _binary(self.model, self.reduction)])
-        seen: list[list[Phase]] = []
         found = Refined(None, None, GAVE_UP, 0)
         for trim in (False, True):
             phases = read_phases(self.model, constraints, self.plan, valves, self.marks, trim)
-            start = self.plan
-            for _ in range(ROUNDS):
-                if phases in seen or self.left <= 0:
-                    break
-                seen.append(phases)
-                found = self.exact(phases, start)
+            if phases in self.seen:
+                break
+            found = self.exact(phases, self.plan)
+            if not found.solved and found.message not in STOPS:
+                found = self.repair(phases, found)
+            if found.solved or found.message in STOPS:
+                break
+        return replace(found, iterations=self.iterations)
+
+    def repair(self, phases: list[Phase], found: Refined) -> Refined:
+        """The solution on phases repaired until their modes fit, else how the last try ended."""
+        start = self.plan
+        for _ in range(ROUNDS):
+            if phases in self.seen or self.left <= 0:
+                break
+            self.seen.append(phases)
+            program, rough = self.rough(phases, start)
+            if rough.message in STOPS:
+                return self._ended(program, rough.message)
+            if misfit(program, rough.x).max(initial=0.0) <= FITS:
+                found = self.finish(program, rough.x)
                 if found.solved or found.message in STOPS:
-                    return found
-                program, rough = self.rough(phases, start)
-                if rough.message in STOPS:
-                    return self._ended(program, rough.message)
-                if misfit(program, rough.x).max(initial=0.0) <= FITS:
-                    found = self.finish(program, rough.x)
-                    if found.solved or found.message in STOPS:
-                        return found
-                better = repaired(program, rough.x, self.marks)
-                if better is None:
                     break
-                phases, start = better, to_trajectory(program, rough.x)
+            better = repaired(program, rough.x, self.marks)
+            if better is None:
+                break
+            phases, start = better, to_trajectory(program, rough.x)
         return found
 
     def exact(self, phases: Sequence[Phase], start: Trajectory) -> Refined:
         """The nearest solution on some phases by the coarser scheme, then the best by both."""
         program, x = self.build(phases, start, RADAU3)
-        found = self._solve(program, program.anchor(x, NEAR), ROUGH)
+        found = self._solve(program, program.anchor(x, NEAR), NEAREST[self.reduction.symmetric])
         if found.message not in SOLVED:
             return self._ended(program, found.message)
         return self.simpler(program, found.x) or self.finish(program, found.x)
@@ -163,6 +173,7 @@ class Refiner:
     def finish(self, near: Program, x: np.ndarray) -> Refined:
         """From the nearest solution x by the coarser scheme to a good one, to an exact one."""
         program, start = self.build(near.phases, self.plan, RADAU3)
+        program.keep_short(x, FAIR)
         best = self._solve(program, x[: len(start)], ROUGH)
         found = self._ended(program, best.message)
         if best.message in SOLVED:

@@ -82,7 +82,8 @@ def merged(phases: Sequence[Phase], marks: Sequence[int]) -> list[Phase]:
 
 
 def _shortest_near(program: Program, x: np.ndarray, p: int) -> int | None:
-    """The shortest of phase p and its neighbours that may give way, in time."""
+    """The shortest of phase p and its neighbours that may give way: by the plan, then by x, where
+    the elastic program may have bent durations."""
     h = x[program.columns.h[:, 0]] * program.layout.scale[program.layout.slices["h"]][0]
     least = COLLAPSED * SHORT * program.task.duration / program.nodes
     last = len(program.phases) - 1
@@ -93,7 +94,7 @@ def _shortest_near(program: Program, x: np.ndarray, p: int) -> int | None:
         and (program.phases[k].elements <= SLIVER or h[k] <= least)
         and _nearest_modes(program.phases, k) != program.phases[k].modes
     ]
-    return min(near, key=lambda k: h[k] * program.phases[k].elements, default=None)
+    return min(near, key=lambda k: (program.phases[k].elements, h[k]), default=None)
 
 
 def _nearest_modes(phases: Sequence[Phase], p: int) -> tuple[int, ...]:

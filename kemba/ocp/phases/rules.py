@@ -15,6 +15,8 @@ from kemba.ocp.phases.radau import node_vector, scaled
 
 INF = np.inf
 LENGTH, SPEED = 0.1, 1.0  # m, m.s-1: scales of gaps and their rates
+CLEAR = 2e-4  # m; a gap that only just stays open closes when executed
+AWAY = 3  # elements before and after a touch in which it may
 LANDS = 0.1  # m.s-1; a foot that comes down slower touches at no certain time
 
 
@@ -56,15 +58,18 @@ def _gaps(program: Program, view: View, i: int, constraint: Constraint) -> None:
     """Open gaps stay open; where one closes it is zero, and a foot comes down."""
     c, phases = program.columns, program.phases
     closing = {phases[p].first: p for p in program.impacts if program.closes(p, i)}
-    apart: Where = [
-        (c.phase_of[e], c.stages[e][stage]["q"])
-        for e in range(program.nodes)
-        for stage in range(len(c.stages[e]))
-        if not phases[c.phase_of[e]].active(i)
-        and not (stage == len(c.stages[e]) - 1 and e + 1 in closing)
-    ]
+    closed = np.array([phases[p].active(i) for p in c.phase_of])
     g = view.of(constraint.gap) / LENGTH
-    program.mode_rule(i, "gap", view.z("q"), g, 0.0, INF, apart)
+    for clear in (False, True):
+        apart: Where = [
+            (c.phase_of[e], c.stages[e][stage]["q"])
+            for e in np.flatnonzero(~closed)
+            for stage in range(len(c.stages[e]))
+            if not (stage == len(c.stages[e]) - 1 and e + 1 in closing)
+            and clear != closed[max(e - AWAY, 0) : e + AWAY + 1].any()
+        ]
+        low = CLEAR / LENGTH if clear else 0.0
+        program.mode_rule(i, "gap", view.z("q"), g, low, INF, apart)
     touching = [(closing[node], c.end(node)["q"]) for node in sorted(closing)]
     program.mode_rule(i, "touch", view.z("q"), g, 0.0, 0.0, touching)
     if constraint.friction is not None:

@@ -16,7 +16,13 @@ from kemba.ocp.phases.program import Program
 
 STOPPED = "User_Requested_Stop"
 GAVE_UP = "No_Progress"
-EXACT: dict[str, Any] = {"tol": 1e-4, "constr_viol_tol": 1e-8, "acceptable_iter": 0}
+EXACT: dict[str, Any] = {
+    "tol": 1e-4,
+    "constr_viol_tol": 1e-8,
+    "acceptable_iter": 0,
+    "mumps_pivtol": 1e-3,  # IPOPT's 1e-6 counts wrong signs on three stages, and steps shrink
+    "max_hessian_perturbation": 1e6,  # beyond, tries cost a second an iteration and lead nowhere
+}
 PATIENCE = 30  # iterations in which the violation must fall
 PROGRESS = 0.8  # to this part of what it was
 SMALL = 1e-4  # scaled violation below which nobody gives up
@@ -43,10 +49,10 @@ class Found:
 
 
 class _Patience:
-    """Passes iterations on and ends a solve that gets nowhere."""
+    """Passes iterations on and ends a solve that gets nowhere, unless `endless`."""
 
-    def __init__(self, control: Control) -> None:
-        self.control, self.lost = control, False
+    def __init__(self, control: Control, endless: bool) -> None:
+        self.control, self.endless, self.lost = control, endless, False
         self.best, self.since = np.inf, 0
 
     def watch(self, iteration: int, objective: float, violation: float) -> None:
@@ -54,7 +60,8 @@ class _Patience:
             self.control.watch(iteration, objective, violation)
         if violation < PROGRESS * self.best:
             self.best, self.since = violation, iteration
-        self.lost = self.best > SMALL and iteration - self.since >= PATIENCE
+        stuck = self.best > SMALL and iteration - self.since >= PATIENCE
+        self.lost = stuck and not self.endless
 
     def stop(self) -> bool:
         return self.lost or (self.control.stop is not None and self.control.stop())
@@ -73,7 +80,8 @@ def solve(program: Program, start: np.ndarray, options: dict[str, Any], control:
         own["max_wall_time"] = remaining
     if control.log is not None:
         own |= {"output_file": str(control.log), "file_print_level": 5, "file_append": "yes"}
-    problem, patience = program.problem, _Patience(control)
+    problem = program.problem
+    patience = _Patience(control, endless=program.elastic > 0.0)  # elastic ones have a solution
     plugin = {
         "print_time": False,
         "error_on_fail": False,

@@ -1,0 +1,85 @@
+"""A plan and how good it really is: its certificate, status and sentence."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from kemba.model import Model
+from kemba.ocp.certify import Certificate, certify, costs
+from kemba.ocp.explain import Explanation
+from kemba.ocp.finding import Relax
+from kemba.ocp.ipopt import Point
+from kemba.ocp.result import to_trajectory
+from kemba.ocp.schedule import Attempt
+from kemba.ocp.task import Task
+from kemba.ocp.transcribe import Transcription
+from kemba.ocp.verdict import verdict
+from kemba.ocp.wishes import Wish
+from kemba.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from kemba.ocp.planner import Planner
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What solving gave: the trajectory, how good it really is, and what it took."""
+
+    task: Task
+    model: Model
+    wishes: tuple[Wish, ...]
+    trajectory: Trajectory
+    certificate: Certificate
+    status: str
+    sentence: str
+    cost: dict[str, float]
+    attempts: tuple[Attempt, ...]
+    solve_s: float
+    solve_cpu_s: float
+    build_s: float
+    variables: int
+    constraints: int
+    relax: tuple[Relax, ...] = ()
+    refined: bool = False
+
+    @property
+    def iterations(self) -> int:
+        """IPOPT iterations over all solves."""
+        return sum(a.iterations for a in self.attempts)
+
+
+def judge(
+    planner: Planner,
+    transcription: Transcription,
+    point: Point,
+    solve_s: float,
+    solve_cpu_s: float,
+) -> Plan:
+    """Certificate, status and sentence of what was found."""
+    trajectory = to_trajectory(transcription, point.Y)
+    certificate = certify(planner.model, planner.task, planner.wishes, trajectory)
+    status, sentence = verdict(planner.task, certificate, trajectory, point.message)
+    return Plan(
+        task=planner.task,
+        model=planner.model,
+        wishes=tuple(planner.wishes),
+        trajectory=trajectory,
+        certificate=certificate,
+        status=status,
+        sentence=sentence,
+        cost=costs(planner.model, trajectory),
+        attempts=tuple(planner.attempts),
+        solve_s=solve_s,
+        solve_cpu_s=solve_cpu_s,
+        build_s=planner.build_s,
+        variables=transcription.variables,
+        constraints=transcription.constraints,
+    )
+
+
+def explained(found: Plan, why: Explanation) -> Plan:
+    """The same with the reason: what is proven replaces the solver's status and words."""
+    if not why.proven:
+        return replace(found, sentence=f"{found.sentence}; {why.sentence}")
+    return replace(found, status="infeasible", sentence=why.sentence, relax=why.relax)

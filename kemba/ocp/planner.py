@@ -1,0 +1,171 @@
+"""Strategies of finding a plan in turn, from coarse to fine and half to whole robot."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from kemba.model import Model
+from kemba.ocp.elastic import Outcome, elastic
+from kemba.ocp.guess import automatic_guess
+from kemba.ocp.ipopt import Ipopt, Point, Watch
+from kemba.ocp.mirror import Reduction, find_symmetry, whole, wishes_are_symmetric
+from kemba.ocp.penalty import WEIGHTS, penalise
+from kemba.ocp.planned import Plan, judge
+from kemba.ocp.resume import resumed
+from kemba.ocp.schedule import (
+    RELAX,
+    Attempt,
+    Search,
+    Stopped,
+    binary,
+    confirm,
+    find,
+    fix,
+    refine,
+    tighten,
+)
+from kemba.ocp.switching import polish
+from kemba.ocp.task import Task
+from kemba.ocp.transcribe import Transcription
+from kemba.ocp.wishes import Wish
+from kemba.trajectory import Trajectory
+
+COARSEST = 24  # nodes below which a coarser grid no longer helps
+
+
+@dataclass
+class Planner:
+    """Builds programs of one task on demand and solves them by a list of strategies."""
+
+    task: Task
+    model: Model
+    wishes: list[Wish]
+    log: Path | None = None
+    tell: Callable[[str], None] = lambda text: None
+    watch: Watch | None = None
+    attempts: list[Attempt] = field(default_factory=list)
+    build_s: float = 0.0
+    build_cpu_s: float = 0.0
+    deadline: float = np.inf
+    start: Trajectory | None = None
+    stop: Callable[[], bool] | None = None
+    outcome: Outcome | None = None  # of the elastic solve after a failure
+
+    def search(self, nodes: int, reduction: Reduction) -> Search:
+        """A fresh program on a grid of `nodes`."""
+        started, busy = time.perf_counter(), time.process_time()
+        transcription = Transcription(self.model, self.task, self.wishes, reduction, nodes)
+        options = {"max_iter": self.task.solver.max_iterations, **self.task.solver.options}
+        ipopt = Ipopt(transcription, options, self.log, self.deadline, self.watch, self.stop)
+        self.build_s += time.perf_counter() - started
+        self.build_cpu_s += time.process_time() - busy
+        name = "half" if reduction.symmetric else "whole"
+
+        def tell(text: str) -> None:
+            self.tell(f"{text} ({name} robot, {nodes} nodes)")
+
+        return Search(ipopt, self.task.solver.complementarity, tell, self.attempts)
+
+    def guess(self, transcription: Transcription) -> Point:
+        """The automatic start guess on a program's grid."""
+        t = transcription
+        return Point(automatic_guess(self.model, self.task, self.wishes, t.layout, t.nodes))
+
+    def reductions(self) -> Iterator[Reduction]:
+        """Half robot first where model and task are mirror images of themselves."""
+        if self.task.solver.symmetry:
+            half = find_symmetry(self.model)
+            if half is not None and wishes_are_symmetric(self.model, self.wishes):
+                yield half
+        yield whole(self.model.node)
+
+    def strategies(self) -> Iterator[Callable[[], tuple[Transcription, Point]]]:
+        """Ways to a plan, the quickest first; from the given start before any guess."""
+        nodes = self.task.nodes
+        for reduction in self.reductions() if self.start is not None else ():
+            yield lambda r=reduction: self._continued(r)  # type: ignore[misc]
+        for reduction in self.reductions():
+            if self.task.solver.coarse and nodes // 2 >= COARSEST:
+                yield lambda r=reduction: self._coarse_to_fine(r)  # type: ignore[misc]
+            yield lambda r=reduction: self._direct(r)  # type: ignore[misc]
+
+    def _coarse_to_fine(self, reduction: Reduction) -> tuple[Transcription, Point]:
+        coarse = self.search(self.task.nodes // 2, reduction)
+        point = self._polished(coarse, find(coarse, self.guess(coarse.transcription)))
+        if not point.solved:
+            return coarse.transcription, point
+        fine = self.search(self.task.nodes, reduction)
+        return self._finish(fine, refine(fine, coarse.transcription, point))
+
+    def _direct(self, reduction: Reduction) -> tuple[Transcription, Point]:
+        search = self.search(self.task.nodes, reduction)
+        point = find(search, self.guess(search.transcription))
+        return self._finish(search, self._polished(search, point))
+
+    def _continued(self, reduction: Reduction) -> tuple[Transcription, Point]:
+        assert self.start is not None
+        search = self.search(self.task.nodes, reduction)
+        point = binary(search, resumed(search.transcription, self.start))
+        return self._finish(search, self._polished(search, point))
+
+    def _polished(self, search: Search, point: Point) -> Point:
+        if not point.solved:
+            return point
+        return polish(search, point) if self.task.solver.polish else fix(search, point)
+
+    def _finish(self, search: Search, point: Point) -> tuple[Transcription, Point]:
+        point = tighten(search, point) if point.solved else point
+        if not point.solved or not search.transcription.reduction.symmetric:
+            return search.transcription, point
+        full = self.search(self.task.nodes, whole(self.model.node))
+        return full.transcription, confirm(full, search.transcription, point)
+
+    def penalty(self) -> tuple[Transcription, Point]:
+        """The paper's way, on the whole robot."""
+        search = self.search(self.task.nodes, whole(self.model.node))
+        start = self.guess(search.transcription)
+        return search.transcription, penalise(search, start, self.task.method)
+
+    def run(self) -> tuple[Transcription, Point]:
+        """The first strategy that solves, else where the first one ended; a stop keeps its
+        iterate."""
+        try:
+            if self.task.method in WEIGHTS:
+                return self.penalty()
+            first = None
+            for strategy in self.strategies():
+                found = strategy()
+                if found[1].solved:
+                    return found
+                first = first or found
+                if self.attempts[-1].name == RELAX and self.outcome is None:
+                    self.outcome = elastic(self, next(self.reductions()))
+                    if self.outcome is not None and self.outcome.short:
+                        return first
+            assert first is not None
+            self.outcome = self.outcome or elastic(self, next(self.reductions()))
+            return first
+        except Stopped as stop:
+            return stop.transcription, stop.point
+
+    def refuse(self) -> tuple[Transcription, Point]:
+        """Nothing solved: the start guess, for a task that a check refused."""
+        whole_robot = whole(self.model.node)
+        program = Transcription(self.model, self.task, self.wishes, whole_robot, self.task.nodes)
+        return program, replace(self.guess(program), message="Infeasible_Problem_Detected")
+
+
+def searched(planner: Planner, refused: bool) -> Plan:
+    """What the strategies find, judged; the start guess for a task that a check refused."""
+    started, busy = time.perf_counter(), time.process_time()
+    build_before = planner.build_s
+    build_cpu_before = planner.build_cpu_s
+    transcription, point = planner.refuse() if refused else planner.run()
+    elapsed = time.perf_counter() - started - (planner.build_s - build_before)
+    busy = time.process_time() - busy - (planner.build_cpu_s - build_cpu_before)
+    return judge(planner, transcription, point, elapsed, busy)

@@ -1,0 +1,39 @@
+"""Modes read off a plan: what opens for a moment stays closed, the last switch before a stop."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from kemba.ocp.phases.modes import HELD, HOP, OPEN, SHUDDER, Phase, _fill_hops, _settling
+
+FALLS = Phase(84, 97, (HELD, OPEN), (1.0, 0.0))
+HITS = Phase(97, 98, (HELD, HELD), (1.0, 0.0))
+RESTS = Phase(98, 100, (HELD, HELD), (0.0, 0.0))
+
+
+def test_air_is_off_before_the_stop_on_which_a_motion_ends() -> None:
+    hit, last = _settling([FALLS, HITS, RESTS])
+    assert hit == Phase(97, 98, FALLS.modes, RESTS.valves)
+    assert last == RESTS
+
+
+def test_a_stop_that_closes_well_before_the_last_switch_keeps_its_order() -> None:
+    early = replace(HITS, first=95)
+    assert _settling([replace(FALLS, last=95), early, RESTS]) == [early, RESTS]
+
+
+def test_a_contact_that_opens_before_the_last_switch_keeps_its_order() -> None:
+    leaves = replace(HITS, modes=(OPEN, OPEN))
+    flies = replace(RESTS, modes=(OPEN, OPEN))
+    assert _settling([FALLS, leaves, flies]) == [leaves, flies]
+
+
+def test_only_brief_and_small_hops_are_filled() -> None:
+    touches = [OPEN, HELD, HELD, OPEN, OPEN, HELD, OPEN, OPEN, OPEN, HELD, OPEN]
+    gap = np.array([0.0, 0.0, 0.0, 1.0, 2.0, 0.0, 1.0, 1.0, 1.0, 0.0, 1.0]) * SHUDDER
+    for hop, filled in ((SHUDDER, []), (HOP, [3, 4])):
+        modes = np.array(touches)
+        _fill_hops(modes, gap, hop)
+        assert np.flatnonzero(modes != np.array(touches)).tolist() == filled

@@ -1,0 +1,98 @@
+"""Functions rewritten for speed give the numbers of the plain ones; an anchor adds what it says."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from kemba.model import load_model
+from kemba.ocp import load_task
+from kemba.ocp.abreast import FEW, abreast
+from kemba.ocp.anchor import Anchored
+from kemba.ocp.blocks import Block, BlockProblem
+from kemba.ocp.folded import folded
+from kemba.ocp.mirror import find_symmetry
+from kemba.ocp.transcribe import Transcription
+from kemba.ocp.wishes import resolve
+
+POINTS = 12
+
+
+@pytest.fixture(scope="module")
+def half() -> Transcription:
+    """Half the jump's robot, whose stage holds both of its legs."""
+    task, document = load_task("jump", ["nodes=24"])
+    model = load_model(task.model)
+    reduction = find_symmetry(model)
+    assert reduction is not None
+    return Transcription(model, task, resolve(task, model, document), reduction, 24)
+
+
+@pytest.mark.parametrize("points", [1, FEW, POINTS])
+def test_abreast_is_the_same_to_the_last_bit(half: Transcription, points: int) -> None:
+    block, p, rng = half.problem.blocks[0], half.problem.p, np.random.default_rng(0)
+    at = [block.z, ca.vertcat(p, block.constants)]
+    lam_f, lam_g = block.multipliers
+    f = ca.Function("f", [*at, lam_f, lam_g], [block.g, ca.SX(block.hessian.nz[:])])
+    z = rng.uniform(0.2, 0.9, (block.z.numel(), points))
+    lam = rng.normal(size=(lam_g.numel(), points))
+    given = np.concatenate([[1e-3, 0.1, 0.1, 0.1, 1e-5], block.numbers])
+    together = abreast(f, points, [1, 2])(z, given, 1.3, lam)
+    for k in range(points):
+        for every, one in zip(together, f(z[:, k], given, 1.3, lam[:, k]), strict=True):
+            assert np.array_equal(np.array(every)[:, k], np.array(one).ravel())
+
+
+def test_abreast_repeats_what_is_the_same_at_all_points() -> None:
+    x, c = ca.SX.sym("x"), ca.SX.sym("c")
+    f = ca.Function("f", [x, c], [ca.vertcat(x * c, c + 1, 2.5), ca.SX(0, 1)])
+    values, nothing = abreast(f, POINTS, [1])(np.arange(POINTS)[None, :], 3.0)
+    assert np.array(values).tolist() == [[3.0 * i for i in range(POINTS)], [4.0] * 12, [2.5] * 12]
+    assert nothing.shape == (0, POINTS)
+
+
+def test_folding_writes_a_mirrored_leg_once() -> None:
+    q, a, b = ca.SX.sym("q"), ca.SX.sym("a"), ca.SX.sym("b")
+
+    def leg(q: ca.SX, b: ca.SX) -> ca.SX:
+        return (a - b * ca.sin(q)) * ca.cos(q) + ca.atan(q) * b / a
+
+    plain = leg(q, b) + leg(-q, -b)
+    (once,) = folded([q, a, b], [plain])
+    count = ca.Function("f", [q, a, b], [leg(q, b)]).n_instructions()
+    f, g = ca.Function("f", [q, a, b], [plain]), ca.Function("g", [q, a, b], [once])
+    assert g.n_instructions() == count + 1 < f.n_instructions()
+    for at in np.random.default_rng(0).normal(size=(20, 3)):
+        assert float(f(*at)) == float(g(*at))
+
+
+def test_folding_shares_the_legs_of_half_a_robot(half: Transcription) -> None:
+    stage = half.stage
+    at = [ca.vertcat(stage.y0, stage.y), ca.vertcat(stage.eps, stage.weights)]
+    plain = ca.Function("f", at, [ca.cse(ca.densify(stage.g))])
+    once = ca.Function("g", at, [ca.cse(folded(at, [stage.g])[0])])
+    assert once.n_instructions() < 0.8 * plain.n_instructions()
+    rng = np.random.default_rng(0)
+    for _ in range(3):
+        z, p = rng.uniform(0.2, 0.9, at[0].numel()), [1e-3, 0.1, 0.1, 0.1, 1e-5]
+        assert np.array_equal(np.array(plain(z, p)), np.array(once(z, p)))
+
+
+def test_an_anchor_adds_half_the_squared_way() -> None:
+    z = ca.SX.sym("z", 2)
+    columns = np.array([[0, 1], [1, 2]])
+    block = Block(z, ca.vertcat(z[0] * z[1]), z[0] ** 3 - z[1], columns)
+    problem = BlockProblem([block], 3, ca.SX(0, 1))
+    anchored, rng = Anchored(problem), np.random.default_rng(0)
+    x, start, weight = rng.normal(size=3), rng.normal(size=3), 0.7
+    p, lam = [weight, *start], [0.3, -2.0]
+    (f, slope), (f0, slope0) = anchored.grad_f(x, p), problem.grad_f(x, [])
+    assert float(f) == pytest.approx(float(f0) + 0.35 * np.sum((x - start) ** 2))
+    assert np.array(slope - slope0).ravel() == pytest.approx(0.7 * (x - start))
+    hessians = anchored.hess_lag(x, p, 1.5, lam), problem.hess_lag(x, [], 1.5, lam)
+    assert np.array(hessians[0] - hessians[1]) == pytest.approx(1.05 * np.eye(3))
+    jacobians = anchored.jac_g(x, p)[1], problem.jac_g(x, [])[1]
+    assert np.array_equal(*map(np.array, jacobians))
+    nlp = ca.Function("nlp", [anchored.nlp["x"], anchored.nlp["p"]], [anchored.nlp["f"]])
+    assert float(nlp(x, p)) == pytest.approx(float(f))
