@@ -14,15 +14,16 @@ from kemba.identify.conflict import Drift, drifting
 from kemba.identify.linear import is_shape, time_blocks
 from kemba.identify.null import NullTest, bootstrap, smallest_detectable
 from kemba.identify.problem import Array, Candidate, Problem
-from kemba.identify.rank import NULL, Hypothesis
+from kemba.identify.rank import FLOOR, NULL, Hypothesis
 from kemba.identify.search import Search, share_of
 from kemba.identify.unknown import Formula, look, unfinished
 
 CLASS = 3.0  # nats within which two explanations are the same to these data
 MATTERS = 0.2  # an effect below this share of its size is no finding,
 MATTERS_TOO = 0.3  # nor is one beside a stronger one
-DEFECT = 0.02  # share of an effect that the model's own imperfection may add or hide, 1 sigma
+DEFECT = FLOOR  # share of an effect that the model's own imperfection may add or hide, 1 sigma
 FINE = 0.1  # s, blocks whose signs are redrawn
+UNEXPLAINED, LEFT = 1.3, 0.9  # noise units and share of the error that no answer may leave
 SHOWN = 8
 
 Talk = Callable[[str], None]
@@ -55,7 +56,7 @@ def discover(
     drift = drifting(search, best)
     if drift is not None and formula is not None and drift.nats > formula.gain:
         formula = None
-    doubts = [] if formula else doubts_about(search, best, drift)
+    doubts = [] if formula else doubts_about(search, best, drift, holdout)
     answer = _answer(search, best, p_value, test, formula, holdout, doubts)
     answer.runtime_s = time.monotonic() - started
     return Found(answer, search, best, holdout)
@@ -109,12 +110,19 @@ def material(search: Search, hypothesis: Hypothesis) -> Hypothesis:
     return tuple(e for e in hypothesis if share(e) >= (MATTERS if e == strongest else least))
 
 
-def doubts_about(search: Search, best: Hypothesis, drift: Drift | None) -> list[str]:
+def doubts_about(
+    search: Search, best: Hypothesis, drift: Drift | None, holdout: Problem | None
+) -> list[str]:
     """Why the best answer cannot be the whole of it."""
     if drift is not None:
         return [str(drift)]
     if unfinished(search, best):
         return ["the error that is left repeats itself with motion and valves"]
+    before, after = (error(search, h, holdout) for h in (NULL, best))
+    if best and after > max(UNEXPLAINED, LEFT * before):
+        return [
+            f"{' and '.join(best)} fits best, but leaves an error of {after:.3g} times the noise"
+        ]
     return []
 
 

@@ -7,6 +7,7 @@ from collections.abc import Collection, Iterable, Mapping
 import numpy as np
 import pytest
 
+from kemba.identify import discover as discovery
 from kemba.identify.discover import discover
 from kemba.identify.problem import Array, Candidate, Parameter, Rows, Theta, secant_jacobian
 from kemba.identify.rank import probabilities
@@ -105,3 +106,13 @@ def test_probabilities_prefer_the_simpler_of_equals() -> None:
     found = probabilities({(): -100.0, ("a",): -50.0, ("a", "b"): -50.0}, count=10)
     assert sum(found.values()) == pytest.approx(1.0)
     assert found["a",] > 0.9 > found["a", "b"]
+
+
+@pytest.mark.parametrize(("before", "after", "doubted"), [(20.0, 19.1, True), (9.0, 1.6, False)])
+def test_an_answer_that_leaves_most_of_the_error_is_doubted(
+    monkeypatch: pytest.MonkeyPatch, before: float, after: float, doubted: bool
+) -> None:
+    monkeypatch.setattr(discovery, "unfinished", lambda search, best: False)
+    monkeypatch.setattr(discovery, "error", lambda search, h, holdout: after if h else before)
+    found = discovery.doubts_about(object(), ("seal_friction",), None, None)  # type: ignore[arg-type]
+    assert bool(found) == doubted
