@@ -39,7 +39,11 @@ CASES = [
     ("jump_forward", "distance=0.1 m"),
     ("jump_forward", "distance=0.2 m"),
     ("jump_forward", "distance=0.3 m"),
-    ("jump_forward", "distance=0.6 m"),
+    pytest.param(
+        "jump_forward",
+        "distance=0.6 m",
+        marks=pytest.mark.xfail(reason="whole robots do not always refine; docs/refine.md"),
+    ),
 ]
 QUICK = [CASES[1], CASES[5]]
 EVERY = [case if case in QUICK else pytest.param(*case, marks=pytest.mark.slow) for case in CASES]
