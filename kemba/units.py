@@ -9,6 +9,7 @@ import math
 import re
 from functools import lru_cache
 from numbers import Real
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from kemba.errors import suggest
@@ -25,6 +26,8 @@ HEADER_UNIT = re.compile(r"1|[A-Za-z%]+(?:-?\d+)?(?:\.[A-Za-z%]+(?:-?\d+)?)*")
 SI_SYMBOLS = frozenset("1 m s kg A K mol cd rad N Pa J W V C F Hz T H".split())
 ALIASES = {"Nm": (("N", 1), ("m", 1)), "°": (("deg", 1),)}  # `Nm` is a textile unit to pint
 COMMON = "m mm cm s ms min kg g N kN Pa kPa MPa bar psi rad deg K degC J W Hz rpm L".split()
+
+VOCABULARY = Path(__file__).with_name("units.txt")
 
 # SI unit of each of pint's dimensions
 BASE = {
@@ -149,10 +152,10 @@ def expectation(unit: str) -> str:
 
 @lru_cache(maxsize=1)
 def registry() -> pint.UnitRegistry[Any]:
-    """The one pint registry, made when first needed."""
+    """The one pint registry, of the units in units.txt, made when first needed."""
     import pint
 
-    return pint.UnitRegistry(autoconvert_offset_to_baseunit=True)
+    return pint.UnitRegistry(VOCABULARY, autoconvert_offset_to_baseunit=True)
 
 
 def _split(text: str, unit: str) -> tuple[float, str]:

@@ -3,6 +3,7 @@
 import ast
 import re
 import statistics
+import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -103,3 +104,14 @@ def test_nothing_names_a_machine() -> None:
     for path in TEXTS:
         for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
             assert not place.search(line) or "re.compile" in line, f"{path}:{number}: {line}"
+
+
+def test_planning_does_not_wait_for_slow_imports() -> None:
+    """Building a program takes less time than these modules take to import."""
+    slow = ["scipy.integrate", "scipy.interpolate", "scipy.optimize", "scipy.stats", "matplotlib"]
+    code = (
+        "import importlib, sys; importlib.import_module('kemba.ocp.plan');"
+        f"print([m for m in {slow} if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import casadi as ca
 import numpy as np
-from scipy.integrate import solve_ivp
 
 from kemba.mechanism import load_robot
 from kemba.model import Model
@@ -110,13 +110,12 @@ def air_work(model: Model) -> float:
     q = np.array([model.mechanism.standing[c.name] for c in model.mechanism.coordinates])
     v, lam = np.zeros(len(q)), np.zeros(node.lam.numel())
     u = np.array([float(symbol == "u_e") for _, symbol in model.inputs])
-    s0 = np.array([s.value for s in model.states.values()])
+    s = np.array([s.value for s in model.states.values()])
     p = np.zeros(node.p.numel())
-
-    def rate(_: float, s: np.ndarray) -> np.ndarray:
-        return -np.array(node.residual(q, v, v, s, 0 * s, lam, u, p)[1]).ravel()
-
-    s = solve_ivp(rate, (0.0, 0.5), s0, method="LSODA", rtol=1e-4).y[:, -1] if len(s0) else s0
+    if len(s):
+        rate = -node.residual(q, v, v, node.s, 0 * node.s, lam, u, p)[1]
+        settle = ca.integrator("settle", "cvodes", {"x": node.s, "ode": rate}, 0.0, 0.5)
+        s = np.array(settle(x0=s)["xf"]).ravel()
     measured = np.array(node.measure(q, v, v, s, 0 * s, lam, u, p)).ravel()
     forces = [
         value

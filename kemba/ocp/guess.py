@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
+from numpy.polynomial.polynomial import polyder, polyval
 
 from kemba.mechanism import Robot, load_robot
 from kemba.mechanism.knee import extension, flexion
@@ -29,8 +29,18 @@ class Course:
     flight: tuple[float, float]
 
     def __call__(self, t: np.ndarray, order: int = 0) -> np.ndarray:
-        spline = CubicHermiteSpline(self.t, self.z, self.vz)
-        return np.asarray(spline(np.clip(t, self.t[0], self.t[-1]), order))
+        """Cubic between the knots, held beyond them; `order` of the time derivative.
+
+        By hand: scipy.interpolate takes longer to import than a program to build.
+        """
+        knots, z, v = (np.asarray(a, float) for a in (self.t, self.z, self.vz))
+        t = np.clip(t, knots[0], knots[-1])
+        i = np.clip(np.searchsorted(knots, t, side="right") - 1, 0, len(knots) - 2)
+        h = knots[i + 1] - knots[i]
+        rise = (z[i + 1] - z[i]) / h
+        bend = [(3 * rise - 2 * v[i] - v[i + 1]) / h, (v[i] + v[i + 1] - 2 * rise) / h**2]
+        cubic = np.array([z[i], v[i], *bend])
+        return np.asarray(polyval(t - knots[i], polyder(cubic, order), tensor=False))
 
 
 def asked(wishes: Sequence[Wish], name: str, at: float) -> float | None:

@@ -106,11 +106,12 @@ def test_impulse_balances_weight(shipped: Solved) -> None:
     """Ground impulse = weight of robot and boom times duration, and the momentum gained.
 
     The legs' momentum, which the fast push of the 1 m jump changes most, is kept to first order
-    in the step: there 7.5, 3.3 and 1.4 % are missing with 40, 80 and 160 nodes.
+    in the step: there 7.6, 3 to 5 (as the plan turns out) and 1.4 % are missing with 40, 80 and
+    160 nodes.
     """
     if shipped.task.name == "max_jump":
-        finer = missing_impulse(solved("max_jump", nodes=80))
-        assert 0.0 < finer < 0.6 * missing_impulse(shipped)
+        finer = missing_impulse(solved("max_jump", nodes=160))
+        assert 0.0 < finer < 0.45 * missing_impulse(shipped)
     else:
         assert abs(missing_impulse(shipped)) < 0.02
 
