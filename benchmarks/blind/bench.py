@@ -48,6 +48,7 @@ PAIRS = [
     ["cross_leak", "stribeck_friction"],
     ["sensor_delay:piston/F", "seal_friction"],
 ]
+SEED = 5000  # cases of other seeds were looked at while the method was built
 REPEATS = ((EFFECTS, 6), (SENSORS, 4), (UNKNOWN, 4), (PAIRS, 3), ([None], 30))
 SIZES, NOISES = (1.0, 0.7, 1.5), (1.0, 2.0, 0.5)
 RIGS = (  # chambers of the rig and of the model, and whether their pressures are measured
@@ -63,9 +64,9 @@ MODELS = {"first_order": "planning", "orifice": str(Path(__file__).parent / "ori
 
 def cases() -> list[dict[str, Any]]:
     """Settings of all cases; each kind is spread evenly over the whole order."""
-    rng = np.random.default_rng(20)
+    rng = np.random.default_rng(SEED)
     turns = study.spread(REPEATS, rng)
-    return [_setting(effect, turn, seed, rng) for seed, (effect, turn) in enumerate(turns)]
+    return [_setting(effect, turn, SEED + i, rng) for i, (effect, turn) in enumerate(turns)]
 
 
 def _setting(effect: Any, turn: int, seed: int, rng: np.random.Generator) -> dict[str, Any]:

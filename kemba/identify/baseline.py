@@ -24,6 +24,8 @@ from kemba.identify.rank import FLOOR, NULL, Hypothesis, Ranker
 GLANCES = 1  # evaluations of each single effect before the leaders are refitted
 ABSURD = 1e5  # noise units
 
+Names = tuple[str, ...]
+
 
 class Baseline:
     """The null hypothesis refitted, with slopes to every effect of the catalogue.
@@ -84,14 +86,20 @@ class Baseline:
         names = names_of(self.problem, theta)
         self.jacobian = self.problem.jacobian(theta, names) if jacobian is None else jacobian
         self.residual = self.problem.residual(theta)
-        linear, coarse = self.division.linear(theta, names, self.jacobian, self.residual)
-        ranker = self.ranker(linear)
-        fit = Fit(dict(theta), 0.5 * float(self.residual @ self.residual))
-        self.point = Point(NULL, fit, linear, coarse, ranker.score(NULL))
+        self.rescore(theta, names)
+        ranker = self.ranker(self.point.linear)
         self.table = ranker.table((0, 1, 2) if self.among is None else (0, 1))
         for hypothesis in [h for h in self.table if len(h) == 1]:
             if self.among is None or hypothesis in self.among:
                 self.table[hypothesis] = self._glance(hypothesis)
+
+    def rescore(self, theta: Mapping[str, float] | None = None, names: Names = ()) -> None:
+        """The null with the slopes as they are now, at theta or where it was."""
+        theta = self.point.fit.theta if theta is None else theta
+        names = names or self.point.linear.names
+        linear, coarse = self.division.linear(theta, names, self.jacobian, self.residual)
+        fit = Fit(dict(theta), 0.5 * float(self.residual @ self.residual))
+        self.point = Point(NULL, fit, linear, coarse, self.ranker(linear).score(NULL))
 
     def _glance(self, hypothesis: Hypothesis) -> float:
         """Log evidence where the linear estimate points to, with the true residual there.

@@ -28,8 +28,8 @@ class Gain:
 
     @property
     def refuted(self) -> bool:
-        """Whether left-out data speak against it."""
-        return self.nats < -2.0
+        """Whether left-out data speak against it, by more than their scatter."""
+        return self.nats + self.error < -2.0
 
 
 def left_out(search: Search, hypothesis: Hypothesis, against: Hypothesis = NULL) -> Gain:

@@ -210,8 +210,8 @@ def _strength(search: Search, effect: str, best: Hypothesis) -> float:
     if effect not in best:
         return 0.0
     rest = tuple(h for h in best if h != effect)
-    point = search.points.get(rest)
-    return search.points[best].log_evidence - point.log_evidence if point else 0.0
+    points = search.points
+    return points[best].log_evidence - points[rest].log_evidence if rest in points else 0.0
 
 
 def equivalents(search: Search, hypothesis: Hypothesis, effect: str) -> tuple[str, ...]:

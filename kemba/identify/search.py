@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from kemba.identify.fit import Fit, refit
 from kemba.identify.linear import Linear, estimate, names_of
 from kemba.identify.point import Movable, Point
 from kemba.identify.problem import Problem
-from kemba.identify.rank import NULL, Hypothesis, Score, log_prior, probabilities
+from kemba.identify.rank import NULL, Hypothesis, log_prior, probabilities
 
 LEADERS = 6
 SURE = 3  # so many leaders are refitted however far behind they are,
@@ -21,6 +21,7 @@ FAR, FAR_SHARE = 40.0, 0.7  # others when no more nats, or share of the gain, be
 FOLLOWED = 2  # times that the motion is found again with the best guess
 LARGEST = 3  # effects in one answer; more need another experiment
 GAIN = 3.0  # nats beyond prior odds that a further effect must bring
+LEAST = 0.1  # sizes, from which on a secant tells more than a slope
 
 
 @dataclass
@@ -34,6 +35,7 @@ class Search:
     points: dict[Hypothesis, Point] = field(default_factory=dict)
     base: Baseline = field(init=False)
     _thetas: dict[Hypothesis, dict[str, float]] = field(default_factory=dict)
+    _stale: bool = False
 
     def run(self) -> Hypothesis:
         """The hypothesis the evidence favours; everything seen stays in `points`."""
@@ -134,24 +136,40 @@ class Search:
             fit = refit(
                 self.problem, hypothesis, self._guess(hypothesis), self.base.frozen, self.heat
             )
-            linear, coarse = self._near(fit)
-            score = self._compared(linear, hypothesis)
-            self.points[hypothesis] = Point(hypothesis, fit, linear, coarse, score)
+            self._learn_secant(hypothesis, fit)
+            self.points[hypothesis] = self._point(hypothesis, fit)
             self._thetas[hypothesis] = fit.theta
         return self.points[hypothesis]
 
-    def _compared(self, linear: Linear, hypothesis: Hypothesis) -> Score:
-        """Score on `linear`, measured against nothing on the same slopes.
+    def _learn_secant(self, hypothesis: Hypothesis, fit: Fit) -> None:
+        """From here on, a refitted effect is known by its secant.
 
-        The floor lets every effect help "nothing" as well, by slopes that promise too much far
-        from where they hold: only promises of the same slopes may be compared.
+        Everything absent may help at floor level, and slopes at nothing promise too much far from
+        where they hold: a rival would look good for what it leaves to them.
         """
-        ranker = self.base.ranker(linear)
-        score = ranker.score(hypothesis)
-        if not isinstance(self.problem, Movable):
-            return score
-        gain = score.log_evidence - ranker.score(NULL).log_evidence
-        return replace(score, log_evidence=self.points[NULL].log_evidence + gain)
+        problem, (effect, *others) = self.problem, hypothesis
+        candidate = problem.candidates[effect]
+        if others or not isinstance(problem, Movable) or problem.is_straight(candidate.key):
+            return
+        size = fit.theta[candidate.key] - candidate.lead.off
+        if abs(size) > LEAST * candidate.lead.size:
+            own = set(candidate.keys())
+            absent = {k: v for k, v in fit.theta.items() if k not in own}
+            change = problem.residual(fit.theta) - problem.residual(absent)
+            self.base.jacobian[:, self.base.point.linear.index(candidate.key)] = change / size
+            self._stale = True
+
+    def _refresh(self) -> None:
+        """Score everything again by the secants learnt."""
+        if self._stale:
+            self.base.rescore()
+            self.points = {h: self._point(h, p.fit) for h, p in self.points.items() if h}
+            self.points[NULL] = self.base.point
+            self._stale = False
+
+    def _point(self, hypothesis: Hypothesis, fit: Fit) -> Point:
+        linear, coarse = self._near(fit)
+        return Point(hypothesis, fit, linear, coarse, self.base.ranker(linear).score(hypothesis))
 
     def _near(self, fit: Fit) -> tuple[Linear, Linear]:
         """Linear at a refitted point: its own slopes are fresh, the others are the null's."""
@@ -176,6 +194,8 @@ class Search:
         return {**guess, **{k: v for k, v in point.fit.theta.items() if k not in guess}}
 
     def best(self) -> Hypothesis:
+        """The likeliest of everything refitted."""
+        self._refresh()
         count = len(self.problem.candidates)
         return max(self.points, key=lambda h: self.points[h].log_evidence + log_prior(h, count))
 

@@ -139,7 +139,7 @@ def look(search: Search, best: Hypothesis) -> Formula | None:
         search, null.linear, search.base.jacobian, search.base.residual, formulas
     )
     alone = _grow(ranker, names, ())
-    catalogue = search.points[best].log_evidence - null.log_evidence if best else 0.0
+    catalogue = search.points[best].log_evidence - null.log_evidence
     if alone is not None and alone.gain > catalogue + AHEAD and _matters(search, alone):
         return replace(alone, gain=alone.gain - catalogue)
     return None

@@ -24,6 +24,7 @@ from kemba.identify.robot.reference import (
     Reference,
     integrator,
 )
+from kemba.identify.robot.sensing import travelled
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -41,6 +42,7 @@ class Linearised:
     normal: Array  # (n, L, legs) contact force, up, steady
     y: Array
     rate: Array
+    way: Array  # (n, L, m) of the measured coordinates since the start
     places: Array  # (n, L, 3 legs): x and z of each foot, pistons
     sinking: Array  # (n, L, legs) speed of the feet, down, steady
     masses: Array
@@ -164,6 +166,7 @@ def linearise(
         normal,
         y,
         rate,
+        travelled(rate, batch.h),
         np.concatenate([feet, y[..., k - legs :]], axis=2),
         steady(-feet_rate[..., 1::2], dt),
         masses,

@@ -37,7 +37,7 @@ from kemba.identify.robot.reference import (
     first_reference,
     schedules,
 )
-from kemba.identify.robot.sensing import sensed
+from kemba.identify.robot.sensing import ahead, sensed
 from kemba.identify.robot.surroundings import changes, robot_surroundings
 from kemba.identify.robot.suspects import (
     DELAYS,
@@ -101,6 +101,9 @@ class RobotProblem:
         self._linear: dict[str, tuple[Array, float]] = {}
         physics, batch = self.physics, self.batch
         ref = first_reference(physics, batch)
+        late = np.array([base.get(f"sensor_delay:{c}.dt", 0.0) for c in physics.channels])
+        rates = ((ref.q, ref.v), (ref.v, ref.a), (ref.a, 0.0 * ref.a))
+        ref = Reference(*(ahead(a, rate, batch.tracks, late) for a, rate in rates))
         self.plan = schedules(physics, batch, ref)
         dt = float(np.median(batch.h[batch.valid]))
         for _ in range(ROUNDS):
@@ -144,7 +147,7 @@ class RobotProblem:
 
     def _measurement(self, point: Linearised, theta: Theta) -> Array:
         """Measured minus reference (n, L, m), the reference as the sensors at theta see it."""
-        seen = sensed(self.physics.channels, self.batch.tracks, point.y, point.rate, theta)
+        seen = sensed(self.physics.channels, self.batch.tracks, point.y, point.way, theta)
         soft = {**self._soft, **theta}
         depth = point.penetration(soft.get(SOFTNESS, 0.0), soft.get("ground_compliance.d", 1.0))
         return np.concatenate([self.batch.y - seen, -point.places - depth], axis=2)
