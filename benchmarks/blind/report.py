@@ -101,6 +101,21 @@ def sure_and_wrong(record: Record) -> bool:
     )
 
 
+def overlooked(record: Record) -> bool:
+    """Whether nothing was found of an effect larger than the size that the answer says it sees."""
+    if record["answer"]["verdict"] != "nothing":
+        return False
+    (effect,) = record["truth"]
+    lead, true = next(iter(effect["parameters"].items()))
+    least = record["answer"]["smallest_detectable"].get(effect["kind"], {}).get(lead, 0.0)
+    return abs(true - _off(lead, true)) > least
+
+
+def _off(name: str, true: float) -> float:
+    """The value at which a parameter changes nothing: factors are one."""
+    return 1.0 if name in ("k", "mu") and 0.3 < true < 3 and abs(true - 1) < 0.7 else 0.0
+
+
 def parameters(records: Iterable[Record]) -> tuple[list[float], list[bool]]:
     """Relative errors of leading parameters that were identified, and whether intervals cover."""
     errors, covered = [], []
@@ -115,9 +130,9 @@ def parameters(records: Iterable[Record]) -> tuple[list[float], list[bool]]:
                 if name not in row["parameters"]:
                     continue
                 value = row["parameters"][name]
-                off = 1.0 if name in ("k", "mu") and 0.3 < true < 3 and abs(true - 1) < 0.7 else 0.0
                 if i == 0:
-                    errors.append(abs(value["value"] - true) / max(abs(true - off), 1e-12))
+                    size = max(abs(true - _off(name, true)), 1e-12)
+                    errors.append(abs(value["value"] - true) / size)
                 covered.append(value["low"] <= true <= value["high"])
     return errors, covered
 
@@ -136,6 +151,11 @@ def table(records: Sequence[Record]) -> str:
         _row("right effect first or second", known, lambda r: among_first(r, 2)),
         _row("exactly the right effect named", known, right),
         _row("in the named class, physics and sensors", known, in_class),
+        _row(
+            "overlooked: larger than the smallest size that the answer says it sees",
+            known,
+            overlooked,
+        ),
         _row("both effects of a pair", groups["pair"], right),
         _row(
             "at least one of a pair, none wrong",

@@ -35,7 +35,15 @@ from kemba.ocp.transcribe import Transcription
 from kemba.ocp.wishes import Wish
 from kemba.trajectory import Trajectory
 
-COARSEST = 24  # nodes below which a coarser grid no longer helps
+COARSEST, FINE = 24, 80  # nodes: no grid is coarser, and valves are sought on none finer
+
+
+def grids(nodes: int) -> list[int]:
+    """Numbers of nodes from coarse to fine, each about half of the next."""
+    found = [nodes // 2, nodes]
+    while found[0] > FINE:
+        found.insert(0, found[0] // 2)
+    return found
 
 
 @dataclass
@@ -95,12 +103,15 @@ class Planner:
             yield lambda r=reduction: self._direct(r)  # type: ignore[misc]
 
     def _coarse_to_fine(self, reduction: Reduction) -> tuple[Transcription, Point]:
-        coarse = self.search(self.task.nodes // 2, reduction)
-        point = self._polished(coarse, find(coarse, self.guess(coarse.transcription)))
-        if not point.solved:
-            return coarse.transcription, point
-        fine = self.search(self.task.nodes, reduction)
-        return self._finish(fine, refine(fine, coarse.transcription, point))
+        first, *finer = grids(self.task.nodes)
+        search = self.search(first, reduction)
+        point = self._polished(search, find(search, self.guess(search.transcription)))
+        for nodes in finer:
+            if not point.solved:
+                return search.transcription, point
+            coarse, search = search, self.search(nodes, reduction)
+            point = refine(search, coarse.transcription, point)
+        return self._finish(search, point)
 
     def _direct(self, reduction: Reduction) -> tuple[Transcription, Point]:
         search = self.search(self.task.nodes, reduction)

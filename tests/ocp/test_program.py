@@ -12,6 +12,7 @@ from kemba.model import load_model
 from kemba.ocp import load_task
 from kemba.ocp.guess import automatic_guess
 from kemba.ocp.mirror import find_symmetry, whole
+from kemba.ocp.planner import grids
 from kemba.ocp.schedule import prolong, widen
 from kemba.ocp.transcribe import Transcription
 from kemba.ocp.wishes import resolve
@@ -118,3 +119,11 @@ def test_a_guess_is_within_bounds(name: str) -> None:
     assert np.array_equal(Y, np.clip(Y, t.layout.lower, t.layout.upper))
     z = t.layout.full(Y, "q")[:, 1]
     assert bool(z.max() > 0.4) == (name == "automatic")
+
+
+@pytest.mark.parametrize(
+    ("nodes", "expected"),
+    [(100, [50, 100]), (60, [30, 60]), (400, [50, 100, 200, 400]), (250, [62, 125, 250])],
+)
+def test_valves_are_sought_on_coarse_grids(nodes: int, expected: list[int]) -> None:
+    assert grids(nodes) == expected
