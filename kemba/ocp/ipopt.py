@@ -14,6 +14,7 @@ import numpy as np
 
 from kemba.ocp.anchor import Anchored
 from kemba.ocp.blocks import BlockProblem
+from kemba.ocp.damped import damped
 from kemba.ocp.transcribe import Transcription
 
 SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
@@ -141,6 +142,7 @@ class Ipopt:
         self.transcription, self.options = transcription, dict(options or {})
         self.log, self.deadline, self.watch, self.stop = log, deadline, watch, stop
         self.iterations = 0
+        self._damped: dict[BlockProblem | Anchored, ca.Function] = {}
 
     def solve(
         self,
@@ -170,7 +172,7 @@ class Ipopt:
         if self.log is not None:
             own |= {"output_file": str(self.log), "file_print_level": 5, "file_append": "yes"}
         problem, p = self._posed(parameters, start)
-        plugin = self._plugin(problem, own)
+        plugin = self._plugin(problem, self._newton(problem, parameters), own)
         if self.watch is not None or self.stop is not None:
             stop = self.stop or (lambda: False)
             plugin["iteration_callback"] = Watcher(t, self.watch, stop, len(p))
@@ -210,14 +212,27 @@ class Ipopt:
     def _anchored(self) -> Anchored:
         return Anchored(self.transcription.problem)
 
+    def _newton(self, problem: BlockProblem | Anchored, parameters: Parameters) -> ca.Function:
+        """The Hessian that Newton steps are made with: damped where there are relaxed pairs.
+
+        The paper's penalty on pairs stays as it is, for it is there to be compared with.
+        """
+        if parameters.pairs or not any(r.kind == "pair" for r in self.transcription.stage.rows):
+            return problem.hess_lag
+        if problem not in self._damped:
+            self._damped[problem] = damped(problem.hess_lag)
+        return self._damped[problem]
+
     @staticmethod
-    def _plugin(problem: BlockProblem | Anchored, options: Mapping[str, Any]) -> dict[str, Any]:
+    def _plugin(
+        problem: BlockProblem | Anchored, hessian: ca.Function, options: Mapping[str, Any]
+    ) -> dict[str, Any]:
         return {
             "print_time": False,
             "error_on_fail": False,
             "grad_f": problem.grad_f,
             "jac_g": problem.jac_g,
-            "hess_lag": problem.hess_lag,
+            "hess_lag": hessian,
             "calc_lam_p": False,
             "no_nlp_grad": True,
             **{f"ipopt.{name}": value for name, value in options.items()},
