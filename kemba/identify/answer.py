@@ -82,8 +82,11 @@ def phrase(answer: Answer) -> str:
         return f"Something is missing that no effect of the catalogue explains{why}.{more}"
     parts = [r for r in answer.ranking if r.effect in answer.added]
     named = " and ".join(_named(r) for r in parts)
-    falls = f"the held-out error falls from {answer.error_before:.2f} to {answer.error_after:.2f}"
-    return f"Missing: {named}; {falls} times the noise.{_doubt(parts)}"
+    before, after = f"{answer.error_before:.2f}", f"{answer.error_after:.2f}"
+    falls = f"falls from {before} to {after}"
+    if float(after) >= float(before):
+        falls = f"was {before} and is {after}"
+    return f"Missing: {named}; the held-out error {falls} times the noise.{_doubt(parts)}"
 
 
 def _named(ranked: Ranked) -> str:

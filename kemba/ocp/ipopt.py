@@ -213,11 +213,13 @@ class Ipopt:
         return Anchored(self.transcription.problem)
 
     def _newton(self, problem: BlockProblem | Anchored, parameters: Parameters) -> ca.Function:
-        """The Hessian that Newton steps are made with: damped where there are relaxed pairs.
+        """The Hessian that Newton steps are made with: damped on a whole robot with relaxed pairs.
 
-        The paper's penalty on pairs stays as it is, for it is there to be compared with.
+        Half a robot is as quick without. The paper's penalty on pairs stays as it is, for it is
+        there to be compared with.
         """
-        if parameters.pairs or not any(r.kind == "pair" for r in self.transcription.stage.rows):
+        stage, half = self.transcription.stage, self.transcription.reduction.symmetric
+        if half or parameters.pairs or not any(r.kind == "pair" for r in stage.rows):
             return problem.hess_lag
         if problem not in self._damped:
             self._damped[problem] = damped(problem.hess_lag)

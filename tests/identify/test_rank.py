@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from kemba.identify import discover as discovery
+from kemba.identify.answer import Answer, Ranked, phrase
 from kemba.identify.discover import discover
 from kemba.identify.problem import Array, Candidate, Parameter, Rows, Theta, secant_jacobian
 from kemba.identify.rank import probabilities
@@ -116,3 +117,17 @@ def test_an_answer_that_leaves_most_of_the_error_is_doubted(
     monkeypatch.setattr(discovery, "error", lambda search, h, holdout: after if h else before)
     found = discovery.doubts_about(object(), ("seal_friction",), None, None)  # type: ignore[arg-type]
     assert bool(found) == doubted
+
+
+@pytest.mark.parametrize(
+    ("after", "said"), [(0.91, "falls from 0.96 to 0.91"), (0.97, "was 0.96 and is 0.97")]
+)
+def test_the_sentence_says_falls_only_where_the_error_falls(after: float, said: str) -> None:
+    found = Answer(
+        "missing",
+        ranking=[Ranked("payload", 1.0, {})],
+        added=("payload",),
+        error_before=0.96,
+        error_after=after,
+    )
+    assert f"the held-out error {said} times the noise" in phrase(found)

@@ -168,7 +168,7 @@ def wrong_touch(phases: tuple[Phase, ...], marks: list[int]) -> tuple[int, list[
 
 
 def test_a_contact_that_cannot_be_is_found_and_taken_out() -> None:
-    euler, found = both(*CASES[5])
+    euler, found = both(*CASES[1])
     tried = refiner(euler)
     k, wrong = wrong_touch(found.phases, tried.marks)
     program, rough = tried.rough(wrong, euler.trajectory)

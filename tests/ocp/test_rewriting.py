@@ -11,6 +11,7 @@ from kemba.ocp import load_task
 from kemba.ocp.abreast import FEW, abreast
 from kemba.ocp.anchor import Anchored
 from kemba.ocp.blocks import Block, BlockProblem
+from kemba.ocp.damped import DAMPING, damped
 from kemba.ocp.folded import folded
 from kemba.ocp.mirror import find_symmetry
 from kemba.ocp.transcribe import Transcription
@@ -96,3 +97,12 @@ def test_an_anchor_adds_half_the_squared_way() -> None:
     assert np.array_equal(*map(np.array, jacobians))
     nlp = ca.Function("nlp", [anchored.nlp["x"], anchored.nlp["p"]], [anchored.nlp["f"]])
     assert float(nlp(x, p)) == pytest.approx(float(f))
+
+
+def test_damping_adds_the_same_curvature_everywhere() -> None:
+    z = ca.SX.sym("z", 2)
+    block = Block(z, ca.vertcat(z[0] * z[1]), z[0] ** 3 - z[1], np.array([[0, 1], [1, 2]]))
+    plain = BlockProblem([block], 3, ca.SX(0, 1)).hess_lag
+    at = (np.random.default_rng(0).normal(size=3), [], 1.5, [0.3, -2.0])
+    added = np.array(damped(plain)(*at) - plain(*at))
+    assert added == pytest.approx(DAMPING * np.eye(3), abs=1e-15)

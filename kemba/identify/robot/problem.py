@@ -102,7 +102,7 @@ class RobotProblem:
         physics, batch = self.physics, self.batch
         ref = first_reference(physics, batch)
         late = np.array([base.get(f"sensor_delay:{c}.dt", 0.0) for c in physics.channels])
-        rates = ((ref.q, ref.v), (ref.v, ref.a), (ref.a, 0.0 * ref.a))
+        rates = ((ref.q, ref.v), (ref.v, ref.a), (ref.a, np.zeros_like(ref.a)))
         ref = Reference(*(ahead(a, rate, batch.tracks, late) for a, rate in rates))
         self.plan = schedules(physics, batch, ref)
         dt = float(np.median(batch.h[batch.valid]))
