@@ -14,9 +14,9 @@ from kemba.files import write_json
 from kemba.sweep.case import Case, Record, perform
 
 PATIENCE = 30.0  # s; for a result that a worker holds
-# Dask has workers give memory back at once; a solver asks for it again at once, which costs a fifth
-# of the time.
-KEEPING = {f"MALLOC_{kind}_THRESHOLD_": 2**30 for kind in ("TRIM", "MMAP")}
+# Instead of Dask's own, with which workers give memory back at once; a solver asks for it again at
+# once, which costs a fifth of the time.
+ENVIRONMENT = {"OPENBLAS_NUM_THREADS": 1}
 
 Tell = Callable[[Case, Record], None]
 
@@ -121,7 +121,7 @@ def _client(scheduler: str | None, jobs: int | None, most: int) -> Iterator[Any]
         dask.config.set(
             {
                 "distributed.scheduler.worker-saturation": 1.0,
-                "distributed.nanny.pre-spawn-environ": {"OPENBLAS_NUM_THREADS": 1, **KEEPING},
+                "distributed.nanny.pre-spawn-environ": ENVIRONMENT,
             }
         ),
         LocalCluster(
