@@ -146,6 +146,7 @@ def table(records: Sequence[Record]) -> str:
     known = [*groups["single"], *groups["sensor"]]
     errors, covered = parameters([*known, *groups["pair"]])
     rows = [
+        _row("right effect first", known, lambda r: among_first(r, 1)),
         _row("right effect first, physics", groups["single"], lambda r: among_first(r, 1)),
         _row("right effect first, sensors", groups["sensor"], lambda r: among_first(r, 1)),
         _row("right effect first or second", known, lambda r: among_first(r, 2)),
