@@ -115,6 +115,12 @@ def _loop(room: Room, name: str, held: str) -> dict[str, list[str]]:
         f"kemba-opt compare {held} -q",
         f"kemba-opt compare {held} --model {answer}/model.yaml --figure {name}-after.png -q",
     ]
+    if name == "droop":
+        fitted = f"logs/{name}/{FITTED}/*.csv"
+        after += [
+            f"kemba-opt compare {fitted} --model {m} -q"
+            for m in (f"{answer}/model.yaml", f"{name}.yaml")
+        ]
     if name == "friction":
         listed = json.loads((room.folder / answer / "answer.json").read_text("utf-8"))
         rows = [row["effect"] for row in listed["ranking"][1:]]

@@ -51,13 +51,14 @@ def discover(
     best = search.run()
     say("asking whether nothing would look like this")
     test = null_test(search)
-    best, p_value = _believed(search, best, test)
+    best, p_value, dismissed = _believed(search, best, test)
     formula = look(search, best)
     drift = drifting(search, best)
     if drift is not None and formula is not None and drift.nats > formula.gain:
         formula = None
     doubts = [] if formula else doubts_about(search, best, drift, holdout)
-    answer = _answer(search, best, p_value, test, formula, holdout, doubts)
+    ranking = ranked(search, best, dismissed, holdout)
+    answer = _answer(search, best, p_value, test, ranking, formula, holdout, doubts)
     answer.runtime_s = time.monotonic() - started
     return Found(answer, search, best, holdout)
 
@@ -75,16 +76,21 @@ def null_test(search: Search) -> NullTest:
     return bootstrap(base.ranker(base.point.linear), noise, singles)
 
 
-def _believed(search: Search, best: Hypothesis, test: NullTest) -> tuple[Hypothesis, float]:
-    """The best hypothesis cut down to what is significant and holds on left-out data."""
+def _believed(
+    search: Search, best: Hypothesis, test: NullTest
+) -> tuple[Hypothesis, float, set[Hypothesis]]:
+    """The best hypothesis cut down to what is significant and holds on left-out data, the p-value
+    of nothing, and what was dismissed on the way."""
     null = search.points[NULL].log_evidence
     singles = [p.log_evidence - null for h, p in search.points.items() if h]
     p_value = test.p_value(max(singles, default=0.0))
+    dismissed: set[Hypothesis] = set()
     if not best or p_value > SIGNIFICANT:
-        return NULL, p_value
+        return NULL, p_value, dismissed
     while best:
         grave = material(search, best)
         if grave != best:
+            dismissed.add(best)
             best = grave
             if best:
                 search.visit(best)
@@ -92,9 +98,10 @@ def _believed(search: Search, best: Hypothesis, test: NullTest) -> tuple[Hypothe
         smaller = [h for h in search.points if len(h) == len(best) - 1 and set(h) < set(best)]
         against = max(smaller, key=lambda h: search.points[h].log_evidence, default=NULL)
         if not left_out(search, best, against).refuted:
-            return best, p_value
+            return best, p_value, dismissed
+        dismissed.add(best)
         best = against
-    return NULL, p_value
+    return NULL, p_value, dismissed
 
 
 def material(search: Search, hypothesis: Hypothesis) -> Hypothesis:
@@ -131,12 +138,12 @@ def _answer(
     best: Hypothesis,
     p_value: float,
     test: NullTest,
+    ranking: Sequence[Ranked],
     formula: Formula | None,
     holdout: Problem | None,
     doubts: Sequence[str] = (),
 ) -> Answer:
     problem = search.problem
-    ranking = ranked(search, best, holdout)
     before = error(search, NULL, holdout)
     after = error(search, best, holdout) if best else before
     verdict = "unknown" if formula or doubts else "missing" if best else "nothing"
@@ -169,12 +176,13 @@ def error(search: Search, hypothesis: Hypothesis, holdout: Problem | None) -> fl
     return heldout_error(holdout, point.fit.theta)
 
 
-def ranked(search: Search, best: Hypothesis, holdout: Problem | None) -> list[Ranked]:
+def ranked(
+    search: Search, best: Hypothesis, dismissed: set[Hypothesis], holdout: Problem | None
+) -> list[Ranked]:
     """The effects in order of probability; those of the best answer first."""
     problem = search.problem
     probability = search.probabilities()
-    if not best:
-        probability = _doubted(probability)
+    probability = _without(probability, dismissed) if best else _doubted(probability)
     shares = share_of(probability, problem.candidates)
     order = sorted(shares, key=lambda e: (e not in best, -_strength(search, e, best), -shares[e]))
     found = []
@@ -196,6 +204,14 @@ def ranked(search: Search, best: Hypothesis, holdout: Problem | None) -> list[Ra
             )
         )
     return found
+
+
+def _without(
+    probability: Mapping[Hypothesis, float], dismissed: set[Hypothesis]
+) -> dict[Hypothesis, float]:
+    """Over what was not dismissed as too small or refuted by left-out data."""
+    rest = {h: p for h, p in probability.items() if h not in dismissed}
+    return {h: p / sum(rest.values()) for h, p in rest.items()}
 
 
 def _doubted(probability: Mapping[Hypothesis, float]) -> dict[Hypothesis, float]:

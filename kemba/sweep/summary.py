@@ -12,7 +12,7 @@ from kemba.sweep.influence import influence
 from kemba.sweep.schema import Sweep
 
 Rows = list[tuple[Case, Record | None]]
-TIMES = ("solve_s", "solve_cpu_s", "wall_s", "cpu_s")
+TIMES = ("build_s", "solve_s", "solve_cpu_s", "wall_s", "cpu_s")
 UNFINISHED = ("error", "lost", "missing")
 
 

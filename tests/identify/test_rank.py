@@ -131,3 +131,9 @@ def test_the_sentence_says_falls_only_where_the_error_falls(after: float, said: 
         error_after=after,
     )
     assert f"the held-out error {said} times the noise" in phrase(found)
+
+
+def test_what_was_dismissed_has_no_probability() -> None:
+    before = {(): 0.05, ("supply_droop",): 0.15, ("supply_droop", "cross_leak"): 0.8}
+    kept = discovery._without(before, {("supply_droop", "cross_leak")})
+    assert kept == pytest.approx({(): 0.25, ("supply_droop",): 0.75})
