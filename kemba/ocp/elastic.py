@@ -150,7 +150,8 @@ def _solve(
     converged: list[Point] = []
     try:
         name = f"soft {' and '.join(soft)}: relax"
-        for wishes, push in ((planner.wishes, 0.3), (quiet, 0.01)):  # the second guess keeps still
+        # the second guess keeps still, which is nearly feasible: far off the bounds it is not
+        for wishes, push in ((planner.wishes, 0.3), (quiet, 1e-3)):
             interior = {"bound_push": push, "bound_frac": push, "mu_init": 0.1, "tol": 1e-3}
             Y = automatic_guess(planner.model, task, wishes, program.layout, nodes)
             start = Point(program.start(Y))

@@ -55,7 +55,6 @@ def test_refused_without_solving(case: Impossible, tmp_path: Path) -> None:
     assert not (tmp_path / "run" / "controller.csv").exists()
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("case", SEARCHED, ids=lambda case: case.name)
 def test_explained_after_solving(case: Impossible, tmp_path: Path) -> None:
     before = time.process_time()

@@ -58,7 +58,6 @@ def test_a_time_limit_keeps_the_best_iterate() -> None:
     assert np.isfinite(stopped.plan["body/z"]).all()
 
 
-@pytest.mark.slow
 def test_an_impossible_jump_is_not_solved() -> None:
     answer = solved("jump", "height=1.6 m", "solver.max_iterations=150", nodes=24).run.certificate
     assert answer["status"] in ("infeasible", "limit", "stalled")
@@ -101,7 +100,6 @@ def test_every_iteration_is_watched_and_every_stage_told() -> None:
     assert seen[0][0] == 0 and all(math.isfinite(x) for values in seen for x in values)
 
 
-@pytest.mark.slow
 def test_the_papers_method_runs() -> None:
     """One penalty solve (eq. 9): it answers in the same form, solved or not."""
     run = solved("max_jump", "method=penalty", "solver.time_limit=20 s", nodes=24)
