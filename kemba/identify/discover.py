@@ -181,8 +181,7 @@ def ranked(
 ) -> list[Ranked]:
     """The effects in order of probability; those of the best answer first."""
     problem = search.problem
-    probability = search.probabilities()
-    probability = _without(probability, dismissed) if best else _doubted(probability)
+    probability = search.probabilities(dismissed) if best else _doubted(search.probabilities())
     shares = share_of(probability, problem.candidates)
     order = sorted(shares, key=lambda e: (e not in best, -_strength(search, e, best), -shares[e]))
     found = []
@@ -204,14 +203,6 @@ def ranked(
             )
         )
     return found
-
-
-def _without(
-    probability: Mapping[Hypothesis, float], dismissed: set[Hypothesis]
-) -> dict[Hypothesis, float]:
-    """Over what was not dismissed as too small or refuted by left-out data."""
-    rest = {h: p for h, p in probability.items() if h not in dismissed}
-    return {h: p / sum(rest.values()) for h, p in rest.items()}
 
 
 def _doubted(probability: Mapping[Hypothesis, float]) -> dict[Hypothesis, float]:

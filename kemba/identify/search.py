@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -218,12 +218,12 @@ class Search:
         gains = {h: p.log_evidence - null for h, p in self.points.items() if h}
         return [h for h, gain in gains.items() if gain > 0.5 * max(gains.values())]
 
-    def probabilities(self) -> dict[Hypothesis, float]:
-        """Over everything refitted, and the rest of the singles by their linear evidence."""
-        evidence = {h: p.log_evidence for h, p in self.points.items()}
-        for h, e in self.base.table.items():
-            if len(h) == 1:
-                evidence.setdefault(h, e)
+    def probabilities(self, dismissed: Collection[Hypothesis] = ()) -> dict[Hypothesis, float]:
+        """Over everything refitted, and the rest of the singles by their linear evidence; without
+        what was `dismissed`, as too small or refuted by left-out data."""
+        evidence = {h: e for h, e in self.base.table.items() if len(h) == 1}
+        evidence |= {h: p.log_evidence for h, p in self.points.items()}
+        evidence = {h: e for h, e in evidence.items() if h not in dismissed}
         return probabilities(evidence, len(self.problem.candidates))
 
 

@@ -15,7 +15,6 @@ DAMPING = 2e-3  # per scaled variable; IPOPT's own additions are 1e-4 to 1
 
 def damped(hess_lag: ca.Function) -> ca.Function:
     """(x, p, lam_f, lam_g) -> upper triangle of the Hessian (n, n), damped."""
-    at = [ca.MX.sym(hess_lag.name_in(i), hess_lag.sparsity_in(i)) for i in range(4)]
+    at = hess_lag.mx_in()
     hessian = hess_lag(*at) + DAMPING * ca.MX.eye(hess_lag.size1_out(0))
-    names = [hess_lag.name_in(i) for i in range(4)]
-    return ca.Function("hess_lag", at, [hessian], names, [hess_lag.name_out(0)])
+    return ca.Function("hess_lag", at, [hessian], hess_lag.name_in(), hess_lag.name_out())

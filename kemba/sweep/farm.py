@@ -129,7 +129,7 @@ def _client(scheduler: str | None, jobs: int | None, most: int) -> Iterator[Any]
             threads_per_worker=1,
             processes=True,
             dashboard_address=None,
-            scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},  # else sweeps share one
+            scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},  # any free port
             silence_logs=logging.CRITICAL,
             preload=["kemba.sweep.preload"],
         ) as cluster,

@@ -12,6 +12,7 @@ from kemba.identify.answer import Answer, Ranked, phrase
 from kemba.identify.discover import discover
 from kemba.identify.problem import Array, Candidate, Parameter, Rows, Theta, secant_jacobian
 from kemba.identify.rank import probabilities
+from kemba.identify.search import Search
 
 EFFECTS = ("bend", "drag", "kick", "twin", "wave")
 
@@ -134,6 +135,11 @@ def test_the_sentence_says_falls_only_where_the_error_falls(after: float, said: 
 
 
 def test_what_was_dismissed_has_no_probability() -> None:
-    before = {(): 0.05, ("supply_droop",): 0.15, ("supply_droop", "cross_leak"): 0.8}
-    kept = discovery._without(before, {("supply_droop", "cross_leak")})
-    assert kept == pytest.approx({(): 0.25, ("supply_droop",): 0.75})
+    """Not even where it leads by so much that the others would vanish beside it."""
+    search = Search(Toy({"kick.a": 80.0}))
+    best = search.run()
+    assert search.points[best].log_evidence - search.points[()].log_evidence > 1000
+    dismissed = {h for h in search.points if "kick" in h}
+    left = search.probabilities(dismissed)
+    assert not dismissed & set(left)
+    assert sum(left.values()) == pytest.approx(1.0)
