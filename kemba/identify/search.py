@@ -221,7 +221,9 @@ class Search:
     def probabilities(self, dismissed: Collection[Hypothesis] = ()) -> dict[Hypothesis, float]:
         """Over everything refitted, and the rest of the singles by their linear evidence; without
         what was `dismissed`, as too small or refuted by left-out data."""
-        evidence = {h: e for h, e in self.base.table.items() if len(h) == 1}
+        evidence: dict[Hypothesis, float] = {
+            h: e for h, e in self.base.table.items() if len(h) == 1
+        }
         evidence |= {h: p.log_evidence for h, p in self.points.items()}
         evidence = {h: e for h, e in evidence.items() if h not in dismissed}
         return probabilities(evidence, len(self.problem.candidates))

@@ -25,8 +25,9 @@ CONFIRMED = 1e-7  # scaled violation
 ANCHOR = 3e-4  # in the last solve, which else wanders too
 REACH = 4  # nodes by which a switch may move at a time
 MISFIT = 200  # iterations; valves that fit the finer grid take 20 to 100
-# off the bounds: a plan with rounded valves, or between the nodes of its grid, is not feasible
-ROUNDED, PROLONGED = 1e-2, 1e-3
+# Off the bounds: a plan whose valves were rounded or released, or between the nodes of its grid, is
+# not feasible; the more it must change, the farther off it starts.
+ROUNDED, CHANGED = 1e-2, 1e-3
 # feasible to the last digit, optimal to a few: the certificate measures the former
 EXACT: dict[str, Any] = {"tol": 1e-2, "constr_viol_tol": 1e-8, "acceptable_iter": 0}
 
@@ -121,11 +122,9 @@ def binary(search: Search, point: Point) -> Point:
     return search.solve("round valves", point, parameters, options=options, fixed=fixed)
 
 
-def fix(
-    search: Search, point: Point, push: float = 1e-6, forces: float = FORCES, **more: Any
-) -> Point:
+def fix(search: Search, point: Point, forces: float = FORCES, **more: Any) -> Point:
     """Round and fix the valves, the pairs tighter; `more` options to IPOPT."""
-    options, fixed = warm(1e-3, push, tol=1e-3, **more), search.valves(point)
+    options, fixed = warm(1e-3, CHANGED, tol=1e-3, **more), search.valves(point)
     parameters = Parameters(TIGHT, forces=forces)
     return search.solve("fix valves", point, parameters, options=options, fixed=fixed)
 
@@ -138,9 +137,9 @@ def tighten(search: Search, point: Point) -> Point:
     return search.solve("tighten", point, parameters, options=options, fixed=fixed)
 
 
-def move(search: Search, point: Point, push: float = 1e-6) -> Point:
+def move(search: Search, point: Point) -> Point:
     """Release every valve switch by a few nodes and push the valves towards 0 and 1 again."""
-    options, free = warm(1e-3, push, tol=1e-3), _released(search.valves(point))
+    options, free = warm(1e-3, CHANGED, tol=1e-3), _released(search.valves(point))
     parameters = Parameters(TIGHT, VALVE, SWITCHING / 5, forces=FORCES)
     return search.solve("move switches", Point(point.Y), parameters, options=options, free=free)
 
@@ -160,11 +159,10 @@ def refine(search: Search, coarse: Transcription, point: Point) -> Point:
     """A coarse plan on the finer grid of `search`, with its valves kept; where that takes too
     long, as where they no longer fit, with their switches moved."""
     start = Point(prolong(coarse, search.transcription, point.Y))
-    kept = fix(search, start, PROLONGED, forces=0.0, max_iter=search.at_most(MISFIT))
+    kept = fix(search, start, forces=0.0, max_iter=search.at_most(MISFIT))
     if kept.solved:
         return kept
-    moved = move(search, start, PROLONGED)
-    return fix(search, Point(moved.Y), PROLONGED, forces=0.0)
+    return fix(search, Point(move(search, start).Y), forces=0.0)
 
 
 def prolong(coarse: Transcription, fine: Transcription, Y: np.ndarray) -> np.ndarray:
