@@ -113,10 +113,10 @@ def find(search: Search, start: Point) -> Point:
     return binary(search, point)
 
 
-def binary(search: Search, point: Point) -> Point:
+def binary(search: Search, point: Point, push: float = 1e-6) -> Point:
     """Push the valves towards 0 and 1, then round and fix them, the pairs as loose as before."""
     parameters = Parameters(LOOSE, VALVE, SWITCHING, forces=FORCES)
-    point = search.solve("binary valves", point, parameters, options=warm(1e-3, tol=1e-3))
+    point = search.solve("binary valves", point, parameters, options=warm(1e-3, push, tol=1e-3))
     options, fixed = warm(1e-2, ROUNDED, tol=1e-3), search.valves(point)
     parameters = Parameters(LOOSE, forces=FORCES)
     return search.solve("round valves", point, parameters, options=options, fixed=fixed)
@@ -157,12 +157,10 @@ def _released(valves: dict[int, np.ndarray]) -> dict[int, tuple[np.ndarray, np.n
 
 def refine(search: Search, coarse: Transcription, point: Point) -> Point:
     """A coarse plan on the finer grid of `search`, with its valves kept; where that takes too
-    long, as where they no longer fit, with their switches moved."""
+    long, as where they no longer fit, with its valves free again."""
     start = Point(prolong(coarse, search.transcription, point.Y))
     kept = fix(search, start, forces=0.0, max_iter=search.at_most(MISFIT))
-    if kept.solved:
-        return kept
-    return fix(search, Point(move(search, start).Y), forces=0.0)
+    return kept if kept.solved else fix(search, binary(search, start, CHANGED), forces=0.0)
 
 
 def prolong(coarse: Transcription, fine: Transcription, Y: np.ndarray) -> np.ndarray:
