@@ -15,6 +15,7 @@ import numpy as np
 from kemba.ocp.anchor import Anchored
 from kemba.ocp.blocks import BlockProblem
 from kemba.ocp.damped import damped
+from kemba.ocp.stopwatch import Stopwatch
 from kemba.ocp.transcribe import Transcription
 
 SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
@@ -131,7 +132,8 @@ WARM: dict[str, Any] = {
 class Ipopt:
     """Solves a transcription, again and again with other parameters, bounds and options.
 
-    `options` go to IPOPT every time; `log` collects its text; `deadline` is in time.monotonic().
+    `options` go to IPOPT every time; `log` collects its text; `deadline` is in time.monotonic();
+    `building` counts the making of what IPOPT evaluates.
     """
 
     def __init__(
@@ -145,7 +147,7 @@ class Ipopt:
     ) -> None:
         self.transcription, self.options = transcription, dict(options or {})
         self.log, self.deadline, self.watch, self.stop = log, deadline, watch, stop
-        self.iterations = 0
+        self.iterations, self.building = 0, Stopwatch()
         self._damped: dict[BlockProblem | Anchored, ca.Function] = {}
 
     def solve(
@@ -175,12 +177,13 @@ class Ipopt:
             own["max_wall_time"] = remaining
         if self.log is not None:
             own |= {"output_file": str(self.log), "file_print_level": 5, "file_append": "yes"}
-        problem, p = self._posed(parameters, start)
-        plugin = self._plugin(problem, self._newton(problem, parameters), own)
-        if self.watch is not None or self.stop is not None:
-            stop = self.stop or (lambda: False)
-            plugin["iteration_callback"] = Watcher(t, self.watch, stop, len(p))
-        solver = ca.nlpsol("solver", "ipopt", problem.nlp, plugin)
+        with self.building.running():
+            problem, p = self._posed(parameters, start)
+            plugin = self._plugin(problem, self._newton(problem, parameters), own)
+            if self.watch is not None or self.stop is not None:
+                stop = self.stop or (lambda: False)
+                plugin["iteration_callback"] = Watcher(t, self.watch, stop, len(p))
+            solver = ca.nlpsol("solver", "ipopt", problem.nlp, plugin)
         arguments: dict[str, Any] = {
             "x0": np.clip(start.Y, lower, upper).ravel(),
             "p": p,

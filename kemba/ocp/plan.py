@@ -16,6 +16,7 @@ from kemba.ocp.mirror import whole
 from kemba.ocp.planned import Plan, explained
 from kemba.ocp.planner import Planner, searched
 from kemba.ocp.refined import refined
+from kemba.ocp.stopwatch import Stopwatch
 from kemba.ocp.task import Task
 from kemba.ocp.transcribe import Transcription
 from kemba.ocp.wishes import resolve
@@ -39,13 +40,15 @@ def plan(
     from, `stop` is asked between iterations whether to end with the best one.
     """
     document = document or Document(task.model_dump())
-    started = time.perf_counter()
-    built = task_model(task, model)
-    wishes = resolve(task, built, document)
-    planner = Planner(task, built, wishes, log, tell, watch, start=start, stop=stop)
-    findings = check_task(task, built, wishes, document)
-    refused = refusal(findings)
-    planner.build_s = time.perf_counter() - started
+    building = Stopwatch()
+    with building.running():
+        built = task_model(task, model)
+        wishes = resolve(task, built, document)
+        findings = check_task(task, built, wishes, document)
+        refused = refusal(findings)
+    planner = Planner(
+        task, built, wishes, log, tell, watch, building=building, start=start, stop=stop
+    )
     planner.deadline = time.monotonic() + task.solver.time_limit
     found = searched(planner, refused is not None)
     if found.status == "solved" and task.refine == "radau":

@@ -72,7 +72,7 @@ def judge(
         attempts=tuple(planner.attempts),
         solve_s=solve_s,
         solve_cpu_s=solve_cpu_s,
-        build_s=planner.build_s,
+        build_s=planner.building.wall,
         variables=transcription.variables,
         constraints=transcription.constraints,
     )

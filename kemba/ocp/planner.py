@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -29,6 +28,7 @@ from kemba.ocp.schedule import (
     refine,
     tighten,
 )
+from kemba.ocp.stopwatch import Stopwatch
 from kemba.ocp.switching import polish
 from kemba.ocp.task import Task
 from kemba.ocp.transcribe import Transcription
@@ -57,8 +57,7 @@ class Planner:
     tell: Callable[[str], None] = lambda text: None
     watch: Watch | None = None
     attempts: list[Attempt] = field(default_factory=list)
-    build_s: float = 0.0
-    build_cpu_s: float = 0.0
+    building: Stopwatch = field(default_factory=Stopwatch)
     deadline: float = np.inf
     start: Trajectory | None = None
     stop: Callable[[], bool] | None = None
@@ -66,12 +65,11 @@ class Planner:
 
     def search(self, nodes: int, reduction: Reduction) -> Search:
         """A fresh program on a grid of `nodes`."""
-        started, busy = time.perf_counter(), time.process_time()
-        transcription = Transcription(self.model, self.task, self.wishes, reduction, nodes)
+        with self.building.running():
+            transcription = Transcription(self.model, self.task, self.wishes, reduction, nodes)
         options = {"max_iter": self.task.solver.max_iterations, **self.task.solver.options}
         ipopt = Ipopt(transcription, options, self.log, self.deadline, self.watch, self.stop)
-        self.build_s += time.perf_counter() - started
-        self.build_cpu_s += time.process_time() - busy
+        ipopt.building = self.building
         name = "half" if reduction.symmetric else "whole"
 
         def tell(text: str) -> None:
@@ -173,10 +171,10 @@ class Planner:
 
 def searched(planner: Planner, refused: bool) -> Plan:
     """What the strategies find, judged; the start guess for a task that a check refused."""
-    started, busy = time.perf_counter(), time.process_time()
-    build_before = planner.build_s
-    build_cpu_before = planner.build_cpu_s
-    transcription, point = planner.refuse() if refused else planner.run()
-    elapsed = time.perf_counter() - started - (planner.build_s - build_before)
-    busy = time.process_time() - busy - (planner.build_cpu_s - build_cpu_before)
-    return judge(planner, transcription, point, elapsed, busy)
+    before = replace(planner.building)
+    searching = Stopwatch()
+    with searching.running():
+        transcription, point = planner.refuse() if refused else planner.run()
+    wall = searching.wall - (planner.building.wall - before.wall)
+    cpu = searching.cpu - (planner.building.cpu - before.cpu)
+    return judge(planner, transcription, point, wall, cpu)
