@@ -114,8 +114,8 @@ COMMON: dict[str, Any] = {
     "nlp_scaling_method": "none",
     "mu_strategy": "monotone",
     # MUMPS asks for eleven times what it expects to need, and the system hands out and takes back
-    # so many pages for every factorisation that a fifth of the time goes there. It asks again for
-    # more where twice as much is too little.
+    # so many pages for every factorisation that it takes time. It asks again for more where twice
+    # as much is too little.
     "mumps_mem_percent": 100,
 }
 
