@@ -142,9 +142,12 @@ def _solve(
     """The usual schedule; the last step that converged counts."""
     task = planner.task
     nodes = min(task.nodes, NODES)
-    program = Elastic(planner.model, task, planner.wishes, reduction, nodes, soft)
+    with planner.building.running():
+        program = Elastic(planner.model, task, planner.wishes, reduction, nodes, soft)
     options = {**task.solver.options, "max_iter": ITERATIONS}
-    ipopt = Ipopt(program, options, planner.log, deadline, planner.watch, planner.stop)
+    ipopt = Ipopt(
+        program, options, planner.log, deadline, planner.watch, planner.stop, planner.building
+    )
     search = Search(ipopt, task.solver.complementarity, planner.tell, planner.attempts)
     quiet = [w for w in planner.wishes if w.location[0] not in soft]
     converged: list[Point] = []

@@ -15,8 +15,8 @@ import numpy as np
 from kemba.ocp.anchor import Anchored
 from kemba.ocp.blocks import BlockProblem
 from kemba.ocp.damped import damped
-from kemba.ocp.stopwatch import Stopwatch
 from kemba.ocp.transcribe import Transcription
+from kemba.stopwatch import Stopwatch
 
 SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
 
@@ -144,10 +144,11 @@ class Ipopt:
         deadline: float = np.inf,
         watch: Watch | None = None,
         stop: Callable[[], bool] | None = None,
+        building: Stopwatch | None = None,
     ) -> None:
         self.transcription, self.options = transcription, dict(options or {})
         self.log, self.deadline, self.watch, self.stop = log, deadline, watch, stop
-        self.iterations, self.building = 0, Stopwatch()
+        self.building, self.iterations = building or Stopwatch(), 0
         self._damped: dict[BlockProblem | Anchored, ca.Function] = {}
 
     def solve(

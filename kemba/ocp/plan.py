@@ -16,10 +16,10 @@ from kemba.ocp.mirror import whole
 from kemba.ocp.planned import Plan, explained
 from kemba.ocp.planner import Planner, searched
 from kemba.ocp.refined import refined
-from kemba.ocp.stopwatch import Stopwatch
 from kemba.ocp.task import Task
 from kemba.ocp.transcribe import Transcription
 from kemba.ocp.wishes import resolve
+from kemba.stopwatch import Stopwatch
 from kemba.trajectory import Trajectory
 
 

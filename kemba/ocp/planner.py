@@ -28,11 +28,11 @@ from kemba.ocp.schedule import (
     refine,
     tighten,
 )
-from kemba.ocp.stopwatch import Stopwatch
 from kemba.ocp.switching import polish
 from kemba.ocp.task import Task
 from kemba.ocp.transcribe import Transcription
 from kemba.ocp.wishes import Wish
+from kemba.stopwatch import Stopwatch
 from kemba.trajectory import Trajectory
 
 COARSEST, FINE = 24, 80  # nodes: no grid is coarser, and valves are sought on none finer
@@ -68,8 +68,9 @@ class Planner:
         with self.building.running():
             transcription = Transcription(self.model, self.task, self.wishes, reduction, nodes)
         options = {"max_iter": self.task.solver.max_iterations, **self.task.solver.options}
-        ipopt = Ipopt(transcription, options, self.log, self.deadline, self.watch, self.stop)
-        ipopt.building = self.building
+        ipopt = Ipopt(
+            transcription, options, self.log, self.deadline, self.watch, self.stop, self.building
+        )
         name = "half" if reduction.symmetric else "whole"
 
         def tell(text: str) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 
 from kemba.ocp.certify import costs
@@ -11,6 +10,7 @@ from kemba.ocp.planned import Plan
 from kemba.ocp.planner import Planner, searched
 from kemba.ocp.schedule import Attempt
 from kemba.ocp.verdict import verdict
+from kemba.stopwatch import Stopwatch
 
 NUDGE = 0.05  # guess noise of the second start where the first plan does not refine
 
@@ -42,25 +42,26 @@ def refined(planner: Planner, found: Plan) -> Plan:
 
 def on_phases(planner: Planner, found: Plan) -> Plan:
     """The plan solved again on its own phases; where that fails, the same with the reason."""
-    started, busy = time.perf_counter(), time.process_time()
+    refining = Stopwatch()
     task, model = found.task, found.model
     planner.tell("phases")
-    answer = refine(
-        model,
-        task,
-        found.wishes,
-        found.trajectory,
-        deadline=planner.deadline,
-        log=planner.log,
-        watch=planner.watch,
-        stop=planner.stop,
-    )
+    with refining.running():
+        answer = refine(
+            model,
+            task,
+            found.wishes,
+            found.trajectory,
+            deadline=planner.deadline,
+            log=planner.log,
+            watch=planner.watch,
+            stop=planner.stop,
+        )
     planner.attempts.append(Attempt("phases", answer.message, answer.iterations))
     found = replace(
         found,
         attempts=tuple(planner.attempts),
-        solve_s=found.solve_s + time.perf_counter() - started,
-        solve_cpu_s=found.solve_cpu_s + time.process_time() - busy,
+        solve_s=found.solve_s + refining.wall,
+        solve_cpu_s=found.solve_cpu_s + refining.cpu,
     )
     new, certificate = answer.trajectory, answer.certificate
     if answer.stopped:

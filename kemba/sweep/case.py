@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from kemba.files import plain, read_json, write_json
+from kemba.stopwatch import Stopwatch
 
 Record = dict[str, Any]
 Work = Mapping[str, Any]
@@ -62,15 +63,16 @@ def perform(function: str, work: Work, path: str) -> Record:
     """
     if Path(path).is_file():
         return dict(read_json(path))
-    wall, cpu = time.perf_counter(), time.process_time()
+    working = Stopwatch()
     try:
-        result = resolve(function)(work)
+        with working.running():
+            result = resolve(function)(work)
     except Exception as error:
         result = {"status": "error", "good": False, "sentence": f"{type(error).__name__}: {error}"}
     record = {
         **result,
-        "wall_s": time.perf_counter() - wall,
-        "cpu_s": time.process_time() - cpu,
+        "wall_s": working.wall,
+        "cpu_s": working.cpu,
         "finished": time.time(),
     }
     if Path(path).parent.is_dir():
