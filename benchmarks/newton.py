@@ -1,4 +1,4 @@
-"""Forward jumps with and without what makes their Newton steps cheap, in turns.
+"""Forward jumps with and without what makes their Newton steps few or cheap, in turns.
 
     python benchmarks/newton.py [--cases 8]
 
@@ -13,6 +13,7 @@ import argparse
 import re
 import tempfile
 from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from unittest.mock import patch
 
@@ -20,13 +21,13 @@ import numpy as np
 
 from kemba.config import parse
 from kemba.ocp import Task, plan
-from kemba.ocp.damped import DAMPING
 from kemba.sweep import expand, load_sweep, machine
 
-VARIANTS = {  # damping, options of IPOPT
-    "as shipped": (DAMPING, {}),
-    "undamped": (0.0, {}),
-    "memory by IPOPT's default": (DAMPING, {"mumps_mem_percent": 1000}),
+VARIANTS: dict[str, tuple[dict[str, float], dict[str, int]]] = {  # constants, options of IPOPT
+    "as shipped": ({}, {}),
+    "undamped": ({"damped.DAMPING": 0.0}, {}),
+    "changed plans at their bounds": ({"schedule.CHANGED": 1e-6}, {}),
+    "memory by IPOPT's default": ({}, {"mumps_mem_percent": 1000}),
 }
 ITERATION = re.compile(r"^ *\d+r?(?: +\S+){5} +(\S+)(?: +\S+){3}$", re.MULTILINE)  # lg(rg)
 
@@ -38,13 +39,14 @@ def jumps(count: int) -> Iterator[Task]:
     return (parse(case.work["task"], Task) for case in cases[:count])
 
 
-def figures(task: Task, damping: float, options: dict[str, int]) -> list[float]:
+def figures(task: Task, constants: dict[str, float], options: dict[str, int]) -> list[float]:
     """Iterations, those shifted, logarithm of the cost and CPU seconds of one cold solve."""
     solver = task.solver.model_copy(update={"options": options})
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder, ExitStack() as patches:
         log = Path(folder) / "solver.log"
-        with patch("kemba.ocp.damped.DAMPING", damping):
-            found = plan(task.model_copy(update={"solver": solver}), log=log)
+        for name, value in constants.items():
+            patches.enter_context(patch(f"kemba.ocp.{name}", value))
+        found = plan(task.model_copy(update={"solver": solver}), log=log)
         shifts = ITERATION.findall(log.read_text(encoding="utf-8"))
     cost = found.cost["torque_squared_integral"]
     shifted = sum(shift != "-" for shift in shifts)

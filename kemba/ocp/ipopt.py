@@ -113,9 +113,8 @@ COMMON: dict[str, Any] = {
     "sb": "yes",
     "nlp_scaling_method": "none",
     "mu_strategy": "monotone",
-    # MUMPS asks for eleven times what it expects to need, and the system hands out and takes back
-    # so many pages for every factorisation that it takes time. It asks again for more where twice
-    # as much is too little.
+    # By default MUMPS asks for eleven times what it expects to need, and the system hands out and
+    # takes back pages at every factorisation. Where twice as much is too little it asks again.
     "mumps_mem_percent": 100,
 }
 

@@ -114,7 +114,8 @@ def find(search: Search, start: Point) -> Point:
 
 
 def binary(search: Search, point: Point, push: float = 1e-6) -> Point:
-    """Push the valves towards 0 and 1, then round and fix them, the pairs as loose as before."""
+    """Push the valves towards 0 and 1, then round and fix them, the pairs as loose as before; the
+    start moves `push` off the bounds."""
     parameters = Parameters(LOOSE, VALVE, SWITCHING, forces=FORCES)
     point = search.solve("binary valves", point, parameters, options=warm(1e-3, push, tol=1e-3))
     options, fixed = warm(1e-2, ROUNDED, tol=1e-3), search.valves(point)
