@@ -161,7 +161,12 @@ def _residual_is_symmetric(model: Model, images: Mapping[str, Matrix]) -> bool:
 
 
 def wishes_are_symmetric(model: Model, wishes: Sequence[Wish]) -> bool:
-    """Whether every wish has its mirror image among the wishes, tried at a random point."""
+    """Whether every wish has its mirror image among the wishes."""
+    return len(mirrored_wishes(model, wishes)) == len(wishes)
+
+
+def mirrored_wishes(model: Model, wishes: Sequence[Wish]) -> list[Wish]:
+    """The wishes that have their mirror image among the wishes, tried at a random point."""
     images = image_matrices(model)
     names = list(dict.fromkeys(w.quantity.name for w in wishes))
     node = model.node
@@ -186,4 +191,4 @@ def wishes_are_symmetric(model: Model, wishes: Sequence[Wish]) -> bool:
         turned = {(i, w.at, -w.upper, -w.lower) for i in np.flatnonzero(np.isclose(here, -value))}
         return bool(asked & (same | turned))
 
-    return all(has_image(w) for w in wishes)
+    return [w for w in wishes if has_image(w)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +12,9 @@ import numpy as np
 from kemba.model import Model
 from kemba.ocp.elastic import Outcome, elastic
 from kemba.ocp.guess import automatic_guess
+from kemba.ocp.halves import confirm, grow
 from kemba.ocp.ipopt import Ipopt, Point, Watch
-from kemba.ocp.mirror import Reduction, find_symmetry, whole, wishes_are_symmetric
+from kemba.ocp.mirror import Reduction, find_symmetry, mirrored_wishes, whole
 from kemba.ocp.penalty import WEIGHTS, penalise
 from kemba.ocp.planned import Plan, judge
 from kemba.ocp.resume import resumed
@@ -22,9 +24,7 @@ from kemba.ocp.schedule import (
     Search,
     Stopped,
     binary,
-    confirm,
     find,
-    fix,
     refine,
     tighten,
 )
@@ -64,9 +64,11 @@ class Planner:
     outcome: Outcome | None = None  # of the elastic solve after a failure
 
     def search(self, nodes: int, reduction: Reduction) -> Search:
-        """A fresh program on a grid of `nodes`."""
+        """A fresh program on a grid of `nodes`; of half a robot, for what is wished of both legs
+        alike."""
+        wishes = self.alike if reduction.symmetric else self.wishes
         with self.building.running():
-            transcription = Transcription(self.model, self.task, self.wishes, reduction, nodes)
+            transcription = Transcription(self.model, self.task, wishes, reduction, nodes)
         options = {"max_iter": self.task.solver.max_iterations, **self.task.solver.options}
         ipopt = Ipopt(
             transcription, options, self.log, self.deadline, self.watch, self.stop, self.building
@@ -83,12 +85,20 @@ class Planner:
         t = transcription
         return Point(automatic_guess(self.model, self.task, self.wishes, t.layout, t.nodes))
 
+    @cached_property
+    def half(self) -> Reduction | None:
+        """Half the robot, where the model is its own mirror image and symmetry may be used."""
+        return find_symmetry(self.model) if self.task.solver.symmetry else None
+
+    @cached_property
+    def alike(self) -> list[Wish]:
+        """The wishes that are their own mirror images."""
+        return mirrored_wishes(self.model, self.wishes)
+
     def reductions(self) -> Iterator[Reduction]:
         """Half robot first where model and task are mirror images of themselves."""
-        if self.task.solver.symmetry:
-            half = find_symmetry(self.model)
-            if half is not None and wishes_are_symmetric(self.model, self.wishes):
-                yield half
+        if self.half is not None and self.alike == self.wishes:
+            yield self.half
         yield whole(self.model.node)
 
     def strategies(self) -> Iterator[Callable[[], tuple[Transcription, Point]]]:
@@ -104,7 +114,7 @@ class Planner:
     def _coarse_to_fine(self, reduction: Reduction) -> tuple[Transcription, Point]:
         first, *finer = grids(self.task.nodes)
         search = self.search(first, reduction)
-        point = self._polished(search, find(search, self.guess(search.transcription)))
+        point = self._sought(search)
         for nodes in finer:
             if not point.solved:
                 return search.transcription, point
@@ -114,8 +124,7 @@ class Planner:
 
     def _direct(self, reduction: Reduction) -> tuple[Transcription, Point]:
         search = self.search(self.task.nodes, reduction)
-        point = find(search, self.guess(search.transcription))
-        return self._finish(search, self._polished(search, point))
+        return self._finish(search, self._sought(search))
 
     def _continued(self, reduction: Reduction) -> tuple[Transcription, Point]:
         assert self.start is not None
@@ -123,10 +132,23 @@ class Planner:
         point = binary(search, resumed(search.transcription, self.start))
         return self._finish(search, self._polished(search, point))
 
+    def _sought(self, search: Search) -> Point:
+        """A plan with binary valves: grown from half a robot's where legs are equal and only the
+        wishes differ, else from the guess."""
+        t, rounds = search.transcription, self.task.solver.polish
+        if self.half is not None and self.alike != self.wishes:
+            half = self.search(t.nodes, self.half)
+            point = find(half, self.guess(half.transcription))
+            if point.solved:
+                point = grow(search, half.transcription, point, self.guess(t))
+            if point.solved:
+                return polish(search, point, rounds - 1, best=point)
+        return self._polished(search, find(search, self.guess(t)))
+
     def _polished(self, search: Search, point: Point) -> Point:
         if not point.solved:
             return point
-        return polish(search, point) if self.task.solver.polish else fix(search, point)
+        return polish(search, point, self.task.solver.polish)
 
     def _finish(self, search: Search, point: Point) -> tuple[Transcription, Point]:
         point = tighten(search, point) if point.solved else point

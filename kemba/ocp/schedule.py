@@ -21,7 +21,6 @@ MARGIN = 0.8  # the last relaxation stays this much below what the certificate a
 VALVE, SWITCHING = 0.1, 0.05
 FORCES = 3e-5  # while valves are sought; without it IPOPT wanders where the cost is flat
 STOPS = ("User_Requested_Stop", "Maximum_CpuTime_Exceeded", "Maximum_WallTime_Exceeded")
-CONFIRMED = 1e-7  # scaled violation
 ANCHOR = 3e-4  # in the last solve, which else wanders too
 REACH = 4  # nodes by which a switch may move at a time
 MISFIT = 200  # iterations; valves that fit the finer grid take 20 to 100
@@ -138,11 +137,12 @@ def tighten(search: Search, point: Point) -> Point:
     return search.solve("tighten", point, parameters, options=options, fixed=fixed)
 
 
-def move(search: Search, point: Point) -> Point:
-    """Release every valve switch by a few nodes and push the valves towards 0 and 1 again."""
-    options, free = warm(1e-3, CHANGED, tol=1e-3), _released(search.valves(point))
-    parameters = Parameters(TIGHT, VALVE, SWITCHING / 5, forces=FORCES)
-    return search.solve("move switches", Point(point.Y), parameters, options=options, free=free)
+def move(search: Search, start: Point, eps: float = TIGHT, **more: Any) -> Point:
+    """Release every valve switch by a few nodes and push the valves towards 0 and 1 again, the
+    pairs relaxed by `eps`; `more` options to IPOPT."""
+    options, free = {**warm(1e-3, CHANGED, tol=1e-3), **more}, _released(search.valves(start))
+    parameters = Parameters(eps, VALVE, SWITCHING / 5, forces=FORCES)
+    return search.solve("move switches", Point(start.Y), parameters, options=options, free=free)
 
 
 def _released(valves: dict[int, np.ndarray]) -> dict[int, tuple[np.ndarray, np.ndarray]]:
@@ -177,25 +177,3 @@ def prolong(coarse: Transcription, fine: Transcription, Y: np.ndarray) -> np.nda
         else:
             result[:, part] = Y[held, part]
     return result
-
-
-def widen(half: Transcription, whole: Transcription, Y: np.ndarray) -> np.ndarray:
-    """Y of the half robot as Y of the whole one."""
-    groups = {g: half.layout.full(Y, g) for g in ("q", "v", "s", "u", "lam")}
-    groups["h"] = half.layout.half(Y, "h")
-    return whole.layout.pack(groups)
-
-
-def confirm(search: Search, half: Transcription, point: Point) -> Point:
-    """A plan of the half robot on the whole one: checked there, and solved on where it falls
-    short (its forces and moments vanish by symmetry, so that it rarely does)."""
-    whole = search.transcription
-    start = replace(point, Y=widen(half, whole, point.Y), lam_x=None, lam_g=None)
-    parameters = Parameters(MARGIN * search.final_eps)
-    g = np.array(whole.problem.g(start.Y.ravel(), parameters.vector(whole.nodes))).ravel()
-    if np.max(np.maximum(whole.g_lower - g, g - whole.g_upper)) <= CONFIRMED:
-        search.attempts.append(Attempt("confirmed on the whole robot", point.message, 0))
-        return start
-    options = warm(1e-7, **EXACT)
-    fixed = search.valves(start)
-    return search.solve("whole robot", start, parameters, options=options, fixed=fixed)

@@ -9,15 +9,14 @@ from kemba.ocp.ipopt import Point
 from kemba.ocp.schedule import Search, fix, move
 from kemba.trajectory import Trajectory
 
-ROUNDS = {True: 2, False: 1}  # half a robot; a whole one takes four times as long
 ENOUGH = 80  # iterations; where moved switches take more, the plan is seldom better
 PAYS = 0.02  # relative fall of the cost that makes another round worth while
 
 
-def polish(search: Search, point: Point) -> Point:
-    """Release every valve switch by a few nodes and round again, as long as the cost falls."""
-    best: Point | None = None
-    for _ in range(ROUNDS[search.transcription.reduction.symmetric]):
+def polish(search: Search, point: Point, rounds: int, best: Point | None = None) -> Point:
+    """Release every valve switch by a few nodes and round again, at most `rounds` times and as
+    long as the cost falls; `best` is a plan that has been through this."""
+    for _ in range(rounds):
         better = fix(search, Point(move(search, point).Y), max_iter=search.at_most(ENOUGH))
         if not better.solved or (best and better.objective >= (1 - PAYS) * best.objective):
             break

@@ -52,7 +52,7 @@ class Solver(Section):
     max_iterations: Annotated[int, Field(ge=1)] = 3000
     symmetry: bool = True
     coarse: bool = True
-    polish: bool = True
+    polish: Annotated[int, Field(ge=0)] = 1
     complementarity: Annotated[float, Param("1", lower=1e-9, upper=1e-3)] = 1e-6
     options: dict[str, float | int | str] = Field(default_factory=dict)
 

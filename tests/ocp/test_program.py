@@ -11,9 +11,10 @@ import pytest
 from kemba.model import load_model
 from kemba.ocp import load_task
 from kemba.ocp.guess import automatic_guess
+from kemba.ocp.halves import widen
 from kemba.ocp.mirror import find_symmetry, whole
 from kemba.ocp.planner import grids
-from kemba.ocp.schedule import prolong, widen
+from kemba.ocp.schedule import prolong
 from kemba.ocp.transcribe import Transcription
 from kemba.ocp.wishes import resolve
 
