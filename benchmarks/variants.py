@@ -1,0 +1,87 @@
+"""Jumps planned with and without what makes planning quick, in turns.
+
+    python benchmarks/variants.py [--block general] [--cases 16]
+
+Prints means over the first cases of a block of the reliability sweep: iterations, those in which
+IPOPT shifted the Hessian and so factorised more than once, the cost (geometric), and the processor
+time as a ratio to what is shipped.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import tempfile
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from unittest.mock import patch
+
+import numpy as np
+
+from kemba.config import parse
+from kemba.ocp import Task, plan
+from kemba.sweep import expand, load_sweep, machine
+
+Changes = tuple[dict[str, object], dict[str, object]]  # in kemba.ocp, in a task's solver
+SHIPPED: Changes = ({}, {})
+VARIANTS: dict[str, dict[str, Changes]] = {
+    "general": {
+        "as shipped": SHIPPED,
+        "from the guess": ({"planner.Planner.half": None}, {}),
+        "two rounds of moving switches": ({}, {"polish": 2}),
+        "undamped": ({"damped.DAMPING": 0.0}, {}),
+        "changed plans at their bounds": ({"schedule.CHANGED": 1e-6}, {}),
+        "memory by IPOPT's default": ({}, {"options": {"mumps_mem_percent": 1000}}),
+    },
+    "symmetric": {
+        "as shipped": SHIPPED,
+        "two rounds of moving switches": ({}, {"polish": 2}),
+        "no round": ({}, {"polish": 0}),
+        "changed plans at their bounds": ({"schedule.CHANGED": 1e-6}, {}),
+    },
+}
+ITERATION = re.compile(r"^ *\d+r?(?: +\S+){5} +(\S+)(?: +\S+){3}$", re.MULTILINE)  # lg(rg)
+
+
+def jumps(block: str, count: int) -> Iterator[Task]:
+    """The first tasks of a block of the sweep."""
+    sweep, document = load_sweep("reliability.yaml")
+    cases = [case for case in expand(sweep, document, Path()) if case.block == block]
+    return (parse(case.work["task"], Task) for case in cases[:count])
+
+
+def figures(task: Task, changes: Changes) -> list[float]:
+    """Iterations, those shifted, logarithm of the cost and CPU seconds of one cold solve."""
+    replaced, set_in_solver = changes
+    solver = task.solver.model_copy(update=set_in_solver)
+    with tempfile.TemporaryDirectory() as folder, ExitStack() as patches:
+        log = Path(folder) / "solver.log"
+        for name, value in replaced.items():
+            patches.enter_context(patch(f"kemba.ocp.{name}", value))
+        found = plan(task.model_copy(update={"solver": solver}), log=log)
+        shifts = ITERATION.findall(log.read_text(encoding="utf-8"))
+    cost = found.cost["torque_squared_integral"]
+    shifted = sum(shift != "-" for shift in shifts)
+    return [found.iterations, shifted, np.log(cost), found.solve_cpu_s]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--block", choices=VARIANTS, default="general")
+    parser.add_argument("--cases", type=int, default=16)
+    asked = parser.parse_args()
+    variants = VARIANTS[asked.block]
+    tasks = jumps(asked.block, asked.cases)
+    found = [[figures(task, changes) for changes in variants.values()] for task in tasks]
+    iterations, shifted, cost, seconds = np.moveaxis(np.array(found), -1, 0)  # (cases, variants)
+    print(f"{asked.cases} {asked.block} jumps, {machine()}\n")
+    print("| variant | iterations | shifted | cost [N².m².s] | CPU time |\n|---|" + "---:|" * 4)
+    for k, name in enumerate(variants):
+        ratio = seconds[:, k].sum() / seconds[:, 0].sum()
+        means = f"{iterations[:, k].mean():.0f} | {shifted[:, k].mean():.0f}"
+        print(f"| {name} | {means} | {np.exp(cost[:, k].mean()):.3g} | {ratio:.2f} |")
+
+
+if __name__ == "__main__":
+    main()

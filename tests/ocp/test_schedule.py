@@ -1,0 +1,55 @@
+"""The order of solves: whole robots grow from half ones, and switches move as often as asked."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from kemba.ocp import load_task, plan, planner
+from kemba.ocp.ipopt import Point
+from kemba.ocp.planned import Plan
+
+FORWARD = ("nodes=50", "refine=none")
+
+
+def told(name: str, *overrides: str) -> tuple[Plan, list[str]]:
+    """A plan, and which solves were announced on the way."""
+    task, document = load_task(name, list(overrides))
+    solves: list[str] = []
+    return plan(task, document, tell=solves.append), solves
+
+
+def test_a_forward_jump_grows_from_half_a_robot() -> None:
+    found, solves = told("jump_forward", *FORWARD)
+    assert found.status == "solved"
+    assert solves[:3] == [
+        f"{step} (half robot, 25 nodes)" for step in ("relax", "binary valves", "round valves")
+    ]
+    assert all("whole robot" in solve for solve in solves[3:])
+    assert "relax (whole robot, 25 nodes)" not in solves
+    jump = found.trajectory
+    assert jump["body/x"][-1] == pytest.approx(0.3)
+    assert abs(jump["front/hip/q"] + jump["rear/hip/q"]).max() > 0.05, "legs move unlike each other"
+
+
+def test_without_symmetry_it_starts_from_the_guess() -> None:
+    _, solves = told("jump_forward", *FORWARD, "solver.symmetry=false", "solver.time_limit=0.5 s")
+    assert solves[0] == "relax (whole robot, 25 nodes)"
+
+
+def test_what_does_not_grow_starts_from_the_guess(monkeypatch: pytest.MonkeyPatch) -> None:
+    def wither(search: object, half: object, point: Point, guess: Point) -> Point:
+        return replace(guess, message="Infeasible_Problem_Detected")
+
+    monkeypatch.setattr(planner, "grow", wither)
+    found, solves = told("jump_forward", *FORWARD)
+    assert found.status == "solved"
+    assert solves[3] == "relax (whole robot, 25 nodes)"
+
+
+@pytest.mark.parametrize(("rounds", "least", "most"), [(0, 0, 0), (1, 1, 1), (3, 2, 3)])
+def test_switches_move_as_often_as_asked(rounds: int, least: int, most: int) -> None:
+    found, solves = told("jump", "nodes=50", "refine=none", f"solver.polish={rounds}")
+    assert found.status == "solved"
+    assert least <= sum(solve.startswith("move switches") for solve in solves) <= most
