@@ -42,10 +42,9 @@ CASES = [
     ("jump_forward", "distance=0.6 m"),
 ]
 QUICK = [CASES[1], CASES[5]]
-UNSURE = pytest.mark.xfail(reason="whole robots do not always refine; docs/refine.md")
+UNSTABLE = pytest.mark.xfail(reason="1 mm at touchdown tips it over at the end; docs/refine.md")
 MARKS = {case: [] if case in QUICK else [pytest.mark.slow] for case in CASES}
-for distance in ("0.3", "0.6"):
-    MARKS["jump_forward", f"distance={distance} m"].append(UNSURE)
+MARKS["jump_forward", "distance=0.1 m"].append(UNSTABLE)
 EVERY = [pytest.param(*case, marks=marks) for case, marks in MARKS.items()]
 
 
@@ -83,8 +82,7 @@ def test_a_refined_plan_replays_within_2_mm_and_2_ms(name: str, override: str) -
     assert found.trajectory is not None, found.message
     done = replay(euler.model, found.trajectory)
     assert abs(done.apex_error_m) <= 2e-3
-    planned_touchdown = name != "max_jump" and override != "height=0.35 m"
-    assert (done.touchdown_error_s is not None) == planned_touchdown
+    assert (done.touchdown_error_s is not None) == (name != "max_jump")
     assert abs(done.touchdown_error_s or 0.0) <= 2e-3
     assert done.landed == (name != "max_jump")
 
