@@ -15,6 +15,7 @@ import numpy as np
 from kemba.ocp.anchor import Anchored
 from kemba.ocp.blocks import BlockProblem
 from kemba.ocp.damped import damped
+from kemba.ocp.patience import GAVE_UP, Patience
 from kemba.ocp.transcribe import Transcription
 from kemba.stopwatch import Stopwatch
 
@@ -71,17 +72,19 @@ class Watched(Protocol):
 
 
 class Watcher(ca.Callback):
-    """Tells `watch` about every iteration, and asks `stop` whether to go on."""
+    """Tells `watch` about every iteration, and asks `stop` and `patience` whether to go on."""
 
     def __init__(
         self,
         program: Watched,
         watch: Watch | None,
-        stop: Callable[[], bool],
+        stop: Callable[[], bool] | None,
+        patience: Patience | None,
         parameters: int | None = None,
     ) -> None:
         super().__init__()
-        self.t, self.watch, self.stop, self.count = program, watch, stop, 0
+        self.t, self.watch, self.stop, self.patience = program, watch, stop, patience
+        self.count = 0
         self.parameters = program.problem.p.numel() if parameters is None else parameters
         self.construct("watcher", {})
 
@@ -100,12 +103,17 @@ class Watcher(ca.Callback):
         return ca.Sparsity.dense(rows.get(ca.nlpsol_out(i), self.parameters))
 
     def eval(self, arguments: Sequence[ca.DM]) -> list[int]:
-        if self.watch is not None:
+        if self.watch is not None or self.patience is not None:
             g = np.asarray(arguments[2]).ravel()
             over = np.maximum(self.t.g_lower - g, g - self.t.g_upper)
-            self.watch(self.count, float(arguments[1]), float(over.max(initial=0.0)))
+            violation = float(over.max(initial=0.0))
+            if self.watch is not None:
+                self.watch(self.count, float(arguments[1]), violation)
+            if self.patience is not None:
+                self.patience.hear(self.count, violation)
         self.count += 1
-        return [int(self.stop())]
+        lost = self.patience is not None and self.patience.lost
+        return [int(lost or (self.stop is not None and self.stop()))]
 
 
 COMMON: dict[str, Any] = {
@@ -157,9 +165,10 @@ class Ipopt:
         options: Mapping[str, Any] | None = None,
         fixed: Mapping[int, np.ndarray] | None = None,
         free: Mapping[int, tuple[np.ndarray, np.ndarray]] | None = None,
+        patience: Patience | None = None,
     ) -> Point:
         """One solve from `start`; `fixed` maps columns of Y to values (nodes + 1,) they keep,
-        `free` to bounds that hold as well."""
+        `free` to bounds that hold as well. Where `patience` is lost its message is GAVE_UP."""
         t = self.transcription
         remaining = self.deadline - time.monotonic()
         if self.stop is not None and self.stop():
@@ -180,9 +189,9 @@ class Ipopt:
         with self.building.running():
             problem, p = self._posed(parameters, start)
             plugin = self._plugin(problem, self._newton(problem, parameters), own)
-            if self.watch is not None or self.stop is not None:
-                stop = self.stop or (lambda: False)
-                plugin["iteration_callback"] = Watcher(t, self.watch, stop, len(p))
+            if any(listener is not None for listener in (self.watch, self.stop, patience)):
+                watcher = Watcher(t, self.watch, self.stop, patience, len(p))
+                plugin["iteration_callback"] = watcher
             solver = ca.nlpsol("solver", "ipopt", problem.nlp, plugin)
         arguments: dict[str, Any] = {
             "x0": np.clip(start.Y, lower, upper).ravel(),
@@ -202,7 +211,7 @@ class Ipopt:
             lam_x=np.array(found["lam_x"]).ravel(),
             lam_g=np.array(found["lam_g"]).ravel(),
             objective=float(found["f"]),
-            message=str(stats["return_status"]),
+            message=GAVE_UP if patience and patience.lost else str(stats["return_status"]),
             iterations=int(stats["iter_count"]),
         )
 

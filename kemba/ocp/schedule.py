@@ -11,6 +11,7 @@ import numpy as np
 
 from kemba.ocp.dwell import dwelling
 from kemba.ocp.ipopt import WARM, Ipopt, Parameters, Point
+from kemba.ocp.patience import Patience
 from kemba.ocp.transcribe import Transcription
 
 RELAX = "relax"  # the first solve of a schedule
@@ -24,6 +25,7 @@ STOPS = ("User_Requested_Stop", "Maximum_CpuTime_Exceeded", "Maximum_WallTime_Ex
 ANCHOR = 3e-4  # in the last solve, which else wanders too
 REACH = 4  # nodes by which a switch may move at a time
 MISFIT = 200  # iterations; valves that fit the finer grid take 20 to 100
+STUCK, NEAR = 40, 0.05  # iterations without coming nearer; scaled violation that is near
 # Off the bounds: a plan whose valves were rounded or released, or between the nodes of its grid, is
 # not feasible; the more it must change, the farther off it starts.
 ROUNDED, CHANGED = 1e-2, 1e-3
@@ -122,11 +124,17 @@ def binary(search: Search, point: Point, push: float = 1e-6) -> Point:
     return search.solve("round valves", point, parameters, options=options, fixed=fixed)
 
 
-def fix(search: Search, point: Point, forces: float = FORCES, **more: Any) -> Point:
+def fix(
+    search: Search,
+    point: Point,
+    forces: float = FORCES,
+    patience: Patience | None = None,
+    **more: Any,
+) -> Point:
     """Round and fix the valves, the pairs tighter; `more` options to IPOPT."""
     options, fixed = warm(1e-3, CHANGED, tol=1e-3, **more), search.valves(point)
-    parameters = Parameters(TIGHT, forces=forces)
-    return search.solve("fix valves", point, parameters, options=options, fixed=fixed)
+    how = {"options": options, "fixed": fixed, "patience": patience}
+    return search.solve("fix valves", point, Parameters(TIGHT, forces=forces), **how)
 
 
 def tighten(search: Search, point: Point) -> Point:
@@ -160,7 +168,8 @@ def refine(search: Search, coarse: Transcription, point: Point) -> Point:
     """A coarse plan on the finer grid of `search`, with its valves kept; where that takes too
     long, as where they no longer fit, with its valves free again."""
     start = Point(prolong(coarse, search.transcription, point.Y))
-    kept = fix(search, start, forces=0.0, max_iter=search.at_most(MISFIT))
+    longest, patience = search.at_most(MISFIT), Patience(STUCK, NEAR)
+    kept = fix(search, start, forces=0.0, patience=patience, max_iter=longest)
     return kept if kept.solved else fix(search, binary(search, start, CHANGED), forces=0.0)
 
 

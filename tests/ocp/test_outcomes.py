@@ -10,7 +10,7 @@ import pytest
 from ocp.runs import solved
 
 from kemba.model import load_model
-from kemba.ocp import load_task, plan, schedule
+from kemba.ocp import load_task, plan
 from kemba.ocp.certify import certify
 from kemba.ocp.mirror import find_symmetry
 from kemba.ocp.planner import Planner
@@ -51,17 +51,6 @@ def test_the_worst_violation_is_named() -> None:
     assert plan.time[first["node"]] == pytest.approx(first["time_s"])
     named = f"worst: {first['what']} by {first['violation']:.3g} {first['unit']}"
     assert named in failed.run.certificate["sentence"]
-
-
-def test_valves_that_do_not_fit_the_finer_grid_are_sought_again(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(schedule, "MISFIT", 1)
-    found = plan(load_task("jump", ["nodes=50", "refine=none"])[0])
-    names = [attempt.name for attempt in found.attempts]
-    assert found.status == "solved"
-    assert names.count(schedule.RELAX) == 1  # no other strategy was needed
-    assert names.count("binary valves") == 2
 
 
 def test_building_and_solving_take_different_seconds() -> None:

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import pytest
 
-from kemba.ocp import load_task, plan, planner
+from kemba.ocp import load_task, plan, planner, schedule
 from kemba.ocp.ipopt import Point
+from kemba.ocp.patience import GAVE_UP, Patience
 from kemba.ocp.planned import Plan
 
 FORWARD = ("nodes=50", "refine=none")
@@ -53,3 +54,33 @@ def test_switches_move_as_often_as_asked(rounds: int, least: int, most: int) -> 
     found, solves = told("jump", "nodes=50", "refine=none", f"solver.polish={rounds}")
     assert found.status == "solved"
     assert least <= sum(solve.startswith("move switches") for solve in solves) <= most
+
+
+@pytest.mark.parametrize(
+    ("limit", "value", "message"),
+    [("MISFIT", 1, "Maximum_Iterations_Exceeded"), ("STUCK", 0, GAVE_UP)],
+)
+def test_valves_that_do_not_fit_the_finer_grid_are_sought_again(
+    limit: str, value: int, message: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(schedule, limit, value)
+    found, solves = told("jump", "nodes=50", "refine=none")
+    assert found.status == "solved"
+    assert message in [attempt.message for attempt in found.attempts]
+    assert solves.count("relax (half robot, 25 nodes)") == 1  # no other strategy was needed
+    assert solves.count("binary valves (half robot, 50 nodes)") == 1
+
+
+@pytest.mark.parametrize(
+    ("violations", "lost"),
+    [
+        ([1.0, 0.9, 0.85, 0.82], True),
+        ([1.0, 0.9, 0.75, 0.74, 0.73], False),
+        ([1.0, 0.04, 3.0, 2.0, 2.0, 2.0], False),  # it was near before
+    ],
+)
+def test_patience_is_lost_where_nothing_comes_nearer(violations: list[float], lost: bool) -> None:
+    patience = Patience(iterations=3, small=0.05)
+    for iteration, violation in enumerate(violations):
+        patience.hear(iteration, violation)
+    assert patience.lost is lost

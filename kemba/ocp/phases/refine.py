@@ -13,6 +13,7 @@ from kemba.model import Model
 from kemba.ocp.certify import Certificate
 from kemba.ocp.ipopt import SOLVED, Watch
 from kemba.ocp.mirror import Reduction, find_symmetry, whole, wishes_are_symmetric
+from kemba.ocp.patience import GAVE_UP
 from kemba.ocp.phases.constraints import read_constraints
 from kemba.ocp.phases.independent import Independent
 from kemba.ocp.phases.modes import Phase, read_phases
@@ -21,7 +22,7 @@ from kemba.ocp.phases.radau import RADAU3, RADAU5, STATE, Scheme
 from kemba.ocp.phases.repair import FITS, misfit, repaired, simplified
 from kemba.ocp.phases.rules import add_rules
 from kemba.ocp.phases.sample import certificate, to_trajectory
-from kemba.ocp.phases.solve import GAVE_UP, STOPPED, Control, Found, solve
+from kemba.ocp.phases.solve import STOPPED, Control, Found, solve
 from kemba.ocp.phases.start import carried, start_vector
 from kemba.ocp.phases.wishes import add_wishes
 from kemba.ocp.result import arrays

@@ -12,10 +12,10 @@ import casadi as ca
 import numpy as np
 
 from kemba.ocp.ipopt import COMMON, Watch, Watcher
+from kemba.ocp.patience import GAVE_UP, Patience
 from kemba.ocp.phases.program import Program
 
 STOPPED = "User_Requested_Stop"
-GAVE_UP = "No_Progress"
 EXACT: dict[str, Any] = {
     "tol": 1e-4,
     "constr_viol_tol": 1e-8,
@@ -24,7 +24,6 @@ EXACT: dict[str, Any] = {
     "max_hessian_perturbation": 1e6,  # beyond, tries cost a second an iteration and lead nowhere
 }
 PATIENCE = 30  # iterations in which the violation must fall
-PROGRESS = 0.8  # to this part of what it was
 SMALL = 1e-4  # scaled violation below which nobody gives up
 
 
@@ -48,25 +47,6 @@ class Found:
     iterations: int
 
 
-class _Patience:
-    """Passes iterations on and ends a solve that gets nowhere, unless `endless`."""
-
-    def __init__(self, control: Control, endless: bool) -> None:
-        self.control, self.endless, self.lost = control, endless, False
-        self.best, self.since = np.inf, 0
-
-    def watch(self, iteration: int, objective: float, violation: float) -> None:
-        if self.control.watch is not None:
-            self.control.watch(iteration, objective, violation)
-        if violation < PROGRESS * self.best:
-            self.best, self.since = violation, iteration
-        stuck = self.best > SMALL and iteration - self.since >= PATIENCE
-        self.lost = stuck and not self.endless
-
-    def stop(self) -> bool:
-        return self.lost or (self.control.stop is not None and self.control.stop())
-
-
 def solve(program: Program, start: np.ndarray, options: dict[str, Any], control: Control) -> Found:
     """The program solved from `start`; it ends as IPOPT says, with `STOPPED` when asked to, or
     with `GAVE_UP`."""
@@ -81,7 +61,8 @@ def solve(program: Program, start: np.ndarray, options: dict[str, Any], control:
     if control.log is not None:
         own |= {"output_file": str(control.log), "file_print_level": 5, "file_append": "yes"}
     problem = program.problem
-    patience = _Patience(control, endless=program.elastic > 0.0)  # elastic ones have a solution
+    elastic = program.elastic > 0.0  # such a program has a solution
+    patience = Patience(np.inf if elastic else PATIENCE, SMALL)
     plugin = {
         "print_time": False,
         "error_on_fail": False,
@@ -89,7 +70,7 @@ def solve(program: Program, start: np.ndarray, options: dict[str, Any], control:
         "jac_g": problem.jac_g,
         "hess_lag": problem.hess_lag,
         "calc_lam_p": False,
-        "iteration_callback": Watcher(program, patience.watch, patience.stop),
+        "iteration_callback": Watcher(program, control.watch, control.stop, patience),
         **{f"ipopt.{name}": value for name, value in own.items()},
     }
     solver = ca.nlpsol("phases", "ipopt", problem.nlp, plugin)
