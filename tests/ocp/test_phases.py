@@ -42,7 +42,7 @@ CASES = [
     ("jump_forward", "distance=0.6 m"),
 ]
 QUICK = [CASES[1], CASES[5]]
-UNSTABLE = pytest.mark.xfail(reason="1 mm at touchdown tips it over at the end; docs/refine.md")
+UNSTABLE = pytest.mark.xfail(reason="after touchdown it drifts, to a knee down; docs/refine.md")
 MARKS = {case: [] if case in QUICK else [pytest.mark.slow] for case in CASES}
 MARKS["jump_forward", "distance=0.1 m"].append(UNSTABLE)
 EVERY = [pytest.param(*case, marks=marks) for case, marks in MARKS.items()]
