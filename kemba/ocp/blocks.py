@@ -8,7 +8,6 @@ from functools import cached_property
 
 import casadi as ca
 import numpy as np
-from scipy import sparse
 
 from kemba.ocp.abreast import abreast
 from kemba.ocp.compiled import compiled
@@ -175,9 +174,7 @@ def _repeated(block: Block, function: ca.Function) -> ca.Function:
 
 def _gather_gradient(parts: list[tuple[ca.MX, np.ndarray]], size: int) -> ca.MX:
     where = np.concatenate([at for _, at in parts])
-    entries = (np.ones(len(where)), (where, np.arange(len(where))))
-    S = sparse.csc_matrix(entries, (size, len(where)))
-    return ca.densify(ca.mtimes(_dm(S), ca.vertcat(*(nz for nz, _ in parts))))
+    return ca.densify(ca.mtimes(_adding(where, size), ca.vertcat(*(nz for nz, _ in parts))))
 
 
 def _column(matrix: ca.SX) -> ca.SX:
@@ -203,15 +200,13 @@ def _scatter(parts: list[Entries], rows: int, columns: int) -> ca.MX:
     nonzeros = ca.vertcat(*(nz for nz, _, _ in parts))
     key = np.concatenate([c.astype(np.int64) * rows + r for _, r, c in parts])
     places, target = np.unique(key, return_inverse=True)
-    entries = (np.ones(len(key)), (target, np.arange(len(key))))
-    S = sparse.csc_matrix(entries, (len(places), len(key)))
     pattern = ca.Sparsity.triplet(
         rows, columns, (places % rows).tolist(), (places // rows).tolist()
     )
-    return ca.MX(pattern, ca.densify(ca.mtimes(_dm(S), nonzeros)))
+    return ca.MX(pattern, ca.densify(ca.mtimes(_adding(target, len(places)), nonzeros)))
 
 
-def _dm(matrix: sparse.csc_matrix) -> ca.DM:
-    rows, columns = matrix.shape
-    pattern = ca.Sparsity(rows, columns, matrix.indptr.tolist(), matrix.indices.tolist())
-    return ca.DM(pattern, matrix.data)
+def _adding(target: np.ndarray, size: int) -> ca.DM:
+    """The matrix that adds entry j of a vector to entry target[j] of one of `size`."""
+    one_each = list(range(len(target) + 1))
+    return ca.DM.ones(ca.Sparsity(size, len(target), one_each, target.tolist()))
