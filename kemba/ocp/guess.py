@@ -69,6 +69,8 @@ def body_course(
     if peak is None or peak.at is None:
         return Course([0.0, duration], [z0, z1 or z0], [0.0, 0.0], (duration, duration))
     apex, t_apex = peak.lower, peak.at * duration
+    lifts = [w.lower for w in wishes if w.quantity.name.endswith("foot/z") and w.at == peak.at]
+    top = min([top, *(apex - lift for lift in lifts if lift > 0.0)])  # else standing reaches that
     if apex <= top:
         course = Course([0.0, t_apex], [z0, apex], [0.0, 0.0], (t_apex, t_apex))
     else:

@@ -6,10 +6,13 @@ from dataclasses import replace
 
 import pytest
 
+from kemba.model import load_model
 from kemba.ocp import load_task, plan, planner, schedule
+from kemba.ocp.guess import body_course
 from kemba.ocp.ipopt import Point
 from kemba.ocp.patience import GAVE_UP, Patience
 from kemba.ocp.planned import Plan
+from kemba.ocp.wishes import resolve
 
 FORWARD = ("nodes=50", "refine=none")
 
@@ -84,3 +87,16 @@ def test_patience_is_lost_where_nothing_comes_nearer(violations: list[float], lo
     for iteration, violation in enumerate(violations):
         patience.hear(iteration, violation)
     assert patience.lost is lost
+
+
+def test_a_guess_flies_where_feet_must_leave_the_ground() -> None:
+    """So low that standing would reach it, and nothing else tells of a flight."""
+    goals = "apex: {quantity: body/z, at: middle, equals: height}"
+    lifted = f"{goals}, flight: {{quantity: '*/foot/z', at: middle, at_least: 5 cm}}"
+    spans = []
+    for asked in (goals, lifted):
+        task, document = load_task("hop", [f"goals={{{asked}}}"])
+        wishes = resolve(task, load_model(task.model), document)
+        takeoff, landing = body_course(wishes, task.duration, (0.17, 0.42), 9.81).flight
+        spans.append(landing - takeoff)
+    assert spans[0] == 0.0 < 0.1 < spans[1]
