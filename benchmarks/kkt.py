@@ -1,4 +1,5 @@
-"""Factorising a Newton step: MUMPS, LAPACK's band solver, and block by block along the nodes.
+"""Factorising a Newton step: MUMPS, LAPACK's band solver, block by block along the nodes, and MUMPS
+with states eliminated by hand.
 
     python benchmarks/kkt.py [--task jump_forward] [--nodes 50]
 
@@ -17,6 +18,7 @@ import casadi as ca
 import numpy as np
 from scipy.linalg.lapack import dgbtrf
 from scipy.sparse import block_array, block_diag, csc_array, eye_array
+from scipy.sparse.linalg import splu
 
 from kemba.model import load_model
 from kemba.ocp import load_task
@@ -95,6 +97,20 @@ def by_blocks(K: csc_array, node: np.ndarray) -> Callable[[], object]:
     return eliminate
 
 
+def without(K: csc_array, t: Transcription, group: str, rows: str) -> csc_array:
+    """The matrix without a group of states and the rows that give them, by a Schur complement."""
+    variables = np.flatnonzero((t.lower < t.upper).ravel())
+    part, first_row = t.layout.slices[group], K.shape[0] - t.problem.rows
+    column = variables % t.shape[1]
+    states = (part.start <= column) & (column < part.stop) & (variables >= t.shape[1])
+    given = [i for i, m in enumerate(t.meanings) if m.label.startswith(rows) and m.node > 0]
+    gone = np.concatenate([np.flatnonzero(states), first_row + np.array(given)])
+    left = np.setdiff1d(np.arange(K.shape[0]), gone)
+    through = splu(K[np.ix_(gone, gone)].tocsc()).solve(K[np.ix_(gone, left)].toarray())
+    dense = K[np.ix_(left, left)].toarray() - K[np.ix_(left, gone)] @ through
+    return csc_array(np.where(np.abs(dense + dense.T) > 1e-13, (dense + dense.T) / 2, 0.0))
+
+
 def milliseconds(work: Callable[[], object]) -> float:
     """The quickest of some repetitions."""
     taken = []
@@ -110,10 +126,15 @@ def main() -> None:
     parser.add_argument("--task", default="jump_forward")
     parser.add_argument("--nodes", type=int, default=50)
     asked = parser.parse_args()
-    K, node = newton(*program(asked.task, asked.nodes))
+    t, Y = program(asked.task, asked.nodes)
+    K, node = newton(t, Y)
+    print(f"{K.shape[0]} columns, {K.nnz} entries, {asked.nodes} nodes, {machine()}\n")
+    for group, rows in (("v", "kinematics:"), ("s", "rate:")):
+        less = without(K, t, group, rows)
+        taken = milliseconds(mumps(less))
+        print(f"MUMPS without {group}: {taken:.1f} ms, {less.shape[0]} columns, {less.nnz} entries")
     order = np.argsort(node, kind="stable")
     K, node = csc_array(K[np.ix_(order, order)]), node[order]
-    print(f"{K.shape[0]} columns, {K.nnz} entries, {asked.nodes} nodes, {machine()}\n")
     ways = {"MUMPS": mumps(K), "band": banded(K), "blocks": by_blocks(K, node)}
     for name, work in ways.items():
         print(f"{name}: {milliseconds(work):.1f} ms")
