@@ -69,8 +69,10 @@ def body_course(
     if peak is None or peak.at is None:
         return Course([0.0, duration], [z0, z1 or z0], [0.0, 0.0], (duration, duration))
     apex, t_apex = peak.lower, peak.at * duration
-    lifts = [w.lower for w in wishes if w.quantity.name.endswith("foot/z") and w.at == peak.at]
-    top = min([top, *(apex - lift for lift in lifts if lift > 0.0)])  # else standing reaches that
+    feet = (w for w in wishes if w.quantity.name.endswith("foot/z") and w.at == peak.at)
+    lift = max((w.lower for w in feet), default=0.0)
+    if lift > 0.0 and z0 < apex <= top:  # standing reaches it, but is not what is asked
+        top = max(apex - lift, (z0 + apex) / 2)
     if apex <= top:
         course = Course([0.0, t_apex], [z0, apex], [0.0, 0.0], (t_apex, t_apex))
     else:

@@ -9,9 +9,9 @@ import numpy as np
 from kemba.ocp.ipopt import Parameters, Point
 from kemba.ocp.schedule import (
     EXACT,
+    LONGEST,
     LOOSE,
     MARGIN,
-    PATIENCE,
     ROUNDED,
     Attempt,
     Search,
@@ -59,6 +59,6 @@ def grow(search: Search, half: Transcription, point: Point, guess: Point) -> Poi
     for group in ("q", "v"):
         columns = whole.layout.slices[group].start + lost
         Y[:, columns] = guess.Y[:, columns]
-    options = warm(1e-2, ROUNDED, max_iter=search.at_most(PATIENCE))
+    options = warm(1e-2, ROUNDED, max_iter=search.at_most(LONGEST))
     moved = move(search, Point(Y), LOOSE, **options)
     return fix(search, moved) if moved.solved else moved

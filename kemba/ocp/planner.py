@@ -92,7 +92,7 @@ class Planner:
 
     @cached_property
     def alike(self) -> list[Wish]:
-        """The wishes that are their own mirror images."""
+        """The wishes whose mirror images are wished as well."""
         return mirrored_wishes(self.model, self.wishes)
 
     def reductions(self) -> Iterator[Reduction]:

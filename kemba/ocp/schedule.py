@@ -15,7 +15,7 @@ from kemba.ocp.patience import Patience
 from kemba.ocp.transcribe import Transcription
 
 RELAX = "relax"  # the first solve of a schedule
-PATIENCE = 600  # its iterations; where there is a plan it takes 30 to 200
+LONGEST = 600  # its iterations; where there is a plan it takes 30 to 200
 HOPELESS = ("Infeasible_Problem_Detected", "Maximum_Iterations_Exceeded")
 LOOSE, TIGHT = 1e-3, 1e-4  # relaxation of the pairs: body weights times metres
 MARGIN = 0.8  # the last relaxation stays this much below what the certificate asks
@@ -107,7 +107,7 @@ def warm(mu: float, push: float = 1e-6, **more: Any) -> dict[str, Any]:
 def find(search: Search, start: Point) -> Point:
     """From a guess to a plan with binary valves, its pairs still a little loose."""
     interior = {"bound_push": 0.3, "bound_frac": 0.3, "mu_init": 0.1, "tol": 1e-3}
-    interior["max_iter"] = search.at_most(PATIENCE)
+    interior["max_iter"] = search.at_most(LONGEST)
     point = search.solve(RELAX, start, Parameters(LOOSE, forces=FORCES), options=interior)
     if point.message in HOPELESS:
         return point  # what the relaxed pairs forbid, tighter ones do not allow

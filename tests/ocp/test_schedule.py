@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from kemba.model import load_model
@@ -89,14 +90,16 @@ def test_patience_is_lost_where_nothing_comes_nearer(violations: list[float], lo
     assert patience.lost is lost
 
 
-def test_a_guess_flies_where_feet_must_leave_the_ground() -> None:
+@pytest.mark.parametrize("lift", ["5 cm", "50 cm"])
+def test_a_guess_flies_where_feet_must_leave_the_ground(lift: str) -> None:
     """So low that standing would reach it, and nothing else tells of a flight."""
     goals = "apex: {quantity: body/z, at: middle, equals: height}"
-    lifted = f"{goals}, flight: {{quantity: '*/foot/z', at: middle, at_least: 5 cm}}"
+    lifted = f"{goals}, flight: {{quantity: '*/foot/z', at: middle, at_least: {lift}}}"
     spans = []
     for asked in (goals, lifted):
         task, document = load_task("hop", [f"goals={{{asked}}}"])
         wishes = resolve(task, load_model(task.model), document)
-        takeoff, landing = body_course(wishes, task.duration, (0.17, 0.42), 9.81).flight
-        spans.append(landing - takeoff)
+        course = body_course(wishes, task.duration, (0.17, 0.42), 9.81)
+        assert np.all(np.diff(course.t) > 0.0) and np.all(np.isfinite(course(np.array(course.t))))
+        spans.append(course.flight[1] - course.flight[0])
     assert spans[0] == 0.0 < 0.1 < spans[1]
