@@ -15,7 +15,6 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
-from kemba.effects.air import ATMOSPHERE
 from kemba.effects.catalogue import (
     HoseLag,
     OrificeChamber,
@@ -24,6 +23,7 @@ from kemba.effects.catalogue import (
     SupplyLine,
     Valve,
 )
+from kemba.effects.pneumatics.constants import ATMOSPHERE
 from kemba.mechanism import rig_mechanism
 from kemba.model import Model
 

@@ -22,11 +22,11 @@ from scipy.sparse.linalg import splu
 
 from kemba.model import load_model
 from kemba.ocp import load_task
-from kemba.ocp.ipopt import Parameters
-from kemba.ocp.mirror import whole
+from kemba.ocp.nlp.ipopt import Parameters
 from kemba.ocp.planner import Planner
-from kemba.ocp.transcribe import Transcription
-from kemba.ocp.wishes import resolve
+from kemba.ocp.task.requirement import resolve
+from kemba.ocp.transcription.symmetry import whole
+from kemba.ocp.transcription.transcribe import Transcription
 from kemba.sweep import machine
 
 REPEATS = 20

@@ -15,8 +15,8 @@ import numpy as np
 
 from kemba.model import Model, load_model
 from kemba.plant import Commands, Profile, Run, run
-from kemba.plant.commands import Sense
-from kemba.plant.replay import peak
+from kemba.plant.execution.replay import peak
+from kemba.plant.simulation.commands import Sense
 from kemba.trajectory import Trajectory
 
 LEGS = ("front", "rear")

@@ -13,8 +13,8 @@ import argparse
 from pathlib import Path
 
 from kemba.plant import tables
-from kemba.plant.bench import bench_model, load_rig, run_rig
-from kemba.plant.characterise import characterise
+from kemba.plant.rig.bench import bench_model, load_rig, run_rig
+from kemba.plant.rig.characterise import characterise
 from kemba.plotting import plot_rig, save_figure
 from kemba.trajectory import Trajectory
 

@@ -9,12 +9,12 @@ import platform
 import sys
 import time
 
-from kemba.ocp.certify import costs
-from kemba.ocp.phases import Refined, refine
-from kemba.ocp.plan import plan
+from kemba.ocp.certificate.certify import costs
 from kemba.ocp.planned import Plan
-from kemba.ocp.task import load_task
-from kemba.plant.replay import Replay, replay
+from kemba.ocp.planning import plan
+from kemba.ocp.refinement import Refined, refine
+from kemba.ocp.task.task import load_task
+from kemba.plant.execution.replay import Replay, replay
 
 CASES = (
     ("jump", ["height=0.35 m"]),

@@ -11,22 +11,22 @@ from typing import Annotated
 import typer
 
 import kemba
-from kemba_cli.adopt import adopt
-from kemba_cli.characterise import characterise
-from kemba_cli.check import check
-from kemba_cli.compare import compare
-from kemba_cli.discover import discover
-from kemba_cli.effects import effects
-from kemba_cli.experiment import experiment
-from kemba_cli.export import export
 from kemba_cli.failures import guarded
-from kemba_cli.plot import plot
-from kemba_cli.report import report
-from kemba_cli.schema import schema
-from kemba_cli.simulate import simulate
-from kemba_cli.solve import solve
-from kemba_cli.sweep import sweep
-from kemba_cli.view import view
+from kemba_cli.verbs.adopt import adopt
+from kemba_cli.verbs.characterise import characterise
+from kemba_cli.verbs.check import check
+from kemba_cli.verbs.compare import compare
+from kemba_cli.verbs.discover import discover
+from kemba_cli.verbs.effects import effects
+from kemba_cli.verbs.experiment import experiment
+from kemba_cli.verbs.export import export
+from kemba_cli.verbs.plot import plot
+from kemba_cli.verbs.report import report
+from kemba_cli.verbs.schema import schema
+from kemba_cli.verbs.simulate import simulate
+from kemba_cli.verbs.solve import solve
+from kemba_cli.verbs.sweep import sweep
+from kemba_cli.verbs.view import view
 
 VERBS = (
     solve,

@@ -15,11 +15,11 @@ if TYPE_CHECKING:
 
 # Kind (the folder under configs/) and where its schema lives; a new kind is one line.
 SCHEMAS = {
-    "tasks": "kemba.ocp.task:Task",
+    "tasks": "kemba.ocp.task.task:Task",
     "models": "kemba.model.spec:ModelSpec",
     "robots": "kemba.mechanism.links:Robot",
     "sweeps": "kemba.sweep.schema:Sweep",
-    "rigs": "kemba.plant.bench:RigFile",
+    "rigs": "kemba.plant.rig.bench:RigFile",
 }
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from kemba.document import dump_yaml, load_yaml
+from kemba.config.document import dump_yaml, load_yaml
 from kemba.errors import KembaError, suggest
 from kemba.files import atomic_text
 from kemba.quantity import Quantity

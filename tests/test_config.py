@@ -14,7 +14,7 @@ from kemba.config import (
     parse,
     shipped_configs,
 )
-from kemba.document import Document, load_text
+from kemba.config.document import Document, load_text
 from kemba.errors import ConfigErrors, KembaError
 from kemba.quantity import Param
 

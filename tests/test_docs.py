@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from kemba.config import shipped_configs
-from kemba.ocp.costs import COSTS
-from kemba.ocp.task import Bound, Goal, Solver, Task, Tolerances
+from kemba.ocp.task.costs import COSTS
+from kemba.ocp.task.task import Bound, Goal, Solver, Task, Tolerances
 
 ROOT = Path(__file__).parent.parent
 PAGES = sorted([*ROOT.glob("docs/*.md"), ROOT / "README.md"])

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from kemba.config import parse
-from kemba.document import load_text
+from kemba.config.document import load_text
 from kemba.effects.catalogue import (
     HoseLag,
     OrificeChamber,

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from kemba.effects import Effect
-from kemba.effects.air import AREA_E, AREA_R
 from kemba.effects.catalogue import (
     BothModeLoss,
     CrossLeak,
@@ -17,6 +16,7 @@ from kemba.effects.catalogue import (
     ValveCloseDelay,
     ValveDelay,
 )
+from kemba.effects.pneumatics.constants import AREA_E, AREA_R
 from kemba.errors import KembaError
 from kemba.model import Model, load_model
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from kemba.effects.air import AREA_E, ATMOSPHERE, GAS, KAPPA, TEMPERATURE
 from kemba.effects.catalogue import CrossLeak, OrificeChamber, SupplyLine, Valve
-from kemba.effects.flow import CHOKED, SUBSONIC, mass_flow, phi, psi
+from kemba.effects.pneumatics.constants import AREA_E, ATMOSPHERE, GAS, KAPPA, TEMPERATURE
+from kemba.effects.pneumatics.flow import CHOKED, SUBSONIC, mass_flow, phi, psi
 from kemba.mechanism import rig_mechanism
 from kemba.model import Model, load_spec
 from kemba.model.spec import build_model

@@ -29,8 +29,8 @@ from twin.measure import Sensors
 
 from blind import study
 from kemba.identify.bench import BenchProblem, bench_problem
-from kemba.identify.checks import check_logs
-from kemba.identify.logs import read_logs
+from kemba.identify.logs.gate import check_logs
+from kemba.identify.logs.reading import read_logs
 from kemba.model.spec import load_model
 
 EFFECTS = [name for name, entry in CATALOGUE.items() if entry.bench and entry.known]

@@ -27,8 +27,8 @@ from twin.catalogue import CATALOGUE
 from twin.measure import Sensors, fault_channels
 
 from blind import study
-from kemba.identify.checks import check_logs
-from kemba.identify.logs import read_logs
+from kemba.identify.logs.gate import check_logs
+from kemba.identify.logs.reading import read_logs
 from kemba.identify.robot import RobotProblem, robot_problem
 from kemba.model.spec import load_model
 

@@ -14,9 +14,9 @@ import numpy as np
 
 from blind import baselines, report
 from kemba.identify.answer import Answer
-from kemba.identify.checks import BadData
 from kemba.identify.discover import discover
-from kemba.identify.problem import Problem
+from kemba.identify.evidence.problem import Problem
+from kemba.identify.logs.gate import BadData
 
 Setting = dict[str, Any]
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "discovery.md"

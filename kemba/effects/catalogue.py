@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from kemba.effects.base import Effect
-from kemba.effects.boom import Boom
-from kemba.effects.boom_faults import (
+from kemba.effects.expression import Expression
+from kemba.effects.mechanics.boom import Boom
+from kemba.effects.mechanics.boom_faults import (
     BoomDamping,
     BoomForce,
     BoomFriction,
@@ -14,13 +15,10 @@ from kemba.effects.boom_faults import (
     BoomSpring,
     PitchFriction,
 )
-from kemba.effects.chamber import Chamber
-from kemba.effects.contact import Contact
-from kemba.effects.damping import ModeDamping
-from kemba.effects.expression import Expression
-from kemba.effects.friction import PressureFriction, SealFriction, StribeckFriction
-from kemba.effects.ground import GroundCompliance, GroundFriction
-from kemba.effects.hip import (
+from kemba.effects.mechanics.contact import Contact
+from kemba.effects.mechanics.friction import PressureFriction, SealFriction, StribeckFriction
+from kemba.effects.mechanics.ground import GroundCompliance, GroundFriction
+from kemba.effects.mechanics.hip import (
     HipDamping,
     HipFriction,
     HipSpring,
@@ -28,17 +26,19 @@ from kemba.effects.hip import (
     RotorInertia,
     TorqueScale,
 )
-from kemba.effects.hose import BothModeLoss, CrossLeak, HoseLag
-from kemba.effects.load import ComOffset, Payload
-from kemba.effects.motor import Motor
-from kemba.effects.orifice import OrificeChamber
-from kemba.effects.piston import EndCushion, GasSpring, PistonDamping, QuadraticDamping
+from kemba.effects.mechanics.load import ComOffset, Payload
+from kemba.effects.mechanics.motor import Motor
+from kemba.effects.mechanics.piston import EndCushion, GasSpring, PistonDamping, QuadraticDamping
+from kemba.effects.mechanics.stops import EndStop
+from kemba.effects.pneumatics.chamber import Chamber
+from kemba.effects.pneumatics.damping import ModeDamping
+from kemba.effects.pneumatics.hose import BothModeLoss, CrossLeak, HoseLag
+from kemba.effects.pneumatics.orifice import OrificeChamber
+from kemba.effects.pneumatics.supply import RiseTimeScale, SupplyDroop, SupplyScale
+from kemba.effects.pneumatics.supply_line import SupplyLine
+from kemba.effects.pneumatics.timing import ValveCloseDelay, ValveDelay
+from kemba.effects.pneumatics.valve import Valve
 from kemba.effects.sensors import SensorBias, SensorDelay, SensorScale
-from kemba.effects.stops import EndStop
-from kemba.effects.supply import RiseTimeScale, SupplyDroop, SupplyScale
-from kemba.effects.supply_line import SupplyLine
-from kemba.effects.timing import ValveCloseDelay, ValveDelay
-from kemba.effects.valve import Valve
 
 # the planning model's own physics
 PLANNING: tuple[type[Effect], ...] = (Valve, Chamber, ModeDamping, EndStop, Motor, Boom, Contact)

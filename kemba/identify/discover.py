@@ -9,14 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from kemba.identify.answer import SIGNIFICANT, Answer, Ranked, Value, phrase
-from kemba.identify.confirm import heldout_error, left_out, predicted_error
-from kemba.identify.conflict import Drift, drifting
-from kemba.identify.linear import is_shape, time_blocks
-from kemba.identify.null import NullTest, bootstrap, smallest_detectable
-from kemba.identify.problem import Array, Candidate, Problem
-from kemba.identify.rank import FLOOR, NULL, Hypothesis
-from kemba.identify.search import Search, share_of
-from kemba.identify.unknown import Formula, look, unfinished
+from kemba.identify.doubt.cross_validation import heldout_error, left_out, predicted_error
+from kemba.identify.doubt.run_consistency import Drift, drifting
+from kemba.identify.doubt.unexplained import Formula, look, unfinished
+from kemba.identify.evidence.bootstrap import NullTest, bootstrap, smallest_detectable
+from kemba.identify.evidence.linear import is_shape, time_blocks
+from kemba.identify.evidence.problem import Array, Candidate, Problem
+from kemba.identify.evidence.search import Search, share_of
+from kemba.identify.evidence.spike_slab import FLOOR, NULL, Hypothesis
 
 CLASS = 3.0  # nats within which two explanations are the same to these data
 MATTERS = 0.2  # an effect below this share of its size is no finding,

@@ -12,12 +12,12 @@ import numpy as np
 from kemba.config import dump_yaml
 from kemba.errors import KembaError
 from kemba.files import read_json
+from kemba.identify.bench.bench_log import prepare
 from kemba.identify.bench.problem import BenchProblem
-from kemba.identify.bench.run import prepare
-from kemba.identify.linear import linearise, time_blocks
-from kemba.identify.problem import Array
+from kemba.identify.evidence.linear import linearise, time_blocks
+from kemba.identify.evidence.problem import Array
 from kemba.model.spec import load_model
-from kemba.plant.rigs import DynamometerRig, LockedRig, RandomRig, Rig
+from kemba.plant.rig.rigs import DynamometerRig, LockedRig, RandomRig, Rig
 from kemba.trajectory import Trajectory
 
 SLOW = (0.01, 0.02, 0.05)  # m.s-1

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from kemba.effects.air import AREA_E, AREA_R
-from kemba.identify.problem import Array
-from kemba.plant.tables import PAPER_FORCE, PAPER_RISE
+from kemba.effects.pneumatics.constants import AREA_E, AREA_R
+from kemba.identify.evidence.problem import Array
+from kemba.plant.rig.tables import PAPER_FORCE, PAPER_RISE
 
 STROKE = 0.070  # m
 LOSS_COLUMNS = ("0.6 MPa", "0.7 MPa", "0.8 MPa")

@@ -11,11 +11,11 @@ from kemba.errors import KembaError
 from kemba.files import write_json
 from kemba.identify.adopt import write_model
 from kemba.identify.answer import Answer
-from kemba.identify.checks import BadData, check_logs, sentence
 from kemba.identify.discover import Found, discover
-from kemba.identify.excerpt import excerpts
-from kemba.identify.logs import load_map, read_logs
-from kemba.identify.problem import Problem
+from kemba.identify.evidence.problem import Problem
+from kemba.identify.logs.excerpt import excerpts
+from kemba.identify.logs.gate import BadData, check_logs, sentence
+from kemba.identify.logs.reading import load_map, read_logs
 from kemba.trajectory import Trajectory
 
 Paths = Sequence[str | Path]

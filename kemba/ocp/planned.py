@@ -6,16 +6,16 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from kemba.model import Model
-from kemba.ocp.certify import Certificate, certify, costs
-from kemba.ocp.explain import Explanation
-from kemba.ocp.finding import Relax
-from kemba.ocp.ipopt import Point
-from kemba.ocp.result import to_trajectory
-from kemba.ocp.schedule import Attempt
-from kemba.ocp.task import Task
-from kemba.ocp.transcribe import Transcription
-from kemba.ocp.verdict import verdict
-from kemba.ocp.wishes import Wish
+from kemba.ocp.certificate.certify import Certificate, certify, costs
+from kemba.ocp.certificate.status import verdict
+from kemba.ocp.infeasibility.diagnostic import Relax
+from kemba.ocp.infeasibility.explain import Explanation
+from kemba.ocp.nlp.ipopt import Point
+from kemba.ocp.relaxation.schedule import Attempt
+from kemba.ocp.task.requirement import Wish
+from kemba.ocp.task.task import Task
+from kemba.ocp.transcription.solution import to_trajectory
+from kemba.ocp.transcription.transcribe import Transcription
 from kemba.trajectory import Trajectory
 
 if TYPE_CHECKING:

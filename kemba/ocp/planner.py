@@ -10,15 +10,14 @@ from pathlib import Path
 import numpy as np
 
 from kemba.model import Model
-from kemba.ocp.elastic import Outcome, elastic
-from kemba.ocp.guess import automatic_guess
-from kemba.ocp.halves import confirm, grow
-from kemba.ocp.ipopt import Ipopt, Point, Watch
-from kemba.ocp.mirror import Reduction, find_symmetry, mirrored_wishes, whole
-from kemba.ocp.penalty import WEIGHTS, penalise
+from kemba.ocp.infeasibility.elastic import Outcome, elastic
+from kemba.ocp.nlp.ipopt import Ipopt, Point, Watch
 from kemba.ocp.planned import Plan, judge
-from kemba.ocp.resume import resumed
-from kemba.ocp.schedule import (
+from kemba.ocp.relaxation.guess import automatic_guess
+from kemba.ocp.relaxation.lifting import confirm, grow
+from kemba.ocp.relaxation.penalty import WEIGHTS, penalise
+from kemba.ocp.relaxation.resume import resumed
+from kemba.ocp.relaxation.schedule import (
     RELAX,
     Attempt,
     Search,
@@ -28,10 +27,11 @@ from kemba.ocp.schedule import (
     refine,
     tighten,
 )
-from kemba.ocp.switching import polish
-from kemba.ocp.task import Task
-from kemba.ocp.transcribe import Transcription
-from kemba.ocp.wishes import Wish
+from kemba.ocp.relaxation.valve_search import polish
+from kemba.ocp.task.requirement import Wish
+from kemba.ocp.task.task import Task
+from kemba.ocp.transcription.symmetry import Reduction, find_symmetry, mirrored_wishes, whole
+from kemba.ocp.transcription.transcribe import Transcription
 from kemba.stopwatch import Stopwatch
 from kemba.trajectory import Trajectory
 

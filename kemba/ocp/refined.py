@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from kemba.ocp.certify import costs
-from kemba.ocp.phases import refine
+from kemba.ocp.certificate.certify import costs
+from kemba.ocp.certificate.status import verdict
 from kemba.ocp.planned import Plan
 from kemba.ocp.planner import Planner, searched
-from kemba.ocp.schedule import Attempt
-from kemba.ocp.verdict import verdict
+from kemba.ocp.refinement import refine
+from kemba.ocp.relaxation.schedule import Attempt
 from kemba.stopwatch import Stopwatch
 
 NUDGE = 0.05  # guess noise of the second start where the first plan does not refine

@@ -10,9 +10,9 @@ from multiprocessing import get_context
 from pathlib import Path
 
 from kemba.config import Document
-from kemba.ocp.plan import plan
 from kemba.ocp.planned import Plan
-from kemba.ocp.task import Task
+from kemba.ocp.planning import plan
+from kemba.ocp.task.task import Task
 
 NOISE = 0.25  # of the scaled guess; the first start has the task's own
 

@@ -1,11 +1,11 @@
 """The plant: fine simulation of a model with hard contact, controller, rigs and sensors."""
 
-from kemba.plant.certificate import replays
-from kemba.plant.commands import Commands, Profile
-from kemba.plant.controller import Execution, Gains, execute
-from kemba.plant.events import Impact
-from kemba.plant.replay import Replay, replay
-from kemba.plant.simulate import Run, run, simulate
+from kemba.plant.execution.certificate import replays
+from kemba.plant.execution.controller import Execution, Gains, execute
+from kemba.plant.execution.replay import Replay, replay
+from kemba.plant.simulation.commands import Commands, Profile
+from kemba.plant.simulation.simulate import Run, run, simulate
+from kemba.plant.stepping.events import Impact
 
 __all__ = [
     "Commands",

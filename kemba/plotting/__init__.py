@@ -4,16 +4,16 @@ Figures are made without pyplot, so they need no display; pass `figure=pyplot.fi
 function to have one that `pyplot.show` opens.
 """
 
-from kemba.plotting.animation import animate, save_animation
-from kemba.plotting.bench import plot_bench, plot_force_velocity, valve_modes
-from kemba.plotting.diagnosis import Band, plot_bands, plot_ladder
+from kemba.plotting.bands import Band, plot_bands, plot_ladder
 from kemba.plotting.draw import draw, machine_of
 from kemba.plotting.heat import plot_heat_map
-from kemba.plotting.machine import Machine, load_machine
-from kemba.plotting.motion import plot_motion
-from kemba.plotting.rig import bench_logs, plot_rig
-from kemba.plotting.robustness import plot_growth, plot_robustness
+from kemba.plotting.rig.bench import plot_bench, plot_force_velocity, valve_modes
+from kemba.plotting.rig.rig import bench_logs, plot_rig
+from kemba.plotting.robot.animation import animate, save_animation
+from kemba.plotting.robot.machine import Machine, load_machine
+from kemba.plotting.robot.motion import plot_motion
 from kemba.plotting.source import Source, default_path, load_source, load_sources
+from kemba.plotting.study.robustness import plot_growth, plot_robustness
 from kemba.plotting.style import paper_figure, paper_style, save_figure, svg_text
 
 __all__ = [

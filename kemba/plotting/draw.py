@@ -8,9 +8,9 @@ from matplotlib.figure import Figure
 
 from kemba.config import load_yaml
 from kemba.errors import KembaError
-from kemba.plotting.bench import plot_bench
-from kemba.plotting.machine import Machine, load_machine
-from kemba.plotting.motion import plot_motion
+from kemba.plotting.rig.bench import plot_bench
+from kemba.plotting.robot.machine import Machine, load_machine
+from kemba.plotting.robot.motion import plot_motion
 from kemba.plotting.source import Source
 from kemba.quantity import to_si
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from kemba.errors import KembaError
-from kemba.identify.logs import ColumnMap, read_log
+from kemba.identify.logs.reading import ColumnMap, read_log
 from kemba.trajectory import Array, Trajectory
 
 PLAN_FILE = "trajectory.csv"

@@ -12,7 +12,7 @@ import numpy as np
 
 from kemba.errors import KembaError
 from kemba.files import atomic_text, write_json
-from kemba.identify.logs import ColumnMap, Source
+from kemba.identify.logs.reading import ColumnMap, Source
 from kemba.quantity import convert
 from kemba.trajectory import TIME, Array, Trajectory
 

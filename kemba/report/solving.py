@@ -9,12 +9,12 @@ from typing import Any
 from kemba.config import Document, dump_yaml
 from kemba.errors import KembaError
 from kemba.ocp import Plan, Task, controller_table, plan
-from kemba.ocp.ipopt import Watch
+from kemba.ocp.nlp.ipopt import Watch
 from kemba.ocp.report import answer
 from kemba.ocp.starts import plan_best
-from kemba.plant.certificate import replays
-from kemba.plant.counterpart import counterpart
-from kemba.plant.replay import ends_standing
+from kemba.plant.execution.certificate import replays
+from kemba.plant.execution.counterpart import counterpart
+from kemba.plant.execution.replay import ends_standing
 from kemba.report.verdict import verdicts
 from kemba.runs import RunFolder, write_json
 from kemba.trajectory import Trajectory

@@ -14,8 +14,8 @@ import kemba
 from kemba.errors import KembaError
 from kemba.files import atomic_text, plain
 from kemba.plotting.draw import machine_of
+from kemba.plotting.robot.sticks import CYLINDER, Pose, poses
 from kemba.plotting.source import Source, load_source
-from kemba.plotting.sticks import CYLINDER, Pose, poses
 
 PAGES = Path(__file__).parent / "pages"
 RATE = 250.0  # poses per second of motion

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from kemba.ocp.task import Tolerances
+from kemba.ocp.task.task import Tolerances
 
 Facts = Mapping[str, Any]
 

@@ -11,13 +11,13 @@ import numpy as np
 from kemba.config import Document, load_yaml, parse
 from kemba.effects import Effect
 from kemba.effects.catalogue import BY_KIND
-from kemba.effects.load import Payload
+from kemba.effects.mechanics.load import Payload
 from kemba.errors import KembaError, suggest
 from kemba.model import Model, load_model
 from kemba.plant import Gains, Replay, execute
-from kemba.plant.controller import read_controller
-from kemba.plant.replay import first_row
-from kemba.plant.valves import scattered
+from kemba.plant.execution.controller import read_controller
+from kemba.plant.execution.replay import first_row
+from kemba.plant.simulation.valves import scattered
 from kemba.quantity import to_si
 from kemba.runs import load_run, sha256
 from kemba.sweep.case import Case, Work, content_hash
@@ -83,7 +83,7 @@ def _run_folder(expansion: Expansion, run: str) -> Path:
 def _plan_folder(expansion: Expansion, name: str, block: ExecuteBlock, folder: Path) -> Path:
     """The folder of the plan to execute. Raises KembaError when there is no good plan."""
     from kemba.ocp import controller_table, plan
-    from kemba.ocp.task import parse_task
+    from kemba.ocp.task.task import parse_task
 
     if block.run is not None:
         run = load_run(_run_folder(expansion, block.run))
@@ -156,7 +156,7 @@ def standing(model: Model, table: Trajectory, offsets: Mapping[str, float]) -> d
     """The table's first pose, moved, with the lower foot on the ground."""
     import casadi as ca
 
-    from kemba.plant.start import initial_values
+    from kemba.plant.simulation.start import initial_values
 
     if not offsets:
         return {}

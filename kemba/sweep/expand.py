@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from kemba.config import Document, apply_overrides, find_config, load_yaml, parse, shipped_configs
-from kemba.document import Location
+from kemba.config.document import Location
 from kemba.errors import ConfigErrors, KembaError
 from kemba.model.spec import load_spec
-from kemba.ocp.task import parse_task
+from kemba.ocp.task.task import parse_task
 from kemba.runs import sha256
 from kemba.sweep.case import Case, content_hash
 from kemba.sweep.sampling import sample
@@ -100,7 +100,7 @@ def expand(sweep: Sweep, document: Document, folder: Path) -> list[Case]:
 
 def _solve_cases(expansion: Expansion, name: str, block: SolveBlock) -> list[Case]:
     from kemba.ocp import task_model
-    from kemba.ocp.wishes import resolve
+    from kemba.ocp.task.requirement import resolve
 
     base = expansion.task_document(name)
     cases = []

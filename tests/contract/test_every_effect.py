@@ -21,10 +21,10 @@ from contract.cases import (
 )
 
 from kemba.config import parse
-from kemba.document import dump_yaml, load_yaml
+from kemba.config.document import dump_yaml, load_yaml
 from kemba.effects.sensors import SensorEffect
 from kemba.model.spec import ModelSpec
-from kemba.ocp.mirror import find_symmetry
+from kemba.ocp.transcription.symmetry import find_symmetry
 from kemba.quantity import is_si
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from kemba.identify.bench.motion import Motion
-from kemba.identify.bench.plant import Rig
+from kemba.identify.bench.rig_model import Rig
 from kemba.identify.bench.switching import pulses
 from kemba.model.spec import load_model
 from kemba.trajectory import Trajectory

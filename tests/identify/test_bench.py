@@ -14,7 +14,7 @@ from kemba.effects.base import Effect
 from kemba.identify.adopt import adopt_effect
 from kemba.identify.bench import bench_problem
 from kemba.identify.bench.motion import Motion
-from kemba.identify.bench.plant import Rig
+from kemba.identify.bench.rig_model import Rig
 from kemba.identify.bench.switching import delayed, is_on, pulses
 from kemba.identify.experiment import propose
 from kemba.identify.published import published

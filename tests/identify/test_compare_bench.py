@@ -16,10 +16,10 @@ from twin import bench, cases, catalogue, figures, measure, rigs
 
 from kemba.identify.bench import bench_problem
 from kemba.identify.bench.missing import lagged
-from kemba.identify.compare import Comparison, compare
-from kemba.identify.smoother import missing_force
+from kemba.identify.compare.compare import Comparison, compare
+from kemba.identify.compare.smoother import missing_force
 from kemba.model.spec import load_model
-from kemba.plotting.comparison import plot_comparison
+from kemba.plotting.study.comparison import plot_comparison
 from kemba.trajectory import Trajectory
 from kemba_cli.main import app
 

@@ -11,9 +11,9 @@ import pytest
 
 from kemba.errors import KembaError
 from kemba.identify.answer import Answer
-from kemba.identify.checks import check_logs
-from kemba.identify.excerpt import excerpts
-from kemba.identify.logs import load_map, read_log
+from kemba.identify.logs.excerpt import excerpts
+from kemba.identify.logs.gate import check_logs
+from kemba.identify.logs.reading import load_map, read_log
 from kemba.identify.workflow import discover_logs
 from kemba.trajectory import Trajectory
 

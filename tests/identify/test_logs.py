@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from kemba.errors import KembaError
-from kemba.identify.checks import check_logs
-from kemba.identify.logs import ColumnMap, Source, grouped, load_map, read_log, read_logs
+from kemba.identify.logs.gate import check_logs
+from kemba.identify.logs.reading import ColumnMap, Source, grouped, load_map, read_log, read_logs
 from kemba.trajectory import Trajectory
 
 DATA = Path(__file__).parent / "data"

@@ -10,9 +10,16 @@ import pytest
 from kemba.identify import discover as discovery
 from kemba.identify.answer import Answer, Ranked, phrase
 from kemba.identify.discover import discover
-from kemba.identify.problem import Array, Candidate, Parameter, Rows, Theta, secant_jacobian
-from kemba.identify.rank import probabilities
-from kemba.identify.search import Search
+from kemba.identify.evidence.problem import (
+    Array,
+    Candidate,
+    Parameter,
+    Rows,
+    Theta,
+    secant_jacobian,
+)
+from kemba.identify.evidence.search import Search
+from kemba.identify.evidence.spike_slab import probabilities
 
 EFFECTS = ("bend", "drag", "kick", "twin", "wave")
 

@@ -9,12 +9,12 @@ import pytest
 
 from kemba.effects import BY_KIND, Effect
 from kemba.effects.base import At, Contribution
-from kemba.effects.chamber import Chamber
-from kemba.effects.damping import ModeDamping
-from kemba.effects.load import Payload
-from kemba.effects.stops import EndStop
-from kemba.effects.supply import SupplyScale
-from kemba.effects.valve import Valve
+from kemba.effects.mechanics.load import Payload
+from kemba.effects.mechanics.stops import EndStop
+from kemba.effects.pneumatics.chamber import Chamber
+from kemba.effects.pneumatics.damping import ModeDamping
+from kemba.effects.pneumatics.supply import SupplyScale
+from kemba.effects.pneumatics.valve import Valve
 from kemba.errors import KembaError
 from kemba.mechanism import rig_mechanism
 from kemba.model import Model, load_model

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from kemba.ocp import load_task
-from kemba.ocp.blocks import Block
-from kemba.ocp.compiled import compiled
-from kemba.ocp.lifted import lifted
-from kemba.ocp.mirror import whole
-from kemba.ocp.plan import task_model
-from kemba.ocp.transcribe import Transcription
-from kemba.ocp.wishes import resolve
+from kemba.ocp.nlp.blocks import Block
+from kemba.ocp.nlp.compiled import compiled
+from kemba.ocp.nlp.constants import lifted
+from kemba.ocp.planning import task_model
+from kemba.ocp.task.requirement import resolve
+from kemba.ocp.transcription.symmetry import whole
+from kemba.ocp.transcription.transcribe import Transcription
 
 compiler = pytest.mark.skipif(
     not any(map(shutil.which, ("cc", "gcc", "clang"))), reason="no compiler here"

@@ -13,10 +13,10 @@ from typer.testing import CliRunner
 
 from kemba.config import find_config
 from kemba.ocp import Task, load_task, task_model
-from kemba.ocp.checks import check_task
-from kemba.ocp.finding import Finding
-from kemba.ocp.flight import air_work, inertia_and_weight
-from kemba.ocp.wishes import resolve
+from kemba.ocp.infeasibility.checks import check_task
+from kemba.ocp.infeasibility.diagnostic import Finding
+from kemba.ocp.infeasibility.flight import air_work, inertia_and_weight
+from kemba.ocp.task.requirement import resolve
 from kemba_cli.main import app
 
 SHIPPED = ("jump", "hop", "jump_forward", "max_jump", "drop", "stand")

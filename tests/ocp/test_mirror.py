@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kemba.effects.load import ComOffset, Payload
-from kemba.effects.valve import Valve
+from kemba.effects.mechanics.load import ComOffset, Payload
+from kemba.effects.pneumatics.valve import Valve
 from kemba.mechanism import load_robot, robot_mechanism
 from kemba.model import Model, load_model
 from kemba.ocp import load_task
-from kemba.ocp.mirror import find_symmetry, mirrored_wishes, wishes_are_symmetric
-from kemba.ocp.wishes import resolve
+from kemba.ocp.task.requirement import resolve
+from kemba.ocp.transcription.symmetry import find_symmetry, mirrored_wishes, wishes_are_symmetric
 
 
 @pytest.fixture(scope="module")

@@ -11,12 +11,12 @@ from ocp.runs import solved
 
 from kemba.model import load_model
 from kemba.ocp import load_task, plan
-from kemba.ocp.certify import certify
-from kemba.ocp.mirror import find_symmetry
+from kemba.ocp.certificate.certify import certify
 from kemba.ocp.planner import Planner
-from kemba.ocp.result import to_trajectory
-from kemba.ocp.schedule import find, fix, tighten
-from kemba.ocp.wishes import resolve
+from kemba.ocp.relaxation.schedule import find, fix, tighten
+from kemba.ocp.task.requirement import resolve
+from kemba.ocp.transcription.solution import to_trajectory
+from kemba.ocp.transcription.symmetry import find_symmetry
 
 FILES = [
     "certificate.json",

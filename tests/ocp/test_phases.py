@@ -12,17 +12,17 @@ import numpy as np
 import pytest
 
 from kemba.ocp import Plan, load_task, plan
-from kemba.ocp.phases import Refined, refine
-from kemba.ocp.phases.constraints import read_constraints
-from kemba.ocp.phases.modes import OPEN, Phase
-from kemba.ocp.phases.radau import RADAU3, RADAU5, Scheme
-from kemba.ocp.phases.refine import ITERATIONS, Refiner, reduction_of
-from kemba.ocp.phases.repair import FITS, merged, misfit, repaired
-from kemba.ocp.phases.rules import AWAY, CLEAR
-from kemba.ocp.phases.solve import STOPPED, Control
-from kemba.ocp.result import arrays
-from kemba.ocp.switching import switching
-from kemba.plant.replay import replay
+from kemba.ocp.refinement import Refined, refine
+from kemba.ocp.refinement.mode_constraints import AWAY, CLEAR
+from kemba.ocp.refinement.modes import OPEN, Phase
+from kemba.ocp.refinement.radau import RADAU3, RADAU5, Scheme
+from kemba.ocp.refinement.refine import ITERATIONS, Refiner, reduction_of
+from kemba.ocp.refinement.repair import FITS, merged, misfit, repaired
+from kemba.ocp.refinement.solve import STOPPED, Control
+from kemba.ocp.refinement.unilateral import read_constraints
+from kemba.ocp.relaxation.valve_search import switching
+from kemba.ocp.transcription.solution import arrays
+from kemba.plant.execution.replay import replay
 
 CASES = [
     ("jump", "height=0.35 m"),

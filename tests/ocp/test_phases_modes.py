@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from kemba.ocp.phases.modes import HELD, HOP, OPEN, SHUDDER, Phase, _fill_hops, _settling
+from kemba.ocp.refinement.modes import HELD, HOP, OPEN, SHUDDER, Phase, _fill_hops, _settling
 
 FALLS = Phase(84, 97, (HELD, OPEN), (1.0, 0.0))
 HITS = Phase(97, 98, (HELD, HELD), (1.0, 0.0))

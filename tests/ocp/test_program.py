@@ -10,13 +10,13 @@ import pytest
 
 from kemba.model import load_model
 from kemba.ocp import load_task
-from kemba.ocp.guess import automatic_guess
-from kemba.ocp.halves import widen
-from kemba.ocp.mirror import find_symmetry, whole
 from kemba.ocp.planner import grids
-from kemba.ocp.schedule import prolong
-from kemba.ocp.transcribe import Transcription
-from kemba.ocp.wishes import resolve
+from kemba.ocp.relaxation.guess import automatic_guess
+from kemba.ocp.relaxation.lifting import widen
+from kemba.ocp.relaxation.schedule import prolong
+from kemba.ocp.task.requirement import resolve
+from kemba.ocp.transcription.symmetry import find_symmetry, whole
+from kemba.ocp.transcription.transcribe import Transcription
 
 PARAMETERS = [1e-3, 0.1, 0.05, 0.02, 1e-2]
 STEP = 1e-6

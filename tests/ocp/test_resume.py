@@ -18,11 +18,11 @@ from ocp.runs import solved
 from typer.testing import CliRunner, Result
 
 from kemba.ocp import load_task, plan, task_model
-from kemba.ocp.interrupt import Interrupt
-from kemba.ocp.mirror import whole
-from kemba.ocp.resume import node_groups, resumed
-from kemba.ocp.transcribe import Transcription
-from kemba.ocp.wishes import resolve
+from kemba.ocp.nlp.interrupt import Interrupt
+from kemba.ocp.relaxation.resume import node_groups, resumed
+from kemba.ocp.task.requirement import resolve
+from kemba.ocp.transcription.symmetry import whole
+from kemba.ocp.transcription.transcribe import Transcription
 from kemba.runs import load_run
 from kemba_cli.main import app
 

@@ -8,14 +8,14 @@ import pytest
 
 from kemba.model import load_model
 from kemba.ocp import load_task
-from kemba.ocp.abreast import FEW, abreast
-from kemba.ocp.anchor import Anchored
-from kemba.ocp.blocks import Block, BlockProblem
-from kemba.ocp.damped import DAMPING, damped
-from kemba.ocp.folded import folded
-from kemba.ocp.mirror import find_symmetry
-from kemba.ocp.transcribe import Transcription
-from kemba.ocp.wishes import resolve
+from kemba.ocp.nlp.blocks import Block, BlockProblem
+from kemba.ocp.nlp.proximal import Anchored
+from kemba.ocp.nlp.regularised import DAMPING, damped
+from kemba.ocp.nlp.signs import folded
+from kemba.ocp.nlp.vectorised import FEW, abreast
+from kemba.ocp.task.requirement import resolve
+from kemba.ocp.transcription.symmetry import find_symmetry
+from kemba.ocp.transcription.transcribe import Transcription
 
 POINTS = 12
 

@@ -9,11 +9,11 @@ import pytest
 
 from kemba.model import load_model
 from kemba.ocp import load_task, plan, planner, schedule
-from kemba.ocp.guess import body_course
-from kemba.ocp.ipopt import Point
-from kemba.ocp.patience import GAVE_UP, Patience
+from kemba.ocp.nlp.ipopt import Point
+from kemba.ocp.nlp.stagnation import GAVE_UP, Patience
 from kemba.ocp.planned import Plan
-from kemba.ocp.wishes import resolve
+from kemba.ocp.relaxation.guess import body_course
+from kemba.ocp.task.requirement import resolve
 
 FORWARD = ("nodes=50", "refine=none")
 

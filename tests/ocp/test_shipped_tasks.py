@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from ocp.runs import QUICK, SLOW, Solved, solved
 
-from kemba.effects.boom import Boom
-from kemba.ocp.result import arrays
+from kemba.effects.mechanics.boom import Boom
+from kemba.ocp.transcription.solution import arrays
 
 TASKS = [*QUICK, *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW)]
 TOLERANCE = 1e-6

@@ -13,11 +13,11 @@ from kemba.config import Document
 from kemba.effects.base import At, Contribution, Effect
 from kemba.mechanism import Mechanism, Port
 from kemba.model import Model
-from kemba.ocp.ipopt import Ipopt, Parameters, Point
-from kemba.ocp.mirror import whole
-from kemba.ocp.task import Task
-from kemba.ocp.transcribe import Transcription
-from kemba.ocp.wishes import resolve
+from kemba.ocp.nlp.ipopt import Ipopt, Parameters, Point
+from kemba.ocp.task.requirement import resolve
+from kemba.ocp.task.task import Task
+from kemba.ocp.transcription.symmetry import whole
+from kemba.ocp.transcription.transcribe import Transcription
 from kemba.quantity import Quantity
 
 SHARP = {"tol": 1e-10, "constr_viol_tol": 1e-11, "acceptable_iter": 0}

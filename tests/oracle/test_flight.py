@@ -11,7 +11,7 @@ import pytest
 from oracle.robots import case
 from scipy.integrate import solve_ivp
 
-from kemba.effects.boom import Boom
+from kemba.effects.mechanics.boom import Boom
 from kemba.model import Model
 
 TIMES = np.linspace(0.0, 0.12, 25)

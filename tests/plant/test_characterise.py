@@ -8,11 +8,11 @@ import pytest
 
 from kemba.errors import KembaError
 from kemba.model import Model, load_model
-from kemba.plant.bench import bench_model, load_rig, run_rig, write_rig
-from kemba.plant.characterise import Characteristics, characterise
-from kemba.plant.drive import stroke
-from kemba.plant.rigs import STROKE, DynamometerRig, LockedRig, RandomRig, Rig
-from kemba.plant.tables import PAPER_FORCE, PAPER_RISE
+from kemba.plant.rig.bench import bench_model, load_rig, run_rig, write_rig
+from kemba.plant.rig.characterise import Characteristics, characterise
+from kemba.plant.rig.imposed import stroke
+from kemba.plant.rig.rigs import STROKE, DynamometerRig, LockedRig, RandomRig, Rig
+from kemba.plant.rig.tables import PAPER_FORCE, PAPER_RISE
 from kemba.trajectory import Trajectory
 
 SPEEDS = dict.fromkeys(("extend", "retract", "both", "none"), (0.2, 0.5, 0.8))

@@ -6,12 +6,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from plant.scripts import drop, jump, planning
 
-from kemba.effects.ground import GroundCompliance, GroundFriction
+from kemba.effects.mechanics.ground import GroundCompliance, GroundFriction
 from kemba.plant import Commands, Profile, run, simulate
-from kemba.plant.equations import equations_of
-from kemba.plant.events import CLOSED, Advance
-from kemba.plant.replay import peak
-from kemba.plant.start import initial_values
+from kemba.plant.execution.replay import peak
+from kemba.plant.simulation.start import initial_values
+from kemba.plant.stepping.equations import equations_of
+from kemba.plant.stepping.events import CLOSED, Advance
 from kemba.trajectory import Trajectory
 
 LEGS = ("front", "rear")

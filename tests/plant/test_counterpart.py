@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from kemba.plant.counterpart import counterpart
+from kemba.plant.execution.counterpart import counterpart
 
 OWN = """\
 name: heavy

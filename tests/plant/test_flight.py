@@ -8,13 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from plant.scripts import AIRBORNE, planning
 
-from kemba.effects.boom import Boom
+from kemba.effects.mechanics.boom import Boom
 from kemba.mechanism import load_robot, robot_mechanism
 from kemba.mechanism.pin_model import build_pin_model
 from kemba.mechanism.robot import tree_angles
 from kemba.model import Model
 from kemba.plant import Commands, Profile, run, simulate
-from kemba.plant.equations import equations_of
+from kemba.plant.stepping.equations import equations_of
 from kemba.trajectory import Trajectory
 
 

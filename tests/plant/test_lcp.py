@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from kemba.plant.lcp import NoSolutionError, lemke, solve_lcp
+from kemba.plant.stepping.lcp import NoSolutionError, lemke, solve_lcp
 
 seeds = st.integers(0, 2**32 - 1)
 

@@ -10,12 +10,12 @@ import casadi as ca
 import mujoco
 import numpy as np
 
-from kemba.effects.contact import Contact
+from kemba.effects.mechanics.contact import Contact
 from kemba.mechanism import Link, Robot, load_robot, robot_mechanism
 from kemba.mechanism.robot import tree_angles
 from kemba.model import Model
 from kemba.plant import simulate
-from kemba.plant.start import initial_values
+from kemba.plant.simulation.start import initial_values
 
 STEP = 2e-5  # s
 HINGE = 'type="hinge" axis="0 -1 0"'

@@ -5,14 +5,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from kemba.effects.air import AREA_E, AREA_R, ATMOSPHERE
-from kemba.effects.orifice import OrificeChamber
-from kemba.effects.supply_line import SupplyLine
-from kemba.effects.valve import Valve
+from kemba.effects.pneumatics.constants import AREA_E, AREA_R, ATMOSPHERE
+from kemba.effects.pneumatics.orifice import OrificeChamber
+from kemba.effects.pneumatics.supply_line import SupplyLine
+from kemba.effects.pneumatics.valve import Valve
 from kemba.mechanism import rig_mechanism
 from kemba.model import Model
 from kemba.plant import Profile
-from kemba.plant.drive import drive, hermite, locked
+from kemba.plant.rig.imposed import drive, hermite, locked
 
 STROKE = 0.07
 

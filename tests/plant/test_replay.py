@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from plant.scripts import jump, planning
 
-from kemba.effects.motor import Motor
+from kemba.effects.mechanics.motor import Motor
 from kemba.plant import Gains, Profile, execute, replay, replays, run
-from kemba.plant.commands import Commands
-from kemba.plant.controller import saturated
+from kemba.plant.execution.controller import saturated
+from kemba.plant.simulation.commands import Commands
 from kemba.trajectory import Trajectory
 
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from kemba.effects.timing import ValveCloseDelay
+from kemba.effects.pneumatics.timing import ValveCloseDelay
 from kemba.model import load_model
 from kemba.plant import Profile
-from kemba.plant.drive import drive, locked
-from kemba.plant.valves import acting
+from kemba.plant.rig.imposed import drive, locked
+from kemba.plant.simulation.valves import acting
 
 
 def pulses(profile: Profile) -> list[float]:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from kemba.effects.chamber import Chamber
+from kemba.effects.pneumatics.chamber import Chamber
 from kemba.mechanism import load_robot
 from kemba.mechanism.robot import standing_pose
 from kemba.plotting import Machine, Source, load_machine

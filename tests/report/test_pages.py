@@ -12,7 +12,7 @@ from scipy.io import loadmat
 from typer.testing import CliRunner, Result
 
 from kemba.config import shipped_configs
-from kemba.identify.logs import load_map, read_log
+from kemba.identify.logs.reading import load_map, read_log
 from kemba.plotting import load_source
 from kemba.report.stage import scene
 from kemba.trajectory import Trajectory

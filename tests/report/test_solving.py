@@ -10,8 +10,8 @@ from typer.testing import CliRunner
 
 from kemba.ocp import load_task, task_model
 from kemba.plant import execute, replay
-from kemba.plant.certificate import SETTLE
-from kemba.plant.counterpart import counterpart
+from kemba.plant.execution.certificate import SETTLE
+from kemba.plant.execution.counterpart import counterpart
 from kemba.report import Listener, solve_into
 from kemba.runs import RunFolder
 from kemba.trajectory import Trajectory

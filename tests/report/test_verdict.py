@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from kemba.ocp.task import Tolerances
+from kemba.ocp.task.task import Tolerances
 from kemba.report.verdict import verdicts
 from kemba_cli.main import app
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from kemba.identify.bench.bench_log import prepare
 from kemba.identify.bench.problem import BenchProblem
-from kemba.identify.bench.run import prepare
 from kemba.model.model import Model
 from kemba.trajectory import Trajectory
 

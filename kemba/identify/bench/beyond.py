@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kemba.identify.bench.bench_log import FRICTION
 from kemba.identify.bench.formulas import features, terms
 from kemba.identify.bench.prediction import true_motion
-from kemba.identify.bench.run import FRICTION
-from kemba.identify.linear import within
-from kemba.identify.problem import Array, Theta
-from kemba.identify.rank import FLOOR
+from kemba.identify.evidence.linear import within
+from kemba.identify.evidence.problem import Array, Theta
+from kemba.identify.evidence.spike_slab import FLOOR
 
 if TYPE_CHECKING:
     from kemba.identify.bench.problem import BenchProblem

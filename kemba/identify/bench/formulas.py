@@ -7,9 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.signal import lfilter
 
-from kemba.effects.friction import V_COULOMB
+from kemba.effects.mechanics.friction import V_COULOMB
 from kemba.identify.bench.motion import Motion
-from kemba.identify.problem import Array
+from kemba.identify.evidence.problem import Array
 
 STROKE = 0.070  # m
 RANGES = (0.003, 0.005, 0.008, 0.013, 0.02)  # m, reach of a force at an end of the stroke

@@ -10,8 +10,8 @@ import numpy as np
 from scipy.linalg import cholesky_banded, solveh_banded
 
 from kemba.identify.bench.problem import BenchProblem
-from kemba.identify.missing import Missing
-from kemba.identify.problem import Array, Theta
+from kemba.identify.compare.missing_force import Missing
+from kemba.identify.evidence.problem import Array, Theta
 
 MEMORY = 0.025  # s, of the missing force
 ROUNDS = 20

@@ -7,8 +7,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from kemba.identify.noise import difference_sigma
-from kemba.identify.problem import Array
+from kemba.identify.evidence.noise import difference_sigma
+from kemba.identify.evidence.problem import Array
 
 FINEST = 2e-6  # m, noise that is never undercut
 HALF_WIDTHS = (5, 8, 11, 15, 20, 27, 40, 60, 90, 135)  # samples

@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 
 from kemba.effects.base import Effect
+from kemba.identify.bench.bench_log import PRESSURES, Run
 from kemba.identify.bench.motion import Motion
-from kemba.identify.bench.plant import Prediction, Rig, share
 from kemba.identify.bench.pressure import absolute_pressure
-from kemba.identify.bench.run import PRESSURES, Run
+from kemba.identify.bench.rig_model import Prediction, Rig, share
 from kemba.identify.bench.switching import delayed
-from kemba.identify.candidates import by_default
-from kemba.identify.problem import Array, Candidate, Theta
+from kemba.identify.evidence.candidates import by_default
+from kemba.identify.evidence.problem import Array, Candidate, Theta
 from kemba.model.model import Model
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from kemba.effects.air import AREA_E, AREA_R, ATMOSPHERE
-from kemba.identify.problem import Array
+from kemba.effects.pneumatics.constants import AREA_E, AREA_R, ATMOSPHERE
+from kemba.identify.evidence.problem import Array
 
 AREA = {"extend": AREA_E, "retract": AREA_R}
 

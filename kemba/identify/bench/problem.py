@@ -8,22 +8,22 @@ from functools import cached_property
 
 import numpy as np
 
+from kemba.identify.bench.bench_log import Run
 from kemba.identify.bench.beyond import formula_columns, leftover, weight
-from kemba.identify.bench.plausible import contradictions
-from kemba.identify.bench.prediction import Predictor
-from kemba.identify.bench.run import Run
-from kemba.identify.bench.surroundings import (
+from kemba.identify.bench.operating_point import (
     Switchings,
     bench_port,
     bench_surroundings,
     switchings,
 )
-from kemba.identify.candidates import effect_candidates, sensor_candidates
-from kemba.identify.checks import BadData
-from kemba.identify.laws import Port
-from kemba.identify.noise import Colour, learn, whiten
-from kemba.identify.problem import Array, Rows, Theta, secant_jacobian
-from kemba.identify.surroundings import Surroundings
+from kemba.identify.bench.prediction import Predictor
+from kemba.identify.bench.validate import contradictions
+from kemba.identify.compare.force_profiles import Port
+from kemba.identify.evidence.candidates import effect_candidates, sensor_candidates
+from kemba.identify.evidence.noise import Colour, learn, whiten
+from kemba.identify.evidence.operating_point import Surroundings
+from kemba.identify.evidence.problem import Array, Rows, Theta, secant_jacobian
+from kemba.identify.logs.gate import BadData
 from kemba.model.model import Model
 
 EARLY = 0.08  # s that tell whether a valve had just been switched when a log begins

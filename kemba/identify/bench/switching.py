@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kemba.identify.problem import Array
+from kemba.identify.evidence.problem import Array
 
 
 def pulses(time: Array, command: Array) -> list[tuple[float, float]]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kemba.effects.friction import V_COULOMB
+from kemba.effects.mechanics.friction import V_COULOMB
 from kemba.identify.bench.formulas import RANGES, STROKE, dahl
 from kemba.identify.robot.ports import port_columns
 

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from kemba.identify.problem import Rows
-from kemba.identify.robot.batch import Batch
-from kemba.identify.robot.contact import Schedule
-from kemba.identify.robot.physics import Physics
-from kemba.identify.robot.reference import GROUND_SIGMA
+from kemba.identify.evidence.problem import Rows
+from kemba.identify.robot.dynamics.physics import Physics
+from kemba.identify.robot.dynamics.reference import GROUND_SIGMA
+from kemba.identify.robot.motion.batch import Batch
+from kemba.identify.robot.motion.contact import Schedule
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Texts = np.ndarray[Any, Any]

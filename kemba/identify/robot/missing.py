@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from kemba.identify.missing import Missing, spans
-from kemba.identify.problem import Array, Theta
-from kemba.identify.robot.filter import System, gains, smooth_with_band
+from kemba.identify.compare.missing_force import Missing, spans
+from kemba.identify.evidence.problem import Array, Theta
+from kemba.identify.robot.dynamics.reference import Floor, densities
+from kemba.identify.robot.motion.filter import System, gains, smooth_with_band
 from kemba.identify.robot.problem import RobotProblem
-from kemba.identify.robot.reference import Floor, densities
 
 MEMORY = 0.025  # s, of the missing force
 ROUNDS = 6

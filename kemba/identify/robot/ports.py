@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kemba.identify.laws import LAGS, Port, risen
-from kemba.identify.problem import Array, Flags
-from kemba.identify.robot.filter import innovations
-from kemba.identify.robot.surroundings import SIDES
-from kemba.identify.surroundings import air_force
+from kemba.identify.compare.force_profiles import LAGS, Port, risen
+from kemba.identify.evidence.operating_point import air_force
+from kemba.identify.evidence.problem import Array, Flags
+from kemba.identify.robot.motion.filter import innovations
+from kemba.identify.robot.operating_point import SIDES
 
 if TYPE_CHECKING:
     from kemba.identify.robot.problem import RobotProblem

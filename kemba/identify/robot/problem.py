@@ -13,33 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from kemba.identify.candidates import sensor_candidates
-from kemba.identify.checks import BadData
-from kemba.identify.laws import Port
-from kemba.identify.problem import Candidate, Parameter, Rows, Theta, parameter_steps
-from kemba.identify.robot.batch import Batch
-from kemba.identify.robot.contact import loaded
-from kemba.identify.robot.drive import air_states, drives
-from kemba.identify.robot.expected import expected_power, predicted_error
-from kemba.identify.robot.filter import gains, innovations
-from kemba.identify.robot.forces import Forces
-from kemba.identify.robot.formulas import formula_columns
-from kemba.identify.robot.labels import describe
-from kemba.identify.robot.linear import Linearised, linearise, smoothed
-from kemba.identify.robot.physics import Physics
-from kemba.identify.robot.plausible import contradictions
-from kemba.identify.robot.ports import robot_ports
-from kemba.identify.robot.reference import (
-    LOOSE,
-    Floor,
-    Reference,
-    densities,
-    first_reference,
-    schedules,
-)
-from kemba.identify.robot.sensing import ahead, sensed
-from kemba.identify.robot.surroundings import changes, robot_surroundings
-from kemba.identify.robot.suspects import (
+from kemba.identify.compare.force_profiles import Port
+from kemba.identify.evidence.candidates import sensor_candidates
+from kemba.identify.evidence.operating_point import Surroundings
+from kemba.identify.evidence.problem import Candidate, Parameter, Rows, Theta, parameter_steps
+from kemba.identify.logs.gate import BadData
+from kemba.identify.robot.candidates import (
     DELAYS,
     GRIP,
     SOFTNESS,
@@ -49,9 +28,30 @@ from kemba.identify.robot.suspects import (
     robot_candidates,
     without_delay,
 )
-from kemba.identify.robot.tolerance import SHARE
-from kemba.identify.robot.track import read_track
-from kemba.identify.surroundings import Surroundings
+from kemba.identify.robot.dynamics.forces import Forces
+from kemba.identify.robot.dynamics.inputs import air_states, drives
+from kemba.identify.robot.dynamics.linear import Linearised, linearise, smoothed
+from kemba.identify.robot.dynamics.physics import Physics
+from kemba.identify.robot.dynamics.reference import (
+    LOOSE,
+    Floor,
+    Reference,
+    densities,
+    first_reference,
+    schedules,
+)
+from kemba.identify.robot.dynamics.tolerance import SHARE
+from kemba.identify.robot.formulas import formula_columns
+from kemba.identify.robot.labels import describe
+from kemba.identify.robot.motion.batch import Batch
+from kemba.identify.robot.motion.contact import loaded
+from kemba.identify.robot.motion.expected import expected_power, predicted_error
+from kemba.identify.robot.motion.filter import gains, innovations
+from kemba.identify.robot.motion.resampled import read_track
+from kemba.identify.robot.motion.sensing import ahead, sensed
+from kemba.identify.robot.operating_point import changes, robot_surroundings
+from kemba.identify.robot.ports import robot_ports
+from kemba.identify.robot.validate import contradictions
 from kemba.model.model import Model
 from kemba.trajectory import Trajectory
 

@@ -12,13 +12,13 @@ pytest.importorskip("numba")
 from robot_logs import hops
 from twin import catalogue
 
-from kemba.identify.cells import excess
-from kemba.identify.compare import Comparison, compare
-from kemba.identify.laws import Law
+from kemba.identify.compare.bins import excess
+from kemba.identify.compare.compare import Comparison, compare
+from kemba.identify.compare.force_profiles import Law
+from kemba.identify.compare.smoother import missing_force
 from kemba.identify.robot import robot_problem
-from kemba.identify.smoother import missing_force
 from kemba.model.spec import load_model
-from kemba.plotting.comparison import plot_comparison
+from kemba.plotting.study.comparison import plot_comparison
 
 
 def compared(*effects: dict) -> Comparison:

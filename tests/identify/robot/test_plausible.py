@@ -8,7 +8,7 @@ pytest.importorskip("numba")
 
 from robot_logs import hops
 
-from kemba.identify.checks import BadData
+from kemba.identify.logs.gate import BadData
 from kemba.identify.robot import robot_problem
 from kemba.model.spec import load_model
 from kemba.trajectory import Trajectory

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from kemba.identify.robot.sensing import ahead, sensed, travelled
-from kemba.identify.robot.track import Track
+from kemba.identify.robot.motion.resampled import Track
+from kemba.identify.robot.motion.sensing import ahead, sensed, travelled
 
 TIME = np.arange(0.0, 0.6, 1e-3)
 STEP = np.full((len(TIME), 1), 1e-3)

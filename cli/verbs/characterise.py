@@ -1,0 +1,109 @@
+"""`kemba-opt characterise`: chambers, damping and valves of a cylinder from bench logs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from kemba_cli.common import Json, Quiet, print_json, results, say
+
+if TYPE_CHECKING:
+    from kemba.plant.rig.characterise import Characteristics
+    from kemba.trajectory import Trajectory
+
+
+def characterise(
+    logs: Annotated[
+        list[Path] | None, typer.Argument(help="Bench logs (CSV), or folders of them.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Model YAML to write.")] = None,
+    figures: Annotated[
+        Path | None, typer.Option(help="Folder for the paper's figure of each rig.")
+    ] = None,
+    paper: Annotated[
+        bool, typer.Option("--paper", help="No logs: what the paper's own tables imply.")
+    ] = False,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Fit eq. 4 to 7 to bench logs; print Tables I and II beside the paper's; write a model.
+
+    Example: kemba-opt characterise bench/locked bench/dynamometer --out cylinder.yaml
+    """
+    if paper:
+        _print_paper(json, quiet)
+        return
+    if not logs:
+        raise typer.BadParameter("logs are missing: give CSV files, or --paper", param_hint="LOGS")
+    from kemba.plant.rig.characterise import characterise as fit
+    from kemba.plant.rig.tables import as_json
+    from kemba.trajectory import Trajectory
+
+    files = [f for item in logs for f in (sorted(item.glob("*.csv")) if item.is_dir() else [item])]
+    read = {str(file): Trajectory.read(file) for file in files}
+    found = fit(read)
+    if out:
+        found.write_model(out, out.stem)
+    drawn = _draw(found, read, figures) if figures else []
+    answer: dict[str, Any] = {"logs": len(files), **as_json(found), "model": out and str(out)}
+    answer["figures"] = drawn
+    if json:
+        print_json(answer)
+        return
+    _print(found)
+    for path in drawn:
+        say(f"wrote {path}", quiet)
+    say(f"wrote {out}" if out else "write a model with --out MODEL.yaml", quiet)
+
+
+def _print_paper(json: bool, quiet: bool) -> None:
+    """Tables I and II of the paper against pressure times area and volume."""
+    from rich.table import Table
+
+    from kemba.identify.published import LOSS_COLUMNS, published
+
+    found = published()
+    if json:
+        print_json(found.json())
+        return
+    typer.echo(found.sentence)
+    table = Table("mode", *LOSS_COLUMNS, title="Pressure x area - F_static, N", box=None)
+    for mode, losses in found.losses.items():
+        table.add_row(mode, *(f"{loss:.1f}" for loss in losses))
+    if not quiet:
+        results().print(table)
+
+
+def _draw(found: Characteristics, logs: dict[str, Trajectory], folder: Path) -> list[str]:
+    """The figure of each rig among the logs; what was fitted predicts random motion."""
+    from kemba.plotting import plot_rig, save_figure
+
+    rigs: dict[str, dict[str, Trajectory]] = {}
+    for name, log in logs.items():
+        rig = str(log.meta.get("rig") or Path(name).resolve().parent.name)
+        rigs.setdefault(rig, {})[Path(name).stem] = log
+    return [
+        str(save_figure(plot_rig(own, effects=found.effects()), folder / f"{rig}.png"))
+        for rig, own in rigs.items()
+    ]
+
+
+def _print(found: Characteristics) -> None:
+    from rich.table import Table
+
+    from kemba.plant import tables
+
+    for title, columns, rows in (
+        ("Chamber force rise time", tables.RISE_COLUMNS, tables.rise_rows(found)),
+        ("Steady state: F = F_static - c_d v", tables.FORCE_COLUMNS, tables.force_rows(found)),
+        ("Fitted model against logs", tables.CHECK_COLUMNS, tables.check_rows(found)),
+    ):
+        if rows:
+            table = Table(title=title, title_justify="left", box=None)
+            for number, column in enumerate(columns):
+                table.add_column(column, justify="right" if number else "left")
+            for row in rows:
+                table.add_row(*row)
+            results().print(table)

@@ -1,0 +1,76 @@
+"""`kemba-opt check`: validate YAML files and logs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from kemba_cli.common import Json, Quiet, print_json
+from kemba_cli.failures import BAD_INPUT
+
+
+def check(
+    files: Annotated[list[Path], typer.Argument(help="YAML files, and logs as CSV.")],
+    column_map: Annotated[
+        str | None, typer.Option("--map", help="Column map YAML for foreign logs.")
+    ] = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Validate any YAML or log, with all mistakes at once.
+
+    Example: kemba-opt check planning.yaml
+    """
+    from kemba.errors import KembaError
+
+    answers = []
+    for file in files:
+        try:
+            answer = _log(file, column_map) if file.suffix == ".csv" else _yaml(file)
+            answers.append({"file": str(file), "good": True, **answer})
+        except KembaError as error:
+            answers.append({"file": str(file), "good": False, "sentence": str(error)})
+    _tell(answers, json, quiet)
+    if not all(answer["good"] for answer in answers):
+        raise typer.Exit(BAD_INPUT)
+
+
+def _tell(answers: list[dict[str, Any]], json: bool, quiet: bool) -> None:
+    if json:
+        print_json({"files": answers})
+    for answer in answers:
+        if not answer["good"]:
+            typer.echo(answer["sentence"], err=True)
+        elif not json and not quiet:
+            typer.echo(f"{answer['file']}: good: {answer['sentence']}")
+
+
+def _log(file: Path, column_map: str | None) -> dict[str, Any]:
+    from kemba.identify.logs.reading import load_map, read_log
+    from kemba.trajectory import Trajectory
+
+    log = read_log(file, load_map(column_map)) if column_map else Trajectory.read(file)
+    sentence = f"{len(log)} rows, {len(log.names)} columns, {log.time[-1] - log.time[0]:.3g} s"
+    return {"kind": "table", "rows": len(log), "columns": log.headers, "sentence": sentence}
+
+
+def _yaml(file: Path) -> dict[str, Any]:
+    from kemba.config import load_yaml, locate, parse
+    from kemba_cli.schemas import SCHEMAS, kind_of, schema_of
+
+    document = load_yaml(locate(file, SCHEMAS))
+    kind = kind_of(document)
+    parsed = parse(document, schema_of(kind))
+    if kind == "tasks":
+        _names(parsed, document)
+    return {"kind": kind, "sentence": f"one of the {kind}"}
+
+
+def _names(task: Any, document: Any) -> None:
+    """Quantities, costs and solver options that a task names."""
+    from kemba.ocp import task_model
+    from kemba.ocp.task.requirement import resolve
+
+    resolve(task, task_model(task), document)

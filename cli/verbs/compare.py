@@ -1,0 +1,72 @@
+"""`kemba-opt compare`: where a model fails on logs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from kemba_cli.common import Json, Quiet, print_json, results, say
+
+if TYPE_CHECKING:
+    from kemba.identify.compare.compare import Comparison
+
+SHOWN = 5
+
+
+def compare(
+    logs: Annotated[list[Path], typer.Argument(help="Logs (CSV) of one machine, any order.")],
+    model: Annotated[str, typer.Option(help="Model YAML to judge.")] = "planning",
+    run: Annotated[Path | None, typer.Option(help="Run folder that was executed.")] = None,
+    figure: Annotated[Path | None, typer.Option(help="Where to save the figure.")] = None,
+    column_map: Annotated[
+        str | None, typer.Option("--map", help="Column map YAML for foreign logs.")
+    ] = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Say whether a model explains logs to within their noise and, if not, where it fails.
+
+    Example: kemba-opt compare jump_1.csv jump_2.csv --figure heat_map.png
+    """
+    import os
+
+    # many small products: more BLAS threads only wait for each other
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    from kemba.identify.compare.from_logs import compare_logs
+
+    found, _ = compare_logs(logs, model, column_map, run)
+    if figure is not None:
+        from kemba.plotting.study.comparison import plot_comparison
+        from kemba.plotting.style import save_figure
+
+        save_figure(plot_comparison(found), figure)
+        say(f"wrote {figure}", quiet)
+    if json:
+        print_json(found.json())
+        return
+    typer.echo(found.sentence)
+    if not quiet:
+        _print(found)
+
+
+def _print(found: Comparison) -> None:
+    from rich.table import Table
+
+    table = Table("channel", "RMS", "largest", "noise", "error / noise")
+    for c in found.channels:
+        numbers = (f"{x:.3g}" for x in (c.rmse, c.max, c.noise_sigma, c.ratio))
+        table.add_row(c.name.replace("[", r"\["), *numbers)
+    results().print(table)
+    for cell in sorted((c for c in found.cells if c.significant), key=lambda c: c.q_value)[:SHOWN]:
+        where = f"{cell.channel} in {cell.phase}, valves {cell.mode}, piston {cell.region}"
+        typer.echo(f"  {where}: {cell.ratio:.2g} times the noise (q = {cell.q_value:.1g})")
+    for hint in found.hints[:SHOWN]:
+        typer.echo(f"  {hint.text}")
+    for peak in found.peaks:
+        if peak.low * peak.high > 0 and not found.good:
+            size = f"{peak.value:+.3g} {peak.unit} ({peak.low:.3g} to {peak.high:.3g})"
+            typer.echo(f"  missing at {peak.channel}: {size} at {peak.time_s:.3f} s of {peak.run}")
+    for header, error in found.plan.items():
+        typer.echo(f"  plan missed by up to {error:.3g} in {header}")

@@ -1,0 +1,68 @@
+"""`kemba-opt discover`: which effect is missing, how large, how sure."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from kemba_cli.common import Json, Quiet, print_json, say
+from kemba_cli.failures import BAD_ANSWER
+
+if TYPE_CHECKING:
+    from kemba.identify.answer import Answer
+
+
+def discover(
+    logs: Annotated[list[Path], typer.Argument(help="Logs (CSV) of one machine, any order.")],
+    holdout: Annotated[
+        list[Path] | None, typer.Option(help="A log kept for judging only; may be repeated.")
+    ] = None,
+    model: Annotated[str, typer.Option(help="Model YAML whose gaps to find.")] = "planning",
+    out: Annotated[Path, typer.Option(help="Folder for answer.json, model.yaml, figures.")] = Path(
+        "answer"
+    ),
+    column_map: Annotated[
+        str | None, typer.Option("--map", help="Column map YAML for foreign logs.")
+    ] = None,
+    time_limit: Annotated[float, typer.Option(min=5.0, help="Seconds at most.")] = 300.0,
+    figures: Annotated[bool, typer.Option(help="Draw the figures.")] = True,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Find the physical effect that a model lacks, from logs of a robot or of a bench rig.
+
+    Example: kemba-opt discover bench_1.csv bench_2.csv --holdout bench_3.csv
+    """
+    import os
+
+    # a search is many small products: more BLAS threads only wait for each other
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    from kemba.identify.workflow import discover_logs
+    from kemba_cli.progress import Progress
+
+    with Progress(quiet or json) as progress:
+        answer, found = discover_logs(
+            logs, holdout or [], model, column_map, time_limit, progress.tell, out
+        )
+    if figures and found is not None:
+        from kemba.plotting.study.discovery import draw_discovery
+
+        draw_discovery(found, out)
+    _tell(answer, out, json, quiet)
+    if answer.verdict == "bad-data":
+        raise typer.Exit(BAD_ANSWER)
+
+
+def _tell(answer: Answer, out: Path, json: bool, quiet: bool) -> None:
+    if json:
+        print_json(answer.json())
+        return
+    typer.echo(answer.sentence)
+    for ranked in answer.ranking[:5]:
+        values = ", ".join(f"{name} = {value}" for name, value in ranked.parameters.items())
+        typer.echo(f"  {100 * ranked.probability:5.1f} %  {ranked.effect:28s} {values}")
+    for remark in answer.remarks:
+        say(remark, quiet)
+    say(f"{out}", quiet)

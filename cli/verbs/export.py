@@ -1,0 +1,32 @@
+"""`kemba-opt export`: trajectories in other formats."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from kemba_cli.common import Json, Quiet, print_json
+
+
+def export(
+    run: Annotated[Path, typer.Argument(help="Run folder (its plan), or any CSV of ours.")],
+    out: Annotated[Path, typer.Option(help="File to write: .mat, .npz, .json or .csv.")],
+    column_map: Annotated[
+        str | None,
+        typer.Option("--map", help="Column map YAML of the program that is to read the .csv."),
+    ] = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Write a plan or a log for MATLAB, NumPy, JSON, or with another program's columns.
+
+    Example: kemba-opt export runs/jump-1 --out jump.mat
+    """
+    from kemba.identify.logs.reading import load_map
+    from kemba.plotting import load_source
+    from kemba.report.export import export as write
+
+    path = write(load_source(run).trajectory, out, load_map(column_map) if column_map else None)
+    print_json({"export": str(path)}) if json else typer.echo(path)

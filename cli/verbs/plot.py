@@ -1,0 +1,68 @@
+"""`kemba-opt plot`: figures and animations of plans, simulations and logs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from kemba_cli.common import Json, Quiet, print_json
+
+
+def plot(
+    runs: Annotated[
+        list[Path],
+        typer.Argument(
+            help="Run folders and CSVs, several over each other; or one folder of bench logs."
+        ),
+    ],
+    save: Annotated[
+        Path | None, typer.Option(help="PNG, PDF or SVG; beside the first run when omitted.")
+    ] = None,
+    animate: Annotated[
+        Path | None, typer.Option(help="Also write a GIF, or an MP4, of the first run.")
+    ] = None,
+    show: Annotated[bool, typer.Option("--show", help="Open a window.")] = False,
+    model: Annotated[
+        str | None, typer.Option(help="Model YAML with the robot and limits, not the run's own.")
+    ] = None,
+    column_map: Annotated[
+        str | None, typer.Option("--map", help="Column map YAML for foreign logs.")
+    ] = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Draw body, joints, efforts, valves and contact, and a strip of stick figures.
+
+    A folder of bench logs is drawn as the paper draws its rig (Fig. 3, 4, 6 and 7).
+
+    Example: kemba-opt plot runs/jump-1
+    """
+    from kemba import plotting
+    from kemba.identify.logs.reading import load_map
+    from kemba.plotting.window import open_window, show_windows
+
+    window = open_window() if show else None
+    logs = plotting.bench_logs(runs[0]) if len(runs) == 1 else {}
+    if logs:
+        figure = plotting.plot_rig(logs, model or "planning", figure=window)
+        names, beside = list(logs), runs[0] / "figure.png"
+    else:
+        sources = plotting.load_sources(runs, load_map(column_map) if column_map else None)
+        figure = plotting.draw(sources, model, window)
+        names, beside = [source.name for source in sources], plotting.default_path(sources)
+    written = {"figure": plotting.save_figure(figure, save or beside)}
+    if animate:
+        if logs:
+            raise typer.BadParameter("a rig does not move about", param_hint="--animate")
+        machine = plotting.machine_of(sources[0], model)
+        written["animation"] = plotting.save_animation(sources[0], machine, animate)
+    paths = {kind: str(path) for kind, path in written.items()}
+    if json:
+        print_json({**paths, "runs": names})
+    elif not quiet:
+        for path in paths.values():
+            typer.echo(path)
+    if show:
+        show_windows()

@@ -1,0 +1,112 @@
+"""`kemba-opt solve`: from a task file to a certified plan."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from kemba_cli.common import Json, Quiet, print_json, say
+
+if TYPE_CHECKING:
+    from kemba.ocp import Task
+    from kemba.trajectory import Trajectory
+
+Set = Annotated[
+    list[str] | None, typer.Option("--set", help="Override a key: --set 'height=0.6 m'.")
+]
+
+
+def solve(
+    task: Annotated[
+        str | None, typer.Argument(help="Task YAML, here or among the shipped ones.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Run folder to write.")] = None,
+    overrides: Set = None,
+    model: Annotated[str | None, typer.Option(help="Model YAML instead of the task's.")] = None,
+    resume: Annotated[
+        Path | None, typer.Option(help="Go on from this run; its task unless TASK is given.")
+    ] = None,
+    time_limit: Annotated[float | None, typer.Option(help="Seconds of solving at most.")] = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Check the task and say its size; solve nothing.")
+    ] = False,
+    starts: Annotated[int, typer.Option(min=1, help="Guesses to try; the best is kept.")] = 1,
+    jobs: Annotated[int | None, typer.Option(min=1, help="Starts at a time.")] = None,
+    replay: Annotated[bool, typer.Option(help="Execute the plan in simulation.")] = True,
+    figure: Annotated[bool, typer.Option(help="Draw the plan.")] = True,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Plan a motion; write trajectory, controller table, certificate and figure to a run folder.
+
+    Exit code 1 when it is not solved, or when its replay or the plant misses the task's
+    tolerances.
+
+    Example: kemba-opt solve jump.yaml --set "height=0.6 m"
+    """
+    from kemba.config import find_config
+    from kemba.ocp import load_task, task_model
+    from kemba.ocp.nlp.interrupt import Interrupt
+    from kemba.ocp.task.requirement import resolve
+    from kemba.report import Listener, solve_into
+    from kemba.runs import RunFolder
+    from kemba_cli.progress import Progress
+
+    start = None
+    if resume is not None:
+        task, out, start = _resumed(resume, task, out)
+    if task is None:
+        raise typer.BadParameter("a task was expected, such as jump.yaml", param_hint="TASK")
+    options = list(overrides or [])
+    if time_limit is not None:
+        options.append(f"solver.time_limit={time_limit}")
+    resolved, document = load_task(task, options)
+    if dry_run:
+        _dry_run(resolved, document, model, json)
+        return
+    resolved = resolved.model_copy(update={"model": model or resolved.model})
+    built = task_model(resolved)
+    resolve(resolved, built, document)
+    if built.ignored:
+        say(f"no plan can use {', '.join(built.ignored)}: it changes what is measured only", quiet)
+    models = [find_config(name, "models") for name in (resolved.model, resolved.plant)]
+    inputs = [find_config(task, "tasks"), *models]
+    folder = RunFolder.create(out, resolved.name, inputs)
+    with Progress(quiet or json) as progress, Interrupt(lambda text: say(text, quiet)) as stop:
+        listener = Listener(progress.tell, progress.watch, stop)
+        answer = solve_into(
+            folder, resolved, document, listener, start, starts, jobs, replay, figure
+        )
+    if json:
+        print_json(answer)
+    else:
+        typer.echo(answer["run"])
+        say(answer["sentence"], quiet)
+    if answer["status"] == "interrupted":
+        raise typer.Exit(130)
+    if not answer["good"]:
+        raise typer.Exit(1)
+
+
+def _resumed(
+    run: Path, task: str | None, out: Path | None
+) -> tuple[str, Path | None, Trajectory | None]:
+    """Task, folder and start of a run that goes on: in its own folder when it never finished."""
+    from kemba.runs import load_run
+
+    found = load_run(run)
+    unfinished = found.manifest.get("status") == "running"
+    start = found.trajectory if (found.path / "trajectory.csv").is_file() else None
+    return task or str(found.task), out or (found.path if unfinished else None), start
+
+
+def _dry_run(task: Task, document: Any, model: str | None, json: bool) -> None:
+    from kemba.ocp.planning import program_size
+
+    size = program_size(task, document, model)
+    if json:
+        print_json({"task": task.name, **size})
+    else:
+        typer.echo(f"{task.name}: {size['variables']} variables, {size['constraints']} rows")

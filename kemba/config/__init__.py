@@ -1,0 +1,26 @@
+"""Configuration files: from YAML to checked data, every mistake at its line."""
+
+from kemba.config.document import Document, Location, dump_yaml, load_text, load_yaml, written
+from kemba.config.parsing import (
+    apply_overrides,
+    beside,
+    find_config,
+    locate,
+    parse,
+    shipped_configs,
+)
+
+__all__ = [
+    "Document",
+    "Location",
+    "apply_overrides",
+    "beside",
+    "dump_yaml",
+    "find_config",
+    "load_text",
+    "load_yaml",
+    "locate",
+    "parse",
+    "shipped_configs",
+    "written",
+]

@@ -1,0 +1,1 @@
+"""Everything that is not air: rods, hips, body, boom, ground."""

@@ -1,0 +1,1 @@
+"""Air: chambers, valves, hoses, supply (paper, eq. 1-8)."""

@@ -1,0 +1,78 @@
+"""What happens to the air between valve, hose and chamber."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, Literal
+
+from kemba.effects.base import At, Contribution, Effect, Signal
+from kemba.effects.pneumatics.constants import AREA_E, AREA_R
+from kemba.quantity import Param, Quantity
+
+
+class HoseLag(Effect):
+    """The hose between valve and chamber: every use of u sees it filtered.
+
+    T = 0.1 ms, the smallest allowed, is as good as no hose.
+    """
+
+    kind: Literal["hose_lag"] = "hose_lag"
+    T: Annotated[float, Param("s", 0.004, lower=1e-4, doc="time constant")] = 1e-4
+
+    family: ClassVar[str] = "air"
+    equation: ClassVar[str] = "T du_f/dt = u - u_f, u -> u_f wherever u is read"
+    source: ClassVar[str] = "line dynamics of pneumatic tubing, lumped to first order"
+    ports: ClassVar[tuple[str, ...]] = ("piston",)
+    off: ClassVar[dict[str, float]] = {"T": 1e-4}
+
+    def states(self) -> dict[str, Quantity]:
+        return {
+            "u_f_e": Quantity("hose/extend/u", "1", 0.0, 1.0, 1.0, doc="valve after the hose"),
+            "u_f_r": Quantity("hose/retract/u", "1", 0.0, 1.0, 1.0, doc="valve after the hose"),
+        }
+
+    def signals(self, at: At) -> dict[str, Signal]:
+        return {"u_e": Signal(lagged=at.u_f_e), "u_r": Signal(lagged=at.u_f_r)}
+
+    def evaluate(self, at: At) -> Contribution:
+        return Contribution(
+            rate={
+                "u_f_e": (at.source("u_e") - at.u_f_e) / self.T,
+                "u_f_r": (at.source("u_r") - at.u_f_r) / self.T,
+            }
+        )
+
+
+class CrossLeak(Effect):
+    """Air creeps past the piston's seal from the fuller chamber into the other.
+
+    p is the pressure difference extend - retract.
+    """
+
+    kind: Literal["cross_leak"] = "cross_leak"
+    k: Annotated[float, Param("s-1", 3.0, lower=0.0, doc="pressure rate per difference")] = 0.0
+
+    family: ClassVar[str] = "air"
+    equation: ClassVar[str] = "p = F_e/A_e - F_r/A_r; dF_e/dt -= k p A_e, dF_r/dt += k p A_r"
+    source: ClassVar[str] = "leak past a worn piston seal; bore 25 mm, rod 10 mm (data sheet)"
+    ports: ClassVar[tuple[str, ...]] = ("piston",)
+    off: ClassVar[dict[str, float]] = {"k": 0.0}
+
+    def evaluate(self, at: At) -> Contribution:
+        p = at.F_e / AREA_E - at.F_r / AREA_R
+        return Contribution(add_rate={"F_e": -self.k * p * AREA_E, "F_r": self.k * p * AREA_R})
+
+
+class BothModeLoss(Effect):
+    """Force that is missing (F < 0: in excess) while both valves are on."""
+
+    kind: Literal["both_mode_loss"] = "both_mode_loss"
+    F: Annotated[float, Param("N", 15.0, doc="force lost with both valves on")] = 0.0
+
+    family: ClassVar[str] = "air"
+    equation: ClassVar[str] = "-F u_e u_r"
+    source: ClassVar[str] = "paper Table II: 50 N with both valves on, where eq. 7 gives 64 N"
+    ports: ClassVar[tuple[str, ...]] = ("piston",)
+    off: ClassVar[dict[str, float]] = {"F": 0.0}
+
+    def evaluate(self, at: At) -> Contribution:
+        return Contribution(effort={"piston": -self.F * at.u_e * at.u_r})

@@ -1,0 +1,102 @@
+"""Physical chambers: thermodynamics behind orifices (paper, eq. 1 to 3)."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, ClassVar, Literal
+
+from kemba.effects.base import At, Contribution, Effect
+from kemba.effects.pneumatics.chamber import TABLE_PRESSURES, Pascal, at_supply
+from kemba.effects.pneumatics.constants import AREA_E, AREA_R, ATMOSPHERE, GAS, KAPPA, TEMPERATURE
+from kemba.effects.pneumatics.flow import CHOKED, mass_flow, phi
+from kemba.quantity import Param, Quantity
+
+Area = Annotated[float, Param("m2", 1e-6, lower=0.0, doc="effective orifice area")]
+Volume = Annotated[float, Param("m3", 3e-6, lower=1e-7, doc="tubing and ports")]
+
+
+class OrificeChamber(Effect):
+    """Pressure of each chamber behind a 3/2 valve: u joins it to the supply, 1 - u to the air.
+
+    Eq. 1 is printed with a plus before dV/dt; compression raises the pressure, so it is a minus
+    here. `gauge` is what reaches the valves at the supply pressures `pressures`, above the
+    atmosphere; dead volumes are at x = 0 and at full stroke. The flow is eq. 2 and 3.
+    """
+
+    kind: Literal["orifice_chamber"] = "orifice_chamber"
+    a_fill: Area = 4.63e-6
+    a_vent: Area = 3.99e-6
+    V_e: Volume = 14.3e-6
+    V_r: Volume = 15.0e-6
+    n: Annotated[float, Param("1", 0.1, lower=1.0, upper=KAPPA, doc="polytropic exponent")] = 1.27
+    pressures: tuple[Pascal, ...] = TABLE_PRESSURES
+    gauge: tuple[Pascal, ...] = (0.572e6, 0.634e6, 0.696e6)
+
+    family: ClassVar[str] = "air"
+    equation: ClassVar[str] = (
+        "dP/dt = n (R T mdot - P dV/dt)/V, mdot = u a_fill phi(P_s, P) - (1-u) a_vent phi(P, P_atm)"
+        "; effort A_e (P_e - P_atm) - A_r (P_r - P_atm)"
+    )
+    source: ClassVar[str] = "paper eq. 1-3 (its ref. 9), fitted to Tables I, II"
+    ports: ClassVar[tuple[str, ...]] = ("piston",)
+    reads: ClassVar[tuple[str, ...]] = ("supply_gain", "droop", "rise_gain")
+    publishes: ClassVar[tuple[str, ...]] = (
+        *("F_e", "F_r", "F_static_e", "F_static_r", "tau_e", "tau_r"),
+        *("draw_e", "draw_r", "full"),
+    )
+    carried_by: ClassVar[dict[str, str]] = {"F_e": "P_e", "F_r": "P_r"}
+    replaces: ClassVar[tuple[str, ...]] = ("chamber", "mode_damping")
+
+    def states(self) -> dict[str, Quantity]:
+        low, high, size = 1e4, 3e6, 2e5
+        return {
+            "P_e": Quantity(
+                "chamber/extend/P", "Pa", low, high, size, ATMOSPHERE, "extend, absolute"
+            ),
+            "P_r": Quantity(
+                "chamber/retract/P", "Pa", low, high, size, ATMOSPHERE, "retract, absolute"
+            ),
+        }
+
+    def rate(self, P: Any, V: Any, dV: Any, inflow: Any) -> Any:
+        """dP/dt [Pa.s-1] of a chamber of volume V [m3] (eq. 1)."""
+        return self.n * (GAS * TEMPERATURE * inflow - P * dV) / V
+
+    def filling_time(self, V: Any, full: Any, gain: Any) -> Any:
+        """Time [s] to 63 % of the gauge pressure `full` at the choked rate from empty."""
+        choked = phi(ATMOSPHERE + full, 0.5 * CHOKED * (ATMOSPHERE + full)) * self.a_fill / gain
+        return (1 - math.exp(-1)) * V * full / (self.n * GAS * TEMPERATURE * choked)
+
+    def evaluate(self, at: At) -> Contribution:
+        x, v = at.piston.x, at.piston.v
+        V_e, V_r = self.V_e + AREA_E * x, self.V_r + AREA_R * (at.stroke - x)
+        full = at.supply_gain * at_supply(at.supply, self.pressures, self.gauge)
+        P_s = ATMOSPHERE + at.droop * full
+        a_fill, a_vent = self.a_fill / at.rise_gain, self.a_vent / at.rise_gain
+        draw_e = at.u_e * mass_flow(a_fill, P_s, at.P_e)
+        draw_r = at.u_r * mass_flow(a_fill, P_s, at.P_r)
+        vent_e = (1 - at.u_e) * mass_flow(a_vent, at.P_e, ATMOSPHERE)
+        vent_r = (1 - at.u_r) * mass_flow(a_vent, at.P_r, ATMOSPHERE)
+        F_e, F_r = AREA_E * (at.P_e - ATMOSPHERE), AREA_R * (at.P_r - ATMOSPHERE)
+        return Contribution(
+            effort={"piston": F_e - F_r},
+            rate={
+                "P_e": self.rate(at.P_e, V_e, AREA_E * v, draw_e - vent_e),
+                "P_r": self.rate(at.P_r, V_r, -AREA_R * v, draw_r - vent_r),
+            },
+            publish={
+                "F_e": F_e,
+                "F_r": F_r,
+                "F_static_e": AREA_E * full,
+                "F_static_r": AREA_R * full,
+                "tau_e": self.filling_time(V_e, full, at.rise_gain),
+                "tau_r": self.filling_time(V_r, full, at.rise_gain),
+                "draw_e": draw_e,
+                "draw_r": draw_r,
+                "full": full,
+            },
+            outputs=(
+                (Quantity("chamber/extend/F", "N", doc="extend chamber"), F_e),
+                (Quantity("chamber/retract/F", "N", doc="retract chamber"), F_r),
+            ),
+        )

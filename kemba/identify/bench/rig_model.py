@@ -1,0 +1,222 @@
+"""The rig's chambers driven by an imposed motion: fast prediction of the rod force."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from kemba.effects.base import Effect
+from kemba.identify.bench.motion import Motion
+from kemba.identify.bench.switching import delayed, edges, is_on
+from kemba.identify.evidence.problem import Array
+from kemba.model.model import Model
+
+LONGEST_STEP = 1.5e-3  # s; the fastest chamber answers in 8 ms
+NEWTON, STILL = 12, 1e-9  # steps to equilibrium, and share of a state per second that is rest
+WAITING = 0.5e-3  # s, steps in which chambers are left to settle
+CHUNK = 512  # steps per call of a compiled map
+# The velocity is known within v_sigma: the force is its mean over three Gauss-Hermite nodes
+V_NODES, V_MIDDLE = ((-np.sqrt(3.0), 1 / 6), (np.sqrt(3.0), 1 / 6)), 2 / 3  # sigma, weight
+BLUR = 0.75e-3  # s; no log says on which side of a switching instant its sample was taken
+
+Pulses = tuple[list[tuple[float, float]], list[tuple[float, float]]]  # of both valves
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Rod force and chamber forces at the samples, with the force's local sensitivities."""
+
+    force: Array
+    by_rate: Array  # dF/dv
+    by_valve: Array  # (n, 2) dF/du
+    valve: Array  # (n, 2) share of the sample's neighbourhood in which each valve is on
+    states: dict[str, Array]
+
+
+class Rig:
+    """One model compiled with numbers left free: `free` parameters, `scaled` tables."""
+
+    def __init__(self, model: Model, free: tuple[str, ...], scaled: tuple[str, ...]) -> None:
+        self.model, self.names = model, (*free, *scaled)
+        node = model.build(free, scaled)
+        self._state_names = [q.name for q in model.states.values()]
+        rate = ca.substitute(-node.rate, node.sd, ca.SX.zeros(node.sd.numel()))
+        inputs = [node.s, node.q, node.v, node.a, node.u, node.p]
+        self._rate = ca.Function("rate", inputs, [rate, ca.jacobian(rate, node.s)])
+        force = node.outputs["piston/F"]
+        results = ca.vertcat(force, ca.jacobian(force, node.v), ca.jacobian(force, node.u).T)
+        self._functions = {
+            "step": _runge_kutta(node, rate),
+            "force": ca.Function("force", inputs, [ca.densify(force)]),
+            "output": ca.Function("output", inputs, [ca.densify(results)]),
+        }
+        self._maps: dict[tuple[str, int], _Call] = {}
+        self._start = np.array([q.value for q in model.states.values()])
+
+    def timing(self, values: Mapping[str, float]) -> tuple[float, float]:
+        """Seconds by which the valves switch on and off late, with these parameters."""
+        on = off = 0.0
+        for effect in self.model.effects:
+            times = effect.bind(_own(effect, values)).timing()
+            on, off = on + times.get("on", 0.0), off + times.get("off", 0.0)
+        return on, off
+
+    def predict(
+        self,
+        motion: Motion,
+        commands: Pulses,
+        values: Mapping[str, float],
+        start: Mapping[str, float] | None = None,
+    ) -> Prediction:
+        """Integrate from equilibrium (plus `start` by state name) with exact switching instants.
+
+        `values` holds every name this rig was compiled for.
+        """
+        on, off = self.timing(values)
+        valves = [delayed(c, on, off) for c in commands]
+        p = np.array([values[name] for name in self.names])
+        times, at_sample = _breakpoints(motion.time, np.concatenate([edges(v) for v in valves]))
+        u = np.stack([is_on(v, times) for v in valves])
+        s = self._integrate(times, motion, u, p, start or {})[:, at_sample]
+        blurred = np.stack([share(v, motion.time) for v in valves])
+        n = len(motion.time)
+        fixed = np.repeat(p[:, None], n, axis=1)
+        states = dict(zip(self._state_names, s, strict=True))
+        out = self._mapped("output", n)(s, motion.x, motion.v, motion.a, blurred, fixed)
+        force = V_MIDDLE * out[0]
+        for place, weight in V_NODES:
+            v = motion.v + place * motion.v_sigma
+            force += weight * self._mapped("force", n)(s, motion.x, v, motion.a, blurred, fixed)[0]
+        return Prediction(force, out[1], out[2:4].T, blurred.T, states)
+
+    def _integrate(
+        self, times: Array, motion: Motion, u: Array, p: Array, start: Mapping[str, float]
+    ) -> Array:
+        middle = 0.5 * (times[:-1] + times[1:])
+        paths = [np.interp(t, motion.time, c) for t in (times, middle) for c in _columns(motion)]
+        x, v, a, xm, vm, am = paths
+        s0 = self._equilibrium(np.array([x[0], 0.0, 0.0]), u[:, 0], p)
+        s0 += np.array([start.get(name, 0.0) for name in self._state_names])
+        n = len(times) - 1
+        drive = np.stack(
+            [np.diff(times), x[:-1], v[:-1], a[:-1], xm, vm, am, x[1:], v[1:], a[1:], *u[:, :-1]]
+        )
+        drive = np.pad(drive, ((0, 0), (0, -n % CHUNK)))  # steps of no length at the end
+        fixed = np.repeat(p[:, None], CHUNK, axis=1)
+        step, states = self._mapped("step", CHUNK), [s0[:, None]]
+        for i in range(0, drive.shape[1], CHUNK):
+            states.append(step(states[-1][:, -1], drive[:, i : i + CHUNK], fixed))
+        return np.concatenate(states, axis=1)[:, : n + 1]
+
+    def _equilibrium(self, motion: Array, u: Array, p: Array) -> Array:
+        """Where the states come to rest under constant commands."""
+        s, done = self._newton(self._start, motion, u, p)
+        if (
+            not done
+        ):  # the flow through an orifice is steep: wait until the chambers are nearly there
+            drive = np.concatenate([[WAITING], motion, motion, motion, u])
+            still = np.repeat(drive[:, None], CHUNK, axis=1)
+            waited = self._mapped("step", CHUNK)(
+                self._start, still, np.repeat(p[:, None], CHUNK, 1)
+            )
+            s, done = self._newton(waited[:, -1], motion, u, p)
+            s = s if done else waited[:, -1]
+        return s
+
+    def _newton(self, s: Array, motion: Array, u: Array, p: Array) -> tuple[Array, bool]:
+        """States at rest near s, and whether they were found."""
+        for _ in range(NEWTON):
+            rate, slope = (np.asarray(part) for part in self._rate(s, *motion, u, p))
+            if np.all(np.abs(rate.ravel()) <= STILL * (1.0 + np.abs(s))):
+                return s, True
+            if not (np.all(np.isfinite(rate)) and np.all(np.isfinite(slope))):
+                break
+            s = s - np.linalg.lstsq(slope, rate.ravel(), rcond=None)[0]
+        return s, False
+
+    def _mapped(self, kind: str, n: int) -> _Call:
+        if (kind, n) not in self._maps:
+            one = self._functions[kind]
+            self._maps[kind, n] = _Call(one.mapaccum(n) if kind == "step" else one.map(n))
+        return self._maps[kind, n]
+
+    @cached_property
+    def state_names(self) -> tuple[str, ...]:
+        return tuple(self._state_names)
+
+
+class _Call:
+    """A CasADi function called on NumPy arrays without copying element by element."""
+
+    def __init__(self, function: ca.Function) -> None:
+        self._buffer, self._evaluate = function.buffer()
+        self._function, self._shape = function, function.size_out(0)
+
+    def __call__(self, *arguments: Array) -> Array:
+        kept = [np.asfortranarray(a, dtype=float).reshape(-1, order="F") for a in arguments]
+        for i, a in enumerate(kept):
+            self._buffer.set_arg(i, memoryview(a))  # type: ignore[call-arg, arg-type]
+        out = np.zeros(self._shape[0] * self._shape[1])
+        self._buffer.set_res(0, memoryview(out))  # type: ignore[call-arg, arg-type]
+        self._evaluate()
+        return out.reshape(self._shape, order="F")
+
+
+def _runge_kutta(node: Any, rate: ca.SX) -> ca.Function:
+    """(s, drive, p) -> s after one classical step of fourth order."""
+    f = ca.Function("f", [node.s, node.q, node.v, node.a, node.u, node.p], [rate])
+    s, d, p = (
+        ca.SX.sym(n, k) for n, k in (("s", node.s.numel()), ("d", 12), ("p", node.p.numel()))
+    )
+    h, u = d[0], d[10:12]
+    k1 = f(s, d[1], d[2], d[3], u, p)
+    k2 = f(s + h / 2 * k1, d[4], d[5], d[6], u, p)
+    k3 = f(s + h / 2 * k2, d[4], d[5], d[6], u, p)
+    k4 = f(s + h * k3, d[7], d[8], d[9], u, p)
+    return ca.Function("step", [s, d, p], [ca.densify(s + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4))])
+
+
+def _breakpoints(samples: Array, events: Array) -> tuple[Array, Any]:
+    """Samples, switching instants between them and sub-steps; and where the samples stand.
+
+    Their number depends on the number of events only, so that compiled maps are reused.
+    """
+    inside = np.clip(events, samples[0], samples[-1])
+    pieces = np.ceil(np.diff(samples) / LONGEST_STEP - 1e-6).astype(int)
+    fill = [
+        np.linspace(samples[i], samples[i + 1], pieces[i] + 1)[1:-1]
+        for i in np.flatnonzero(pieces > 1)
+    ]
+    times = np.concatenate([samples, inside, *fill])
+    order = np.argsort(times, kind="stable")
+    place = np.empty(len(times), dtype=int)
+    place[order] = np.arange(len(times))
+    return times[order], place[: len(samples)]
+
+
+def share(intervals: Array, times: Array) -> Array:
+    """Share of [t - BLUR, t + BLUR] in which the valve is on: continuous in any delay."""
+    flat = np.clip(intervals, times[0] - 1.0, times[-1] + 1.0).ravel()
+    if not len(flat):
+        return np.zeros(len(times))
+    knots = np.concatenate([[times[0] - 1.5], flat, [times[-1] + 1.5]])
+    slope = np.arange(len(knots) - 1) % 2
+    on_time = np.concatenate([[0.0], np.cumsum(slope * np.diff(knots))])
+    later = np.interp(times + BLUR, knots, on_time)
+    earlier = np.interp(times - BLUR, knots, on_time)
+    return np.asarray(np.clip((later - earlier) / (2 * BLUR), 0.0, 1.0))
+
+
+def _columns(motion: Motion) -> tuple[Array, Array, Array]:
+    return motion.x, motion.v, motion.a
+
+
+def _own(effect: Effect, values: Mapping[str, float]) -> dict[str, float]:
+    """The scalar parameters among `values` that belong to this effect."""
+    prefix = f"{effect.name}."
+    return {k[len(prefix) :]: v for k, v in values.items() if k.startswith(prefix) and "[" not in k}

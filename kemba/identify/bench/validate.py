@@ -1,0 +1,127 @@
+"""Is it these columns at all? The nominal prediction against each way to mix them up."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+from scipy.signal import correlate
+
+from kemba.errors import KembaError
+from kemba.identify.bench.bench_log import Run
+from kemba.identify.bench.motion import Motion
+from kemba.identify.evidence.problem import Array
+
+STROKE = 0.070  # m
+BETTER = 4.0  # factor by which a mix-up must fit better to be believed
+SMALL = 4.0  # sigma of error that no mix-up would leave
+CLOSE = 0.25  # share of the force's spread that a believable fit leaves at most
+LATEST = 0.015  # s; a lag beyond this is no sensor's delay but another clock
+RESOLUTION = 1e-3  # s
+
+Predict = Callable[[Run], Array]  # the nominal force along a run
+
+
+def mix_ups(run: Run) -> Iterator[tuple[str, Run]]:
+    """The run as it would be, were a column's mistake undone."""
+    extend, retract = run.commands
+    force = run.measured["piston/F"]
+    yield (
+        "piston/F has the reversed sign (pushing is positive)",
+        replace(run, measured={**run.measured, "piston/F": -force}),
+    )
+    yield (
+        "valve/extend and valve/retract are swapped",
+        replace(run, commands=(retract, extend)),
+    )
+    yield (
+        "valve/extend and valve/retract are inverted (1 is on)",
+        replace(run, commands=(_inverted(extend), _inverted(retract))),
+    )
+    flipped = _flipped(run.motion)
+    yield "piston/x counts from the extended end (0 is retracted)", replace(run, motion=flipped)
+    for factor, unit in ((1e3, "kN"), (1e-3, "mN"), (4.4482, "lbf"), (9.81, "kgf")):
+        yield (
+            f"piston/F seems to be in {unit}",
+            replace(run, measured={**run.measured, "piston/F": factor * force}),
+        )
+    for factor, unit in ((10.0, "dm"), (0.0254 * 1e0, "inches")):
+        motion = run.motion
+        scaled = replace(motion, x=factor * motion.x, v=factor * motion.v, a=factor * motion.a)
+        yield f"piston/x seems to be in {unit}", replace(run, motion=scaled)
+
+
+def contradictions(run: Run, predict: Predict) -> list[KembaError]:
+    """What must be wrong with a run's columns, if anything."""
+    path = run.name
+    error, scale = _misfit(run, predict)
+    if error < SMALL * run.sigma["piston/F"]:
+        return []
+    trials = [(text, _misfit(trial, predict)) for text, trial in mix_ups(run)]
+    text, (best, spread) = min(trials, key=lambda t: t[1][0] / t[1][1])
+    if best / spread < CLOSE and best / spread * BETTER < error / scale:
+        return [KembaError(path, text, "the force answers the valves so much better then")]
+    lagging = _clock(run, predict)
+    if lagging:
+        return lagging
+    if error > 1.2 * scale and scale > 0:
+        return [
+            KembaError(
+                path,
+                "piston/F does not follow the valves at all",
+                f"the model leaves {error / scale:.1f} of its spread",
+                "are columns swapped, or the logs of another test?",
+            )
+        ]
+    return []
+
+
+def _misfit(run: Run, predict: Predict) -> tuple[float, float]:
+    """Median error of the nominal prediction and spread of the measured force."""
+    keep = run.keep["piston/F"]
+    force = run.measured["piston/F"][keep]
+    with np.errstate(over="ignore", invalid="ignore"):  # a mix-up may lead anywhere
+        error = float(np.sqrt(np.mean((predict(run)[keep] - force) ** 2)))
+    error = error if np.isfinite(error) else np.inf
+    return error, max(float(np.std(force)), float(np.sqrt(np.mean(force**2))), 1.0)
+
+
+def _clock(run: Run, predict: Predict) -> list[KembaError]:
+    """A force that comes much later or earlier than any sensor's delay has another clock."""
+    keep = run.keep["piston/F"]
+    grid = np.arange(run.motion.time[0], run.motion.time[-1], RESOLUTION)
+    if len(grid) < 400 or not any(run.commands):
+        return []
+    time = run.motion.time[keep]
+    measured = np.gradient(np.interp(grid, time, run.measured["piston/F"][keep]))
+    expected = np.gradient(np.interp(grid, time, predict(run)[keep]))
+    if not measured.std() or not expected.std():
+        return []
+    far = min(int(0.5 / RESOLUTION), len(grid) // 3)
+    both = correlate(measured - measured.mean(), expected - expected.mean(), "same", "fft")
+    both /= len(grid) * measured.std() * expected.std()
+    middle = len(grid) // 2
+    near = both[middle - far : middle + far + 1]
+    lag = (int(np.argmax(near)) - far) * RESOLUTION
+    if abs(lag) <= LATEST or near.max() < 0.3 or near.max() < 1.5 * both[middle]:
+        return []
+    word = "late" if lag > 0 else "early"
+    return [
+        KembaError(
+            run.name,
+            f"piston/F comes {abs(lag) * 1e3:.0f} ms {word} against the valves and the motion",
+            "one clock for all columns was expected",
+            "correct it with `delay` in a column map",
+        )
+    ]
+
+
+def _inverted(intervals: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    edges = [-np.inf, *(e for pair in intervals for e in pair), np.inf]
+    pairs = zip(edges[::2], edges[1::2], strict=True)
+    return [(a, b) for a, b in pairs if b > a]
+
+
+def _flipped(motion: Motion) -> Motion:
+    return replace(motion, x=STROKE - motion.x, v=-motion.v, a=-motion.a)

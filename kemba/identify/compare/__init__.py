@@ -1,0 +1,1 @@
+"""Where a model fails, and how much force it lacks there."""

@@ -1,0 +1,73 @@
+"""Errors by condition: channel, phase of motion, valve mode and region of the piston's stroke."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.stats import chi2, false_discovery_control
+
+from kemba.identify.evidence.problem import Array, Labels, Rows
+from kemba.identify.evidence.windows import codes, rms
+
+FEWEST = 5  # grains that make a cell
+TOLERATED = 1.15  # error ratio that a good model may have: nobody's nominal figures are exact
+FALSE_DISCOVERIES = 0.01
+ASSUMED = ("/foot/x", "/foot/z", "/stop")  # channels that no sensor measures
+STEADY = ("rest", "stance2")  # phases in which they can be relied on
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One channel in one phase of motion, valve mode and region of the stroke (`in`, `mid`,
+    `out`); `q_value` controls false discoveries over all cells of a comparison."""
+
+    channel: str
+    phase: str
+    mode: str
+    region: str
+    ratio: float
+    q_value: float
+
+    @property
+    def significant(self) -> bool:
+        return self.q_value < FALSE_DISCOVERIES
+
+
+def cells(rows: Rows, region: Labels, first: Labels, sums: Array) -> Iterable[Cell]:
+    """Every condition with enough data, of grains that begin at row `first` (k,) and sum to `sums`
+    (k,) in units of noise; q values over all of them."""
+    parts = (rows.phase, rows.mode, region)
+    names = [np.unique(a.astype(str)) for a in parts]
+    table = np.stack([rows.channel, *(codes(a) for a in parts)], axis=1)[first]
+    sound = ~doubtful(rows)[first]
+    kinds, own = np.unique(table[sound], axis=0, return_inverse=True)
+    groups = [sums[sound][own.ravel() == i] for i in range(len(kinds))]
+    known = [i for i, z in enumerate(groups) if len(z) >= FEWEST]
+    q = false_discovery_control([excess(groups[i]) for i in known]) if known else ()
+    for i, q_value in zip(known, q, strict=True):
+        channel, *place = kinds[i]
+        labels = [str(n[k]) for n, k in zip(names, place, strict=True)]
+        phase, mode, piece = labels
+        yield Cell(rows.channels[channel], phase, mode, piece, rms(groups[i]), float(q_value))
+
+
+def doubtful(rows: Rows) -> np.ndarray[Any, np.dtype[np.bool_]]:
+    """Rows (n,) of places that stand still by assumption, where the assumption is doubtful: when
+    feet come and go, a contact read a moment early or late is no fault of the model."""
+    assumed = np.array([name.endswith(ASSUMED) for name in rows.channels])
+    return np.asarray(assumed[rows.channel] & ~np.isin(rows.phase.astype(str), STEADY))
+
+
+def excess(z: Array) -> float:
+    """p value of errors (n,) larger than a good model's: correlated ones count for less, and the
+    largest not at all, for a foot that lifts a moment early convicts no model."""
+    if len(z) > 1:
+        z = np.delete(z, np.argmax(np.abs(z)))
+    power = z**2 - np.mean(z**2)
+    spread = float(power @ power)
+    echo = max(float(power[1:] @ power[:-1]) / spread, 0.0) if spread > 0 else 0.0
+    count = len(z) * (1.0 - echo) / (1.0 + echo)
+    return float(chi2.sf(np.mean(z**2) / TOLERATED**2 * count, count))

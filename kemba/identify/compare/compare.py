@@ -1,0 +1,194 @@
+"""Where a model fails: noise ratios by channel and condition, what the error goes with, how much
+force is missing, and one plain sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from kemba.identify.compare.bins import Cell, cells
+from kemba.identify.compare.force_profiles import Law, laws
+from kemba.identify.compare.hints import Hint, Response, conflicts, lacking, lagged
+from kemba.identify.compare.missing_force import Missing, Peak, peaks
+from kemba.identify.compare.smoother import missing_force
+from kemba.identify.compare.tolerance import free_starts, slopes, within_tolerance
+from kemba.identify.evidence.operating_point import region_labels
+from kemba.identify.evidence.problem import Array, Labels, Problem, Rows, Theta
+from kemba.identify.evidence.windows import Grains, expected, grains, rms
+
+GOOD, FAIR = 1.15, 1.5
+
+
+@dataclass(frozen=True)
+class ChannelError:
+    """One channel: error over windows in its unit, its noise, and whitened error by noise."""
+
+    name: str
+    rmse: float
+    max: float
+    noise_sigma: float
+    ratio: float
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What `compare` says; `good` where the error is within the noise.
+
+    `tolerant_ratio`: what the error would be if the model's nominal figures were off by their
+    usual tolerance, in the best way; `tolerable`: that would be within the noise everywhere.
+    """
+
+    logs: tuple[str, ...]
+    model: str
+    noise_ratio: float
+    channels: tuple[ChannelError, ...]
+    cells: tuple[Cell, ...]
+    tolerant_ratio: float = float("nan")
+    tolerable: bool = False
+    hints: tuple[Hint, ...] = ()
+    responses: tuple[Response, ...] = ()
+    laws: tuple[Law, ...] = ()
+    missing: tuple[Missing, ...] = ()
+    plan: Mapping[str, float] = field(default_factory=dict)
+    sentence: str = ""
+
+    @property
+    def good(self) -> bool:
+        return self.noise_ratio <= GOOD and not any(c.significant for c in self.cells)
+
+    @property
+    def peaks(self) -> list[Peak]:
+        """Per channel the moment at which the missing force stands out most."""
+        return peaks(list(self.missing)) if self.missing else []
+
+    def json(self) -> dict[str, Any]:
+        """The object that `--json` prints."""
+        return {
+            "logs": list(self.logs),
+            "model": self.model,
+            "noise_ratio": self.noise_ratio,
+            "tolerant_ratio": self.tolerant_ratio,
+            "channels": [asdict(c) for c in self.channels],
+            "cells": [asdict(c) for c in self.cells],
+            "hints": [asdict(h) for h in self.hints],
+            "missing_force": [asdict(p) for p in self.peaks],
+            "sentence": self.sentence,
+        }
+
+
+def compare(problem: Problem, model: str, logs: Sequence[str] = ()) -> Comparison:
+    """Compare the logs of `problem` with its model as it stands; only how each log begins is
+    fitted."""
+    start = free_starts(problem)
+    rows, r = problem.rows(), problem.residual(start)
+    _, region = region_labels(problem, rows)
+    grain = grains(problem, rows, region)
+    sums = grain.sums(r)
+    known = slopes(problem, start)
+    responses = tuple(lagged(problem, rows, r / np.sqrt(expected(problem, len(r)))))
+    forces = tuple(laws(problem, r))
+    sent = [s.hint for s in responses if s.certain]
+    left = within_tolerance(r, known)
+    ratio, clean = _tolerant(rows, region, grain, left)
+    found = Comparison(
+        tuple(logs) or problem.runs,
+        model,
+        rms(sums),
+        tuple(_channels(problem, rows, r, grain, start)),
+        tuple(cells(rows, region, grain.first, sums)),
+        ratio,
+        clean and not any(law.matters for law in laws(problem, left)),
+        (*sent, *conflicts(problem, rows, r, known)),
+        responses,
+        forces,
+        tuple(missing_force(problem, start)),
+    )
+    if not found.good and not found.tolerable:
+        found = replace(found, hints=(*lacking(forces), *found.hints))
+    return replace(found, sentence=phrase(found))
+
+
+def conditions(
+    problem: Problem, theta: Theta | None = None, regions: bool = False
+) -> tuple[float, list[Cell]]:
+    """Error ratio and cells of the model with `theta` added, told apart by region or not."""
+    rows, r = problem.rows(), problem.residual(free_starts(problem, theta))
+    region = np.full(len(rows), "", dtype=object)
+    if regions:
+        _, region = region_labels(problem, rows)
+    grain = grains(problem, rows, region)
+    sums = grain.sums(r)
+    return rms(sums), list(cells(rows, region, grain.first, sums))
+
+
+def _tolerant(rows: Rows, region: Labels, grain: Grains, left: Array) -> tuple[float, bool]:
+    """Error ratio of what the figures' tolerance leaves, and whether it is within the noise."""
+    sums = grain.sums(left)
+    clean = not any(c.significant for c in cells(rows, region, grain.first, sums))
+    return rms(sums), clean and rms(sums) <= GOOD
+
+
+def measured_units(rows: Rows) -> dict[str, str]:
+    """Header of every measured channel: those with a place in a log."""
+    units = {"x": "m", "z": "m", "q": "rad", "pitch": "rad", "F": "N", "P": "Pa"}
+    found = {}
+    for name in rows.channels:
+        last = name.rsplit("/", 1)[-1]
+        if "/foot/" not in name and last in units:
+            found[name] = f"{name} [{units[last]}]"
+    return found
+
+
+def _channels(
+    problem: Problem, rows: Rows, r: Array, grain: Grains, start: Theta
+) -> Iterable[ChannelError]:
+    windows = getattr(problem, "window_errors", None)
+    errors = windows(start) if windows else {}
+    sums = grain.sums(r)
+    headers = measured_units(rows)
+    for k, channel in enumerate(rows.channels):
+        own = rows.channel == k
+        if channel not in headers or not own.any():
+            continue
+        error = errors.get(channel, r[own] * rows.sigma[own])
+        yield ChannelError(
+            headers[channel],
+            float(np.sqrt(np.mean(error**2))),
+            float(np.max(np.abs(error))),
+            float(np.median(rows.sigma[own])),
+            rms(sums[own[grain.first]]),
+        )
+
+
+def _first(hints: Sequence[Hint], kind: str) -> Sequence[Hint]:
+    return [hint for hint in hints if hint.kind == kind][:1]
+
+
+def phrase(found: Comparison) -> str:
+    """The answer in plain words."""
+    ratio = f"{found.noise_ratio:.2g} times the noise"
+    bad = sorted((c for c in found.cells if c.significant), key=lambda c: -c.ratio)
+    if found.good:
+        return f"The model explains the logs to within the noise: its error is {ratio}."
+    if not bad:
+        return f"The model's error is {ratio}; no single condition stands out."
+    worst = f"worst is {_place(bad[0])} ({bad[0].ratio:.2g} times)"
+    if found.tolerable:
+        return (
+            f"As it stands the model errs by {ratio}; {worst}; but figures off by no more than "
+            f"their usual tolerance would explain the logs ({found.tolerant_ratio:.2g} times)."
+        )
+    grade = "nearly explains" if found.noise_ratio < FAIR else "does not explain"
+    hints = [h for kind in ("law", "command", "conflict") for h in _first(found.hints, kind)]
+    parts = [f"The model {grade} the logs: its error is {ratio}", worst, *(h.text for h in hints)]
+    return "; ".join(parts) + "."
+
+
+def _place(cell: Cell) -> str:
+    valves = {"00": "valves off", "10": "extend valve on", "01": "retract valve on"}
+    stroke = {"in": ", piston retracted", "mid": ", piston mid-stroke", "out": ", piston extended"}
+    mode = valves.get(cell.mode, "both valves on")
+    return f"{cell.channel} in {cell.phase} with {mode}{stroke.get(cell.region, '')}"

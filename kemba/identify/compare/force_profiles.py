@@ -1,0 +1,165 @@
+"""The missing force as a function of one quantity: speed, position, load, time since a command.
+
+The force is taken as constant within bins of the quantity. Its values follow by least squares in
+the same whitened residuals that all else is judged by, so that they carry honest intervals and
+are not shrunk as a smoothed force is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+
+from kemba.identify.evidence.problem import Array, Flags, Problem
+
+BINS = 8
+FEWEST = 30  # samples in a bin
+NARROW = 0.02  # of the middle 90 % of a quantity: no bin is narrower
+WIDE = 20.0  # times a port's usual force: prior sigma of a bin's force
+LAGS = np.arange(0.0015, 0.042, 0.004)  # s between a command's change and the error: edges
+SAME = 0.1  # share of a force's power by which bins may differ and still be one force
+DOUBT, NEGLIGIBLE = 20.0, 0.1  # nats; share of a port's usual force
+PLAIN = 60.0  # nats that nominal figures at the edge of their tolerance do not reach
+
+
+@dataclass(frozen=True)
+class Port:
+    """Where a force may be missing: quantities by label, arrays (...) over samples, and the
+    columns (rows, b) of residual that unit forces in bins (..., b) make. `after`: by command how
+    much it changed within each of the LAGS before a sample, (..., b). `usual`: a force [unit] that
+    is neither small nor large."""
+
+    name: str
+    unit: str
+    usual: float
+    quantities: Mapping[str, Array]
+    columns: Callable[[Array], Array]
+    after: Mapping[str, Array] = field(default_factory=dict)
+
+
+@runtime_checkable
+class Ported(Protocol):
+    """A problem with ports."""
+
+    def ports(self) -> Sequence[Port]:
+        """All of them."""
+
+
+@dataclass(frozen=True)
+class Law:
+    """Missing `force` [unit] and its 1 sigma per bin (b,) around `centre` of a quantity; `gain`:
+    what it explains beyond its number of bins [nats]; `usual` as of its port."""
+
+    port: str
+    unit: str
+    quantity: str
+    centre: Array
+    force: Array
+    sigma: Array
+    gain: float
+    usual: float
+
+    @property
+    def matters(self) -> bool:
+        """Whether a force is there beyond doubt, and is not negligible."""
+        return self.gain > DOUBT and self.largest > NEGLIGIBLE * self.usual
+
+    @property
+    def largest(self) -> float:
+        """Of the forces that are plainly not nought, the largest."""
+        plain = np.abs(self.force) > 3.0 * self.sigma
+        return float(np.max(np.abs(self.force[plain]), initial=0.0))
+
+    @property
+    def constant(self) -> float | None:
+        """The one force that explains as much as a force per bin, if there is one."""
+        weight = 1.0 / self.sigma**2
+        mean = float(np.sum(weight * self.force) / np.sum(weight))
+        varies = float(np.sum(weight * (self.force - mean) ** 2))
+        return mean if varies < SAME * float(np.sum(weight)) * mean**2 else None
+
+    def __str__(self) -> str:
+        what = self.quantity.partition(" [")[0]
+        if self.constant is not None:
+            return (
+                f"a constant force on the {self.port} is missing ({self.constant:+.2g} {self.unit})"
+            )
+        going = "comes" if what.startswith("after ") else "goes with"
+        size = f"up to {self.largest:.2g} {self.unit}"
+        return f"a force on the {self.port} is missing that {going} {what} ({size})"
+
+
+def laws(problem: Problem, residual: Array) -> list[Law]:
+    """Every port against every quantity of its own, the most telling port first."""
+    if not isinstance(problem, Ported):
+        return []
+    found = [[law for law in _of(port, residual) if law is not None] for port in problem.ports()]
+    found = [group for group in found if group]
+    found.sort(key=lambda group: -max(law.gain for law in group))
+    return [law for group in found for law in group]
+
+
+def _of(port: Port, residual: Array) -> list[Law | None]:
+    by_value = [law(port, label, residual) for label in port.quantities]
+    return by_value + [_solved(port, f"after {n} [ms]", 1e3 * middle(LAGS), rise, residual)
+                       for n, rise in port.after.items()]  # fmt: skip
+
+
+def law(port: Port, label: str, residual: Array) -> Law | None:
+    """The missing force of a port by bins of one of its quantities; None where it hardly varies."""
+    values = port.quantities[label]
+    edges = bins(values)
+    if edges is None:
+        return None
+    flags = _flags(values, edges)
+    sides = flags.reshape(-1, flags.shape[-1])
+    centre = np.array([float(np.median(values.ravel()[own])) for own in sides.T])
+    return _solved(port, label, centre, flags.astype(float), residual)
+
+
+def _solved(port: Port, label: str, centre: Array, shapes: Array, residual: Array) -> Law:
+    columns = port.columns(shapes)
+    prior = np.eye(shapes.shape[-1]) / (WIDE * port.usual) ** 2
+    gram, slope = columns.T @ columns + prior, columns.T @ residual
+    force = -np.linalg.solve(gram, slope)
+    sigma = np.sqrt(np.diag(np.linalg.inv(gram)))
+    gain = 0.5 * float(force @ gram @ force) - len(force)
+    return Law(port.name, port.unit, label, centre, force, sigma, gain, port.usual)
+
+
+def middle(edges: Array) -> Array:
+    """Centres of bins."""
+    return np.asarray(0.5 * (edges[1:] + edges[:-1]))
+
+
+def risen(times: Array, sizes: Array, at: Array) -> Array:
+    """How much a command with changes `sizes` at `times` rose within each of the LAGS before the
+    moments `at` (n,): (n, lags)."""
+    total = np.concatenate([[0.0], np.cumsum(sizes)])
+    level = total[np.searchsorted(times, at[:, None] - LAGS, side="right")]
+    return np.asarray(level[:, :-1] - level[:, 1:])
+
+
+def bins(values: Array) -> Array | None:
+    """Edges of bins with the same number of samples each; None without enough of them."""
+    seen = values[np.isfinite(values)]
+    if len(seen) < 2 * FEWEST:
+        return None
+    count = min(BINS, len(seen) // FEWEST)
+    edges = np.quantile(seen, np.linspace(0.0, 1.0, count + 1))
+    narrowest = NARROW * float(np.diff(np.quantile(seen, (0.05, 0.95)))[0])
+    kept = [float(edges[0])]
+    for edge in edges[1:-1]:
+        if min(edge - kept[-1], edges[-1] - edge) > narrowest:
+            kept.append(float(edge))
+    kept.append(float(edges[-1]))
+    return np.array(kept) if len(kept) > 2 and narrowest > 0 else None
+
+
+def _flags(values: Array, edges: Array) -> Flags:
+    place = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, len(edges) - 2)
+    place = np.where(np.isfinite(values), place, -1)
+    return np.asarray(place[..., None] == np.arange(len(edges) - 1))

@@ -1,0 +1,144 @@
+"""What the error goes with: a force by speed, position or load, commands sent before it, and
+parameters that wander between runs or between valve modes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2, norm
+
+from kemba.identify.compare.force_profiles import LAGS, PLAIN, Law, middle, risen
+from kemba.identify.compare.tolerance import Slopes
+from kemba.identify.evidence.problem import Array, Labels, Problem, Rows
+from kemba.identify.evidence.windows import codes
+
+CERTAIN = 1e-4
+DEPENDENT = 1.5  # rows are not quite independent: z scores count for so much less
+LEAST_INFORMATION = 4.0  # in sizes to the -2: a run that tells less about a parameter is mute
+SLACK = 0.1  # sizes by which a parameter may differ between runs without anybody caring
+
+Changes = Mapping[str, tuple[Array, Array]]
+
+
+@dataclass(frozen=True)
+class Hint:
+    """One finding in words; `kind`: law, command, conflict; the larger `weight`, the plainer."""
+
+    kind: str
+    text: str
+    weight: float
+
+
+@dataclass(frozen=True)
+class Response:
+    """Cross-correlation of a channel's error with the changes of a command before it: z score
+    (k,) per `lag` (k,) [s]; `tests`: how many were tried for this one."""
+
+    channel: str
+    command: str
+    lag: Array
+    z: Array
+    tests: int
+
+    @property
+    def peak(self) -> int:
+        return int(np.argmax(np.abs(self.z)))
+
+    @property
+    def certain(self) -> bool:
+        return bool(np.abs(self.z[self.peak]) > norm.isf(CERTAIN / (2 * self.tests)))
+
+    @property
+    def hint(self) -> Hint:
+        late = f"{self.lag[self.peak] * 1e3:.0f} ms after {self.command}"
+        verb = "switches" if "valve/" in self.command else "changes"
+        return Hint("command", f"{self.channel} errs {late} {verb}", float(abs(self.z[self.peak])))
+
+
+def lacking(found: Sequence[Law]) -> list[Hint]:
+    """The missing force that explains most, if it is plain."""
+    best = max(found, key=lambda law: law.gain, default=None)
+    return [Hint("law", str(best), best.gain)] if best and best.gain > PLAIN else []
+
+
+def lagged(problem: Problem, rows: Rows, white: Array) -> list[Response]:
+    """Of every command the channel whose error follows its changes most plainly; these first.
+
+    `white` (n,) has unit variance where the model is right.
+    """
+    source = getattr(problem, "commands", None)
+    if source is None:
+        return []
+    runs: list[Changes] = source()
+    names = sorted({n for run in runs for n in run})
+    found = [_strongest(rows, white, runs, name, len(names)) for name in names]
+    return sorted(found, key=lambda s: -abs(s.z[s.peak]))
+
+
+def _strongest(
+    rows: Rows, white: Array, runs: Sequence[Changes], name: str, commands: int
+) -> Response:
+    """A command's rise within each lag, as a regressor of every channel's error."""
+    rise = np.zeros((len(rows), len(LAGS) - 1))
+    for i, changes in enumerate(runs):
+        if name in changes:
+            own = rows.run == i
+            rise[own] = risen(*changes[name], rows.time[own])
+    best, tests = None, commands * len(rows.channels)
+    for k, channel in enumerate(rows.channels):
+        own = rows.channel == k
+        power = np.sum(rise[own] ** 2, axis=0)
+        z = white[own] @ rise[own] / np.sqrt(np.maximum(power, 1e-12)) / DEPENDENT
+        z = np.where(power > 1e-9 * np.max(power, initial=1e-12), z, 0.0)
+        this = Response(channel, name, middle(LAGS), z, tests)
+        if best is None or np.max(np.abs(z)) > np.max(np.abs(best.z)):
+            best = this
+    assert best is not None
+    return best
+
+
+def conflicts(problem: Problem, rows: Rows, r: Array, known: Slopes) -> list[Hint]:
+    """Parameters whose best value wanders more than its error allows, the clearest first: from run
+    to run, or from one valve mode to another."""
+    groups = {"from run to run": rows.run, "between valve modes": codes(rows.mode)}
+    found = [
+        hint
+        for text, group in groups.items()
+        for hint in _wandering(r, known, np.asarray(group), text)
+    ]
+    return sorted(found, key=lambda h: -h.weight)
+
+
+def _wandering(r: Array, known: Slopes, group: Labels, text: str) -> Iterable[Hint]:
+    """Each effect's switch with a value per group against one value for all; the nuisance
+    parameters, free within their priors, are the same in all groups."""
+    parts = [group == i for i in np.unique(group)]
+    by_part = [(known.by_lead[own], known.by_nuisance[own], r[own]) for own in parts]
+    power = np.stack([np.sum(j * j, axis=0) for j, _, _ in by_part])
+    cross = np.stack([j.T @ n for j, n, _ in by_part])
+    slope = np.stack([j.T @ own for j, _, own in by_part])
+    n = known.by_nuisance
+    solve = np.linalg.inv(n.T @ n + np.eye(n.shape[1]))
+    for i, c in enumerate(known.leads):
+        told = np.flatnonzero(power[:, i] > LEAST_INFORMATION)
+        own = cross[told, i]
+        information = np.diag(power[told, i]) - own @ solve @ own.T
+        p = _agreement(information, own @ solve @ (n.T @ r) - slope[told, i])
+        if p < CERTAIN / len(known.leads):
+            weight = float(-np.log10(max(p, 1e-300)))
+            yield Hint("conflict", f"{c.key} would have to differ {text}", weight)
+
+
+def _agreement(information: Array, pull: Array) -> float:
+    """p value of one value for all groups, from the information (g, g) on a value for each and the
+    slope (g,) of the log likelihood at nought."""
+    if len(pull) < 2:
+        return 1.0
+    spread = np.linalg.pinv(information, rcond=1e-9, hermitian=True)
+    a = spread @ pull
+    certainty = np.linalg.inv(spread + SLACK**2 * np.eye(len(a)))
+    ones = np.ones(len(a))
+    apart = a - ones @ certainty @ a / (ones @ certainty @ ones)
+    return float(chi2.sf(apart @ certainty @ apart, len(a) - 1))

@@ -1,0 +1,74 @@
+"""The force that a model lacks, in time, with its 95 % band."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from kemba.identify.evidence.problem import Array
+
+
+@dataclass(frozen=True)
+class Missing:
+    """Missing force in one run: `force` and its 1 sigma (n, k) at `time` (n,), per channel.
+
+    `strength`: 1 sigma (k,) that each channel is taken to have; `stance`: spans [s] in which a foot
+    is down, so that contact hides most of what is missing.
+    """
+
+    run: str
+    time: Array
+    channels: tuple[str, ...]
+    units: tuple[str, ...]
+    force: Array
+    sigma: Array
+    strength: Array
+    stance: tuple[tuple[float, float], ...] = ()
+
+    def band(self) -> tuple[Array, Array]:
+        """Low and high ends of the 95 % interval."""
+        return self.force - 1.96 * self.sigma, self.force + 1.96 * self.sigma
+
+    def evidence(self) -> Array:
+        """Mean square (k,) of the force in its own sigma: how plainly each channel lacks one."""
+        return np.asarray(np.mean((self.force / self.sigma) ** 2, axis=0))
+
+
+@dataclass(frozen=True)
+class Peak:
+    """The largest force that one channel lacks: where, how much, its 95 % interval."""
+
+    channel: str
+    unit: str
+    run: str
+    time_s: float
+    value: float
+    low: float
+    high: float
+    rms: float
+
+
+def peaks(found: list[Missing]) -> list[Peak]:
+    """Per channel the moment at which the missing force stands out most from its band."""
+    chosen = []
+    for k, channel in enumerate(found[0].channels):
+        clear = [np.max(np.abs(m.force[:, k]) / m.sigma[:, k]) for m in found]
+        m = found[int(np.argmax(clear))]
+        i = int(np.argmax(np.abs(m.force[:, k]) / m.sigma[:, k]))
+        value, spread = float(m.force[i, k]), 1.96 * float(m.sigma[i, k])
+        rms = float(np.sqrt(np.mean(np.concatenate([m.force[:, k] for m in found]) ** 2)))
+        at = float(m.time[i])
+        chosen.append(
+            Peak(channel, m.units[k], m.run, at, value, value - spread, value + spread, rms)
+        )
+    return chosen
+
+
+def spans(time: Array, flags: Array) -> tuple[tuple[float, float], ...]:
+    """Intervals [s] in which `flags` (n,) holds."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]])))
+    last = len(time) - 1
+    return tuple(
+        (float(time[a]), float(time[min(b, last)])) for a, b in edges.reshape(-1, 2).tolist()
+    )

@@ -1,0 +1,1 @@
+"""Reasons not to believe an answer: left-out data, runs that disagree, unexplained error."""

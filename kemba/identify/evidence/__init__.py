@@ -1,0 +1,1 @@
+"""Which effects explain the data: linearised evidence, refits, search, bootstrap."""

@@ -1,0 +1,189 @@
+"""A problem linearised at one point: sums over rows, from which all rankings are K x K algebra."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kemba.identify.evidence.problem import Array, Flags, Labels, Parameter, Problem, Theta
+
+FARTHEST = 4.0  # sizes
+
+
+@dataclass(frozen=True)
+class Linear:
+    """r(z) = r0 + J (z - at) summed over blocks of rows.
+
+    `gram` (b, k, k) = J'J, `slope` (b, k) = J'r0, `power` (b,) = r0'r0, `count` (b,) rows per
+    block. Shape parameters stand as their logarithms. `width` and `mean` (k,) are the prior of
+    each z when it is free; `bend` tells which names are switches of absent effects.
+    """
+
+    names: tuple[str, ...]
+    at: Array
+    mean: Array
+    width: Array
+    gram: Array
+    slope: Array
+    power: Array
+    count: Array
+
+    @property
+    def total(self) -> tuple[Array, Array, float]:
+        return self.gram.sum(axis=0), self.slope.sum(axis=0), float(self.power.sum())
+
+    def without(self, blocks: Flags) -> Linear:
+        """The same with the blocks where `blocks` (b,) is true left out."""
+        return self.only(~blocks)
+
+    def only(self, keep: Flags) -> Linear:
+        return replace(
+            self,
+            gram=self.gram[keep],
+            slope=self.slope[keep],
+            power=self.power[keep],
+            count=self.count[keep],
+        )
+
+    def index(self, name: str) -> int:
+        return self.names.index(name)
+
+
+def names_of(problem: Problem, theta: Theta) -> tuple[str, ...]:
+    """Nuisance, every switch, and the shapes of the effects that are on."""
+    shapes = [
+        key
+        for c in problem.candidates.values()
+        if is_on(theta, c.key, c.lead)
+        for key in tuple(c.keys())
+        if key != c.key
+    ]
+    return (*problem.nuisance, *(c.key for c in problem.candidates.values()), *shapes)
+
+
+def is_on(theta: Theta, key: str, lead: Parameter) -> bool:
+    return theta.get(key, lead.off) != lead.off
+
+
+def linearise(
+    problem: Problem, theta: Theta, blocks: Labels, names: Iterable[str] | None = None
+) -> tuple[Linear, Array, Array]:
+    """The problem at theta, with J (n, k) and the residual (n,); `blocks` (n,) labels the rows."""
+    names = names_of(problem, theta) if names is None else tuple(names)
+    r = problem.residual(theta)
+    jacobian = problem.jacobian(theta, names)
+    at, mean, width = priors(problem, theta, names)
+    for i, name in enumerate(names):
+        if is_shape(problem, name):
+            jacobian[:, i] *= theta[name]
+    return condense(names, at, mean, width, jacobian, r, blocks), jacobian, r
+
+
+def condense(
+    names: tuple[str, ...],
+    at: Array,
+    mean: Array,
+    width: Array,
+    jacobian: Array,
+    r: Array,
+    blocks: Labels,
+) -> Linear:
+    """Sums over each block."""
+    labels = np.unique(blocks)
+    gram, slope, power, count = [], [], [], []
+    for label in labels:
+        rows = blocks == label
+        j, e = jacobian[rows], r[rows]
+        gram.append(j.T @ j)
+        slope.append(j.T @ e)
+        power.append(float(e @ e))
+        count.append(int(rows.sum()))
+    arrays = (np.array(a) for a in (gram, slope, power, count))
+    return Linear(tuple(names), at, mean, width, *arrays)
+
+
+def moved(linear: Linear, at: Array, jacobian: Array, r: Array, blocks: Labels) -> Linear:
+    """The same slopes about another point, where the residual is r (n,)."""
+    labels = np.unique(blocks)
+    slope = np.array([jacobian[blocks == b].T @ r[blocks == b] for b in labels])
+    power = np.array([float(r[blocks == b] @ r[blocks == b]) for b in labels])
+    return replace(linear, at=at, slope=slope, power=power)
+
+
+def within(problem: Problem, theta: Mapping[str, float]) -> dict[str, float]:
+    """Theta with every effect's parameters inside their bounds."""
+    bounds = {k: p for c in problem.candidates.values() for k, p in c.keys().items()}
+    clipped = {k: _sane(v, bounds[k]) if k in bounds else v for k, v in theta.items()}
+    typical = {
+        key: p.typical
+        for c in problem.candidates.values()
+        if is_on(clipped, c.key, c.lead)
+        for key, p in c.keys().items()
+        if key not in clipped
+    }
+    return {**clipped, **typical}
+
+
+def _sane(value: float, parameter: Parameter) -> float:
+    """Within the bounds, and within a few sizes of off where it is a switch."""
+    if np.isnan(parameter.typical):
+        reach = FARTHEST * parameter.size
+        value = float(np.clip(value, parameter.off - reach, parameter.off + reach))
+    return float(np.clip(value, parameter.lower, parameter.upper))
+
+
+def is_shape(problem: Problem, name: str) -> bool:
+    effect = name.rsplit(".", 1)[0]
+    candidate = problem.candidates.get(effect)
+    return candidate is not None and name != candidate.key
+
+
+def priors(problem: Problem, theta: Theta, names: Iterable[str]) -> tuple[Array, Array, Array]:
+    """Where the linearisation stands, and mean and width of the prior, per name."""
+    rows = []
+    for name in names:
+        if name in problem.nuisance:
+            nominal, sigma = problem.nuisance[name]
+            rows.append((theta.get(name, nominal), nominal, sigma))
+            continue
+        parameter = problem.candidates[name.rsplit(".", 1)[0]].keys()[name]
+        if is_shape(problem, name):
+            rows.append((np.log(theta[name]), np.log(parameter.typical), parameter.size))
+        else:
+            rows.append((theta.get(name, parameter.off), parameter.off, parameter.size))
+    at, mean, width = np.array(rows).T
+    return at, mean, width
+
+
+def time_blocks(problem: Problem, wanted: int = 4, shortest: float = 0.0) -> Labels:
+    """A label per row: every run, cut in time where there are fewer runs than `wanted`."""
+    rows = problem.rows()
+    pieces = max(1, int(np.ceil(wanted / max(len(problem.runs), 1))))
+    labels = np.zeros(len(rows), dtype=int)
+    for i in range(len(problem.runs)):
+        own = rows.run == i
+        t = rows.time[own]
+        span = max(float(np.ptp(t)), 1e-9)
+        k = max(1, int(span / shortest)) if shortest else pieces
+        labels[own] = i * 100000 + np.minimum((t - t.min()) / span * k, k - 1).astype(int)
+    return np.unique(labels, return_inverse=True)[1]
+
+
+def estimate(problem: Problem, linear: Linear, z: Array) -> dict[str, float]:
+    """Theta of a vector z; switches that are at their off value are left out."""
+    theta: dict[str, float] = {}
+    for name, value in zip(linear.names, z, strict=True):
+        theta[name] = float(np.exp(value)) if is_shape(problem, name) else float(value)
+    return _clean(problem, theta)
+
+
+def _clean(problem: Problem, theta: Mapping[str, float]) -> dict[str, float]:
+    off = {
+        key
+        for c in problem.candidates.values()
+        if not is_on(theta, c.key, c.lead)
+        for key in tuple(c.keys())
+    }
+    return {k: v for k, v in theta.items() if k not in off}

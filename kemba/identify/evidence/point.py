@@ -1,0 +1,75 @@
+"""One hypothesis refitted, and the problem linearised there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+
+from kemba.identify.evidence.linear import Linear, condense, priors, time_blocks
+from kemba.identify.evidence.problem import Array, Labels, Problem
+from kemba.identify.evidence.refit import Fit
+from kemba.identify.evidence.spike_slab import Hypothesis, Score
+from kemba.identify.evidence.windows import Grains, grains_of
+
+
+@dataclass(frozen=True)
+class Point:
+    """A fit, what the problem looks like there, row by row (`linear`) and summed over grains
+    (`coarse`), and how the hypothesis scores."""
+
+    hypothesis: Hypothesis
+    fit: Fit
+    linear: Linear
+    coarse: Linear
+    score: Score
+
+    @property
+    def log_evidence(self) -> float:
+        return self.score.log_evidence
+
+
+@runtime_checkable
+class Colourable(Protocol):
+    """A problem whose noise colour can be learnt from the residuals of a flexible model."""
+
+    def recolour(self, residual: Array | None, careful: bool = False) -> None:
+        """Learn from residuals (n,) that were not whitened; None: forget. `careful`: the model
+        behind them is good, so that spikes are no physics and may be silenced."""
+
+    def whiten(self, columns: Array) -> Array:
+        """Columns (n, k) computed before any colour as they are under the present one."""
+
+
+@runtime_checkable
+class Movable(Protocol):
+    """A problem that is linearised along a motion, which depends on the model."""
+
+    def relinearise(self, base: Mapping[str, float]) -> None:
+        """Find the motion again with the model at `base`; rows may be others than before."""
+
+    def is_straight(self, name: str) -> bool:
+        """Whether residuals are linear in this parameter, so that slopes tell all."""
+
+
+class Division:
+    """The rows of a problem divided into time blocks (n,) and into grains."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self.blocks: Labels = time_blocks(problem)
+        self.grains: Grains = grains_of(problem)
+
+    def linear(
+        self, theta: Mapping[str, float], names: tuple[str, ...], jacobian: Array, r: Array
+    ) -> tuple[Linear, Linear]:
+        """The problem about theta with these slopes (n, k), row by row and by grains."""
+        at = priors(self.problem, theta, names)
+        fine = condense(names, *at, jacobian, r, self.blocks)
+        if len(self.grains.first) == len(r):
+            return fine, fine
+        sums = self.grains.sums(np.column_stack([jacobian, r]))
+        coarse = condense(names, *at, sums[:, :-1], sums[:, -1], self.blocks[self.grains.first])
+        return fine, coarse

@@ -1,0 +1,186 @@
+"""Nonlinear refit of one hypothesis: least squares with priors, nuisance columns kept frozen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from kemba.identify.evidence.linear import is_shape
+from kemba.identify.evidence.problem import Array, Parameter, Problem
+from kemba.identify.evidence.spike_slab import SLAB, Hypothesis
+
+EVALUATIONS = 10
+ABSURD = 1e6  # noise units
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Theta of a hypothesis at its best, half the sum of squares (priors included), and the
+    slopes of the residual along its own parameters there."""
+
+    theta: dict[str, float]
+    cost: float
+    columns: dict[str, Array] = field(default_factory=dict)  # (n,) by name; shapes by ln
+
+
+@dataclass(frozen=True)
+class Frozen:
+    """Columns of the nuisance parameters (n, k), good enough at every point of a search."""
+
+    names: tuple[str, ...]
+    jacobian: Array
+
+
+def refit(
+    problem: Problem,
+    hypothesis: Hypothesis,
+    start: Mapping[str, float],
+    frozen: Frozen,
+    heat: float = 1.0,
+) -> Fit:
+    """The best theta with these effects on, from `start` (and, where shapes exist, others)."""
+    best: Fit | None = None
+    for trial in _starts(problem, hypothesis, start):
+        fit = _Search(problem, hypothesis, trial, frozen, heat).run()
+        if best is None or fit.cost < best.cost - 1e-6:
+            best = fit
+    assert best is not None
+    return best
+
+
+def _starts(
+    problem: Problem, hypothesis: Hypothesis, start: Mapping[str, float]
+) -> Iterable[dict[str, float]]:
+    """Effects not switched on in `start` begin at half their size, shapes at several values."""
+    theta = {k: v for k, v in start.items() if k in problem.nuisance}
+    shapes: list[tuple[str, Parameter]] = []
+    for effect in hypothesis:
+        c = problem.candidates[effect]
+        for key, parameter in c.keys().items():
+            if key == c.key:
+                theta[key] = _inside(start.get(key, parameter.off), parameter)
+            else:
+                theta[key] = start.get(key, parameter.typical)
+                if key not in start:
+                    shapes.append((key, parameter))
+    yield theta
+    for key, parameter in shapes:
+        for factor in (1 / 3, 3.0):
+            value = np.clip(parameter.typical * factor, parameter.lower, parameter.upper)
+            yield {**theta, key: float(value)}
+
+
+def _inside(value: float, parameter: Parameter) -> float:
+    """A start that is on, not too far out, and on the possible side."""
+    step = np.clip(value - parameter.off, -3.0 * parameter.size, 3.0 * parameter.size)
+    least = 0.1 * parameter.size
+    if abs(step) < least:
+        step = least if step >= 0 or not parameter.signed else -least
+    if not parameter.signed:
+        step = max(step, least)
+    return float(np.clip(parameter.off + step, parameter.lower, parameter.upper))
+
+
+class _Search:
+    """One least-squares run in scaled coordinates."""
+
+    def __init__(
+        self,
+        problem: Problem,
+        hypothesis: Hypothesis,
+        start: Mapping[str, float],
+        frozen: Frozen,
+        heat: float,
+    ) -> None:
+        self.problem, self.frozen, self.scale = problem, frozen, 1.0 / np.sqrt(heat)
+        self.own = {key: p for e in hypothesis for key, p in problem.candidates[e].keys().items()}
+        self.switches = {problem.candidates[e].key for e in hypothesis}
+        self.nuisance = list(frozen.names)
+        self.start = dict(start)
+
+    def run(self) -> Fit:
+        x0 = np.array([*self._nuisance_start(), *(self._in(k, self.start[k]) for k in self.own)])
+        lower, upper = self._bounds()
+        x0 = np.clip(x0, lower + 1e-9, upper - 1e-9)
+        found = least_squares(
+            self._residual,
+            x0,
+            self._jacobian,
+            bounds=(lower, upper),
+            method="trf",
+            x_scale=1.0,
+            max_nfev=EVALUATIONS,
+            ftol=3e-6,
+            xtol=1e-4,
+        )
+        return Fit(self._theta(found.x), float(found.cost), self._columns(found.jac))
+
+    def _columns(self, jacobian: Array) -> dict[str, Array]:
+        rows, n = len(self.frozen.jacobian), len(self.nuisance)
+        columns = {}
+        for i, (key, p) in enumerate(self.own.items(), start=n):
+            unit = p.size if is_shape(self.problem, key) else SLAB * p.size
+            columns[key] = jacobian[:rows, i] / (self.scale * unit)
+        return columns
+
+    def _nuisance_start(self) -> Iterable[float]:
+        for name in self.nuisance:
+            nominal, sigma = self.problem.nuisance[name]
+            yield (self.start.get(name, nominal) - nominal) / sigma
+
+    def _in(self, key: str, value: float) -> float:
+        """A parameter in prior widths: shapes by their logarithm."""
+        p = self.own[key]
+        if is_shape(self.problem, key):
+            return float(np.log(value / p.typical)) / p.size
+        return (value - p.off) / (SLAB * p.size)
+
+    def _out(self, key: str, x: float) -> float:
+        p = self.own[key]
+        if is_shape(self.problem, key):
+            return float(np.clip(p.typical * np.exp(p.size * x), p.lower, p.upper))
+        return float(np.clip(p.off + SLAB * p.size * x, p.lower, p.upper))
+
+    def _bounds(self) -> tuple[Array, Array]:
+        n = len(self.nuisance)
+        lower, upper = np.full(n + len(self.own), -8.0), np.full(n + len(self.own), 8.0)
+        for i, (key, p) in enumerate(self.own.items(), start=n):
+            if np.isfinite(p.lower):
+                lower[i] = max(
+                    lower[i],
+                    self._in(key, p.lower) if p.lower > 0 or key in self.switches else -8.0,
+                )
+            if np.isfinite(p.upper):
+                upper[i] = min(upper[i], self._in(key, p.upper))
+        return lower, np.maximum(upper, lower + 1e-3)
+
+    def _theta(self, x: Array) -> dict[str, float]:
+        theta = {}
+        for name, value in zip(self.nuisance, x, strict=False):
+            nominal, sigma = self.problem.nuisance[name]
+            theta[name] = nominal + sigma * float(value)
+        for key, value in zip(self.own, x[len(self.nuisance) :], strict=True):
+            theta[key] = self._out(key, float(value))
+        return theta
+
+    def _residual(self, x: Array) -> Array:
+        r = self.problem.residual(self._theta(x)) * self.scale
+        return np.concatenate([np.nan_to_num(np.clip(r, -ABSURD, ABSURD), nan=ABSURD), x])
+
+    def _jacobian(self, x: Array) -> Array:
+        base = self._residual(x)
+        n = len(self.nuisance)
+        sigmas = np.array([self.problem.nuisance[name][1] for name in self.nuisance])
+        jacobian = np.zeros((len(base), len(x)))
+        rows = len(base) - len(x)
+        jacobian[:rows, :n] = self.frozen.jacobian * sigmas * self.scale
+        jacobian[rows:] = np.eye(len(x))
+        for i in range(n, len(x)):
+            h = 0.03
+            moved = x.copy()
+            moved[i] += h
+            jacobian[:rows, i] = (self._residual(moved) - base)[:rows] / h
+        return jacobian

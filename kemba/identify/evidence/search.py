@@ -1,0 +1,234 @@
+"""The search: null fit, ranking, refits of the leaders, growth, and what each step believed."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from kemba.identify.evidence.linear import Linear, estimate, names_of
+from kemba.identify.evidence.null_model import Baseline
+from kemba.identify.evidence.point import Movable, Point
+from kemba.identify.evidence.problem import Problem
+from kemba.identify.evidence.refit import Fit, refit
+from kemba.identify.evidence.spike_slab import NULL, Hypothesis, log_prior, probabilities
+
+LEADERS = 6
+SURE = 3  # so many leaders are refitted however far behind they are,
+FAR, FAR_SHARE = 40.0, 0.7  # others when no more nats, or share of the gain, behind
+FOLLOWED = 2  # times that the motion is found again with the best guess
+LARGEST = 3  # effects in one answer; more need another experiment
+GAIN = 3.0  # nats beyond prior odds that a further effect must bring
+LEAST = 0.1  # sizes, from which on a secant tells more than a slope
+
+
+@dataclass
+class Search:
+    """State of one search on one problem; `run` fills it."""
+
+    problem: Problem
+    deadline: float = np.inf
+    say: Callable[[str], None] = lambda text: None
+    heat: float = 1.0
+    points: dict[Hypothesis, Point] = field(default_factory=dict)
+    base: Baseline = field(init=False)
+    _thetas: dict[Hypothesis, dict[str, float]] = field(default_factory=dict)
+    _stale: bool = False
+
+    def run(self) -> Hypothesis:
+        """The hypothesis the evidence favours; everything seen stays in `points`."""
+        self.say("fitting the model as it is")
+        self.start()
+        best = self._round(NULL, LEADERS)
+        self.say(f"first guess: {' + '.join(best) or 'nothing'}")
+        if isinstance(self.problem, Movable):
+            return self._follow(self.problem, best)
+        if best != NULL:
+            promising = self._promising()
+            self.base.seen_from(self.points[best].fit.theta)
+            self.points = {NULL: self.base.point}
+            for hypothesis in promising:
+                self.visit(hypothesis)
+            best = self._round(NULL, LEADERS)
+            best = self._grow(best)
+        return best
+
+    def _follow(self, problem: Movable, best: Hypothesis) -> Hypothesis:
+        """Look again along the motion that the best guess makes of the data, until it stays.
+
+        A guess far from the first motion looks bad only for being far: what the slopes promise
+        counts as well as what the refit found.
+        """
+        for _ in range(FOLLOWED):
+            guess = best or self._promised()
+            if guess == NULL or time.monotonic() > self.deadline:
+                return best
+            point = self.points[guess]
+            self.say(f"looking again as if {' + '.join(guess)} were there")
+            among = self._contenders()
+            problem.relinearise(point.fit.theta)
+            self.start(among)
+            self.visit(guess)
+            best = self._round(NULL, LEADERS)
+            if best in (guess, NULL):
+                break
+        return self._grow(best) if best else best
+
+    def _contenders(self) -> frozenset[Hypothesis]:
+        """Single effects that were refitted, or promise half of what the best one does."""
+        null = self.points[NULL].log_evidence
+        gains = {h: e - null for h, e in self.base.table.items() if len(h) == 1}
+        least = 0.5 * max(gains.values())
+        return frozenset(h for h, gain in gains.items() if gain > least or h in self.points)
+
+    def _promised(self) -> Hypothesis:
+        """The refitted single effect that the table puts first, if it pays there."""
+        count = len(self.problem.candidates)
+        null = self.points[NULL].log_evidence + log_prior(NULL, count)
+        tables: dict[Hypothesis, float] = {
+            h: e for h, e in self.base.table.items() if h in self.points and len(h) == 1
+        }
+        first = max(tables, key=tables.__getitem__, default=NULL)
+        pays = first and tables[first] + log_prior(first, count) > null
+        return first if pays else NULL
+
+    def start(self, among: frozenset[Hypothesis] | None = None) -> None:
+        """Null fit, noise colour, and the linear table at the null."""
+        self.base = Baseline(self.problem, self.heat, among)
+        self.points = {NULL: self.base.point}
+
+    def _round(self, given: Hypothesis, leaders: int) -> Hypothesis:
+        """Refit the most promising extensions of `given` by one; the best of all points so far."""
+        table = self._extensions(given)
+        order = sorted(table, key=lambda h: -table[h])[:leaders]
+        promise = table[order[0]] - self.points[given].log_evidence
+        reach = max(FAR, FAR_SHARE * promise)
+        for hypothesis in order:
+            if given and table[hypothesis] < self.points[given].log_evidence:
+                break  # not even the slopes promise anything
+            if table[hypothesis] < table[order[0]] - reach and hypothesis not in order[:SURE]:
+                break
+            if time.monotonic() > self.deadline:
+                break
+            self.visit(hypothesis)
+        return self.best()
+
+    def _extensions(self, given: Hypothesis) -> dict[Hypothesis, float]:
+        """Linear evidence of `given` plus one effect, pairs lending theirs to their members."""
+        if given != NULL:
+            ranker = self.base.ranker(self.points[given].linear)
+            return ranker.table((len(given) + 1,), given=given)
+        single: dict[Hypothesis, float] = {h: e for h, e in self.base.table.items() if len(h) == 1}
+        base = max(single.values())
+        pairs = [h for h in self.base.table if len(h) == 2]
+        best_pair = max(pairs, key=self.base.table.__getitem__, default=NULL)
+        if best_pair and self.base.table[best_pair] > base + GAIN:
+            for name in best_pair:
+                single[(name,)] = max(single[(name,)], base)
+        return single
+
+    def visit(self, hypothesis: Hypothesis) -> Point:
+        """Refit a hypothesis (once) and score it there."""
+        if hypothesis not in self.points:
+            self.say(f"refitting {' + '.join(hypothesis)}")
+            fit = refit(
+                self.problem, hypothesis, self._guess(hypothesis), self.base.frozen, self.heat
+            )
+            self._learn_secant(hypothesis, fit)
+            self.points[hypothesis] = self._point(hypothesis, fit)
+            self._thetas[hypothesis] = fit.theta
+        return self.points[hypothesis]
+
+    def _learn_secant(self, hypothesis: Hypothesis, fit: Fit) -> None:
+        """From here on, a refitted effect is known by its secant.
+
+        Everything absent may help at floor level, and slopes at nothing promise too much far from
+        where they hold: a rival would look good for what it leaves to them.
+        """
+        problem, (effect, *others) = self.problem, hypothesis
+        candidate = problem.candidates[effect]
+        if others or not isinstance(problem, Movable) or problem.is_straight(candidate.key):
+            return
+        size = fit.theta[candidate.key] - candidate.lead.off
+        if abs(size) > LEAST * candidate.lead.size:
+            own = set(candidate.keys())
+            absent = {k: v for k, v in fit.theta.items() if k not in own}
+            change = problem.residual(fit.theta) - problem.residual(absent)
+            self.base.jacobian[:, self.base.point.linear.index(candidate.key)] = change / size
+            self._stale = True
+
+    def _refresh(self) -> None:
+        """Score everything again by the secants learnt."""
+        if self._stale:
+            self.base.rescore()
+            self.points = {h: self._point(h, p.fit) for h, p in self.points.items() if h}
+            self.points[NULL] = self.base.point
+            self._stale = False
+
+    def _point(self, hypothesis: Hypothesis, fit: Fit) -> Point:
+        linear, coarse = self._near(fit)
+        return Point(hypothesis, fit, linear, coarse, self.base.ranker(linear).score(hypothesis))
+
+    def _near(self, fit: Fit) -> tuple[Linear, Linear]:
+        """Linear at a refitted point: its own slopes are fresh, the others are the null's."""
+        names, base = names_of(self.problem, fit.theta), self.base
+        known = base.point.linear
+        columns = [
+            fit.columns[n] if n in fit.columns else base.jacobian[:, known.index(n)] for n in names
+        ]
+        r = self.problem.residual(fit.theta)
+        return base.division.linear(fit.theta, names, np.stack(columns, axis=1), r)
+
+    def _guess(self, hypothesis: Hypothesis) -> dict[str, float]:
+        """Where it was before, or the largest part that was refitted, moved by the linear
+        estimate there."""
+        if hypothesis in self._thetas:
+            return self._thetas[hypothesis]
+        parts = [h for h in self.points if set(h) < set(hypothesis)]
+        part = max(parts, key=lambda h: (len(h), self.points[h].log_evidence))
+        point = self.points[part]
+        z = self.base.ranker(point.linear).score(hypothesis).z
+        guess = estimate(self.problem, point.linear, z)
+        return {**guess, **{k: v for k, v in point.fit.theta.items() if k not in guess}}
+
+    def best(self) -> Hypothesis:
+        """The likeliest of everything refitted."""
+        self._refresh()
+        count = len(self.problem.candidates)
+        return max(self.points, key=lambda h: self.points[h].log_evidence + log_prior(h, count))
+
+    def _grow(self, best: Hypothesis) -> Hypothesis:
+        """Add while it pays; then try to swap each member for another."""
+        while len(best) < LARGEST and time.monotonic() < self.deadline:
+            grown = self._round(best, 3)
+            if grown == best or len(grown) <= len(best):
+                break
+            best = grown
+        for member in best if len(best) > 1 else ():
+            rest = tuple(h for h in best if h != member)
+            self.visit(rest)
+            self._round(rest, 2)
+        return self.best()
+
+    def _promising(self) -> list[Hypothesis]:
+        """What was refitted and gained at least half of what the best gained."""
+        null = self.points[NULL].log_evidence
+        gains = {h: p.log_evidence - null for h, p in self.points.items() if h}
+        return [h for h, gain in gains.items() if gain > 0.5 * max(gains.values())]
+
+    def probabilities(self, dismissed: Collection[Hypothesis] = ()) -> dict[Hypothesis, float]:
+        """Over everything refitted, and the rest of the singles by their linear evidence; without
+        what was `dismissed`, as too small or refuted by left-out data."""
+        evidence: dict[Hypothesis, float] = {
+            h: e for h, e in self.base.table.items() if len(h) == 1
+        }
+        evidence |= {h: p.log_evidence for h, p in self.points.items()}
+        evidence = {h: e for h, e in evidence.items() if h not in dismissed}
+        return probabilities(evidence, len(self.problem.candidates))
+
+
+def share_of(probability: Mapping[Hypothesis, float], effects: Iterable[str]) -> dict[str, float]:
+    """Probability that each effect is among the missing ones."""
+    return {e: sum(p for h, p in probability.items() if e in h) for e in effects}

@@ -1,0 +1,251 @@
+"""The gate: a log that cannot be right is refused with row and column, and nothing is fitted."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+
+import numpy as np
+
+from kemba.errors import ConfigErrors, KembaError, suggest
+from kemba.identify.evidence.noise import difference_sigma
+from kemba.identify.logs.reading import NEEDED
+from kemba.trajectory import TIME, Array, Trajectory
+
+SHORTEST = 0.15  # s
+FEWEST = 60  # rows
+LONGEST_BURST = 0.1  # s without a value that interpolation may bridge
+MISSING_SHARE = 0.3
+QUIET = 1e-4  # noise as a share of the range, below which a channel counts as noiseless
+FASTEST, LEAP = 8.0, 0.004  # m.s-1, m: no piston goes farther between two rows
+FROZEN = 40  # equal readings in a row where noise is seen elsewhere
+# by the last part of the name: smallest and largest value that can be, and what a mistake would be
+RANGES = {
+    "piston/x": (-0.01, 0.085, "metres from 0 (retracted) to 0.070; is it in millimetres?"),
+    "piston/v": (-8.0, 8.0, "metres per second; is it in mm/s?"),
+    "piston/F": (-3000.0, 3000.0, "newtons, pushing positive"),
+    "hip/q": (-2 * math.pi, 2 * math.pi, "radians; is it in degrees?"),
+    "hip/tau": (-60.0, 60.0, "newton metres at the joint; is it in N.mm?"),
+    "body/pitch": (-math.pi, math.pi, "radians, nose up positive; is it in degrees?"),
+    "body/x": (-20.0, 20.0, "metres; is it in millimetres?"),
+    "body/z": (-0.1, 3.0, "metres above the ground; is it in millimetres?"),
+    "body/vx": (-20.0, 20.0, "metres per second"),
+    "body/vz": (-20.0, 20.0, "metres per second"),
+    "body/ax": (-2000.0, 2000.0, "metres per second squared"),
+    "body/az": (-2000.0, 2000.0, "metres per second squared"),
+    "P": (2e4, 2e6, "pascals, absolute; is it in bar or kPa, or gauge?"),
+}
+# what most of a channel's motion would be, were its unit right: smallest plausible 98 % spread
+ANGLES = ("hip/q", "body/pitch")
+
+
+class BadData(ConfigErrors):
+    """What is wrong with the logs, all of it; the verdict is `bad-data`."""
+
+
+def check_logs(logs: Sequence[Trajectory]) -> list[str]:
+    """Raise BadData with every fault found; remarks on what was tolerated are returned."""
+    faults = [fault for log in logs for fault in _faults(log)]
+    if faults:
+        raise BadData(faults)
+    return [remark for log in logs for remark in _remarks(log)]
+
+
+def _faults(log: Trajectory) -> list[KembaError]:
+    """Faults of one log; the deeper checks only where the plain ones pass."""
+    for stage in (_columns, _time, _cells, _values):
+        found = list(stage(log))
+        if found:
+            return found
+    return []
+
+
+def _columns(log: Trajectory) -> Iterator[KembaError]:
+    for name in NEEDED[log.meta["kind"]]:
+        if name not in log:
+            hint = f"{suggest(name, log.names)} Map foreign columns with --map".strip()
+            yield _fault(log, f"needs the column '{name}', which is missing", hint=hint)
+
+
+def _time(log: Trajectory) -> Iterator[KembaError]:
+    t = log.time
+    if len(t) < FEWEST:
+        yield _fault(log, f"has {len(t)} rows", f"at least {FEWEST} were expected")
+        return
+    wrong = ~np.isfinite(t)
+    wrong[1:] |= ~(np.diff(t) > 0)
+    if wrong.any():
+        i = int(np.argmax(wrong))
+        what = "the time is missing"
+        if np.isfinite(t[i]):
+            same = "is repeated" if i and t[i] == t[i - 1] else "goes back"
+            what = f"the time {same}: {t[i]:.6f} s after {t[i - 1]:.6f} s"
+        count = f"{int(wrong.sum())} such rows; are rows duplicated, or clocks mixed?"
+        yield _fault(log, what, "times must increase from row to row", count, row=i, column=TIME)
+        return
+    if t[-1] - t[0] < SHORTEST:
+        yield _fault(log, f"lasts {t[-1] - t[0]:.3f} s", f"at least {SHORTEST} s were expected")
+    step = float(np.median(np.diff(t)))
+    if step > 0.02:
+        hint = "is the time in milliseconds?" if step > 0.5 else "a valve's answer takes 8 ms"
+        yield _fault(log, f"has a row every {step:.3g} s", "at least 50 rows a second", hint)
+    elif t[-1] - t[0] > 0.5 * len(t):
+        yield _fault(log, "has gaps longer than all of its rows", column=TIME)
+
+
+def _cells(log: Trajectory) -> Iterator[KembaError]:
+    for name in NEEDED[log.meta["kind"]]:
+        y = log[name]
+        missing = ~np.isfinite(y)
+        if missing.mean() > MISSING_SHARE:
+            what = f"{100 * missing.mean():.0f} % of its readings are missing"
+            yield _fault(log, what, column=name, row=int(np.argmax(missing)))
+        elif "valve/" in name:
+            yield from _valve(log, name, y)
+
+
+def _valve(log: Trajectory, name: str, y: Array) -> Iterator[KembaError]:
+    wrong = np.isfinite(y) & (np.abs(y - np.round(y)) > 1e-6) | (y < 0) | (y > 1)
+    if wrong.any():
+        i = int(np.argmax(wrong))
+        what = f"the valve command is {y[i]:g}"
+        hint = "map a voltage or per cent with a scale" if y[i] > 1 else ""
+        yield _fault(log, what, "0 or 1 was expected", hint, row=i, column=name)
+
+
+def _values(log: Trajectory) -> Iterator[KembaError]:
+    needed = NEEDED[log.meta["kind"]]
+    for name in log.names:
+        y = log[name]
+        if "valve/" in name or not np.isfinite(y).any():
+            continue
+        yield from _range(log, name, y)
+        if name in needed:
+            yield from _frozen(log, name, y)
+        if name.endswith("piston/x"):
+            yield from _leap(log, name, y)
+    yield from _excitation(log)
+
+
+def _range(log: Trajectory, name: str, y: Array) -> Iterator[KembaError]:
+    known = [v for k, v in RANGES.items() if name == k or name.endswith(f"/{k}")]
+    if not known:
+        return
+    low, high, expected = known[0]
+    outside = np.isfinite(y) & ((y < low) | (y > high))
+    few = 0.002 if name in NEEDED[log.meta["kind"]] else 0.05
+    if outside.mean() > few:
+        i = int(np.argmax(outside))
+        what = f"the reading {y[i]:.6g} {log.unit(name)} cannot be ({int(outside.sum())} rows)"
+        yield _fault(
+            log,
+            what,
+            f"{expected.split(';')[0]} expected",
+            expected.partition("; ")[2],
+            row=i,
+            column=name,
+        )
+
+
+def _frozen(log: Trajectory, name: str, y: Array) -> Iterator[KembaError]:
+    """A sensor that repeats one reading while it is noisy elsewhere: dead, stuck or saturated."""
+    if name.endswith("hip/tau"):
+        return
+    good = np.flatnonzero(np.isfinite(y))
+    values = y[good]
+    equal = np.diff(values) == 0
+    start, length = _longest(equal)
+    elsewhere = np.delete(equal, np.s_[start : start + length])
+    if length < FROZEN or not len(elsewhere) or elsewhere.mean() > 0.2:
+        return
+    if difference_sigma(values) < QUIET * np.ptp(values):
+        return  # a simulation without noise may well stand still
+    value, row = values[start], int(good[start])
+    at_end = value in (values.max(), values.min())
+    what = f"{length + 1} readings in a row are exactly {value:.6g} {log.unit(name)}"
+    hint = "is the sensor saturated?" if at_end else "is the sensor stuck?"
+    yield _fault(log, what, "the channel is noisy elsewhere", hint, row=row, column=name)
+
+
+def _leap(log: Trajectory, name: str, y: Array) -> Iterator[KembaError]:
+    """A position that is elsewhere from one row to the next, and stays there."""
+    good = np.flatnonzero(np.isfinite(y))
+    step, passed = np.diff(y[good]), np.diff(log.time[good])
+    far = np.abs(step) > FASTEST * passed + LEAP
+    calm = np.abs(step) < 0.3 * np.max(np.abs(step), initial=0.0)
+    far[1:-1] &= calm[:-2] & calm[2:]  # a spike returns at once: a bad reading, which is borne
+    if far.any():
+        i = int(np.argmax(far))
+        what = f"leaps by {1e3 * step[i]:.1f} mm within {1e3 * passed[i]:.1f} ms"
+        hint = "are two logs joined?"
+        yield _fault(log, what, "a piston that moves", hint, row=int(good[i + 1]), column=name)
+
+
+def _longest(flags: np.ndarray) -> tuple[int, int]:
+    """Start and length of the longest run of True."""
+    if not flags.any():
+        return 0, 0
+    padded = np.concatenate([[False], flags, [False]]).astype(int)
+    edges = np.flatnonzero(np.diff(padded))
+    starts, ends = edges[::2], edges[1::2]
+    i = int(np.argmax(ends - starts))
+    return int(starts[i]), int(ends[i] - starts[i])
+
+
+def _excitation(log: Trajectory) -> Iterator[KembaError]:
+    """Something must be commanded or move, and the answer must not be dead."""
+    valves = [n for n in log.names if "valve/" in n]
+    switched = any(np.ptp(log[n][np.isfinite(log[n])]) > 0 for n in valves)
+    moving = [n for n in NEEDED[log.meta["kind"]] if n.endswith("/x") or n == "body/z"]
+    moved = any(_travel(log[n]) > 2e-3 for n in moving)
+    if not switched and not moved:
+        yield _fault(
+            log, "no valve switches and nothing moves", "a log with excitation was expected"
+        )
+        return
+    if log.meta["kind"] == "bench" and _travel(log["piston/F"]) == 0.0:
+        yield _fault(log, "never changes", "is the sensor dead?", column="piston/F", row=0)
+    for leg in ("front", "rear") if log.meta["kind"] == "robot" else ():
+        for name in (f"{leg}/hip/q", f"{leg}/piston/x", "body/z"):
+            if np.ptp(log[name][np.isfinite(log[name])]) == 0.0 and len(log) > 200:
+                yield _fault(log, "never changes", "is the sensor dead?", column=name, row=0)
+
+
+def _travel(y: Array) -> float:
+    good = y[np.isfinite(y)]
+    return float(np.ptp(np.percentile(good, [0.5, 99.5]))) if len(good) else 0.0
+
+
+def _remarks(log: Trajectory) -> Iterator[str]:
+    name = log.meta["name"]
+    gaps = np.diff(log.time) > 5 * np.median(np.diff(log.time))
+    if gaps.any():
+        yield f"{name}: {int(gaps.sum())} gaps in time, the longest {np.diff(log.time).max():.3f} s"
+    for column in NEEDED[log.meta["kind"]]:
+        missing = int((~np.isfinite(log[column])).sum())
+        if missing:
+            yield f"{name}: {column}: {missing} readings missing"
+
+
+def _fault(
+    log: Trajectory,
+    what: str,
+    expected: str = "",
+    hint: str = "",
+    row: int | None = None,
+    column: str = "",
+) -> KembaError:
+    where = log.meta.get("path", log.meta.get("name", "log"))
+    if row is not None:
+        names = ["time", *log.names]
+        bare = column.split(" [")[0]
+        at = names.index(bare) + 1 if bare in names else 1
+        where = f"{where}:{row + 2}:{at}"
+    return KembaError(f"{where}: {column}" if column else where, what, expected, hint)
+
+
+def sentence(faults: Iterable[KembaError]) -> str:
+    """All faults as one text, the first few in full."""
+    faults = list(faults)
+    more = f" (and {len(faults) - 3} more)" if len(faults) > 3 else ""
+    return "The data cannot be right: " + " | ".join(str(f) for f in faults[:3]) + more

@@ -1,0 +1,58 @@
+"""What robot logs can tell of: the catalogue's effects, put so that a switch can be linearised."""
+
+from __future__ import annotations
+
+from kemba.effects import BY_KIND
+from kemba.identify.evidence.candidates import effect_candidates
+from kemba.identify.evidence.problem import Candidate, Parameter
+from kemba.model.model import Model
+
+GROUND = ("ground_compliance", "ground_friction", "contact")
+DELAYS = ("valve_delay.dt", "valve_close_delay.dt")
+SOFTNESS = "ground_compliance.softness"
+GRIP = "ground_friction.mu"
+LAGS = {"hose_lag.T": 6e-4, "motor_lag.T": 6e-4}  # s; shorter is as good as none
+SHORTEST = 1e-6  # s
+
+
+def robot_candidates(model: Model) -> dict[str, Candidate]:
+    """The effects that `model` lacks; a soft ground is searched by its softness 1/k."""
+    found = effect_candidates(model)
+    if "ground_compliance" in found:
+        found["ground_compliance"] = Candidate(
+            "ground_compliance",
+            Parameter("softness", "m.N-1", 0.0, 5e-5, 0.0, 1e-3),
+            (Parameter("d", "s.m-1", 1.0, 0.7, 0.1, 10.0, 1.0),),
+            reciprocal={"softness": ("k", "N.m-1")},
+        )
+    return found
+
+
+def in_the_air(found: dict[str, Candidate]) -> tuple[Candidate, ...]:
+    """The candidates that stand in the model's equations; ground and sensors do not."""
+    return tuple(c for c in found.values() if c.effect in BY_KIND and c.effect not in GROUND)
+
+
+def extended(model: Model, candidates: tuple[Candidate, ...]) -> Model:
+    """The model without its ground, and with every candidate on its list, switched off."""
+    kept = [e for e in model.effects if e.kind not in GROUND]
+    bare = Model(model.mechanism, kept, model.supply, model.name)
+    return bare.with_effects(
+        BY_KIND[c.effect].model_validate({"kind": c.effect}) for c in candidates
+    )
+
+
+def ground_of(model: Model) -> tuple[float, dict[str, float]]:
+    """Friction coefficient of the model's ground, and its softness where it is not rigid."""
+    mu, soft = 1.0, {}
+    for effect in model.effects:
+        if effect.kind in GROUND:
+            mu *= float(effect.mu)  # type: ignore[attr-defined]
+        if effect.kind == "ground_compliance":
+            soft = {SOFTNESS: 1.0 / effect.k, "ground_compliance.d": effect.d}  # type: ignore[attr-defined]
+    return mu, soft
+
+
+def without_delay(name: str, value: float) -> float:
+    """A lag too short to matter as the model should have it: none."""
+    return SHORTEST if name in LAGS and value < LAGS[name] else value

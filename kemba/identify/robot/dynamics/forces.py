@@ -1,0 +1,90 @@
+"""Forces of the model along a reference as its parameters change; only what changes is redone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from kemba.identify.robot.dynamics.inputs import Drive, air_states, drives
+from kemba.identify.robot.dynamics.linear import Linearised
+from kemba.identify.robot.dynamics.physics import Physics, prepared
+from kemba.identify.robot.motion.batch import Batch
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+KEPT = 4
+
+
+@dataclass
+class Line:
+    """Force (N, k) at p, and its slopes along parameters in which it is straight."""
+
+    p: Array
+    force: Array
+    slopes: dict[int, Array] = field(default_factory=dict)
+
+
+class Forces:
+    """What `point` needs beyond the model at any parameters p (k,) and delays (valves, 2)."""
+
+    def __init__(self, physics: Physics, batch: Batch, point: Linearised) -> None:
+        self.physics, self.batch, self.point = physics, batch, point
+        self._drives: dict[bytes, list[Drive]] = {}
+        self._states: dict[bytes, tuple[ca.DM, ca.DM]] = {}
+        self._lines: dict[bytes, Line] = {}
+        self._middle = tuple(prepared(a) for a in point.middle)
+
+    def at(self, p: Array, delays: Array) -> Array:
+        """Force (n, L, k) that the motion needs beyond model and contact."""
+        return self.batch.deep(self._force(p, delays)) - self.point.contact
+
+    def slopes(self, p: Array, delays: Array) -> Array:
+        """d force / dp (N, k, len(p)) at the samples."""
+        given = (*self._middle, *self.states(p, delays))
+        return self.physics.call("by_parameter", *given, p=p)[0]
+
+    def states(self, p: Array, delays: Array) -> tuple[ca.DM, ca.DM]:
+        """Effect states and inputs at the samples."""
+        key = delays.tobytes() + p[self.physics.moves].tobytes()
+        if key not in self._states:
+            path = self._drives.get(delays.tobytes())
+            if path is None:
+                path = drives(self.physics, self.batch, self.point.ref, delays)
+                _keep(self._drives, delays.tobytes(), path)
+            states = air_states(self.physics, self.batch, path, p)
+            ready = tuple(prepared(self.batch.flat(a)) for a in states)
+            _keep(self._states, key, ready)
+        return self._states[key]
+
+    def _force(self, p: Array, delays: Array) -> Array:
+        straight, crossed = self.physics.straight
+        key = delays.tobytes() + p[~straight].tobytes()
+        line = self._lines.get(key)
+        if line is None:
+            line = Line(p.copy(), self._exact(p, delays))
+            _keep(self._lines, key, line)
+        moved = np.flatnonzero(p != line.p)
+        if crossed[np.ix_(moved, moved)].any():
+            return self._exact(p, delays)
+        force = line.force
+        for i in moved.tolist():
+            if i not in line.slopes:
+                one = line.p.copy()
+                one[i] += 1.0
+                line.slopes[i] = self._exact(one, delays) - line.force
+            force = force + (p[i] - line.p[i]) * line.slopes[i]
+        return force
+
+    def _exact(self, p: Array, delays: Array) -> Array:
+        given = (*self._middle, *self.states(p, delays))
+        return self.physics.call("residual", *given, p=p)[0]
+
+
+def _keep(store: dict[bytes, Any], key: bytes, value: Any) -> None:
+    """Add to a store that holds the first one and the last few."""
+    if len(store) > KEPT:
+        del store[list(store)[1]]
+    store[key] = value

@@ -1,0 +1,213 @@
+"""The model linearised along a reference: a filter's system, force defects, contact forces."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from kemba.identify.robot.dynamics.physics import Physics
+from kemba.identify.robot.dynamics.reference import (
+    ANCHOR_FREE,
+    ANCHOR_PRIOR,
+    GROUND_PRIOR,
+    GROUND_SIGMA,
+    GROUND_WANDER,
+    SLIPPING,
+    STOP_SIGMA,
+    STOP_WANDER,
+    Reference,
+    integrator,
+)
+from kemba.identify.robot.motion.batch import Batch
+from kemba.identify.robot.motion.contact import Schedule, steady
+from kemba.identify.robot.motion.filter import System, gains, smooth
+from kemba.identify.robot.motion.sensing import travelled
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+
+@dataclass(frozen=True)
+class Linearised:
+    """Everything about one reference that does not change with theta."""
+
+    ref: Reference
+    middle: tuple[Array, Array, Array]  # flat q, v in the middle of each step, the model's a
+    states: tuple[Array, Array]
+    system: System
+    inverse: Array  # (n, L, k, k) of the mass matrix
+    contact: Array  # (n, L, k) generalised contact and stop force found in the data
+    normal: Array  # (n, L, legs) contact force, up, steady
+    y: Array
+    rate: Array
+    way: Array  # (n, L, m) of the measured coordinates since the start
+    places: Array  # (n, L, 3 legs): x and z of each foot, pistons
+    sinking: Array  # (n, L, legs) speed of the feet, down, steady
+    masses: Array
+    less_grip: Array  # (n, L, k) generalised force per unit of friction coefficient, missing
+    shift: Array  # (n, L, k) acceleration of the model beyond the reference's
+    A: tuple[Array, Array]
+    channels: Array  # (n, L, k, c) generalised force per unknown force: channels, then feet
+
+    def response(self, force: Array) -> Array:
+        """Acceleration (n, L, k) by which a missing force pushes."""
+        return -(self.inverse @ force[..., None])[..., 0]
+
+    def defect(self, force: Array) -> Array:
+        """Acceleration that the model adds to the reference's, (n, L, k)."""
+        live = np.any(self.inverse != 0.0, axis=(2, 3))[..., None]
+        return np.where(live, self.shift, 0.0) + self.response(force)
+
+    def system_with(self, density: Array, h: Array) -> System:
+        """The filter's system with other densities of unknown force."""
+        k = self.ref.q.shape[2]
+        W = self.system.W.copy()
+        W[..., :k, :k] = scatter(self.inverse @ self.channels, density, h)
+        return replace(self.system, W=W)
+
+    def extend(self, g: Array) -> Array:
+        """`g` (n, L, k, c) with the feet's places, which nothing pushes."""
+        return np.concatenate(
+            [g, np.zeros((*g.shape[:2], 3 * self.normal.shape[2], g.shape[3]))], 2
+        )
+
+    def penetration(self, softness: float, d: float) -> Array:
+        """Depth (n, L, places) of the feet in a floor of stiffness 1/softness."""
+        growth = np.maximum(1.0 + d * self.sinking, 0.5)
+        legs = self.normal.shape[2]
+        depth = np.zeros_like(self.places)
+        depth[..., 1 : 2 * legs : 2] = softness * np.maximum(self.normal, 0.0) / growth
+        return depth
+
+
+def linearise(
+    physics: Physics,
+    batch: Batch,
+    plan: Sequence[Schedule],
+    ref: Reference,
+    density: Array,
+    states: tuple[Array, Array],
+    p: Array,
+) -> Linearised:
+    """The model along `ref` with unknown forces of `density` per channel and foot axis."""
+    k, legs = physics.mechanism.n, len(physics.legs)
+    mid = tuple(batch.flat(a) for a in ref.middle(batch.h))
+    s, u = (batch.flat(a) for a in states)
+    inverse = batch.deep(np.asarray(np.linalg.inv(physics.call("mass", *mid, s, u, p=p)[0])))
+    force = batch.deep(physics.call("residual", *mid, s, u, p=p)[0])
+    at_nodes = [batch.flat(ref.q), batch.flat(ref.v)]
+    y, rate, Jy = (batch.deep(a) for a in physics.call("measured", *at_nodes))
+    feet, feet_rate, Jf = (batch.deep(a) for a in physics.call("feet", *at_nodes))
+    slip = batch.pad([x.slides for x in plan], 0.0)
+    density = density.copy()
+    for leg in range(legs):  # a sliding foot pushes along the edge of its cone
+        pushing = k + 2 * leg
+        density[..., pushing] = np.where(slip[..., leg] != 0.0, SLIPPING, density[..., pushing])
+    grip = physics.grip * slip[..., None] * Jf[..., 0::2, :]
+    Jf_force = Jf.copy()
+    Jf_force[..., 1::2, :] -= grip
+    channels = np.concatenate([Jy, Jf_force], axis=2).swapaxes(-1, -2)
+    contact, feet_force = contact_force(channels, density, force, k, legs)
+    dt = float(np.median(batch.h[batch.valid]))
+    normal = steady(feet_force[..., 1::2], dt)
+    # inertia effects are judged at the model's acceleration: the data's own is noise for the most
+    # part, and noise in a regressor passes for a smaller mass
+    shift = -(inverse @ (force - contact)[..., None])[..., 0]
+    mid = (mid[0], mid[1], mid[2] + batch.flat(shift))
+    stiffness = (batch.deep(a) for a in physics.call("stiffness", *mid, s, u, p=p))
+    A_q, A_v = (-inverse @ a for a in stiffness)
+    less_grip = (slip[..., None] * np.maximum(normal, 0.0)[..., None] * Jf[..., 0::2, :]).sum(
+        axis=2
+    )
+
+    h = batch.h[..., None, None]
+    F, G = integrator(batch.h, k, 3 * legs)
+    F[..., :k, :k] += h**2 / 2 * A_q
+    F[..., :k, k : 2 * k] += h**2 / 2 * A_v
+    F[..., k : 2 * k, :k] += h * A_q
+    F[..., k : 2 * k, k : 2 * k] += h * A_v
+    places = 3 * legs  # where each foot stands (x, z), and the stop on which each piston rests
+    W = np.zeros((*batch.h.shape, k + places, k + places))
+    W[..., :k, :k] = scatter(inverse @ channels, density, batch.h)
+    held = batch.pad([x.held.astype(float) for x in plan], 0.0) > 0.5
+    wander = np.array([GROUND_WANDER] * 2 * legs + [STOP_WANDER] * legs)
+    free = np.array([ANCHOR_FREE, GROUND_WANDER] * legs + [ANCHOR_FREE] * legs)
+    i = np.arange(places)
+    W[..., k + i, k + i] = np.where(held, wander, free) ** 2 * batch.h[..., None]
+    H = np.zeros((*batch.h.shape, k + places, 2 * k + places))
+    H[..., :k, :k] = Jy
+    H[..., k:, :k] = np.concatenate([Jf, Jy[..., k - legs :, :]], axis=2)
+    H[..., k + i, 2 * k + i] = 1.0
+    sharp = np.array([GROUND_SIGMA] * 2 * legs + [STOP_SIGMA] * legs)
+    R = np.concatenate(
+        [
+            np.where(np.isfinite(batch.y), batch.sigma**2, np.inf),
+            np.where(held, sharp**2, np.inf),
+        ],
+        axis=2,
+    )
+    prior = [0.03] * k + [3.0] * k + [ANCHOR_PRIOR, GROUND_PRIOR] * legs + [ANCHOR_PRIOR] * legs
+    P0 = np.diag(prior) ** 2
+    system = System(F, G, W, H, R, np.broadcast_to(P0, (len(batch.tracks), *P0.shape)))
+    ends = ~batch.valid
+    ends[:-1] |= ~batch.valid[1:]
+    system.W[ends], system.F[ends] = 0.0, np.eye(2 * k + places)
+    inverse = np.where(ends[..., None, None], 0.0, inverse)
+    masses = batch.deep(physics.call("masses", *mid)[0])
+    return Linearised(
+        ref,
+        mid,
+        states,
+        system,
+        inverse,
+        contact,
+        normal,
+        y,
+        rate,
+        travelled(rate, batch.h),
+        np.concatenate([feet, y[..., k - legs :]], axis=2),
+        steady(-feet_rate[..., 1::2], dt),
+        masses,
+        less_grip,
+        shift,
+        (A_q, A_v),
+        channels,
+    )
+
+
+def scatter(pushed: Array, density: Array, h: Array) -> Array:
+    """Covariance (n, L, k, k) of the acceleration over a step that unknown forces make."""
+    return np.asarray((pushed * (density / h[..., None])[..., None, :]) @ pushed.swapaxes(-1, -2))
+
+
+def contact_force(
+    channels: Array, density: Array, force: Array, k: int, legs: int
+) -> tuple[Array, Array]:
+    """Generalised force (n, L, k) of contacts and stops in `force`, and the feet's (n, L, 2 legs).
+
+    The split of least norm, weighted with what each channel is thought capable of.
+    """
+    weighted = channels * density[..., None, :]
+    S = weighted @ channels.swapaxes(-1, -2)
+    S = S + 1e-9 * np.eye(k)
+    share = (weighted.swapaxes(-1, -2) @ np.linalg.solve(S, force[..., None]))[..., 0]
+    feet = share[..., k:]
+    stops = share[..., k - legs : k] * (density[..., k - legs : k] > 50.0)
+    rigid = np.concatenate([stops, feet], axis=-1)
+    acting = channels[..., k - legs :]
+    return (acting @ rigid[..., None])[..., 0], feet
+
+
+def smoothed(point: Linearised, y: Array, g: Array) -> Reference:
+    """A better reference: the smoothed deviations added."""
+    k = point.ref.q.shape[2]
+    g_all = point.extend(g[..., None])[..., 0]
+    x, w = smooth(point.system, gains(point.system), y, g_all)
+    A_q, A_v = point.A
+    dq, dv = x[..., :k], x[..., k : 2 * k]
+    turn = (A_q @ dq[..., None] + A_v @ dv[..., None])[..., 0]
+    live = np.any(point.inverse != 0.0, axis=(2, 3))[..., None]
+    a = np.where(live, point.ref.a + turn + g + w[..., :k], 0.0)
+    return Reference(point.ref.q + dq, point.ref.v + dv, a)

@@ -1,0 +1,130 @@
+"""Numeric functions of a robot model along measured motion, mapped over many samples at once."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from kemba.identify.robot.dynamics.air import StateRunner
+from kemba.identify.robot.dynamics.tolerance import mass_regressors, with_tolerances
+from kemba.model.model import Model
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+Flags = np.ndarray[Any, np.dtype[np.bool_]]
+
+
+class Physics:
+    """Residual forces, state rates and kinematics of `model`, vectorised over samples.
+
+    Contact and end stops are left out: where they act is read from the data. `names` are the free
+    parameters in the order of every `p`, those of `free` first, then the nuisance ones.
+    """
+
+    def __init__(self, model: Model, free: tuple[str, ...], grip: float = 1.0) -> None:
+        self.base = model
+        self.model, further, self.nuisance = with_tolerances(model)
+        early = [n for n in self.nuisance if n in self.model.parameters]
+        self.names = (*free, *early, *(n for n in self.nuisance if n not in early))
+        self.nominal = np.array(
+            [model.parameters[n][1] for n in free] + [v for v, _ in self.nuisance.values()]
+        )
+        self.node = node = self.model.build((*free, *early))
+        self.p = ca.vertcat(node.p, further)
+        self.mechanism, self.legs = model.mechanism, model.mechanism.legs
+        self.inputs = tuple(q.name for q in self.model.inputs.values())
+        rate = -ca.substitute(node.rate, node.sd, ca.SX.zeros(node.sd.numel()))
+        start = np.array([q.value for q in self.model.states.values()])
+        self.moves = np.array(ca.which_depends(rate, self.p, 1), dtype=bool)
+        self.moving = [n for n, moves in zip(self.names, self.moves, strict=True) if moves]
+        p = ca.vertcat(*(self.p[int(i)] for i in np.flatnonzero(self.moves)))
+        self.states = StateRunner([node.q, node.v, node.s, node.u, p], rate, start)
+        self.grip = grip
+        self._maps: dict[tuple[str, int], ca.Function] = {}
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Measured channels, one per coordinate: the knees are measured by their pistons."""
+        pistons = tuple(f"{leg}/piston/x" for leg in self.legs)
+        return tuple(c.name for c in self.mechanism.coordinates[: 3 + len(self.legs)]) + pistons
+
+    @cached_property
+    def functions(self) -> dict[str, ca.Function]:
+        """All functions of samples, by name."""
+        node, m = self.node, self.mechanism
+        r = ca.substitute(node.dynamics, node.lam, ca.SX.zeros(node.lam.numel()))
+        full = [node.q, node.v, node.a, node.s, node.u, self.p]
+        y = ca.vertcat(*(m.motion(name)[0] for name in self.channels))
+        feet = ca.vertcat(*(m.motion(f"{g}/foot/{x}")[0] for g in self.legs for x in "xz"))
+        motion = [m.q, m.v]
+        named = {
+            "residual": (full, [r]),
+            "mass": (full, [ca.jacobian(r, node.a)]),
+            "stiffness": (full, [ca.jacobian(r, x) for x in (node.q, node.v)]),
+            "by_parameter": (full, [ca.jacobian(r, self.p)]),
+            "measured": (motion, [y, ca.jtimes(y, m.q, m.v), ca.jacobian(y, m.q)]),
+            "feet": (motion, [feet, ca.jtimes(feet, m.q, m.v), ca.jacobian(feet, m.q)]),
+        }
+        made = {k: ca.Function(k, a, b, {"cse": True}) for k, (a, b) in named.items()}
+        self.masses, made["masses"] = mass_regressors(self.base)
+        return made
+
+    @cached_property
+    def straight(self) -> tuple[Flags, Flags]:
+        """Parameters (k,) in which the force at given effect states is linear, and pairs (k, k)
+        of parameters that multiply each other."""
+        r = ca.substitute(self.node.dynamics, self.node.lam, 0 * self.node.lam)
+        slopes = ca.jacobian(r, self.p)
+        rows, _, count = *slopes.shape, self.p.numel()
+        second = ca.jacobian_sparsity(ca.vec(ca.densify(slopes)), self.p)
+        bends = np.zeros((count, count), bool)
+        for row, column in zip(*second.get_triplet(), strict=True):
+            bends[row // rows, column] = True
+        return ~(np.diag(bends) | self.moves), bends
+
+    def call(self, name: str, *args: Array | ca.DM, p: Array | None = None) -> list[Array]:
+        """Function `name` over samples (N, .), or (., N) as `prepared` makes them: arrays
+        (N, rows) or (N, rows, columns)."""
+        given = [a if isinstance(a, ca.DM) else prepared(a) for a in args]
+        function, count = self.functions[name], given[0].shape[1]
+        if (name, count) not in self._maps:
+            fixed = [len(args)] if p is not None else []
+            self._maps[name, count] = function.map(f"{name}_map", "serial", count, fixed, [])
+        answers = self._maps[name, count].call(given + ([ca.DM(p)] if p is not None else []))
+        blocks = []
+        for i, answer in enumerate(answers):
+            rows, columns = function.size_out(i)
+            block = np.asarray(answer.full()).reshape(rows, count, columns).transpose(1, 0, 2)
+            blocks.append(block[:, :, 0] if columns == 1 else block)
+        return blocks
+
+    def knees(self, pistons: Array) -> Array:
+        """Knee coordinates (n, legs) of piston extensions (n, legs)."""
+        return np.column_stack(
+            [np.interp(pistons[:, i], *self._knee(i)) for i in range(len(self.legs))]
+        )
+
+    def _knee(self, i: int) -> tuple[Array, Array]:
+        """Piston extension and knee angle on a fine grid, the extension increasing."""
+        m, k = self.mechanism, 3 + len(self.legs) + i
+        low, high = m.coordinates[k].lower, m.coordinates[k].upper
+        grid = np.linspace(low, high, 4001)
+        q = np.zeros((len(grid), m.n))
+        q[:, k] = grid
+        x = self.call("measured", q, 0 * q)[0][:, k]
+        order = np.argsort(x)
+        return x[order], grid[order]
+
+    def arrange(self, torque: Array, valves: Array) -> Array:
+        """Inputs (nu, N) in the model's order from torques (legs, N) and valves (2 legs, N)."""
+        rows = {f"{leg}/hip/tau": torque[i] for i, leg in enumerate(self.legs)}
+        for i, leg in enumerate(self.legs):
+            rows[f"{leg}/valve/extend"], rows[f"{leg}/valve/retract"] = valves[2 * i : 2 * i + 2]
+        return np.stack([rows[name] for name in self.inputs])
+
+
+def prepared(samples: Array) -> ca.DM:
+    """Samples (N, .) as the functions take them."""
+    return ca.DM(np.ascontiguousarray(samples.T))

@@ -1,0 +1,1 @@
+"""Motion along a robot log: samples, contacts, a Kalman filter over them."""

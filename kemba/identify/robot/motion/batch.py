@@ -1,0 +1,66 @@
+"""Several runs side by side: arrays (n, L, .) padded at the end, and flat ones for functions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from kemba.identify.robot.motion.resampled import Track
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+
+@dataclass(frozen=True)
+class Batch:
+    """`tracks` as arrays whose second axis is the run; steps past a run's end stand still."""
+
+    tracks: tuple[Track, ...]
+
+    @cached_property
+    def n(self) -> int:
+        return max(len(t.time) for t in self.tracks)
+
+    @cached_property
+    def valid(self) -> np.ndarray[Any, np.dtype[np.bool_]]:
+        """(n, L): is this a node of the run?"""
+        return np.arange(self.n)[:, None] < [len(t.time) for t in self.tracks]
+
+    @cached_property
+    def h(self) -> Array:
+        """(n, L): seconds from each node to the next, 1 ms where there is none."""
+        steps = [np.append(np.diff(t.time), 1e-3) for t in self.tracks]
+        return self.pad(steps, 1e-3)
+
+    @cached_property
+    def time(self) -> Array:
+        return self.pad([t.time for t in self.tracks], 0.0)
+
+    @cached_property
+    def y(self) -> Array:
+        return self.pad([t.y for t in self.tracks], np.nan)
+
+    @cached_property
+    def sigma(self) -> Array:
+        """(L, m): noise of one node's value."""
+        return np.stack([t.sigma for t in self.tracks])
+
+    def pad(self, parts: Sequence[Array], value: float) -> Array:
+        """(n, L, .) of one array (n_l, .) per run."""
+        whole = np.full((self.n, len(parts), *parts[0].shape[1:]), value)
+        for i, part in enumerate(parts):
+            whole[: len(part), i] = part
+        return whole
+
+    def flat(self, values: Array) -> Array:
+        """(n, L, .) -> (N, .): the nodes that are."""
+        return np.asarray(values[self.valid])
+
+    def deep(self, values: Array, fill: float = 0.0) -> Array:
+        """(N, .) -> (n, L, .)."""
+        whole = np.full((*self.valid.shape, *values.shape[1:]), fill)
+        whole[self.valid] = values
+        return whole

@@ -1,0 +1,49 @@
+"""What the residuals of a right model would be: pure sensor noise through the same filter."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from kemba.identify.robot.motion.filter import Gains, System, innovations
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+DRAWS = 6
+
+
+def expected_power(system: System, gain: Gains, seed: int = 0) -> Array:
+    """Mean square (n, L, m) of the whitened innovations that sensor noise alone makes.
+
+    Below 1 where the filter allows for contact forces that a steady stance does not use up.
+    Averaged over a fiftieth of a second, for the draws are few.
+    """
+    rng = np.random.default_rng(seed)
+    sigma = np.sqrt(np.where(np.isfinite(system.R), system.R, 0.0))
+    y = sigma[..., None] * rng.standard_normal((*sigma.shape, DRAWS))
+    g = np.zeros((*sigma.shape[:2], system.G.shape[-1], DRAWS))
+    _, errors = innovations(system, gain, y, g)
+    power = np.mean((gain.whitener @ errors) ** 2, axis=-1)
+    width = 21
+    padded = np.pad(power, ((width // 2, width // 2), (0, 0), (0, 0)), mode="edge")
+    total = np.cumsum(padded, axis=0)
+    total = np.concatenate([np.zeros((1, *total.shape[1:])), total])
+    return np.asarray(np.maximum((total[width:] - total[:-width]) / width, 0.02))
+
+
+def predicted_error(system: System, y: Array, g: Array, steps: int) -> Array:
+    """y (n, L, m) minus its prediction, begun anew on the reference every so many steps.
+
+    In the channels' units: how far the model's motion leaves the measured one in a window.
+    """
+    n, runs, m, d = system.H.shape
+    push = (system.G @ g[..., None])[..., 0]
+    errors = np.empty((n, runs, m))
+    x = np.zeros((runs, d))
+    for k in range(n):
+        if k % steps == 0:
+            x = np.zeros((runs, d))
+        errors[k] = y[k] - (system.H[k] @ x[..., None])[..., 0]
+        x = (system.F[k] @ x[..., None])[..., 0] + push[k]
+    return errors

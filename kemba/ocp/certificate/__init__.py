@@ -1,0 +1,1 @@
+"""What a written plan really satisfies, and the status that follows."""

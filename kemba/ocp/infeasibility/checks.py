@@ -1,0 +1,146 @@
+"""Before solving: what can be said in milliseconds about a task that cannot be met.
+
+A certain finding refuses the task; the others are kept as hints for when solving fails.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import groupby
+
+from kemba.config import Document
+from kemba.config.document import Location
+from kemba.model import Model
+from kemba.ocp.infeasibility.budget import budget_findings
+from kemba.ocp.infeasibility.diagnostic import (
+    Finding,
+    key,
+    number,
+    one_per_wish,
+    place,
+    relax,
+    spoken,
+)
+from kemba.ocp.infeasibility.flight import Flight, flight_of
+from kemba.ocp.infeasibility.pose import Gap, Poses
+from kemba.ocp.task.requirement import Wish
+from kemba.ocp.task.task import Task
+from kemba.quantity import Quantity
+
+LONGEST_STEP = 0.05  # s; with longer ones a valve cannot be timed within a push
+
+
+def check_task(
+    task: Task, model: Model, wishes: Sequence[Wish], document: Document
+) -> list[Finding]:
+    """Findings, certain ones first; after the first certain kind nothing more is looked for."""
+    found = list(contradictions(task, wishes, document))
+    if found:
+        return found
+    poses = Poses(model, wishes)
+    found = list(impossible_poses(task, poses, wishes, document))
+    if found:
+        return found
+    flight = flight_of(model, wishes, poses)
+    budget = budget_findings(task, model, wishes, flight, document)
+    return sorted([*coarse_grid(task, flight, document), *budget], key=lambda f: not f.certain)
+
+
+def moments(task: Task, wishes: Sequence[Wish]) -> Iterator[tuple[str, list[Wish]]]:
+    """The wishes that hold at each moment (those that hold throughout included), and its name."""
+    always = [w for w in wishes if w.at is None]
+    timed = sorted((w for w in wishes if w.at is not None), key=lambda w: w.node(task.nodes))
+    for node, group in groupby(timed, key=lambda w: w.node(task.nodes)):
+        names = {0: "the start", task.nodes: "the end"}
+        yield names.get(node, f"node {node} of {task.nodes}"), [*group, *always]
+    if always and not timed:
+        yield "every moment", always
+
+
+def contradictions(task: Task, wishes: Sequence[Wish], document: Document) -> Iterator[Finding]:
+    """Two wishes on one quantity, or a wish and the quantity's own range, that exclude each
+    other."""
+    told: set[tuple[Location, Location]] = set()
+    for when, here in moments(task, wishes):
+        for name in dict.fromkeys(w.quantity.name for w in here):
+            same = [w for w in here if w.quantity.name == name]
+            low, high = max(same, key=lambda w: w.lower), min(same, key=lambda w: w.upper)
+            if low.lower > high.upper + 1e-9 and (low.location, high.location) not in told:
+                told.add((low.location, high.location))
+                yield _against_wish(low, high, when, document)
+    for wish in wishes:
+        q = wish.quantity
+        if (wish.lower > q.upper or wish.upper < q.lower) and (wish.location, ()) not in told:
+            told.add((wish.location, ()))
+            yield _against_range(wish, q, document)
+
+
+def _against_wish(low: Wish, high: Wish, when: str, document: Document) -> Finding:
+    unit = low.quantity.unit
+    sentence = (
+        f"contradiction on {low.quantity.name} at {when}: {spoken(low.location)} "
+        f"({place(document, low.location)}) asks for at least {number(low.lower, unit)}, "
+        f"{spoken(high.location)} ({place(document, high.location)}) for at most "
+        f"{number(high.upper, unit)}"
+    )
+    weaker = relax(document, low, low.lower, high.upper)
+    return Finding(sentence, True, (weaker, relax(document, high, high.upper, low.lower)))
+
+
+def _against_range(wish: Wish, q: Quantity, document: Document) -> Finding:
+    above = wish.lower > q.upper
+    asked, end = (wish.lower, q.upper) if above else (wish.upper, q.lower)
+    given = relax(document, wish, asked, end)
+    sentence = f"{given} ({given.where}); {q.name} stays within "
+    sentence += f"{number(q.lower, q.unit)} to {number(q.upper, q.unit)}"
+    return Finding(sentence, True, (given,))
+
+
+def impossible_poses(
+    task: Task, poses: Poses, wishes: Sequence[Wish], document: Document
+) -> Iterator[Finding]:
+    """Moments at which no pose and no rates meet all wishes: reach, ground, stops, geometry."""
+    for when, here in moments(task, wishes):
+        together = poses.gaps(here, here)
+        if together == []:
+            continue
+        single = _smallest(poses, here) or together or []
+        given = one_per_wish(relax(document, g.wish, g.asked, g.reachable) for g in single)
+        why = "; ".join(f"{r} ({r.where})" for r in given) or "the wishes exclude each other"
+        reason = "" if together is None else _reason(single)
+        certain = together is not None
+        yield Finding(f"no pose of the robot does what {when} asks: {why}{reason}", certain, given)
+
+
+def _smallest(poses: Poses, here: Sequence[Wish]) -> list[Gap]:
+    """The one line of the task that helps if it gives way alone, by the least; [] if none does."""
+    best: list[Gap] = []
+    for location in dict.fromkeys(w.location for w in here if w.at is not None):
+        gaps = poses.gaps(here, [w for w in here if w.location == location])
+        if gaps and (not best or _size(gaps) < 0.999 * _size(best)):
+            best = gaps
+    return best
+
+
+def _size(gaps: Sequence[Gap]) -> float:
+    return sum(abs(g.asked - g.reachable) for g in gaps)
+
+
+def _reason(gaps: Sequence[Gap]) -> str:
+    """What stands in the way, where one wish tells it."""
+    if any(g.wish.quantity.name.endswith("foot/z") and g.asked < -1e-6 for g in gaps):
+        return "; the ground is at 0 m"
+    return " with the other wishes kept"
+
+
+def coarse_grid(task: Task, flight: Flight | None, document: Document) -> Iterator[Finding]:
+    """Steps too long to time a push."""
+    if flight is None or task.step <= LONGEST_STEP:
+        return
+    enough = int(-(-task.duration // LONGEST_STEP))
+    sentence = (
+        f"{key('nodes', document)}: {task.nodes} over {task.duration:g} s make steps of "
+        f"{1e3 * task.step:.0f} ms; a push by air needs steps of at most "
+        f"{1e3 * LONGEST_STEP:.0f} ms, so at least {enough} nodes"
+    )
+    yield Finding(sentence, True)

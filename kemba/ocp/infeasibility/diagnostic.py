@@ -1,0 +1,89 @@
+"""What stands in a task's way: a sentence, the wish to relax, and how sure we are."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+
+from kemba.config import Document
+from kemba.config.document import Location, written
+from kemba.ocp.task.requirement import Wish
+
+
+@dataclass(frozen=True)
+class Relax:
+    """A wish that cannot be met: what the task asks, and what could be reached instead."""
+
+    wish: str
+    where: str
+    quantity: str
+    asked: float
+    reachable: float
+    unit: str
+
+    def __str__(self) -> str:
+        """`goals.apex`: 1.45 m asked, 1.21 m is the most that can be reached."""
+        end = "most" if self.asked > self.reachable else "least"
+        asked, reachable = number(self.asked, self.unit), number(self.reachable, self.unit)
+        name = f"`{self.wish}`"
+        if self.quantity not in (self.wish.partition(".")[2], "") and "*" not in self.wish:
+            name += f" ({self.quantity})"
+        return f"{name}: {asked} asked, {reachable} is the {end} that can be reached"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What a check found. `certain`: no plan can exist, nothing need be solved. `cause`: it names
+    something else than the wish that fails."""
+
+    sentence: str
+    certain: bool
+    relax: tuple[Relax, ...] = ()
+    cause: bool = False
+
+
+def number(value: float, unit: str) -> str:
+    """A value as people write it: `0.35 m`, `-10 deg`, `0`."""
+    if unit == "rad":
+        value, unit = math.degrees(value), "deg"
+    text = f"{round(value, 3) + 0.0:.4g}"
+    return text if unit == "1" else f"{text} {unit}"
+
+
+def place(document: Document, location: Location) -> str:
+    """`jump.yaml:33:3`, or the `--set` option, where the task says so."""
+    return document.error(location, "").where
+
+
+def key(name: str, document: Document) -> str:
+    """A top-level key of the task with its place: `payload` (jump.yaml:6:1)."""
+    known = (name,) in document.marks or (name,) in document.overrides
+    return f"`{name}` ({place(document, (name,))})" if known else f"`{name}`"
+
+
+def relax(document: Document, wish: Wish, asked: float, reachable: float) -> Relax:
+    """How far a wish must give way."""
+    where = place(document, wish.location)
+    return Relax(wish.text, where, wish.quantity.name, asked, reachable, wish.quantity.unit)
+
+
+def one_per_wish(relaxed: Iterable[Relax]) -> tuple[Relax, ...]:
+    """The farthest of every wish: `*/foot/z` holds for two feet and is told once."""
+    worst: dict[tuple[str, bool], Relax] = {}
+    for r in relaxed:
+        known = worst.setdefault((r.wish, r.asked > r.reachable), r)
+        if abs(r.asked - r.reachable) > abs(known.asked - known.reachable):
+            worst[(r.wish, r.asked > r.reachable)] = r
+    return tuple(worst.values())
+
+
+def among(wishes: Sequence[Wish], pattern: str, at: float | None) -> list[Wish]:
+    """The wishes on quantities like `pattern` at a moment."""
+    return [w for w in wishes if w.at == at and fnmatchcase(w.quantity.name, pattern)]
+
+
+def spoken(location: Location) -> str:
+    """A location between backticks."""
+    return f"`{written(location)}`"

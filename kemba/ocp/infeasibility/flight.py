@@ -1,0 +1,132 @@
+"""A task that asks for a flight: what it lifts, how far, and what the robot can give."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from kemba.mechanism import load_robot
+from kemba.model import Model
+from kemba.ocp.infeasibility.pose import Poses
+from kemba.ocp.task.requirement import Wish
+
+
+@dataclass(frozen=True)
+class Flight:
+    """A height that asks for a flight, and what is known about it before solving.
+
+    z0, z1 [m]: heights of the body at the start, and at the landing if there is one; mass [kg],
+    fall [m.s-2] with boom and payload; swing [m]: how far moving legs shift the body against the
+    centre of mass at most; `stays_below`: the height is the highest point.
+    """
+
+    wish: Wish
+    height: float
+    z0: float
+    z1: float | None
+    mass: float
+    fall: float
+    swing: float
+    stays_below: bool
+
+    def least_time(self, other: float, generous: bool) -> float:
+        """Seconds between the apex and the height `other` [m], at least.
+
+        The ground only pushes, so the centre of mass never falls, nor slows while it rises, faster
+        than by `fall`. Generous: the legs' motion lends the body their swing, in height and time.
+        """
+        lent = self.swing if generous else 0.0
+        way = max(self.height - other - lent, 0.0)
+        return float(np.sqrt(2 * way / self.fall) - np.sqrt(2 * lent / self.fall))
+
+    def most(self, other: float, span: float) -> float:
+        """The height [m] that `span` seconds from or to `other` allow, generously."""
+        lent = float(np.sqrt(2 * self.swing / self.fall))
+        return other + self.swing + self.fall * (span + lent) ** 2 / 2
+
+
+def flight_of(model: Model, wishes: Sequence[Wish], poses: Poses) -> Flight | None:
+    """The flight that the highest wish on the body's height asks for, from a start at rest."""
+    highest = [w for w in wishes if w.quantity.name == "body/z" and w.at and np.isfinite(w.lower)]
+    start = [w for w in wishes if w.at == 0.0]
+    resting = any(w.location[-1] == "rest" for w in start)
+    grounded = any(w.quantity.name.endswith("foot/z") and w.upper <= 1e-6 for w in start)
+    if not highest or not resting or not grounded:
+        return None
+    wish = max(highest, key=lambda w: w.lower)
+    robot = load_robot(model.mechanism.name)
+    leg = robot.leg.femur.length + robot.leg.tibia.length
+    if wish.lower <= leg:
+        return None
+    mass, weight = inertia_and_weight(model)
+    end = [w for w in wishes if w.at == 1.0]
+    lands = any(w.quantity.name.endswith("foot/z") and w.upper <= 1e-6 for w in end)
+    below = [w for w in wishes if w.quantity.name == "body/z" and w.at is None]
+    return Flight(
+        wish,
+        wish.lower,
+        poses.highest(start) or leg,
+        (poses.highest(end) or leg) if lands else None,
+        mass,
+        weight / mass,
+        leg_swing(model) / mass,
+        any(w.upper <= wish.lower for w in below),
+    )
+
+
+def leg_swing(model: Model) -> float:
+    """How much the legs can move the centre of mass, from one side of the hips to the other,
+    times the mass [kg.m]; at most."""
+    leg = load_robot(model.mechanism.name).leg
+    shank = leg.femur.length + leg.tibia.com
+    rod = leg.piston.mount + leg.piston.retracted + leg.piston.stroke
+    arms = leg.femur.mass * leg.femur.com + leg.tibia.mass * shank
+    arms += leg.cylinder.mass * (leg.piston.mount + leg.cylinder.com) + leg.rod.mass * rod
+    return 2 * len(model.mechanism.legs) * arms
+
+
+def inertia_and_weight(model: Model) -> tuple[float, float]:
+    """What the body's height feels in free fall: mass [kg] and weight [N], all effects counted."""
+    node = model.node
+    row = [c.name for c in model.mechanism.coordinates].index("body/z")
+    q = np.array([model.mechanism.standing[c.name] for c in model.mechanism.coordinates])
+    still, zeros = np.zeros(len(q)), [0.0 * np.ones(x.numel()) for x in (node.s, node.lam, node.u)]
+
+    def force(a: float) -> float:
+        up = a * (np.arange(len(q)) == row)
+        s, lam, u = zeros
+        found = node.residual(q, still, up, s, s, lam, u, np.zeros(node.p.numel()))
+        return float(found[0][row])
+
+    return abs(force(1.0) - force(0.0)), abs(force(0.0))
+
+
+def air_work(model: Model) -> float:
+    """Energy [J] that all pistons give over one stroke, at their steady force from the supply."""
+    node, stroke = model.node, model.mechanism.stroke
+    q = np.array([model.mechanism.standing[c.name] for c in model.mechanism.coordinates])
+    v, lam = np.zeros(len(q)), np.zeros(node.lam.numel())
+    u = np.array([float(symbol == "u_e") for _, symbol in model.inputs])
+    s = np.array([s.value for s in model.states.values()])
+    p = np.zeros(node.p.numel())
+    if len(s):
+        rate = -node.residual(q, v, v, node.s, 0 * node.s, lam, u, p)[1]
+        settle = ca.integrator("settle", "cvodes", {"x": node.s, "ode": rate}, 0.0, 0.5)
+        s = np.array(settle(x0=s)["xf"]).ravel()
+    measured = np.array(node.measure(q, v, v, s, 0 * s, lam, u, p)).ravel()
+    forces = [
+        value
+        for quantity, value in zip(node.output_quantities, measured, strict=True)
+        if quantity.name.endswith("piston/F")
+    ]
+    return float(sum(max(f, 0.0) for f in forces) * stroke)
+
+
+def hip_power(model: Model) -> float:
+    """Mechanical power [W] of all hips at most: peak torque at no-load speed, generously."""
+    hips = [e for e in model.effects if e.kind == "motor"]
+    legs = len(model.mechanism.legs)
+    return sum(float(e.value("tau_peak") * e.value("w_noload")) * legs for e in hips)

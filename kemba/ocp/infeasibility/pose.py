@@ -1,0 +1,154 @@
+"""Poses: can the wishes at one moment hold together, and which of them must give way?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from kemba.model import Model
+from kemba.ocp.task.requirement import Wish, quantity_expression
+
+TRIES = 4
+MET = 1e-5  # slack in SI units below which a wish counts as met
+SCALE = {"m": 0.1, "rad": 0.2, "m.s-1": 1.0, "rad.s-1": 5.0}
+SILENT: dict[str, Any] = {
+    "print_time": False,
+    "error_on_fail": False,
+    "ipopt.print_level": 0,
+    "ipopt.sb": "yes",
+    "ipopt.tol": 1e-8,
+    "ipopt.max_iter": 150,
+    "ipopt.bound_relax_factor": 0.0,
+}
+
+
+@dataclass(frozen=True)
+class Gap:
+    """A wish and the value nearest to it that a pose can have while the other wishes hold."""
+
+    wish: Wish
+    asked: float
+    reachable: float
+
+
+class Poses:
+    """Poses and rates (q, v) of a model: joints within their range, pistons within their stroke,
+    feet not below the ground. `wishes` that speak of other things are left aside.
+    """
+
+    def __init__(self, model: Model, wishes: Iterable[Wish]) -> None:
+        self.model = model
+        node = model.node
+        others = ca.vertcat(node.a, node.s, node.sd, node.lam, node.u)
+        self.expressions: dict[str, ca.SX] = {}
+        self.units = {w.quantity.name: w.quantity.unit for w in wishes}
+        for name in self.units:
+            expression = quantity_expression(model, name)
+            if not ca.depends_on(expression, others):
+                self.expressions[name] = expression
+        self.names = list(self.expressions)
+
+    @cached_property
+    def walls(self) -> ca.SX:
+        """What is never negative in any pose: gaps of the feet, way left to the end stops."""
+        node = self.model.node
+        others = ca.vertcat(node.v, node.a, node.s, node.sd, node.lam, node.u)
+        rows = ca.vertsplit(ca.vertcat(node.pair_a, node.pair_b))
+        return ca.vertcat(*(r for r in rows if not ca.depends_on(r, others) and r.nnz()))
+
+    @cached_property
+    def _solver(self) -> ca.Function:
+        node, n = self.model.node, len(self.names)
+        below, above, weight = ca.SX.sym("below", n), ca.SX.sym("above", n), ca.SX.sym("w", n + 1)
+        height = quantity_expression(self.model, "body/z")
+        aims = ca.vertcat(*self.expressions.values())
+        nlp = {
+            "x": ca.vertcat(node.q, node.v, below, above),
+            "p": weight,
+            "f": ca.dot(weight[:n], below + above) - weight[n] * height + 1e-6 * ca.sumsqr(node.v),
+            "g": ca.vertcat(aims + below - above, self.walls),
+        }
+        return ca.nlpsol("pose", "ipopt", nlp, SILENT)
+
+    def gaps(self, wishes: Sequence[Wish], free: Iterable[Wish]) -> list[Gap] | None:
+        """How far the wishes of `free` must give way so that all of `wishes` can hold.
+
+        [] when they can as they are, None when giving way there does not help.
+        """
+        may = {w.quantity.name for w in free}
+        best: tuple[np.ndarray, np.ndarray] | None = None
+        for attempt in range(TRIES):
+            found = self._solve(wishes, may, attempt)
+            if found is not None:
+                slack = found[1]
+                if best is None or np.abs(slack).sum() < np.abs(best[1]).sum():
+                    best = found
+                if np.abs(slack).max(initial=0.0) < MET:
+                    return []
+        return None if best is None else self._told(best[1], wishes)
+
+    def highest(self, wishes: Sequence[Wish]) -> float | None:
+        """The largest height of the body [m] in any pose in which `wishes` hold."""
+        found = [self._solve(wishes, set(), k, lift=1.0) for k in range(TRIES)]
+        names = [c.name for c in self.model.mechanism.coordinates]
+        heights = [float(f[0][names.index("body/z")]) for f in found if f is not None]
+        return max(heights) if heights else None
+
+    def limits(self, wishes: Sequence[Wish]) -> tuple[np.ndarray, np.ndarray]:
+        """The range of every quantity that `wishes` leave."""
+        lower, upper = np.full(len(self.names), -np.inf), np.full(len(self.names), np.inf)
+        for wish in (w for w in wishes if w.quantity.name in self.names):
+            i = self.names.index(wish.quantity.name)
+            lower[i], upper[i] = max(lower[i], wish.lower), min(upper[i], wish.upper)
+        return lower, upper
+
+    def _solve(
+        self, wishes: Sequence[Wish], may: set[str], attempt: int, lift: float = 0.0
+    ) -> tuple[np.ndarray, np.ndarray] | None:
+        """(q and v, slack per quantity: positive where the pose lies above what is asked)."""
+        mechanism, n, walls = self.model.mechanism, len(self.names), self.walls.numel()
+        lower, upper = self.limits(wishes)
+        boxes = [*mechanism.coordinates, *mechanism.velocities]
+        low, high = np.array([q.lower for q in boxes]), np.array([q.upper for q in boxes])
+        room = np.array([10.0 * (name in may) for name in self.names])
+        weight = [1.0 / SCALE.get(self.units[name], 1.0) for name in self.names]
+        found = self._solver(
+            x0=np.concatenate([np.clip(self._start(attempt), low, high), np.full(2 * n, 0.01)]),
+            p=[*weight, lift],
+            lbx=np.concatenate([low, np.zeros(2 * n)]),
+            ubx=np.concatenate([high, room, room]),
+            lbg=np.concatenate([lower, np.zeros(walls)]),
+            ubg=np.concatenate([upper, np.full(walls, np.inf)]),
+        )
+        if not self._solver.stats()["success"]:
+            return None
+        x = np.array(found["x"]).ravel()
+        first = len(boxes)
+        return x[:first], x[first + n :] - x[first : first + n]
+
+    def _start(self, attempt: int) -> np.ndarray:
+        """The standing pose at rest, then others around it."""
+        mechanism, rng = self.model.mechanism, np.random.default_rng(attempt)
+        q = np.array([mechanism.standing[c.name] for c in mechanism.coordinates])
+        away = rng.normal(size=len(q)) * [3 * c.scale for c in mechanism.coordinates]
+        return np.concatenate([q + away * (attempt > 0), np.zeros(len(q))])
+
+    def _told(self, slack: np.ndarray, wishes: Sequence[Wish]) -> list[Gap]:
+        gaps = []
+        for i, name in enumerate(self.names):
+            if abs(slack[i]) < MET:
+                continue
+            same = [w for w in wishes if w.quantity.name == name]
+            if slack[i] > 0:
+                wish = min(same, key=lambda w: w.upper)
+                asked = wish.upper
+            else:
+                wish = max(same, key=lambda w: w.lower)
+                asked = wish.lower
+            gaps.append(Gap(wish, asked, asked + float(slack[i])))
+        return gaps

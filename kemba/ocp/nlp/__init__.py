@@ -1,0 +1,1 @@
+"""Nonlinear programs with exact sparse derivatives, and IPOPT that solves them."""

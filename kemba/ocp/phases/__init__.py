@@ -1,5 +1,0 @@
-"""Plans that replay: the modes of an implicit Euler plan solved again as smooth phases."""
-
-from kemba.ocp.phases.refine import Refined, refine
-
-__all__ = ["Refined", "refine"]

@@ -1,0 +1,73 @@
+"""From a task to a certified plan: checked, searched, refined; what stands in its way if not."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from kemba.config import Document
+from kemba.effects.mechanics.load import Payload
+from kemba.model import Model, load_model
+from kemba.ocp.infeasibility.checks import check_task
+from kemba.ocp.infeasibility.explain import explanation, refusal
+from kemba.ocp.nlp.ipopt import Watch
+from kemba.ocp.planned import Plan, explained
+from kemba.ocp.planner import Planner, searched
+from kemba.ocp.refined import refined
+from kemba.ocp.task.requirement import resolve
+from kemba.ocp.task.task import Task
+from kemba.ocp.transcription.symmetry import whole
+from kemba.ocp.transcription.transcribe import Transcription
+from kemba.stopwatch import Stopwatch
+from kemba.trajectory import Trajectory
+
+
+def plan(
+    task: Task,
+    document: Document | None = None,
+    model: str | Path | None = None,
+    log: Path | None = None,
+    tell: Callable[[str], None] = lambda text: None,
+    watch: Watch | None = None,
+    start: Trajectory | None = None,
+    stop: Callable[[], bool] | None = None,
+) -> Plan:
+    """Solve a task. Never raises for a task that cannot be met: the status says so.
+
+    Raises ConfigErrors for wrong names, units and solver options. `log` collects IPOPT's text,
+    `tell` hears what is being done, `watch` every iteration; `start` is a trajectory to go on
+    from, `stop` is asked between iterations whether to end with the best one.
+    """
+    document = document or Document(task.model_dump())
+    building = Stopwatch()
+    with building.running():
+        built = task_model(task, model)
+        wishes = resolve(task, built, document)
+        findings = check_task(task, built, wishes, document)
+        refused = refusal(findings)
+    planner = Planner(
+        task, built, wishes, log, tell, watch, building=building, start=start, stop=stop
+    )
+    planner.deadline = time.monotonic() + task.solver.time_limit
+    found = searched(planner, refused is not None)
+    if found.status == "solved" and task.refine == "radau":
+        return refined(planner, found)
+    if found.status in ("solved", "acceptable", "interrupted"):
+        return found
+    why = refused or explanation(task, built, planner.outcome, findings, document)
+    return found if why is None else explained(found, why)
+
+
+def task_model(task: Task, name: str | Path | None = None) -> Model:
+    """The model of a task: its own unless `name` is given, with the task's supply and payload."""
+    extra = [Payload(m=task.payload)] if task.payload else []
+    return load_model(name or task.model, extra, task.supply)
+
+
+def program_size(task: Task, document: Document, model: str | Path | None = None) -> dict[str, int]:
+    """Variables and rows of the whole program of a task, everything checked, nothing solved."""
+    built = task_model(task, model)
+    wishes = resolve(task, built, document)
+    transcription = Transcription(built, task, wishes, whole(built.node), task.nodes)
+    return {"variables": transcription.variables, "constraints": transcription.constraints}

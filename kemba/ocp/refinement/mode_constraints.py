@@ -1,0 +1,171 @@
+"""What every mode asks: closed constraints hold, open ones stay apart, friction in its cone."""
+
+from __future__ import annotations
+
+import itertools
+
+import casadi as ca
+import numpy as np
+
+from kemba.ocp.refinement.independent import Independent
+from kemba.ocp.refinement.modes import AHEAD, BACK, HELD, OPEN
+from kemba.ocp.refinement.program import Program, Where
+from kemba.ocp.refinement.radau import node_vector, scaled
+from kemba.ocp.refinement.unilateral import Constraint
+
+INF = np.inf
+LENGTH, SPEED = 0.1, 1.0  # m, m.s-1: scales of gaps and their rates
+CLEAR = 2e-4  # m; a gap that only just stays open closes when executed
+AWAY = 3  # elements before and after a touch in which it may
+LANDS = 0.1  # m.s-1; a foot that comes down slower touches at no certain time
+
+
+class View:
+    """Expressions of the node in half symbols: `q`, `v`, `s`, `u`, `lam` scaled."""
+
+    def __init__(self, program: Program) -> None:
+        self.layout, self.node = program.layout, program.model.node
+        groups = ("q", "v", "s", "u", "lam")
+        self.symbols = {g: scaled(self.layout, g, g) for g in groups}
+        y = node_vector(self.layout, self.symbols)
+        self._full = [ca.densify(self.layout.full(y, g)) for g in groups]
+
+    def of(self, expression: ca.SX) -> ca.SX:
+        """An expression of the node's symbols in the half ones."""
+        node = self.node
+        symbols = [node.q, node.v, node.s, node.u, node.lam]
+        return ca.SX(ca.cse(ca.densify(ca.substitute([ca.SX(expression)], symbols, self._full)[0])))
+
+    def z(self, groups: str) -> ca.SX:
+        """The symbols of some groups, such as "q v"."""
+        return ca.vertcat(*(self.symbols[g] for g in groups.split()))
+
+
+def add_rules(program: Program, start: Independent) -> None:
+    """Rows of every constraint in every phase and at every impact; `start` knows what the task
+    already fixes at the first node."""
+    view = View(program)
+    for i, constraint in enumerate(program.constraints):
+        _gaps(program, view, i, constraint)
+        _held(program, view, i, constraint)
+        _friction(program, view, i, constraint)
+        _start(program, view, i, constraint, start)
+    _limits(program, view)
+    _durations(program)
+
+
+def _gaps(program: Program, view: View, i: int, constraint: Constraint) -> None:
+    """Open gaps stay open; where one closes it is zero, and a foot comes down."""
+    c, phases = program.columns, program.phases
+    closing = {phases[p].first: p for p in program.impacts if program.closes(p, i)}
+    closed = np.array([phases[p].active(i) for p in c.phase_of])
+    g = view.of(constraint.gap) / LENGTH
+    for clear in (False, True):
+        apart: Where = [
+            (c.phase_of[e], c.stages[e][stage]["q"])
+            for e in np.flatnonzero(~closed)
+            for stage in range(len(c.stages[e]))
+            if not (stage == len(c.stages[e]) - 1 and e + 1 in closing)
+            and clear != closed[max(e - AWAY, 0) : e + AWAY + 1].any()
+        ]
+        low = CLEAR / LENGTH if clear else 0.0
+        program.mode_rule(i, "gap", view.z("q"), g, low, INF, apart)
+    touching = [(closing[node], c.end(node)["q"]) for node in sorted(closing)]
+    program.mode_rule(i, "touch", view.z("q"), g, 0.0, 0.0, touching)
+    if constraint.friction is not None:
+        rate = view.of(constraint.rate) / SPEED
+        before = [(p, np.concatenate([c.end(n)["q"], c.end(n)["v"]])) for n, p in closing.items()]
+        program.mode_rule(i, "approach", view.z("q v"), rate, -INF, -LANDS / SPEED, before)
+
+
+def _held(program: Program, view: View, i: int, constraint: Constraint) -> None:
+    """The rate of a closed gap is zero, and the slip of a sticking contact."""
+    c, phases = program.columns, program.phases
+    rate = view.of(constraint.rate) / SPEED
+    states: Where = [
+        (c.phase_of[e], np.concatenate([stage["q"], stage["v"]]))
+        for e in range(program.nodes)
+        for stage in c.stages[e]
+    ]
+    states += [(p, np.concatenate([c.end(phases[p].first)["q"], c.after[p]])) for p in c.after]
+    closed = [(p, z) for p, z in states if phases[p].active(i)]
+    program.mode_rule(i, "rate", view.z("q v"), rate, 0.0, 0.0, closed)
+    if constraint.friction is None:
+        return
+    slip = view.of(constraint.friction.slip) / SPEED
+    settling = [
+        (p, np.concatenate([c.end(phases[p].first)["q"], c.end(phases[p].first)["v"]]))
+        for p in range(1, len(phases))
+        if phases[p].modes[i] == HELD and phases[p - 1].modes[i] in (AHEAD, BACK)
+        and p not in c.after
+    ]  # fmt: skip
+    sets = [(HELD, 0.0, 0.0), (AHEAD, 0.0, INF), (BACK, -INF, 0.0)]
+    for wanted, low, high in sets:
+        where = [(p, z) for p, z in states if phases[p].modes[i] == wanted]
+        program.mode_rule(i, "slip", view.z("q v"), slip, low, high, where)
+    program.mode_rule(i, "settles", view.z("q v"), slip, 0.0, 0.0, settling)
+
+
+def _friction(program: Program, view: View, i: int, constraint: Constraint) -> None:
+    """Forces and impulses in the cone; on its edge while sliding."""
+    if constraint.friction is None:
+        return
+    c, phases = program.columns, program.phases
+    forces: Where = [
+        (c.phase_of[e], stage["lam"]) for e in range(program.nodes) for stage in c.stages[e]
+    ]
+    forces += list(c.impulse.items())
+    weight = program.model.mechanism.weight
+    edges = (("forward", constraint.friction.cone_forward, BACK),
+             ("backward", constraint.friction.cone_backward, AHEAD))  # fmt: skip
+    for way, cone, sliding in edges:
+        g = view.of(cone) / weight
+        for wanted, high in ((HELD, INF), (sliding, 0.0)):
+            where = [(p, lam) for p, lam in forces if phases[p].modes[i] == wanted]
+            program.mode_rule(i, f"cone {way}", view.z("lam"), g, 0.0, high, where)
+
+
+def _start(
+    program: Program, view: View, i: int, constraint: Constraint, start: Independent
+) -> None:
+    """A constraint that is closed at first touches at rest there, unless the task says so."""
+    mode, first = program.phases[0].modes[i], program.columns.first
+    if mode == OPEN:
+        return
+    at = np.concatenate([first["q"], first["v"]])
+    rows = [("gap", constraint.gap, LENGTH), ("rate", constraint.rate, SPEED)]
+    if constraint.friction is not None and mode == HELD:
+        rows.append(("slip", constraint.friction.slip, SPEED))
+    for name, expression, scale in rows:
+        g = view.of(expression) / scale
+        if start.adds(g, view):
+            program.rule(f"{constraint.label} first {name}", view.z("q v"), g, 0.0, 0.0, [at])
+
+
+def _limits(program: Program, view: View) -> None:
+    c = program.columns
+    for j in program.reduction.limits:
+        label = program.model.node.limit_rows[j].label
+        where = [
+            np.concatenate([stage["q"], stage["v"], stage["s"], c.u[e], stage["lam"]])
+            for e in range(program.nodes)
+            for stage in c.stages[e]
+        ]
+        g = view.of(program.model.node.limits[j])
+        program.rule(label, view.z("q v s u lam"), g, 0.0, INF, where)
+
+
+def _durations(program: Program) -> None:
+    """The whole motion lasts what the task allows, and valves dwell between switches."""
+    task, phases, h = program.task, program.phases, ca.SX.sym("h", len(program.phases))
+    scale = program.layout.scale[program.layout.slices["h"]][0]
+    lasting = [phase.elements * scale * h[p] / task.duration for p, phase in enumerate(phases)]
+    columns = [program.columns.h[:, 0]]
+    low, high = 1 - task.step_variation, 1 + task.step_variation
+    program.rule("duration", h, sum(lasting), low, high, columns)
+    for valve in range(len(phases[0].valves)):
+        places = [phase.valves[valve] for phase in phases]
+        switches = [p for p in range(1, len(phases)) if places[p] != places[p - 1]]
+        for a, b in itertools.pairwise(switches):
+            dwell = sum(lasting[a:b], ca.SX(0))
+            program.rule("dwell", h, dwell, task.min_dwell / task.duration, INF, columns)

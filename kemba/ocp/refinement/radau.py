@@ -1,0 +1,155 @@
+"""Radau IIA collocation of one element and an inelastic impact, as scaled rows of the residual."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+
+from kemba.model import Model
+from kemba.ocp.task.costs import COSTS
+from kemba.ocp.transcription.layout import GROUPS, STEP, Layout
+from kemba.ocp.transcription.stage import ANGLE_ARM, COST_SCALE
+from kemba.ocp.transcription.symmetry import Reduction
+
+STATE = ("q", "v", "s")
+
+
+@dataclass(frozen=True)
+class Scheme:
+    """Radau IIA: stage times within an element, the last one its end, and Butcher's matrix."""
+
+    points: np.ndarray
+    butcher: np.ndarray
+
+    @property
+    def stages(self) -> int:
+        return len(self.points)
+
+    @cached_property
+    def slopes(self) -> np.ndarray:
+        """D in h y'_i = sum_j D[i, j] (y_j - y_0)."""
+        return np.linalg.inv(self.butcher)
+
+
+RADAU3 = Scheme(np.array([1 / 3, 1.0]), np.array([[5 / 12, -1 / 12], [3 / 4, 1 / 4]]))
+_R = 6**0.5
+RADAU5 = Scheme(
+    np.array([(4 - _R) / 10, (4 + _R) / 10, 1.0]),
+    np.array(
+        [
+            [(88 - 7 * _R) / 360, (296 - 169 * _R) / 1800, (-2 + 3 * _R) / 225],
+            [(296 + 169 * _R) / 1800, (88 + 7 * _R) / 360, (-2 - 3 * _R) / 225],
+            [(16 - _R) / 36, (16 + _R) / 36, 1 / 9],
+        ]
+    ),
+)
+
+
+@dataclass(frozen=True)
+class Element:
+    """Rows g and cost f of one element in z = [x0, (x, lam) per stage, u, h], x = [q, v, s]."""
+
+    z: ca.SX
+    g: ca.SX
+    f: ca.SX
+    labels: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Jump:
+    """Rows g of an impact in z = [x before, v after, impulses / STEP]."""
+
+    z: ca.SX
+    g: ca.SX
+    labels: tuple[str, ...]
+
+
+def width(layout: Layout, group: str) -> int:
+    """Number of columns of a group."""
+    part = layout.slices[group]
+    return int(part.stop - part.start)
+
+
+def scaled(layout: Layout, group: str, name: str) -> ca.SX:
+    """Symbols of a group's scaled half values."""
+    return ca.SX.sym(name, width(layout, group))
+
+
+def node_vector(layout: Layout, parts: dict[str, ca.SX]) -> ca.SX:
+    """A layout vector with groups that are left out at zero."""
+    zero = {g: ca.SX.zeros(width(layout, g)) for g in GROUPS}
+    return ca.vertcat(*({**zero, **parts}[g] for g in GROUPS))
+
+
+def element(
+    model: Model, layout: Layout, reduction: Reduction, cost: dict[str, float], scheme: Scheme
+) -> Element:
+    """The collocation of one element."""
+    x0 = {g: scaled(layout, g, f"{g}0") for g in STATE}
+    stages = [
+        {g: scaled(layout, g, f"{g}{i + 1}") for g in (*STATE, "lam")} for i in range(scheme.stages)
+    ]
+    u, h_scaled = scaled(layout, "u", "u"), scaled(layout, "h", "h")
+    shared = {"u": u, "h": h_scaled}
+    at = [node_vector(layout, {**stage, **shared}) for stage in stages]
+    start = node_vector(layout, {**x0, **shared})
+    h = layout.half(start, "h")
+
+    def slope(i: int, group: str, view: str) -> ca.SX:
+        read = getattr(layout, view)
+        before = read(start, group)
+        terms = (d * (read(y, group) - before) for d, y in zip(scheme.slopes[i], at, strict=True))
+        return ca.SX(sum(terms, ca.SX(0)))
+
+    q_scale, s_rows = [c.scale for c in layout.quantities["q"]], model.node.rate_rows
+    rows, labels = [], []
+    for i in range(scheme.stages):
+        now = {g: layout.full(at[i], g) for g in ("q", "v", "s", "u", "lam")}
+        dynamics, rate, _, _, _ = model.node.residual.call(
+            [
+                now["q"], now["v"], slope(i, "v", "full") / h, now["s"],
+                slope(i, "s", "full") / h, now["lam"], now["u"], ca.SX(0, 1),
+            ]
+        )  # fmt: skip
+        rows.append((slope(i, "q", "half") - h * layout.half(at[i], "v")) / ca.DM(q_scale))
+        labels += [f"kinematics:{c.name}" for c in layout.quantities["q"]]
+        rows.append(project(model, reduction, dynamics) * h / STEP)
+        labels += [f"dynamics:{c.name}" for c in layout.quantities["q"]]
+        kept = reduction.rate
+        if kept:
+            rows.append(h * rate[kept] / ca.DM([s_rows[j].scale for j in kept]))
+            labels += [s_rows[j].label for j in kept]
+    own = layout.full(start, "u")
+    f = sum((w * COSTS[name](model, own, h) for name, w in cost.items()), ca.SX(0)) / COST_SCALE
+    parts = [*x0.values(), *(part for stage in stages for part in stage.values()), u, h_scaled]
+    return Element(ca.vertcat(*parts), ca.vertcat(*rows), ca.densify(ca.SX(f)), tuple(labels))
+
+
+def impact(model: Model, layout: Layout, reduction: Reduction) -> Jump:
+    """M (v+ - v-) = B impulse, from the residual's own inertia and force directions."""
+    x = {g: scaled(layout, g, g) for g in STATE}
+    after, impulse = scaled(layout, "v", "v_after"), scaled(layout, "lam", "impulse")
+    before = node_vector(layout, x)
+    later = node_vector(layout, {**x, "v": after, "lam": impulse})
+    q, s = layout.full(before, "q"), layout.full(before, "s")
+    u, rest = ca.SX.zeros(model.node.u.numel()), ca.SX.zeros(model.node.v.numel())
+    change = (layout.full(later, "v") - layout.full(before, "v")) / STEP
+    lam = layout.full(later, "lam")
+
+    def dynamics(a: ca.SX, forces: ca.SX) -> ca.SX:
+        fixed = [s, ca.SX.zeros(s.numel()), forces, u, ca.SX(0, 1)]
+        return model.node.residual.call([q, rest, a, *fixed])[0]
+
+    g = dynamics(change, lam) - dynamics(rest, ca.SX.zeros(lam.numel()))
+    labels = tuple(f"impact:{c.name}" for c in layout.quantities["q"])
+    return Jump(ca.vertcat(*x.values(), after, impulse), project(model, reduction, g), labels)
+
+
+def project(model: Model, reduction: Reduction, dynamics: ca.SX) -> ca.SX:
+    """Scaled equations of motion of the half robot, by virtual work."""
+    scale = [r.scale * (1.0 if r.unit == "N" else ANGLE_ARM) for r in model.node.dynamics_rows]
+    B = ca.sparsify(ca.DM(reduction.B["q"]))
+    return ca.mtimes(B.T, dynamics / ca.DM(scale))

@@ -1,0 +1,90 @@
+"""A task's wishes on the multi-phase program, at element ends."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import casadi as ca
+import numpy as np
+
+from kemba.ocp.refinement.independent import Independent
+from kemba.ocp.refinement.mode_constraints import View
+from kemba.ocp.refinement.modes import HELD
+from kemba.ocp.refinement.program import Program
+from kemba.ocp.task.requirement import Wish, quantity_expression
+from kemba.ocp.transcription.stage import as_variable
+
+INF = np.inf
+SCALES = {"m": 0.1, "m.s-1": 1.0, "rad": 0.2}
+
+
+def add_wishes(
+    program: Program, wishes: Sequence[Wish], start: Independent, end: Independent
+) -> None:
+    """Bounds where a wish is about a variable, rows otherwise; none where modes grant it."""
+    view = View(program)
+    _granted_at_end(program, view, end)
+    seen: set[tuple[object, ...]] = set()
+    for wish in wishes:
+        g = view.of(quantity_expression(program.model, wish.quantity.name))
+        z = view.z("q v s u lam")
+        key = (wish.at, str(g), wish.lower, wish.upper)
+        if ca.jacobian(g, z).nnz() == 0 or key in seen or _about_valves(program, view, g):
+            continue
+        seen.add(key)
+        last = program.nodes
+        acts = ca.depends_on(g, view.z("u lam"))
+        nodes = range(int(acts), last + 1) if wish.at is None else [wish.node(last)]
+        if wish.at is not None and wish.lower == wish.upper and not acts:
+            moment = {0: start, last: end}.get(nodes[0])
+            if moment is not None and not moment.adds(g, view):
+                continue
+        _put(program, view, wish, g, list(nodes))
+
+
+def _about_valves(program: Program, view: View, g: ca.SX) -> bool:
+    """Whether a wish is about valves alone: phases keep them as the plan has them."""
+    inputs = view.layout.slices["u"].start
+    valves = [view.symbols["u"][c - inputs] for c in view.layout.binary]
+    own = {str(symbol) for symbol in ca.symvar(g)}
+    return own <= {str(symbol) for symbol in valves}
+
+
+def _put(program: Program, view: View, wish: Wish, g: ca.SX, nodes: list[int]) -> None:
+    variable = as_variable(g, view.z("q v s"))
+    columns = [_columns(program, node, full=variable is None) for node in nodes]
+    if variable is not None:
+        index, factor, offset = variable
+        ends = sorted(((wish.lower - offset) / factor, (wish.upper - offset) / factor))
+        at = [z[index] for z in columns]
+        program.lower[at] = np.maximum(program.lower[at], ends[0])
+        program.upper[at] = np.minimum(program.upper[at], ends[1])
+        return
+    scale = SCALES.get(wish.quantity.unit, 1.0)
+    label = f"{wish.text}:{wish.quantity.name}"
+    low, high = wish.lower / scale, wish.upper / scale
+    if not ca.depends_on(g, view.z("u lam")):
+        columns = [_columns(program, node, full=False) for node in nodes]
+        program.rule(label, view.z("q v s"), g / scale, low, high, columns)
+        return
+    program.rule(label, view.z("q v s u lam"), g / scale, low, high, columns)
+
+
+def _columns(program: Program, node: int, full: bool) -> np.ndarray:
+    c = program.columns
+    at = c.end(node)
+    parts = [at["q"], at["v"], at["s"]]
+    if full and node > 0:
+        parts += [c.u[node - 1], at["lam"]]
+    return np.concatenate(parts)
+
+
+def _granted_at_end(program: Program, view: View, end: Independent) -> None:
+    """What the last phase's closed constraints imply at the last node."""
+    for constraint, mode in zip(program.constraints, program.phases[-1].modes, strict=True):
+        if mode == 0:
+            continue
+        end.adds(view.of(constraint.gap), view)
+        end.adds(view.of(constraint.rate), view)
+        if constraint.friction is not None and mode == HELD:
+            end.adds(view.of(constraint.friction.slip), view)

@@ -1,0 +1,102 @@
+"""The solved multi-phase program as a trajectory at element ends, and its own defects."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+
+from kemba.ocp.certificate.certify import Certificate, Violation
+from kemba.ocp.refinement.program import Program
+from kemba.ocp.transcription.layout import STEP
+from kemba.ocp.transcription.solution import arrays, written
+from kemba.trajectory import Trajectory
+
+PHYSICS = ("kinematics", "dynamics", "rate", "impact")  # first words of their rows
+WORST = 8
+
+
+def to_trajectory(program: Program, x: np.ndarray) -> Trajectory:
+    """Every quantity of the model at element ends, just before an impact there. Inputs and
+    forces of a row act on the interval before it; at the first node they are zero."""
+    layout, c = program.layout, program.columns
+    nodes = program.nodes
+    Y = np.zeros((nodes + 1, layout.size))
+    rates = np.zeros_like(Y)
+    part = layout.slices
+    h = np.array([x[c.h[c.phase_of[e]]][0] for e in range(nodes)]) * STEP
+    for g in ("q", "v", "s"):
+        Y[0, part[g]] = x[c.first[g]]
+    for e in range(nodes):
+        begin, stages = c.begin(e), c.stages[e]
+        for g in ("q", "v", "s"):
+            Y[e + 1, part[g]] = x[stages[-1][g]]
+            steps = np.array([x[stage[g]] - x[begin[g]] for stage in stages])
+            rates[e + 1, part[g]] = program.scheme.slopes[-1] @ steps / h[e]
+        Y[e + 1, part["lam"]] = x[stages[-1]["lam"]]
+        Y[e + 1, part["u"]] = x[c.u[e]]
+    Y[:, layout.binary] = np.round(Y[:, layout.binary])
+    _split_friction(program, Y)
+    values = {g: layout.full(Y, g) for g in ("q", "v", "s", "u", "lam")}
+    values["lam"] = _slip_speeds(program, values["q"], values["v"], values["lam"])
+    times = np.concatenate([[0.0], np.cumsum(h)])
+    a, sd = layout.full(rates, "v"), layout.full(rates, "s")
+    return written(program.model, program.task.name, times, values, a, sd)
+
+
+def _split_friction(program: Program, Y: np.ndarray) -> None:
+    """One signed friction force as its forward and backward part."""
+    offset = program.layout.slices["lam"].start
+    for constraint in program.constraints:
+        if constraint.friction is not None:
+            forward = offset + program.place(constraint.friction.forward)
+            backward = offset + program.place(constraint.friction.backward)
+            force = Y[:, forward].copy()
+            Y[:, forward], Y[:, backward] = np.maximum(force, 0.0), np.maximum(-force, 0.0)
+
+
+def _slip_speeds(program: Program, q: np.ndarray, v: np.ndarray, lam: np.ndarray) -> np.ndarray:
+    """Forces with every slip speed that the pairs ask for: its size."""
+    node, B = program.model.node, program.reduction.B["lam"]
+    lam = lam.copy()
+    for constraint in program.constraints:
+        friction = constraint.friction
+        if friction is None:
+            continue
+        slip = ca.Function("slip", [node.q, node.v], [friction.slip])
+        size = np.abs(np.array(slip.map(len(q))(q.T, v.T)).ravel())
+        for place in np.flatnonzero(B[:, program.place(friction.speed)]):
+            lam[1:, place] = size[1:]
+    return lam
+
+
+def certificate(program: Program, x: np.ndarray, trajectory: Trajectory) -> Certificate:
+    """What the solution violates: collocation and impacts (dynamics), modes, bounds and wishes
+    (bounds), forces times gaps at the element ends (complementarity)."""
+    g = np.array(program.problem.g(x, [])).ravel()
+    over = np.maximum(np.maximum(program.g_lower - g, g - program.g_upper), 0.0)
+    rows = program.rows
+    found = []
+    for i in np.argsort(-over)[:WORST]:
+        node, size = rows[i].node, float(over[i])
+        if size > 1e-9:
+            time = float(trajectory.time[node])
+            found.append(Violation(rows[i].label, node, time, size, "of its scale", size))
+    physics = np.array([row.label.split(":")[0] in PHYSICS for row in rows])
+    boxes = np.maximum(program.lower - x, x - program.upper)
+    return Certificate(
+        complementarity=_complementarity(program, trajectory),
+        binary=0.0,  # valves are rounded constants of their phase
+        dynamics=float(np.max(over[physics], initial=0.0)),
+        bounds=float(max(np.max(boxes, initial=0.0), np.max(over[~physics], initial=0.0))),
+        worst=tuple(found),
+    )
+
+
+def _complementarity(program: Program, trajectory: Trajectory) -> float:
+    model, node = program.model, program.model.node
+    x = arrays(model, trajectory)
+    q, v, s, lam, u = (x[name][1:].T for name in ("q", "v", "s", "lam", "u"))
+    zero_a, zero_s = np.zeros_like(v), np.zeros_like(s)
+    _, _, a, b, _ = node.residual.map(q.shape[1])(q, v, zero_a, s, zero_s, lam, u, [])
+    scale = np.array([[row.scale] for _, row in node.pair_rows])
+    return float(np.max(np.abs(np.array(a) * np.array(b) / scale), initial=0.0))

@@ -1,0 +1,1 @@
+"""The strategy that finds a plan: relaxed pairs, rounded valves, tightened pairs."""

@@ -1,0 +1,190 @@
+"""Automatic start guess: the body's height as one-dimensional rest, push, flight, landing; legs by
+inverse kinematics with the feet under the hips; forces and valves by virtual work."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial.polynomial import polyder, polyval
+
+from kemba.mechanism import Robot, load_robot
+from kemba.mechanism.knee import extension, flexion
+from kemba.model import Model
+from kemba.ocp.task.requirement import Wish
+from kemba.ocp.task.task import Task
+from kemba.ocp.transcription.layout import Layout
+
+STRETCH = 0.92  # of the full leg length at take-off
+
+
+@dataclass(frozen=True)
+class Course:
+    """Knots of the body's height: times [s], heights [m], rates [m.s-1], and the flight's span."""
+
+    t: list[float]
+    z: list[float]
+    vz: list[float]
+    flight: tuple[float, float]
+
+    def __call__(self, t: np.ndarray, order: int = 0) -> np.ndarray:
+        """Cubic between the knots, held beyond them; `order` of the time derivative.
+
+        By hand: scipy.interpolate takes longer to import than a program to build.
+        """
+        knots, z, v = (np.asarray(a, float) for a in (self.t, self.z, self.vz))
+        t = np.clip(t, knots[0], knots[-1])
+        i = np.clip(np.searchsorted(knots, t, side="right") - 1, 0, len(knots) - 2)
+        h = knots[i + 1] - knots[i]
+        rise = (z[i + 1] - z[i]) / h
+        bend = [(3 * rise - 2 * v[i] - v[i + 1]) / h, (v[i] + v[i + 1] - 2 * rise) / h**2]
+        cubic = np.array([z[i], v[i], *bend])
+        return np.asarray(polyval(t - knots[i], polyder(cubic, order), tensor=False))
+
+
+def asked(wishes: Sequence[Wish], name: str, at: float) -> float | None:
+    """The value wished for a quantity at a moment, if any (the nearer end of a range)."""
+    for wish in wishes:
+        if wish.quantity.name == name and wish.at == at:
+            return wish.lower if np.isfinite(wish.lower) else wish.upper
+    return None
+
+
+def body_course(
+    wishes: Sequence[Wish], duration: float, reach: tuple[float, float], g: float
+) -> Course:
+    """Height of the body over the motion; `reach` = leg length retracted and stretched [m]."""
+    low, high = reach
+    top = low + STRETCH * (high - low)
+    z0 = asked(wishes, "body/z", 0.0) or low
+    z1 = asked(wishes, "body/z", 1.0)
+    peaks = [w for w in wishes if w.quantity.name == "body/z" and w.at and np.isfinite(w.lower)]
+    peak = max(peaks, key=lambda w: w.lower, default=None)
+    lands = any(w.quantity.name.endswith("foot/z") and w.at == 1.0 for w in wishes)
+    if z0 > top:
+        fall = float(np.sqrt(2 * (z0 - top) / g))
+        course = Course([0.0, fall], [z0, top], [0.0, -g * fall], (0.0, fall))
+        return _landed(course, duration, z1 or low + 0.3 * (top - low))
+    if peak is None or peak.at is None:
+        return Course([0.0, duration], [z0, z1 or z0], [0.0, 0.0], (duration, duration))
+    apex, t_apex = peak.lower, peak.at * duration
+    feet = (w for w in wishes if w.quantity.name.endswith("foot/z") and w.at == peak.at)
+    lift = max((w.lower for w in feet), default=0.0)
+    if lift > 0.0 and z0 < apex <= top:  # standing reaches it, but is not what is asked
+        top = max(apex - lift, (z0 + apex) / 2)
+    if apex <= top:
+        course = Course([0.0, t_apex], [z0, apex], [0.0, 0.0], (t_apex, t_apex))
+    else:
+        rise = min(float(np.sqrt(2 * (apex - top) / g)), 0.7 * t_apex)
+        speed = g * rise
+        push = min(2 * (top - z0) / speed, t_apex - rise)
+        start = t_apex - rise - push
+        wait = [0.0] if start > 1e-6 else []
+        knots = [*wait, start, t_apex - rise, t_apex]
+        z = [*(z0 for _ in wait), z0, top, apex]
+        vz = [*(0.0 for _ in wait), 0.0, speed, 0.0]
+        end = t_apex + rise if lands and t_apex < duration else t_apex
+        course = Course(knots, z, vz, (t_apex - rise, max(end, t_apex)))
+        if lands and end < duration:
+            course = Course([*knots, end], [*z, top], [*vz, -speed], course.flight)
+    if t_apex < duration and (lands or z1 is not None):
+        return _landed(course, duration, z1 or low + 0.3 * (top - low))
+    return course
+
+
+def _landed(course: Course, duration: float, z: float) -> Course:
+    if course.t[-1] >= duration:
+        return course
+    return Course([*course.t, duration], [*course.z, z], [*course.vz, 0.0], course.flight)
+
+
+def leg_pose(robot: Robot, fold: int, dx: np.ndarray, dz: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Hip angle and flexion [rad] (n,) that put the foot at (dx, dz) from the hip [m]."""
+    f, t = robot.leg.femur.length, robot.leg.tibia.length
+    bends = sorted(flexion(robot.leg, x) for x in (0.0, robot.leg.piston.stroke))
+    length = np.hypot(dx, dz)
+    cosine = np.clip((length**2 - f**2 - t**2) / (2 * f * t), -1, 1)
+    bend = np.clip(np.arccos(cosine), bends[0], bends[1])
+    lean = np.arctan2(t * np.sin(bend), f + t * np.cos(bend))
+    return np.arctan2(dx, -dz) - fold * lean, bend
+
+
+def automatic_guess(
+    model: Model, task: Task, wishes: Sequence[Wish], layout: Layout, nodes: int
+) -> np.ndarray:
+    """Start guess Y (nodes + 1, n) in the layout's scaled coordinates."""
+    robot = load_robot(model.mechanism.name)
+    t = np.linspace(0.0, task.duration, nodes + 1)
+    lengths = [
+        np.hypot(f + b * np.cos(k), b * np.sin(k))
+        for f, b in [(robot.leg.femur.length, robot.leg.tibia.length)]
+        for k in (flexion(robot.leg, x) for x in (0.0, robot.leg.piston.stroke))
+    ]
+    gravity = model.mechanism.gravity
+    if task.guess == "standing":
+        still = task.duration
+        course = Course([0.0, still], [lengths[0]] * 2, [0.0] * 2, (still, still))
+    else:
+        course = body_course(wishes, task.duration, (lengths[0], lengths[1]), gravity)
+    z, az = course(t), course(t, 2)
+    airborne = (t > course.flight[0]) & (t < course.flight[1])
+    x0, x1 = (asked(wishes, "body/x", at) or 0.0 for at in (0.0, 1.0))
+    span = max(course.flight[1] - course.flight[0], 0.05)
+    x = x0 + (x1 - x0) * np.clip((t - course.flight[0]) / span, 0.0, 1.0)
+
+    names = [c.name for c in model.mechanism.coordinates]
+    q = np.zeros((nodes + 1, len(names)))
+    q[:, names.index("body/x")], q[:, names.index("body/z")] = x, z
+    load = np.where(airborne, 0.0, model.mechanism.mass * np.maximum(az + gravity, 0.0))
+    share = load / len(robot.legs)
+    forces: dict[str, np.ndarray] = {}
+    for leg, place in robot.legs.items():
+        reach = np.minimum(z, lengths[0] + STRETCH * (lengths[1] - lengths[0]))
+        hip, bend = leg_pose(robot, place.fold, np.zeros_like(z), -reach)
+        q[:, names.index(f"{leg}/hip/q")] = hip
+        q[:, names.index(f"{leg}/knee/q")] = place.fold * bend
+        forces[leg] = share * _lever(robot, bend)
+    v = np.asarray(np.gradient(q, t, axis=0))
+    groups: dict[str, np.ndarray] = {
+        "q": q,
+        "v": v,
+        "h": np.full((nodes + 1, 1), task.duration / nodes),
+    }
+    groups |= _efforts(model, t, forces, share)
+    Y = layout.pack(groups)
+    if task.guess_noise:
+        rng = np.random.default_rng(task.seed)
+        Y = Y + task.guess_noise * rng.normal(size=Y.shape)
+    return np.asarray(np.clip(Y, layout.lower, layout.upper))
+
+
+def _lever(robot: Robot, bend: np.ndarray) -> np.ndarray:
+    """Piston force per vertical foot force: dz/dx of the leg, by virtual work."""
+    f, b = robot.leg.femur.length, robot.leg.tibia.length
+
+    def length(k: np.ndarray) -> np.ndarray:
+        return np.asarray(np.hypot(f + b * np.cos(k), b * np.sin(k)))
+
+    step = 1e-4
+    ahead, behind = ([extension(robot.leg, k + d) for k in bend] for d in (step, -step))
+    dx = np.array(ahead, float) - np.array(behind, float)
+    return np.asarray((length(bend + step) - length(bend - step)) / dx)
+
+
+def _efforts(
+    model: Model, t: np.ndarray, piston: dict[str, np.ndarray], share: np.ndarray
+) -> dict[str, np.ndarray]:
+    s = np.zeros((len(t), len(model.states)))
+    u = np.zeros((len(t), len(model.inputs)))
+    lam = np.zeros((len(t), len(model.forces)))
+    for i, (leg, symbol) in enumerate(model.states):
+        if symbol == "F_e" and leg in piston:
+            s[:, i] = np.clip(piston[leg], 0.0, 300.0)
+    for i, (leg, symbol) in enumerate(model.inputs):
+        if symbol == "u_e" and leg in piston:
+            u[:, i] = np.clip((piston[leg] + 0.015 * np.gradient(piston[leg], t)) / 300.0, 0.0, 1.0)
+    for i, (_, symbol) in enumerate(model.forces):
+        if symbol == "lam_n":
+            lam[:, i] = share
+    return {"s": s, "u": u, "lam": lam}

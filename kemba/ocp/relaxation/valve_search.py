@@ -1,0 +1,37 @@
+"""Valve sequences: moving switches while it pays, and counting them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kemba.model import Model
+from kemba.ocp.nlp.ipopt import Point
+from kemba.ocp.relaxation.schedule import Search, fix, move
+from kemba.trajectory import Trajectory
+
+ENOUGH = 80  # iterations; where moved switches take more, the plan is seldom better
+PAYS = 0.02  # relative fall of the cost that makes another round worth while
+
+
+def polish(search: Search, point: Point, rounds: int, best: Point | None = None) -> Point:
+    """Release every valve switch by a few nodes and round again, at most `rounds` times and as
+    long as the cost falls; `best` is a plan that has been through this."""
+    for _ in range(rounds):
+        better = fix(search, Point(move(search, point).Y), max_iter=search.at_most(ENOUGH))
+        if not better.solved or (best and better.objective >= (1 - PAYS) * best.objective):
+            break
+        point = best = better
+    return best or fix(search, point)
+
+
+def switching(model: Model, plan: Trajectory) -> dict[str, float | int]:
+    """How often valves switch in a plan, and the shortest time between two switches of one [s]."""
+    count, dwell = 0, np.inf
+    for quantity in model.inputs.values():
+        if not quantity.binary:
+            continue
+        at = plan.time[np.flatnonzero(np.diff(plan[quantity.name]))]
+        count += len(at)
+        dwell = min(dwell, np.diff(at).min(initial=np.inf))
+    shortest = float(dwell) if np.isfinite(dwell) else float(plan.time[-1] - plan.time[0])
+    return {"switches": count, "shortest_dwell_s": shortest}

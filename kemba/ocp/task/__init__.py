@@ -1,0 +1,1 @@
+"""What a motion should do: tasks, their requirements, costs and options."""

@@ -1,0 +1,148 @@
+"""From a task's names to wishes on a model's quantities, every mistake at its line."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+
+import casadi as ca
+
+from kemba.config import Document
+from kemba.config.document import Location, written
+from kemba.errors import ConfigErrors, KembaError, suggest
+from kemba.model import Model
+from kemba.ocp.task.options import cost_errors, option_errors
+from kemba.ocp.task.task import Bound, Goal, Task
+from kemba.quantity import Quantity, to_si
+
+# `rest`: every rate is zero; `settled`: every state of an effect is where it comes to rest
+SPECIAL = ("rest", "settled")
+MOMENTS = {"start": 0.0, "middle": 0.5, "end": 1.0}
+
+
+@dataclass(frozen=True)
+class Wish:
+    """lower <= quantity <= upper at one moment (fraction of the nodes) or, at None, throughout."""
+
+    location: Location
+    quantity: Quantity
+    at: float | None
+    lower: float
+    upper: float
+
+    @property
+    def text(self) -> str:
+        """Where the task asks for it, as people write it: `goals.apex`."""
+        return written(self.location)
+
+    def node(self, nodes: int) -> int:
+        """The node at which it holds."""
+        return round((self.at or 0.0) * nodes)
+
+
+def quantities(model: Model) -> dict[str, Quantity]:
+    """Everything a task may speak of: coordinates, rates, ports, states, inputs, forces."""
+    mechanism = model.mechanism
+    own = [*mechanism.coordinates, *mechanism.velocities]
+    ports = [q for p in mechanism.ports.values() for q in (p.quantity, p.rate)]
+    groups = (model.states, model.inputs, model.forces)
+    named = [q for group in groups for q in group.values()]
+    return {q.name: q for q in (*ports, *own, *named)}
+
+
+def quantity_expression(model: Model, name: str) -> ca.SX:
+    """The quantity as an expression of the node's q, v, s, lam, u."""
+    node, mechanism = model.node, model.mechanism
+    groups = [
+        (mechanism.coordinates, node.q),
+        (mechanism.velocities, node.v),
+        (model.states.values(), node.s),
+        (model.forces.values(), node.lam),
+        (model.inputs.values(), node.u),
+    ]
+    for group, symbol in groups:
+        for i, quantity in enumerate(group):
+            if quantity.name == name:
+                return symbol[i]
+    return node.outputs[name]
+
+
+def resolve(task: Task, model: Model, document: Document) -> list[Wish]:
+    """All wishes of a task. Raises ConfigErrors with every wrong name, unit or range, of its
+    costs and solver options too."""
+    known = quantities(model)
+    wishes: list[Wish] = []
+    errors: list[KembaError] = []
+    for location, pattern, at, bound in _asked(task):
+        try:
+            for quantity in _matching(pattern, known, model):
+                wishes.append(_wish(task, location, quantity, at, bound))
+        except KembaError as error:
+            place = (*location, "quantity") if isinstance(bound, Goal) else location
+            errors.append(document.error(place, f"{written(place)}: {error.what}", hint=error.hint))
+        except ValueError as error:
+            errors.append(document.error(location, f"{written(location)}: {error}"))
+    errors += cost_errors(task.cost, document)
+    errors += option_errors(task.solver.options, document)
+    if errors:
+        raise ConfigErrors(errors)
+    return wishes
+
+
+Asked = tuple[Location, str, float | None, Bound | Goal]
+
+
+def _asked(task: Task) -> Iterator[Asked]:
+    for side, at in (("start", 0.0), ("end", 1.0)):
+        for name, bound in getattr(task, side).items():
+            yield (side, name), name, at, bound
+    for name, bound in task.bounds.items():
+        yield ("bounds", name), name, None, bound
+    for name, goal in task.goals.items():
+        at = goal.at if isinstance(goal.at, float | int) else MOMENTS[goal.at]
+        yield ("goals", name), goal.quantity, float(at), goal
+
+
+def _matching(pattern: str, known: dict[str, Quantity], model: Model) -> list[Quantity]:
+    if pattern == "rest":
+        return list(model.mechanism.velocities)
+    if pattern == "settled":
+        return list(model.states.values())
+    found = [q for name, q in known.items() if fnmatchcase(name, pattern)]
+    if not found:
+        hint = suggest(pattern, (*known, *SPECIAL))
+        raise KembaError("", f"unknown quantity '{pattern}'", hint=hint)
+    return found
+
+
+def _wish(
+    task: Task, location: Location, quantity: Quantity, at: float | None, bound: Bound | Goal
+) -> Wish:
+    if location[-1] in SPECIAL:
+        if bound.equals is not True and bound.equals != 1:
+            raise ValueError(f"'{location[-1]}' is either true or left out")
+        value = 0.0 if location[-1] == "rest" else quantity.value
+        return Wish(location, quantity, at, value, value)
+    if bound.equals is not None:
+        if bound.at_least is not None or bound.at_most is not None:
+            raise ValueError("'equals' does not go with 'at_least' or 'at_most'")
+        value = _number(task, bound.equals, quantity)
+        return Wish(location, quantity, at, value, value)
+    lower = -math.inf if bound.at_least is None else _number(task, bound.at_least, quantity)
+    upper = math.inf if bound.at_most is None else _number(task, bound.at_most, quantity)
+    if lower == -math.inf and upper == math.inf:
+        raise ValueError("asks for nothing; 'equals', 'at_least' or 'at_most' was expected")
+    if lower > upper:
+        raise ValueError(f"at_least {lower:g} is above at_most {upper:g} {quantity.unit}")
+    return Wish(location, quantity, at, lower, upper)
+
+
+def _number(task: Task, value: float | str, quantity: Quantity) -> float:
+    if value in ("height", "distance"):
+        number = getattr(task, str(value))
+        if number is None:
+            raise ValueError(f"refers to '{value}', which the task does not give")
+        return float(number)
+    return to_si(value, quantity.unit)

@@ -1,0 +1,82 @@
+"""What a node's vector holds: q, v, s, u, lam, h, scaled, possibly of half a robot."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from kemba.model import Model
+from kemba.ocp.transcription.symmetry import Reduction
+from kemba.quantity import Quantity
+
+STEP = 0.005  # s; scale of the steps, the same for every grid so that all share their code
+GROUPS = ("q", "v", "s", "u", "lam", "h")
+
+
+class Layout:
+    """Slices, scales and bounds of y = [q, v, s, u, lam, h] in half coordinates.
+
+    `slices` and `quantities` by group; `scale`, `lower`, `upper` (n,): physical = scale * y, the
+    bounds are on y.
+    """
+
+    def __init__(self, model: Model, reduction: Reduction, step: float, variation: float) -> None:
+        mechanism = model.mechanism
+        h = Quantity("step", "s", step * (1 - variation), step * (1 + variation), STEP)
+        full: dict[str, Iterable[Quantity]] = {
+            "q": mechanism.coordinates,
+            "v": mechanism.velocities,
+            "s": model.states.values(),
+            "u": model.inputs.values(),
+            "lam": model.forces.values(),
+            "h": (h,),
+        }
+        self.reduction = reduction
+        self.quantities = {g: self._kept(g, list(full[g])) for g in GROUPS}
+        self.slices: dict[str, slice] = {}
+        start = 0
+        for group in GROUPS:
+            stop = start + len(self.quantities[group])
+            self.slices[group] = slice(start, stop)
+            start = stop
+        listed = [q for group in GROUPS for q in self.quantities[group]]
+        self.size = start
+        self.scale = np.array([q.scale for q in listed])
+        self.lower = np.array([q.lower for q in listed]) / self.scale
+        self.upper = np.array([q.upper for q in listed]) / self.scale
+        inputs, first = self.quantities["u"], self.slices["u"].start
+        self.binary = [first + i for i, q in enumerate(inputs) if q.binary]
+
+    def _matrix(self, group: str) -> np.ndarray:
+        if group == "h":
+            return np.eye(1)
+        return self.reduction.B["q" if group == "v" else group]
+
+    def _kept(self, group: str, full: list[Quantity]) -> list[Quantity]:
+        matrix = self._matrix(group)
+        return [full[int(np.argmax(np.abs(matrix[:, j])))] for j in range(matrix.shape[1])]
+
+    def half(self, y: Any, group: str) -> Any:
+        """Physical half values of a group: of a symbol y (n,), or of rows Y (..., n)."""
+        part = self.slices[group]
+        if isinstance(y, ca.SX):
+            return y[part] * ca.DM(self.scale[part])
+        return y[..., part] * self.scale[part]
+
+    def full(self, y: Any, group: str) -> Any:
+        """Physical values of a group for the whole robot."""
+        if isinstance(y, ca.SX):
+            return ca.mtimes(ca.sparsify(ca.DM(self._matrix(group))), self.half(y, group))
+        return self.half(y, group) @ self._matrix(group).T
+
+    def pack(self, groups: dict[str, np.ndarray]) -> np.ndarray:
+        """Rows Y (..., n) of physical full values per group."""
+        parts = []
+        for group in GROUPS:
+            matrix = self._matrix(group)
+            mean = matrix / np.maximum((matrix**2).sum(axis=0), 1e-300)
+            parts.append(groups[group] @ mean / self.scale[self.slices[group]])
+        return np.concatenate(parts, axis=-1)

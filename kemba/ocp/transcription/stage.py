@@ -1,0 +1,192 @@
+"""One step of implicit Euler as scaled, labelled rows of two neighbouring nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from kemba.model import Model
+from kemba.model.node import Row
+from kemba.ocp.task.costs import COSTS
+from kemba.ocp.transcription.layout import STEP, Layout
+from kemba.ocp.transcription.symmetry import Reduction
+
+ANGLE_ARM = 0.2  # m; turns a moment defect into a force defect
+COST_SCALE = 10.0  # N2.m2.s; makes a plan's cost 0.01 to 10 beside penalties near one
+
+INF = np.inf
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Labelled rows lower <= g <= upper of one kind: defect, pair, sign, limit or wish.
+
+    `unit` and `scale` give the physical size of a violation: scale * g in unit.
+    """
+
+    kind: str
+    g: ca.SX
+    lower: float
+    upper: float
+    labels: tuple[str, ...]
+    units: tuple[str, ...]
+    scales: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Stage:
+    """Symbols and rows of one interval between the nodes y0 and y.
+
+    Parameters: `eps` relaxes the pairs; `weights` = (valve penalty, switching, pair
+    penalty, squared forces).
+    """
+
+    layout: Layout
+    y0: ca.SX
+    y: ca.SX
+    eps: ca.SX
+    weights: ca.SX
+    rows: tuple[Rows, ...]
+    cost: ca.SX
+
+    @property
+    def g(self) -> ca.SX:
+        """All rows (m,)."""
+        return ca.vertcat(*(r.g for r in self.rows))
+
+
+def build_stage(
+    model: Model, layout: Layout, reduction: Reduction, cost: dict[str, float]
+) -> Stage:
+    """The stage of any grid."""
+    y0, y = ca.SX.sym("y0", layout.size), ca.SX.sym("y", layout.size)
+    node, h = model.node, layout.half(y, "h")
+    now = {group: layout.full(y, group) for group in ("q", "v", "s", "u", "lam")}
+    v0, s0 = layout.full(y0, "v"), layout.full(y0, "s")
+    dynamics, rate, pair_a, pair_b, limits = node.residual.call(
+        [
+            now["q"],
+            now["v"],
+            (now["v"] - v0) / h,
+            now["s"],
+            (now["s"] - s0) / h,
+            now["lam"],
+            now["u"],
+            ca.SX(0, 1),
+        ]
+    )
+    eps, weights = ca.SX.sym("eps"), ca.SX.sym("weights", 4)
+    labels = [node.pair_rows[i][0].label for i in reduction.pairs]
+    a_rows = [node.pair_rows[i][0] for i in reduction.pairs]
+    b_rows = [node.pair_rows[i][1] for i in reduction.pairs]
+    a = pair_a[reduction.pairs]
+    b = pair_b[reduction.pairs] / ca.DM([r.scale for r in b_rows])
+    product = a * b
+    rows = (
+        _kinematics(layout, y0, y, h),
+        _momentum(model, layout, reduction, dynamics, h),
+        _rates(model, reduction, rate, h),
+        _rows("pair", product - eps, labels, [r.unit for r in a_rows], -INF, 0.0),
+        _signs(a, y, layout, a_rows, [1.0] * len(a_rows)),
+        _signs(b, y, layout, b_rows, [r.scale for r in b_rows]),
+        _rows(
+            "limit",
+            limits[reduction.limits],
+            [node.limit_rows[i].label for i in reduction.limits],
+            ["1"] * len(reduction.limits),
+            0.0,
+            INF,
+        ),
+    )
+    objective = sum(w * COSTS[name](model, now["u"], h) for name, w in cost.items())
+    u, u0 = y[layout.binary], y0[layout.binary]
+    objective = (
+        objective / COST_SCALE
+        + weights[0] * ca.sum1(u * (1 - u))
+        + weights[1] * ca.sumsqr(u - u0)
+        + weights[2] * ca.sum1(product)
+        + weights[3] * ca.sumsqr(y[layout.slices["lam"]]) * h / STEP
+    )
+    kept = tuple(r for r in rows if r.g.numel())
+    return Stage(layout, y0, y, eps, weights, kept, ca.densify(ca.SX(objective)))
+
+
+def _rows(
+    kind: str,
+    g: ca.SX,
+    labels: Sequence[str],
+    units: Sequence[str],
+    lower: float = 0.0,
+    upper: float = 0.0,
+    scales: Iterable[float] | None = None,
+) -> Rows:
+    scales = tuple(scales) if scales is not None else (1.0,) * len(labels)
+    return Rows(kind, ca.SX(g), lower, upper, tuple(labels), tuple(units), scales)
+
+
+def _kinematics(layout: Layout, y0: ca.SX, y: ca.SX, h: ca.SX) -> Rows:
+    kept = layout.quantities["q"]
+    scale = [q.scale for q in kept]
+    g = (layout.half(y, "q") - layout.half(y0, "q") - h * layout.half(y, "v")) / ca.DM(scale)
+    return _rows(
+        "defect", g, [f"kinematics:{q.name}" for q in kept], [q.unit for q in kept], scales=scale
+    )
+
+
+def _momentum(
+    model: Model, layout: Layout, reduction: Reduction, dynamics: ca.SX, h: ca.SX
+) -> Rows:
+    """Equations of motion times the step, projected on the half robot (virtual work)."""
+    kept, rows = layout.quantities["q"], model.node.dynamics_rows
+    B = ca.sparsify(ca.DM(reduction.B["q"]))
+    scale = [r.scale * (1.0 if r.unit == "N" else ANGLE_ARM) for r in rows]
+    g = ca.mtimes(B.T, dynamics / ca.DM(scale)) * h / STEP
+    units = ["N" if q.unit == "m" else "N.m" for q in kept]
+    size = [model.mechanism.weight * (1.0 if unit == "N" else ANGLE_ARM) for unit in units]
+    return _rows("defect", g, [f"dynamics:{q.name}" for q in kept], units, scales=size)
+
+
+def _rates(model: Model, reduction: Reduction, rate: ca.SX, h: ca.SX) -> Rows:
+    rows = [model.node.rate_rows[i] for i in reduction.rate]
+    scale = [r.scale for r in rows]
+    g = h * rate[reduction.rate] / ca.DM(scale) if rows else ca.SX(0, 1)
+    units = [r.unit.removesuffix(".s-1") for r in rows]
+    return _rows("defect", g, [r.label for r in rows], units, scales=scale)
+
+
+def _signs(
+    g: ca.SX, y: ca.SX, layout: Layout, rows: Sequence[Row], scales: Sequence[float]
+) -> Rows:
+    """Rows g >= 0, except where g is a variable whose own bound says so."""
+    kept = [i for i in range(g.numel()) if not _bounded_below(g[i], y, layout)]
+    return _rows(
+        "sign",
+        g[kept],
+        [rows[i].label for i in kept],
+        [rows[i].unit for i in kept],
+        0.0,
+        INF,
+        [scales[i] for i in kept],
+    )
+
+
+def as_variable(g: ca.SX, y: ca.SX) -> tuple[int, float, float] | None:
+    """(index, factor, offset) where g = factor * y[index] + offset, else None."""
+    jacobian = ca.jacobian(g, y)
+    if jacobian.nnz() != 1 or ca.symvar(jacobian):
+        return None
+    factor = float(ca.SX(jacobian.nz[0]))
+    index = jacobian.sparsity().get_triplet()[1][0]
+    offset = float(ca.evalf(ca.substitute(g, y, ca.SX.zeros(y.numel()))))
+    return index, factor, offset
+
+
+def _bounded_below(g: ca.SX, y: ca.SX, layout: Layout) -> bool:
+    variable = as_variable(g, y)
+    if variable is None:
+        return False
+    index, factor, offset = variable
+    return factor > 0 and factor * float(layout.lower[index]) + offset >= 0

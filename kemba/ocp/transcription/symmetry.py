@@ -1,0 +1,194 @@
+"""Mirror symmetry: a level task on a symmetric model needs only half of the variables."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from kemba.model import Model, Node
+from kemba.ocp.task.requirement import Wish, quantity_expression
+
+Matrix = np.ndarray
+
+
+@dataclass(frozen=True)
+class Reduction:
+    """full = B half for q (and v, a), s, lam, u, and the rows that the half problem keeps."""
+
+    B: dict[str, Matrix]
+    rate: list[int]
+    pairs: list[int]
+    limits: list[int]
+    symmetric: bool
+
+    def expand(self, group: str, half: Matrix) -> Matrix:
+        """Full values (..., n) of half values (..., nh)."""
+        return np.asarray(np.asarray(half) @ self.B[group].T)
+
+    def restrict(self, group: str, full: Matrix) -> Matrix:
+        """Half values (..., nh) of symmetric full values (..., n)."""
+        b = self.B[group]
+        return np.asarray(np.asarray(full) @ (b / np.maximum((b**2).sum(axis=0), 1e-300)))
+
+
+def whole(node: Node) -> Reduction:
+    """No reduction: every variable, every row."""
+    sizes = {"q": node.q, "s": node.s, "lam": node.lam, "u": node.u}
+    return Reduction(
+        {name: np.eye(symbol.numel()) for name, symbol in sizes.items()},
+        list(range(node.rate.numel())),
+        list(range(node.pair_a.numel())),
+        list(range(node.limits.numel())),
+        False,
+    )
+
+
+def mirror_names(model: Model) -> dict[str, str]:
+    """Mirror image of every variable by column name, "-" prefixed where the sign turns.
+
+    Empty for a mechanism without a mirror, or with an effect on one leg only.
+    """
+    legs = model.mechanism.legs
+    names = dict(model.mechanism.mirror)
+    if not names:
+        return {}
+    other: dict[str | None, str | None] = {legs[0]: legs[1], legs[1]: legs[0], None: None}
+    groups = (model.states, model.inputs, model.forces)
+    quantities = {key: q for group in groups for key, q in group.items()}
+    for instance in model.instances:
+        for role in ("states", "inputs", "forces"):
+            for (leg, symbol), quantity in instance.variables(role).items():
+                image = instance.effect.mirror.get(symbol, symbol)
+                key = (other[leg], image.lstrip("-"))
+                if key not in quantities:
+                    return {}
+                names[quantity.name] = "-" * image.startswith("-") + quantities[key].name
+    rates = {v.name: _rate_image(model, i, names) for i, v in enumerate(model.mechanism.velocities)}
+    return {**names, **rates}
+
+
+def _rate_image(model: Model, index: int, names: Mapping[str, str]) -> str:
+    mechanism = model.mechanism
+    image = names[mechanism.coordinates[index].name]
+    position = [c.name for c in mechanism.coordinates].index(image.lstrip("-"))
+    return "-" * image.startswith("-") + mechanism.velocities[position].name
+
+
+def find_symmetry(model: Model) -> Reduction | None:
+    """The half problem of a mirror-symmetric model, or None. Never assumed: the declared mirror
+    is tried on the residual at random points."""
+    names = mirror_names(model)
+    if not names:
+        return None
+    images = image_matrices(model)
+    if not _residual_is_symmetric(model, images):
+        return None
+    first = model.mechanism.legs[0]
+
+    def kept(labels: list[str]) -> list[int]:
+        others = [leg for leg in model.mechanism.legs if leg != first]
+        return [i for i, label in enumerate(labels) if not any(leg in label for leg in others)]
+
+    node = model.node
+    return Reduction(
+        {name: _basis(matrix) for name, matrix in images.items()},
+        kept([row.label for row in node.rate_rows]),
+        kept([row.label for row, _ in node.pair_rows]),
+        kept([row.label for row in node.limit_rows]),
+        True,
+    )
+
+
+def image_matrices(model: Model) -> dict[str, Matrix]:
+    """The mirror as signed permutations of q, s, lam and u; the model must have one."""
+    names = mirror_names(model)
+    groups = {
+        "q": [c.name for c in model.mechanism.coordinates],
+        "s": [q.name for q in model.states.values()],
+        "lam": [q.name for q in model.forces.values()],
+        "u": [q.name for q in model.inputs.values()],
+    }
+    return {name: _image_matrix(columns, names) for name, columns in groups.items()}
+
+
+def _image_matrix(columns: list[str], names: Mapping[str, str]) -> Matrix:
+    matrix = np.zeros((len(columns), len(columns)))
+    for i, column in enumerate(columns):
+        image = names[column]
+        matrix[columns.index(image.lstrip("-")), i] = -1.0 if image.startswith("-") else 1.0
+    return matrix
+
+
+def _basis(image: Matrix) -> Matrix:
+    """Columns that span the symmetric subspace: each variable with its image, once."""
+    columns: list[Matrix] = []
+    for i in range(len(image)):
+        column = np.sign(np.eye(len(image))[:, i] + image[:, i])
+        if np.any(column) and not any(np.array_equal(np.abs(column), np.abs(c)) for c in columns):
+            columns.append(column)
+    return np.array(columns).T if columns else np.zeros((len(image), 0))
+
+
+def _residual_is_symmetric(model: Model, images: Mapping[str, Matrix]) -> bool:
+    residual, rng = model.node.residual, np.random.default_rng(0)
+    standing = np.array([model.mechanism.standing[c.name] for c in model.mechanism.coordinates])
+    for _ in range(3):
+        draw = {key: rng.uniform(0.1, 1.0, len(image)) for key, image in images.items()}
+        q = standing + 0.1 * draw["q"]
+        v, a = rng.normal(size=len(q)), rng.normal(size=len(q))
+        s = draw["s"] * [x.scale for x in model.states.values()]
+        sd = draw["s"][::-1].copy()
+        lam, u = draw["lam"] * 50.0, draw["u"]
+        here = residual(q, v, a, s, sd, lam, u, [])
+        m = images
+        motion = (m["q"] @ q, m["q"] @ v, m["q"] @ a)
+        there = residual(*motion, m["s"] @ s, m["s"] @ sd, m["lam"] @ lam, m["u"] @ u, [])
+        dynamics = np.allclose(m["q"] @ np.array(here[0]).ravel(), np.array(there[0]).ravel())
+        rates = np.allclose(m["s"] @ np.array(here[1]).ravel(), np.array(there[1]).ravel())
+        pairs = np.allclose(
+            np.sort((np.array(here[2]) * np.array(here[3])).ravel()),
+            np.sort((np.array(there[2]) * np.array(there[3])).ravel()),
+        )
+        limits = np.allclose(
+            np.sort(np.array(here[4]).ravel()), np.sort(np.array(there[4]).ravel())
+        )
+        if not (dynamics and rates and pairs and limits):
+            return False
+    return True
+
+
+def wishes_are_symmetric(model: Model, wishes: Sequence[Wish]) -> bool:
+    """Whether every wish has its mirror image among the wishes."""
+    return len(mirrored_wishes(model, wishes)) == len(wishes)
+
+
+def mirrored_wishes(model: Model, wishes: Sequence[Wish]) -> list[Wish]:
+    """The wishes that have their mirror image among the wishes, tried at a random point."""
+    images = image_matrices(model)
+    names = list(dict.fromkeys(w.quantity.name for w in wishes))
+    node = model.node
+    values = ca.Function(
+        "values",
+        [node.q, node.v, node.s, node.lam, node.u],
+        [ca.vertcat(*(quantity_expression(model, name) for name in names))],
+    )
+    rng = np.random.default_rng(1)
+    q = [model.mechanism.standing[c.name] for c in model.mechanism.coordinates]
+    draw = {k: rng.uniform(0.1, 1.0, len(m)) for k, m in images.items()}
+    point = {**draw, "q": q + 0.1 * draw["q"], "v": rng.normal(size=len(q))}
+    image = {k: images.get(k, images["q"]) @ x for k, x in point.items()}
+    order = ("q", "v", "s", "lam", "u")
+    here = np.array(values(*(point[k] for k in order))).ravel()
+    there = np.array(values(*(image[k] for k in order))).ravel()
+    asked = {(names.index(w.quantity.name), w.at, w.lower, w.upper) for w in wishes}
+
+    def has_image(w: Wish) -> bool:
+        value = there[names.index(w.quantity.name)]
+        same = {(i, w.at, w.lower, w.upper) for i in np.flatnonzero(np.isclose(here, value))}
+        turned = {(i, w.at, -w.upper, -w.lower) for i in np.flatnonzero(np.isclose(here, -value))}
+        return bool(asked & (same | turned))
+
+    return [w for w in wishes if has_image(w)]

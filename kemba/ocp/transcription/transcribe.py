@@ -1,0 +1,159 @@
+"""A task on a model becomes a nonlinear program: grid, bounds, rows, and what each one means."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from kemba.model import Model
+from kemba.ocp.nlp.blocks import Block, BlockProblem
+from kemba.ocp.task.requirement import Wish, quantity_expression
+from kemba.ocp.task.task import Task
+from kemba.ocp.transcription.layout import GROUPS, STEP, Layout
+from kemba.ocp.transcription.stage import INF, Rows, Stage, as_variable, build_stage
+from kemba.ocp.transcription.symmetry import Reduction
+
+WishBlock = tuple[Block, Rows, list[int]]  # with the nodes at which its rows hold
+
+
+@dataclass(frozen=True)
+class Meaning:
+    """What a row of the program says: kind, label, node, and the size of a violation."""
+
+    kind: str
+    label: str
+    unit: str
+    scale: float
+    node: int
+
+
+class Transcription:
+    """The program of one task on one grid.
+
+    Variables: Y (nodes + 1, n) row by row, `layout` tells what is where; node 0 has no inputs.
+    `lower`, `upper` bound the variables, `g_lower`, `g_upper` the rows; `meanings` names them.
+    """
+
+    def __init__(
+        self, model: Model, task: Task, wishes: Sequence[Wish], reduction: Reduction, nodes: int
+    ) -> None:
+        self.model, self.task, self.wishes, self.nodes = model, task, wishes, nodes
+        self.reduction = reduction
+        self.layout = Layout(model, reduction, task.duration / nodes, task.step_variation)
+        self.stage: Stage = build_stage(model, self.layout, reduction, task.cost)
+        n = self.layout.size
+        self.shape = (nodes + 1, n + self.extra_columns())
+        self.lower, self.upper = np.zeros(self.shape), np.zeros(self.shape)
+        self.lower[:, :n], self.upper[:, :n] = self.layout.lower, self.layout.upper
+        self._rest_before_start()
+        stage = self.stage
+        index = np.arange((nodes + 1) * self.shape[1]).reshape(self.shape)
+        moments = self.wish_blocks(index)
+        pairs = np.hstack([index[:-1, :n], index[1:, :n]])
+        both, p = ca.vertcat(stage.y0, stage.y), ca.vertcat(stage.eps, stage.weights)
+        blocks = [Block(both, stage.g, stage.cost, pairs)]
+        meanings = [m for k in range(1, nodes + 1) for r in stage.rows for m in _meanings(r, k)]
+        g_bounds = [(r.lower, r.upper) for r in stage.rows for _ in r.labels] * nodes
+        for block, rows, where in moments:
+            blocks.append(block)
+            meanings += [m for k in where for m in _meanings(rows, k)]
+            g_bounds += [(rows.lower, rows.upper)] * len(where)
+        self.meanings = meanings
+        self.g_lower, self.g_upper = (np.array(b) for b in zip(*g_bounds, strict=True))
+        self.problem = BlockProblem(blocks, index.size, p, worth_compiling=True)
+
+    def _rest_before_start(self) -> None:
+        """Node 0 has no interval before it: its inputs and forces are dummies at zero."""
+        for group in ("u", "lam"):
+            part = self.layout.slices[group]
+            self.lower[0, part] = self.upper[0, part] = 0.0
+        part = self.layout.slices["h"]
+        self.lower[0, part] = self.upper[0, part] = self.task.duration / self.nodes / STEP
+
+    def extra_columns(self) -> int:
+        """Columns of Y behind the layout's own, kept at zero unless `wish_blocks` frees them."""
+        return 0
+
+    def wish_blocks(self, index: np.ndarray) -> list[WishBlock]:
+        """Wishes on plain variables tighten their bounds; the others become rows at nodes."""
+        blocks = (self.hard(wish, g, where, index) for wish, g, where in self.wish_expressions())
+        return [block for block in blocks if block is not None]
+
+    def hard(self, wish: Wish, g: ca.SX, where: list[int], index: np.ndarray) -> WishBlock | None:
+        """The rows of a wish that holds exactly; None where tighter bounds do it."""
+        variable = as_variable(g, self.stage.y)
+        if variable is not None:
+            self._tighten(where, variable, wish)
+            return None
+        rows = _wish_row(g, wish)
+        at = index[where, : self.layout.size]
+        return Block(self.stage.y, rows.g, ca.SX(0), at), rows, where
+
+    def wish_expressions(self) -> Iterator[tuple[Wish, ca.SX, list[int]]]:
+        """Every wish as an expression of the stage's y and the nodes at which it holds; those that
+        symmetry grants or repeats are left out."""
+        full = {g: ca.densify(self.layout.full(self.stage.y, g)) for g in GROUPS if g != "h"}
+        node = self.model.node
+        symbols = {"q": node.q, "v": node.v, "s": node.s, "u": node.u, "lam": node.lam}
+        values = [full[name] for name in symbols]
+        seen: set[tuple[object, ...]] = set()
+        for wish in self.wishes:
+            expression = quantity_expression(self.model, wish.quantity.name)
+            g = ca.substitute([expression], list(symbols.values()), values)[0]
+            g = ca.SX(ca.cse(ca.densify(g)))
+            key = (wish.location, wish.at, str(g), wish.lower, wish.upper)
+            if ca.jacobian(g, self.stage.y).nnz() == 0 or key in seen:
+                continue
+            seen.add(key)
+            # inputs and forces act on the interval before a node, so the first node has none
+            acts = ca.depends_on(expression, ca.vertcat(node.u, node.lam))
+            where = list(range(int(acts), self.nodes + 1))
+            yield wish, g, where if wish.at is None else [wish.node(self.nodes)]
+
+    def _tighten(self, where: list[int], variable: tuple[int, float, float], wish: Wish) -> None:
+        index, factor, offset = variable
+        ends = sorted(((wish.lower - offset) / factor, (wish.upper - offset) / factor))
+        self.lower[where, index] = np.maximum(self.lower[where, index], ends[0])
+        self.upper[where, index] = np.minimum(self.upper[where, index], ends[1])
+
+    @property
+    def variables(self) -> int:
+        """Number of free variables."""
+        return int(np.sum(self.lower < self.upper))
+
+    @property
+    def constraints(self) -> int:
+        """Number of rows."""
+        return len(self.g_lower)
+
+    def h(self, Y: np.ndarray) -> np.ndarray:
+        """Steps [s] (nodes,)."""
+        return np.asarray(self.layout.half(Y, "h"))[1:, 0]
+
+    def times(self, Y: np.ndarray) -> np.ndarray:
+        """Times [s] of the nodes, from 0."""
+        return np.concatenate([[0.0], np.cumsum(self.h(Y))])
+
+
+def _wish_row(g: ca.SX, wish: Wish) -> Rows:
+    scale = {"m": 0.1, "m.s-1": 1.0, "rad": 0.2}.get(wish.quantity.unit, 1.0)
+    label = f"{wish.text}:{wish.quantity.name}"
+    return Rows(
+        "wish",
+        g / scale,
+        wish.lower / scale if wish.lower > -INF else -INF,
+        wish.upper / scale if wish.upper < INF else INF,
+        (label,),
+        (wish.quantity.unit,),
+        (scale,),
+    )
+
+
+def _meanings(rows: Rows, node: int) -> list[Meaning]:
+    return [
+        Meaning(rows.kind, label, unit, scale, node)
+        for label, unit, scale in zip(rows.labels, rows.units, rows.scales, strict=True)
+    ]

@@ -1,0 +1,1 @@
+"""Plans executed on the plant: controller, replays, repeats, sensors."""

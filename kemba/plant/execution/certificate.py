@@ -1,0 +1,45 @@
+"""What a plan is worth: its replay on the same model, and its execution on the full plant."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from kemba.errors import KembaError
+from kemba.model import Model, load_model
+from kemba.plant.execution.controller import execute
+from kemba.plant.execution.replay import Replay, ends_standing, replay
+from kemba.trajectory import Trajectory
+
+PLANT = "plant"
+SETTLE = 0.3  # s; the last commands are held before a landing is judged
+
+
+def replays(
+    model: Model, plan: Trajectory, controller: Trajectory, plant: str | Model | None = PLANT
+) -> dict[str, Any]:
+    """The entries `replay` and `plant_replay` of the certificate.
+
+    On the plant a plan that ends standing, with its valves closed, has a moment to come to rest
+    before its landing is judged. `plant_replay` is None without a plant; either is None where a
+    plan that was not solved cannot even be started.
+    """
+    full = load_model(plant) if isinstance(plant, str) else plant
+    rest = SETTLE if ends_standing(model, plan) and _closed(controller) else 0.0
+    return {
+        "replay": _tried(lambda: replay(model, plan)),
+        "plant_replay": full
+        and _tried(lambda: execute(controller, full, extra=rest).against(full, plan)),
+    }
+
+
+def _closed(controller: Trajectory) -> bool:
+    """Whether the last command leaves every valve closed: with one open the robot would go on."""
+    return not any(controller[name][-1] for name in controller.names if "/valve/" in name)
+
+
+def _tried(attempt: Callable[[], Replay]) -> dict[str, Any] | None:
+    try:
+        return attempt().summary()
+    except KembaError:
+        return None

@@ -1,0 +1,31 @@
+"""The plant that stands for a plan's own robot: full pneumatics, all else as the planner has it."""
+
+from __future__ import annotations
+
+from kemba.effects import Effect
+from kemba.effects.catalogue import CHAMBERS
+from kemba.effects.mechanics.load import Payload
+from kemba.model import Model, build_model, load_spec
+
+PLAIN = "planning"
+
+
+def counterpart(
+    model: str, payload: float = 0.0, supply: float | None = None, plant: str = "plant"
+) -> Model:
+    """The model YAML `plant` with the robot and the own effects of the planning model `model`.
+
+    Own is what `model` has and the shipped planning model has not, unless it is air: chambers,
+    and what the plant itself describes, stay the plant's. `payload` [kg], `supply` [Pa] are the
+    task's. Raises KembaError as `load_model` does.
+    """
+    spec, own = load_spec(plant), load_spec(model)
+    plain: list[Effect] = [*load_spec(PLAIN).effects]
+    mine: list[Effect] = [e for e in own.effects if e not in plain]
+    theirs: list[Effect] = [e for e in spec.effects if e not in plain]
+    theirs += [e for make in CHAMBERS.values() for e in make()]
+    fixed = {e.name for e in theirs}
+    extra = [e for e in mine if e.moves and e.name not in fixed]
+    extra += [Payload(m=payload)] if payload else []
+    spec = spec.model_copy(update={"robot": own.robot or spec.robot})
+    return build_model(spec, extra, supply or own.supply)

@@ -1,0 +1,96 @@
+"""Executing a run several times, as on hardware, and writing the logs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kemba.config import load_yaml
+from kemba.effects.mechanics.load import Payload
+from kemba.errors import KembaError
+from kemba.model import Model, load_model
+from kemba.plant.execution.controller import Execution, Gains, execute, read_controller
+from kemba.plant.execution.replay import Replay
+from kemba.plant.execution.sensors import Sensors, take_log
+from kemba.plant.simulation.valves import scattered
+from kemba.quantity import to_si
+from kemba.trajectory import Trajectory
+
+VALVE_SCATTER = 1e-4  # s, 1 sigma of every switching on hardware; Fig. 3 shows less than 1 ms
+
+
+@dataclass(frozen=True)
+class Repeat:
+    """One execution: the log that was written, and how it compares with the plan (None without
+    a plan)."""
+
+    path: Path
+    execution: Execution
+    replay: Replay | None
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The figures of `kemba-opt simulate --json` for this log."""
+        motion = self.execution.trajectory
+        facts = {"log": str(self.path), "apex_m": float(motion["body/z"].max())}
+        return facts | (self.replay.summary() if self.replay else {})
+
+
+def repeat_run(
+    run: str | Path,
+    model: Model,
+    out: str | Path,
+    count: int = 1,
+    noise: bool = False,
+    seed: int = 0,
+    gains: Gains | None = None,
+) -> list[Repeat]:
+    """Execute the controller of a run `count` times on `model` and write `log-1.csv`, ... to `out`.
+
+    With `noise`, sensors are noisy and the valves scatter; the same `seed` gives the same logs.
+    Raises KembaError when `run` has no controller table.
+    """
+    folder = Path(run)
+    controller = folder / "controller.csv" if folder.is_dir() else folder
+    if not controller.is_file():
+        raise KembaError(str(run), "has no controller.csv", hint="make one with: kemba-opt solve")
+    table = read_controller(controller)
+    plan_file = controller.parent / "trajectory.csv"
+    plan = Trajectory.read(plan_file) if plan_file.is_file() else None
+    repeats = []
+    for number in range(1, count + 1):
+        rng = np.random.default_rng([seed, number])
+        sensors = Sensors.usual() if noise else Sensors()
+        valves = scattered(model, table, VALVE_SCATTER, rng) if noise else None
+        sample = sensors.times(float(table.time[-1]), rng)
+        done = execute(table, model, gains, valves=valves, sample=sample)
+        log = _as_sent(take_log(done.trajectory, sensors, rng, model.effects), table)
+        log.meta |= {"run": number, "repeat_of": controller.parent.name, "plant": model.name}
+        path = Path(out) / f"log-{number}.csv"
+        log.write(path)
+        repeats.append(Repeat(path, done, done.against(model, plan) if plan else None))
+    return repeats
+
+
+def _as_sent(log: Trajectory, table: Trajectory) -> Trajectory:
+    """The log with valves as the table sends them: how late each of them acts no log can show."""
+    row = np.maximum(np.searchsorted(table.time, log.time + 1e-9, side="right") - 1, 0)
+    valves = {
+        header: table[name][row]
+        for header, name in zip(log.headers, log.names, strict=True)
+        if "/valve/" in name and name in table
+    }
+    return log.with_columns(valves)
+
+
+def plant_of(run: str | Path, name: str) -> Model:
+    """The model `name` under the supply and the payload of the task that a run was made for."""
+    file = (Path(run) if Path(run).is_dir() else Path(run).parent) / "task.yaml"
+    task = load_yaml(file).data if file.is_file() else {}
+    payload = to_si(task.get("payload") or 0.0, "kg")
+    supply = task.get("supply")
+    extra = [Payload(m=payload)] if payload else []
+    return load_model(name, extra, None if supply is None else to_si(supply, "Pa"))

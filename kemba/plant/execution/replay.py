@@ -1,0 +1,138 @@
+"""Replay: a plan's own inputs, open loop, on the finely simulated same model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from kemba.model import Model
+from kemba.plant.simulation.commands import Commands, Profile
+from kemba.plant.simulation.simulate import STEP, Run, run
+from kemba.plant.stepping.arrays import Array
+from kemba.trajectory import Trajectory
+
+ON_GROUND = 1e-3  # m; planned feet below this count as standing
+UPRIGHT = 0.35  # rad; a landing with more pitch has failed
+
+
+@dataclass(frozen=True)
+class Replay:
+    """How far an executed plan ends from the plan; errors are executed minus planned.
+
+    `touchdown_error_s` is None when either does not touch down after its apex. `fault`: what is
+    wrong with the landing; none if at the end the feet stand where the plan has them stand, the
+    body is upright, and neither hip nor knee met the ground.
+    """
+
+    apex_error_m: float
+    touchdown_error_s: float | None
+    final_error_m: float
+    fault: str | None
+    trajectory: Trajectory
+
+    @property
+    def landed(self) -> bool:
+        """Whether nothing is wrong with the landing."""
+        return self.fault is None
+
+    def summary(self) -> dict[str, float | bool | str | None]:
+        """The figures of the certificate."""
+        return {
+            "apex_error_m": self.apex_error_m,
+            "touchdown_error_s": self.touchdown_error_s,
+            "final_error_m": self.final_error_m,
+            "landed": self.landed,
+            "fault": self.fault,
+        }
+
+
+def replay(model: Model, plan: Trajectory, step: float = STEP) -> Replay:
+    """Execute the inputs of `plan` on `model` from the plan's first node.
+
+    Input k of an implicit Euler plan acts on (t[k-1], t[k]]; valves act as planned, without dead
+    time. Raises KembaError when the plan lacks columns of the model.
+    """
+    clock = plan.time - plan.time[0]
+    profiles = {
+        quantity.name: Profile.of(clock[:-1], plan[quantity.name][1:])
+        for quantity in model.inputs.values()
+    }
+    done = run(
+        model, first_row(model, plan), Commands(profiles), float(clock[-1]), step, dead_time=False
+    )
+    return judge(model, plan, clock, done)
+
+
+def first_row(model: Model, plan: Trajectory) -> dict[str, float]:
+    """Coordinates, velocities and effect states at the start of a plan, as far as it has them."""
+    mechanism = model.mechanism
+    listed = [*mechanism.coordinates, *mechanism.velocities, *model.states.values()]
+    names = [q.name for q in listed] + [f"{leg}/piston/x" for leg in mechanism.legs]
+    present = (name for name in names if name in plan and np.isfinite(plan[name][0]))
+    return {name: float(plan[name][0]) for name in present}
+
+
+def judge(model: Model, plan: Trajectory, clock: Array, done: Run) -> Replay:
+    """Compare what was executed with the plan, whose times are `clock` [s] of the execution."""
+    real = done.trajectory
+    planned = int(np.argmax(plan["body/z"]))
+    apex_time, apex = peak(real.time, real["body/z"])
+    was = touchdown(plan, clock, float(clock[planned]), ON_GROUND / 10)
+    now = touchdown(real, real.time, apex_time, 1e-6)
+    impacts = [i.time for i in done.impacts if any("contact:" in label for label in i.labels)]
+    if now is not None:  # the sample grid is coarser than the impact's own time
+        now = min([i for i in impacts if apex_time < i <= now + 1e-9], default=now)
+    final = np.array([real[name][-1] - plan[name][-1] for name in ("body/x", "body/z")])
+    return Replay(
+        apex_error_m=apex - float(plan["body/z"][planned]),
+        touchdown_error_s=None if was is None or now is None else now - was,
+        final_error_m=float(np.hypot(*final)),
+        fault=_fault(model, plan, real, apex_time),
+        trajectory=real,
+    )
+
+
+def peak(time: Array, z: Array) -> tuple[float, float]:
+    """Time [s] and height [m] of the highest point, by the parabola through its neighbours."""
+    i = int(np.argmax(z))
+    if not 0 < i < len(z) - 1:
+        return float(time[i]), float(z[i])
+    c, b, a = np.polynomial.polynomial.polyfit(time[i - 1 : i + 2] - time[i], z[i - 1 : i + 2], 2)
+    shift = -b / (2 * a) if a < 0 else 0.0
+    return float(time[i] + shift), float(c + shift * (b + a * shift))
+
+
+def touchdown(t: Trajectory, clock: Array, after: float, low: float) -> float | None:
+    """The first time [s] after `after` at which a foot in the air comes below `low` [m]."""
+    feet = [t[name] for name in t.names if name.endswith("foot/z")]
+    times = []
+    for z in feet:
+        down = (z <= low) & (clock > after)
+        was_up = np.r_[False, z[:-1] > low]
+        times += clock[down & was_up].tolist()
+    return min(times, default=None)
+
+
+def ends_standing(model: Model, plan: Trajectory) -> list[str]:
+    """The legs on which a plan stands at its end."""
+    return [
+        leg
+        for leg in model.mechanism.legs
+        if f"{leg}/foot/z" not in plan or plan[f"{leg}/foot/z"][-1] <= ON_GROUND
+    ]
+
+
+def _fault(model: Model, plan: Trajectory, real: Trajectory, apex_time: float) -> str | None:
+    standing = ends_standing(model, plan)
+    if not standing:
+        return "the plan ends in the air"
+    if abs(real["body/pitch"][-1]) > UPRIGHT:
+        return "tips over"
+    late = real.time > apex_time
+    for point in ("hip", "knee"):
+        for leg in model.mechanism.legs:
+            if (real[f"{leg}/{point}/z"][late] <= 0.0).any():
+                return f"the {leg} {point} meets the ground"
+    up = [leg for leg in standing if real[f"{leg}/foot/z"][-1] > 5 * ON_GROUND]
+    return f"the {up[0]} foot does not stand" if up else None

@@ -1,0 +1,1 @@
+"""The paper's bench rigs: imposed motion, logs, and what is fitted to them."""

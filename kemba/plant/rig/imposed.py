@@ -1,0 +1,136 @@
+"""A bench piston whose motion is imposed: only the air answers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from kemba.errors import KembaError
+from kemba.model import Model
+from kemba.plant.simulation.commands import SAME_TIME, Commands, Profile
+from kemba.plant.simulation.inputs import Inputs, merged
+from kemba.plant.simulation.valves import delayed
+from kemba.plant.stepping.arrays import Array
+from kemba.plant.stepping.equations import Equations, equations_of
+from kemba.trajectory import Trajectory
+
+Motion = Callable[[Array], tuple[Array, Array]]  # times (m,) -> x [m], v [m/s]
+STEP = 2e-4  # s
+
+
+def drive(
+    model: Model,
+    motion: Motion,
+    valves: Mapping[str, Profile],
+    times: Array,
+    start: Mapping[str, float] | None = None,
+    step: float = STEP,
+    dead_time: bool = True,
+) -> Trajectory:
+    """The force of a bench piston moved as `motion` says, sampled at `times` (m,) [s].
+
+    `valves` are commands as sent, by column name; effect states begin at `start` or at what they
+    settle to with the first commands. Raises KembaError when the model's motion is free.
+    """
+    if not model.mechanism.imposed:
+        raise KembaError(
+            model.name, "its motion is free", hint="use kemba.plant.simulation.simulate"
+        )
+    commands = Commands(dict(valves))
+    acting = delayed(model, dict(valves)) if dead_time else dict(valves)
+    inputs, eq = Inputs(model, commands, acting), equations_of(model)
+    first = float(times[0])
+    shifted = {name: Profile(p.times - first, p.values) for name, p in acting.items()}
+    breaks = Inputs(model, commands, shifted).breaks(float(times[-1]) - first) + first
+    marks = merged(np.asarray(times, dtype=float), breaks)
+    wanted = np.searchsorted(times, marks - SAME_TIME) < np.searchsorted(times, marks + SAME_TIME)
+    u = inputs.update(first, {})
+    s = _settled(model, eq, motion, first, u) if start is None else _given(model, start)
+    rows = []
+    for index, time in enumerate(marks):
+        if index:
+            s = _advance(eq, motion, s, u, float(marks[index - 1]), float(time), step)
+            u = inputs.update(float(time), {})
+        if wanted[index]:
+            rows.append(_row(eq, motion, s, u, inputs.sent(float(time)), float(time)))
+    return _table(model, eq, np.asarray(times, dtype=float), np.array(rows))
+
+
+def _advance(
+    eq: Equations, motion: Motion, s: Array, u: Array, begin: float, end: float, step: float
+) -> Array:
+    count = max(1, int(np.ceil((end - begin) / step - 1e-6)))
+    grid = np.linspace(begin, end, count + 1)
+    x, v = motion(grid)
+    for i in range(count):
+        s = eq.driven(q=x[i], v=v[i], s=s, u=u, q1=x[i + 1], v1=v[i + 1], h=(end - begin) / count)[
+            "s"
+        ].copy()
+    return s
+
+
+def _settled(model: Model, eq: Equations, motion: Motion, time: float, u: Array) -> Array:
+    """Effect states after long rest at the first position and commands."""
+    x, _ = motion(np.array([time]))
+    s = np.array([q.value for q in model.states.values()], dtype=float)
+    for _ in range(800):
+        s = eq.driven(q=x[0], v=0.0, s=s, u=u, q1=x[0], v1=0.0, h=1e-3)["s"].copy()
+    return s
+
+
+def _given(model: Model, start: Mapping[str, float]) -> Array:
+    return np.array([start.get(q.name, q.value) for q in model.states.values()], dtype=float)
+
+
+def _row(eq: Equations, motion: Motion, s: Array, u: Array, sent: Array, time: float) -> Array:
+    x, v = motion(np.array([time]))
+    y = eq.measure(q=x[0], v=v[0], a=0.0, s=s, sd=0.0, lam=0.0, u=u)["y"]
+    return np.concatenate([s, sent, y])
+
+
+def _table(model: Model, eq: Equations, times: Array, rows: Array) -> Trajectory:
+    quantities = [*model.states.values(), *model.inputs.values(), *eq.node.output_quantities]
+    columns: dict[str, Array] = {}
+    for i, quantity in enumerate(quantities):
+        columns.setdefault(quantity.header, rows[:, i])
+    return Trajectory(times, columns)
+
+
+def locked(x: float) -> Motion:
+    """A rod held at `x` [m]."""
+    return lambda t: (np.full(len(t), x), np.zeros(len(t)))
+
+
+def stroke(begin: float, speed: float, after: float, ramp: float, stop: float) -> Motion:
+    """Held at `begin` [m] until `after` [s], then moved at `speed` [m/s] reached within `ramp`
+    [s], until `stop` [m]."""
+    acceleration = speed / ramp
+    reach = begin + 0.5 * acceleration * ramp**2
+
+    def motion(t: Array) -> tuple[Array, Array]:
+        late = np.clip(t - after, 0.0, None)
+        up = np.minimum(late, ramp)
+        x = begin + 0.5 * acceleration * up**2 + speed * (late - up)
+        over = (x - stop) * np.sign(speed) > 0.0
+        return np.where(over, stop, x), np.where(over, 0.0, acceleration * up)
+
+    if (stop - reach) * np.sign(speed) <= 0.0:
+        raise KembaError("rig", f"the stroke is too short for {speed:g} m/s")
+    return motion
+
+
+def hermite(knots: Array, x: Array, v: Array) -> Motion:
+    """Cubic pieces through positions `x` and speeds `v` (k,) at the times `knots` (k,)."""
+    from scipy.interpolate import CubicHermiteSpline
+
+    spline = CubicHermiteSpline(knots, x, v)
+    rate = spline.derivative()
+    return lambda t: (spline(t), rate(t))
+
+
+def followed(log: Trajectory) -> Motion:
+    """The motion of a bench log; its speed is the log's where it has one."""
+    x = log["piston/x"]
+    v = log["piston/v"] if "piston/v" in log else np.gradient(x, log.time)
+    return hermite(log.time, x, v)

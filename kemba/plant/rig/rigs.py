@@ -1,0 +1,167 @@
+"""The paper's bench rigs: what they impose on a piston, from YAML (configs/rigs)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from kemba.plant.rig.imposed import Motion, hermite, locked, stroke
+from kemba.plant.simulation.commands import Profile
+from kemba.plant.stepping.arrays import Array
+from kemba.quantity import Param
+
+STROKE = 0.07  # m
+Length = Annotated[float, Param("m", lower=0.0, upper=STROKE, doc="rod extension")]
+Speed = Annotated[float, Param("m.s-1", lower=0.0, doc="rod speed")]
+Second = Annotated[float, Param("s", lower=0.0, doc="time")]
+Hertz = Annotated[float, Param("Hz", lower=0.0, doc="rate")]
+Pressure = Annotated[float, Param("Pa", lower=0.0, doc="supply pressure")]
+Mode = Literal["extend", "retract", "both", "none"]
+VALVES: dict[str, tuple[float, float]] = {
+    "extend": (1.0, 0.0),
+    "retract": (0.0, 1.0),
+    "both": (1.0, 1.0),
+    "none": (0.0, 0.0),
+}
+# up to what each mode reaches on its own, m/s
+SPEEDS: dict[Mode, tuple[float, ...]] = {
+    "extend": (0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0, 2.25),
+    "retract": (0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0),
+    "both": (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8),
+    "none": (0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0),
+}
+
+
+@dataclass(frozen=True)
+class Test:
+    """One test of a rig: what moves, what is switched, when it is sampled [s]."""
+
+    name: str
+    supply: float
+    motion: Motion
+    valves: dict[str, Profile]
+    times: Array
+    facts: dict[str, Any]
+
+
+class Rig(BaseModel):
+    """What every rig has: supply pressures, logging rate, repetitions."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    name: str
+    notes: str = ""
+    supplies: tuple[Pressure, ...] = (0.7e6,)
+    repeats: int = Field(default=1, ge=1, le=100)
+    rate: Hertz = 2000.0
+
+    def tests(self, rng: np.random.Generator) -> Iterator[Test]:
+        """The tests in order; random ones are drawn from `rng`."""
+        raise NotImplementedError
+
+    def clock(self, duration: float) -> Array:
+        """Sample times [s] of a test."""
+        return np.arange(int(duration * self.rate) + 1) / self.rate
+
+
+class LockedRig(Rig):
+    """A locked rod on a force transducer; one chamber fills or vents (paper, Fig. 3 and 4)."""
+
+    kind: Literal["locked"] = "locked"
+    chamber: Literal["extend", "retract"] = "extend"
+    positions: tuple[Length, ...] = (0.0, STROKE)
+    switch: tuple[Literal["fill", "vent"], ...] = ("fill", "vent")
+    command: Second = 0.02
+    duration: Second = 0.35
+
+    def tests(self, rng: np.random.Generator) -> Iterator[Test]:
+        for supply in self.supplies:
+            for x in self.positions:
+                for switch in self.switch:
+                    steps = [0.0, 1.0] if switch == "fill" else [1.0, 0.0]
+                    valve = Profile(np.array([-1.0, self.command]), np.array(steps))
+                    valves = {f"valve/{self.chamber}": valve}
+                    facts = {"test": "locked", "switch": switch, "position": x}
+                    for number in range(1, self.repeats + 1):
+                        name = f"{switch}-{1e3 * x:.0f}mm-{supply / 1e6:.1f}MPa-{number}"
+                        times = self.clock(self.duration)
+                        yield Test(name, supply, locked(x), valves, times, facts)
+
+
+class DynamometerRig(Rig):
+    """Constant `speeds` in each valve mode (paper, Fig. 5 and 6).
+
+    The opposing piston behind its flow-restricting valve is replaced by what it is for: a rod
+    speed that settles within `ramp`. The chambers have settled before the rod moves.
+    """
+
+    kind: Literal["dynamometer"] = "dynamometer"
+    speeds: dict[Mode, tuple[Speed, ...]] = Field(default_factory=lambda: dict(SPEEDS))
+    ramp: Second = 0.005
+    settle: Second = 0.05
+
+    def tests(self, rng: np.random.Generator) -> Iterator[Test]:
+        for supply in self.supplies:
+            for mode, speeds in self.speeds.items():
+                for speed in speeds:
+                    for number in range(1, self.repeats + 1):
+                        yield self._test(supply, mode, speed, number)
+
+    def _test(self, supply: float, mode: str, speed: float, number: int) -> Test:
+        u_e, u_r = VALVES[mode]
+        valves = {"valve/extend": Profile.constant(u_e), "valve/retract": Profile.constant(u_r)}
+        begin, end, way = (STROKE, 0.0, -1.0) if mode == "retract" else (0.0, STROKE, 1.0)
+        motion = stroke(begin, way * speed, self.settle, self.ramp, end)
+        times = self.clock(self.settle + self.ramp + STROKE / speed)
+        name = f"{mode}-{1e3 * speed:.0f}mms-{supply / 1e6:.1f}MPa-{number}"
+        return Test(name, supply, motion, valves, times, {"test": "dynamometer", "mode": mode})
+
+
+class RandomRig(Rig):
+    """Random valve commands and random motion (paper, Fig. 7).
+
+    Every 1/`frequency` both valves are drawn anew and the rod is at a uniformly random position
+    with a uniformly random speed; cubic pieces lie in between.
+    """
+
+    kind: Literal["random"] = "random"
+    frequency: Hertz = 10.0
+    speed: Speed = 0.6
+    duration: Second = 10.0
+
+    def tests(self, rng: np.random.Generator) -> Iterator[Test]:
+        for supply in self.supplies:
+            for number in range(1, self.repeats + 1):
+                knots = np.arange(int(self.duration * self.frequency) + 2) / self.frequency
+                motion = hermite(knots, *self._states(len(knots), rng))
+                valves = {
+                    f"valve/{chamber}": Profile.of(knots, rng.integers(0, 2, len(knots)))
+                    for chamber in ("extend", "retract")
+                }
+                name = f"random-{supply / 1e6:.1f}MPa-{number}"
+                yield Test(
+                    name, supply, motion, valves, self.clock(self.duration), {"test": "random"}
+                )
+
+    def _states(self, count: int, rng: np.random.Generator) -> tuple[Array, Array]:
+        """Positions and speeds whose cubic pieces stay within the stroke."""
+        x, v = [STROKE / 2], [0.0]
+        inside = np.linspace(0.0, 1.0, 21)
+        while len(x) < count:
+            place, speed = rng.uniform(0.0, STROKE), rng.uniform(-self.speed, self.speed)
+            knots = np.array([0.0, 1.0 / self.frequency])
+            piece = hermite(knots, np.array([x[-1], place]), np.array([v[-1], speed]))
+            path = piece(inside / self.frequency)[0]
+            if path.min() >= 0.0 and path.max() <= STROKE:
+                x.append(place)
+                v.append(speed)
+            elif rng.random() < 0.02:  # a corner without a way out: go back one
+                x, v = (x[:-1], v[:-1]) if len(x) > 1 else (x, v)
+        return np.array(x), np.array(v)
+
+
+AnyRig = Annotated[LockedRig | DynamometerRig | RandomRig, Field(discriminator="kind")]

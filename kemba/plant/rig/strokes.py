@@ -1,0 +1,77 @@
+"""Steady force of a moving piston: F_static and c_d by valve mode and supply (eq. 6 and 7)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from kemba.plant.rig.estimate import Estimate, linear
+from kemba.trajectory import Trajectory
+
+MODES = {(1, 0): "extend", (0, 1): "retract", (1, 1): "both", (0, 0): "none"}
+USED = (0.5, 0.85)  # shares of the way between which chambers have settled and ends are far
+STEADY = 0.03  # deviation of the speed from its median within which a sample counts
+
+
+@dataclass(frozen=True)
+class Stroke:
+    """One steady stroke: valve mode, supply [Pa], speed [m/s] and force [N]."""
+
+    mode: str
+    supply: float
+    speed: float
+    force: float
+
+
+@dataclass(frozen=True)
+class Line:
+    """One row of Table II: F = F_static - c_d v."""
+
+    mode: str
+    supply: float
+    F_static: Estimate
+    c_d: Estimate
+    r2: float
+
+
+def find_stroke(log: Trajectory) -> Stroke | None:
+    """The steady part of a bench log in which the rod moves at one speed in one valve mode."""
+    modes = {
+        (int(a > 0.5), int(b > 0.5))
+        for a, b in zip(log["valve/extend"], log["valve/retract"], strict=True)
+    }
+    x = log["piston/x"]
+    if len(modes) > 1 or np.ptp(x) < 0.01:
+        return None
+    v = log["piston/v"] if "piston/v" in log else np.gradient(x, log.time)
+    moving = np.abs(v) > 0.2 * np.abs(v).max()
+    usual = float(np.median(v[moving]))
+    progress = np.abs(x - x[0]) / float(np.abs(x - x[0]).max())
+    used = moving & (progress > USED[0]) & (progress < USED[1])
+    used &= np.abs(v - usual) < STEADY * abs(usual)
+    if used.sum() < 3:
+        return None
+    mode = MODES[modes.pop()]
+    supply = 0.0 if mode == "none" else float(log.meta.get("supply", 0.7e6))
+    return Stroke(mode, supply, float(v[used].mean()), float(log["piston/F"][used].mean()))
+
+
+def stroke_table(strokes: Iterable[Stroke]) -> list[Line]:
+    """Table II: one line per mode and supply with at least two speeds."""
+    groups: dict[tuple[str, float], list[Stroke]] = {}
+    for stroke in strokes:
+        groups.setdefault((stroke.mode, stroke.supply), []).append(stroke)
+    order = list(MODES.values())
+    lines = []
+    for (mode, supply), group in sorted(
+        groups.items(), key=lambda item: (order.index(item[0][0]), item[0][1])
+    ):
+        v = np.array([stroke.speed for stroke in group])
+        if len(np.unique(np.round(v, 3))) < 2:
+            continue
+        force = np.array([stroke.force for stroke in group])
+        (F_static, c_d), r2 = linear(np.column_stack([np.ones_like(v), -v]), force)
+        lines.append(Line(mode, supply, F_static, c_d, r2))
+    return lines

@@ -1,0 +1,1 @@
+"""From initial values and commands to a simulated trajectory."""

@@ -1,0 +1,1 @@
+"""One step of the plant: equations, contact forces, impacts."""

@@ -1,0 +1,1 @@
+"""Figures of bench logs and rigs."""

@@ -1,0 +1,1 @@
+"""Figures of a robot's motion."""

@@ -1,0 +1,99 @@
+"""What a figure needs to know of the robot: where its points are, and its limits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+
+import casadi as ca
+import numpy as np
+
+from kemba.effects.pneumatics.chamber import Chamber
+from kemba.mechanism import Mechanism, Robot, knee, load_robot
+from kemba.model import Model, build_model, load_spec
+from kemba.plotting.source import Mask
+from kemba.trajectory import Array, Trajectory
+
+OVERTRAVEL = 0.004  # m; a sensor may read this far beyond the stops
+ON_GROUND = 0.01  # m; a foot below this height is taken to stand, for want of its force
+PRESSED = 0.02  # of the weight; more than this on a foot means it stands
+
+
+@dataclass(frozen=True)
+class Machine:
+    """A robot to draw. `limits` by quantity, in SI: levels that a panel shows as lines."""
+
+    robot: Robot
+    mechanism: Mechanism
+    limits: Mapping[str, tuple[float, ...]]
+    places: ca.Function
+
+    def coordinates(self, trajectory: Trajectory) -> Array | None:
+        """Coordinates (rows, n) of the mechanism, or None where columns are missing.
+
+        A knee that is not recorded follows from its piston. Body x and pitch may be missing.
+        """
+        columns = []
+        for quantity in self.mechanism.coordinates:
+            values = self._column(trajectory, quantity.name)
+            if values is None:
+                return None
+            columns.append(values)
+        return np.column_stack(columns)
+
+    def _column(self, trajectory: Trajectory, name: str) -> Array | None:
+        if name in trajectory:
+            return trajectory[name]
+        leg, _, rest = name.partition("/")
+        if rest == "knee/q" and f"{leg}/piston/x" in trajectory:
+            return self._knee(leg, trajectory[f"{leg}/piston/x"])
+        optional = name in ("body/x", "body/pitch")
+        return np.zeros(len(trajectory)) if optional else None
+
+    def _knee(self, leg: str, extension: Array) -> Array:
+        """Knee angles [rad] of piston extensions [m], from a table so fine that none can tell."""
+        table = np.linspace(-OVERTRAVEL, self.mechanism.stroke + OVERTRAVEL, 2001)
+        bend = [knee.flexion(self.robot.leg, x) for x in table]
+        return np.asarray(self.robot.legs[leg].fold * np.interp(extension, table, bend))
+
+    def points(self, coordinates: Array) -> dict[str, Array]:
+        """Places (rows, 2) such as `front/knee` in x and z [m], from coordinates (rows, n)."""
+        values = np.asarray(self.places(coordinates.T)).T
+        names = self.mechanism.points
+        return {name: values[:, 2 * i : 2 * i + 2] for i, name in enumerate(names)}
+
+    def stance(self, trajectory: Trajectory, leg: str) -> Mask:
+        """In which rows (n,) the leg's foot stands: by its force, else by its height."""
+        if f"{leg}/foot/Fz" in trajectory:
+            force = trajectory[f"{leg}/foot/Fz"]
+            return np.asarray(force > PRESSED * self.mechanism.weight)
+        coordinates = self.coordinates(trajectory) if leg in self.mechanism.legs else None
+        if coordinates is None:
+            return np.zeros(len(trajectory), dtype=bool)
+        return np.asarray(self.points(coordinates)[f"{leg}/foot"][:, 1] < ON_GROUND)
+
+
+@lru_cache(maxsize=4)
+def load_machine(model: str = "planning", supply: float | None = None) -> Machine:
+    """The robot of a model YAML (a path or a shipped model), fed with `supply` [Pa] instead of
+    the model's own pressure. Raises KembaError."""
+    spec = load_spec(model)
+    built, robot = build_model(spec, supply=supply), load_robot(spec.robot or "kemba")
+    mechanism = built.mechanism
+    places = ca.Function("places", [mechanism.q], [ca.vertcat(*mechanism.points.values())])
+    return Machine(robot, mechanism, _limits(built), places)
+
+
+def _limits(model: Model) -> dict[str, tuple[float, ...]]:
+    """Stroke, peak torque and steady chamber forces, as far as the model knows them."""
+    known: dict[str, tuple[float, ...]] = {"piston/x": (0.0, model.mechanism.stroke)}
+    for (_, symbol), quantity in model.inputs.items():
+        if symbol == "tau":
+            known["hip/tau"] = (quantity.lower, quantity.upper)
+    for effect in model.effects:
+        if isinstance(effect, Chamber):
+            tables = (effect.F_extend, effect.F_retract)
+            steady = [float(np.interp(model.supply, effect.pressures, t)) for t in tables]
+            known["chamber/F"] = tuple(steady)
+    return known

@@ -1,0 +1,148 @@
+"""The figure of a comparison, one page: where the error is, how much force is missing in time, and
+what that force goes with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure, SubFigure
+
+from kemba.identify.compare.bins import Cell
+from kemba.identify.compare.compare import Comparison
+from kemba.identify.compare.force_profiles import Law
+from kemba.identify.compare.missing_force import Missing
+from kemba.plotting.bands import Band, draw_band
+from kemba.plotting.heat import LEVEL, ROW, add_bar, draw_heat, name_conditions
+from kemba.plotting.style import BLUE, GREY, key_above, paper_figure, paper_style
+from kemba.trajectory import Array
+
+PHASES = ("rest", "stance2", "stance1", "impact", "flight", "moving")
+REGIONS = ("", "in", "mid", "out")
+WIDEST = 26  # columns of one heat map; more are shown in two, one below the other
+BANDS = 3
+Column = tuple[str, str, str]  # phase, mode, region
+
+
+@paper_style
+def plot_comparison(found: Comparison, figure: Figure | None = None) -> Figure:
+    """Heat map by condition (significant cells bold); d(t) with its 95 % band in the run that
+    lacks most; the missing force against what it goes with."""
+    tables = columns_of(found.cells)
+    bands = bands_of(found.missing)
+    panels = panels_of(found.laws)
+    channels = list(dict.fromkeys(c.channel for c in found.cells))
+    heights = [len(channels) * ROW + 3 * LEVEL + 0.3] * len(tables)
+    parts = [sum(heights), 0.85 * len(bands) + 0.35, 1.75 if panels else 0.0]
+    figure = paper_figure(sum(parts), figure=figure)
+    rooms = figure.subfigures(3, 1, height_ratios=[max(p, 0.01) for p in parts], squeeze=False)
+    heat, time, force = rooms[:, 0]
+    _heat(heat, found.cells, channels, tables)
+    _bands(time, bands)
+    _laws(force, panels)
+    return figure
+
+
+def columns_of(cells: Sequence[Cell]) -> list[list[Column]]:
+    """The conditions that were visited, in one table or, when there are many, in two."""
+    order = sorted({(c.phase, c.mode, c.region) for c in cells}, key=place_of)
+    if len(order) <= WIDEST:
+        return [order]
+    half = len(order) / 2
+    cuts = [i for i in range(1, len(order)) if order[i][0] != order[i - 1][0]] or [int(half)]
+    cut = min(cuts, key=lambda i: abs(i - half))
+    return [order[:cut], order[cut:]]
+
+
+def place_of(column: Column) -> tuple[int, str, int]:
+    phase, mode, region = column
+    return PHASES.index(phase) if phase in PHASES else len(PHASES), mode, REGIONS.index(region)
+
+
+def _heat(
+    room: SubFigure, cells: Sequence[Cell], channels: Sequence[str], tables: list[list[Column]]
+) -> None:
+    known = {(c.channel, (c.phase, c.mode, c.region)): c for c in cells}
+    grid = room.subplots(len(tables), 1, squeeze=False)[:, 0]
+    for axes, columns in zip(grid, tables, strict=True):
+        ratios = np.full((len(channels), len(columns)), np.nan)
+        bold = np.zeros(ratios.shape, bool)
+        for at in np.ndindex(ratios.shape):
+            cell = known.get((channels[at[0]], columns[at[1]]))
+            if cell is not None:
+                ratios[at], bold[at] = cell.ratio, cell.significant
+        image = draw_heat(axes, ratios, bold)
+        axes.set_yticks(range(len(channels)), channels)
+        name_conditions(axes, [c if c[2] else c[:2] for c in columns])
+    grid[0].set_title("error / noise (bold: significant)", loc="left")
+    if len(channels) * len(tables) > 3:  # there is no room for a scale beside one row
+        add_bar(room, image, list(grid), "")
+
+
+def bands_of(missing: Sequence[Missing], after: Sequence[Missing] = ()) -> list[Band]:
+    """d(t) of the channels that lack most, in the run that lacks most; with `after`, the part of
+    it that is gone there counts as explained."""
+    if not missing:
+        return []
+    at = int(np.argmax([float(np.max(m.evidence())) for m in missing]))
+    worst = missing[at]
+    order = np.argsort(-worst.evidence())[:BANDS]
+    low, high = worst.band()
+    found = []
+    for k in sorted(order.tolist()):
+        label = f"{_owner(worst.channels[k])}\nd [{worst.units[k]}]"
+        own = (worst.force[:, k], low[:, k], high[:, k])
+        explained = worst.force[:, k] - after[at].force[:, k] if after else None
+        found.append(Band(label, worst.time, *own, explained, worst.stance))
+    return found
+
+
+def _owner(channel: str) -> str:
+    if channel == "piston/F":
+        return "rod"
+    return channel.replace("piston/x", "rod").replace("hip/q", "hip").replace("/", " ")
+
+
+def _bands(room: SubFigure, bands: Sequence[Band]) -> None:
+    if not bands:
+        return
+    grid = room.subplots(len(bands), 1, squeeze=False, sharex=True)[:, 0]
+    for axes, band in zip(grid, bands, strict=True):
+        draw_band(axes, band)
+    key_above(grid[0])
+    grid[0].set_title("missing force", loc="left")
+    grid[-1].set_xlabel("time [s]")
+    room.align_ylabels()
+
+
+def panels_of(found: Sequence[Law]) -> list[Law]:
+    """Of the port that lacks most: its quantities, and the command that tells most."""
+    own = [law for law in found if law.port == found[0].port]
+    sent = [law for law in own if law.quantity.startswith("after ")]
+    best = max(sent, key=lambda law: law.gain, default=None)
+    return [law for law in own if law not in sent or law is best]
+
+
+def _laws(room: SubFigure, panels: Sequence[Law]) -> None:
+    if not panels:
+        return
+    grid = room.subplots(1, len(panels), squeeze=False)[0]
+    for axes, law in zip(grid, panels, strict=True):
+        _law(axes, law)
+    first = panels[0]
+    grid[0].set_ylabel(f"missing on the {first.port} [{first.unit}]")
+
+
+def _law(axes: Axes, law: Law) -> None:
+    """Force per bin with 95 % intervals; unsure bins do not stretch the axis."""
+    axes.axhline(0.0, color=GREY, lw=0.6, zorder=1)
+    spread: Array = 1.96 * law.sigma
+    axes.errorbar(
+        law.centre, law.force, spread, fmt="o-", ms=3, lw=0.8, elinewidth=0.8, capsize=1.5,
+        color=BLUE, zorder=3,
+    )  # fmt: skip
+    sure = spread <= 4.0 * np.median(spread)
+    reach = 1.15 * float(np.max(np.abs(law.force[sure]) + spread[sure]))
+    axes.set_ylim(-reach, reach)
+    axes.set_xlabel(law.quantity)
