@@ -95,7 +95,7 @@ def test_every_package_is_installed() -> None:
     folders = {path.parent for path in ROOT.glob("kemba/**/*.py")}
     names = {".".join(folder.relative_to(ROOT).parts) for folder in folders}
     listed = project["tool"]["setuptools"]["packages"]
-    assert listed == sorted(names | {"kemba_cli", "kemba_configs"})
+    assert listed == sorted(names | {"kemba_cli", "kemba_cli.verbs", "kemba_configs"})
     assert all((folder / "__init__.py").is_file() for folder in folders)
 
 

@@ -97,7 +97,7 @@ def locate(name: str | Path, folders: Collection[str]) -> Path:
 
 def shipped_configs(folder: str) -> dict[str, Path]:
     """The files shipped in configs/`folder` by name."""
-    above = Path(__file__).resolve().parent.parent
+    above = Path(__file__).resolve().parents[2]
     checkout = (above / "pyproject.toml").is_file()
     root = above / ("configs" if checkout else "kemba_configs")
     return {path.name: path for path in sorted((root / folder).glob("*.yaml"))}
