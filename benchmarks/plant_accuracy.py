@@ -14,7 +14,7 @@ import time
 import numpy as np
 
 from kemba.model import Model, load_model
-from kemba.plant import Commands, Profile, Run, run
+from kemba.plant import Commands, Profile, Simulated, run
 from kemba.plant.execution.replay import peak
 from kemba.plant.simulation.commands import Sense
 from kemba.trajectory import Trajectory
@@ -36,7 +36,7 @@ def under_the_hips(time: float, sense: Sense) -> dict[str, float]:
     return torques
 
 
-def push(model: Model, step: float) -> Run:
+def push(model: Model, step: float) -> Simulated:
     valves = {
         "front/valve/extend": Profile.pulses((0.02, 0.20), (0.45, 0.70)),
         "rear/valve/extend": Profile.pulses((0.02, 0.204), (0.45, 0.70)),

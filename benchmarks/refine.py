@@ -53,7 +53,7 @@ def main(cases: tuple[tuple[str, list[str]], ...]) -> None:
         task, document = load_task(name, [*overrides, "refine=none"])
         euler = plan(task, document)
         busy = time.process_time()
-        found = refine(euler.model, task, euler.wishes, euler.trajectory)
+        found = refine(euler.model, task, euler.requirements, euler.trajectory)
         busy = time.process_time() - busy
         print("|", " ".join([name, *overrides]), "|", _line(euler, found, busy), flush=True)
 

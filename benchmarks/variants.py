@@ -29,15 +29,15 @@ VARIANTS: dict[str, dict[str, Changes]] = {
     "general": {
         "as shipped": SHIPPED,
         "from the guess": ({"planner.Planner.half": None}, {}),
-        "two rounds of moving switches": ({}, {"polish": 2}),
+        "two rounds of moving switches": ({}, {"valve_search": 2}),
         "undamped": ({"damped.DAMPING": 0.0}, {}),
         "changed plans at their bounds": ({"schedule.CHANGED": 1e-6}, {}),
         "memory by IPOPT's default": ({}, {"options": {"mumps_mem_percent": 1000}}),
     },
     "symmetric": {
         "as shipped": SHIPPED,
-        "two rounds of moving switches": ({}, {"polish": 2}),
-        "no round": ({}, {"polish": 0}),
+        "two rounds of moving switches": ({}, {"valve_search": 2}),
+        "no round": ({}, {"valve_search": 0}),
         "changed plans at their bounds": ({"schedule.CHANGED": 1e-6}, {}),
     },
 }

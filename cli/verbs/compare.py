@@ -59,7 +59,7 @@ def _print(found: Comparison) -> None:
         numbers = (f"{x:.3g}" for x in (c.rmse, c.max, c.noise_sigma, c.ratio))
         table.add_row(c.name.replace("[", r"\["), *numbers)
     results().print(table)
-    for cell in sorted((c for c in found.cells if c.significant), key=lambda c: c.q_value)[:SHOWN]:
+    for cell in sorted((c for c in found.bins if c.significant), key=lambda c: c.q_value)[:SHOWN]:
         where = f"{cell.channel} in {cell.phase}, valves {cell.mode}, piston {cell.region}"
         typer.echo(f"  {where}: {cell.ratio:.2g} times the noise (q = {cell.q_value:.1g})")
     for hint in found.hints[:SHOWN]:

@@ -35,7 +35,7 @@ EXPECTED = {
 UNKNOWN_KEY = ("extra_forbidden", "unexpected_keyword_argument")
 
 
-class Found(NamedTuple):
+class Complaint(NamedTuple):
     """One pydantic error, where it is in the file, and the schemas of the group around it."""
 
     place: Location
@@ -50,12 +50,12 @@ def complaints(
     error: ValidationError, document: Document, schema: type[BaseModel]
 ) -> list[KembaError]:
     """One KembaError for each place in the document that is wrong, in the file's order."""
-    found: dict[Location, list[Found]] = {}
+    found: dict[Location, list[Complaint]] = {}
     for item in error.errors(include_url=False):
         place = descend(schema, document.data, item["loc"])[1]
         holders = descend(schema, document.data, item["loc"][:-1])[0]
         context = dict(item.get("ctx", {}))
-        entry = Found(place, holders, item["type"], item["input"], item["msg"], context)
+        entry = Complaint(place, holders, item["type"], item["input"], item["msg"], context)
         found.setdefault(place, []).append(entry)
     kept = [
         _merged(entries, document)
@@ -67,17 +67,17 @@ def complaints(
     return [report for _, report in kept]
 
 
-def _all_types(entries: list[Found]) -> bool:
+def _all_types(entries: list[Complaint]) -> bool:
     """Whether a union's branches only say that they are of another type."""
     return all(entry.kind in EXPECTED for entry in entries)
 
 
-def _any_below(place: Location, found: dict[Location, list[Found]]) -> bool:
+def _any_below(place: Location, found: dict[Location, list[Complaint]]) -> bool:
     """Whether another branch of the union got further, so that its error is the telling one."""
     return any(len(other) > len(place) and other[: len(place)] == place for other in found)
 
 
-def _merged(entries: list[Found], document: Document) -> tuple[Location, KembaError]:
+def _merged(entries: list[Complaint], document: Document) -> tuple[Location, KembaError]:
     """The one report on a place, from the errors of all branches of its union."""
     telling = [entry for entry in entries if entry.kind not in EXPECTED]
     if telling:
@@ -91,7 +91,7 @@ def _merged(entries: list[Found], document: Document) -> tuple[Location, KembaEr
     return first.place, document.error(first.place, what, expected)
 
 
-def _report(found: Found, document: Document) -> KembaError:
+def _report(found: Complaint, document: Document) -> KembaError:
     """The report on an error that is more than a wrong type."""
     place = found.place
     if found.kind in UNKNOWN_KEY:
@@ -109,7 +109,7 @@ def _report(found: Found, document: Document) -> KembaError:
     return document.error(place, _at(place, f"{_shown(found.value)}: {message}"))
 
 
-def _unknown_tag(found: Found, document: Document) -> KembaError:
+def _unknown_tag(found: Complaint, document: Document) -> KembaError:
     """A list item whose `kind` is missing or unknown."""
     key = found.context["discriminator"].strip("'")
     place = (*found.place, key)
@@ -120,7 +120,7 @@ def _unknown_tag(found: Found, document: Document) -> KembaError:
     return document.error(place, _at(place, f"unknown {key} '{tag}'"), hint=suggest(tag, names))
 
 
-def _not_among(found: Found, document: Document) -> KembaError:
+def _not_among(found: Complaint, document: Document) -> KembaError:
     """A value that is not one of the few allowed."""
     what = _at(found.place, f"{_shown(found.value)} is not allowed")
     names = re.findall(r"'([^']*)'", found.context["expected"])
@@ -129,7 +129,7 @@ def _not_among(found: Found, document: Document) -> KembaError:
     return document.error(found.place, what, f"{found.context['expected']} was expected")
 
 
-def _expectation(found: Found) -> str:
+def _expectation(found: Complaint) -> str:
     """What a missing key should hold, when its schema says so."""
     for schema in found.holders:
         info = fields_of(schema).get(str(found.place[-1]))

@@ -16,12 +16,14 @@ from kemba.identify.evidence.bootstrap import NullTest, bootstrap, smallest_dete
 from kemba.identify.evidence.linear import is_shape, time_blocks
 from kemba.identify.evidence.problem import Array, Candidate, Problem
 from kemba.identify.evidence.search import Search, share_of
-from kemba.identify.evidence.spike_slab import FLOOR, NULL, Hypothesis
+from kemba.identify.evidence.spike_slab import NULL, SPIKE_WIDTH, Hypothesis
 
 CLASS = 3.0  # nats within which two explanations are the same to these data
 MATTERS = 0.2  # an effect below this share of its size is no finding,
 MATTERS_TOO = 0.3  # nor is one beside a stronger one
-DEFECT = FLOOR  # share of an effect that the model's own imperfection may add or hide, 1 sigma
+DEFECT = (
+    SPIKE_WIDTH  # share of an effect that the model's own imperfection may add or hide, 1 sigma
+)
 FINE = 0.1  # s, blocks whose signs are redrawn
 UNEXPLAINED, LEFT = 1.3, 0.9  # noise units and share of the error that no answer may leave
 SHOWN = 8
@@ -30,7 +32,7 @@ Talk = Callable[[str], None]
 
 
 @dataclass(frozen=True)
-class Found:
+class Discovery:
     """A finished search and what was made of it."""
 
     answer: Answer
@@ -44,7 +46,7 @@ def discover(
     holdout: Problem | None = None,
     time_limit: float = np.inf,
     say: Talk = lambda text: None,
-) -> Found:
+) -> Discovery:
     """Which effect is missing from the model behind `problem`, if any."""
     started = time.monotonic()
     search = Search(problem, started + 0.8 * time_limit, say)
@@ -60,7 +62,7 @@ def discover(
     ranking = ranked(search, best, dismissed, holdout)
     answer = _answer(search, best, p_value, test, ranking, formula, holdout, doubts)
     answer.runtime_s = time.monotonic() - started
-    return Found(answer, search, best, holdout)
+    return Discovery(answer, search, best, holdout)
 
 
 def null_test(search: Search) -> NullTest:

@@ -11,7 +11,7 @@ from kemba.errors import KembaError
 from kemba.files import write_json
 from kemba.identify.adopt import write_model
 from kemba.identify.answer import Answer
-from kemba.identify.discover import Found, discover
+from kemba.identify.discover import Discovery, discover
 from kemba.identify.evidence.problem import Problem
 from kemba.identify.logs.excerpt import excerpts
 from kemba.identify.logs.gate import BadData, check_logs, sentence
@@ -29,7 +29,7 @@ def discover_logs(
     time_limit: float = 300.0,
     say: Callable[[str], None] = lambda text: None,
     out: str | Path | None = None,
-) -> tuple[Answer, Found | None]:
+) -> tuple[Answer, Discovery | None]:
     """Answer which effect `model` lacks; written to the folder `out` when one is given.
 
     Data that cannot be right give the verdict `bad-data`, and nothing is fitted. Raises
@@ -38,7 +38,7 @@ def discover_logs(
     started = time.monotonic()
     columns = load_map(column_map) if column_map else None
     fitted, kept = read_logs(logs, columns), read_logs(holdout, columns) if holdout else []
-    found: Found | None = None
+    found: Discovery | None = None
     try:
         _apart(fitted, kept)
         remarks = check_logs([*fitted, *kept])

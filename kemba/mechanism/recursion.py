@@ -31,7 +31,7 @@ class Joint:
 
 
 @dataclass(frozen=True)
-class Motion:
+class FrameMotion:
     """Where a joint's frame is and how it moves: position, angle's cosine and sine, rates."""
 
     angle: ca.SX
@@ -82,22 +82,22 @@ def read_joints(model: pin.Model) -> list[Joint]:
     return joints
 
 
-def forward(joints: list[Joint], q: ca.SX, v: ca.SX, a: ca.SX, gravity: float) -> list[Motion]:
+def forward(joints: list[Joint], q: ca.SX, v: ca.SX, a: ca.SX, gravity: float) -> list[FrameMotion]:
     """Motion of every joint frame; gravity enters as an upward acceleration of the base."""
     zero = ca.SX(0)
-    base = Motion(zero, ca.SX(1), zero, (zero, zero), zero, (zero, ca.SX(gravity)), zero)
-    motions: list[Motion] = []
+    base = FrameMotion(zero, ca.SX(1), zero, (zero, zero), zero, (zero, ca.SX(gravity)), zero)
+    motions: list[FrameMotion] = []
     for i, joint in enumerate(joints):
         parent = base if joint.parent < 0 else motions[joint.parent]
         motions.append(_step(joint, parent, q[i], v[i], a[i]))
     return motions
 
 
-def _step(joint: Joint, parent: Motion, q: ca.SX, v: ca.SX, a: ca.SX) -> Motion:
+def _step(joint: Joint, parent: FrameMotion, q: ca.SX, v: ca.SX, a: ca.SX) -> FrameMotion:
     if joint.turns:
         arm = parent.turn(joint.offset)
         angle = parent.angle + joint.turns * q
-        return Motion(
+        return FrameMotion(
             angle,
             ca.cos(angle),
             ca.sin(angle),
@@ -116,7 +116,7 @@ def _step(joint: Joint, parent: Motion, q: ca.SX, v: ca.SX, a: ca.SX) -> Motion:
         carried[1] + axis[1] * a + coriolis * axis[0],
     )
     position = (parent.position[0] + arm[0], parent.position[1] + arm[1])
-    return Motion(
+    return FrameMotion(
         parent.angle, parent.cos, parent.sin, position, parent.rate, acceleration, parent.angular
     )
 
@@ -149,7 +149,7 @@ def rnea(joints: list[Joint], q: ca.SX, v: ca.SX, a: ca.SX, gravity: float) -> c
     return ca.vertcat(*tau)
 
 
-def _along(joint: Joint, motion: Motion, force: Vector, moment: ca.SX) -> ca.SX:
+def _along(joint: Joint, motion: FrameMotion, force: Vector, moment: ca.SX) -> ca.SX:
     if joint.turns:
         return joint.turns * moment
     axis = motion.turn(joint.slides)

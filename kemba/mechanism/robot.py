@@ -9,7 +9,7 @@ from kemba.mechanism import knee
 from kemba.mechanism.links import Robot, load_robot
 from kemba.mechanism.pin_model import build_pin_model
 from kemba.mechanism.planar import Mechanism, Port
-from kemba.mechanism.recursion import Motion, forward, read_joints, rnea
+from kemba.mechanism.recursion import FrameMotion, forward, read_joints, rnea
 from kemba.quantity import Quantity
 
 HIP_RANGE = 1.4  # rad; beyond it the knee would rise above the body
@@ -107,7 +107,7 @@ def _coordinates(robot: Robot) -> tuple[tuple[Quantity, ...], tuple[Quantity, ..
     return tuple(q), tuple(v)
 
 
-def _ports(robot: Robot, q: ca.SX, motions: dict[str, Motion]) -> dict[str, Port]:
+def _ports(robot: Robot, q: ca.SX, motions: dict[str, FrameMotion]) -> dict[str, Port]:
     legs = len(robot.legs)
     ports = [
         _port("body/x", "body/vx", "m", q[0], "body centre, forward"),
@@ -139,7 +139,7 @@ def _ports(robot: Robot, q: ca.SX, motions: dict[str, Motion]) -> dict[str, Port
     return {p.quantity.name: p for p in ports}
 
 
-def _points(robot: Robot, motions: dict[str, Motion]) -> dict[str, ca.SX]:
+def _points(robot: Robot, motions: dict[str, FrameMotion]) -> dict[str, ca.SX]:
     """Where each leg's hip, knee and foot are, and its cylinder's pivot and its rod's pin."""
     points: dict[str, ca.SX] = {}
     for leg in robot.legs:

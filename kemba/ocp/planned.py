@@ -10,9 +10,9 @@ from kemba.ocp.certificate.certify import Certificate, certify, costs
 from kemba.ocp.certificate.status import verdict
 from kemba.ocp.infeasibility.diagnostic import Relax
 from kemba.ocp.infeasibility.explain import Explanation
-from kemba.ocp.nlp.ipopt import Point
+from kemba.ocp.nlp.ipopt import Iterate
 from kemba.ocp.relaxation.schedule import Attempt
-from kemba.ocp.task.requirement import Wish
+from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.solution import to_trajectory
 from kemba.ocp.transcription.transcribe import Transcription
@@ -28,7 +28,7 @@ class Plan:
 
     task: Task
     model: Model
-    wishes: tuple[Wish, ...]
+    requirements: tuple[Requirement, ...]
     trajectory: Trajectory
     certificate: Certificate
     status: str
@@ -52,18 +52,18 @@ class Plan:
 def judge(
     planner: Planner,
     transcription: Transcription,
-    point: Point,
+    point: Iterate,
     solve_s: float,
     solve_cpu_s: float,
 ) -> Plan:
     """Certificate, status and sentence of what was found."""
     trajectory = to_trajectory(transcription, point.Y)
-    certificate = certify(planner.model, planner.task, planner.wishes, trajectory)
+    certificate = certify(planner.model, planner.task, planner.requirements, trajectory)
     status, sentence = verdict(planner.task, certificate, trajectory, point.message)
     return Plan(
         task=planner.task,
         model=planner.model,
-        wishes=tuple(planner.wishes),
+        requirements=tuple(planner.requirements),
         trajectory=trajectory,
         certificate=certificate,
         status=status,

@@ -11,7 +11,7 @@ import numpy as np
 
 from kemba.model import Model
 from kemba.ocp.infeasibility.elastic import Outcome, elastic
-from kemba.ocp.nlp.ipopt import Ipopt, Point, Watch
+from kemba.ocp.nlp.ipopt import Ipopt, Iterate, Watch
 from kemba.ocp.planned import Plan, judge
 from kemba.ocp.relaxation.guess import automatic_guess
 from kemba.ocp.relaxation.lifting import confirm, grow
@@ -20,17 +20,17 @@ from kemba.ocp.relaxation.resume import resumed
 from kemba.ocp.relaxation.schedule import (
     RELAX,
     Attempt,
-    Search,
+    Schedule,
     Stopped,
     binary,
     find,
     refine,
     tighten,
 )
-from kemba.ocp.relaxation.valve_search import polish
-from kemba.ocp.task.requirement import Wish
+from kemba.ocp.relaxation.valve_search import search_neighbourhood
+from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
-from kemba.ocp.transcription.symmetry import Reduction, find_symmetry, mirrored_wishes, whole
+from kemba.ocp.transcription.symmetry import Reduction, find_symmetry, mirrored_requirements, whole
 from kemba.ocp.transcription.transcribe import Transcription
 from kemba.stopwatch import Stopwatch
 from kemba.trajectory import Trajectory
@@ -52,7 +52,7 @@ class Planner:
 
     task: Task
     model: Model
-    wishes: list[Wish]
+    requirements: list[Requirement]
     log: Path | None = None
     tell: Callable[[str], None] = lambda text: None
     watch: Watch | None = None
@@ -63,12 +63,12 @@ class Planner:
     stop: Callable[[], bool] | None = None
     outcome: Outcome | None = None  # of the elastic solve after a failure
 
-    def search(self, nodes: int, reduction: Reduction) -> Search:
-        """A fresh program on a grid of `nodes`; of half a robot, for what is wished of both legs
+    def search(self, nodes: int, reduction: Reduction) -> Schedule:
+        """A fresh program on a grid of `nodes`; of half a robot, for what is asked of both legs
         alike."""
-        wishes = self.alike if reduction.symmetric else self.wishes
+        requirements = self.alike if reduction.symmetric else self.requirements
         with self.building.running():
-            transcription = Transcription(self.model, self.task, wishes, reduction, nodes)
+            transcription = Transcription(self.model, self.task, requirements, reduction, nodes)
         options = {"max_iter": self.task.solver.max_iterations, **self.task.solver.options}
         ipopt = Ipopt(
             transcription, options, self.log, self.deadline, self.watch, self.stop, self.building
@@ -78,12 +78,12 @@ class Planner:
         def tell(text: str) -> None:
             self.tell(f"{text} ({name} robot, {nodes} nodes)")
 
-        return Search(ipopt, self.task.solver.complementarity, tell, self.attempts)
+        return Schedule(ipopt, self.task.solver.complementarity, tell, self.attempts)
 
-    def guess(self, transcription: Transcription) -> Point:
+    def guess(self, transcription: Transcription) -> Iterate:
         """The automatic start guess on a program's grid."""
         t = transcription
-        return Point(automatic_guess(self.model, self.task, self.wishes, t.layout, t.nodes))
+        return Iterate(automatic_guess(self.model, self.task, self.requirements, t.layout, t.nodes))
 
     @cached_property
     def half(self) -> Reduction | None:
@@ -91,17 +91,17 @@ class Planner:
         return find_symmetry(self.model) if self.task.solver.symmetry else None
 
     @cached_property
-    def alike(self) -> list[Wish]:
-        """The wishes whose mirror images are wished as well."""
-        return mirrored_wishes(self.model, self.wishes)
+    def alike(self) -> list[Requirement]:
+        """The requirements whose mirror images are required as well."""
+        return mirrored_requirements(self.model, self.requirements)
 
     def reductions(self) -> Iterator[Reduction]:
         """Half robot first where model and task are mirror images of themselves."""
-        if self.half is not None and self.alike == self.wishes:
+        if self.half is not None and self.alike == self.requirements:
             yield self.half
         yield whole(self.model.node)
 
-    def strategies(self) -> Iterator[Callable[[], tuple[Transcription, Point]]]:
+    def strategies(self) -> Iterator[Callable[[], tuple[Transcription, Iterate]]]:
         """Ways to a plan, the quickest first; from the given start before any guess."""
         nodes = self.task.nodes
         for reduction in self.reductions() if self.start is not None else ():
@@ -111,7 +111,7 @@ class Planner:
                 yield lambda r=reduction: self._coarse_to_fine(r)  # type: ignore[misc]
             yield lambda r=reduction: self._direct(r)  # type: ignore[misc]
 
-    def _coarse_to_fine(self, reduction: Reduction) -> tuple[Transcription, Point]:
+    def _coarse_to_fine(self, reduction: Reduction) -> tuple[Transcription, Iterate]:
         first, *finer = grids(self.task.nodes)
         search = self.search(first, reduction)
         point = self._sought(search)
@@ -122,48 +122,48 @@ class Planner:
             point = refine(search, coarse.transcription, point)
         return self._finish(search, point)
 
-    def _direct(self, reduction: Reduction) -> tuple[Transcription, Point]:
+    def _direct(self, reduction: Reduction) -> tuple[Transcription, Iterate]:
         search = self.search(self.task.nodes, reduction)
         return self._finish(search, self._sought(search))
 
-    def _continued(self, reduction: Reduction) -> tuple[Transcription, Point]:
+    def _continued(self, reduction: Reduction) -> tuple[Transcription, Iterate]:
         assert self.start is not None
         search = self.search(self.task.nodes, reduction)
         point = binary(search, resumed(search.transcription, self.start))
-        return self._finish(search, self._polished(search, point))
+        return self._finish(search, self._searched_nearby(search, point))
 
-    def _sought(self, search: Search) -> Point:
+    def _sought(self, search: Schedule) -> Iterate:
         """A plan with binary valves: grown from half a robot's where legs are equal and only the
-        wishes differ, else from the guess."""
-        t, rounds = search.transcription, self.task.solver.polish
-        if self.half is not None and self.alike != self.wishes:
+        requirements differ, else from the guess."""
+        t, rounds = search.transcription, self.task.solver.valve_search
+        if self.half is not None and self.alike != self.requirements:
             half = self.search(t.nodes, self.half)
             point = find(half, self.guess(half.transcription))
             if point.solved:
                 point = grow(search, half.transcription, point, self.guess(t))
             if point.solved:
-                return polish(search, point, rounds - 1, best=point)
-        return self._polished(search, find(search, self.guess(t)))
+                return search_neighbourhood(search, point, rounds - 1, best=point)
+        return self._searched_nearby(search, find(search, self.guess(t)))
 
-    def _polished(self, search: Search, point: Point) -> Point:
+    def _searched_nearby(self, search: Schedule, point: Iterate) -> Iterate:
         if not point.solved:
             return point
-        return polish(search, point, self.task.solver.polish)
+        return search_neighbourhood(search, point, self.task.solver.valve_search)
 
-    def _finish(self, search: Search, point: Point) -> tuple[Transcription, Point]:
+    def _finish(self, search: Schedule, point: Iterate) -> tuple[Transcription, Iterate]:
         point = tighten(search, point) if point.solved else point
         if not point.solved or not search.transcription.reduction.symmetric:
             return search.transcription, point
         full = self.search(self.task.nodes, whole(self.model.node))
         return full.transcription, confirm(full, search.transcription, point)
 
-    def penalty(self) -> tuple[Transcription, Point]:
+    def penalty(self) -> tuple[Transcription, Iterate]:
         """The paper's way, on the whole robot."""
         search = self.search(self.task.nodes, whole(self.model.node))
         start = self.guess(search.transcription)
         return search.transcription, penalise(search, start, self.task.method)
 
-    def run(self) -> tuple[Transcription, Point]:
+    def run(self) -> tuple[Transcription, Iterate]:
         """The first strategy that solves, else where the first one ended; a stop keeps its
         iterate."""
         try:
@@ -185,10 +185,12 @@ class Planner:
         except Stopped as stop:
             return stop.transcription, stop.point
 
-    def refuse(self) -> tuple[Transcription, Point]:
+    def refuse(self) -> tuple[Transcription, Iterate]:
         """Nothing solved: the start guess, for a task that a check refused."""
         whole_robot = whole(self.model.node)
-        program = Transcription(self.model, self.task, self.wishes, whole_robot, self.task.nodes)
+        program = Transcription(
+            self.model, self.task, self.requirements, whole_robot, self.task.nodes
+        )
         return program, replace(self.guess(program), message="Infeasible_Problem_Detected")
 
 

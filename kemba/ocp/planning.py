@@ -43,11 +43,11 @@ def plan(
     building = Stopwatch()
     with building.running():
         built = task_model(task, model)
-        wishes = resolve(task, built, document)
-        findings = check_task(task, built, wishes, document)
-        refused = refusal(findings)
+        requirements = resolve(task, built, document)
+        diagnostics = check_task(task, built, requirements, document)
+        refused = refusal(diagnostics)
     planner = Planner(
-        task, built, wishes, log, tell, watch, building=building, start=start, stop=stop
+        task, built, requirements, log, tell, watch, building=building, start=start, stop=stop
     )
     planner.deadline = time.monotonic() + task.solver.time_limit
     found = searched(planner, refused is not None)
@@ -55,7 +55,7 @@ def plan(
         return refined(planner, found)
     if found.status in ("solved", "acceptable", "interrupted"):
         return found
-    why = refused or explanation(task, built, planner.outcome, findings, document)
+    why = refused or explanation(task, built, planner.outcome, diagnostics, document)
     return found if why is None else explained(found, why)
 
 
@@ -68,6 +68,6 @@ def task_model(task: Task, name: str | Path | None = None) -> Model:
 def program_size(task: Task, document: Document, model: str | Path | None = None) -> dict[str, int]:
     """Variables and rows of the whole program of a task, everything checked, nothing solved."""
     built = task_model(task, model)
-    wishes = resolve(task, built, document)
-    transcription = Transcription(built, task, wishes, whole(built.node), task.nodes)
+    requirements = resolve(task, built, document)
+    transcription = Transcription(built, task, requirements, whole(built.node), task.nodes)
     return {"variables": transcription.variables, "constraints": transcription.constraints}

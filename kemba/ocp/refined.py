@@ -49,7 +49,7 @@ def on_phases(planner: Planner, found: Plan) -> Plan:
         answer = refine(
             model,
             task,
-            found.wishes,
+            found.requirements,
             found.trajectory,
             deadline=planner.deadline,
             log=planner.log,

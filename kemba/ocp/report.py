@@ -38,7 +38,10 @@ def answer(plan: Plan, run: str) -> dict[str, Any]:
         "good": plan.status == "solved",
         "ignored": plan.model.ignored,
         "relax": [
-            {name: getattr(r, name) for name in ("wish", "where", "asked", "reachable", "unit")}
+            {
+                name: getattr(r, name)
+                for name in ("requirement", "where", "asked", "reachable", "unit")
+            }
             for r in plan.relax
         ],
         "worst": [

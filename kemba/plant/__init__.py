@@ -4,7 +4,7 @@ from kemba.plant.execution.certificate import replays
 from kemba.plant.execution.controller import Execution, Gains, execute
 from kemba.plant.execution.replay import Replay, replay
 from kemba.plant.simulation.commands import Commands, Profile
-from kemba.plant.simulation.simulate import Run, run, simulate
+from kemba.plant.simulation.simulate import Simulated, run, simulate
 from kemba.plant.stepping.events import Impact
 
 __all__ = [
@@ -14,7 +14,7 @@ __all__ = [
     "Impact",
     "Profile",
     "Replay",
-    "Run",
+    "Simulated",
     "execute",
     "replay",
     "replays",

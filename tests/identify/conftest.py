@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kemba.identify.bench.motion import Motion
-from kemba.identify.bench.rig_model import Rig
+from kemba.identify.bench.motion import SmoothedMotion
+from kemba.identify.bench.rig_model import RigModel
 from kemba.identify.bench.switching import pulses
 from kemba.model.spec import load_model
 from kemba.trajectory import Trajectory
@@ -17,7 +17,7 @@ from kemba.trajectory import Trajectory
 BenchLog = Callable[..., Trajectory]
 
 
-def motion(duration: float, rng: np.random.Generator) -> Motion:
+def motion(duration: float, rng: np.random.Generator) -> SmoothedMotion:
     """Smooth random strokes within the piston's travel."""
     time = np.arange(0.0, duration, 1e-3)
     phases = rng.uniform(0, 2 * np.pi, 4)
@@ -26,7 +26,7 @@ def motion(duration: float, rng: np.random.Generator) -> Motion:
     angle = rates[:, None] * time + phases[:, None]
     x = 0.035 + sizes @ np.sin(angle)
     v = (sizes * rates) @ np.cos(angle)
-    return Motion(time, x, v, np.gradient(v, time), np.zeros(len(time)), 0.0)
+    return SmoothedMotion(time, x, v, np.gradient(v, time), np.zeros(len(time)), 0.0)
 
 
 @pytest.fixture(scope="session")
@@ -38,7 +38,7 @@ def bench_log() -> BenchLog:
         path = motion(duration, rng)
         switched = rng.random((int(duration / 0.11) + 1, 2)) < 0.5
         sent = switched[(path.time / 0.11).astype(int)].T.astype(float)
-        rig = Rig(load_model(extra=effects, rig=True), (), ())
+        rig = RigModel(load_model(extra=effects, rig=True), (), ())
         force = rig.predict(
             path, (pulses(path.time, sent[0]), pulses(path.time, sent[1])), {}
         ).force

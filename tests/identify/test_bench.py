@@ -13,8 +13,8 @@ from kemba.effects import BY_KIND
 from kemba.effects.base import Effect
 from kemba.identify.adopt import adopt_effect
 from kemba.identify.bench import bench_problem
-from kemba.identify.bench.motion import Motion
-from kemba.identify.bench.rig_model import Rig
+from kemba.identify.bench.motion import SmoothedMotion
+from kemba.identify.bench.rig_model import RigModel
 from kemba.identify.bench.switching import delayed, is_on, pulses
 from kemba.identify.experiment import propose
 from kemba.identify.published import published
@@ -58,8 +58,8 @@ def test_effects_join_by_theta(bench_log: BenchLog, kind: str, values: dict[str,
 @pytest.mark.parametrize("sent", [(1.0, 0.0), (0.0, 1.0), (1.0, 1.0)])
 def test_a_log_may_begin_with_a_valve_on_for_long(name: str, sent: tuple[float, float]) -> None:
     """Orifices pass the same at any low pressure, so that Newton's steps alone lead nowhere."""
-    rig, time = Rig(load_model(name, rig=True), (), ()), np.arange(200) / 1e3
-    still = Motion(time, *(np.full(200, x) for x in (0.03, 0.0, 0.0, 0.0)), 0.0)
+    rig, time = RigModel(load_model(name, rig=True), (), ()), np.arange(200) / 1e3
+    still = SmoothedMotion(time, *(np.full(200, x) for x in (0.03, 0.0, 0.0, 0.0)), 0.0)
     extend, retract = ([(-np.inf, np.inf)] if on else [] for on in sent)
     force = rig.predict(still, (extend, retract), {}).force
     assert np.ptp(force) < 0.5

@@ -59,9 +59,9 @@ def compared(*effects: dict, **setting: object) -> Comparison:
 def test_a_right_model_explains_every_rig(pressures: bool) -> None:
     found = compared(pressures=pressures)
     assert found.good, found.sentence
-    assert {c.phase for c in found.cells} == {"rest", "moving"}
-    assert {c.region for c in found.cells} == {"in", "mid", "out"}
-    assert {c.mode for c in found.cells} == {"00", "10", "01", "11"}
+    assert {c.phase for c in found.bins} == {"rest", "moving"}
+    assert {c.region for c in found.bins} == {"in", "mid", "out"}
+    assert {c.mode for c in found.bins} == {"00", "10", "01", "11"}
     names = {c.name for c in found.channels}
     assert ("chamber/extend/P [Pa]" in names) == pressures
 
@@ -78,7 +78,7 @@ def test_each_rig_shows_what_it_can(test: str, effect: str, quantity: str) -> No
     found = compared(catalogue.hidden(effect, 1.0), tests=(test,))
     assert not found.good
     assert found.noise_ratio > 2.0
-    telling = max(found.laws, key=lambda law: law.gain)
+    telling = max(found.force_profiles, key=lambda law: law.gain)
     assert telling.quantity == quantity
     assert f"goes with {quantity.split(' [')[0]}" in found.sentence
 
@@ -88,7 +88,7 @@ def test_pressures_tell_air_from_friction() -> None:
     """Friction does not touch the chambers, a weak supply does."""
     friction = compared(catalogue.hidden("seal_friction", 1.0), pressures=True)
     supply = compared(catalogue.hidden("supply_scale", -1.0), pressures=True)
-    worst = [max(found.cells, key=lambda c: c.ratio).channel for found in (friction, supply)]
+    worst = [max(found.bins, key=lambda c: c.ratio).channel for found in (friction, supply)]
     assert worst[0] == "piston/F" and worst[1].endswith("/P")
     ratios = {c.name: c.ratio for c in friction.channels}
     assert max(r for name, r in ratios.items() if "/P" in name) < 1.2

@@ -15,7 +15,7 @@ SWING = (
 @dataclass(frozen=True)
 class Impossible:
     """A shipped task changed by `--set` options, perhaps on another model; `named` are words of
-    the sentence, `relax` the wish to relax (None: it lies elsewhere)."""
+    the sentence, `relax` the requirement to relax (None: it lies elsewhere)."""
 
     name: str
     task: str

@@ -44,8 +44,8 @@ class Solved:
     @cached_property
     def measured(self) -> Certificate:
         """The certificate measured anew from the trajectory on disk."""
-        wishes = resolve(self.task, self.model, load_yaml(self.run.task))
-        return certify(self.model, self.task, wishes, self.plan)
+        requirements = resolve(self.task, self.model, load_yaml(self.run.task))
+        return certify(self.model, self.task, requirements, self.plan)
 
 
 @lru_cache(maxsize=16)

@@ -13,7 +13,7 @@ import pytest
 from kemba.ocp import load_task
 from kemba.ocp.nlp.blocks import Block
 from kemba.ocp.nlp.compiled import compiled
-from kemba.ocp.nlp.constants import lifted
+from kemba.ocp.nlp.constants import parameterised
 from kemba.ocp.planning import task_model
 from kemba.ocp.task.requirement import resolve
 from kemba.ocp.transcription.symmetry import whole
@@ -35,7 +35,7 @@ def step(*options: str) -> tuple[Block, ca.SX]:
 def test_lifting_keeps_the_numbers() -> None:
     x = ca.SX.sym("x", 3)
     g = ca.vertcat(3.7 * ca.sin(x[0]) - x[1] ** 2, 3.7 / x[2], ca.fmax(x[0], 1.5) + 0.0 * x[1])
-    (same,), constants, numbers = lifted([x], [g])
+    (same,), constants, numbers = parameterised([x], [g])
     assert sorted(numbers) == [1.5, 3.7]
     at = np.array([0.3, -1.2, 0.7])
     plain, other = ca.Function("g", [x], [g]), ca.Function("g", [x, constants], [same])

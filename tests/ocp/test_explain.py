@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from kemba.config import find_config
 from kemba.ocp import Task, load_task, task_model
 from kemba.ocp.infeasibility.checks import check_task
-from kemba.ocp.infeasibility.diagnostic import Finding
+from kemba.ocp.infeasibility.diagnostic import Diagnostic
 from kemba.ocp.infeasibility.flight import air_work, inertia_and_weight
 from kemba.ocp.task.requirement import resolve
 from kemba_cli.main import app
@@ -40,8 +40,8 @@ def holds(case: Impossible, exit_code: int, answer: dict[str, Any]) -> None:
     for words in case.named:
         assert words in answer["sentence"]
     assert answer["sentence"].startswith("cannot be met: ")
-    wishes = [r["wish"] for r in answer["relax"]]
-    assert case.relax in wishes if case.relax else not wishes
+    requirements = [r["requirement"] for r in answer["relax"]]
+    assert case.relax in requirements if case.relax else not requirements
     for r in answer["relax"]:
         assert r["asked"] != r["reachable"] and r["where"]
 
@@ -78,7 +78,7 @@ def test_the_apex_within_reach_is_told(tmp_path: Path) -> None:
     assert answer["iterations"] < 2000
 
 
-def findings(name: str, *options: str) -> list[Finding]:
+def diagnostics(name: str, *options: str) -> list[Diagnostic]:
     """What the checks say before solving."""
     task, document = load_task(name, list(options))
     model = task_model(task)
@@ -87,7 +87,7 @@ def findings(name: str, *options: str) -> list[Finding]:
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_shipped_tasks_pass_the_checks(name: str) -> None:
-    assert not [f for f in findings(name) if f.certain]
+    assert not [f for f in diagnostics(name) if f.certain]
 
 
 @pytest.mark.parametrize(
@@ -103,16 +103,16 @@ def test_shipped_tasks_pass_the_checks(name: str) -> None:
     ids=str,
 )
 def test_checks_are_generous(options: tuple[str, ...]) -> None:
-    assert not [f for f in findings("jump", *options) if f.certain]
+    assert not [f for f in diagnostics("jump", *options) if f.certain]
 
 
 def test_checks_take_no_time() -> None:
     task, document = load_task("jump")
     model = task_model(task)
-    wishes = resolve(task, model, document)
+    requirements = resolve(task, model, document)
     assert model.node
     before = time.process_time()
-    check_task(task, model, wishes, document)
+    check_task(task, model, requirements, document)
     assert time.process_time() - before < 1.0
 
 
@@ -130,18 +130,18 @@ def test_free_fall_counts_boom_and_payload() -> None:
 
 
 def test_a_value_outside_its_range_is_told() -> None:
-    (found,) = findings("jump", "end.body/z=4 m", "bounds={}")
+    (found,) = diagnostics("jump", "end.body/z=4 m", "bounds={}")
     assert found.certain and "3 m is the most" in found.sentence
     assert "body/z stays within 0 m to 3 m" in found.sentence
 
 
 def test_two_wishes_on_rates_that_exclude_each_other() -> None:
-    (found,) = findings("jump", "start.body/vz=1 m/s")
+    (found,) = diagnostics("jump", "start.body/vz=1 m/s")
     assert found.certain and "`start.rest`" in found.sentence
     assert "`start.body/vz`" in found.sentence
 
 
 def test_poses_that_a_chain_cannot_hold() -> None:
     """Feet on the ground, pistons retracted, body level: the knees cannot be straight too."""
-    (found,) = findings("jump", "start.front/knee/q=50 deg")
+    (found,) = diagnostics("jump", "start.front/knee/q=50 deg")
     assert found.certain and found.relax and "no pose" in found.sentence

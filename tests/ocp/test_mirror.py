@@ -11,7 +11,11 @@ from kemba.mechanism import load_robot, robot_mechanism
 from kemba.model import Model, load_model
 from kemba.ocp import load_task
 from kemba.ocp.task.requirement import resolve
-from kemba.ocp.transcription.symmetry import find_symmetry, mirrored_wishes, wishes_are_symmetric
+from kemba.ocp.transcription.symmetry import (
+    find_symmetry,
+    mirrored_requirements,
+    requirements_are_symmetric,
+)
 
 
 @pytest.fixture(scope="module")
@@ -85,16 +89,18 @@ def test_an_asymmetric_robot_has_none(planning: Model, rear: dict[str, float]) -
 )
 def test_tasks(planning: Model, override: str, symmetric: bool) -> None:
     task, document = load_task("jump.yaml", [override])
-    assert wishes_are_symmetric(planning, resolve(task, planning, document)) is symmetric
+    assert requirements_are_symmetric(planning, resolve(task, planning, document)) is symmetric
 
 
 def test_wishes_of_both_legs_alike(planning: Model) -> None:
     """Of a jump ahead all but the way ahead, with hips at odds with each other not theirs."""
     hips = "start={front/hip/q: -1.1, rear/hip/q: 1.2, body/x: 0 m}"
     task, document = load_task("jump_forward.yaml", [hips])
-    wishes = resolve(task, planning, document)
-    alike = mirrored_wishes(planning, wishes)
-    left_out = {(w.quantity.name, w.at) for w in wishes} - {(w.quantity.name, w.at) for w in alike}
+    requirements = resolve(task, planning, document)
+    alike = mirrored_requirements(planning, requirements)
+    left_out = {(w.quantity.name, w.at) for w in requirements} - {
+        (w.quantity.name, w.at) for w in alike
+    }
     assert left_out == {("body/x", 1.0), ("front/hip/q", 0.0), ("rear/hip/q", 0.0)}
 
 

@@ -86,15 +86,15 @@ def test_half_a_plan_is_a_whole_one() -> None:
     """The half problem's solution, widened, has the whole model's residuals within tolerance."""
     task, document = load_task("max_jump.yaml", ["nodes=24"])
     model = load_model(task.model, supply=task.supply)
-    wishes = resolve(task, model, document)
+    requirements = resolve(task, model, document)
     half = find_symmetry(model)
     assert half is not None
-    search = Planner(task, model, wishes, deadline=math.inf).search(task.nodes, half)
+    search = Planner(task, model, requirements, deadline=math.inf).search(task.nodes, half)
     transcription = search.transcription
-    point = find(search, Planner(task, model, wishes).guess(transcription))
+    point = find(search, Planner(task, model, requirements).guess(transcription))
     point = tighten(search, fix(search, point))
     assert point.solved
-    found = certify(model, task, wishes, to_trajectory(transcription, point.Y))
+    found = certify(model, task, requirements, to_trajectory(transcription, point.Y))
     assert found.within(task.tolerances), found.worst
 
 

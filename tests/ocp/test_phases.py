@@ -58,14 +58,14 @@ def euler_plan(name: str, override: str) -> Plan:
 def both(name: str, override: str) -> tuple[Plan, Refined]:
     """The same, and refined."""
     euler = euler_plan(name, override)
-    return euler, refine(euler.model, euler.task, euler.wishes, euler.trajectory)
+    return euler, refine(euler.model, euler.task, euler.requirements, euler.trajectory)
 
 
 def refiner(euler: Plan, **control: Any) -> Refiner:
     """What `refine` runs."""
-    half = reduction_of(euler.model, euler.task, euler.wishes, euler.trajectory)
+    half = reduction_of(euler.model, euler.task, euler.requirements, euler.trajectory)
     return Refiner(
-        euler.model, euler.task, euler.wishes, euler.trajectory, half, Control(**control)
+        euler.model, euler.task, euler.requirements, euler.trajectory, half, Control(**control)
     )
 
 
@@ -92,11 +92,13 @@ def test_a_refined_plan_keeps_what_the_task_asks(name: str, override: str) -> No
     euler, found = both(name, override)
     assert found.certificate is not None and found.trajectory is not None
     assert found.certificate.within(euler.task.tolerances)
-    for wish in euler.wishes:
-        if wish.at is None or (wish.at == 1.0 and wish.text.endswith("rest")):
+    for requirement in euler.requirements:
+        if requirement.at is None or (requirement.at == 1.0 and requirement.text.endswith("rest")):
             continue
-        value = found.trajectory[wish.quantity.name][wish.node(len(found.trajectory) - 1)]
-        assert wish.lower - 1e-6 <= value <= wish.upper + 1e-6, wish
+        value = found.trajectory[requirement.quantity.name][
+            requirement.node(len(found.trajectory) - 1)
+        ]
+        assert requirement.lower - 1e-6 <= value <= requirement.upper + 1e-6, requirement
 
 
 @pytest.mark.parametrize(("name", "override"), QUICK)
@@ -122,7 +124,7 @@ def test_phases_cover_the_motion_and_touch_down_once_for_a_clean_jump() -> None:
 def test_open_gaps_keep_clear_away_from_touches(name: str, override: str) -> None:
     euler, found = both(name, override)
     assert found.trajectory is not None
-    half = reduction_of(euler.model, euler.task, euler.wishes, euler.trajectory)
+    half = reduction_of(euler.model, euler.task, euler.requirements, euler.trajectory)
     x, node = arrays(euler.model, found.trajectory), euler.model.node
     for i, constraint in enumerate(read_constraints(euler.model, half)):
         gap = ca.Function("gap", [node.q], [constraint.gap]).map(len(x["q"]))
@@ -134,7 +136,7 @@ def test_open_gaps_keep_clear_away_from_touches(name: str, override: str) -> Non
 
 def test_the_half_robot_has_one_foot_and_two_stops() -> None:
     euler, _ = both(*CASES[1])
-    half = reduction_of(euler.model, euler.task, euler.wishes, euler.trajectory)
+    half = reduction_of(euler.model, euler.task, euler.requirements, euler.trajectory)
     assert half.symmetric
     constraints = read_constraints(euler.model, half)
     assert [c.label for c in constraints] == [
@@ -191,7 +193,7 @@ def test_refining_stops_when_asked_and_tells_every_iteration(enough: int) -> Non
     found = refine(
         euler.model,
         euler.task,
-        euler.wishes,
+        euler.requirements,
         euler.trajectory,
         watch=lambda iteration, objective, violation: heard.append((iteration, violation)),
         stop=lambda: len(heard) >= enough,
@@ -204,14 +206,14 @@ def test_refining_stops_when_asked_and_tells_every_iteration(enough: int) -> Non
 def test_refining_ends_at_its_deadline() -> None:
     euler = euler_plan(*CASES[1])
     late = time.monotonic() - 1.0
-    found = refine(euler.model, euler.task, euler.wishes, euler.trajectory, deadline=late)
+    found = refine(euler.model, euler.task, euler.requirements, euler.trajectory, deadline=late)
     assert not found.solved and found.message == "Maximum_WallTime_Exceeded"
 
 
 def test_refining_spends_no_more_iterations_than_it_may(monkeypatch: pytest.MonkeyPatch) -> None:
     euler = euler_plan(*CASES[1])
     monkeypatch.setitem(ITERATIONS, True, 7)
-    found = refine(euler.model, euler.task, euler.wishes, euler.trajectory)
+    found = refine(euler.model, euler.task, euler.requirements, euler.trajectory)
     assert not found.solved and 0 < found.iterations <= 7
 
 

@@ -34,7 +34,7 @@ def program(symmetric: bool, nodes: int = 5) -> Transcription:
 def guess(program: Transcription) -> np.ndarray:
     """The automatic guess on a program's grid."""
     t = program
-    return automatic_guess(t.model, t.task, t.wishes, t.layout, t.nodes)
+    return automatic_guess(t.model, t.task, t.requirements, t.layout, t.nodes)
 
 
 @pytest.fixture(scope="module", params=[False, True], ids=["whole", "half"])
@@ -76,7 +76,7 @@ def test_every_row_has_a_meaning(any_program: Transcription) -> None:
     t = any_program
     assert len(t.meanings) == t.constraints == t.problem.rows
     kinds = {m.kind for m in t.meanings}
-    assert kinds == {"defect", "pair", "sign", "limit", "wish"}
+    assert kinds == {"defect", "pair", "sign", "limit", "requirement"}
     assert {m.node for m in t.meanings} == set(range(t.nodes + 1))
     assert "front/contact:gap" in {m.label for m in t.meanings}
 

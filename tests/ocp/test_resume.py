@@ -164,14 +164,16 @@ def test_trajectory_to_program_and_back() -> None:
     run = solved("jump").run
     task, document = load_task(run.task)
     model = task_model(task)
-    wishes = resolve(task, model, document)
-    program = Transcription(model, task, wishes, whole(model.node), task.nodes)
+    requirements = resolve(task, model, document)
+    program = Transcription(model, task, requirements, whole(model.node), task.nodes)
     Y = resumed(program, run.trajectory).Y
     groups = node_groups(model, run.trajectory)
     assert len(groups["h"]) == len(run.trajectory)
     for name in ("q", "v", "s"):
         assert program.layout.full(Y, name) == pytest.approx(groups[name], abs=1e-6)
-    finer = Transcription(model, task, wishes, whole(model.node), 2 * (len(run.trajectory) - 1))
+    finer = Transcription(
+        model, task, requirements, whole(model.node), 2 * (len(run.trajectory) - 1)
+    )
     fine = resumed(finer, run.trajectory).Y
     assert program.layout.full(fine[::2], "q") == pytest.approx(groups["q"], abs=1e-6)
     assert finer.times(fine)[-1] == pytest.approx(run.trajectory.time[-1], rel=0.03)

@@ -9,10 +9,10 @@ import pytest
 from kemba.model import load_model
 from kemba.ocp import load_task
 from kemba.ocp.nlp.blocks import Block, BlockProblem
-from kemba.ocp.nlp.proximal import Anchored
-from kemba.ocp.nlp.regularised import DAMPING, damped
-from kemba.ocp.nlp.signs import folded
-from kemba.ocp.nlp.vectorised import FEW, abreast
+from kemba.ocp.nlp.proximal import Proximal
+from kemba.ocp.nlp.regularised import DAMPING, regularised_hessian
+from kemba.ocp.nlp.signs import canonical_signs
+from kemba.ocp.nlp.vectorised import FEW, vectorised
 from kemba.ocp.task.requirement import resolve
 from kemba.ocp.transcription.symmetry import find_symmetry
 from kemba.ocp.transcription.transcribe import Transcription
@@ -39,7 +39,7 @@ def test_abreast_is_the_same_to_the_last_bit(half: Transcription, points: int) -
     z = rng.uniform(0.2, 0.9, (block.z.numel(), points))
     lam = rng.normal(size=(lam_g.numel(), points))
     given = np.concatenate([[1e-3, 0.1, 0.1, 0.1, 1e-5], block.numbers])
-    together = abreast(f, points, [1, 2])(z, given, 1.3, lam)
+    together = vectorised(f, points, [1, 2])(z, given, 1.3, lam)
     for k in range(points):
         for every, one in zip(together, f(z[:, k], given, 1.3, lam[:, k]), strict=True):
             assert np.array_equal(np.array(every)[:, k], np.array(one).ravel())
@@ -48,7 +48,7 @@ def test_abreast_is_the_same_to_the_last_bit(half: Transcription, points: int) -
 def test_abreast_repeats_what_is_the_same_at_all_points() -> None:
     x, c = ca.SX.sym("x"), ca.SX.sym("c")
     f = ca.Function("f", [x, c], [ca.vertcat(x * c, c + 1, 2.5), ca.SX(0, 1)])
-    values, nothing = abreast(f, POINTS, [1])(np.arange(POINTS)[None, :], 3.0)
+    values, nothing = vectorised(f, POINTS, [1])(np.arange(POINTS)[None, :], 3.0)
     assert np.array(values).tolist() == [[3.0 * i for i in range(POINTS)], [4.0] * 12, [2.5] * 12]
     assert nothing.shape == (0, POINTS)
 
@@ -60,7 +60,7 @@ def test_folding_writes_a_mirrored_leg_once() -> None:
         return (a - b * ca.sin(q)) * ca.cos(q) + ca.atan(q) * b / a
 
     plain = leg(q, b) + leg(-q, -b)
-    (once,) = folded([q, a, b], [plain])
+    (once,) = canonical_signs([q, a, b], [plain])
     count = ca.Function("f", [q, a, b], [leg(q, b)]).n_instructions()
     f, g = ca.Function("f", [q, a, b], [plain]), ca.Function("g", [q, a, b], [once])
     assert g.n_instructions() == count + 1 < f.n_instructions()
@@ -72,7 +72,7 @@ def test_folding_shares_the_legs_of_half_a_robot(half: Transcription) -> None:
     stage = half.stage
     at = [ca.vertcat(stage.y0, stage.y), ca.vertcat(stage.eps, stage.weights)]
     plain = ca.Function("f", at, [ca.cse(ca.densify(stage.g))])
-    once = ca.Function("g", at, [ca.cse(folded(at, [stage.g])[0])])
+    once = ca.Function("g", at, [ca.cse(canonical_signs(at, [stage.g])[0])])
     assert once.n_instructions() < 0.8 * plain.n_instructions()
     rng = np.random.default_rng(0)
     for _ in range(3):
@@ -85,7 +85,7 @@ def test_an_anchor_adds_half_the_squared_way() -> None:
     columns = np.array([[0, 1], [1, 2]])
     block = Block(z, ca.vertcat(z[0] * z[1]), z[0] ** 3 - z[1], columns)
     problem = BlockProblem([block], 3, ca.SX(0, 1))
-    anchored, rng = Anchored(problem), np.random.default_rng(0)
+    anchored, rng = Proximal(problem), np.random.default_rng(0)
     x, start, weight = rng.normal(size=3), rng.normal(size=3), 0.7
     p, lam = [weight, *start], [0.3, -2.0]
     (f, slope), (f0, slope0) = anchored.grad_f(x, p), problem.grad_f(x, [])
@@ -104,5 +104,5 @@ def test_damping_adds_the_same_curvature_everywhere() -> None:
     block = Block(z, ca.vertcat(z[0] * z[1]), z[0] ** 3 - z[1], np.array([[0, 1], [1, 2]]))
     plain = BlockProblem([block], 3, ca.SX(0, 1)).hess_lag
     at = (np.random.default_rng(0).normal(size=3), [], 1.5, [0.3, -2.0])
-    added = np.array(damped(plain)(*at) - plain(*at))
+    added = np.array(regularised_hessian(plain)(*at) - plain(*at))
     assert added == pytest.approx(DAMPING * np.eye(3), abs=1e-15)

@@ -9,8 +9,8 @@ import pytest
 
 from kemba.model import load_model
 from kemba.ocp import load_task, plan, planner, schedule
-from kemba.ocp.nlp.ipopt import Point
-from kemba.ocp.nlp.stagnation import GAVE_UP, Patience
+from kemba.ocp.nlp.ipopt import Iterate
+from kemba.ocp.nlp.stagnation import GAVE_UP, Stagnation
 from kemba.ocp.planned import Plan
 from kemba.ocp.relaxation.guess import body_course
 from kemba.ocp.task.requirement import resolve
@@ -44,7 +44,7 @@ def test_without_symmetry_it_starts_from_the_guess() -> None:
 
 
 def test_what_does_not_grow_starts_from_the_guess(monkeypatch: pytest.MonkeyPatch) -> None:
-    def wither(search: object, half: object, point: Point, guess: Point) -> Point:
+    def wither(search: object, half: object, point: Iterate, guess: Iterate) -> Iterate:
         return replace(guess, message="Infeasible_Problem_Detected")
 
     monkeypatch.setattr(planner, "grow", wither)
@@ -55,7 +55,7 @@ def test_what_does_not_grow_starts_from_the_guess(monkeypatch: pytest.MonkeyPatc
 
 @pytest.mark.parametrize(("rounds", "least", "most"), [(0, 0, 0), (1, 1, 1), (3, 2, 3)])
 def test_switches_move_as_often_as_asked(rounds: int, least: int, most: int) -> None:
-    found, solves = told("jump", "nodes=50", "refine=none", f"solver.polish={rounds}")
+    found, solves = told("jump", "nodes=50", "refine=none", f"solver.valve_search={rounds}")
     assert found.status == "solved"
     assert least <= sum(solve.startswith("move switches") for solve in solves) <= most
 
@@ -84,7 +84,7 @@ def test_valves_that_do_not_fit_the_finer_grid_are_sought_again(
     ],
 )
 def test_patience_is_lost_where_nothing_comes_nearer(violations: list[float], lost: bool) -> None:
-    patience = Patience(iterations=3, small=0.05)
+    patience = Stagnation(iterations=3, small=0.05)
     for iteration, violation in enumerate(violations):
         patience.hear(iteration, violation)
     assert patience.lost is lost
@@ -98,8 +98,8 @@ def test_a_guess_flies_where_feet_must_leave_the_ground(lift: str) -> None:
     spans = []
     for asked in (goals, lifted):
         task, document = load_task("hop", [f"goals={{{asked}}}"])
-        wishes = resolve(task, load_model(task.model), document)
-        course = body_course(wishes, task.duration, (0.17, 0.42), 9.81)
+        requirements = resolve(task, load_model(task.model), document)
+        course = body_course(requirements, task.duration, (0.17, 0.42), 9.81)
         assert np.all(np.diff(course.t) > 0.0) and np.all(np.isfinite(course(np.array(course.t))))
         spans.append(course.flight[1] - course.flight[0])
     assert spans[0] == 0.0 < 0.1 < spans[1]

@@ -13,7 +13,7 @@ from kemba.config import Document
 from kemba.effects.base import At, Contribution, Effect
 from kemba.mechanism import Mechanism, Port
 from kemba.model import Model
-from kemba.ocp.nlp.ipopt import Ipopt, Parameters, Point
+from kemba.ocp.nlp.ipopt import Ipopt, Iterate, Parameters
 from kemba.ocp.task.requirement import resolve
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.symmetry import whole
@@ -90,13 +90,13 @@ def bead(axes: str = "x", gravity: float = 0.0) -> Mechanism:
 
 def solve(
     mechanism: Mechanism, effects: Iterable[Effect], start: dict[str, float], **task: object
-) -> tuple[Transcription, Point]:
+) -> tuple[Transcription, Iterate]:
     """The task solved from straight lines between its start and its end."""
     document = Document({"start": start, **task})
     wanted = Task.model_validate(document.data)
     model = Model(mechanism, effects)
-    wishes = resolve(wanted, model, document)
-    program = Transcription(model, wanted, wishes, whole(model.node), wanted.nodes)
+    requirements = resolve(wanted, model, document)
+    program = Transcription(model, wanted, requirements, whole(model.node), wanted.nodes)
     ends = {
         c.name: float(wanted.end[c.name].equals or 0.0) if c.name in wanted.end else start[c.name]
         for c in mechanism.coordinates
@@ -111,7 +111,7 @@ def solve(
         "lam": np.zeros((len(q), len(model.forces))),
         "h": np.full((len(q), 1), wanted.step),
     }
-    guess = Point(np.clip(program.layout.pack(groups), program.lower, program.upper))
+    guess = Iterate(np.clip(program.layout.pack(groups), program.lower, program.upper))
     found = Ipopt(program, SHARP).solve(guess, Parameters(eps=0.0))
     assert found.solved, found.message
     return program, found

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from kemba.effects.mechanics.friction import V_COULOMB
-from kemba.identify.bench.motion import Motion, smooth_motion
+from kemba.identify.bench.motion import SmoothedMotion, smooth_motion
 from kemba.identify.bench.rig_model import Pulses
 from kemba.identify.bench.switching import pulses
 from kemba.identify.evidence.noise import difference_sigma
@@ -27,11 +27,11 @@ CREEPING, CREEP = 200.0, 0.08
 
 
 @dataclass(frozen=True)
-class Run:
+class BenchLog:
     """One bench log, prepared: motion, commands, and the measured channels."""
 
     name: str
-    motion: Motion
+    motion: SmoothedMotion
     commands: Pulses
     measured: dict[str, Array]
     sigma: dict[str, float]
@@ -48,7 +48,7 @@ class Run:
         return np.asarray(slope * self.motion.v_sigma + 0.5 * FRICTION * (high - low))
 
 
-def prepare(name: str, log: Trajectory) -> Run:
+def prepare(name: str, log: Trajectory) -> BenchLog:
     """Smooth the motion and learn each channel's white noise from its fastest differences."""
     speeds = [log[name] for name in ("piston/v",) if name in log]
     motion = smooth_motion(log.time, log["piston/x"], *speeds)
@@ -59,7 +59,7 @@ def prepare(name: str, log: Trajectory) -> Run:
     seen = ~blind(log.time, np.isfinite(log["piston/x"]), np.stack(sent))
     keep = {c: np.isfinite(y) & seen for c, y in measured.items()}
     commands = (pulses(log.time, sent[0]), pulses(log.time, sent[1]))
-    return Run(name, motion, commands, measured, sigma, np.char.add(*on), keep)
+    return BenchLog(name, motion, commands, measured, sigma, np.char.add(*on), keep)
 
 
 def noise_of(channel: str, y: Array) -> float:

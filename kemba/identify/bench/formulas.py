@@ -8,7 +8,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from kemba.effects.mechanics.friction import V_COULOMB
-from kemba.identify.bench.motion import Motion
+from kemba.identify.bench.motion import SmoothedMotion
 from kemba.identify.evidence.problem import Array
 
 STROKE = 0.070  # m
@@ -17,7 +17,7 @@ MEMORIES = (0.001, 0.006, 0.02, 0.06, 0.2)  # s
 CREEPS = (0.002, 0.006, 0.015)  # m, travel over which a hysteresis turns round
 
 
-def terms(motion: Motion, u: Array) -> Iterator[tuple[str, Array]]:
+def terms(motion: SmoothedMotion, u: Array) -> Iterator[tuple[str, Array]]:
     """(formula, force per unit coefficient (n,)); `u` (n, 2): share of each valve being on."""
     x, v, (u_e, u_r) = motion.x, motion.v, u.T
     sign = np.tanh(v / V_COULOMB)
@@ -48,7 +48,7 @@ def terms(motion: Motion, u: Array) -> Iterator[tuple[str, Array]]:
         yield f"dahl(x, {travel:g})", dahl(x, travel)
 
 
-def features(motion: Motion, u: Array) -> Array:
+def features(motion: SmoothedMotion, u: Array) -> Array:
     """Whatever a missing force could depend on (n, m): where, how fast, and since when which
     valve is on, each with each."""
     step = float(np.median(np.diff(motion.time)))

@@ -15,7 +15,7 @@ HALF_WIDTHS = (5, 8, 11, 15, 20, 27, 40, 60, 90, 135)  # samples
 
 
 @dataclass(frozen=True)
-class Motion:
+class SmoothedMotion:
     """x [m], v [m.s-1], a [m.s-2] at `time` (n,) [s], and one sigma of v (n,)."""
 
     time: Array
@@ -26,7 +26,7 @@ class Motion:
     x_sigma: float
 
 
-def smooth_motion(time: Array, x: Array, v: Array | None = None) -> Motion:
+def smooth_motion(time: Array, x: Array, v: Array | None = None) -> SmoothedMotion:
     """Local cubics, each of the width that promises the smallest error of the velocity.
 
     At rest the window is wide, so that noise does not look like creeping; in fast motion it is
@@ -44,7 +44,7 @@ def smooth_motion(time: Array, x: Array, v: Array | None = None) -> Motion:
         rate, spread = _weigh_in(grid, rate, spread, half, time, v)
     a = np.gradient(_mean(rate, 3), step)
     x, v, a, spread = (np.interp(time, grid, c) for c in (position, rate, a, spread))
-    return Motion(time, x, v, a, spread, sigma)
+    return SmoothedMotion(time, x, v, a, spread, sigma)
 
 
 def _adaptive(values: Array, sigma: float, step: float) -> tuple[Array, Array, Array, Array]:

@@ -7,18 +7,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kemba.identify.bench.switching import edges
-from kemba.identify.compare.force_profiles import LAGS, Port, risen
-from kemba.identify.evidence.operating_point import Surroundings
+from kemba.identify.compare.force_profiles import LAGS, ForceChannel, risen
+from kemba.identify.evidence.operating_point import OperatingPoint
 from kemba.identify.evidence.problem import Array
 
 if TYPE_CHECKING:
-    from kemba.identify.bench.bench_log import Run
+    from kemba.identify.bench.bench_log import BenchLog
     from kemba.identify.bench.problem import BenchProblem
 
 Switchings = dict[str, tuple[Array, Array]]
 
 
-def bench_surroundings(problem: BenchProblem) -> Surroundings:
+def bench_operating_point(problem: BenchProblem) -> OperatingPoint:
     """The piston at every row: imposed motion, and the rod force that the model predicts."""
     parts = []
     for i, run in enumerate(problem.logs):
@@ -26,10 +26,10 @@ def bench_surroundings(problem: BenchProblem) -> Surroundings:
         table = np.stack([run.motion.x, run.motion.v, force])
         parts += [table[:, run.keep[channel]] for channel in run.measured]
     x, v, force = np.concatenate(parts, axis=1)
-    return Surroundings(x, v, force, problem.model.mechanism.stroke)
+    return OperatingPoint(x, v, force, problem.model.mechanism.stroke)
 
 
-def switchings(run: Run) -> Switchings:
+def switchings(run: BenchLog) -> Switchings:
     """Valve name -> instants of the commands and +1 or -1 for on and off."""
     found = {}
     for side, intervals in zip(("extend", "retract"), run.commands, strict=True):
@@ -39,9 +39,9 @@ def switchings(run: Run) -> Switchings:
     return found
 
 
-def bench_port(problem: BenchProblem) -> Port:
+def bench_port(problem: BenchProblem) -> ForceChannel:
     """The rod: what is missing shows in its force channel, sample by sample."""
-    around, rows = bench_surroundings(problem), problem.rows()
+    around, rows = bench_operating_point(problem), problem.rows()
     force = rows.channel == rows.channels.index("piston/F")
     sigma = _sigma(problem)
 
@@ -60,7 +60,7 @@ def bench_port(problem: BenchProblem) -> Port:
         for i, run in enumerate(problem.logs):
             own = rows.run == i
             after[side][own] = risen(*switchings(run)[f"valve/{side}"], rows.time[own])
-    return Port("rod", "N", 10.0, quantities, columns, after)
+    return ForceChannel("rod", "N", 10.0, quantities, columns, after)
 
 
 def _sigma(problem: BenchProblem) -> Array:

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from kemba.effects.base import Effect
-from kemba.identify.bench.bench_log import PRESSURES, Run
-from kemba.identify.bench.motion import Motion
+from kemba.identify.bench.bench_log import PRESSURES, BenchLog
+from kemba.identify.bench.motion import SmoothedMotion
 from kemba.identify.bench.pressure import absolute_pressure
-from kemba.identify.bench.rig_model import Prediction, Rig, share
+from kemba.identify.bench.rig_model import Prediction, RigModel, share
 from kemba.identify.bench.switching import delayed
 from kemba.identify.evidence.candidates import by_default
 from kemba.identify.evidence.problem import Array, Candidate, Theta
@@ -27,9 +27,9 @@ class Predictor:
     def __init__(self, model: Model, candidates: Mapping[str, Candidate]) -> None:
         self.model, self.candidates = model, candidates
         self.figures = _figures(model)
-        self._rigs: dict[tuple[str, ...], Rig] = {}
+        self._rigs: dict[tuple[str, ...], RigModel] = {}
 
-    def rig(self, theta: Theta) -> Rig:
+    def rig(self, theta: Theta) -> RigModel:
         """The rig with the effects on its list that theta switches on."""
         active = tuple(
             name
@@ -41,11 +41,11 @@ class Predictor:
             model = self.model.with_effects(_unlike(self.model, extra))
             keys = (key for name in active for key in tuple(self.candidates[name].keys()))
             free = tuple(key for key in keys if key in model.parameters)
-            self._rigs[active] = Rig(model, free, self.figures)
+            self._rigs[active] = RigModel(model, free, self.figures)
         return self._rigs[active]
 
     def predict(
-        self, run: Run, theta: Theta, start: Mapping[str, float] | None = None
+        self, run: BenchLog, theta: Theta, start: Mapping[str, float] | None = None
     ) -> Prediction:
         """What happens on the rig, before any sensor; `start`: states beyond their usual."""
         rig = self.rig(theta)
@@ -54,7 +54,7 @@ class Predictor:
         return rig.predict(true_motion(run.motion, theta), run.commands, values, start or {})
 
     def readings(
-        self, run: Run, theta: Theta, start: Mapping[str, float]
+        self, run: BenchLog, theta: Theta, start: Mapping[str, float]
     ) -> dict[str, tuple[Array, Array]]:
         """Per channel (n,): what should have been measured, and its variance."""
         p = self.predict(run, theta, start)
@@ -64,14 +64,14 @@ class Predictor:
                 out[channel] = _pressure(channel, p, run, theta)
         return out
 
-    def acting(self, run: Run, theta: Theta) -> Array:
+    def acting(self, run: BenchLog, theta: Theta) -> Array:
         """Share of each sample's neighbourhood in which the valves act (n, 2)."""
         delays = self.rig(theta).timing(theta)
         times = run.motion.time
         return np.stack([share(delayed(c, *delays), times) for c in run.commands], axis=1)
 
 
-def true_motion(motion: Motion, theta: Theta) -> Motion:
+def true_motion(motion: SmoothedMotion, theta: Theta) -> SmoothedMotion:
     """The motion that made the position sensor say what it said."""
     k = theta.get("sensor_scale:piston/x.k", 0.0)
     b = theta.get("sensor_bias:piston/x.b", 0.0)
@@ -83,7 +83,7 @@ def true_motion(motion: Motion, theta: Theta) -> Motion:
     return replace(motion, x=(x - b) / (1 + k), v=v / (1 + k), a=a / (1 + k))
 
 
-def _force(p: Prediction, run: Run, theta: Theta) -> tuple[Array, Array]:
+def _force(p: Prediction, run: BenchLog, theta: Theta) -> tuple[Array, Array]:
     """The transducer's reading and its variance: sensor, velocity error, switching instants."""
     force, valve = p.force, p.valve
     dt = theta.get("sensor_delay:piston/F.dt", 0.0)
@@ -98,7 +98,7 @@ def _force(p: Prediction, run: Run, theta: Theta) -> tuple[Array, Array]:
     return force, variance
 
 
-def _pressure(channel: str, p: Prediction, run: Run, theta: Theta) -> tuple[Array, Array]:
+def _pressure(channel: str, p: Prediction, run: BenchLog, theta: Theta) -> tuple[Array, Array]:
     value = absolute_pressure(channel, p.states)
     gain, offset = theta.get(f"gain:{channel}", 1.0), theta.get(f"offset:{channel}", 0.0)
     return gain * value + offset, np.full(len(value), run.sigma[channel] ** 2)

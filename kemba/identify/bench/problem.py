@@ -8,20 +8,20 @@ from functools import cached_property
 
 import numpy as np
 
-from kemba.identify.bench.bench_log import Run
+from kemba.identify.bench.bench_log import BenchLog
 from kemba.identify.bench.beyond import formula_columns, leftover, weight
 from kemba.identify.bench.operating_point import (
     Switchings,
+    bench_operating_point,
     bench_port,
-    bench_surroundings,
     switchings,
 )
 from kemba.identify.bench.prediction import Predictor
 from kemba.identify.bench.validate import contradictions
-from kemba.identify.compare.force_profiles import Port
+from kemba.identify.compare.force_profiles import ForceChannel
 from kemba.identify.evidence.candidates import effect_candidates, sensor_candidates
 from kemba.identify.evidence.noise import Colour, learn, whiten
-from kemba.identify.evidence.operating_point import Surroundings
+from kemba.identify.evidence.operating_point import OperatingPoint
 from kemba.identify.evidence.problem import Array, Rows, Theta, secant_jacobian
 from kemba.identify.logs.gate import BadData
 from kemba.model.model import Model
@@ -34,7 +34,7 @@ JITTER = 0.02  # nominal figures are off by 1-3 %
 class BenchProblem:
     """Residuals of bench runs; effects join the model's list when theta switches them on."""
 
-    def __init__(self, runs: Iterable[Run], model: Model, sensors: bool = True) -> None:
+    def __init__(self, runs: Iterable[BenchLog], model: Model, sensors: bool = True) -> None:
         self._runs = list(runs)
         self.model = model
         self.runs = tuple(run.name for run in self._runs)
@@ -60,7 +60,7 @@ class BenchProblem:
         self._settle_starts()
 
     @property
-    def logs(self) -> tuple[Run, ...]:
+    def logs(self) -> tuple[BenchLog, ...]:
         """The prepared logs, in the order of `runs`."""
         return tuple(self._runs)
 
@@ -139,15 +139,15 @@ class BenchProblem:
         )
         return Rows(run_, channel, time, phase, mode, self.channels, sigma)
 
-    def surroundings(self) -> Surroundings:
+    def operating_point(self) -> OperatingPoint:
         """The piston at every row."""
-        return bench_surroundings(self)
+        return bench_operating_point(self)
 
     def commands(self) -> list[Switchings]:
         """Per run: valve -> instants and signs of its switchings."""
         return [switchings(run) for run in self._runs]
 
-    def ports(self) -> list[Port]:
+    def ports(self) -> list[ForceChannel]:
         """Where a force may be missing: on the rod."""
         return [bench_port(self)]
 

@@ -11,7 +11,7 @@ import casadi as ca
 import numpy as np
 
 from kemba.effects.base import Effect
-from kemba.identify.bench.motion import Motion
+from kemba.identify.bench.motion import SmoothedMotion
 from kemba.identify.bench.switching import delayed, edges, is_on
 from kemba.identify.evidence.problem import Array
 from kemba.model.model import Model
@@ -38,7 +38,7 @@ class Prediction:
     states: dict[str, Array]
 
 
-class Rig:
+class RigModel:
     """One model compiled with numbers left free: `free` parameters, `scaled` tables."""
 
     def __init__(self, model: Model, free: tuple[str, ...], scaled: tuple[str, ...]) -> None:
@@ -68,7 +68,7 @@ class Rig:
 
     def predict(
         self,
-        motion: Motion,
+        motion: SmoothedMotion,
         commands: Pulses,
         values: Mapping[str, float],
         start: Mapping[str, float] | None = None,
@@ -95,7 +95,7 @@ class Rig:
         return Prediction(force, out[1], out[2:4].T, blurred.T, states)
 
     def _integrate(
-        self, times: Array, motion: Motion, u: Array, p: Array, start: Mapping[str, float]
+        self, times: Array, motion: SmoothedMotion, u: Array, p: Array, start: Mapping[str, float]
     ) -> Array:
         middle = 0.5 * (times[:-1] + times[1:])
         paths = [np.interp(t, motion.time, c) for t in (times, middle) for c in _columns(motion)]
@@ -212,7 +212,7 @@ def share(intervals: Array, times: Array) -> Array:
     return np.asarray(np.clip((later - earlier) / (2 * BLUR), 0.0, 1.0))
 
 
-def _columns(motion: Motion) -> tuple[Array, Array, Array]:
+def _columns(motion: SmoothedMotion) -> tuple[Array, Array, Array]:
     return motion.x, motion.v, motion.a
 
 

@@ -9,8 +9,8 @@ import numpy as np
 from scipy.signal import correlate
 
 from kemba.errors import KembaError
-from kemba.identify.bench.bench_log import Run
-from kemba.identify.bench.motion import Motion
+from kemba.identify.bench.bench_log import BenchLog
+from kemba.identify.bench.motion import SmoothedMotion
 from kemba.identify.evidence.problem import Array
 
 STROKE = 0.070  # m
@@ -20,10 +20,10 @@ CLOSE = 0.25  # share of the force's spread that a believable fit leaves at most
 LATEST = 0.015  # s; a lag beyond this is no sensor's delay but another clock
 RESOLUTION = 1e-3  # s
 
-Predict = Callable[[Run], Array]  # the nominal force along a run
+Predict = Callable[[BenchLog], Array]  # the nominal force along a run
 
 
-def mix_ups(run: Run) -> Iterator[tuple[str, Run]]:
+def mix_ups(run: BenchLog) -> Iterator[tuple[str, BenchLog]]:
     """The run as it would be, were a column's mistake undone."""
     extend, retract = run.commands
     force = run.measured["piston/F"]
@@ -52,7 +52,7 @@ def mix_ups(run: Run) -> Iterator[tuple[str, Run]]:
         yield f"piston/x seems to be in {unit}", replace(run, motion=scaled)
 
 
-def contradictions(run: Run, predict: Predict) -> list[KembaError]:
+def contradictions(run: BenchLog, predict: Predict) -> list[KembaError]:
     """What must be wrong with a run's columns, if anything."""
     path = run.name
     error, scale = _misfit(run, predict)
@@ -77,7 +77,7 @@ def contradictions(run: Run, predict: Predict) -> list[KembaError]:
     return []
 
 
-def _misfit(run: Run, predict: Predict) -> tuple[float, float]:
+def _misfit(run: BenchLog, predict: Predict) -> tuple[float, float]:
     """Median error of the nominal prediction and spread of the measured force."""
     keep = run.keep["piston/F"]
     force = run.measured["piston/F"][keep]
@@ -87,7 +87,7 @@ def _misfit(run: Run, predict: Predict) -> tuple[float, float]:
     return error, max(float(np.std(force)), float(np.sqrt(np.mean(force**2))), 1.0)
 
 
-def _clock(run: Run, predict: Predict) -> list[KembaError]:
+def _clock(run: BenchLog, predict: Predict) -> list[KembaError]:
     """A force that comes much later or earlier than any sensor's delay has another clock."""
     keep = run.keep["piston/F"]
     grid = np.arange(run.motion.time[0], run.motion.time[-1], RESOLUTION)
@@ -123,5 +123,5 @@ def _inverted(intervals: list[tuple[float, float]]) -> list[tuple[float, float]]
     return [(a, b) for a, b in pairs if b > a]
 
 
-def _flipped(motion: Motion) -> Motion:
+def _flipped(motion: SmoothedMotion) -> SmoothedMotion:
     return replace(motion, x=STROKE - motion.x, v=-motion.v, a=-motion.a)

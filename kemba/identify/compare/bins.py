@@ -20,7 +20,7 @@ STEADY = ("rest", "stance2")  # phases in which they can be relied on
 
 
 @dataclass(frozen=True)
-class Cell:
+class ConditionBin:
     """One channel in one phase of motion, valve mode and region of the stroke (`in`, `mid`,
     `out`); `q_value` controls false discoveries over all cells of a comparison."""
 
@@ -36,7 +36,9 @@ class Cell:
         return self.q_value < FALSE_DISCOVERIES
 
 
-def cells(rows: Rows, region: Labels, first: Labels, sums: Array) -> Iterable[Cell]:
+def condition_bins(
+    rows: Rows, region: Labels, first: Labels, sums: Array
+) -> Iterable[ConditionBin]:
     """Every condition with enough data, of grains that begin at row `first` (k,) and sum to `sums`
     (k,) in units of noise; q values over all of them."""
     parts = (rows.phase, rows.mode, region)
@@ -51,7 +53,9 @@ def cells(rows: Rows, region: Labels, first: Labels, sums: Array) -> Iterable[Ce
         channel, *place = kinds[i]
         labels = [str(n[k]) for n, k in zip(names, place, strict=True)]
         phase, mode, piece = labels
-        yield Cell(rows.channels[channel], phase, mode, piece, rms(groups[i]), float(q_value))
+        yield ConditionBin(
+            rows.channels[channel], phase, mode, piece, rms(groups[i]), float(q_value)
+        )
 
 
 def doubtful(rows: Rows) -> np.ndarray[Any, np.dtype[np.bool_]]:

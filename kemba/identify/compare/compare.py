@@ -9,15 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from kemba.identify.compare.bins import Cell, cells
-from kemba.identify.compare.force_profiles import Law, laws
+from kemba.identify.compare.bins import ConditionBin, condition_bins
+from kemba.identify.compare.force_profiles import ForceProfile, force_profiles
 from kemba.identify.compare.hints import Hint, Response, conflicts, lacking, lagged
 from kemba.identify.compare.missing_force import Missing, Peak, peaks
 from kemba.identify.compare.smoother import missing_force
 from kemba.identify.compare.tolerance import free_starts, slopes, within_tolerance
 from kemba.identify.evidence.operating_point import region_labels
 from kemba.identify.evidence.problem import Array, Labels, Problem, Rows, Theta
-from kemba.identify.evidence.windows import Grains, expected, grains, rms
+from kemba.identify.evidence.windows import Windows, aggregation_windows, expected, rms
 
 GOOD, FAIR = 1.15, 1.5
 
@@ -45,19 +45,19 @@ class Comparison:
     model: str
     noise_ratio: float
     channels: tuple[ChannelError, ...]
-    cells: tuple[Cell, ...]
+    bins: tuple[ConditionBin, ...]
     tolerant_ratio: float = float("nan")
     tolerable: bool = False
     hints: tuple[Hint, ...] = ()
     responses: tuple[Response, ...] = ()
-    laws: tuple[Law, ...] = ()
+    force_profiles: tuple[ForceProfile, ...] = ()
     missing: tuple[Missing, ...] = ()
     plan: Mapping[str, float] = field(default_factory=dict)
     sentence: str = ""
 
     @property
     def good(self) -> bool:
-        return self.noise_ratio <= GOOD and not any(c.significant for c in self.cells)
+        return self.noise_ratio <= GOOD and not any(c.significant for c in self.bins)
 
     @property
     def peaks(self) -> list[Peak]:
@@ -72,7 +72,7 @@ class Comparison:
             "noise_ratio": self.noise_ratio,
             "tolerant_ratio": self.tolerant_ratio,
             "channels": [asdict(c) for c in self.channels],
-            "cells": [asdict(c) for c in self.cells],
+            "cells": [asdict(c) for c in self.bins],
             "hints": [asdict(h) for h in self.hints],
             "missing_force": [asdict(p) for p in self.peaks],
             "sentence": self.sentence,
@@ -85,22 +85,22 @@ def compare(problem: Problem, model: str, logs: Sequence[str] = ()) -> Compariso
     start = free_starts(problem)
     rows, r = problem.rows(), problem.residual(start)
     _, region = region_labels(problem, rows)
-    grain = grains(problem, rows, region)
-    sums = grain.sums(r)
+    window = aggregation_windows(problem, rows, region)
+    sums = window.sums(r)
     known = slopes(problem, start)
     responses = tuple(lagged(problem, rows, r / np.sqrt(expected(problem, len(r)))))
-    forces = tuple(laws(problem, r))
+    forces = tuple(force_profiles(problem, r))
     sent = [s.hint for s in responses if s.certain]
     left = within_tolerance(r, known)
-    ratio, clean = _tolerant(rows, region, grain, left)
+    ratio, clean = _tolerant(rows, region, window, left)
     found = Comparison(
         tuple(logs) or problem.runs,
         model,
         rms(sums),
-        tuple(_channels(problem, rows, r, grain, start)),
-        tuple(cells(rows, region, grain.first, sums)),
+        tuple(_channels(problem, rows, r, window, start)),
+        tuple(condition_bins(rows, region, window.first, sums)),
         ratio,
-        clean and not any(law.matters for law in laws(problem, left)),
+        clean and not any(law.matters for law in force_profiles(problem, left)),
         (*sent, *conflicts(problem, rows, r, known)),
         responses,
         forces,
@@ -113,21 +113,21 @@ def compare(problem: Problem, model: str, logs: Sequence[str] = ()) -> Compariso
 
 def conditions(
     problem: Problem, theta: Theta | None = None, regions: bool = False
-) -> tuple[float, list[Cell]]:
+) -> tuple[float, list[ConditionBin]]:
     """Error ratio and cells of the model with `theta` added, told apart by region or not."""
     rows, r = problem.rows(), problem.residual(free_starts(problem, theta))
     region = np.full(len(rows), "", dtype=object)
     if regions:
         _, region = region_labels(problem, rows)
-    grain = grains(problem, rows, region)
-    sums = grain.sums(r)
-    return rms(sums), list(cells(rows, region, grain.first, sums))
+    window = aggregation_windows(problem, rows, region)
+    sums = window.sums(r)
+    return rms(sums), list(condition_bins(rows, region, window.first, sums))
 
 
-def _tolerant(rows: Rows, region: Labels, grain: Grains, left: Array) -> tuple[float, bool]:
+def _tolerant(rows: Rows, region: Labels, window: Windows, left: Array) -> tuple[float, bool]:
     """Error ratio of what the figures' tolerance leaves, and whether it is within the noise."""
-    sums = grain.sums(left)
-    clean = not any(c.significant for c in cells(rows, region, grain.first, sums))
+    sums = window.sums(left)
+    clean = not any(c.significant for c in condition_bins(rows, region, window.first, sums))
     return rms(sums), clean and rms(sums) <= GOOD
 
 
@@ -143,11 +143,11 @@ def measured_units(rows: Rows) -> dict[str, str]:
 
 
 def _channels(
-    problem: Problem, rows: Rows, r: Array, grain: Grains, start: Theta
+    problem: Problem, rows: Rows, r: Array, window: Windows, start: Theta
 ) -> Iterable[ChannelError]:
     windows = getattr(problem, "window_errors", None)
     errors = windows(start) if windows else {}
-    sums = grain.sums(r)
+    sums = window.sums(r)
     headers = measured_units(rows)
     for k, channel in enumerate(rows.channels):
         own = rows.channel == k
@@ -159,7 +159,7 @@ def _channels(
             float(np.sqrt(np.mean(error**2))),
             float(np.max(np.abs(error))),
             float(np.median(rows.sigma[own])),
-            rms(sums[own[grain.first]]),
+            rms(sums[own[window.first]]),
         )
 
 
@@ -170,7 +170,7 @@ def _first(hints: Sequence[Hint], kind: str) -> Sequence[Hint]:
 def phrase(found: Comparison) -> str:
     """The answer in plain words."""
     ratio = f"{found.noise_ratio:.2g} times the noise"
-    bad = sorted((c for c in found.cells if c.significant), key=lambda c: -c.ratio)
+    bad = sorted((c for c in found.bins if c.significant), key=lambda c: -c.ratio)
     if found.good:
         return f"The model explains the logs to within the noise: its error is {ratio}."
     if not bad:
@@ -187,7 +187,7 @@ def phrase(found: Comparison) -> str:
     return "; ".join(parts) + "."
 
 
-def _place(cell: Cell) -> str:
+def _place(cell: ConditionBin) -> str:
     valves = {"00": "valves off", "10": "extend valve on", "01": "retract valve on"}
     stroke = {"in": ", piston retracted", "mid": ", piston mid-stroke", "out": ", piston extended"}
     mode = valves.get(cell.mode, "both valves on")

@@ -26,7 +26,7 @@ PLAIN = 60.0  # nats that nominal figures at the edge of their tolerance do not 
 
 
 @dataclass(frozen=True)
-class Port:
+class ForceChannel:
     """Where a force may be missing: quantities by label, arrays (...) over samples, and the
     columns (rows, b) of residual that unit forces in bins (..., b) make. `after`: by command how
     much it changed within each of the LAGS before a sample, (..., b). `usual`: a force [unit] that
@@ -41,15 +41,15 @@ class Port:
 
 
 @runtime_checkable
-class Ported(Protocol):
+class ForceChannelled(Protocol):
     """A problem with ports."""
 
-    def ports(self) -> Sequence[Port]:
+    def ports(self) -> Sequence[ForceChannel]:
         """All of them."""
 
 
 @dataclass(frozen=True)
-class Law:
+class ForceProfile:
     """Missing `force` [unit] and its 1 sigma per bin (b,) around `centre` of a quantity; `gain`:
     what it explains beyond its number of bins [nats]; `usual` as of its port."""
 
@@ -92,23 +92,23 @@ class Law:
         return f"a force on the {self.port} is missing that {going} {what} ({size})"
 
 
-def laws(problem: Problem, residual: Array) -> list[Law]:
+def force_profiles(problem: Problem, residual: Array) -> list[ForceProfile]:
     """Every port against every quantity of its own, the most telling port first."""
-    if not isinstance(problem, Ported):
+    if not isinstance(problem, ForceChannelled):
         return []
-    found = [[law for law in _of(port, residual) if law is not None] for port in problem.ports()]
+    found = [[p for p in _of(port, residual) if p is not None] for port in problem.ports()]
     found = [group for group in found if group]
-    found.sort(key=lambda group: -max(law.gain for law in group))
-    return [law for group in found for law in group]
+    found.sort(key=lambda group: -max(p.gain for p in group))
+    return [p for group in found for p in group]
 
 
-def _of(port: Port, residual: Array) -> list[Law | None]:
-    by_value = [law(port, label, residual) for label in port.quantities]
+def _of(port: ForceChannel, residual: Array) -> list[ForceProfile | None]:
+    by_value = [force_profile(port, label, residual) for label in port.quantities]
     return by_value + [_solved(port, f"after {n} [ms]", 1e3 * middle(LAGS), rise, residual)
                        for n, rise in port.after.items()]  # fmt: skip
 
 
-def law(port: Port, label: str, residual: Array) -> Law | None:
+def force_profile(port: ForceChannel, label: str, residual: Array) -> ForceProfile | None:
     """The missing force of a port by bins of one of its quantities; None where it hardly varies."""
     values = port.quantities[label]
     edges = bins(values)
@@ -120,14 +120,16 @@ def law(port: Port, label: str, residual: Array) -> Law | None:
     return _solved(port, label, centre, flags.astype(float), residual)
 
 
-def _solved(port: Port, label: str, centre: Array, shapes: Array, residual: Array) -> Law:
+def _solved(
+    port: ForceChannel, label: str, centre: Array, shapes: Array, residual: Array
+) -> ForceProfile:
     columns = port.columns(shapes)
     prior = np.eye(shapes.shape[-1]) / (WIDE * port.usual) ** 2
     gram, slope = columns.T @ columns + prior, columns.T @ residual
     force = -np.linalg.solve(gram, slope)
     sigma = np.sqrt(np.diag(np.linalg.inv(gram)))
     gain = 0.5 * float(force @ gram @ force) - len(force)
-    return Law(port.name, port.unit, label, centre, force, sigma, gain, port.usual)
+    return ForceProfile(port.name, port.unit, label, centre, force, sigma, gain, port.usual)
 
 
 def middle(edges: Array) -> Array:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2, norm
 
-from kemba.identify.compare.force_profiles import LAGS, PLAIN, Law, middle, risen
+from kemba.identify.compare.force_profiles import LAGS, PLAIN, ForceProfile, middle, risen
 from kemba.identify.compare.tolerance import Slopes
 from kemba.identify.evidence.problem import Array, Labels, Problem, Rows
 from kemba.identify.evidence.windows import codes
@@ -57,7 +57,7 @@ class Response:
         return Hint("command", f"{self.channel} errs {late} {verb}", float(abs(self.z[self.peak])))
 
 
-def lacking(found: Sequence[Law]) -> list[Hint]:
+def lacking(found: Sequence[ForceProfile]) -> list[Hint]:
     """The missing force that explains most, if it is plain."""
     best = max(found, key=lambda law: law.gain, default=None)
     return [Hint("law", str(best), best.gain)] if best and best.gain > PLAIN else []

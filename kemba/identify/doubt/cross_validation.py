@@ -9,11 +9,11 @@ from scipy.optimize import lsq_linear
 
 from kemba.identify.evidence.linear import Linear, estimate, linearise, time_blocks
 from kemba.identify.evidence.null_model import best_fit
-from kemba.identify.evidence.point import Point
+from kemba.identify.evidence.point import LinearisationPoint
 from kemba.identify.evidence.problem import Array, Problem, Theta
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
-from kemba.identify.evidence.windows import grains_of, rms
+from kemba.identify.evidence.windows import rms, windows_of
 
 NONE = 1e-6  # a floor that lets nothing through
 TOLERATED = 3.0  # sigma by which a nominal figure may be off
@@ -41,12 +41,12 @@ def left_out(search: Search, hypothesis: Hypothesis, against: Hypothesis = NULL)
     return Gain(float(gains.sum()), float(np.sqrt(count) * gains.std(ddof=1)) if count > 1 else 0.0)
 
 
-def _predicted(search: Search, point: Point) -> Array:
+def _predicted(search: Search, point: LinearisationPoint) -> Array:
     """Log likelihood (b,) of each block under the fit to all others."""
     return -0.5 * _powers(search, point, point.linear) / search.heat
 
 
-def _powers(search: Search, point: Point, judged: Linear) -> Array:
+def _powers(search: Search, point: LinearisationPoint, judged: Linear) -> Array:
     """Sum of squares (b,) that `judged` has of each block under the fit to all others.
 
     A left-out block judges the hypothesis itself: nothing else may help at floor level, and no
@@ -75,7 +75,7 @@ def within_tolerance(search: Search, linear: Linear, hypothesis: Hypothesis) -> 
     return np.asarray(linear.at + width * found.x)
 
 
-def predicted_error(search: Search, point: Point) -> float:
+def predicted_error(search: Search, point: LinearisationPoint) -> float:
     """RMS of whitened residuals summed over grains, each block predicted from all others."""
     power = float(_powers(search, point, point.coarse).sum())
     return float(np.sqrt(max(power, 0.0) / point.coarse.count.sum()))
@@ -89,4 +89,4 @@ def heldout_error(problem: Problem, theta: Theta) -> float:
     if names:
         linear, _, _ = linearise(problem, theta, time_blocks(problem), names)
         theta = theta | estimate(problem, linear, best_fit(linear))
-    return rms(grains_of(problem).sums(problem.residual(theta)))
+    return rms(windows_of(problem).sums(problem.residual(theta)))

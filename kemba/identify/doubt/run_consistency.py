@@ -9,7 +9,7 @@ import numpy as np
 from kemba.identify.doubt.cross_validation import within_tolerance
 from kemba.identify.evidence.problem import Array, Labels
 from kemba.identify.evidence.search import Search
-from kemba.identify.evidence.spike_slab import FLOOR, NULL, Hypothesis
+from kemba.identify.evidence.spike_slab import NULL, SPIKE_WIDTH, Hypothesis
 
 CLEAR = 100.0  # nats that separate values per run must bring over one value for all
 SHARE_OF_ROWS = 0.01  # per row
@@ -51,7 +51,7 @@ def drifting(search: Search, best: Hypothesis) -> Drift | None:
         if keep.sum() < 2:
             continue
         gram, slope = gram[keep], slope[keep]
-        narrow = error[keep] + (FLOOR * candidate.lead.size) ** 2
+        narrow = error[keep] + (SPIKE_WIDTH * candidate.lead.size) ** 2
         own = -slope / gram
         shared = float(np.sum(own / narrow) / np.sum(1.0 / narrow))
         nats = 0.5 * float(np.sum((own - shared) ** 2 / narrow))

@@ -11,7 +11,13 @@ from scipy.special import logsumexp
 from scipy.stats import norm
 
 from kemba.identify.evidence.problem import Array
-from kemba.identify.evidence.spike_slab import FLOOR, SLAB, TOLERANCES, Hypothesis, Ranker
+from kemba.identify.evidence.spike_slab import (
+    SLAB_WIDTH,
+    SPIKE_WIDTH,
+    TOLERANCES,
+    Hypothesis,
+    Ranker,
+)
 
 DRAWS = 400
 QUANTILE = 0.98
@@ -64,7 +70,7 @@ def _slopes(ranker: Ranker, noise: Array, rng: np.random.Generator, draws: int) 
     truth = rng.standard_normal((draws, len(width))) * width
     truth[:, ranker.nuisance] *= tolerance[:, None]
     for effect, i in ranker.lead.items():
-        truth[:, i] *= FLOOR
+        truth[:, i] *= SPIKE_WIDTH
         if not ranker.candidates[effect].lead.signed:
             truth[:, i] = np.abs(truth[:, i])
     return np.asarray((-(truth @ gram) + signs @ noise).T)
@@ -103,10 +109,10 @@ def smallest_detectable(ranker: Ranker, threshold: float) -> dict[str, float]:
     found = {}
     for effect, i in ranker.lead.items():
         size = ranker.candidates[effect].lead.size
-        wide = SLAB * size
+        wide = SLAB_WIDTH * size
         covariance = ranker.score((effect,)).covariance
         variance = 1.0 / max(1.0 / covariance[i, i] - 1.0 / wide**2, 1e-12 / wide**2)
-        narrow = variance + (FLOOR * size) ** 2
+        narrow = variance + (SPIKE_WIDTH * size) ** 2
         gain = 0.5 * (1.0 / narrow - 1.0 / (variance + wide**2))
         occam = 0.5 * np.log((variance + wide**2) / narrow)
         found[effect] = float(np.sqrt(max(threshold + occam, 0.5) / gain) + 1.28 * np.sqrt(narrow))

@@ -16,10 +16,10 @@ from kemba.identify.evidence.linear import (
     priors,
     within,
 )
-from kemba.identify.evidence.point import Colourable, Division, Movable, Point
+from kemba.identify.evidence.point import Colourable, Division, LinearisationPoint, Movable
 from kemba.identify.evidence.problem import Array, Problem
 from kemba.identify.evidence.refit import Fit, Frozen
-from kemba.identify.evidence.spike_slab import FLOOR, NULL, Hypothesis, Ranker
+from kemba.identify.evidence.spike_slab import NULL, SPIKE_WIDTH, Hypothesis, Ranker
 
 GLANCES = 1  # evaluations of each single effect before the leaders are refitted
 ABSURD = 1e5  # noise units
@@ -34,7 +34,7 @@ class Baseline:
     (n, k) and `residual` (n,) at the null. `among`: single effects worth more than a linear look.
     """
 
-    point: Point
+    point: LinearisationPoint
     jacobian: Array
     residual: Array
 
@@ -53,7 +53,7 @@ class Baseline:
         at = [self.point.linear.index(n) for n in names]
         return Frozen(names, self.jacobian[:, at])
 
-    def ranker(self, linear: Linear, floor: float = FLOOR) -> Ranker:
+    def ranker(self, linear: Linear, floor: float = SPIKE_WIDTH) -> Ranker:
         """Evidence of hypotheses on `linear`."""
         return Ranker(linear, self.problem.candidates, self.problem.nuisance, self.heat, floor)
 
@@ -99,7 +99,7 @@ class Baseline:
         names = names or self.point.linear.names
         linear, coarse = self.division.linear(theta, names, self.jacobian, self.residual)
         fit = Fit(dict(theta), 0.5 * float(self.residual @ self.residual))
-        self.point = Point(NULL, fit, linear, coarse, self.ranker(linear).score(NULL))
+        self.point = LinearisationPoint(NULL, fit, linear, coarse, self.ranker(linear).score(NULL))
 
     def _glance(self, hypothesis: Hypothesis) -> float:
         """Log evidence where the linear estimate points to, with the true residual there.

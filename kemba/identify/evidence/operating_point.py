@@ -16,7 +16,7 @@ REGIONS = ("in", "mid", "out")
 
 
 @dataclass(frozen=True)
-class Surroundings:
+class OperatingPoint:
     """Per row (n,): the piston of the row's leg (of the body: the front leg's) at `x` [m], moving
     at `v` [m.s-1], pushed by the model's air with `force` [N]; `stroke` [m]."""
 
@@ -32,18 +32,18 @@ class Surroundings:
 
 
 @runtime_checkable
-class Surrounded(Protocol):
+class HasOperatingPoint(Protocol):
     """A problem that knows the surroundings of its rows."""
 
-    def surroundings(self) -> Surroundings:
+    def operating_point(self) -> OperatingPoint:
         """Those of every row of `rows()`, in the same order."""
 
 
-def region_labels(problem: Problem, rows: Rows) -> tuple[Surroundings | None, Labels]:
+def region_labels(problem: Problem, rows: Rows) -> tuple[OperatingPoint | None, Labels]:
     """Surroundings where the problem knows them, and the region's label of every row."""
-    if not isinstance(problem, Surrounded):
+    if not isinstance(problem, HasOperatingPoint):
         return None, np.full(len(rows), "", dtype=object)
-    around = problem.surroundings()
+    around = problem.operating_point()
     return around, np.array(REGIONS, dtype=object)[around.regions()]
 
 

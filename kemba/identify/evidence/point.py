@@ -12,11 +12,11 @@ from kemba.identify.evidence.linear import Linear, condense, priors, time_blocks
 from kemba.identify.evidence.problem import Array, Labels, Problem
 from kemba.identify.evidence.refit import Fit
 from kemba.identify.evidence.spike_slab import Hypothesis, Score
-from kemba.identify.evidence.windows import Grains, grains_of
+from kemba.identify.evidence.windows import Windows, windows_of
 
 
 @dataclass(frozen=True)
-class Point:
+class LinearisationPoint:
     """A fit, what the problem looks like there, row by row (`linear`) and summed over grains
     (`coarse`), and how the hypothesis scores."""
 
@@ -60,7 +60,7 @@ class Division:
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
         self.blocks: Labels = time_blocks(problem)
-        self.grains: Grains = grains_of(problem)
+        self.grains: Windows = windows_of(problem)
 
     def linear(
         self, theta: Mapping[str, float], names: tuple[str, ...], jacobian: Array, r: Array

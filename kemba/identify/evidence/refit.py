@@ -10,7 +10,7 @@ from scipy.optimize import least_squares
 
 from kemba.identify.evidence.linear import is_shape
 from kemba.identify.evidence.problem import Array, Parameter, Problem
-from kemba.identify.evidence.spike_slab import SLAB, Hypothesis
+from kemba.identify.evidence.spike_slab import SLAB_WIDTH, Hypothesis
 
 EVALUATIONS = 10
 ABSURD = 1e6  # noise units
@@ -44,7 +44,7 @@ def refit(
     """The best theta with these effects on, from `start` (and, where shapes exist, others)."""
     best: Fit | None = None
     for trial in _starts(problem, hypothesis, start):
-        fit = _Search(problem, hypothesis, trial, frozen, heat).run()
+        fit = _LeastSquares(problem, hypothesis, trial, frozen, heat).run()
         if best is None or fit.cost < best.cost - 1e-6:
             best = fit
     assert best is not None
@@ -84,7 +84,7 @@ def _inside(value: float, parameter: Parameter) -> float:
     return float(np.clip(parameter.off + step, parameter.lower, parameter.upper))
 
 
-class _Search:
+class _LeastSquares:
     """One least-squares run in scaled coordinates."""
 
     def __init__(
@@ -122,7 +122,7 @@ class _Search:
         rows, n = len(self.frozen.jacobian), len(self.nuisance)
         columns = {}
         for i, (key, p) in enumerate(self.own.items(), start=n):
-            unit = p.size if is_shape(self.problem, key) else SLAB * p.size
+            unit = p.size if is_shape(self.problem, key) else SLAB_WIDTH * p.size
             columns[key] = jacobian[:rows, i] / (self.scale * unit)
         return columns
 
@@ -136,13 +136,13 @@ class _Search:
         p = self.own[key]
         if is_shape(self.problem, key):
             return float(np.log(value / p.typical)) / p.size
-        return (value - p.off) / (SLAB * p.size)
+        return (value - p.off) / (SLAB_WIDTH * p.size)
 
     def _out(self, key: str, x: float) -> float:
         p = self.own[key]
         if is_shape(self.problem, key):
             return float(np.clip(p.typical * np.exp(p.size * x), p.lower, p.upper))
-        return float(np.clip(p.off + SLAB * p.size * x, p.lower, p.upper))
+        return float(np.clip(p.off + SLAB_WIDTH * p.size * x, p.lower, p.upper))
 
     def _bounds(self) -> tuple[Array, Array]:
         n = len(self.nuisance)

@@ -10,7 +10,7 @@ import numpy as np
 
 from kemba.identify.evidence.linear import Linear, estimate, names_of
 from kemba.identify.evidence.null_model import Baseline
-from kemba.identify.evidence.point import Movable, Point
+from kemba.identify.evidence.point import LinearisationPoint, Movable
 from kemba.identify.evidence.problem import Problem
 from kemba.identify.evidence.refit import Fit, refit
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis, log_prior, probabilities
@@ -32,7 +32,7 @@ class Search:
     deadline: float = np.inf
     say: Callable[[str], None] = lambda text: None
     heat: float = 1.0
-    points: dict[Hypothesis, Point] = field(default_factory=dict)
+    points: dict[Hypothesis, LinearisationPoint] = field(default_factory=dict)
     base: Baseline = field(init=False)
     _thetas: dict[Hypothesis, dict[str, float]] = field(default_factory=dict)
     _stale: bool = False
@@ -129,7 +129,7 @@ class Search:
                 single[(name,)] = max(single[(name,)], base)
         return single
 
-    def visit(self, hypothesis: Hypothesis) -> Point:
+    def visit(self, hypothesis: Hypothesis) -> LinearisationPoint:
         """Refit a hypothesis (once) and score it there."""
         if hypothesis not in self.points:
             self.say(f"refitting {' + '.join(hypothesis)}")
@@ -167,9 +167,11 @@ class Search:
             self.points[NULL] = self.base.point
             self._stale = False
 
-    def _point(self, hypothesis: Hypothesis, fit: Fit) -> Point:
+    def _point(self, hypothesis: Hypothesis, fit: Fit) -> LinearisationPoint:
         linear, coarse = self._near(fit)
-        return Point(hypothesis, fit, linear, coarse, self.base.ranker(linear).score(hypothesis))
+        return LinearisationPoint(
+            hypothesis, fit, linear, coarse, self.base.ranker(linear).score(hypothesis)
+        )
 
     def _near(self, fit: Fit) -> tuple[Linear, Linear]:
         """Linear at a refitted point: its own slopes are fresh, the others are the null's."""

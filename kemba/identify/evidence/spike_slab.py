@@ -14,8 +14,8 @@ from scipy.stats import norm
 from kemba.identify.evidence.linear import Linear
 from kemba.identify.evidence.problem import Array, Candidate
 
-FLOOR = 0.05  # every effect of the catalogue may be there with this share of its size
-SLAB = 0.7  # width of a large effect, in sizes
+SPIKE_WIDTH = 0.05  # every effect of the catalogue may be there with this share of its size
+SLAB_WIDTH = 0.7  # width of a large effect, in sizes
 TOLERANCES = (0.5, 1.0, 1.5)  # how far nominal figures are off, in units of their prior sigma
 
 Hypothesis = tuple[str, ...]  # names of the effects that are large, sorted
@@ -40,7 +40,7 @@ class Ranker:
         candidates: Mapping[str, Candidate],
         nuisance: Iterable[str],
         heat: float = 1.0,
-        floor: float = FLOOR,
+        floor: float = SPIKE_WIDTH,
     ) -> None:
         self.linear, self.candidates, self.heat, self.floor = linear, candidates, heat, floor
         self.silent: frozenset[str] = frozenset()  # effects with no floor of their own
@@ -85,7 +85,7 @@ class Ranker:
         width[self.nuisance] *= tolerance
         for effect, i in self.lead.items():
             floor = 1e-6 if effect in self.silent else self.floor
-            share = np.hypot(SLAB, floor) if effect in hypothesis else floor
+            share = np.hypot(SLAB_WIDTH, floor) if effect in hypothesis else floor
             width[i] *= share
         return np.asarray(np.maximum(width, 1e-12))
 

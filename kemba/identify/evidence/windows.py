@@ -12,7 +12,7 @@ from kemba.identify.evidence.problem import Array, Labels, Problem, Rows
 
 
 @dataclass(frozen=True)
-class Grains:
+class Windows:
     """Stretches of successive rows of one run, channel and condition: the first row (k,) of each,
     and the size (k,) that noise would give to the sum over it."""
 
@@ -25,18 +25,18 @@ class Grains:
         return np.asarray(np.add.reduceat(columns, self.first, axis=0) / scale)
 
 
-def grains(problem: Problem, rows: Rows, region: Labels) -> Grains:
-    """Grains of as many rows as the problem says (`grain`, else one), each under one condition."""
+def aggregation_windows(problem: Problem, rows: Rows, region: Labels) -> Windows:
+    """Grains of as many rows as the problem says (`window`, else one), each under one condition."""
     begin = np.flatnonzero(changes(rows, region))
     place = np.arange(len(rows)) - np.repeat(begin, np.diff(np.append(begin, len(rows))))
     first = np.flatnonzero(place % getattr(problem, "grain", 1) == 0)
-    return Grains(first, np.sqrt(np.add.reduceat(expected(problem, len(rows)), first)))
+    return Windows(first, np.sqrt(np.add.reduceat(expected(problem, len(rows)), first)))
 
 
-def grains_of(problem: Problem) -> Grains:
+def windows_of(problem: Problem) -> Windows:
     """Grains of a problem by all its conditions."""
     rows = problem.rows()
-    return grains(problem, rows, region_labels(problem, rows)[1])
+    return aggregation_windows(problem, rows, region_labels(problem, rows)[1])
 
 
 def expected(problem: Problem, count: int) -> Array:

@@ -25,7 +25,7 @@ def formula_columns(problem: RobotProblem) -> dict[str, Array]:
     y, rate = problem.point.y, problem.point.rate
     legs = len(problem.physics.legs)
     hips, rods = slice(3, 3 + legs), slice(3 + legs, 3 + 2 * legs)
-    torque = problem.batch.pad([t.torque for t in problem.batch.tracks], 0.0)
+    torque = problem.batch.pad([t.torque for t in problem.batch.resampled], 0.0)
     groups = (
         (range(3 + legs, 3 + 2 * legs), "rods", rod_terms(y[..., rods], rate[..., rods])),
         (range(3, 3 + legs), "hips", hip_terms(y[..., hips], rate[..., hips], torque)),

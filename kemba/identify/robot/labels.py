@@ -37,7 +37,7 @@ def describe(
     m = len(channels)
     found: dict[str, list[Any]] = {}
     for i in runs:
-        track, own = batch.tracks[i], mask[:, i].T
+        track, own = batch.resampled[i], mask[:, i].T
         time = np.zeros(batch.n)
         time[: len(track.time)] = track.time
         phase = np.full(batch.n, "", dtype=object)

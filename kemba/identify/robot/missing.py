@@ -41,7 +41,7 @@ def robot_missing(
         used, sigma = sigma, np.maximum(np.sqrt(power), least)
     units = tuple("N.m" if kind in ("pitch", "hip") else "N" for kind in kinds)
     found = []
-    for i, track in enumerate(problem.batch.tracks):
+    for i, track in enumerate(problem.batch.resampled):
         n = len(track.time)
         force, spread = x[:n, i, -k:], np.sqrt(variance[:n, i, -k:])
         down = spans(track.time, problem.plan[i].phase != "flight")

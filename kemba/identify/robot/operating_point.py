@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kemba.identify.evidence.operating_point import Surroundings, air_force
+from kemba.identify.evidence.operating_point import OperatingPoint, air_force
 from kemba.identify.evidence.problem import Array
 from kemba.identify.robot.labels import row_channels
-from kemba.identify.robot.motion.resampled import Track
+from kemba.identify.robot.motion.resampled import ResampledLog
 
 if TYPE_CHECKING:
     from kemba.identify.robot.problem import RobotProblem
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 SIDES = ("extend", "retract")
 
 
-def robot_surroundings(problem: RobotProblem) -> Surroundings:
+def robot_operating_point(problem: RobotProblem) -> OperatingPoint:
     """The pistons along the motion on which the problem was linearised."""
     physics, point = problem.physics, problem.point
     names = [q.name for q in physics.model.states.values()]
@@ -33,10 +33,10 @@ def robot_surroundings(problem: RobotProblem) -> Surroundings:
     own = [per_leg[legs.index(o) if o in legs else 0] for o in owners]
     picked = problem.pick(np.stack(own, axis=2))
     x, v, force = picked.T
-    return Surroundings(x, v, force, float(physics.mechanism.stroke))
+    return OperatingPoint(x, v, force, float(physics.mechanism.stroke))
 
 
-def changes(track: Track, legs: Sequence[str]) -> dict[str, tuple[Array, Array]]:
+def changes(track: ResampledLog, legs: Sequence[str]) -> dict[str, tuple[Array, Array]]:
     """Command -> times and sizes of its changes in one run: valves, then hip torques [N.m]."""
     valves = [f"{leg}/valve/{side}" for leg in legs for side in SIDES]
     found = {

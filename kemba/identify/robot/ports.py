@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kemba.identify.compare.force_profiles import LAGS, Port, risen
+from kemba.identify.compare.force_profiles import LAGS, ForceChannel, risen
 from kemba.identify.evidence.operating_point import air_force
 from kemba.identify.evidence.problem import Array, Flags
 from kemba.identify.robot.motion.filter import innovations
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 BODY = {"body z": 1, "body x": 0}  # place among the channels
 
 
-def robot_ports(problem: RobotProblem) -> list[Port]:
+def robot_ports(problem: RobotProblem) -> list[ForceChannel]:
     """Rods and hips (both legs share a law), then the body along z and x.
 
     A force is looked for where it shows: of hips and body in flight, of rods off their stops.
@@ -32,11 +32,11 @@ def robot_ports(problem: RobotProblem) -> list[Port]:
             "speed [m/s]": np.where(where, rate[..., [k]], np.nan),
             "position [m]": np.where(where, y[..., [k]], np.nan),
         }
-        found.append(Port(name, "N", 3.0, quantities, port_columns(problem, [k])))
+        found.append(ForceChannel(name, "N", 3.0, quantities, port_columns(problem, [k])))
     return found
 
 
-def _rods(problem: RobotProblem) -> Port:
+def _rods(problem: RobotProblem) -> ForceChannel:
     physics, point, batch = problem.physics, problem.point, problem.batch
     legs = len(physics.legs)
     names = [q.name for q in physics.model.states.values()]
@@ -49,7 +49,7 @@ def _rods(problem: RobotProblem) -> Port:
         "position [mm]": 1e3 * point.y[..., 3 + legs :],
         "air force [N]": air,
     }
-    return Port(
+    return ForceChannel(
         "rods",
         "N",
         10.0,
@@ -59,15 +59,15 @@ def _rods(problem: RobotProblem) -> Port:
     )
 
 
-def _hips(problem: RobotProblem, where: Flags) -> Port:
+def _hips(problem: RobotProblem, where: Flags) -> ForceChannel:
     legs = range(3, 3 + len(problem.physics.legs))
-    torque = problem.batch.pad([t.torque for t in problem.batch.tracks], 0.0)
+    torque = problem.batch.pad([t.torque for t in problem.batch.resampled], 0.0)
     quantities = {
         "speed [rad/s]": problem.point.rate[..., legs],
         "angle [rad]": problem.point.y[..., legs],
         "torque [N.m]": torque,
     }
-    return Port(
+    return ForceChannel(
         "hips",
         "N.m",
         0.5,
@@ -80,7 +80,7 @@ def _hips(problem: RobotProblem, where: Flags) -> Port:
 def _after(problem: RobotProblem, command: str) -> Array:
     """How much each leg's own command rose before every node, (n, L, legs, lags)."""
     runs = []
-    for sent, track in zip(problem.commands(), problem.batch.tracks, strict=True):
+    for sent, track in zip(problem.commands(), problem.batch.resampled, strict=True):
         own = [risen(*sent[f"{leg}/{command}"], track.time) for leg in problem.physics.legs]
         runs.append(np.stack(own, axis=1).reshape(len(track.time), -1))
     return problem.batch.pad(runs, 0.0).reshape(*problem.batch.valid.shape, -1, len(LAGS) - 1)

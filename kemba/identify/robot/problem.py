@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from kemba.identify.compare.force_profiles import Port
+from kemba.identify.compare.force_profiles import ForceChannel
 from kemba.identify.evidence.candidates import sensor_candidates
-from kemba.identify.evidence.operating_point import Surroundings
+from kemba.identify.evidence.operating_point import OperatingPoint
 from kemba.identify.evidence.problem import Candidate, Parameter, Rows, Theta, parameter_steps
 from kemba.identify.logs.gate import BadData
 from kemba.identify.robot.candidates import (
@@ -29,7 +29,7 @@ from kemba.identify.robot.candidates import (
     without_delay,
 )
 from kemba.identify.robot.dynamics.forces import Forces
-from kemba.identify.robot.dynamics.inputs import air_states, drives
+from kemba.identify.robot.dynamics.inputs import air_states, read_inputs
 from kemba.identify.robot.dynamics.linear import Linearised, linearise, smoothed
 from kemba.identify.robot.dynamics.physics import Physics
 from kemba.identify.robot.dynamics.reference import (
@@ -47,9 +47,9 @@ from kemba.identify.robot.motion.batch import Batch
 from kemba.identify.robot.motion.contact import loaded
 from kemba.identify.robot.motion.expected import expected_power, predicted_error
 from kemba.identify.robot.motion.filter import gains, innovations
-from kemba.identify.robot.motion.resampled import read_track
+from kemba.identify.robot.motion.resampled import resample
 from kemba.identify.robot.motion.sensing import ahead, sensed
-from kemba.identify.robot.operating_point import changes, robot_surroundings
+from kemba.identify.robot.operating_point import changes, robot_operating_point
 from kemba.identify.robot.ports import robot_ports
 from kemba.identify.robot.validate import contradictions
 from kemba.model.model import Model
@@ -67,7 +67,7 @@ class RobotProblem:
     `base`: theta at which the motion is smoothed and the model linearised.
     """
 
-    grain = 20  # rows over which a comparison sums: innovations are one-step errors
+    window = 20  # rows over which a comparison sums: innovations are one-step errors
 
     def __init__(
         self, logs: Sequence[Trajectory], model: Model, floor: Floor | None = None
@@ -82,7 +82,7 @@ class RobotProblem:
         names = [str(log.meta.get("name", i)) for i, log in enumerate(logs)]
         self.batch = Batch(
             tuple(
-                read_track(log, channels, legs, name) for log, name in zip(logs, names, strict=True)
+                resample(log, channels, legs, name) for log, name in zip(logs, names, strict=True)
             )
         )
         self.runs = tuple(names)
@@ -103,7 +103,7 @@ class RobotProblem:
         ref = first_reference(physics, batch)
         late = np.array([base.get(f"sensor_delay:{c}.dt", 0.0) for c in physics.channels])
         rates = ((ref.q, ref.v), (ref.v, ref.a), (ref.a, np.zeros_like(ref.a)))
-        ref = Reference(*(ahead(a, rate, batch.tracks, late) for a, rate in rates))
+        ref = Reference(*(ahead(a, rate, batch.resampled, late) for a, rate in rates))
         self.plan = schedules(physics, batch, ref)
         dt = float(np.median(batch.h[batch.valid]))
         for _ in range(ROUNDS):
@@ -125,7 +125,7 @@ class RobotProblem:
 
     def _linearise(self, ref: Reference, density: Array) -> Linearised:
         p, delays = self._values(self.base)
-        driven = drives(self.physics, self.batch, ref, delays)
+        driven = read_inputs(self.physics, self.batch, ref, delays)
         states = air_states(self.physics, self.batch, driven, p)
         return linearise(self.physics, self.batch, self.plan, ref, density, states, p)
 
@@ -147,7 +147,7 @@ class RobotProblem:
 
     def _measurement(self, point: Linearised, theta: Theta) -> Array:
         """Measured minus reference (n, L, m), the reference as the sensors at theta see it."""
-        seen = sensed(self.physics.channels, self.batch.tracks, point.y, point.way, theta)
+        seen = sensed(self.physics.channels, self.batch.resampled, point.y, point.way, theta)
         soft = {**self._soft, **theta}
         depth = point.penetration(soft.get(SOFTNESS, 0.0), soft.get("ground_compliance.d", 1.0))
         return np.concatenate([self.batch.y - seen, -point.places - depth], axis=2)
@@ -251,13 +251,13 @@ class RobotProblem:
 
     def commands(self) -> list[dict[str, tuple[Array, Array]]]:
         """Per run: command -> times and sizes of its changes."""
-        return [changes(track, self.physics.legs) for track in self.batch.tracks]
+        return [changes(track, self.physics.legs) for track in self.batch.resampled]
 
-    def surroundings(self) -> Surroundings:
+    def operating_point(self) -> OperatingPoint:
         """The piston of each row's leg."""
-        return robot_surroundings(self)
+        return robot_operating_point(self)
 
-    def ports(self) -> list[Port]:
+    def ports(self) -> list[ForceChannel]:
         """Where a force may be missing: on rods, hips and the body."""
         return robot_ports(self)
 

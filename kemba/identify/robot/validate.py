@@ -27,7 +27,7 @@ def contradictions(problem: RobotProblem) -> Iterator[KembaError]:
     legs = problem.physics.legs
     rows, r = problem.rows(), problem.residual({})
     forgiven: Array | None = None
-    for i, track in enumerate(problem.batch.tracks):
+    for i, track in enumerate(problem.batch.resampled):
         n = len(track.time)
         sunk = False
         for leg, height in zip(

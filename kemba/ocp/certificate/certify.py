@@ -10,7 +10,7 @@ import numpy as np
 
 from kemba.model import Model
 from kemba.ocp.task.costs import COSTS
-from kemba.ocp.task.requirement import Wish
+from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task, Tolerances
 from kemba.ocp.transcription.solution import arrays
 from kemba.ocp.transcription.stage import ANGLE_ARM
@@ -20,7 +20,7 @@ from kemba.trajectory import Trajectory
 
 @dataclass(frozen=True)
 class Violation:
-    """One violated piece of physics or wish: `size` is relative to its scale, `violation` in
+    """One violated piece of physics or requirement: `size` is relative to its scale, `violation` in
     `unit`."""
 
     what: str
@@ -52,12 +52,16 @@ class Certificate:
 
 
 def certify(
-    model: Model, task: Task, wishes: Sequence[Wish], trajectory: Trajectory, most: int = 8
+    model: Model,
+    task: Task,
+    requirements: Sequence[Requirement],
+    trajectory: Trajectory,
+    most: int = 8,
 ) -> Certificate:
     """Residuals of a trajectory under implicit Euler on its own grid.
 
     complementarity: max of force (by body weight) times gap [m] or slip [m.s-1]; dynamics: max
-    scaled defect; bounds: max scaled violation of bounds, limits, signs and wishes.
+    scaled defect; bounds: max scaled violation of bounds, limits, signs and requirements.
     """
     x, t = arrays(model, trajectory), trajectory.time
     h = np.diff(t)
@@ -109,7 +113,7 @@ def certify(
         note(-limits, [(r.label, "of the limit", 1.0) for r in node.limit_rows]),
     )
     acting = {q.name for q in (*model.inputs.values(), *model.forces.values())}
-    boxes = [signs, *_boxes(model, x, note), _wishes(wishes, trajectory, found, acting)]
+    boxes = [signs, *_boxes(model, x, note), _requirements(requirements, trajectory, found, acting)]
     binary = [i for i, q in enumerate(model.inputs.values()) if q.binary]
     u = now["u"][:, binary]
     worst = sorted((v for v in found if v.size > 1e-9), key=lambda v: -v.size)[:most]
@@ -137,21 +141,26 @@ def _boxes(model: Model, x: dict[str, np.ndarray], note) -> list[float]:  # type
     return sizes
 
 
-def _wishes(
-    wishes: Sequence[Wish], trajectory: Trajectory, found: list[Violation], acting: set[str]
+def _requirements(
+    requirements: Sequence[Requirement],
+    trajectory: Trajectory,
+    found: list[Violation],
+    acting: set[str],
 ) -> float:
     worst = 0.0
     nodes = len(trajectory) - 1
-    for wish in wishes:
-        values = trajectory[wish.quantity.name]
-        over = np.maximum(wish.lower - values, values - wish.upper)
-        if wish.at is None and wish.quantity.name in acting:
+    for requirement in requirements:
+        values = trajectory[requirement.quantity.name]
+        over = np.maximum(requirement.lower - values, values - requirement.upper)
+        if requirement.at is None and requirement.quantity.name in acting:
             over[0] = 0.0  # inputs and forces act on the interval before a node
-        k = int(np.argmax(over)) if wish.at is None else wish.node(nodes)
-        size = float(over[k]) / wish.quantity.scale
-        what = f"{wish.text}:{wish.quantity.name}"
+        k = int(np.argmax(over)) if requirement.at is None else requirement.node(nodes)
+        size = float(over[k]) / requirement.quantity.scale
+        what = f"{requirement.text}:{requirement.quantity.name}"
         found.append(
-            Violation(what, k, float(trajectory.time[k]), float(over[k]), wish.quantity.unit, size)
+            Violation(
+                what, k, float(trajectory.time[k]), float(over[k]), requirement.quantity.unit, size
+            )
         )
         worst = max(worst, size)
     return worst

@@ -6,33 +6,33 @@ from collections.abc import Iterator, Sequence
 
 from kemba.config import Document
 from kemba.model import Model
-from kemba.ocp.infeasibility.diagnostic import Finding, key, number, place, relax
+from kemba.ocp.infeasibility.diagnostic import Diagnostic, key, number, place, relax
 from kemba.ocp.infeasibility.flight import Flight, air_work, hip_power, leg_swing
-from kemba.ocp.task.requirement import Wish
+from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
 
 HEAVY = 0.2  # of all that is lifted, from which the payload is told
 STROKES = 3  # more pushes than this fit into no planned motion
 
 
-def budget_findings(
+def budget_diagnostics(
     task: Task,
     model: Model,
-    wishes: Sequence[Wish],
+    requirements: Sequence[Requirement],
     flight: Flight | None,
     document: Document,
-) -> Iterator[Finding]:
+) -> Iterator[Diagnostic]:
     """Time, energy, valves and friction of a task."""
     if flight is not None:
         yield from _time(task, flight, document)
         yield from _energy(task, model, flight, document)
-    yield from _grip(model, wishes, document)
+    yield from _grip(model, requirements, document)
 
 
-def _time(task: Task, flight: Flight, document: Document) -> Iterator[Finding]:
+def _time(task: Task, flight: Flight, document: Document) -> Iterator[Diagnostic]:
     """Rise to the apex and fall from it within the longest steps allowed."""
     longest = task.duration * (1 + task.step_variation)
-    before = longest * (flight.wish.at or 0.0)
+    before = longest * (flight.requirement.at or 0.0)
     spans = []
     if flight.stays_below and before < longest:
         spans.append(("rise", flight.z0, before))
@@ -43,43 +43,43 @@ def _time(task: Task, flight: Flight, document: Document) -> Iterator[Finding]:
         if needed <= span:
             continue
         certain = flight.least_time(other, generous=True) > span * (1 + 1 / task.nodes)
-        most = relax(document, flight.wish, flight.height, flight.most(other, span))
+        most = relax(document, flight.requirement, flight.height, flight.most(other, span))
         way = number(flight.height - other, "m")
         reason = (
             f"{key('duration', document)}: a {what} of {way} takes {needed:.2f} s, "
             f"{task.duration:g} s in all leave at most {span:.2f} s for it"
         )
         if certain:
-            yield Finding(f"{most} ({most.where}); {reason}", True, (most,), cause=True)
+            yield Diagnostic(f"{most} ({most.where}); {reason}", True, (most,), cause=True)
         else:
-            yield Finding(reason, False, cause=True)
+            yield Diagnostic(reason, False, cause=True)
         return
 
 
-def _energy(task: Task, model: Model, flight: Flight, document: Document) -> Iterator[Finding]:
+def _energy(task: Task, model: Model, flight: Flight, document: Document) -> Iterator[Diagnostic]:
     """Work of the air over the stroke against the lift, hips counted generously."""
     air, lift = air_work(model), flight.mass * flight.fall * (flight.height - flight.z0)
-    asked = f"`{flight.wish.text}` ({place(document, flight.wish.location)})"
+    asked = f"`{flight.requirement.text}` ({place(document, flight.requirement.location)})"
     off = _pistons_off(task, document)
     air = 0.0 if off else air
     if lift <= air:
         return
-    longest = task.duration * (1 + task.step_variation) * (flight.wish.at or 1.0)
+    longest = task.duration * (1 + task.step_variation) * (flight.requirement.at or 1.0)
     causes = [f"{off} keeps the pistons without air"] if off else []
     if task.payload > HEAVY * flight.mass:
         causes.append(f"{key('payload', document)} adds {number(task.payload, 'kg')}")
     lifted = f"{asked}: lifting {flight.mass:.1f} kg to {number(flight.height, 'm')}"
     most = flight.z0 + air / (flight.mass * flight.fall)
-    yield Finding(
+    yield Diagnostic(
         "; ".join([*causes, f"{lifted} takes {lift:.0f} J, one stroke of the pistons {air:.0f} J"]),
         lift > STROKES * air + hip_power(model) * longest,
-        (relax(document, flight.wish, flight.height, most),),
+        (relax(document, flight.requirement, flight.height, most),),
         cause=bool(causes),
     )
 
 
 def _pistons_off(task: Task, document: Document) -> str:
-    """The wish that keeps every extend valve shut all the time, if there is one."""
+    """The requirement that keeps every extend valve shut all the time, if there is one."""
     for pattern, bound in task.bounds.items():
         closed = bound.equals in (0, 0.0) or bound.at_most in (0, 0.0)
         if closed and "valve" in pattern and "retract" not in pattern and pattern.startswith("*"):
@@ -87,11 +87,13 @@ def _pistons_off(task: Task, document: Document) -> str:
     return ""
 
 
-def _grip(model: Model, wishes: Sequence[Wish], document: Document) -> Iterator[Finding]:
+def _grip(
+    model: Model, requirements: Sequence[Requirement], document: Document
+) -> Iterator[Diagnostic]:
     """A jump to another place from rest needs friction."""
-    first = [w for w in wishes if w.at == 0.0 and w.quantity.name == "body/x"]
-    last = [w for w in wishes if w.at == 1.0 and w.quantity.name == "body/x"]
-    resting = any(w.at == 0.0 and w.location[-1] == "rest" for w in wishes)
+    first = [w for w in requirements if w.at == 0.0 and w.quantity.name == "body/x"]
+    last = [w for w in requirements if w.at == 1.0 and w.quantity.name == "body/x"]
+    resting = any(w.at == 0.0 and w.location[-1] == "rest" for w in requirements)
     if not (first and last and resting):
         return
     way = max(last[0].lower - first[0].upper, first[0].lower - last[0].upper)
@@ -101,7 +103,7 @@ def _grip(model: Model, wishes: Sequence[Wish], document: Document) -> Iterator[
     if way < 0.01:
         return
     where = place(document, last[0].location)
-    yield Finding(
+    yield Diagnostic(
         f"`{last[0].text}` ({where}): {number(way, 'm')} forward asked, but the ground "
         f"gives no grip: friction coefficient mu is 0 in the model `{model.name}` "
         f"({floors[0].name}), and without it the centre of mass stays where it starts",

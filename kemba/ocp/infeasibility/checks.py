@@ -11,19 +11,19 @@ from itertools import groupby
 from kemba.config import Document
 from kemba.config.document import Location
 from kemba.model import Model
-from kemba.ocp.infeasibility.budget import budget_findings
+from kemba.ocp.infeasibility.budget import budget_diagnostics
 from kemba.ocp.infeasibility.diagnostic import (
-    Finding,
+    Diagnostic,
     key,
     number,
-    one_per_wish,
+    one_per_requirement,
     place,
     relax,
     spoken,
 )
 from kemba.ocp.infeasibility.flight import Flight, flight_of
 from kemba.ocp.infeasibility.pose import Gap, Poses
-from kemba.ocp.task.requirement import Wish
+from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
 from kemba.quantity import Quantity
 
@@ -31,25 +31,27 @@ LONGEST_STEP = 0.05  # s; with longer ones a valve cannot be timed within a push
 
 
 def check_task(
-    task: Task, model: Model, wishes: Sequence[Wish], document: Document
-) -> list[Finding]:
+    task: Task, model: Model, requirements: Sequence[Requirement], document: Document
+) -> list[Diagnostic]:
     """Findings, certain ones first; after the first certain kind nothing more is looked for."""
-    found = list(contradictions(task, wishes, document))
+    found = list(contradictions(task, requirements, document))
     if found:
         return found
-    poses = Poses(model, wishes)
-    found = list(impossible_poses(task, poses, wishes, document))
+    poses = Poses(model, requirements)
+    found = list(impossible_poses(task, poses, requirements, document))
     if found:
         return found
-    flight = flight_of(model, wishes, poses)
-    budget = budget_findings(task, model, wishes, flight, document)
+    flight = flight_of(model, requirements, poses)
+    budget = budget_diagnostics(task, model, requirements, flight, document)
     return sorted([*coarse_grid(task, flight, document), *budget], key=lambda f: not f.certain)
 
 
-def moments(task: Task, wishes: Sequence[Wish]) -> Iterator[tuple[str, list[Wish]]]:
-    """The wishes that hold at each moment (those that hold throughout included), and its name."""
-    always = [w for w in wishes if w.at is None]
-    timed = sorted((w for w in wishes if w.at is not None), key=lambda w: w.node(task.nodes))
+def moments(
+    task: Task, requirements: Sequence[Requirement]
+) -> Iterator[tuple[str, list[Requirement]]]:
+    """The requirements that hold at each moment (those that hold throughout included), and its name."""
+    always = [w for w in requirements if w.at is None]
+    timed = sorted((w for w in requirements if w.at is not None), key=lambda w: w.node(task.nodes))
     for node, group in groupby(timed, key=lambda w: w.node(task.nodes)):
         names = {0: "the start", task.nodes: "the end"}
         yield names.get(node, f"node {node} of {task.nodes}"), [*group, *always]
@@ -57,25 +59,32 @@ def moments(task: Task, wishes: Sequence[Wish]) -> Iterator[tuple[str, list[Wish
         yield "every moment", always
 
 
-def contradictions(task: Task, wishes: Sequence[Wish], document: Document) -> Iterator[Finding]:
-    """Two wishes on one quantity, or a wish and the quantity's own range, that exclude each
+def contradictions(
+    task: Task, requirements: Sequence[Requirement], document: Document
+) -> Iterator[Diagnostic]:
+    """Two requirements on one quantity, or a requirement and the quantity's own range, that exclude each
     other."""
     told: set[tuple[Location, Location]] = set()
-    for when, here in moments(task, wishes):
+    for when, here in moments(task, requirements):
         for name in dict.fromkeys(w.quantity.name for w in here):
             same = [w for w in here if w.quantity.name == name]
             low, high = max(same, key=lambda w: w.lower), min(same, key=lambda w: w.upper)
             if low.lower > high.upper + 1e-9 and (low.location, high.location) not in told:
                 told.add((low.location, high.location))
-                yield _against_wish(low, high, when, document)
-    for wish in wishes:
-        q = wish.quantity
-        if (wish.lower > q.upper or wish.upper < q.lower) and (wish.location, ()) not in told:
-            told.add((wish.location, ()))
-            yield _against_range(wish, q, document)
+                yield _against_requirement(low, high, when, document)
+    for requirement in requirements:
+        q = requirement.quantity
+        if (requirement.lower > q.upper or requirement.upper < q.lower) and (
+            requirement.location,
+            (),
+        ) not in told:
+            told.add((requirement.location, ()))
+            yield _against_range(requirement, q, document)
 
 
-def _against_wish(low: Wish, high: Wish, when: str, document: Document) -> Finding:
+def _against_requirement(
+    low: Requirement, high: Requirement, when: str, document: Document
+) -> Diagnostic:
     unit = low.quantity.unit
     sentence = (
         f"contradiction on {low.quantity.name} at {when}: {spoken(low.location)} "
@@ -84,35 +93,39 @@ def _against_wish(low: Wish, high: Wish, when: str, document: Document) -> Findi
         f"{number(high.upper, unit)}"
     )
     weaker = relax(document, low, low.lower, high.upper)
-    return Finding(sentence, True, (weaker, relax(document, high, high.upper, low.lower)))
+    return Diagnostic(sentence, True, (weaker, relax(document, high, high.upper, low.lower)))
 
 
-def _against_range(wish: Wish, q: Quantity, document: Document) -> Finding:
-    above = wish.lower > q.upper
-    asked, end = (wish.lower, q.upper) if above else (wish.upper, q.lower)
-    given = relax(document, wish, asked, end)
+def _against_range(requirement: Requirement, q: Quantity, document: Document) -> Diagnostic:
+    above = requirement.lower > q.upper
+    asked, end = (requirement.lower, q.upper) if above else (requirement.upper, q.lower)
+    given = relax(document, requirement, asked, end)
     sentence = f"{given} ({given.where}); {q.name} stays within "
     sentence += f"{number(q.lower, q.unit)} to {number(q.upper, q.unit)}"
-    return Finding(sentence, True, (given,))
+    return Diagnostic(sentence, True, (given,))
 
 
 def impossible_poses(
-    task: Task, poses: Poses, wishes: Sequence[Wish], document: Document
-) -> Iterator[Finding]:
-    """Moments at which no pose and no rates meet all wishes: reach, ground, stops, geometry."""
-    for when, here in moments(task, wishes):
+    task: Task, poses: Poses, requirements: Sequence[Requirement], document: Document
+) -> Iterator[Diagnostic]:
+    """Moments at which no pose and no rates meet all requirements: reach, ground, stops, geometry."""
+    for when, here in moments(task, requirements):
         together = poses.gaps(here, here)
         if together == []:
             continue
         single = _smallest(poses, here) or together or []
-        given = one_per_wish(relax(document, g.wish, g.asked, g.reachable) for g in single)
-        why = "; ".join(f"{r} ({r.where})" for r in given) or "the wishes exclude each other"
+        given = one_per_requirement(
+            relax(document, g.requirement, g.asked, g.reachable) for g in single
+        )
+        why = "; ".join(f"{r} ({r.where})" for r in given) or "the requirements exclude each other"
         reason = "" if together is None else _reason(single)
         certain = together is not None
-        yield Finding(f"no pose of the robot does what {when} asks: {why}{reason}", certain, given)
+        yield Diagnostic(
+            f"no pose of the robot does what {when} asks: {why}{reason}", certain, given
+        )
 
 
-def _smallest(poses: Poses, here: Sequence[Wish]) -> list[Gap]:
+def _smallest(poses: Poses, here: Sequence[Requirement]) -> list[Gap]:
     """The one line of the task that helps if it gives way alone, by the least; [] if none does."""
     best: list[Gap] = []
     for location in dict.fromkeys(w.location for w in here if w.at is not None):
@@ -127,13 +140,13 @@ def _size(gaps: Sequence[Gap]) -> float:
 
 
 def _reason(gaps: Sequence[Gap]) -> str:
-    """What stands in the way, where one wish tells it."""
-    if any(g.wish.quantity.name.endswith("foot/z") and g.asked < -1e-6 for g in gaps):
+    """What stands in the way, where one requirement tells it."""
+    if any(g.requirement.quantity.name.endswith("foot/z") and g.asked < -1e-6 for g in gaps):
         return "; the ground is at 0 m"
-    return " with the other wishes kept"
+    return " with the other requirements kept"
 
 
-def coarse_grid(task: Task, flight: Flight | None, document: Document) -> Iterator[Finding]:
+def coarse_grid(task: Task, flight: Flight | None, document: Document) -> Iterator[Diagnostic]:
     """Steps too long to time a push."""
     if flight is None or task.step <= LONGEST_STEP:
         return
@@ -143,4 +156,4 @@ def coarse_grid(task: Task, flight: Flight | None, document: Document) -> Iterat
         f"{1e3 * task.step:.0f} ms; a push by air needs steps of at most "
         f"{1e3 * LONGEST_STEP:.0f} ms, so at least {enough} nodes"
     )
-    yield Finding(sentence, True)
+    yield Diagnostic(sentence, True)

@@ -1,4 +1,4 @@
-"""What stands in a task's way: a sentence, the wish to relax, and how sure we are."""
+"""What stands in a task's way: a sentence, the requirement to relax, and how sure we are."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from fnmatch import fnmatchcase
 
 from kemba.config import Document
 from kemba.config.document import Location, written
-from kemba.ocp.task.requirement import Wish
+from kemba.ocp.task.requirement import Requirement
 
 
 @dataclass(frozen=True)
 class Relax:
-    """A wish that cannot be met: what the task asks, and what could be reached instead."""
+    """A requirement that cannot be met: what the task asks, and what could be reached instead."""
 
-    wish: str
+    requirement: str
     where: str
     quantity: str
     asked: float
@@ -27,16 +27,19 @@ class Relax:
         """`goals.apex`: 1.45 m asked, 1.21 m is the most that can be reached."""
         end = "most" if self.asked > self.reachable else "least"
         asked, reachable = number(self.asked, self.unit), number(self.reachable, self.unit)
-        name = f"`{self.wish}`"
-        if self.quantity not in (self.wish.partition(".")[2], "") and "*" not in self.wish:
+        name = f"`{self.requirement}`"
+        if (
+            self.quantity not in (self.requirement.partition(".")[2], "")
+            and "*" not in self.requirement
+        ):
             name += f" ({self.quantity})"
         return f"{name}: {asked} asked, {reachable} is the {end} that can be reached"
 
 
 @dataclass(frozen=True)
-class Finding:
+class Diagnostic:
     """What a check found. `certain`: no plan can exist, nothing need be solved. `cause`: it names
-    something else than the wish that fails."""
+    something else than the requirement that fails."""
 
     sentence: str
     certain: bool
@@ -63,25 +66,32 @@ def key(name: str, document: Document) -> str:
     return f"`{name}` ({place(document, (name,))})" if known else f"`{name}`"
 
 
-def relax(document: Document, wish: Wish, asked: float, reachable: float) -> Relax:
-    """How far a wish must give way."""
-    where = place(document, wish.location)
-    return Relax(wish.text, where, wish.quantity.name, asked, reachable, wish.quantity.unit)
+def relax(document: Document, requirement: Requirement, asked: float, reachable: float) -> Relax:
+    """How far a requirement must give way."""
+    where = place(document, requirement.location)
+    return Relax(
+        requirement.text,
+        where,
+        requirement.quantity.name,
+        asked,
+        reachable,
+        requirement.quantity.unit,
+    )
 
 
-def one_per_wish(relaxed: Iterable[Relax]) -> tuple[Relax, ...]:
-    """The farthest of every wish: `*/foot/z` holds for two feet and is told once."""
+def one_per_requirement(relaxed: Iterable[Relax]) -> tuple[Relax, ...]:
+    """The farthest of every requirement: `*/foot/z` holds for two feet and is told once."""
     worst: dict[tuple[str, bool], Relax] = {}
     for r in relaxed:
-        known = worst.setdefault((r.wish, r.asked > r.reachable), r)
+        known = worst.setdefault((r.requirement, r.asked > r.reachable), r)
         if abs(r.asked - r.reachable) > abs(known.asked - known.reachable):
-            worst[(r.wish, r.asked > r.reachable)] = r
+            worst[(r.requirement, r.asked > r.reachable)] = r
     return tuple(worst.values())
 
 
-def among(wishes: Sequence[Wish], pattern: str, at: float | None) -> list[Wish]:
-    """The wishes on quantities like `pattern` at a moment."""
-    return [w for w in wishes if w.at == at and fnmatchcase(w.quantity.name, pattern)]
+def among(requirements: Sequence[Requirement], pattern: str, at: float | None) -> list[Requirement]:
+    """The requirements on quantities like `pattern` at a moment."""
+    return [w for w in requirements if w.at == at and fnmatchcase(w.quantity.name, pattern)]
 
 
 def spoken(location: Location) -> str:

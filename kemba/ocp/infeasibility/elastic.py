@@ -1,4 +1,4 @@
-"""The same program with wishes that may give way at an l1 cost; the physics stays hard."""
+"""The same program with requirements that may give way at an l1 cost; the physics stays hard."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ import numpy as np
 from kemba.model import Model
 from kemba.ocp.infeasibility.pose import SCALE
 from kemba.ocp.nlp.blocks import Block
-from kemba.ocp.nlp.ipopt import Ipopt, Parameters, Point
+from kemba.ocp.nlp.ipopt import Ipopt, Iterate, Parameters
 from kemba.ocp.relaxation.guess import automatic_guess
 from kemba.ocp.relaxation.schedule import (
     LOOSE,
     SWITCHING,
     VALVE,
-    Search,
+    Schedule,
     Stopped,
     fix,
     tighten,
     warm,
 )
-from kemba.ocp.task.requirement import Wish
+from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.stage import Rows
 from kemba.ocp.transcription.symmetry import Reduction
-from kemba.ocp.transcription.transcribe import Transcription, WishBlock
+from kemba.ocp.transcription.transcribe import RequirementBlock, Transcription
 
 if TYPE_CHECKING:
     from kemba.ocp.planner import Planner
@@ -38,7 +38,7 @@ BUDGET = 30.0  # s
 NODES = 40  # a coarser grid is enough to say what is too much
 ITERATIONS = 500
 PRICE = 100.0  # of one unit of scaled slack, against a cost of 0.01 to 10
-SHORT = 0.05  # scaled slack (5 mm, 0.6 deg) from which a wish counts as out of reach
+SHORT = 0.05  # scaled slack (5 mm, 0.6 deg) from which a requirement counts as out of reach
 
 # Who gives way: goals first, as people would; then everything but the start, whose pose is judged
 # before solving.
@@ -46,7 +46,7 @@ TIERS = (("goals",), ("goals", "bounds", "end"))
 
 
 class Elastic(Transcription):
-    """Wishes of the sections `soft` have a pair of slack variables, shared by their nodes: how far
+    """Requirements of the sections `soft` have a pair of slack variables, shared by their nodes: how far
     below and above what is asked the plan stays. They stand at the first node, in columns of Y
     behind the layout's.
     """
@@ -55,39 +55,45 @@ class Elastic(Transcription):
         self,
         model: Model,
         task: Task,
-        wishes: Sequence[Wish],
+        requirements: Sequence[Requirement],
         reduction: Reduction,
         nodes: int,
         soft: Sequence[str],
     ) -> None:
         self.soft = soft
-        self.slack: list[tuple[Wish, int, float]] = []  # wish, first column, scale
+        self.slack: list[tuple[Requirement, int, float]] = []  # requirement, first column, scale
         cheap = {name: 0.01 * weight for name, weight in task.cost.items()}
-        super().__init__(model, task.model_copy(update={"cost": cheap}), wishes, reduction, nodes)
+        super().__init__(
+            model, task.model_copy(update={"cost": cheap}), requirements, reduction, nodes
+        )
 
     def extra_columns(self) -> int:
-        return 2 * sum(w.location[0] in self.soft for w, _, _ in self.wish_expressions())
+        return 2 * sum(w.location[0] in self.soft for w, _, _ in self.requirement_expressions())
 
-    def wish_blocks(self, index: np.ndarray) -> list[WishBlock]:
+    def requirement_blocks(self, index: np.ndarray) -> list[RequirementBlock]:
         blocks = (
-            (self.yielding if wish.location[0] in self.soft else self.hard)(wish, g, where, index)
-            for wish, g, where in self.wish_expressions()
+            (self.yielding if requirement.location[0] in self.soft else self.hard)(
+                requirement, g, where, index
+            )
+            for requirement, g, where in self.requirement_expressions()
         )
         return [block for block in blocks if block is not None]
 
-    def yielding(self, wish: Wish, g: ca.SX, where: list[int], index: np.ndarray) -> WishBlock:
-        """The rows of a wish that may give way, at a price per unit of scaled slack."""
-        column, scale = self.layout.size + 2 * len(self.slack), wish_scale(wish)
-        self.slack.append((wish, column, scale))
+    def yielding(
+        self, requirement: Requirement, g: ca.SX, where: list[int], index: np.ndarray
+    ) -> RequirementBlock:
+        """The rows of a requirement that may give way, at a price per unit of scaled slack."""
+        column, scale = self.layout.size + 2 * len(self.slack), requirement_scale(requirement)
+        self.slack.append((requirement, column, scale))
         self.upper[0, column : column + 2] = np.inf
         below, above = ca.SX.sym("below"), ca.SX.sym("above")
         rows = Rows(
-            "wish",
+            "requirement",
             g / scale + below - above,
-            wish.lower / scale,
-            wish.upper / scale,
-            (f"{wish.text}:{wish.quantity.name}",),
-            (wish.quantity.unit,),
+            requirement.lower / scale,
+            requirement.upper / scale,
+            (f"{requirement.text}:{requirement.quantity.name}",),
+            (requirement.quantity.unit,),
             (scale,),
         )
         shared = np.tile(index[0, column : column + 2], (len(where), 1))
@@ -96,24 +102,24 @@ class Elastic(Transcription):
         return Block(ca.vertcat(self.stage.y, below, above), rows.g, price, at), rows, where
 
     def start(self, Y: np.ndarray) -> np.ndarray:
-        """A start guess with room for every wish to give way."""
+        """A start guess with room for every requirement to give way."""
         wide = np.zeros(self.shape)
         wide[:, : self.layout.size] = Y
         wide[0, self.layout.size :] = 0.1
         return wide
 
-    def given(self, Y: np.ndarray) -> list[tuple[Wish, float, float]]:
-        """Wishes that gave way: the wish, by how much in its unit (above: positive), and scaled."""
+    def given(self, Y: np.ndarray) -> list[tuple[Requirement, float, float]]:
+        """Requirements that gave way: the requirement, by how much in its unit (above: positive), and scaled."""
         found = []
-        for wish, column, scale in self.slack:
+        for requirement, column, scale in self.slack:
             by = float(Y[0, column + 1] - Y[0, column])
-            found.append((wish, by * scale, abs(by)))
+            found.append((requirement, by * scale, abs(by)))
         return found
 
 
-def wish_scale(wish: Wish) -> float:
+def requirement_scale(requirement: Requirement) -> float:
     """What counts as one unit of slack."""
-    return SCALE.get(wish.quantity.unit, wish.quantity.scale)
+    return SCALE.get(requirement.quantity.unit, requirement.quantity.scale)
 
 
 @dataclass(frozen=True)
@@ -121,22 +127,22 @@ class Outcome:
     """How an elastic solve ended: the program, its last converged point, and what gave way."""
 
     transcription: Elastic
-    point: Point
-    given: tuple[tuple[Wish, float, float], ...]
+    point: Iterate
+    given: tuple[tuple[Requirement, float, float], ...]
 
     @property
     def short(self) -> bool:
-        """Whether some wish is out of reach."""
+        """Whether some requirement is out of reach."""
         return bool(self.given)
 
 
 def elastic(planner: Planner, reduction: Reduction) -> Outcome | None:
-    """Solve the task with soft wishes on a coarse grid; None when even that failed.
+    """Solve the task with soft requirements on a coarse grid; None when even that failed.
 
     Raises Stopped when the user stopped it.
     """
     deadline = min(planner.deadline, time.monotonic() + BUDGET)
-    sections = {str(w.location[0]) for w in planner.wishes}
+    sections = {str(w.location[0]) for w in planner.requirements}
     for soft in TIERS:
         if sections & set(soft):
             outcome = _solve(planner, reduction, soft, deadline)
@@ -152,21 +158,21 @@ def _solve(
     task = planner.task
     nodes = min(task.nodes, NODES)
     with planner.building.running():
-        program = Elastic(planner.model, task, planner.wishes, reduction, nodes, soft)
+        program = Elastic(planner.model, task, planner.requirements, reduction, nodes, soft)
     options = {**task.solver.options, "max_iter": ITERATIONS}
     ipopt = Ipopt(
         program, options, planner.log, deadline, planner.watch, planner.stop, planner.building
     )
-    search = Search(ipopt, task.solver.complementarity, planner.tell, planner.attempts)
-    quiet = [w for w in planner.wishes if w.location[0] not in soft]
-    converged: list[Point] = []
+    search = Schedule(ipopt, task.solver.complementarity, planner.tell, planner.attempts)
+    quiet = [w for w in planner.requirements if w.location[0] not in soft]
+    converged: list[Iterate] = []
     try:
         name = f"soft {' and '.join(soft)}: relax"
         # the second guess keeps still, which is nearly feasible: far off the bounds it is not
-        for wishes, push in ((planner.wishes, 0.3), (quiet, 1e-3)):
+        for requirements, push in ((planner.requirements, 0.3), (quiet, 1e-3)):
             interior = {"bound_push": push, "bound_frac": push, "mu_init": 0.1, "tol": 1e-3}
-            Y = automatic_guess(planner.model, task, wishes, program.layout, nodes)
-            start = Point(program.start(Y))
+            Y = automatic_guess(planner.model, task, requirements, program.layout, nodes)
+            start = Iterate(program.start(Y))
             point = search.solve(name, start, Parameters(LOOSE), options=interior)
             if point.solved:
                 converged.append(point)

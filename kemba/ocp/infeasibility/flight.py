@@ -11,7 +11,7 @@ import numpy as np
 from kemba.mechanism import load_robot
 from kemba.model import Model
 from kemba.ocp.infeasibility.pose import Poses
-from kemba.ocp.task.requirement import Wish
+from kemba.ocp.task.requirement import Requirement
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class Flight:
     centre of mass at most; `stays_below`: the height is the highest point.
     """
 
-    wish: Wish
+    requirement: Requirement
     height: float
     z0: float
     z1: float | None
@@ -48,32 +48,34 @@ class Flight:
         return other + self.swing + self.fall * (span + lent) ** 2 / 2
 
 
-def flight_of(model: Model, wishes: Sequence[Wish], poses: Poses) -> Flight | None:
-    """The flight that the highest wish on the body's height asks for, from a start at rest."""
-    highest = [w for w in wishes if w.quantity.name == "body/z" and w.at and np.isfinite(w.lower)]
-    start = [w for w in wishes if w.at == 0.0]
+def flight_of(model: Model, requirements: Sequence[Requirement], poses: Poses) -> Flight | None:
+    """The flight that the highest requirement on the body's height asks for, from a start at rest."""
+    highest = [
+        w for w in requirements if w.quantity.name == "body/z" and w.at and np.isfinite(w.lower)
+    ]
+    start = [w for w in requirements if w.at == 0.0]
     resting = any(w.location[-1] == "rest" for w in start)
     grounded = any(w.quantity.name.endswith("foot/z") and w.upper <= 1e-6 for w in start)
     if not highest or not resting or not grounded:
         return None
-    wish = max(highest, key=lambda w: w.lower)
+    requirement = max(highest, key=lambda w: w.lower)
     robot = load_robot(model.mechanism.name)
     leg = robot.leg.femur.length + robot.leg.tibia.length
-    if wish.lower <= leg:
+    if requirement.lower <= leg:
         return None
     mass, weight = inertia_and_weight(model)
-    end = [w for w in wishes if w.at == 1.0]
+    end = [w for w in requirements if w.at == 1.0]
     lands = any(w.quantity.name.endswith("foot/z") and w.upper <= 1e-6 for w in end)
-    below = [w for w in wishes if w.quantity.name == "body/z" and w.at is None]
+    below = [w for w in requirements if w.quantity.name == "body/z" and w.at is None]
     return Flight(
-        wish,
-        wish.lower,
+        requirement,
+        requirement.lower,
         poses.highest(start) or leg,
         (poses.highest(end) or leg) if lands else None,
         mass,
         weight / mass,
         leg_swing(model) / mass,
-        any(w.upper <= wish.lower for w in below),
+        any(w.upper <= requirement.lower for w in below),
     )
 
 

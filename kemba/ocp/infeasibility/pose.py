@@ -1,4 +1,4 @@
-"""Poses: can the wishes at one moment hold together, and which of them must give way?"""
+"""Poses: can the requirements at one moment hold together, and which of them must give way?"""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ import casadi as ca
 import numpy as np
 
 from kemba.model import Model
-from kemba.ocp.task.requirement import Wish, quantity_expression
+from kemba.ocp.task.requirement import Requirement, quantity_expression
 
 TRIES = 4
-MET = 1e-5  # slack in SI units below which a wish counts as met
+MET = 1e-5  # slack in SI units below which a requirement counts as met
 SCALE = {"m": 0.1, "rad": 0.2, "m.s-1": 1.0, "rad.s-1": 5.0}
 SILENT: dict[str, Any] = {
     "print_time": False,
@@ -29,24 +29,24 @@ SILENT: dict[str, Any] = {
 
 @dataclass(frozen=True)
 class Gap:
-    """A wish and the value nearest to it that a pose can have while the other wishes hold."""
+    """A requirement and the value nearest to it that a pose can have while the other requirements hold."""
 
-    wish: Wish
+    requirement: Requirement
     asked: float
     reachable: float
 
 
 class Poses:
     """Poses and rates (q, v) of a model: joints within their range, pistons within their stroke,
-    feet not below the ground. `wishes` that speak of other things are left aside.
+    feet not below the ground. `requirements` that speak of other things are left aside.
     """
 
-    def __init__(self, model: Model, wishes: Iterable[Wish]) -> None:
+    def __init__(self, model: Model, requirements: Iterable[Requirement]) -> None:
         self.model = model
         node = model.node
         others = ca.vertcat(node.a, node.s, node.sd, node.lam, node.u)
         self.expressions: dict[str, ca.SX] = {}
-        self.units = {w.quantity.name: w.quantity.unit for w in wishes}
+        self.units = {w.quantity.name: w.quantity.unit for w in requirements}
         for name in self.units:
             expression = quantity_expression(model, name)
             if not ca.depends_on(expression, others):
@@ -75,44 +75,46 @@ class Poses:
         }
         return ca.nlpsol("pose", "ipopt", nlp, SILENT)
 
-    def gaps(self, wishes: Sequence[Wish], free: Iterable[Wish]) -> list[Gap] | None:
-        """How far the wishes of `free` must give way so that all of `wishes` can hold.
+    def gaps(
+        self, requirements: Sequence[Requirement], free: Iterable[Requirement]
+    ) -> list[Gap] | None:
+        """How far the requirements of `free` must give way so that all of `requirements` can hold.
 
         [] when they can as they are, None when giving way there does not help.
         """
         may = {w.quantity.name for w in free}
         best: tuple[np.ndarray, np.ndarray] | None = None
         for attempt in range(TRIES):
-            found = self._solve(wishes, may, attempt)
+            found = self._solve(requirements, may, attempt)
             if found is not None:
                 slack = found[1]
                 if best is None or np.abs(slack).sum() < np.abs(best[1]).sum():
                     best = found
                 if np.abs(slack).max(initial=0.0) < MET:
                     return []
-        return None if best is None else self._told(best[1], wishes)
+        return None if best is None else self._told(best[1], requirements)
 
-    def highest(self, wishes: Sequence[Wish]) -> float | None:
-        """The largest height of the body [m] in any pose in which `wishes` hold."""
-        found = [self._solve(wishes, set(), k, lift=1.0) for k in range(TRIES)]
+    def highest(self, requirements: Sequence[Requirement]) -> float | None:
+        """The largest height of the body [m] in any pose in which `requirements` hold."""
+        found = [self._solve(requirements, set(), k, lift=1.0) for k in range(TRIES)]
         names = [c.name for c in self.model.mechanism.coordinates]
         heights = [float(f[0][names.index("body/z")]) for f in found if f is not None]
         return max(heights) if heights else None
 
-    def limits(self, wishes: Sequence[Wish]) -> tuple[np.ndarray, np.ndarray]:
-        """The range of every quantity that `wishes` leave."""
+    def limits(self, requirements: Sequence[Requirement]) -> tuple[np.ndarray, np.ndarray]:
+        """The range of every quantity that `requirements` leave."""
         lower, upper = np.full(len(self.names), -np.inf), np.full(len(self.names), np.inf)
-        for wish in (w for w in wishes if w.quantity.name in self.names):
-            i = self.names.index(wish.quantity.name)
-            lower[i], upper[i] = max(lower[i], wish.lower), min(upper[i], wish.upper)
+        for requirement in (w for w in requirements if w.quantity.name in self.names):
+            i = self.names.index(requirement.quantity.name)
+            lower[i], upper[i] = max(lower[i], requirement.lower), min(upper[i], requirement.upper)
         return lower, upper
 
     def _solve(
-        self, wishes: Sequence[Wish], may: set[str], attempt: int, lift: float = 0.0
+        self, requirements: Sequence[Requirement], may: set[str], attempt: int, lift: float = 0.0
     ) -> tuple[np.ndarray, np.ndarray] | None:
         """(q and v, slack per quantity: positive where the pose lies above what is asked)."""
         mechanism, n, walls = self.model.mechanism, len(self.names), self.walls.numel()
-        lower, upper = self.limits(wishes)
+        lower, upper = self.limits(requirements)
         boxes = [*mechanism.coordinates, *mechanism.velocities]
         low, high = np.array([q.lower for q in boxes]), np.array([q.upper for q in boxes])
         room = np.array([10.0 * (name in may) for name in self.names])
@@ -138,17 +140,17 @@ class Poses:
         away = rng.normal(size=len(q)) * [3 * c.scale for c in mechanism.coordinates]
         return np.concatenate([q + away * (attempt > 0), np.zeros(len(q))])
 
-    def _told(self, slack: np.ndarray, wishes: Sequence[Wish]) -> list[Gap]:
+    def _told(self, slack: np.ndarray, requirements: Sequence[Requirement]) -> list[Gap]:
         gaps = []
         for i, name in enumerate(self.names):
             if abs(slack[i]) < MET:
                 continue
-            same = [w for w in wishes if w.quantity.name == name]
+            same = [w for w in requirements if w.quantity.name == name]
             if slack[i] > 0:
-                wish = min(same, key=lambda w: w.upper)
-                asked = wish.upper
+                requirement = min(same, key=lambda w: w.upper)
+                asked = requirement.upper
             else:
-                wish = max(same, key=lambda w: w.lower)
-                asked = wish.lower
-            gaps.append(Gap(wish, asked, asked + float(slack[i])))
+                requirement = max(same, key=lambda w: w.lower)
+                asked = requirement.lower
+            gaps.append(Gap(requirement, asked, asked + float(slack[i])))
         return gaps

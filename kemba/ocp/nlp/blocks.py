@@ -10,9 +10,9 @@ import casadi as ca
 import numpy as np
 
 from kemba.ocp.nlp.compiled import compiled
-from kemba.ocp.nlp.constants import lifted
-from kemba.ocp.nlp.signs import folded
-from kemba.ocp.nlp.vectorised import abreast
+from kemba.ocp.nlp.constants import parameterised
+from kemba.ocp.nlp.signs import canonical_signs
+from kemba.ocp.nlp.vectorised import vectorised
 
 Entries = tuple[ca.MX, np.ndarray, np.ndarray]  # nonzeros, their rows, their columns
 
@@ -34,11 +34,11 @@ class Block:
     constants: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
     numbers: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
-    def lifted(self, p: ca.SX) -> Block:
+    def parameterised(self, p: ca.SX) -> Block:
         """The same with its numbers as constants, so that others can share its code, and mirrored
         halves written once."""
-        (f, g), constants, numbers = lifted([self.z, p], [self.f, ca.densify(self.g)])
-        f, g = folded([self.z, p, constants], [f, g])
+        (f, g), constants, numbers = parameterised([self.z, p], [self.f, ca.densify(self.g)])
+        f, g = canonical_signs([self.z, p, constants], [f, g])
         return replace(self, g=g, f=f, constants=constants, numbers=numbers)
 
     @cached_property
@@ -67,7 +67,7 @@ class BlockProblem:
     def __init__(
         self, blocks: Sequence[Block], size: int, p: ca.SX, worth_compiling: bool = False
     ) -> None:
-        self.blocks = [b.lifted(p) for b in blocks] if worth_compiling else list(blocks)
+        self.blocks = [b.parameterised(p) for b in blocks] if worth_compiling else list(blocks)
         self.size, self.p, self.worth_compiling = size, p, worth_compiling
         self.rows = sum(len(b.columns) * b.g.numel() for b in blocks)
         self.x, self.parameter = ca.MX.sym("x", size), ca.MX.sym("p", p.numel())
@@ -169,7 +169,7 @@ def _functions(block: Block, p: ca.SX, worth_compiling: bool) -> list[ca.Functio
 def _repeated(block: Block, function: ca.Function) -> ca.Function:
     """(z side by side, parameters and constants; lam_f, lam_g side by side) -> results alike."""
     shared = [1, 2] if function.n_in() > 2 else [1]
-    return abreast(function, len(block.columns), shared)
+    return vectorised(function, len(block.columns), shared)
 
 
 def _gather_gradient(parts: list[tuple[ca.MX, np.ndarray]], size: int) -> ca.MX:

@@ -12,7 +12,7 @@ from kemba.ocp.nlp.rewriting import replay
 SHAPING = (-1.0, 0.0, 0.5, 1.0, 2.0)  # numbers that decide what an expression simplifies to
 
 
-def lifted(
+def parameterised(
     inputs: Sequence[ca.SX], outputs: Sequence[ca.SX]
 ) -> tuple[list[ca.SX], ca.SX, np.ndarray]:
     """The dense outputs with a symbol (k,) for their distinct constants, and the values (k,)."""

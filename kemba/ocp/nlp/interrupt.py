@@ -1,4 +1,4 @@
-"""Ctrl-C as a wish to stop: the first ends the work in order, the second at once."""
+"""Ctrl-C as a request to stop: the first ends the work in order, the second at once."""
 
 from __future__ import annotations
 

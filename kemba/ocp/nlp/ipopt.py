@@ -13,9 +13,9 @@ import casadi as ca
 import numpy as np
 
 from kemba.ocp.nlp.blocks import BlockProblem
-from kemba.ocp.nlp.proximal import Anchored
-from kemba.ocp.nlp.regularised import damped
-from kemba.ocp.nlp.stagnation import GAVE_UP, Patience
+from kemba.ocp.nlp.proximal import Proximal
+from kemba.ocp.nlp.regularised import regularised_hessian
+from kemba.ocp.nlp.stagnation import GAVE_UP, Stagnation
 from kemba.ocp.transcription.transcribe import Transcription
 from kemba.stopwatch import Stopwatch
 
@@ -23,7 +23,7 @@ SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
 
 
 @dataclass(frozen=True)
-class Point:
+class Iterate:
     """A primal-dual iterate: Y (nodes + 1, n), multipliers of bounds and rows, and how it ended."""
 
     Y: np.ndarray
@@ -79,7 +79,7 @@ class Watcher(ca.Callback):
         program: Watched,
         watch: Watch | None,
         stop: Callable[[], bool] | None,
-        patience: Patience | None,
+        patience: Stagnation | None,
         parameters: int | None = None,
     ) -> None:
         super().__init__()
@@ -156,17 +156,17 @@ class Ipopt:
         self.transcription, self.options = transcription, dict(options or {})
         self.log, self.deadline, self.watch, self.stop = log, deadline, watch, stop
         self.building, self.iterations = building or Stopwatch(), 0
-        self._damped: dict[BlockProblem | Anchored, ca.Function] = {}
+        self._damped: dict[BlockProblem | Proximal, ca.Function] = {}
 
     def solve(
         self,
-        start: Point,
+        start: Iterate,
         parameters: Parameters,
         options: Mapping[str, Any] | None = None,
         fixed: Mapping[int, np.ndarray] | None = None,
         free: Mapping[int, tuple[np.ndarray, np.ndarray]] | None = None,
-        patience: Patience | None = None,
-    ) -> Point:
+        patience: Stagnation | None = None,
+    ) -> Iterate:
         """One solve from `start`; `fixed` maps columns of Y to values (nodes + 1,) they keep,
         `free` to bounds that hold as well. Where `patience` is lost its message is GAVE_UP."""
         t = self.transcription
@@ -206,7 +206,7 @@ class Ipopt:
         found = solver(**arguments)
         stats = solver.stats()
         self.iterations += int(stats["iter_count"])
-        return Point(
+        return Iterate(
             Y=np.array(found["x"]).reshape(t.shape),
             lam_x=np.array(found["lam_x"]).ravel(),
             lam_g=np.array(found["lam_g"]).ravel(),
@@ -216,8 +216,8 @@ class Ipopt:
         )
 
     def _posed(
-        self, parameters: Parameters, start: Point
-    ) -> tuple[BlockProblem | Anchored, list[float]]:
+        self, parameters: Parameters, start: Iterate
+    ) -> tuple[BlockProblem | Proximal, list[float]]:
         """The problem, anchored where asked, and its parameters."""
         problem, p = self.transcription.problem, parameters.vector(self.transcription.nodes)
         if not parameters.anchor:
@@ -225,10 +225,10 @@ class Ipopt:
         return self._anchored, [*p, parameters.anchor, *start.Y.ravel()]
 
     @cached_property
-    def _anchored(self) -> Anchored:
-        return Anchored(self.transcription.problem)
+    def _anchored(self) -> Proximal:
+        return Proximal(self.transcription.problem)
 
-    def _newton(self, problem: BlockProblem | Anchored, parameters: Parameters) -> ca.Function:
+    def _newton(self, problem: BlockProblem | Proximal, parameters: Parameters) -> ca.Function:
         """The Hessian that Newton steps are made with: damped on a whole robot with relaxed pairs.
 
         Half a robot is as quick without. The paper's penalty on pairs stays as it is, for it is
@@ -238,12 +238,12 @@ class Ipopt:
         if half or parameters.pairs or not any(r.kind == "pair" for r in stage.rows):
             return problem.hess_lag
         if problem not in self._damped:
-            self._damped[problem] = damped(problem.hess_lag)
+            self._damped[problem] = regularised_hessian(problem.hess_lag)
         return self._damped[problem]
 
     @staticmethod
     def _plugin(
-        problem: BlockProblem | Anchored, hessian: ca.Function, options: Mapping[str, Any]
+        problem: BlockProblem | Proximal, hessian: ca.Function, options: Mapping[str, Any]
     ) -> dict[str, Any]:
         return {
             "print_time": False,

@@ -13,7 +13,7 @@ import casadi as ca
 from kemba.ocp.nlp.blocks import BlockProblem
 
 
-class Anchored:
+class Proximal:
     """A problem with weight / 2 |x - start|^2 added to its cost; its parameters become
     [p, weight, start]. Ready for `ca.nlpsol` like the problem itself."""
 

@@ -13,7 +13,7 @@ import casadi as ca
 DAMPING = 2e-3  # per scaled variable; IPOPT's own additions are 1e-4 to 1
 
 
-def damped(hess_lag: ca.Function) -> ca.Function:
+def regularised_hessian(hess_lag: ca.Function) -> ca.Function:
     """(x, p, lam_f, lam_g) -> upper triangle of the Hessian (n, n), damped."""
     at = hess_lag.mx_in()
     hessian = hess_lag(*at) + DAMPING * ca.MX.eye(hess_lag.size1_out(0))

@@ -22,18 +22,18 @@ SUMS = {ca.OP_ADD, ca.OP_SUB}
 Signed = tuple[bool, ca.SX]  # whether negated, and of what
 
 
-def folded(inputs: Sequence[ca.SX], outputs: Sequence[ca.SX]) -> list[ca.SX]:
+def canonical_signs(inputs: Sequence[ca.SX], outputs: Sequence[ca.SX]) -> list[ca.SX]:
     """The same outputs, dense, of symbols, with mirrored subexpressions shared."""
     f = ca.Function("f", list(inputs), [ca.densify(y) for y in outputs])
     given = [[(False, x) for x in ca.vertsplit(ca.vec(symbols))] for symbols in inputs]
-    fold = _Fold()
+    fold = _Canonical()
     found = replay(f, given, fold.number, fold.apply)
     elements = [ca.vertcat(*(_plain(x) for x in nonzeros)) for nonzeros in found]
     return [ca.reshape(ca.SX(e), y.shape) for e, y in zip(elements, outputs, strict=True)]
 
 
 @dataclass
-class _Fold:
+class _Canonical:
     """Builds signed expressions, each once; `order` numbers them as they come
     (and keeps them, since a hash is unique among the living only)."""
 

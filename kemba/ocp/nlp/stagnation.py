@@ -11,7 +11,7 @@ PROGRESS = 0.8  # the part of the violation that may be left
 
 
 @dataclass
-class Patience:
+class Stagnation:
     """Is `lost` once the worst scaled violation has not fallen by a fifth in `iterations`, unless
     it was below `small` before."""
 

@@ -16,7 +16,7 @@ from kemba.ocp.nlp.rewriting import replay
 FEW = 8  # points at which one by one is as fast
 
 
-def abreast(f: ca.Function, points: int, shared: Collection[int] = ()) -> ca.Function:
+def vectorised(f: ca.Function, points: int, shared: Collection[int] = ()) -> ca.Function:
     """f of SX at `points` at once: its inputs (n, points), except the `shared` ones (n,), which
     are the same at all; dense outputs (m, points). Equal to f at every point to the last bit."""
     if points < FEW or f.class_name() != "SXFunction":

@@ -41,7 +41,7 @@ class View:
         return ca.vertcat(*(self.symbols[g] for g in groups.split()))
 
 
-def add_rules(program: Program, start: Independent) -> None:
+def add_mode_constraints(program: Program, start: Independent) -> None:
     """Rows of every constraint in every phase and at every impact; `start` knows what the task
     already fixes at the first node."""
     view = View(program)

@@ -14,20 +14,25 @@ from kemba.ocp.certificate.certify import Certificate
 from kemba.ocp.nlp.ipopt import SOLVED, Watch
 from kemba.ocp.nlp.stagnation import GAVE_UP
 from kemba.ocp.refinement.independent import Independent
-from kemba.ocp.refinement.mode_constraints import add_rules
+from kemba.ocp.refinement.mode_constraints import add_mode_constraints
 from kemba.ocp.refinement.modes import Phase, read_phases
 from kemba.ocp.refinement.program import Program
 from kemba.ocp.refinement.radau import RADAU3, RADAU5, STATE, Scheme
 from kemba.ocp.refinement.repair import FITS, misfit, repaired, simplified
-from kemba.ocp.refinement.requirements import add_wishes
+from kemba.ocp.refinement.requirements import add_requirements
 from kemba.ocp.refinement.sample import certificate, to_trajectory
-from kemba.ocp.refinement.solve import STOPPED, Control, Found, solve
+from kemba.ocp.refinement.solve import STOPPED, Control, PhaseSolution, solve
 from kemba.ocp.refinement.start import carried, start_vector
 from kemba.ocp.refinement.unilateral import read_constraints
-from kemba.ocp.task.requirement import Wish
+from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.solution import arrays
-from kemba.ocp.transcription.symmetry import Reduction, find_symmetry, whole, wishes_are_symmetric
+from kemba.ocp.transcription.symmetry import (
+    Reduction,
+    find_symmetry,
+    requirements_are_symmetric,
+    whole,
+)
 from kemba.trajectory import Trajectory
 
 STOPS = (STOPPED, "Maximum_WallTime_Exceeded")
@@ -73,7 +78,7 @@ class Refined:
 def refine(
     model: Model,
     task: Task,
-    wishes: Sequence[Wish],
+    requirements: Sequence[Requirement],
     plan: Trajectory,
     reduction: Reduction | None = None,
     deadline: float = np.inf,
@@ -87,8 +92,10 @@ def refine(
     is in time.monotonic(). `log` collects IPOPT's text. `watch` hears every iteration, `stop` is
     asked whether to end: the message then is IPOPT's for a user's stop.
     """
-    reduction = reduction or reduction_of(model, task, wishes, plan)
-    refiner = Refiner(model, task, wishes, plan, reduction, Control(deadline, log, watch, stop))
+    reduction = reduction or reduction_of(model, task, requirements, plan)
+    refiner = Refiner(
+        model, task, requirements, plan, reduction, Control(deadline, log, watch, stop)
+    )
     try:
         return refiner.run()
     except ValueError as error:
@@ -101,7 +108,7 @@ class Refiner:
 
     model: Model
     task: Task
-    wishes: Sequence[Wish]
+    requirements: Sequence[Requirement]
     plan: Trajectory
     reduction: Reduction
     control: Control
@@ -111,7 +118,7 @@ class Refiner:
     @property
     def marks(self) -> list[int]:
         """Nodes at which the task asks for something: phases end there."""
-        return [w.node(len(self.plan) - 1) for w in self.wishes if w.at is not None]
+        return [w.node(len(self.plan) - 1) for w in self.requirements if w.at is not None]
 
     @property
     def left(self) -> int:
@@ -187,7 +194,7 @@ class Refiner:
                 break
         return found
 
-    def rough(self, phases: Sequence[Phase], start: Trajectory) -> tuple[Program, Found]:
+    def rough(self, phases: Sequence[Phase], start: Trajectory) -> tuple[Program, PhaseSolution]:
         """The elastic program of the coarser scheme, solved."""
         program, x = self.build(phases, start, RADAU3, PRICE)
         x = program.loosened(program.anchor(x, NEAR_ELASTIC))
@@ -216,12 +223,14 @@ class Refiner:
         x = start_vector(program, start)
         first, end = program.columns.first, program.columns.end(program.nodes)
         at_first = Independent({g: x[first[g]] for g in STATE})
-        add_wishes(program, self.wishes, at_first, Independent({g: x[end[g]] for g in STATE}))
-        add_rules(program, at_first)
+        add_requirements(
+            program, self.requirements, at_first, Independent({g: x[end[g]] for g in STATE})
+        )
+        add_mode_constraints(program, at_first)
         x = np.concatenate([x, np.zeros(program.columns.size - len(x))])
         return program, np.clip(x, program.lower, program.upper)
 
-    def _solve(self, program: Program, start: np.ndarray, options: dict[str, Any]) -> Found:
+    def _solve(self, program: Program, start: np.ndarray, options: dict[str, Any]) -> PhaseSolution:
         options = {**options, "max_iter": max(0, min(options["max_iter"], self.left))}
         found = solve(program, start, options, self.control)
         self.iterations += found.iterations
@@ -231,10 +240,12 @@ class Refiner:
         return Refined(None, None, message, self.iterations, tuple(program.phases))
 
 
-def reduction_of(model: Model, task: Task, wishes: Sequence[Wish], plan: Trajectory) -> Reduction:
+def reduction_of(
+    model: Model, task: Task, requirements: Sequence[Requirement], plan: Trajectory
+) -> Reduction:
     """Half the robot where model, task and plan are their own mirror images, else the whole."""
     half = find_symmetry(model) if task.solver.symmetry else None
-    if half is None or not wishes_are_symmetric(model, wishes):
+    if half is None or not requirements_are_symmetric(model, requirements):
         return whole(model.node)
     x = arrays(model, plan)
     for name, matrix in half.B.items():

@@ -1,4 +1,4 @@
-"""A task's wishes on the multi-phase program, at element ends."""
+"""A task's requirements on the multi-phase program, at element ends."""
 
 from __future__ import annotations
 
@@ -11,58 +11,62 @@ from kemba.ocp.refinement.independent import Independent
 from kemba.ocp.refinement.mode_constraints import View
 from kemba.ocp.refinement.modes import HELD
 from kemba.ocp.refinement.program import Program
-from kemba.ocp.task.requirement import Wish, quantity_expression
+from kemba.ocp.task.requirement import Requirement, quantity_expression
 from kemba.ocp.transcription.stage import as_variable
 
 INF = np.inf
 SCALES = {"m": 0.1, "m.s-1": 1.0, "rad": 0.2}
 
 
-def add_wishes(
-    program: Program, wishes: Sequence[Wish], start: Independent, end: Independent
+def add_requirements(
+    program: Program, requirements: Sequence[Requirement], start: Independent, end: Independent
 ) -> None:
-    """Bounds where a wish is about a variable, rows otherwise; none where modes grant it."""
+    """Bounds where a requirement is about a variable, rows otherwise; none where modes grant it."""
     view = View(program)
     _granted_at_end(program, view, end)
     seen: set[tuple[object, ...]] = set()
-    for wish in wishes:
-        g = view.of(quantity_expression(program.model, wish.quantity.name))
+    for requirement in requirements:
+        g = view.of(quantity_expression(program.model, requirement.quantity.name))
         z = view.z("q v s u lam")
-        key = (wish.at, str(g), wish.lower, wish.upper)
+        key = (requirement.at, str(g), requirement.lower, requirement.upper)
         if ca.jacobian(g, z).nnz() == 0 or key in seen or _about_valves(program, view, g):
             continue
         seen.add(key)
         last = program.nodes
         acts = ca.depends_on(g, view.z("u lam"))
-        nodes = range(int(acts), last + 1) if wish.at is None else [wish.node(last)]
-        if wish.at is not None and wish.lower == wish.upper and not acts:
+        nodes = range(int(acts), last + 1) if requirement.at is None else [requirement.node(last)]
+        if requirement.at is not None and requirement.lower == requirement.upper and not acts:
             moment = {0: start, last: end}.get(nodes[0])
             if moment is not None and not moment.adds(g, view):
                 continue
-        _put(program, view, wish, g, list(nodes))
+        _put(program, view, requirement, g, list(nodes))
 
 
 def _about_valves(program: Program, view: View, g: ca.SX) -> bool:
-    """Whether a wish is about valves alone: phases keep them as the plan has them."""
+    """Whether a requirement is about valves alone: phases keep them as the plan has them."""
     inputs = view.layout.slices["u"].start
     valves = [view.symbols["u"][c - inputs] for c in view.layout.binary]
     own = {str(symbol) for symbol in ca.symvar(g)}
     return own <= {str(symbol) for symbol in valves}
 
 
-def _put(program: Program, view: View, wish: Wish, g: ca.SX, nodes: list[int]) -> None:
+def _put(
+    program: Program, view: View, requirement: Requirement, g: ca.SX, nodes: list[int]
+) -> None:
     variable = as_variable(g, view.z("q v s"))
     columns = [_columns(program, node, full=variable is None) for node in nodes]
     if variable is not None:
         index, factor, offset = variable
-        ends = sorted(((wish.lower - offset) / factor, (wish.upper - offset) / factor))
+        ends = sorted(
+            ((requirement.lower - offset) / factor, (requirement.upper - offset) / factor)
+        )
         at = [z[index] for z in columns]
         program.lower[at] = np.maximum(program.lower[at], ends[0])
         program.upper[at] = np.minimum(program.upper[at], ends[1])
         return
-    scale = SCALES.get(wish.quantity.unit, 1.0)
-    label = f"{wish.text}:{wish.quantity.name}"
-    low, high = wish.lower / scale, wish.upper / scale
+    scale = SCALES.get(requirement.quantity.unit, 1.0)
+    label = f"{requirement.text}:{requirement.quantity.name}"
+    low, high = requirement.lower / scale, requirement.upper / scale
     if not ca.depends_on(g, view.z("u lam")):
         columns = [_columns(program, node, full=False) for node in nodes]
         program.rule(label, view.z("q v s"), g / scale, low, high, columns)

@@ -70,7 +70,7 @@ def _slip_speeds(program: Program, q: np.ndarray, v: np.ndarray, lam: np.ndarray
 
 
 def certificate(program: Program, x: np.ndarray, trajectory: Trajectory) -> Certificate:
-    """What the solution violates: collocation and impacts (dynamics), modes, bounds and wishes
+    """What the solution violates: collocation and impacts (dynamics), modes, bounds and requirements
     (bounds), forces times gaps at the element ends (complementarity)."""
     g = np.array(program.problem.g(x, [])).ravel()
     over = np.maximum(np.maximum(program.g_lower - g, g - program.g_upper), 0.0)

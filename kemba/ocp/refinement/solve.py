@@ -12,7 +12,7 @@ import casadi as ca
 import numpy as np
 
 from kemba.ocp.nlp.ipopt import COMMON, Watch, Watcher
-from kemba.ocp.nlp.stagnation import GAVE_UP, Patience
+from kemba.ocp.nlp.stagnation import GAVE_UP, Stagnation
 from kemba.ocp.refinement.program import Program
 
 STOPPED = "User_Requested_Stop"
@@ -39,7 +39,7 @@ class Control:
 
 
 @dataclass(frozen=True)
-class Found:
+class PhaseSolution:
     """Where a solve ended: variables, IPOPT's word, iterations."""
 
     x: np.ndarray
@@ -47,14 +47,16 @@ class Found:
     iterations: int
 
 
-def solve(program: Program, start: np.ndarray, options: dict[str, Any], control: Control) -> Found:
+def solve(
+    program: Program, start: np.ndarray, options: dict[str, Any], control: Control
+) -> PhaseSolution:
     """The program solved from `start`; it ends as IPOPT says, with `STOPPED` when asked to, or
     with `GAVE_UP`."""
     remaining = control.deadline - time.monotonic()
     if control.stop is not None and control.stop():
-        return Found(start, STOPPED, 0)
+        return PhaseSolution(start, STOPPED, 0)
     if remaining <= 0:
-        return Found(start, "Maximum_WallTime_Exceeded", 0)
+        return PhaseSolution(start, "Maximum_WallTime_Exceeded", 0)
     own = {**COMMON, **program.task.solver.options, **EXACT, **options}
     if np.isfinite(remaining):
         own["max_wall_time"] = remaining
@@ -62,7 +64,7 @@ def solve(program: Program, start: np.ndarray, options: dict[str, Any], control:
         own |= {"output_file": str(control.log), "file_print_level": 5, "file_append": "yes"}
     problem = program.problem
     elastic = program.elastic > 0.0  # such a program has a solution
-    patience = Patience(np.inf if elastic else PATIENCE, SMALL)
+    patience = Stagnation(np.inf if elastic else PATIENCE, SMALL)
     plugin = {
         "print_time": False,
         "error_on_fail": False,
@@ -84,4 +86,4 @@ def solve(program: Program, start: np.ndarray, options: dict[str, Any], control:
     )
     stats = solver.stats()
     message = GAVE_UP if patience.lost else str(stats["return_status"])
-    return Found(np.array(found["x"]).ravel(), message, int(stats["iter_count"]))
+    return PhaseSolution(np.array(found["x"]).ravel(), message, int(stats["iter_count"]))

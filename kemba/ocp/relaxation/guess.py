@@ -12,7 +12,7 @@ from numpy.polynomial.polynomial import polyder, polyval
 from kemba.mechanism import Robot, load_robot
 from kemba.mechanism.knee import extension, flexion
 from kemba.model import Model
-from kemba.ocp.task.requirement import Wish
+from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.layout import Layout
 
@@ -43,25 +43,27 @@ class Course:
         return np.asarray(polyval(t - knots[i], polyder(cubic, order), tensor=False))
 
 
-def asked(wishes: Sequence[Wish], name: str, at: float) -> float | None:
+def asked(requirements: Sequence[Requirement], name: str, at: float) -> float | None:
     """The value wished for a quantity at a moment, if any (the nearer end of a range)."""
-    for wish in wishes:
-        if wish.quantity.name == name and wish.at == at:
-            return wish.lower if np.isfinite(wish.lower) else wish.upper
+    for requirement in requirements:
+        if requirement.quantity.name == name and requirement.at == at:
+            return requirement.lower if np.isfinite(requirement.lower) else requirement.upper
     return None
 
 
 def body_course(
-    wishes: Sequence[Wish], duration: float, reach: tuple[float, float], g: float
+    requirements: Sequence[Requirement], duration: float, reach: tuple[float, float], g: float
 ) -> Course:
     """Height of the body over the motion; `reach` = leg length retracted and stretched [m]."""
     low, high = reach
     top = low + STRETCH * (high - low)
-    z0 = asked(wishes, "body/z", 0.0) or low
-    z1 = asked(wishes, "body/z", 1.0)
-    peaks = [w for w in wishes if w.quantity.name == "body/z" and w.at and np.isfinite(w.lower)]
+    z0 = asked(requirements, "body/z", 0.0) or low
+    z1 = asked(requirements, "body/z", 1.0)
+    peaks = [
+        w for w in requirements if w.quantity.name == "body/z" and w.at and np.isfinite(w.lower)
+    ]
     peak = max(peaks, key=lambda w: w.lower, default=None)
-    lands = any(w.quantity.name.endswith("foot/z") and w.at == 1.0 for w in wishes)
+    lands = any(w.quantity.name.endswith("foot/z") and w.at == 1.0 for w in requirements)
     if z0 > top:
         fall = float(np.sqrt(2 * (z0 - top) / g))
         course = Course([0.0, fall], [z0, top], [0.0, -g * fall], (0.0, fall))
@@ -69,7 +71,7 @@ def body_course(
     if peak is None or peak.at is None:
         return Course([0.0, duration], [z0, z1 or z0], [0.0, 0.0], (duration, duration))
     apex, t_apex = peak.lower, peak.at * duration
-    feet = (w for w in wishes if w.quantity.name.endswith("foot/z") and w.at == peak.at)
+    feet = (w for w in requirements if w.quantity.name.endswith("foot/z") and w.at == peak.at)
     lift = max((w.lower for w in feet), default=0.0)
     if lift > 0.0 and z0 < apex <= top:  # standing reaches it, but is not what is asked
         top = max(apex - lift, (z0 + apex) / 2)
@@ -111,7 +113,7 @@ def leg_pose(robot: Robot, fold: int, dx: np.ndarray, dz: np.ndarray) -> tuple[n
 
 
 def automatic_guess(
-    model: Model, task: Task, wishes: Sequence[Wish], layout: Layout, nodes: int
+    model: Model, task: Task, requirements: Sequence[Requirement], layout: Layout, nodes: int
 ) -> np.ndarray:
     """Start guess Y (nodes + 1, n) in the layout's scaled coordinates."""
     robot = load_robot(model.mechanism.name)
@@ -126,10 +128,10 @@ def automatic_guess(
         still = task.duration
         course = Course([0.0, still], [lengths[0]] * 2, [0.0] * 2, (still, still))
     else:
-        course = body_course(wishes, task.duration, (lengths[0], lengths[1]), gravity)
+        course = body_course(requirements, task.duration, (lengths[0], lengths[1]), gravity)
     z, az = course(t), course(t, 2)
     airborne = (t > course.flight[0]) & (t < course.flight[1])
-    x0, x1 = (asked(wishes, "body/x", at) or 0.0 for at in (0.0, 1.0))
+    x0, x1 = (asked(requirements, "body/x", at) or 0.0 for at in (0.0, 1.0))
     span = max(course.flight[1] - course.flight[0], 0.05)
     x = x0 + (x1 - x0) * np.clip((t - course.flight[0]) / span, 0.0, 1.0)
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from kemba.ocp.nlp.ipopt import Parameters, Point
+from kemba.ocp.nlp.ipopt import Iterate, Parameters
 from kemba.ocp.relaxation.schedule import (
     EXACT,
     LONGEST,
@@ -14,7 +14,7 @@ from kemba.ocp.relaxation.schedule import (
     MARGIN,
     ROUNDED,
     Attempt,
-    Search,
+    Schedule,
     fix,
     move,
     warm,
@@ -31,7 +31,7 @@ def widen(half: Transcription, whole: Transcription, Y: np.ndarray) -> np.ndarra
     return whole.layout.pack(groups)
 
 
-def confirm(search: Search, half: Transcription, point: Point) -> Point:
+def confirm(search: Schedule, half: Transcription, point: Iterate) -> Iterate:
     """A plan of the half robot on the whole one: checked there, and solved on where it falls
     short (its forces and moments vanish by symmetry, so that it rarely does)."""
     whole = search.transcription
@@ -46,9 +46,9 @@ def confirm(search: Search, half: Transcription, point: Point) -> Point:
     return search.solve("whole robot", start, parameters, options=options, fixed=fixed)
 
 
-def grow(search: Search, half: Transcription, point: Point, guess: Point) -> Point:
+def grow(search: Schedule, half: Transcription, point: Iterate, guess: Iterate) -> Iterate:
     """A plan of the whole robot, its pairs still a little loose, from one of the half robot for
-    what the task wishes of both legs alike.
+    what the task asks of both legs alike.
 
     All switches are released by a few nodes, and rounded again. What the mirror keeps at zero, as
     the way ahead, starts from `guess`.
@@ -60,5 +60,5 @@ def grow(search: Search, half: Transcription, point: Point, guess: Point) -> Poi
         columns = whole.layout.slices[group].start + lost
         Y[:, columns] = guess.Y[:, columns]
     options = warm(1e-2, ROUNDED, max_iter=search.at_most(LONGEST))
-    moved = move(search, Point(Y), LOOSE, **options)
+    moved = move(search, Iterate(Y), LOOSE, **options)
     return fix(search, moved) if moved.solved else moved

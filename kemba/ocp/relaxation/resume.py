@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from kemba.model import Model
-from kemba.ocp.nlp.ipopt import Point
+from kemba.ocp.nlp.ipopt import Iterate
 from kemba.ocp.transcription.solution import arrays
 from kemba.ocp.transcription.transcribe import Transcription
 from kemba.trajectory import Trajectory
@@ -13,7 +13,7 @@ from kemba.trajectory import Trajectory
 HELD = ("u", "lam", "h")  # act on the interval before a node
 
 
-def resumed(transcription: Transcription, trajectory: Trajectory) -> Point:
+def resumed(transcription: Transcription, trajectory: Trajectory) -> Iterate:
     """The trajectory as a point of the program; another number of nodes is interpolated.
 
     Raises KembaError when the trajectory lacks a column of the model.
@@ -25,7 +25,7 @@ def resumed(transcription: Transcription, trajectory: Trajectory) -> Point:
     steps["h"] = steps["h"] * (len(trajectory) - 1) / t.nodes
     Y = np.zeros(t.shape)
     Y[:, : t.layout.size] = t.layout.pack(steps)
-    return Point(np.clip(Y, t.lower, t.upper))
+    return Iterate(np.clip(Y, t.lower, t.upper))
 
 
 def node_groups(model: Model, trajectory: Trajectory) -> dict[str, np.ndarray]:

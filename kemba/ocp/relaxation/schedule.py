@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from kemba.ocp.nlp.ipopt import WARM, Ipopt, Parameters, Point
-from kemba.ocp.nlp.stagnation import Patience
+from kemba.ocp.nlp.ipopt import WARM, Ipopt, Iterate, Parameters
+from kemba.ocp.nlp.stagnation import Stagnation
 from kemba.ocp.relaxation.dwell import dwelling
 from kemba.ocp.transcription.transcribe import Transcription
 
@@ -45,13 +45,13 @@ class Attempt:
 class Stopped(Exception):  # noqa: N818 (a way out, not an error)
     """The user or a limit ended a solve; the best iterate travels along."""
 
-    def __init__(self, transcription: Transcription, point: Point) -> None:
+    def __init__(self, transcription: Transcription, point: Iterate) -> None:
         super().__init__(point.message)
         self.transcription, self.point = transcription, point
 
 
 @dataclass
-class Search:
+class Schedule:
     """A transcription being solved: its solver, what was tried, and who is told."""
 
     ipopt: Ipopt
@@ -63,7 +63,7 @@ class Search:
     def transcription(self) -> Transcription:
         return self.ipopt.transcription
 
-    def solve(self, name: str, start: Point, parameters: Parameters, **how: Any) -> Point:
+    def solve(self, name: str, start: Iterate, parameters: Parameters, **how: Any) -> Iterate:
         """One labelled solve. Raises Stopped when it was cut short."""
         self.tell(name)
         point = self.ipopt.solve(start, parameters, **how)
@@ -72,7 +72,7 @@ class Search:
             raise Stopped(self.transcription, self.better(start, point, parameters))
         return point
 
-    def better(self, start: Point, point: Point, parameters: Parameters) -> Point:
+    def better(self, start: Iterate, point: Iterate, parameters: Parameters) -> Iterate:
         """The less violated of a start and an iterate, with the iterate's message."""
         t = self.transcription
 
@@ -89,7 +89,7 @@ class Search:
         """As many iterations, or the user's limit if that is less."""
         return min(iterations, int(self.ipopt.options.get("max_iter", iterations)))
 
-    def valves(self, point: Point) -> dict[int, np.ndarray]:
+    def valves(self, point: Iterate) -> dict[int, np.ndarray]:
         """Columns of the valves, rounded, without pulses shorter than the task's dwell, as the
         task's own bounds on them allow."""
         t = self.transcription
@@ -104,7 +104,7 @@ def warm(mu: float, push: float = 1e-6, **more: Any) -> dict[str, Any]:
     return {**WARM, **pushed, "mu_init": mu, **more}
 
 
-def find(search: Search, start: Point) -> Point:
+def find(search: Schedule, start: Iterate) -> Iterate:
     """From a guess to a plan with binary valves, its pairs still a little loose."""
     interior = {"bound_push": 0.3, "bound_frac": 0.3, "mu_init": 0.1, "tol": 1e-3}
     interior["max_iter"] = search.at_most(LONGEST)
@@ -114,7 +114,7 @@ def find(search: Search, start: Point) -> Point:
     return binary(search, point)
 
 
-def binary(search: Search, point: Point, push: float = 1e-6) -> Point:
+def binary(search: Schedule, point: Iterate, push: float = 1e-6) -> Iterate:
     """Push the valves towards 0 and 1, then round and fix them, the pairs as loose as before; the
     start moves `push` off the bounds."""
     parameters = Parameters(LOOSE, VALVE, SWITCHING, forces=FORCES)
@@ -125,19 +125,19 @@ def binary(search: Search, point: Point, push: float = 1e-6) -> Point:
 
 
 def fix(
-    search: Search,
-    point: Point,
+    search: Schedule,
+    point: Iterate,
     forces: float = FORCES,
-    patience: Patience | None = None,
+    patience: Stagnation | None = None,
     **more: Any,
-) -> Point:
+) -> Iterate:
     """Round and fix the valves, the pairs tighter; `more` options to IPOPT."""
     options, fixed = warm(1e-3, CHANGED, tol=1e-3, **more), search.valves(point)
     how = {"options": options, "fixed": fixed, "patience": patience}
     return search.solve("fix valves", point, Parameters(TIGHT, forces=forces), **how)
 
 
-def tighten(search: Search, point: Point) -> Point:
+def tighten(search: Schedule, point: Iterate) -> Iterate:
     """Tighten the pairs to what the certificate asks, with the valves fixed."""
     parameters = Parameters(MARGIN * search.final_eps, anchor=ANCHOR)
     options = warm(1e-5, **EXACT)
@@ -145,12 +145,12 @@ def tighten(search: Search, point: Point) -> Point:
     return search.solve("tighten", point, parameters, options=options, fixed=fixed)
 
 
-def move(search: Search, start: Point, eps: float = TIGHT, **more: Any) -> Point:
+def move(search: Schedule, start: Iterate, eps: float = TIGHT, **more: Any) -> Iterate:
     """Release every valve switch by a few nodes and push the valves towards 0 and 1 again, the
     pairs relaxed by `eps`; `more` options to IPOPT."""
     options, free = {**warm(1e-3, CHANGED, tol=1e-3), **more}, _released(search.valves(start))
     parameters = Parameters(eps, VALVE, SWITCHING / 5, forces=FORCES)
-    return search.solve("move switches", Point(start.Y), parameters, options=options, free=free)
+    return search.solve("move switches", Iterate(start.Y), parameters, options=options, free=free)
 
 
 def _released(valves: dict[int, np.ndarray]) -> dict[int, tuple[np.ndarray, np.ndarray]]:
@@ -164,11 +164,11 @@ def _released(valves: dict[int, np.ndarray]) -> dict[int, tuple[np.ndarray, np.n
     return bounds
 
 
-def refine(search: Search, coarse: Transcription, point: Point) -> Point:
+def refine(search: Schedule, coarse: Transcription, point: Iterate) -> Iterate:
     """A coarse plan on the finer grid of `search`, with its valves kept; where that takes too
     long, as where they no longer fit, with its valves free again."""
-    start = Point(prolong(coarse, search.transcription, point.Y))
-    longest, patience = search.at_most(MISFIT), Patience(STUCK, NEAR)
+    start = Iterate(prolong(coarse, search.transcription, point.Y))
+    longest, patience = search.at_most(MISFIT), Stagnation(STUCK, NEAR)
     kept = fix(search, start, forces=0.0, patience=patience, max_iter=longest)
     return kept if kept.solved else fix(search, binary(search, start, CHANGED), forces=0.0)
 

@@ -5,19 +5,21 @@ from __future__ import annotations
 import numpy as np
 
 from kemba.model import Model
-from kemba.ocp.nlp.ipopt import Point
-from kemba.ocp.relaxation.schedule import Search, fix, move
+from kemba.ocp.nlp.ipopt import Iterate
+from kemba.ocp.relaxation.schedule import Schedule, fix, move
 from kemba.trajectory import Trajectory
 
 ENOUGH = 80  # iterations; where moved switches take more, the plan is seldom better
 PAYS = 0.02  # relative fall of the cost that makes another round worth while
 
 
-def polish(search: Search, point: Point, rounds: int, best: Point | None = None) -> Point:
+def search_neighbourhood(
+    search: Schedule, point: Iterate, rounds: int, best: Iterate | None = None
+) -> Iterate:
     """Release every valve switch by a few nodes and round again, at most `rounds` times and as
     long as the cost falls; `best` is a plan that has been through this."""
     for _ in range(rounds):
-        better = fix(search, Point(move(search, point).Y), max_iter=search.at_most(ENOUGH))
+        better = fix(search, Iterate(move(search, point).Y), max_iter=search.at_most(ENOUGH))
         if not better.solved or (best and better.objective >= (1 - PAYS) * best.objective):
             break
         point = best = better

@@ -1,4 +1,4 @@
-"""From a task's names to wishes on a model's quantities, every mistake at its line."""
+"""From a task's names to requirements on a model's quantities, every mistake at its line."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ MOMENTS = {"start": 0.0, "middle": 0.5, "end": 1.0}
 
 
 @dataclass(frozen=True)
-class Wish:
+class Requirement:
     """lower <= quantity <= upper at one moment (fraction of the nodes) or, at None, throughout."""
 
     location: Location
@@ -69,16 +69,16 @@ def quantity_expression(model: Model, name: str) -> ca.SX:
     return node.outputs[name]
 
 
-def resolve(task: Task, model: Model, document: Document) -> list[Wish]:
-    """All wishes of a task. Raises ConfigErrors with every wrong name, unit or range, of its
+def resolve(task: Task, model: Model, document: Document) -> list[Requirement]:
+    """All requirements of a task. Raises ConfigErrors with every wrong name, unit or range, of its
     costs and solver options too."""
     known = quantities(model)
-    wishes: list[Wish] = []
+    requirements: list[Requirement] = []
     errors: list[KembaError] = []
     for location, pattern, at, bound in _asked(task):
         try:
             for quantity in _matching(pattern, known, model):
-                wishes.append(_wish(task, location, quantity, at, bound))
+                requirements.append(_requirement(task, location, quantity, at, bound))
         except KembaError as error:
             place = (*location, "quantity") if isinstance(bound, Goal) else location
             errors.append(document.error(place, f"{written(place)}: {error.what}", hint=error.hint))
@@ -88,7 +88,7 @@ def resolve(task: Task, model: Model, document: Document) -> list[Wish]:
     errors += option_errors(task.solver.options, document)
     if errors:
         raise ConfigErrors(errors)
-    return wishes
+    return requirements
 
 
 Asked = tuple[Location, str, float | None, Bound | Goal]
@@ -117,26 +117,26 @@ def _matching(pattern: str, known: dict[str, Quantity], model: Model) -> list[Qu
     return found
 
 
-def _wish(
+def _requirement(
     task: Task, location: Location, quantity: Quantity, at: float | None, bound: Bound | Goal
-) -> Wish:
+) -> Requirement:
     if location[-1] in SPECIAL:
         if bound.equals is not True and bound.equals != 1:
             raise ValueError(f"'{location[-1]}' is either true or left out")
         value = 0.0 if location[-1] == "rest" else quantity.value
-        return Wish(location, quantity, at, value, value)
+        return Requirement(location, quantity, at, value, value)
     if bound.equals is not None:
         if bound.at_least is not None or bound.at_most is not None:
             raise ValueError("'equals' does not go with 'at_least' or 'at_most'")
         value = _number(task, bound.equals, quantity)
-        return Wish(location, quantity, at, value, value)
+        return Requirement(location, quantity, at, value, value)
     lower = -math.inf if bound.at_least is None else _number(task, bound.at_least, quantity)
     upper = math.inf if bound.at_most is None else _number(task, bound.at_most, quantity)
     if lower == -math.inf and upper == math.inf:
         raise ValueError("asks for nothing; 'equals', 'at_least' or 'at_most' was expected")
     if lower > upper:
         raise ValueError(f"at_least {lower:g} is above at_most {upper:g} {quantity.unit}")
-    return Wish(location, quantity, at, lower, upper)
+    return Requirement(location, quantity, at, lower, upper)
 
 
 def _number(task: Task, value: float | str, quantity: Quantity) -> float:

@@ -52,7 +52,7 @@ class Solver(Section):
     max_iterations: Annotated[int, Field(ge=1)] = 3000
     symmetry: bool = True
     coarse: bool = True
-    polish: Annotated[int, Field(ge=0)] = 1
+    valve_search: Annotated[int, Field(ge=0)] = 1
     complementarity: Annotated[float, Param("1", lower=1e-9, upper=1e-3)] = 1e-6
     options: dict[str, float | int | str] = Field(default_factory=dict)
 
@@ -74,7 +74,7 @@ class Tolerances(Section):
 
 
 class Task(Section):
-    """A motion to plan: grid, wishes at start and end, bounds on the way, goals, costs.
+    """A motion to plan: grid, requirements at start and end, bounds on the way, goals, costs.
 
     `step_variation`: each step lasts duration/nodes within this fraction. `start` and `end` map
     quantities to values; `rest: true` there means that all rates are zero,

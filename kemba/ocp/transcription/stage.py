@@ -22,7 +22,7 @@ INF = np.inf
 
 @dataclass(frozen=True)
 class Rows:
-    """Labelled rows lower <= g <= upper of one kind: defect, pair, sign, limit or wish.
+    """Labelled rows lower <= g <= upper of one kind: defect, pair, sign, limit or requirement.
 
     `unit` and `scale` give the physical size of a violation: scale * g in unit.
     """

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 
 from kemba.model import Model, Node
-from kemba.ocp.task.requirement import Wish, quantity_expression
+from kemba.ocp.task.requirement import Requirement, quantity_expression
 
 Matrix = np.ndarray
 
@@ -160,15 +160,15 @@ def _residual_is_symmetric(model: Model, images: Mapping[str, Matrix]) -> bool:
     return True
 
 
-def wishes_are_symmetric(model: Model, wishes: Sequence[Wish]) -> bool:
-    """Whether every wish has its mirror image among the wishes."""
-    return len(mirrored_wishes(model, wishes)) == len(wishes)
+def requirements_are_symmetric(model: Model, requirements: Sequence[Requirement]) -> bool:
+    """Whether every requirement has its mirror image among the requirements."""
+    return len(mirrored_requirements(model, requirements)) == len(requirements)
 
 
-def mirrored_wishes(model: Model, wishes: Sequence[Wish]) -> list[Wish]:
-    """The wishes that have their mirror image among the wishes, tried at a random point."""
+def mirrored_requirements(model: Model, requirements: Sequence[Requirement]) -> list[Requirement]:
+    """The requirements that have their mirror image among the requirements, tried at a random point."""
     images = image_matrices(model)
-    names = list(dict.fromkeys(w.quantity.name for w in wishes))
+    names = list(dict.fromkeys(w.quantity.name for w in requirements))
     node = model.node
     values = ca.Function(
         "values",
@@ -183,12 +183,12 @@ def mirrored_wishes(model: Model, wishes: Sequence[Wish]) -> list[Wish]:
     order = ("q", "v", "s", "lam", "u")
     here = np.array(values(*(point[k] for k in order))).ravel()
     there = np.array(values(*(image[k] for k in order))).ravel()
-    asked = {(names.index(w.quantity.name), w.at, w.lower, w.upper) for w in wishes}
+    asked = {(names.index(w.quantity.name), w.at, w.lower, w.upper) for w in requirements}
 
-    def has_image(w: Wish) -> bool:
+    def has_image(w: Requirement) -> bool:
         value = there[names.index(w.quantity.name)]
         same = {(i, w.at, w.lower, w.upper) for i in np.flatnonzero(np.isclose(here, value))}
         turned = {(i, w.at, -w.upper, -w.lower) for i in np.flatnonzero(np.isclose(here, -value))}
         return bool(asked & (same | turned))
 
-    return [w for w in wishes if has_image(w)]
+    return [w for w in requirements if has_image(w)]

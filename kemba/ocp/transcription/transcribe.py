@@ -10,13 +10,13 @@ import numpy as np
 
 from kemba.model import Model
 from kemba.ocp.nlp.blocks import Block, BlockProblem
-from kemba.ocp.task.requirement import Wish, quantity_expression
+from kemba.ocp.task.requirement import Requirement, quantity_expression
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.layout import GROUPS, STEP, Layout
 from kemba.ocp.transcription.stage import INF, Rows, Stage, as_variable, build_stage
 from kemba.ocp.transcription.symmetry import Reduction
 
-WishBlock = tuple[Block, Rows, list[int]]  # with the nodes at which its rows hold
+RequirementBlock = tuple[Block, Rows, list[int]]  # with the nodes at which its rows hold
 
 
 @dataclass(frozen=True)
@@ -38,9 +38,14 @@ class Transcription:
     """
 
     def __init__(
-        self, model: Model, task: Task, wishes: Sequence[Wish], reduction: Reduction, nodes: int
+        self,
+        model: Model,
+        task: Task,
+        requirements: Sequence[Requirement],
+        reduction: Reduction,
+        nodes: int,
     ) -> None:
-        self.model, self.task, self.wishes, self.nodes = model, task, wishes, nodes
+        self.model, self.task, self.requirements, self.nodes = model, task, requirements, nodes
         self.reduction = reduction
         self.layout = Layout(model, reduction, task.duration / nodes, task.step_variation)
         self.stage: Stage = build_stage(model, self.layout, reduction, task.cost)
@@ -51,7 +56,7 @@ class Transcription:
         self._rest_before_start()
         stage = self.stage
         index = np.arange((nodes + 1) * self.shape[1]).reshape(self.shape)
-        moments = self.wish_blocks(index)
+        moments = self.requirement_blocks(index)
         pairs = np.hstack([index[:-1, :n], index[1:, :n]])
         both, p = ca.vertcat(stage.y0, stage.y), ca.vertcat(stage.eps, stage.weights)
         blocks = [Block(both, stage.g, stage.cost, pairs)]
@@ -74,48 +79,67 @@ class Transcription:
         self.lower[0, part] = self.upper[0, part] = self.task.duration / self.nodes / STEP
 
     def extra_columns(self) -> int:
-        """Columns of Y behind the layout's own, kept at zero unless `wish_blocks` frees them."""
+        """Columns of Y behind the layout's own, kept at zero unless `requirement_blocks` frees them."""
         return 0
 
-    def wish_blocks(self, index: np.ndarray) -> list[WishBlock]:
-        """Wishes on plain variables tighten their bounds; the others become rows at nodes."""
-        blocks = (self.hard(wish, g, where, index) for wish, g, where in self.wish_expressions())
+    def requirement_blocks(self, index: np.ndarray) -> list[RequirementBlock]:
+        """Requirements on plain variables tighten their bounds; the others become rows at nodes."""
+        blocks = (
+            self.hard(requirement, g, where, index)
+            for requirement, g, where in self.requirement_expressions()
+        )
         return [block for block in blocks if block is not None]
 
-    def hard(self, wish: Wish, g: ca.SX, where: list[int], index: np.ndarray) -> WishBlock | None:
-        """The rows of a wish that holds exactly; None where tighter bounds do it."""
+    def hard(
+        self, requirement: Requirement, g: ca.SX, where: list[int], index: np.ndarray
+    ) -> RequirementBlock | None:
+        """The rows of a requirement that holds exactly; None where tighter bounds do it."""
         variable = as_variable(g, self.stage.y)
         if variable is not None:
-            self._tighten(where, variable, wish)
+            self._tighten(where, variable, requirement)
             return None
-        rows = _wish_row(g, wish)
+        rows = _requirement_row(g, requirement)
         at = index[where, : self.layout.size]
         return Block(self.stage.y, rows.g, ca.SX(0), at), rows, where
 
-    def wish_expressions(self) -> Iterator[tuple[Wish, ca.SX, list[int]]]:
-        """Every wish as an expression of the stage's y and the nodes at which it holds; those that
+    def requirement_expressions(self) -> Iterator[tuple[Requirement, ca.SX, list[int]]]:
+        """Every requirement as an expression of the stage's y and the nodes at which it holds; those that
         symmetry grants or repeats are left out."""
         full = {g: ca.densify(self.layout.full(self.stage.y, g)) for g in GROUPS if g != "h"}
         node = self.model.node
         symbols = {"q": node.q, "v": node.v, "s": node.s, "u": node.u, "lam": node.lam}
         values = [full[name] for name in symbols]
         seen: set[tuple[object, ...]] = set()
-        for wish in self.wishes:
-            expression = quantity_expression(self.model, wish.quantity.name)
+        for requirement in self.requirements:
+            expression = quantity_expression(self.model, requirement.quantity.name)
             g = ca.substitute([expression], list(symbols.values()), values)[0]
             g = ca.SX(ca.cse(ca.densify(g)))
-            key = (wish.location, wish.at, str(g), wish.lower, wish.upper)
+            key = (
+                requirement.location,
+                requirement.at,
+                str(g),
+                requirement.lower,
+                requirement.upper,
+            )
             if ca.jacobian(g, self.stage.y).nnz() == 0 or key in seen:
                 continue
             seen.add(key)
             # inputs and forces act on the interval before a node, so the first node has none
             acts = ca.depends_on(expression, ca.vertcat(node.u, node.lam))
             where = list(range(int(acts), self.nodes + 1))
-            yield wish, g, where if wish.at is None else [wish.node(self.nodes)]
+            yield (
+                requirement,
+                g,
+                where if requirement.at is None else [requirement.node(self.nodes)],
+            )
 
-    def _tighten(self, where: list[int], variable: tuple[int, float, float], wish: Wish) -> None:
+    def _tighten(
+        self, where: list[int], variable: tuple[int, float, float], requirement: Requirement
+    ) -> None:
         index, factor, offset = variable
-        ends = sorted(((wish.lower - offset) / factor, (wish.upper - offset) / factor))
+        ends = sorted(
+            ((requirement.lower - offset) / factor, (requirement.upper - offset) / factor)
+        )
         self.lower[where, index] = np.maximum(self.lower[where, index], ends[0])
         self.upper[where, index] = np.minimum(self.upper[where, index], ends[1])
 
@@ -138,16 +162,16 @@ class Transcription:
         return np.concatenate([[0.0], np.cumsum(self.h(Y))])
 
 
-def _wish_row(g: ca.SX, wish: Wish) -> Rows:
-    scale = {"m": 0.1, "m.s-1": 1.0, "rad": 0.2}.get(wish.quantity.unit, 1.0)
-    label = f"{wish.text}:{wish.quantity.name}"
+def _requirement_row(g: ca.SX, requirement: Requirement) -> Rows:
+    scale = {"m": 0.1, "m.s-1": 1.0, "rad": 0.2}.get(requirement.quantity.unit, 1.0)
+    label = f"{requirement.text}:{requirement.quantity.name}"
     return Rows(
-        "wish",
+        "requirement",
         g / scale,
-        wish.lower / scale if wish.lower > -INF else -INF,
-        wish.upper / scale if wish.upper < INF else INF,
+        requirement.lower / scale if requirement.lower > -INF else -INF,
+        requirement.upper / scale if requirement.upper < INF else INF,
         (label,),
-        (wish.quantity.unit,),
+        (requirement.quantity.unit,),
         (scale,),
     )
 

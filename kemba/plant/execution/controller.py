@@ -13,7 +13,7 @@ from kemba.errors import KembaError
 from kemba.model import Model
 from kemba.plant.execution.replay import Replay, first_row, judge
 from kemba.plant.simulation.commands import Commands, Feedback, Profile, Sense
-from kemba.plant.simulation.simulate import STEP, Run, run
+from kemba.plant.simulation.simulate import STEP, Simulated, run
 from kemba.plant.stepping.arrays import Array
 from kemba.trajectory import Trajectory
 
@@ -33,7 +33,7 @@ class Execution:
     """An executed controller table: what happened, and the impacts. `lead` [s] is the time by
     which the table starts before the plan."""
 
-    run: Run
+    run: Simulated
     table: Trajectory
     lead: float
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from kemba.model import Model
 from kemba.plant.simulation.commands import Commands, Profile
-from kemba.plant.simulation.simulate import STEP, Run, run
+from kemba.plant.simulation.simulate import STEP, Simulated, run
 from kemba.plant.stepping.arrays import Array
 from kemba.trajectory import Trajectory
 
@@ -73,7 +73,7 @@ def first_row(model: Model, plan: Trajectory) -> dict[str, float]:
     return {name: float(plan[name][0]) for name in present}
 
 
-def judge(model: Model, plan: Trajectory, clock: Array, done: Run) -> Replay:
+def judge(model: Model, plan: Trajectory, clock: Array, done: Simulated) -> Replay:
     """Compare what was executed with the plan, whose times are `clock` [s] of the execution."""
     real = done.trajectory
     planned = int(np.argmax(plan["body/z"]))

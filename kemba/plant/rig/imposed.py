@@ -15,13 +15,13 @@ from kemba.plant.stepping.arrays import Array
 from kemba.plant.stepping.equations import Equations, equations_of
 from kemba.trajectory import Trajectory
 
-Motion = Callable[[Array], tuple[Array, Array]]  # times (m,) -> x [m], v [m/s]
+ImposedMotion = Callable[[Array], tuple[Array, Array]]  # times (m,) -> x [m], v [m/s]
 STEP = 2e-4  # s
 
 
 def drive(
     model: Model,
-    motion: Motion,
+    motion: ImposedMotion,
     valves: Mapping[str, Profile],
     times: Array,
     start: Mapping[str, float] | None = None,
@@ -58,7 +58,7 @@ def drive(
 
 
 def _advance(
-    eq: Equations, motion: Motion, s: Array, u: Array, begin: float, end: float, step: float
+    eq: Equations, motion: ImposedMotion, s: Array, u: Array, begin: float, end: float, step: float
 ) -> Array:
     count = max(1, int(np.ceil((end - begin) / step - 1e-6)))
     grid = np.linspace(begin, end, count + 1)
@@ -70,7 +70,7 @@ def _advance(
     return s
 
 
-def _settled(model: Model, eq: Equations, motion: Motion, time: float, u: Array) -> Array:
+def _settled(model: Model, eq: Equations, motion: ImposedMotion, time: float, u: Array) -> Array:
     """Effect states after long rest at the first position and commands."""
     x, _ = motion(np.array([time]))
     s = np.array([q.value for q in model.states.values()], dtype=float)
@@ -83,7 +83,9 @@ def _given(model: Model, start: Mapping[str, float]) -> Array:
     return np.array([start.get(q.name, q.value) for q in model.states.values()], dtype=float)
 
 
-def _row(eq: Equations, motion: Motion, s: Array, u: Array, sent: Array, time: float) -> Array:
+def _row(
+    eq: Equations, motion: ImposedMotion, s: Array, u: Array, sent: Array, time: float
+) -> Array:
     x, v = motion(np.array([time]))
     y = eq.measure(q=x[0], v=v[0], a=0.0, s=s, sd=0.0, lam=0.0, u=u)["y"]
     return np.concatenate([s, sent, y])
@@ -97,12 +99,12 @@ def _table(model: Model, eq: Equations, times: Array, rows: Array) -> Trajectory
     return Trajectory(times, columns)
 
 
-def locked(x: float) -> Motion:
+def locked(x: float) -> ImposedMotion:
     """A rod held at `x` [m]."""
     return lambda t: (np.full(len(t), x), np.zeros(len(t)))
 
 
-def stroke(begin: float, speed: float, after: float, ramp: float, stop: float) -> Motion:
+def stroke(begin: float, speed: float, after: float, ramp: float, stop: float) -> ImposedMotion:
     """Held at `begin` [m] until `after` [s], then moved at `speed` [m/s] reached within `ramp`
     [s], until `stop` [m]."""
     acceleration = speed / ramp
@@ -120,7 +122,7 @@ def stroke(begin: float, speed: float, after: float, ramp: float, stop: float) -
     return motion
 
 
-def hermite(knots: Array, x: Array, v: Array) -> Motion:
+def hermite(knots: Array, x: Array, v: Array) -> ImposedMotion:
     """Cubic pieces through positions `x` and speeds `v` (k,) at the times `knots` (k,)."""
     from scipy.interpolate import CubicHermiteSpline
 
@@ -129,7 +131,7 @@ def hermite(knots: Array, x: Array, v: Array) -> Motion:
     return lambda t: (spline(t), rate(t))
 
 
-def followed(log: Trajectory) -> Motion:
+def followed(log: Trajectory) -> ImposedMotion:
     """The motion of a bench log; its speed is the log's where it has one."""
     x = log["piston/x"]
     v = log["piston/v"] if "piston/v" in log else np.gradient(x, log.time)

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from kemba.plant.rig.imposed import Motion, hermite, locked, stroke
+from kemba.plant.rig.imposed import ImposedMotion, hermite, locked, stroke
 from kemba.plant.simulation.commands import Profile
 from kemba.plant.stepping.arrays import Array
 from kemba.quantity import Param
@@ -42,7 +42,7 @@ class Test:
 
     name: str
     supply: float
-    motion: Motion
+    motion: ImposedMotion
     valves: dict[str, Profile]
     times: Array
     facts: dict[str, Any]

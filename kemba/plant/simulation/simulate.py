@@ -26,7 +26,7 @@ SMALLER = "try a smaller step, or look for a start that is impossible"
 
 
 @dataclass(frozen=True)
-class Run:
+class Simulated:
     """A simulated motion, and the impacts on the way."""
 
     trajectory: Trajectory
@@ -62,7 +62,7 @@ def run(
     step: float = STEP,
     sample: float | Array = 1e-3,
     dead_time: bool = True,
-) -> Run:
+) -> Simulated:
     """As `simulate`, with the impacts that happened."""
     times = _samples(duration, sample)
     simulation = Simulation(model, commands or Commands(), step, dead_time)
@@ -75,7 +75,7 @@ def run(
             simulation.to(float(until))
         if wanted:
             simulation.record()
-    return Run(simulation.recorder.trajectory(), tuple(simulation.advance.impacts))
+    return Simulated(simulation.recorder.trajectory(), tuple(simulation.advance.impacts))
 
 
 class Simulation:

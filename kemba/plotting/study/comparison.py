@@ -9,9 +9,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
-from kemba.identify.compare.bins import Cell
+from kemba.identify.compare.bins import ConditionBin
 from kemba.identify.compare.compare import Comparison
-from kemba.identify.compare.force_profiles import Law
+from kemba.identify.compare.force_profiles import ForceProfile
 from kemba.identify.compare.missing_force import Missing
 from kemba.plotting.bands import Band, draw_band
 from kemba.plotting.heat import LEVEL, ROW, add_bar, draw_heat, name_conditions
@@ -29,22 +29,22 @@ Column = tuple[str, str, str]  # phase, mode, region
 def plot_comparison(found: Comparison, figure: Figure | None = None) -> Figure:
     """Heat map by condition (significant cells bold); d(t) with its 95 % band in the run that
     lacks most; the missing force against what it goes with."""
-    tables = columns_of(found.cells)
+    tables = columns_of(found.bins)
     bands = bands_of(found.missing)
-    panels = panels_of(found.laws)
-    channels = list(dict.fromkeys(c.channel for c in found.cells))
+    panels = panels_of(found.force_profiles)
+    channels = list(dict.fromkeys(c.channel for c in found.bins))
     heights = [len(channels) * ROW + 3 * LEVEL + 0.3] * len(tables)
     parts = [sum(heights), 0.85 * len(bands) + 0.35, 1.75 if panels else 0.0]
     figure = paper_figure(sum(parts), figure=figure)
     rooms = figure.subfigures(3, 1, height_ratios=[max(p, 0.01) for p in parts], squeeze=False)
     heat, time, force = rooms[:, 0]
-    _heat(heat, found.cells, channels, tables)
+    _heat(heat, found.bins, channels, tables)
     _bands(time, bands)
     _laws(force, panels)
     return figure
 
 
-def columns_of(cells: Sequence[Cell]) -> list[list[Column]]:
+def columns_of(cells: Sequence[ConditionBin]) -> list[list[Column]]:
     """The conditions that were visited, in one table or, when there are many, in two."""
     order = sorted({(c.phase, c.mode, c.region) for c in cells}, key=place_of)
     if len(order) <= WIDEST:
@@ -61,7 +61,10 @@ def place_of(column: Column) -> tuple[int, str, int]:
 
 
 def _heat(
-    room: SubFigure, cells: Sequence[Cell], channels: Sequence[str], tables: list[list[Column]]
+    room: SubFigure,
+    cells: Sequence[ConditionBin],
+    channels: Sequence[str],
+    tables: list[list[Column]],
 ) -> None:
     known = {(c.channel, (c.phase, c.mode, c.region)): c for c in cells}
     grid = room.subplots(len(tables), 1, squeeze=False)[:, 0]
@@ -116,7 +119,7 @@ def _bands(room: SubFigure, bands: Sequence[Band]) -> None:
     room.align_ylabels()
 
 
-def panels_of(found: Sequence[Law]) -> list[Law]:
+def panels_of(found: Sequence[ForceProfile]) -> list[ForceProfile]:
     """Of the port that lacks most: its quantities, and the command that tells most."""
     own = [law for law in found if law.port == found[0].port]
     sent = [law for law in own if law.quantity.startswith("after ")]
@@ -124,7 +127,7 @@ def panels_of(found: Sequence[Law]) -> list[Law]:
     return [law for law in own if law not in sent or law is best]
 
 
-def _laws(room: SubFigure, panels: Sequence[Law]) -> None:
+def _laws(room: SubFigure, panels: Sequence[ForceProfile]) -> None:
     if not panels:
         return
     grid = room.subplots(1, len(panels), squeeze=False)[0]
@@ -134,7 +137,7 @@ def _laws(room: SubFigure, panels: Sequence[Law]) -> None:
     grid[0].set_ylabel(f"missing on the {first.port} [{first.unit}]")
 
 
-def _law(axes: Axes, law: Law) -> None:
+def _law(axes: Axes, law: ForceProfile) -> None:
     """Force per bin with 95 % intervals; unsure bins do not stretch the axis."""
     axes.axhline(0.0, color=GREY, lw=0.6, zorder=1)
     spread: Array = 1.96 * law.sigma

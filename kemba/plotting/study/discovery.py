@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from kemba.identify.compare.compare import conditions
 from kemba.identify.compare.smoother import missing_force
 from kemba.identify.compare.tolerance import free_starts
-from kemba.identify.discover import Found
+from kemba.identify.discover import Discovery
 from kemba.identify.evidence.problem import Array, Rows
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
 from kemba.plotting.bands import plot_bands, plot_ladder
@@ -32,7 +32,7 @@ FEWEST = 30  # rows that make a span of the residual
 SHOWN = 2.0  # s of residual drawn
 
 
-def draw_discovery(found: Found, folder: Path) -> list[Path]:
+def draw_discovery(found: Discovery, folder: Path) -> list[Path]:
     """Into `folder`: heat map before and after, the residual in time, the missing force and what
     was found of it, and the ladder of errors."""
     figures = {"heat_map": plot_cells(found), "residual": plot_residual(found)}
@@ -42,7 +42,7 @@ def draw_discovery(found: Found, folder: Path) -> list[Path]:
     return [save_figure(f, folder / f"{name}.png") for name, f in figures.items()]
 
 
-def theta_of(found: Found, hypothesis: Hypothesis) -> dict[str, float]:
+def theta_of(found: Discovery, hypothesis: Hypothesis) -> dict[str, float]:
     """What a model with these effects added would have: their figures, all others nominal."""
     search = found.search
     fitted = search.points[hypothesis].fit.theta
@@ -50,7 +50,7 @@ def theta_of(found: Found, hypothesis: Hypothesis) -> dict[str, float]:
     return {key: fitted[key] for keys in listed for key in keys}
 
 
-def plot_cells(found: Found) -> Figure:
+def plot_cells(found: Discovery) -> Figure:
     """Error by noise, by channel and by motion and valve mode: of the model as it stood, and with
     what was found."""
     steps = {"before": NULL, "after": found.best} if found.best else {"": NULL}
@@ -69,7 +69,7 @@ def plot_cells(found: Found) -> Figure:
     return plot_heat_map(tables, channels, [c[:2] for c in columns], bold)
 
 
-def plot_explained(found: Found) -> Figure:
+def plot_explained(found: Discovery) -> Figure:
     """d(t) of the model as it stood, with its 95 % band, and what was found of it."""
     problem = found.search.problem
     before = missing_force(problem, free_starts(problem))
@@ -80,7 +80,7 @@ def plot_explained(found: Found) -> Figure:
     return plot_bands(bands_of(before, after), " + ".join(found.best))
 
 
-def plot_steps(found: Found) -> Figure:
+def plot_steps(found: Discovery) -> Figure:
     """Errors of fitted and held-out runs as effects are added, all other figures nominal."""
     names = [name for name, _ in found.answer.ladder]
     thetas = [theta_of(found, tuple(sorted(names[1 : i + 1]))) for i in range(len(names))]
@@ -91,7 +91,7 @@ def plot_steps(found: Found) -> Figure:
     return plot_ladder(names, fitted, held_out)
 
 
-def _residuals(found: Found) -> tuple[Rows, dict[str, Array]]:
+def _residuals(found: Discovery) -> tuple[Rows, dict[str, Array]]:
     search = found.search
     before = search.problem.residual(search.points[NULL].fit.theta)
     tables = {"before": before}
@@ -101,7 +101,7 @@ def _residuals(found: Found) -> tuple[Rows, dict[str, Array]]:
 
 
 @paper_style
-def plot_residual(found: Found, figure: Figure | None = None) -> Figure:
+def plot_residual(found: Discovery, figure: Figure | None = None) -> Figure:
     """Whitened residual of the channel that was worst, before and after, in the worst seconds."""
     rows, residuals = _residuals(found)
     before = residuals["before"]

@@ -14,7 +14,7 @@ from twin import catalogue
 
 from kemba.identify.compare.bins import excess
 from kemba.identify.compare.compare import Comparison, compare
-from kemba.identify.compare.force_profiles import Law
+from kemba.identify.compare.force_profiles import ForceProfile
 from kemba.identify.compare.smoother import missing_force
 from kemba.identify.robot import robot_problem
 from kemba.model.spec import load_model
@@ -41,7 +41,7 @@ def test_a_right_model_explains_the_logs() -> None:
 def test_a_wrong_model_is_told_where_it_fails(wrong: Comparison) -> None:
     assert not wrong.good
     assert wrong.noise_ratio > 1.3
-    worst = min(wrong.cells, key=lambda c: c.q_value)
+    worst = min(wrong.bins, key=lambda c: c.q_value)
     assert worst.q_value < 1e-6
     assert "does not explain" in wrong.sentence or "nearly" in wrong.sentence
 
@@ -62,7 +62,7 @@ def test_its_figure_has_every_channel_and_region(wrong: Comparison) -> None:
     figure = plot_comparison(wrong)
     texts = [t for axes in figure.axes for t in (*axes.get_yticklabels(), *axes.get_xticklabels())]
     shown = {text.get_text() for text in texts}
-    assert {c.channel for c in wrong.cells} <= shown
+    assert {c.channel for c in wrong.bins} <= shown
     assert {"in", "mid", "flight", "stance2"} <= shown | {
         text.get_text() for axes in figure.axes for text in axes.texts
     }
@@ -85,7 +85,7 @@ def test_friction_shows_as_a_force_against_speed() -> None:
 def test_a_weak_motor_shows_against_its_torque() -> None:
     found = compared(catalogue.hidden("torque_scale", 1.0))
     law = law_of(found, "hips", "torque [N.m]")
-    assert law.gain == max(law.gain for law in found.laws)
+    assert law.gain == max(law.gain for law in found.force_profiles)
     sent = {hint.text.partition(" ms after ")[2] for hint in found.hints if hint.kind == "command"}
     assert {"front/hip/tau changes", "rear/hip/tau changes"} & sent
 
@@ -98,8 +98,8 @@ def test_a_late_valve_shows_after_it_switches() -> None:
     assert after.gain > 100 > 20 > usual.gain
 
 
-def law_of(found: Comparison, port: str, quantity: str) -> Law:
-    return next(law for law in found.laws if (law.port, law.quantity) == (port, quantity))
+def law_of(found: Comparison, port: str, quantity: str) -> ForceProfile:
+    return next(law for law in found.force_profiles if (law.port, law.quantity) == (port, quantity))
 
 
 @pytest.mark.slow

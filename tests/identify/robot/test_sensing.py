@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kemba.identify.robot.motion.resampled import Track
+from kemba.identify.robot.motion.resampled import ResampledLog
 from kemba.identify.robot.motion.sensing import ahead, sensed, travelled
 
 TIME = np.arange(0.0, 0.6, 1e-3)
@@ -13,10 +13,10 @@ THETA = {"sensor_delay:body/z.dt": LATE}
 
 
 @pytest.fixture
-def track() -> Track:
+def track() -> ResampledLog:
     """A run of which only the clock matters."""
     nothing = np.zeros((len(TIME), 1))
-    return Track("run", TIME, nothing, nothing, (), np.ones(1))
+    return ResampledLog("run", TIME, nothing, nothing, (), np.ones(1))
 
 
 def swing(t: np.ndarray) -> np.ndarray:
@@ -31,13 +31,13 @@ def column(values: np.ndarray) -> np.ndarray:
     return values[:, None, None]
 
 
-def test_a_late_sensor_reads_the_past(track: Track) -> None:
+def test_a_late_sensor_reads_the_past(track: ResampledLog) -> None:
     way = travelled(column(rate(TIME)), STEP)
     seen = sensed(["body/z"], [track], column(swing(TIME)), way, THETA)[20:-20, 0, 0]
     assert seen == pytest.approx(swing(TIME - LATE)[20:-20], abs=2e-5)
 
 
-def test_noise_in_the_rate_hardly_shortens_a_delay(track: Track) -> None:
+def test_noise_in_the_rate_hardly_shortens_a_delay(track: ResampledLog) -> None:
     """Least squares for the delay, with a noisy rate as regressor, finds it within 8 %; with the
     rate as it is, a quarter is missing."""
     noise = 0.5 * np.random.default_rng(0).standard_normal(len(TIME))
@@ -50,7 +50,7 @@ def test_noise_in_the_rate_hardly_shortens_a_delay(track: Track) -> None:
     assert -target @ noisy / (noisy @ noisy) < 0.8 * LATE
 
 
-def test_ahead_undoes_a_delay(track: Track) -> None:
+def test_ahead_undoes_a_delay(track: ResampledLog) -> None:
     late = column(swing(TIME - LATE))
     found = ahead(late, column(rate(TIME - LATE)), [track], np.array([LATE]))
     assert found[:, 0, 0] == pytest.approx(swing(TIME), abs=5e-5)  # the last rows go by their rate

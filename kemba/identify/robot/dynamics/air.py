@@ -7,7 +7,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from kemba.identify.robot.motion.resampled import Track
+from kemba.identify.robot.motion.resampled import ResampledLog
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Index = np.ndarray[Any, np.dtype[np.int_]]
@@ -64,7 +64,7 @@ def _mean_growth(h: ca.SX, slope: ca.SX, stiff: ca.SX) -> ca.SX:
     return h * slope * ca.if_else(small, 0.5 + z / 6, (ca.exp(z) - 1 - z) / safe**2)
 
 
-def substeps(track: Track, delays: Array) -> tuple[Array, Array, Index]:
+def substeps(track: ResampledLog, delays: Array) -> tuple[Array, Array, Index]:
     """(times (N + 1,), valves (valves, N), index of each node) with a time at every switching.
 
     `delays` (valves, 2): seconds from the command to switching on and off. As many times come back

@@ -8,7 +8,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from kemba.identify.robot.dynamics.inputs import Drive, air_states, drives
+from kemba.identify.robot.dynamics.inputs import Inputs, air_states, read_inputs
 from kemba.identify.robot.dynamics.linear import Linearised
 from kemba.identify.robot.dynamics.physics import Physics, prepared
 from kemba.identify.robot.motion.batch import Batch
@@ -32,7 +32,7 @@ class Forces:
 
     def __init__(self, physics: Physics, batch: Batch, point: Linearised) -> None:
         self.physics, self.batch, self.point = physics, batch, point
-        self._drives: dict[bytes, list[Drive]] = {}
+        self._drives: dict[bytes, list[Inputs]] = {}
         self._states: dict[bytes, tuple[ca.DM, ca.DM]] = {}
         self._lines: dict[bytes, Line] = {}
         self._middle = tuple(prepared(a) for a in point.middle)
@@ -52,7 +52,7 @@ class Forces:
         if key not in self._states:
             path = self._drives.get(delays.tobytes())
             if path is None:
-                path = drives(self.physics, self.batch, self.point.ref, delays)
+                path = read_inputs(self.physics, self.batch, self.point.ref, delays)
                 _keep(self._drives, delays.tobytes(), path)
             states = air_states(self.physics, self.batch, path, p)
             ready = tuple(prepared(self.batch.flat(a)) for a in states)

@@ -18,7 +18,7 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
 @dataclass(frozen=True)
-class Drive:
+class Inputs:
     """One run cut at every switching: `given` are steps, q, v and inputs of the integration;
     `h` (N,) the steps from the log's start on, `index` of each node among them."""
 
@@ -35,10 +35,10 @@ class Drive:
         return np.vstack([(sums / self.width).T[:-1], values[:, -1:].T])
 
 
-def drives(physics: Physics, batch: Batch, ref: Reference, delays: Array) -> list[Drive]:
+def read_inputs(physics: Physics, batch: Batch, ref: Reference, delays: Array) -> list[Inputs]:
     """Per run; `delays` (valves, 2) in seconds to switching on and off."""
     found = []
-    for i, track in enumerate(batch.tracks):
+    for i, track in enumerate(batch.resampled):
         n = len(track.time)
         times, valves, index = substeps(track, delays)
         h = np.diff(times)
@@ -51,13 +51,13 @@ def drives(physics: Physics, batch: Batch, ref: Reference, delays: Array) -> lis
         steps = np.append(SETTLING, h)[None, :]
         given = tuple(ca.DM(a) for a in (steps, *whole))
         width = np.append(np.diff(track.time), 1.0)
-        drive = Drive(given, h, index, width, np.empty(0))  # type: ignore[arg-type]
-        found.append(Drive(drive.given, h, index, width, drive.means(u)))
+        drive = Inputs(given, h, index, width, np.empty(0))  # type: ignore[arg-type]
+        found.append(Inputs(drive.given, h, index, width, drive.means(u)))
     return found
 
 
 def air_states(
-    physics: Physics, batch: Batch, driven: Sequence[Drive], p: Array
+    physics: Physics, batch: Batch, driven: Sequence[Inputs], p: Array
 ) -> tuple[Array, Array]:
     """Effect states (n, L, ns) and inputs (n, L, nu), both the mean over each step."""
     moving = p[physics.moves]

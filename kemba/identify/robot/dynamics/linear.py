@@ -150,7 +150,7 @@ def linearise(
     )
     prior = [0.03] * k + [3.0] * k + [ANCHOR_PRIOR, GROUND_PRIOR] * legs + [ANCHOR_PRIOR] * legs
     P0 = np.diag(prior) ** 2
-    system = System(F, G, W, H, R, np.broadcast_to(P0, (len(batch.tracks), *P0.shape)))
+    system = System(F, G, W, H, R, np.broadcast_to(P0, (len(batch.resampled), *P0.shape)))
     ends = ~batch.valid
     ends[:-1] |= ~batch.valid[1:]
     system.W[ends], system.F[ends] = 0.0, np.eye(2 * k + places)

@@ -98,7 +98,7 @@ def schedules(physics: Physics, batch: Batch, ref: Reference) -> list[Schedule]:
     feet = batch.deep(physics.call("feet", q, v)[0].reshape(-1, legs, 2))
     y = batch.deep(physics.call("measured", q, v)[0])
     found = []
-    for i, track in enumerate(batch.tracks):
+    for i, track in enumerate(batch.resampled):
         n = len(track.time)
         found.append(
             read_schedule(
@@ -115,7 +115,7 @@ def schedules(physics: Physics, batch: Batch, ref: Reference) -> list[Schedule]:
 def densities(physics: Physics, batch: Batch, plan: Sequence[Schedule], floor: Floor) -> Array:
     """(n, L, k + 2 legs): density of unknown force per measured channel and foot axis."""
     legs, parts = len(physics.legs), []
-    for track, schedule in zip(batch.tracks, plan, strict=True):
+    for track, schedule in zip(batch.resampled, plan, strict=True):
         own = [floor.body, floor.body, floor.pitch] + [floor.hip] * legs + [floor.rod] * legs
         density = np.tile(np.array(own + [0.0] * 2 * legs), (len(track.time), 1))
         rods = density[:, 3 + legs : 3 + 2 * legs]

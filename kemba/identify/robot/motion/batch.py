@@ -9,44 +9,44 @@ from typing import Any
 
 import numpy as np
 
-from kemba.identify.robot.motion.resampled import Track
+from kemba.identify.robot.motion.resampled import ResampledLog
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
 @dataclass(frozen=True)
 class Batch:
-    """`tracks` as arrays whose second axis is the run; steps past a run's end stand still."""
+    """`resampled` as arrays whose second axis is the run; steps past a run's end stand still."""
 
-    tracks: tuple[Track, ...]
+    resampled: tuple[ResampledLog, ...]
 
     @cached_property
     def n(self) -> int:
-        return max(len(t.time) for t in self.tracks)
+        return max(len(t.time) for t in self.resampled)
 
     @cached_property
     def valid(self) -> np.ndarray[Any, np.dtype[np.bool_]]:
         """(n, L): is this a node of the run?"""
-        return np.arange(self.n)[:, None] < [len(t.time) for t in self.tracks]
+        return np.arange(self.n)[:, None] < [len(t.time) for t in self.resampled]
 
     @cached_property
     def h(self) -> Array:
         """(n, L): seconds from each node to the next, 1 ms where there is none."""
-        steps = [np.append(np.diff(t.time), 1e-3) for t in self.tracks]
+        steps = [np.append(np.diff(t.time), 1e-3) for t in self.resampled]
         return self.pad(steps, 1e-3)
 
     @cached_property
     def time(self) -> Array:
-        return self.pad([t.time for t in self.tracks], 0.0)
+        return self.pad([t.time for t in self.resampled], 0.0)
 
     @cached_property
     def y(self) -> Array:
-        return self.pad([t.y for t in self.tracks], np.nan)
+        return self.pad([t.y for t in self.resampled], np.nan)
 
     @cached_property
     def sigma(self) -> Array:
         """(L, m): noise of one node's value."""
-        return np.stack([t.sigma for t in self.tracks])
+        return np.stack([t.sigma for t in self.resampled])
 
     def pad(self, parts: Sequence[Array], value: float) -> Array:
         """(n, L, .) of one array (n_l, .) per run."""

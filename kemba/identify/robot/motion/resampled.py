@@ -17,7 +17,7 @@ TRIMMED = 0.97  # share of third differences that count for the noise: impacts a
 
 
 @dataclass(frozen=True)
-class Track:
+class ResampledLog:
     """One run: `time` (n,) of the nodes, `y` (n, m) with NaN where nothing was measured,
     `torque` (n, legs) held from each node, `switches` per valve as (times, +-1, at the start),
     `sigma` (m,) of one value of `y`."""
@@ -30,7 +30,9 @@ class Track:
     sigma: Array
 
 
-def read_track(log: Trajectory, channels: Sequence[str], legs: Sequence[str], name: str) -> Track:
+def resample(
+    log: Trajectory, channels: Sequence[str], legs: Sequence[str], name: str
+) -> ResampledLog:
     """The nodes of a log."""
     keep = np.isfinite(log.time)
     time = log.time[keep]
@@ -41,7 +43,7 @@ def read_track(log: Trajectory, channels: Sequence[str], legs: Sequence[str], na
     sigma = np.array([_sigma(log, c, raw[:, i]) for i, c in enumerate(channels)])
     time, raw, torque, count = _thin(time, raw, torque)
     time, raw, torque = _fill(time, raw, torque)
-    return Track(name, time, raw, torque, switches, sigma / np.sqrt(count))
+    return ResampledLog(name, time, raw, torque, switches, sigma / np.sqrt(count))
 
 
 def _held(values: Array) -> Array:

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from kemba.identify.evidence.problem import Theta
-from kemba.identify.robot.motion.resampled import Track
+from kemba.identify.robot.motion.resampled import ResampledLog
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -28,13 +28,13 @@ def travelled(rate: Array, h: Array) -> Array:
 
 
 def sensed(
-    channels: Sequence[str], tracks: Sequence[Track], y: Array, way: Array, theta: Theta
+    channels: Sequence[str], resampled: Sequence[ResampledLog], y: Array, way: Array, theta: Theta
 ) -> Array:
     """Readings (n, L, m) of the true coordinates `y`, at theta; `way` (n, L, m) as `travelled`."""
     seen = y.copy()
     for i, channel in enumerate(channels):
         delay = theta.get(f"sensor_delay:{channel}.dt", 0.0)
-        for j, track in enumerate(tracks if delay else ()):
+        for j, track in enumerate(resampled if delay else ()):
             t, own = track.time, way[: len(track.time), j, i]
             seen[: len(t), j, i] += np.interp(t - delay, t, own) - own
         seen[..., i] *= 1.0 + theta.get(f"sensor_scale:{channel}.k", 0.0)
@@ -42,12 +42,12 @@ def sensed(
     return np.asarray(seen)
 
 
-def ahead(values: Array, rates: Array, tracks: Sequence[Track], late: Array) -> Array:
+def ahead(values: Array, rates: Array, resampled: Sequence[ResampledLog], late: Array) -> Array:
     """Columns (n, L, k) as they are `late` (k,) seconds later: what late sensors will have seen;
     by their `rates` beyond the end of a run."""
     shifted = values.copy()
     for i in np.flatnonzero(late):
-        for j, track in enumerate(tracks):
+        for j, track in enumerate(resampled):
             t, n = track.time + late[i], len(track.time)
             beyond = np.maximum(t - track.time[-1], 0.0) * rates[n - 1, j, i]
             shifted[:n, j, i] = np.interp(t, track.time, values[:n, j, i]) + beyond
