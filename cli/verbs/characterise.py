@@ -93,7 +93,7 @@ def _draw(found: Characteristics, logs: dict[str, Trajectory], folder: Path) -> 
 def _print(found: Characteristics) -> None:
     from rich.table import Table
 
-    from kemba.plant import tables
+    from kemba.plant.rig import tables
 
     for title, columns, rows in (
         ("Chamber force rise time", tables.RISE_COLUMNS, tables.rise_rows(found)),

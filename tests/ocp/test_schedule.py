@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from kemba.model import load_model
-from kemba.ocp import load_task, plan, planner, schedule
+from kemba.ocp import load_task, plan, planner
 from kemba.ocp.nlp.ipopt import Iterate
 from kemba.ocp.nlp.stagnation import GAVE_UP, Stagnation
 from kemba.ocp.planned import Plan
+from kemba.ocp.relaxation import schedule
 from kemba.ocp.relaxation.guess import body_course
 from kemba.ocp.task.requirement import resolve
 

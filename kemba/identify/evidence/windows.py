@@ -29,7 +29,7 @@ def aggregation_windows(problem: Problem, rows: Rows, region: Labels) -> Windows
     """Grains of as many rows as the problem says (`window`, else one), each under one condition."""
     begin = np.flatnonzero(changes(rows, region))
     place = np.arange(len(rows)) - np.repeat(begin, np.diff(np.append(begin, len(rows))))
-    first = np.flatnonzero(place % getattr(problem, "grain", 1) == 0)
+    first = np.flatnonzero(place % getattr(problem, "window", 1) == 0)
     return Windows(first, np.sqrt(np.add.reduceat(expected(problem, len(rows)), first)))
 
 
