@@ -11,7 +11,7 @@ from typing import Any
 from kemba.config import Document, apply_overrides, find_config, load_yaml, parse, shipped_configs
 from kemba.config.document import Location
 from kemba.errors import ConfigErrors, KembaError
-from kemba.model.spec import load_spec
+from kemba.model.spec import load_spec, model_files
 from kemba.ocp.task.task import parse_task
 from kemba.runs import sha256
 from kemba.sweep.case import Case, content_hash
@@ -129,6 +129,5 @@ def model_name(expansion: Expansion, name: str) -> str:
 
 def model_hash(name: str) -> str:
     """What a model's YAML and its robot's hold."""
-    spec = load_spec(name)
-    robot = find_config(spec.robot or "kemba", "robots")
-    return content_hash([spec.model_dump(mode="json"), sha256(robot)])
+    spec = load_spec(name).model_dump(mode="json", exclude={"robot"})  # its place does not matter
+    return content_hash([spec, *(sha256(path) for path in model_files(name))])

@@ -49,15 +49,16 @@ def leftover(problem: BenchProblem, theta: Theta) -> tuple[Array, Array, Array]:
         keep = run.keep["piston/F"]
         r = problem.standardised(theta, i)["piston/F"] / _imperfection(problem, i)
         u = problem.predictor.acting(run, theta)
-        seen = features(true_motion(run.motion, theta), u)[keep]
+        seen = features(true_motion(run.motion, theta), u, problem.model.mechanism.stroke)[keep]
         parts.append((r, seen, np.full(len(r), i)))
     residual, columns, index = (np.concatenate(p) for p in zip(*parts, strict=True))
     return residual, columns, index
 
 
 def _terms(problem: BenchProblem, theta: Theta, index: int) -> dict[str, Array]:
-    run = problem.logs[index]
-    return dict(terms(true_motion(run.motion, theta), problem.predictor.acting(run, theta)))
+    run, stroke = problem.logs[index], problem.model.mechanism.stroke
+    acting = problem.predictor.acting(run, theta)
+    return dict(terms(true_motion(run.motion, theta), acting, stroke))
 
 
 def _imperfection(problem: BenchProblem, index: int) -> Array:

@@ -187,7 +187,9 @@ class BenchProblem:
         faults = [
             fault
             for run in self._runs
-            for fault in contradictions(run, lambda r: self.predictor.predict(r, {}).force)
+            for fault in contradictions(
+                run, self.model.mechanism.stroke, lambda r: self.predictor.predict(r, {}).force
+            )
         ]
         if faults:
             raise BadData(faults)

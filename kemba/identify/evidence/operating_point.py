@@ -8,8 +8,9 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from kemba.effects.pneumatics.constants import AREA_E, AREA_R, ATMOSPHERE
+from kemba.effects.pneumatics.constants import ATMOSPHERE
 from kemba.identify.evidence.problem import Array, Labels, Problem, Rows
+from kemba.mechanism import Cylinder
 
 END = 0.010  # m from the end of a stroke that counts as its end; a cushion is as long
 REGIONS = ("in", "mid", "out")
@@ -17,7 +18,7 @@ REGIONS = ("in", "mid", "out")
 
 @dataclass(frozen=True)
 class OperatingPoint:
-    """Per row (n,): the piston of the row's leg (of the body: the front leg's) at `x` [m], moving
+    """Per row (n,): the piston of the row's leg (of the body: the first leg's) at `x` [m], moving
     at `v` [m.s-1], pushed by the model's air with `force` [N]; `stroke` [m]."""
 
     x: Array
@@ -47,10 +48,11 @@ def region_labels(problem: Problem, rows: Rows) -> tuple[OperatingPoint | None, 
     return around, np.array(REGIONS, dtype=object)[around.regions()]
 
 
-def air_force(states: Mapping[str, Array], prefix: str = "") -> Array:
+def air_force(states: Mapping[str, Array], cylinder: Cylinder, prefix: str = "") -> Array:
     """Push of the air on a rod [N] from the chambers' states by name, in force or in pressure."""
     push = []
-    for chamber, area in (("extend", AREA_E), ("retract", AREA_R)):
+    areas = {"extend": cylinder.area_extend, "retract": cylinder.area_retract}
+    for chamber, area in areas.items():
         name = f"{prefix}chamber/{chamber}/"
         known = states.get(f"{name}F")
         push.append((states[f"{name}P"] - ATMOSPHERE) * area if known is None else known)

@@ -23,17 +23,17 @@ def robot_operating_point(problem: RobotProblem) -> OperatingPoint:
     physics, point = problem.physics, problem.point
     names = [q.name for q in physics.model.states.values()]
     states = dict(zip(names, np.moveaxis(point.states[0], -1, 0), strict=True))
-    legs = physics.legs
+    legs, cylinder = physics.legs, physics.mechanism.need_cylinder()
     per_leg = []
     for i, leg in enumerate(legs):
         place = point.y.shape[-1] - len(legs) + i
         x, v = point.y[..., place], point.rate[..., place]
-        per_leg.append(np.stack([x, v, air_force(states, f"{leg}/")], axis=-1))
+        per_leg.append(np.stack([x, v, air_force(states, cylinder, f"{leg}/")], axis=-1))
     owners = [channel.split("/")[0] for channel in row_channels(physics)]
     own = [per_leg[legs.index(o) if o in legs else 0] for o in owners]
     picked = problem.pick(np.stack(own, axis=2))
     x, v, force = picked.T
-    return OperatingPoint(x, v, force, float(physics.mechanism.stroke))
+    return OperatingPoint(x, v, force, cylinder.stroke)
 
 
 def changes(track: ResampledLog, legs: Sequence[str]) -> dict[str, tuple[Array, Array]]:

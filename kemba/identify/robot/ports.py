@@ -41,7 +41,8 @@ def _rods(problem: RobotProblem) -> ForceChannel:
     legs = len(physics.legs)
     names = [q.name for q in physics.model.states.values()]
     states = dict(zip(names, np.moveaxis(point.states[0], -1, 0), strict=True))
-    air = np.stack([air_force(states, f"{leg}/") for leg in physics.legs], axis=-1)
+    cylinder = physics.mechanism.need_cylinder()
+    air = np.stack([air_force(states, cylinder, f"{leg}/") for leg in physics.legs], axis=-1)
     stopped = batch.pad([(s.low | s.high).astype(float) for s in problem.plan], 1.0)
     where = (stopped < 0.5) & batch.valid[..., None]
     quantities = {
