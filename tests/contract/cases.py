@@ -52,7 +52,8 @@ def model_of(*effects: Effect, rig: bool = False) -> Model:
 def placed(kind: str, rig: bool = False) -> tuple[Effect, Model]:
     """The example of a kind, and the model that it stands in."""
     effect = example(kind)
-    return effect, model_of(effect, rig=rig)
+    model = model_of(effect, rig=rig)
+    return model.effect(effect.name), model
 
 
 @cache

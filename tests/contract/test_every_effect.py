@@ -103,7 +103,7 @@ def test_every_parameter_matters(kind: str) -> None:
             later = effect.bind({name: effect.value(name) + 0.001})
             assert later.timing() != effect.timing()
         return
-    _, model = placed(kind)
+    effect, model = placed(kind)
     both, p = with_slopes(kind)
     slope = sum(np.abs(np.asarray(both(**point, p=p)["dp"])) for point in points(model, 12))
     for i, name in enumerate(effect.parameters()):
