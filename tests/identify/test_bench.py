@@ -86,7 +86,7 @@ def test_pressures_are_read_when_there_are_any(bench_log: BenchLog) -> None:
     log = bench_log()
     model = load_model(rig=True)
     bare = bench_problem([log], model)
-    states = bare.predictor.predict(bare.logs[0], {}).states
+    states = bare.predicted.predictor.predict(bare.logs[0], {}).states
     from kemba.identify.bench.pressure import absolute_pressure
 
     columns = {

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kemba.identify.evidence.linear import Linear, condense
-from kemba.identify.evidence.problem import Array, Candidate, Parameter
+from kemba.identify.evidence.problem import Array, Candidate, Labels, Parameter
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis, Ranker
 
@@ -37,7 +37,7 @@ def structured(search: Search, hypothesis: Hypothesis) -> tuple[float, float]:
     return power, max(power - left, 0.0)
 
 
-def _foretold(r: Array, columns: Array, folds: Array, ridge: float) -> Array:
+def _foretold(r: Array, columns: Array, folds: Labels, ridge: float) -> Array:
     """Each fold as the regression on the others foretells it."""
     predicted = np.zeros(len(r))
     for fold in np.unique(folds):
@@ -48,7 +48,7 @@ def _foretold(r: Array, columns: Array, folds: Array, ridge: float) -> Array:
     return predicted
 
 
-def _folds(run: Array) -> Array:
+def _folds(run: Labels) -> Labels:
     """Blocks of time, FOLDS of them per run, dealt out in turn."""
     labels = np.zeros(len(run), dtype=int)
     for i in np.unique(run):

@@ -113,9 +113,8 @@ class Baseline:
         starts: list[dict[str, float]] = [dict(theta)]
         if candidate.lead.unit == "s":
             signs = (1.0, -1.0) if candidate.lead.signed else (1.0,)
-            starts += [
-                {**theta, **within(self.problem.candidates, candidate.typical(s))} for s in signs
-            ]
+            sizes = [within(self.problem.candidates, candidate.typical(sign)) for sign in signs]
+            starts += [{**theta, **size} for size in sizes]
         return max(self._descend(hypothesis, start) for start in starts)
 
     def _descend(self, hypothesis: Hypothesis, theta: dict[str, float]) -> float:

@@ -50,19 +50,20 @@ __all__ = [
 class Problem(ABC):
     """One set of logs under one model.
 
-    The prediction. `residual(theta)` is (predicted - measured) / noise, one number per row, whitened:
-    about N(0, 1) and independent from row to row if the model at `theta` is right. Rows stand run by
-    run in the order of `runs`, then channel by channel, then in time; `rows()` describes them in the
-    same order. Physical values are in SI units, as `Parameter.unit` says. The rows do not depend on
-    theta.
+    The prediction. `residual(theta)` is (predicted - measured) / noise, one number per row,
+    whitened: about N(0, 1) and independent from row to row if the model at `theta` is right. Rows
+    stand run by run in the order of `runs`, then channel by channel, then in time; `rows()`
+    describes them in the same order. Physical values are in SI units, as `Parameter.unit` says.
+    The rows do not depend on theta.
 
     A problem does not change. What learns something (`recolour`, `relinearise`) returns a new
     problem; the old one stays as it was.
 
-    `runs`: names of the runs. `candidates`: effects that may be missing, by name. `nuisance`: nominal
-    value and prior sigma of every figure that is never exactly known, by name; always free within
-    its prior. `window`: number of successive rows over which errors are summed before they are
-    judged; 1 where each row is a prediction over a long time, more where rows are one-step errors.
+    `runs`: names of the runs. `candidates`: effects that may be missing, by name. `nuisance`:
+    nominal value and prior sigma of every figure that is never exactly known, by name; it is always
+    free within its prior. `window`: number of successive rows over which errors are summed before
+    they are judged: 1 where each row is a prediction over a long time, more where rows are one-step
+    errors.
 
     Everything below `rows` is a capability with a default: a problem that lacks it inherits "none".
     """
