@@ -7,13 +7,11 @@ are not shrunk as a smoothed force is.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Protocol, runtime_checkable
+from dataclasses import dataclass
 
 import numpy as np
 
-from kemba.identify.evidence.problem import Array, Flags, Problem
+from kemba.identify.evidence.problem import Array, Flags, ForceChannel, Problem
 
 BINS = 8
 FEWEST = 30  # samples in a bin
@@ -23,29 +21,6 @@ LAGS = np.arange(0.0015, 0.042, 0.004)  # s between a command's change and the e
 SAME = 0.1  # share of a force's power by which bins may differ and still be one force
 DOUBT, NEGLIGIBLE = 20.0, 0.1  # nats; share of a port's usual force
 PLAIN = 60.0  # nats that nominal figures at the edge of their tolerance do not reach
-
-
-@dataclass(frozen=True)
-class ForceChannel:
-    """Where a force may be missing: quantities by label, arrays (...) over samples, and the
-    columns (rows, b) of residual that unit forces in bins (..., b) make. `after`: by command how
-    much it changed within each of the LAGS before a sample, (..., b). `usual`: a force [unit] that
-    is neither small nor large."""
-
-    name: str
-    unit: str
-    usual: float
-    quantities: Mapping[str, Array]
-    columns: Callable[[Array], Array]
-    after: Mapping[str, Array] = field(default_factory=dict)
-
-
-@runtime_checkable
-class ForceChannelled(Protocol):
-    """A problem with ports."""
-
-    def ports(self) -> Sequence[ForceChannel]:
-        """All of them."""
 
 
 @dataclass(frozen=True)
@@ -94,8 +69,6 @@ class ForceProfile:
 
 def force_profiles(problem: Problem, residual: Array) -> list[ForceProfile]:
     """Every port against every quantity of its own, the most telling port first."""
-    if not isinstance(problem, ForceChannelled):
-        return []
     found = [[p for p in _of(port, residual) if p is not None] for port in problem.ports()]
     found = [group for group in found if group]
     found.sort(key=lambda group: -max(p.gain for p in group))

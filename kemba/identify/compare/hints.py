@@ -3,7 +3,7 @@ parameters that wander between runs or between valve modes."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,15 +11,13 @@ from scipy.stats import chi2, norm
 
 from kemba.identify.compare.force_profiles import LAGS, PLAIN, ForceProfile, middle, risen
 from kemba.identify.compare.tolerance import Slopes
-from kemba.identify.evidence.problem import Array, Labels, Problem, Rows
+from kemba.identify.evidence.problem import Array, Changes, Labels, Problem, Rows
 from kemba.identify.evidence.windows import codes
 
 CERTAIN = 1e-4
 DEPENDENT = 1.5  # rows are not quite independent: z scores count for so much less
 LEAST_INFORMATION = 4.0  # in sizes to the -2: a run that tells less about a parameter is mute
 SLACK = 0.1  # sizes by which a parameter may differ between runs without anybody caring
-
-Changes = Mapping[str, tuple[Array, Array]]
 
 
 @dataclass(frozen=True)
@@ -68,10 +66,7 @@ def lagged(problem: Problem, rows: Rows, white: Array) -> list[Response]:
 
     `white` (n,) has unit variance where the model is right.
     """
-    source = getattr(problem, "commands", None)
-    if source is None:
-        return []
-    runs: list[Changes] = source()
+    runs = problem.commands()
     names = sorted({n for run in runs for n in run})
     found = [_strongest(rows, white, runs, name, len(names)) for name in names]
     return sorted(found, key=lambda s: -abs(s.z[s.peak]))

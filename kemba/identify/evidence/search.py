@@ -10,7 +10,7 @@ import numpy as np
 
 from kemba.identify.evidence.linear import Linear, estimate, names_of
 from kemba.identify.evidence.null_model import Baseline
-from kemba.identify.evidence.point import LinearisationPoint, Movable
+from kemba.identify.evidence.point import LinearisationPoint
 from kemba.identify.evidence.problem import Problem
 from kemba.identify.evidence.refit import Fit, refit
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis, log_prior, probabilities
@@ -43,11 +43,12 @@ class Search:
         self.start()
         best = self._round(NULL, LEADERS)
         self.say(f"first guess: {' + '.join(best) or 'nothing'}")
-        if isinstance(self.problem, Movable):
-            return self._follow(self.problem, best)
+        if self.problem.moves:
+            return self._follow(best)
         if best != NULL:
             promising = self._promising()
             self.base.seen_from(self.points[best].fit.theta)
+            self.problem = self.base.problem
             self.points = {NULL: self.base.point}
             for hypothesis in promising:
                 self.visit(hypothesis)
@@ -55,7 +56,7 @@ class Search:
             best = self._grow(best)
         return best
 
-    def _follow(self, problem: Movable, best: Hypothesis) -> Hypothesis:
+    def _follow(self, best: Hypothesis) -> Hypothesis:
         """Look again along the motion that the best guess makes of the data, until it stays.
 
         A guess far from the first motion looks bad only for being far: what the slopes promise
@@ -68,7 +69,7 @@ class Search:
             point = self.points[guess]
             self.say(f"looking again as if {' + '.join(guess)} were there")
             among = self._contenders()
-            problem.relinearise(point.fit.theta)
+            self.problem = self.problem.relinearise(point.fit.theta)
             self.start(among)
             self.visit(guess)
             best = self._round(NULL, LEADERS)
@@ -97,6 +98,7 @@ class Search:
     def start(self, among: frozenset[Hypothesis] | None = None) -> None:
         """Null fit, noise colour, and the linear table at the null."""
         self.base = Baseline(self.problem, self.heat, among)
+        self.problem = self.base.problem
         self.points = {NULL: self.base.point}
 
     def _round(self, given: Hypothesis, leaders: int) -> Hypothesis:
@@ -149,7 +151,7 @@ class Search:
         """
         problem, (effect, *others) = self.problem, hypothesis
         candidate = problem.candidates[effect]
-        if others or not isinstance(problem, Movable) or problem.is_straight(candidate.key):
+        if others or not problem.moves or problem.is_straight(candidate.key):
             return
         size = fit.theta[candidate.key] - candidate.lead.off
         if abs(size) > LEAST * candidate.lead.size:
