@@ -12,7 +12,9 @@ from kemba_cli.common import Json, Quiet, print_json, say
 
 def simulate(
     source: Annotated[str, typer.Argument(help="Run folder, controller.csv, or rig YAML.")],
-    model: Annotated[str, typer.Option(help="Model YAML of the plant.")] = "plant",
+    model: Annotated[
+        str | None, typer.Option(help="Model YAML of the plant; else the task's own.")
+    ] = None,
     repeat: Annotated[int, typer.Option(min=1, help="How often to execute the run.")] = 1,
     noise: Annotated[
         bool, typer.Option("--noise", help="Noisy sensors, scattering valves.")
@@ -27,7 +29,7 @@ def simulate(
     Example: kemba-opt simulate runs/jump-1 --repeat 3 --noise
     """
     if Path(source).suffix in (".yaml", ".yml"):
-        answer = _rig(source, model, out, seed, noise)
+        answer = _rig(source, model or "plant", out, seed, noise)
     else:
         answer = _run(source, model, out, seed, noise, repeat)
     if json:
@@ -38,7 +40,7 @@ def simulate(
 
 
 def _run(
-    source: str, model: str, out: Path | None, seed: int, noise: bool, repeat: int
+    source: str, model: str | None, out: Path | None, seed: int, noise: bool, repeat: int
 ) -> dict[str, Any]:
     from kemba.plant.execution.repeat import plant_of, repeat_run
 

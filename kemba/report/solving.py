@@ -13,7 +13,7 @@ from kemba.ocp.nlp.ipopt import Watch
 from kemba.ocp.report import answer
 from kemba.ocp.starts import plan_best
 from kemba.plant.execution.certificate import replays
-from kemba.plant.execution.counterpart import counterpart
+from kemba.plant.execution.counterpart import another_robot, counterpart
 from kemba.plant.execution.replay import ends_standing
 from kemba.report.verdict import verdicts
 from kemba.runs import RunFolder, write_json
@@ -75,15 +75,17 @@ def _replayed(found: Plan, good: bool) -> dict[str, Any]:
     table = controller_table(found.model, found.trajectory)
     try:
         plant = counterpart(task.model, task.payload, task.supply, task.plant)
+        other = another_robot(task.model, task.plant)
         executed = replays(found.model, found.trajectory, table, plant)
     except KembaError as error:  # a model that the simulator cannot execute still has its plan
         return {"good": False, "sentence": f"{found.sentence}; but there is no replay: {error}"}
     lands = bool(ends_standing(found.model, found.trajectory))
+    said = [f"the plant is another robot, {other}, which {task.plant} names"] if other else []
     told = verdicts(executed, task.tolerances, lands).values()
     return {
         **executed,
         "good": good and all(verdict.good for verdict in told),
-        "sentence": "; ".join([found.sentence, *(verdict.sentence for verdict in told)]),
+        "sentence": "; ".join([found.sentence, *said, *(verdict.sentence for verdict in told)]),
     }
 
 

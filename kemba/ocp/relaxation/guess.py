@@ -17,6 +17,8 @@ from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.layout import Layout
 
 STRETCH = 0.92  # of the full leg length at take-off
+FILLED = 300.0 / 324.0  # of a chamber's steady force is the most that a guess asks of it
+RISE = 0.6  # of the fill time at full stroke: the chamber's in the middle of a push
 
 
 @dataclass(frozen=True)
@@ -180,12 +182,15 @@ def _efforts(
     s = np.zeros((len(t), len(model.states)))
     u = np.zeros((len(t), len(model.inputs)))
     lam = np.zeros((len(t), len(model.forces)))
+    cylinder = model.mechanism.need_cylinder()
+    full = FILLED * float(np.interp(model.supply, cylinder.pressures, cylinder.F_extend))
+    rise = RISE * max(cylinder.fill)
     for i, (leg, symbol) in enumerate(model.states):
         if symbol == "F_e" and leg in piston:
-            s[:, i] = np.clip(piston[leg], 0.0, 300.0)
+            s[:, i] = np.clip(piston[leg], 0.0, full)
     for i, (leg, symbol) in enumerate(model.inputs):
-        if symbol == "u_e" and leg in piston:
-            u[:, i] = np.clip((piston[leg] + 0.015 * np.gradient(piston[leg], t)) / 300.0, 0.0, 1.0)
+        if symbol == "u_e" and leg in piston:  # eq. 4 solved for the valve
+            u[:, i] = np.clip((piston[leg] + rise * np.gradient(piston[leg], t)) / full, 0.0, 1.0)
     for i, (_, symbol) in enumerate(model.forces):
         if symbol == "lam_n":
             lam[:, i] = share
