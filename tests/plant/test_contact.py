@@ -81,9 +81,9 @@ def test_the_energy_an_impact_loses_is_what_the_motion_loses(mu: float) -> None:
     M = eq.now(q=q, v=v, s=s, u=np.zeros(eq.nu))["M"]
     lost = 0.5 * float(v @ M @ v - after.v @ M @ after.v)
     assert impact.lost == pytest.approx(lost, rel=1e-9) and lost > 1.0
-    feet = [model.mechanism.port(f"{leg}/foot/x").phi for leg in LEGS]
-    slip = ca.Function("slip", [model.mechanism.q, model.mechanism.v],
-                       [ca.jtimes(ca.vertcat(*feet), model.mechanism.q, model.mechanism.v)])  # fmt: skip
+    q_, v_ = model.mechanism.q, model.mechanism.v
+    feet = ca.vertcat(*(model.mechanism.port(f"{leg}/foot/x").phi for leg in LEGS))
+    slip = ca.Function("slip", [q_, v_], [ca.jtimes(feet, q_, v_)])
     slides = np.abs(np.asarray(slip(q, after.v))).max() > 0.1
     assert slides == (mu < 1.0)
 
