@@ -13,9 +13,9 @@ from kemba.identify.compare.bins import ConditionBin, condition_bins
 from kemba.identify.compare.force_profiles import ForceProfile, force_profiles
 from kemba.identify.compare.hints import Hint, Response, conflicts, lacking, lagged
 from kemba.identify.compare.missing_force import Peak, peaks
-from kemba.identify.compare.tolerance import free_starts, slopes, within_tolerance
+from kemba.identify.compare.tolerance import slopes, within_tolerance
 from kemba.identify.evidence.problem import Array, MissingForce, Problem, Rows, Texts, Theta
-from kemba.identify.evidence.windows import Windows, aggregation_windows, rms
+from kemba.identify.evidence.windows import Windows, aggregation_windows, free_starts, rms
 
 GOOD, FAIR = 1.15, 1.5
 
@@ -109,17 +109,13 @@ def compare(problem: Problem, model: str, logs: Sequence[str] = ()) -> Compariso
     return replace(found, sentence=phrase(found))
 
 
-def conditions(
-    problem: Problem, theta: Theta | None = None, regions: bool = False
-) -> tuple[float, list[ConditionBin]]:
-    """Error ratio and cells of the model with `theta` added, told apart by region or not."""
+def conditions(problem: Problem, theta: Theta | None = None) -> list[ConditionBin]:
+    """Error by condition of the model with `theta` added; regions of the stroke are not told
+    apart."""
     rows, r = problem.rows(), problem.residual(free_starts(problem, theta))
     region = np.full(len(rows), "", dtype=object)
-    if regions:
-        region = problem.operating_point().regions()
     window = aggregation_windows(problem, rows, region)
-    sums = window.sums(r)
-    return rms(sums), list(condition_bins(rows, region, window.first, sums))
+    return list(condition_bins(rows, region, window.first, window.sums(r)))
 
 
 def _tolerant(rows: Rows, region: Texts, window: Windows, left: Array) -> tuple[float, bool]:

@@ -10,7 +10,6 @@ from scipy.optimize import lsq_linear
 from kemba.identify.evidence.problem import Array, Candidate, Problem, Theta
 
 WIDEST = 2.0  # prior sigmas
-START = "start:"  # names of nuisance parameters that say how a log begins
 
 
 @dataclass(frozen=True)
@@ -39,15 +38,3 @@ def within_tolerance(residual: Array, known: Slopes) -> Array:
     q, triangle = np.linalg.qr(known.by_nuisance)
     step = lsq_linear(triangle, -q.T @ residual, (-WIDEST, WIDEST)).x
     return np.asarray(residual + known.by_nuisance @ step)
-
-
-def free_starts(problem: Problem, at: Theta | None = None) -> dict[str, float]:
-    """Theta `at` with each log beginning as its data say, all else nominal."""
-    theta = dict(at or {})
-    names = [n for n in problem.nuisance if n.startswith(START)]
-    if not names:
-        return theta
-    sigma = np.array([problem.nuisance[n][1] for n in names])
-    j, r = problem.jacobian(theta, names) * sigma, problem.residual(theta)
-    step = np.linalg.solve(j.T @ j + np.eye(len(names)), -j.T @ r)
-    return theta | dict(zip(names, (sigma * step).tolist(), strict=True))

@@ -1,4 +1,4 @@
-"""Does it hold on data it was not fitted to? Prediction of left-out blocks, and held-out logs."""
+"""Does it hold on data it was not fitted to? Each block of time is predicted from the others."""
 
 from __future__ import annotations
 
@@ -7,13 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from kemba.identify.evidence.linear import Linear, estimate, linearise, time_blocks
-from kemba.identify.evidence.null_model import best_fit
+from kemba.identify.evidence.linear import Linear
 from kemba.identify.evidence.point import LinearisationPoint
-from kemba.identify.evidence.problem import Array, Problem, Theta
+from kemba.identify.evidence.problem import Array
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
-from kemba.identify.evidence.windows import rms, windows_of
 
 NONE = 1e-6  # spike width of an effect that is absent
 TOLERATED = 3.0  # sigma by which a nominal figure may be off
@@ -75,19 +73,9 @@ def within_tolerance(search: Search, linear: Linear, hypothesis: Hypothesis) -> 
     return np.asarray(linear.at + width * found.x)
 
 
-def predicted_error(search: Search, point: LinearisationPoint) -> float:
-    """RMS of whitened residuals summed over aggregation windows, each block of time predicted from
-    all others."""
+def left_out_error(search: Search, hypothesis: Hypothesis) -> float:
+    """RMS of whitened residuals summed over aggregation windows, as `error_ratio`, each block of
+    time predicted from all others."""
+    point = search.points[hypothesis]
     power = float(_powers(search, point, point.windowed).sum())
     return float(np.sqrt(max(power, 0.0) / point.windowed.count.sum()))
-
-
-def heldout_error(problem: Problem, theta: Theta) -> float:
-    """RMS of whitened residuals summed over aggregation windows on other logs; only how their runs
-    start is fitted to them."""
-    names = tuple(n for n in problem.nuisance if n not in theta or n.startswith("start:"))
-    theta = {k: v for k, v in theta.items() if not k.startswith("start:")}
-    if names:
-        linear, _, _ = linearise(problem, theta, time_blocks(problem), names)
-        theta = theta | estimate(problem, linear, best_fit(linear))
-    return rms(windows_of(problem).sums(problem.residual(theta)))

@@ -29,6 +29,11 @@ class LinearisationPoint:
     def log_evidence(self) -> float:
         return self.score.log_evidence
 
+    @property
+    def fitted_error(self) -> float:
+        """Error in units of the noise on the fitted logs: RMS over aggregation windows."""
+        return float(np.sqrt(self.windowed.power.sum() / self.windowed.count.sum()))
+
 
 class Division:
     """The rows of a problem divided into time blocks (n,) and into aggregation windows."""
