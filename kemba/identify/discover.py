@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -279,6 +280,6 @@ def rungs(search: Search, best: Hypothesis) -> list[Hypothesis]:
 def _ladder(search: Search, best: Hypothesis, holdout: Problem | None) -> list[tuple[str, float]]:
     """Error on unseen data at every rung, by what joins there."""
     steps, names = rungs(search, best), ["model as it is"]
-    for before, after in zip(steps, steps[1:], strict=False):
+    for before, after in pairwise(steps):
         names.append(" + ".join(e for e in after if e not in before))
     return [(n, error(search, step, holdout)) for n, step in zip(names, steps, strict=True)]

@@ -35,8 +35,9 @@ class ChannelError:
 class Comparison:
     """What `compare` says; `good` where the error is within the noise.
 
-    `tolerant_ratio`: what the error would be if the model's nominal figures were off by their
-    usual tolerance, in the best way; `tolerable`: that would be within the noise everywhere.
+    `noise_ratio`: error in units of the noise (see `error_ratio`). `tolerant_ratio`: the same if
+    the model's nominal figures took the best values within their usual tolerance; `tolerable`: that
+    would be within the noise everywhere.
     """
 
     logs: tuple[str, ...]
@@ -98,7 +99,7 @@ def compare(problem: Problem, model: str, logs: Sequence[str] = ()) -> Compariso
         tuple(_channels(problem, rows, r, window, start)),
         tuple(condition_bins(rows, region, window.first, sums)),
         ratio,
-        clean and not any(law.matters for law in force_profiles(problem, left)),
+        clean and not any(profile.matters for profile in force_profiles(problem, left)),
         (*sent, *conflicts(problem, rows, r, known)),
         responses,
         forces,
@@ -180,8 +181,8 @@ def phrase(found: Comparison) -> str:
     return "; ".join(parts) + "."
 
 
-def _place(cell: ConditionBin) -> str:
+def _place(at: ConditionBin) -> str:
     valves = {"00": "valves off", "10": "extend valve on", "01": "retract valve on"}
     stroke = {"in": ", piston retracted", "mid": ", piston mid-stroke", "out": ", piston extended"}
-    mode = valves.get(cell.mode, "both valves on")
-    return f"{cell.channel} in {cell.phase} with {mode}{stroke.get(cell.region, '')}"
+    mode = valves.get(at.mode, "both valves on")
+    return f"{at.channel} in {at.phase} with {mode}{stroke.get(at.region, '')}"

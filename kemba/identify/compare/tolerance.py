@@ -14,8 +14,11 @@ WIDEST = 2.0  # prior sigmas
 
 @dataclass(frozen=True)
 class Slopes:
-    """Slopes of a residual: along the switch of every effect (n, leads), per size, and along
-    every nuisance parameter (n, nuisance), per prior sigma."""
+    """Slopes of a residual.
+
+    `by_lead` (n, leads): along the switch of every effect, per size. `by_nuisance` (n, nuisance):
+    along every nuisance parameter, per prior sigma.
+    """
 
     leads: tuple[Candidate, ...]
     by_lead: Array
@@ -23,7 +26,7 @@ class Slopes:
 
 
 def slopes(problem: Problem, at: Theta) -> Slopes:
-    """Of the effects of the catalogue that are no sensor's."""
+    """Slopes at theta `at`, of all effects but sensor faults."""
     leads = tuple(c for c in problem.candidates.values() if not c.sensor)
     nuisance = list(problem.nuisance)
     jacobian = problem.jacobian(at, [*(c.key for c in leads), *nuisance])
@@ -34,7 +37,8 @@ def slopes(problem: Problem, at: Theta) -> Slopes:
 
 
 def within_tolerance(residual: Array, known: Slopes) -> Array:
-    """What is left of a residual (n,) when no nuisance parameter moves by more than WIDEST."""
+    """The part (n,) of a residual (n,) that is left when every nuisance parameter takes its best
+    value within WIDEST prior sigmas."""
     q, triangle = np.linalg.qr(known.by_nuisance)
     step = lsq_linear(triangle, -q.T @ residual, (-WIDEST, WIDEST)).x
     return np.asarray(residual + known.by_nuisance @ step)

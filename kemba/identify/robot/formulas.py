@@ -9,7 +9,7 @@ import numpy as np
 from kemba.effects.mechanics.friction import V_COULOMB
 from kemba.identify.bench.formulas import RANGES, STROKE, dahl
 from kemba.identify.evidence.types import Array
-from kemba.identify.robot.ports import port_columns
+from kemba.identify.robot.force_channels import force_columns
 from kemba.identify.robot.state import LinearisedState
 
 W_COULOMB = 0.1  # rad.s-1
@@ -32,7 +32,7 @@ def formula_columns(state: LinearisedState) -> dict[str, Array]:
     found: dict[str, Array] = {}
     for channels, name, terms in groups:
         listed = list(terms)
-        columns = port_columns(state, channels)(np.stack([f for _, f in listed], axis=-1))
+        columns = force_columns(state, channels)(np.stack([f for _, f in listed], axis=-1))
         found |= {f"{t} [{name}]": c for (t, _), c in zip(listed, columns.T, strict=True)}
     return found
 

@@ -31,6 +31,7 @@ from kemba.identify.robot.candidates import (
 from kemba.identify.robot.dynamics.physics import Physics
 from kemba.identify.robot.dynamics.reference import Floor
 from kemba.identify.robot.dynamics.tolerance import SHARE
+from kemba.identify.robot.force_channels import robot_force_channels
 from kemba.identify.robot.formulas import formula_columns
 from kemba.identify.robot.labels import describe
 from kemba.identify.robot.missing import robot_missing
@@ -38,7 +39,6 @@ from kemba.identify.robot.motion.batch import Batch
 from kemba.identify.robot.motion.expected import expected_power, predicted_error
 from kemba.identify.robot.motion.resampled import resample
 from kemba.identify.robot.operating_point import changes, robot_operating_point
-from kemba.identify.robot.ports import robot_ports
 from kemba.identify.robot.state import LinearisedState, linearise_at
 from kemba.identify.robot.validate import contradictions
 from kemba.model.model import Model
@@ -179,9 +179,9 @@ class RobotProblem(Problem):
         """Force on the body, moments at pitch and hips, force on the rods."""
         return robot_missing(self.state, theta or {}, strength)
 
-    def ports(self) -> list[ForceChannel]:
+    def force_channels(self) -> list[ForceChannel]:
         """Where a force may be missing: on rods, hips and the body."""
-        return robot_ports(self.state)
+        return robot_force_channels(self.state)
 
     def validate(self) -> list[str]:
         """No remarks. Raises BadData where a log contradicts itself or any model."""

@@ -14,7 +14,7 @@ from kemba.identify.robot.state import LinearisedState
 BODY = {"body z": 1, "body x": 0}  # place among the channels
 
 
-def robot_ports(state: LinearisedState) -> list[ForceChannel]:
+def robot_force_channels(state: LinearisedState) -> list[ForceChannel]:
     """Rods and hips (both legs share a force profile), then the body along z and x.
 
     A force is looked for where it shows: of hips and body in flight, of rods off their stops.
@@ -28,7 +28,7 @@ def robot_ports(state: LinearisedState) -> list[ForceChannel]:
             "speed [m/s]": np.where(where, rate[..., [k]], np.nan),
             "position [m]": np.where(where, y[..., [k]], np.nan),
         }
-        found.append(ForceChannel(name, "N", 3.0, quantities, port_columns(state, [k])))
+        found.append(ForceChannel(name, "N", 3.0, quantities, force_columns(state, [k])))
     return found
 
 
@@ -46,7 +46,7 @@ def _rods(state: LinearisedState) -> ForceChannel:
         "N",
         10.0,
         {label: np.where(where, values, np.nan) for label, values in quantities.items()},
-        port_columns(state, range(3 + legs, 3 + 2 * legs)),
+        force_columns(state, range(3 + legs, 3 + 2 * legs)),
         {side: _after(state, f"valve/{side}") for side in SIDES},
     )
 
@@ -63,7 +63,7 @@ def _hips(state: LinearisedState, where: Flags) -> ForceChannel:
         "N.m",
         0.5,
         {label: np.where(where, values, np.nan) for label, values in quantities.items()},
-        port_columns(state, legs),
+        force_columns(state, legs),
         {"hip/tau": _after(state, "hip/tau")},
     )
 
@@ -79,7 +79,7 @@ def _after(state: LinearisedState, command: str) -> Array:
     return batch.pad(runs, 0.0).reshape(*batch.valid.shape, -1, len(LAGS) - 1)
 
 
-def port_columns(state: LinearisedState, channels: Sequence[int]) -> Callable[[Array], Array]:
+def force_columns(state: LinearisedState, channels: Sequence[int]) -> Callable[[Array], Array]:
     """Function from forces (n, L, ports, b) on these channels to columns (rows, b) of residual."""
     motion = state.motion
 
