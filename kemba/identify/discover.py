@@ -5,11 +5,12 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from kemba.identify.answer import SIGNIFICANT, Answer, Ranked, Value, phrase
-from kemba.identify.doubt.cross_validation import heldout_error, left_out, predicted_error
+from kemba.identify.doubt.cross_validation import left_out, left_out_error
 from kemba.identify.doubt.run_consistency import Drift, drifting
 from kemba.identify.doubt.unexplained import Formula, look, unfinished
 from kemba.identify.evidence.bootstrap import NullTest, bootstrap, smallest_detectable
@@ -17,6 +18,7 @@ from kemba.identify.evidence.linear import is_shape, time_blocks
 from kemba.identify.evidence.problem import Array, Candidate, Problem
 from kemba.identify.evidence.search import Search, share_of
 from kemba.identify.evidence.spike_slab import NULL, SPIKE_WIDTH, Hypothesis
+from kemba.identify.evidence.windows import error_ratio
 
 CLASS = 3.0  # nats within which two explanations are the same to these data
 MATTERS = 0.2  # an effect below this share of its size is no finding,
@@ -171,11 +173,12 @@ def _answer(
 
 
 def error(search: Search, hypothesis: Hypothesis, holdout: Problem | None) -> float:
-    """Whitened RMS on data the fit has not seen."""
-    point = search.points[hypothesis]
+    """Error in units of the noise on data that the fit has not seen: the one number that sentence,
+    ranking, ladder and figures show. Of the held-out logs; without any, of left-out blocks."""
     if holdout is None:
-        return predicted_error(search, point)
-    return heldout_error(holdout, point.fit.theta)
+        return left_out_error(search, hypothesis)
+    unknown = set(holdout.nuisance) - set(search.problem.nuisance)  # of sensors not seen before
+    return error_ratio(holdout, search.points[hypothesis].fit.theta, unknown)
 
 
 def ranked(
@@ -266,12 +269,17 @@ def reported(candidate: Candidate, name: str, unit: str, triple: Array) -> tuple
     return name, unit, np.array([value, high, low])
 
 
-def _ladder(search: Search, best: Hypothesis, holdout: Problem | None) -> list[tuple[str, float]]:
-    """Held-out error as the effects join, the strongest first."""
-    steps = [("model as it is", error(search, NULL, holdout))]
+def rungs(search: Search, best: Hypothesis) -> list[Hypothesis]:
+    """Nothing, then the effects of the best answer as they join, the strongest first; parts that
+    were not refitted are passed over."""
     order = sorted(best, key=lambda e: -_strength(search, e, best))
-    for i in range(len(order)):
-        part = tuple(sorted(order[: i + 1]))
-        if part in search.points:
-            steps.append((order[i], error(search, part, holdout)))
-    return steps
+    parts = [tuple(sorted(order[: i + 1])) for i in range(len(order))]
+    return [NULL, *(part for part in parts if part in search.points)]
+
+
+def _ladder(search: Search, best: Hypothesis, holdout: Problem | None) -> list[tuple[str, float]]:
+    """Error on unseen data at every rung, by what joins there."""
+    steps, names = rungs(search, best), ["model as it is"]
+    for before, after in pairwise(steps):
+        names.append(" + ".join(e for e in after if e not in before))
+    return [(n, error(search, step, holdout)) for n, step in zip(names, steps, strict=True)]

@@ -46,7 +46,8 @@ def bootstrap(
     seed: int = 0,
     draws: int = DRAWS,
 ) -> NullTest:
-    """Nominal figures off within their tolerance, every effect at floor level, noise redrawn.
+    """Scores of simulated logs: figures off within their tolerance, effects within their spike
+    width, noise redrawn.
 
     `noise` (blocks, k): J'e of short blocks of what a flexible model leaves; blocks keep the
     colour, their random signs make new noise.
@@ -78,12 +79,12 @@ def _slopes(ranker: Ranker, noise: Array, rng: np.random.Generator, draws: int) 
 
 def _evidence(ranker: Ranker, hypothesis: Hypothesis, slopes: Array) -> Array:
     """Log evidence (draws,), up to a term that all hypotheses share."""
-    gram = ranker.linear.gram.sum(axis=0) / ranker.heat
+    gram = ranker.linear.gram.sum(axis=0)
     parts = []
     for tolerance in TOLERANCES:
         width = ranker.widths(hypothesis, tolerance)
         factor = cho_factor(gram * np.outer(width, width) + np.eye(len(width)), lower=True)
-        eta = -width[:, None] * slopes / ranker.heat
+        eta = -width[:, None] * slopes
         step = cho_solve(factor, eta)
         value = 0.5 * np.sum(eta * step, axis=0) - float(np.sum(np.log(np.diag(factor[0]))))
         parts.append(value + _sides(ranker, hypothesis, width, factor, step))

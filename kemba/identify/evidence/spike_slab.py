@@ -32,18 +32,21 @@ class Score:
 
 
 class Ranker:
-    """Scores hypotheses on one linearisation; `heat` > 1 tempers too sure a likelihood."""
+    """Scores hypotheses on one linearisation.
+
+    Every effect of the catalogue may be there with a small share of its size: the `spike` width of
+    its prior, in sizes. The effects of a hypothesis have the slab width instead.
+    """
 
     def __init__(
         self,
         linear: Linear,
         candidates: Mapping[str, Candidate],
         nuisance: Iterable[str],
-        heat: float = 1.0,
-        floor: float = SPIKE_WIDTH,
+        spike: float = SPIKE_WIDTH,
     ) -> None:
-        self.linear, self.candidates, self.heat, self.floor = linear, candidates, heat, floor
-        self.silent: frozenset[str] = frozenset()  # effects with no floor of their own
+        self.linear, self.candidates, self.spike = linear, candidates, spike
+        self.silent: frozenset[str] = frozenset()  # effects that are absent unless supposed
         free = set(nuisance)
         self.nuisance = np.array([name in free for name in linear.names])
         self.lead = {c.effect: linear.index(c.key) for c in candidates.values()}
@@ -53,8 +56,7 @@ class Ranker:
             ]
             for effect, c in candidates.items()
         }
-        gram, slope, power = linear.total
-        self._gram, self._slope, self._power = gram / heat, slope / heat, power / heat
+        self._gram, self._slope, self._power = linear.total
 
     def score(self, hypothesis: Hypothesis) -> Score:
         """Averaged over how far the nominal figures may be off."""
@@ -84,8 +86,8 @@ class Ranker:
         width = self.linear.width.copy()
         width[self.nuisance] *= tolerance
         for effect, i in self.lead.items():
-            floor = 1e-6 if effect in self.silent else self.floor
-            share = np.hypot(SLAB_WIDTH, floor) if effect in hypothesis else floor
+            spike = 1e-6 if effect in self.silent else self.spike
+            share = np.hypot(SLAB_WIDTH, spike) if effect in hypothesis else spike
             width[i] *= share
         return np.asarray(np.maximum(width, 1e-12))
 
