@@ -26,7 +26,7 @@ LEVELS = [
     {"effects"},
     {"model"},
     {"ocp", "plant"},
-    {"identify"},
+    {"contract", "identify"},
     {"runs"},
     {"sweep"},
     {"plotting", "report"},

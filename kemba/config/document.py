@@ -105,14 +105,23 @@ def load_text(text: str, source: str) -> Document:
 
 def dump_yaml(data: Any, path: str | Path) -> None:
     """Write plain data as YAML, whole or not at all; keys keep their order."""
+    with atomic_text(path) as stream:
+        stream.write(dump_text(data))
+
+
+def dump_text(data: Any) -> str:
+    """Plain data as YAML text; keys keep their order."""
+    from io import StringIO
+
     from ruamel.yaml import YAML
 
     yaml = YAML(typ="rt")
     yaml.indent(mapping=2, sequence=4, offset=2)
     yaml.width = 100
     yaml.representer.ignore_aliases = lambda _: True
-    with atomic_text(path) as stream:
-        yaml.dump(data, stream)
+    stream = StringIO()
+    yaml.dump(data, stream)
+    return stream.getvalue()
 
 
 def written(location: Location) -> str:
