@@ -94,7 +94,7 @@ def _plan_folder(expansion: Expansion, name: str, block: ExecuteBlock, folder: P
     path = folder / "plans" / content_hash(task.model_dump(exclude_none=True))
     if not (path / "controller.csv").is_file():
         found = plan(task, document)
-        if found.status not in ("solved", "acceptable"):
+        if not found.status.plan:
             at = ("blocks", name, "task")
             raise expansion.document.error(at, f"{block.task}: {found.sentence}")
         found.trajectory.write(path / "trajectory.csv")
