@@ -26,7 +26,7 @@ LEVELS = [
     {"effects"},
     {"model"},
     {"ocp", "plant"},
-    {"identify"},
+    {"contract", "identify"},
     {"runs"},
     {"sweep"},
     {"plotting", "report"},
@@ -42,7 +42,7 @@ ONLY_IN = {
     "distributed": {"sweep"},
     "statsmodels": {"sweep"},
     "pint": {"units"},
-    "ruamel": {"config"},
+    "yaml": {"config"},
 }
 SOURCES = sorted([*ROOT.glob("kemba/**/*.py"), *ROOT.glob("cli/**/*.py")])
 FOLDERS = (".", ".ci", ".github", "cli", "configs", "docs", "kemba", "tests")

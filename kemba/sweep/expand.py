@@ -10,6 +10,7 @@ from typing import Any
 
 from kemba.config import Document, apply_overrides, find_config, load_yaml, parse, shipped_configs
 from kemba.config.document import Location
+from kemba.effects import BY_KIND
 from kemba.errors import ConfigErrors, KembaError
 from kemba.model.spec import load_spec
 from kemba.ocp.task.task import parse_task
@@ -128,7 +129,7 @@ def model_name(expansion: Expansion, name: str) -> str:
 
 
 def model_hash(name: str) -> str:
-    """What a model's YAML and its robot's hold."""
+    """What a model's YAML and its robot's hold, and the files of effects from outside."""
     spec = load_spec(name)
     robot = find_config(spec.robot or "kemba", "robots")
-    return content_hash([spec.model_dump(mode="json"), sha256(robot)])
+    return content_hash([spec.model_dump(mode="json"), sha256(robot), *BY_KIND.files.values()])
