@@ -11,7 +11,7 @@ from kemba.identify.bench.formulas import features, terms
 from kemba.identify.bench.prediction import true_motion
 from kemba.identify.evidence.linear import within
 from kemba.identify.evidence.problem import Array, Theta
-from kemba.identify.evidence.spike_slab import SPIKE_WIDTH
+from kemba.identify.evidence.spike_slab import SpikeSlabSettings
 
 if TYPE_CHECKING:
     from kemba.identify.bench.problem import BenchProblem
@@ -64,9 +64,9 @@ def _imperfection(problem: BenchProblem, index: int) -> Array:
     """Spread (n,) of the force residual, in noise units, when every effect of the catalogue may
     be there at floor level."""
     base = problem.standardised({}, index)["piston/F"]
-    power = np.ones(len(base))
+    power, spike = np.ones(len(base)), SpikeSlabSettings.current().spike
     for c in problem.candidates.values():
-        small = {c.key: c.lead.off + SPIKE_WIDTH * c.lead.size}
+        small = {c.key: c.lead.off + spike * c.lead.size}
         there = problem.standardised(within(problem, small), index)["piston/F"]
         power += (there - base) ** 2
     return np.asarray(np.sqrt(power))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kemba.identify.bench.switching import edges
-from kemba.identify.compare.force_profiles import LAGS, ForceChannel, risen
+from kemba.identify.compare.force_profiles import ForceChannel, lags, risen
 from kemba.identify.evidence.operating_point import OperatingPoint
 from kemba.identify.evidence.problem import Array
 
@@ -56,7 +56,7 @@ def bench_port(problem: BenchProblem) -> ForceChannel:
     }
     after = {}
     for side in ("extend", "retract"):
-        after[side] = np.zeros((len(rows), len(LAGS) - 1))
+        after[side] = np.zeros((len(rows), len(lags()) - 1))
         for i, run in enumerate(problem.logs):
             own = rows.run == i
             after[side][own] = risen(*switchings(run)[f"valve/{side}"], rows.time[own])

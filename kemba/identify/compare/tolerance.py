@@ -8,9 +8,21 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from kemba.identify.evidence.problem import Array, Candidate, Problem, Theta
+from kemba.settings import Settings, setting
 
-WIDEST = 2.0  # prior sigmas
 START = "start:"  # names of nuisance parameters that say how a log begins
+
+
+class ToleranceSettings(Settings):
+    """How far nominal figures may be off."""
+
+    widest: float = setting(
+        2.0,
+        "1",
+        "largest error of a figure, in prior sigmas",
+        "convention: 95 % of them",
+        decides=True,
+    )
 
 
 @dataclass(frozen=True)
@@ -35,9 +47,10 @@ def slopes(problem: Problem, at: Theta) -> Slopes:
 
 
 def within_tolerance(residual: Array, known: Slopes) -> Array:
-    """What is left of a residual (n,) when no nuisance parameter moves by more than WIDEST."""
+    """What is left of a residual (n,) when no nuisance parameter moves by more than `widest`."""
+    widest = ToleranceSettings.current().widest
     q, triangle = np.linalg.qr(known.by_nuisance)
-    step = lsq_linear(triangle, -q.T @ residual, (-WIDEST, WIDEST)).x
+    step = lsq_linear(triangle, -q.T @ residual, (-widest, widest)).x
     return np.asarray(residual + known.by_nuisance @ step)
 
 

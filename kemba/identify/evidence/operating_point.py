@@ -10,9 +10,20 @@ import numpy as np
 
 from kemba.effects.pneumatics.constants import AREA_E, AREA_R, ATMOSPHERE
 from kemba.identify.evidence.problem import Array, Labels, Problem, Rows
+from kemba.settings import Settings, setting
 
-END = 0.010  # m from the end of a stroke that counts as its end; a cushion is as long
 REGIONS = ("in", "mid", "out")
+
+
+class RegionSettings(Settings):
+    """Regions of a piston's stroke."""
+
+    end: float = setting(
+        0.010,
+        "m",
+        "length of the region at each end of the stroke",
+        "derived: as long as a cushion of the catalogue",
+    )
 
 
 @dataclass(frozen=True)
@@ -27,7 +38,8 @@ class OperatingPoint:
 
     def regions(self) -> Labels:
         """Index (n,) into REGIONS: near the retracted end, between, near the extended end."""
-        ends = np.array([END, self.stroke - END])
+        end = RegionSettings.current().end
+        ends = np.array([end, self.stroke - end])
         return np.asarray(np.searchsorted(ends, self.x, side="right"))
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kemba.identify.compare.force_profiles import LAGS, ForceChannel, risen
+from kemba.identify.compare.force_profiles import ForceChannel, lags, risen
 from kemba.identify.evidence.operating_point import air_force
 from kemba.identify.evidence.problem import Array, Flags
 from kemba.identify.robot.motion.filter import innovations
@@ -83,7 +83,7 @@ def _after(problem: RobotProblem, command: str) -> Array:
     for sent, track in zip(problem.commands(), problem.batch.resampled, strict=True):
         own = [risen(*sent[f"{leg}/{command}"], track.time) for leg in problem.physics.legs]
         runs.append(np.stack(own, axis=1).reshape(len(track.time), -1))
-    return problem.batch.pad(runs, 0.0).reshape(*problem.batch.valid.shape, -1, len(LAGS) - 1)
+    return problem.batch.pad(runs, 0.0).reshape(*problem.batch.valid.shape, -1, len(lags()) - 1)
 
 
 def port_columns(problem: RobotProblem, channels: Sequence[int]) -> Callable[[Array], Array]:
