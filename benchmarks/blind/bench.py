@@ -28,7 +28,7 @@ from twin.catalogue import CATALOGUE
 from twin.measure import Sensors
 
 from blind import study
-from kemba.identify.bench import BenchProblem, bench_problem
+from kemba.identify.bench.problem import BenchProblem, bench_problem
 from kemba.identify.logs.gate import check_logs
 from kemba.identify.logs.reading import read_logs
 from kemba.model.spec import load_model
@@ -98,7 +98,7 @@ def run(setting: dict[str, Any]) -> dict[str, Any]:
     def problem() -> BenchProblem:
         check_logs(logs)
         found = bench_problem(logs, load_model(MODELS[setting["chambers"]], rig=True))
-        found.plausible()
+        found.validate()
         return found
 
     return {"case": setting, "truth": truth["effects"], **study.answered(problem)}

@@ -29,7 +29,7 @@ from twin.measure import Sensors, fault_channels
 from blind import study
 from kemba.identify.logs.gate import check_logs
 from kemba.identify.logs.reading import read_logs
-from kemba.identify.robot import RobotProblem, robot_problem
+from kemba.identify.robot.problem import RobotProblem, robot_problem
 from kemba.model.spec import load_model
 
 EFFECTS = [name for name, entry in CATALOGUE.items() if entry.known]
@@ -85,7 +85,7 @@ def run(setting: dict[str, Any]) -> dict[str, Any]:
     def problem() -> RobotProblem:
         check_logs(logs)
         found = robot_problem(logs, load_model())
-        found.plausible()
+        found.validate()
         return found
 
     return {"case": setting, "truth": truth["effects"], **study.answered(problem)}

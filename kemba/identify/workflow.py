@@ -46,7 +46,7 @@ def discover_logs(
         fitted, cut = excerpts(fitted)
         kept, _ = excerpts(kept)
         problem = make_problem(fitted, model)
-        remarks = [*remarks, *cut, *plausible(problem)]
+        remarks = [*remarks, *cut, *problem.validate()]
         judge = make_problem(kept, model) if kept else None
         left = time_limit - (time.monotonic() - started)
         found = discover(problem, judge, left, say)
@@ -66,19 +66,12 @@ def make_problem(logs: Sequence[Trajectory], model: str) -> Problem:
     from kemba.model.spec import load_model
 
     if logs[0].meta["kind"] == "bench":
-        from kemba.identify.bench import bench_problem
+        from kemba.identify.bench.problem import bench_problem
 
         return bench_problem(logs, load_model(model, rig=True))
-    from kemba.identify.robot import robot_problem
+    from kemba.identify.robot.problem import robot_problem
 
     return robot_problem(logs, load_model(model))
-
-
-def plausible(problem: Problem) -> list[str]:
-    """Remarks of the problem's own gate. Raises BadData when the model and the data contradict
-    each other so grossly that a column must be wrong."""
-    gate = getattr(problem, "plausible", None)
-    return list(gate()) if gate else []
 
 
 def write_answer(answer: Answer, out: Path, model: str) -> None:

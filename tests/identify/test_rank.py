@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Mapping
 
 import numpy as np
 import pytest
@@ -10,21 +10,14 @@ import pytest
 from kemba.identify import discover as discovery
 from kemba.identify.answer import Answer, Ranked, phrase
 from kemba.identify.discover import discover
-from kemba.identify.evidence.problem import (
-    Array,
-    Candidate,
-    Parameter,
-    Rows,
-    Theta,
-    secant_jacobian,
-)
+from kemba.identify.evidence.problem import Array, Candidate, Parameter, Problem, Rows, Theta
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import probabilities
 
 EFFECTS = ("bend", "drag", "kick", "twin", "wave")
 
 
-class Toy:
+class Toy(Problem):
     """y(t) = gain * u(t) + effects; `twin` is nearly `drag`, so the two cannot be told apart."""
 
     def __init__(self, truth: Mapping[str, float], seed: int = 0, runs: int = 3) -> None:
@@ -54,11 +47,6 @@ class Toy:
         for name, shape in self._shapes.items():
             y = y + theta.get(f"{name}.a", 0.0) * shape
         return np.asarray(y - self.measured)
-
-    def jacobian(
-        self, theta: Theta, names: Iterable[str], runs: Collection[int] | None = None
-    ) -> Array:
-        return secant_jacobian(self, theta, names, runs)
 
     def rows(self, runs: Collection[int] | None = None) -> Rows:
         n = len(self._time)

@@ -9,9 +9,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import cholesky_banded, solveh_banded
 
-from kemba.identify.bench.problem import BenchProblem
-from kemba.identify.compare.missing_force import Missing
-from kemba.identify.evidence.problem import Array, Theta
+from kemba.identify.bench.predicted import PredictedLogs
+from kemba.identify.evidence.types import Array, MissingForce, Theta
 
 MEMORY = 0.025  # s, of the missing force
 ROUNDS = 20
@@ -20,17 +19,17 @@ FORCE = "piston/F"
 
 
 def bench_missing(
-    problem: BenchProblem, theta: Theta | None = None, strength: Array | None = None
-) -> list[Missing]:
+    predicted: PredictedLogs, theta: Theta, strength: Array | None = None
+) -> list[MissingForce]:
     """d(t) per run: the force on the rod, with its band."""
     found = []
-    for i, run in enumerate(problem.logs):
-        predicted, variance = problem.predict(theta or {}, i)[FORCE]
+    for i, run in enumerate(predicted.logs):
+        expected, variance = predicted.readings(theta, i)[FORCE]
         keep = run.keep[FORCE]
-        time, gap = run.motion.time[keep], (run.measured[FORCE] - predicted)[keep]
+        time, gap = run.motion.time[keep], (run.measured[FORCE] - expected)[keep]
         known = None if strength is None else float(strength[0])
         force, sigma, used = lagged(time, gap, variance[keep], known)
-        found.append(Missing(run.name, time, (FORCE,), ("N",), force[:, None], sigma[:, None],
+        found.append(MissingForce(run.name, time, (FORCE,), ("N",), force[:, None], sigma[:, None],
                              np.array([used])))  # fmt: skip
     return found
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import chi2, false_discovery_control
 
-from kemba.identify.evidence.problem import Array, Labels, Rows
+from kemba.identify.evidence.problem import Array, Labels, Rows, Texts
 from kemba.identify.evidence.windows import codes, rms
 from kemba.settings import BY_HAND, Settings, setting
 
@@ -54,9 +54,7 @@ class ConditionBin:
         return self.q_value < BinSettings.current().false_discoveries
 
 
-def condition_bins(
-    rows: Rows, region: Labels, first: Labels, sums: Array
-) -> Iterable[ConditionBin]:
+def condition_bins(rows: Rows, region: Texts, first: Labels, sums: Array) -> Iterable[ConditionBin]:
     """Every condition with enough data, of grains that begin at row `first` (k,) and sum to `sums`
     (k,) in units of noise; q values over all of them."""
     parts = (rows.phase, rows.mode, region)

@@ -12,12 +12,10 @@ import numpy as np
 from kemba.identify.compare.bins import ConditionBin, condition_bins
 from kemba.identify.compare.force_profiles import ForceProfile, force_profiles
 from kemba.identify.compare.hints import Hint, Response, conflicts, lacking, lagged
-from kemba.identify.compare.missing_force import Missing, Peak, peaks
-from kemba.identify.compare.smoother import missing_force
+from kemba.identify.compare.missing_force import Peak, peaks
 from kemba.identify.compare.tolerance import free_starts, slopes, within_tolerance
-from kemba.identify.evidence.operating_point import region_labels
-from kemba.identify.evidence.problem import Array, Labels, Problem, Rows, Theta
-from kemba.identify.evidence.windows import Windows, aggregation_windows, expected, rms
+from kemba.identify.evidence.problem import Array, MissingForce, Problem, Rows, Texts, Theta
+from kemba.identify.evidence.windows import Windows, aggregation_windows, rms
 from kemba.settings import BY_HAND, Settings, setting
 
 
@@ -59,7 +57,7 @@ class Comparison:
     hints: tuple[Hint, ...] = ()
     responses: tuple[Response, ...] = ()
     force_profiles: tuple[ForceProfile, ...] = ()
-    missing: tuple[Missing, ...] = ()
+    missing: tuple[MissingForce, ...] = ()
     plan: Mapping[str, float] = field(default_factory=dict)
     sentence: str = ""
 
@@ -93,11 +91,11 @@ def compare(problem: Problem, model: str, logs: Sequence[str] = ()) -> Compariso
     fitted."""
     start = free_starts(problem)
     rows, r = problem.rows(), problem.residual(start)
-    _, region = region_labels(problem, rows)
+    region = problem.operating_point().regions()
     window = aggregation_windows(problem, rows, region)
     sums = window.sums(r)
     known = slopes(problem, start)
-    responses = tuple(lagged(problem, rows, r / np.sqrt(expected(problem, len(r)))))
+    responses = tuple(lagged(problem, rows, r / np.sqrt(problem.expected_power())))
     forces = tuple(force_profiles(problem, r))
     sent = [s.hint for s in responses if s.certain]
     left = within_tolerance(r, known)
@@ -113,7 +111,7 @@ def compare(problem: Problem, model: str, logs: Sequence[str] = ()) -> Compariso
         (*sent, *conflicts(problem, rows, r, known)),
         responses,
         forces,
-        tuple(missing_force(problem, start)),
+        tuple(problem.missing_force(start)),
     )
     if not found.good and not found.tolerable:
         found = replace(found, hints=(*lacking(forces), *found.hints))
@@ -127,13 +125,13 @@ def conditions(
     rows, r = problem.rows(), problem.residual(free_starts(problem, theta))
     region = np.full(len(rows), "", dtype=object)
     if regions:
-        _, region = region_labels(problem, rows)
+        region = problem.operating_point().regions()
     window = aggregation_windows(problem, rows, region)
     sums = window.sums(r)
     return rms(sums), list(condition_bins(rows, region, window.first, sums))
 
 
-def _tolerant(rows: Rows, region: Labels, window: Windows, left: Array) -> tuple[float, bool]:
+def _tolerant(rows: Rows, region: Texts, window: Windows, left: Array) -> tuple[float, bool]:
     """Error ratio of what the figures' tolerance leaves, and whether it is within the noise."""
     sums = window.sums(left)
     clean = not any(c.significant for c in condition_bins(rows, region, window.first, sums))
@@ -154,8 +152,7 @@ def measured_units(rows: Rows) -> dict[str, str]:
 def _channels(
     problem: Problem, rows: Rows, r: Array, window: Windows, start: Theta
 ) -> Iterable[ChannelError]:
-    windows = getattr(problem, "window_errors", None)
-    errors = windows(start) if windows else {}
+    errors = problem.window_errors(start)
     sums = window.sums(r)
     headers = measured_units(rows)
     for k, channel in enumerate(rows.channels):

@@ -7,13 +7,11 @@ are not shrunk as a smoothed force is.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Protocol, runtime_checkable
+from dataclasses import dataclass
 
 import numpy as np
 
-from kemba.identify.evidence.problem import Array, Flags, Problem
+from kemba.identify.evidence.problem import Array, Flags, ForceChannel, Problem
 from kemba.settings import BY_HAND, Settings, setting
 
 
@@ -58,29 +56,6 @@ class ForceProfileSettings(Settings):
         BY_HAND,
         decides=True,
     )
-
-
-@dataclass(frozen=True)
-class ForceChannel:
-    """Where a force may be missing: quantities by label, arrays (...) over samples, and the
-    columns (rows, b) of residual that unit forces in bins (..., b) make. `after`: by command how
-    much it changed within each of the `lags` before a sample, (..., b). `usual`: a force [unit]
-    that is neither small nor large."""
-
-    name: str
-    unit: str
-    usual: float
-    quantities: Mapping[str, Array]
-    columns: Callable[[Array], Array]
-    after: Mapping[str, Array] = field(default_factory=dict)
-
-
-@runtime_checkable
-class ForceChannelled(Protocol):
-    """A problem with ports."""
-
-    def ports(self) -> Sequence[ForceChannel]:
-        """All of them."""
 
 
 @dataclass(frozen=True)
@@ -131,8 +106,6 @@ class ForceProfile:
 
 def force_profiles(problem: Problem, residual: Array) -> list[ForceProfile]:
     """Every port against every quantity of its own, the most telling port first."""
-    if not isinstance(problem, ForceChannelled):
-        return []
     found = [[p for p in _of(port, residual) if p is not None] for port in problem.ports()]
     found = [group for group in found if group]
     found.sort(key=lambda group: -max(p.gain for p in group))

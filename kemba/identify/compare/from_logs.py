@@ -12,7 +12,7 @@ from kemba.identify.compare.compare import Comparison, compare
 from kemba.identify.evidence.problem import Problem
 from kemba.identify.logs.gate import check_logs
 from kemba.identify.logs.reading import load_map, read_logs
-from kemba.identify.workflow import make_problem, plausible
+from kemba.identify.workflow import make_problem
 from kemba.trajectory import Trajectory
 
 PLANNED = ("body/x", "body/z", "body/pitch", "hip/q", "piston/x")
@@ -30,7 +30,7 @@ def compare_logs(
     read = read_logs(logs, columns)
     check_logs(read)
     problem = make_problem(read, model)
-    plausible(problem)
+    problem.validate()
     found = compare(problem, model, [str(log.meta["path"]) for log in read])
     if run is not None:
         plan = Trajectory.read(Path(run) / "trajectory.csv" if Path(run).is_dir() else run)

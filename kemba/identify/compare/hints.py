@@ -3,7 +3,7 @@ parameters that wander between runs or between valve modes."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +17,7 @@ from kemba.identify.compare.force_profiles import (
     risen,
 )
 from kemba.identify.compare.tolerance import Slopes
-from kemba.identify.evidence.problem import Array, Labels, Problem, Rows
+from kemba.identify.evidence.problem import Array, Changes, Labels, Problem, Rows
 from kemba.identify.evidence.windows import codes
 from kemba.settings import BY_HAND, Settings, setting
 
@@ -41,9 +41,6 @@ class HintSettings(Settings):
     slack: float = setting(
         0.1, "1", "sizes by which a parameter may differ between runs", BY_HAND, decides=True
     )
-
-
-Changes = Mapping[str, tuple[Array, Array]]
 
 
 @dataclass(frozen=True)
@@ -94,10 +91,7 @@ def lagged(problem: Problem, rows: Rows, white: Array) -> list[Response]:
 
     `white` (n,) has unit variance where the model is right.
     """
-    source = getattr(problem, "commands", None)
-    if source is None:
-        return []
-    runs: list[Changes] = source()
+    runs = problem.commands()
     names = sorted({n for run in runs for n in run})
     found = [_strongest(rows, white, runs, name, len(names)) for name in names]
     return sorted(found, key=lambda s: -abs(s.z[s.peak]))

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 
 from kemba.identify.evidence.linear import Linear, condense
-from kemba.identify.evidence.problem import Array, Candidate, Parameter, Theta
+from kemba.identify.evidence.problem import Array, Candidate, Labels, Parameter
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis, Ranker
 from kemba.settings import BY_HAND, Settings, setting
@@ -59,22 +58,6 @@ class UnexplainedSettings(Settings):
     )
 
 
-@runtime_checkable
-class Examinable(Protocol):
-    """A problem that can say what its residual may depend on."""
-
-    def leftover(self, theta: Theta) -> tuple[Array, Array, Array]:
-        """Residual over its white noise (n,), regressors (n, m), and the run of each row (n,)."""
-
-
-@runtime_checkable
-class Weighing(Protocol):
-    """A problem that can say how much a term would matter."""
-
-    def weight(self, theta: Theta, formula: str, coefficient: float) -> float:
-        """Its largest force as a share of what matters in practice."""
-
-
 def structured(search: Search, hypothesis: Hypothesis) -> tuple[float, float]:
     """Mean square of the residual in noise units, and the part of it that repeats itself.
 
@@ -82,18 +65,19 @@ def structured(search: Search, hypothesis: Hypothesis) -> tuple[float, float]:
     it predicts in the other blocks is structure: noise cannot be predicted, however coloured.
     """
     settings = UnexplainedSettings.current()
-    if not isinstance(search.problem, Examinable):
+    left_over = search.problem.leftover(search.points[hypothesis].fit.theta)
+    if left_over is None:
         return 1.0, 0.0
-    r, columns, run = search.problem.leftover(search.points[hypothesis].fit.theta)
-    r = np.clip(r, -settings.clip, settings.clip)
+    r = np.clip(left_over.residual, -settings.clip, settings.clip)
+    columns = left_over.features
     columns = columns / np.maximum(np.sqrt(np.mean(columns**2, axis=0)), 1e-9)
-    folds = _folds(run)
+    folds = _folds(left_over.run)
     power = float(np.mean(r**2))
     left = min(float(np.mean((r - _foretold(r, columns, folds, k)) ** 2)) for k in settings.ridges)
     return power, max(power - left, 0.0)
 
 
-def _foretold(r: Array, columns: Array, folds: Array, ridge: float) -> Array:
+def _foretold(r: Array, columns: Array, folds: Labels, ridge: float) -> Array:
     """Each fold as the regression on the others foretells it."""
     predicted = np.zeros(len(r))
     for fold in np.unique(folds):
@@ -104,7 +88,7 @@ def _foretold(r: Array, columns: Array, folds: Array, ridge: float) -> Array:
     return predicted
 
 
-def _folds(run: Array) -> Array:
+def _folds(run: Labels) -> Labels:
     """Which fold each row (n,) belongs to: runs are cut into blocks of time, dealt out in turn."""
     folds = UnexplainedSettings.current().folds
     labels = np.zeros(len(run), dtype=int)
@@ -190,8 +174,6 @@ def look(search: Search, best: Hypothesis) -> Formula | None:
 def _matters(search: Search, formula: Formula) -> bool:
     """Whether a formula is more than the imperfection that every model has."""
     problem, theta = search.problem, search.points[NULL].fit.theta
-    if not isinstance(problem, Weighing):
-        return True
     parts = zip(formula.terms, formula.coefficients, strict=True)
     least = UnexplainedSettings.current().matters
     return any(problem.weight(theta, term, c) > least for term, (c, _) in parts)

@@ -7,7 +7,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kemba.identify.evidence.problem import Array, Flags, Labels, Parameter, Problem, Theta
+from kemba.identify.evidence.problem import (
+    Array,
+    Candidate,
+    Flags,
+    Labels,
+    Parameter,
+    Problem,
+    Theta,
+)
 from kemba.settings import BY_HAND, Settings, setting
 
 
@@ -122,13 +130,13 @@ def moved(linear: Linear, at: Array, jacobian: Array, r: Array, blocks: Labels) 
     return replace(linear, at=at, slope=slope, power=power)
 
 
-def within(problem: Problem, theta: Mapping[str, float]) -> dict[str, float]:
+def within(candidates: Mapping[str, Candidate], theta: Theta) -> dict[str, float]:
     """Theta with every effect's parameters inside their bounds."""
-    bounds = {k: p for c in problem.candidates.values() for k, p in c.keys().items()}
+    bounds = {k: p for c in candidates.values() for k, p in c.keys().items()}
     clipped = {k: _sane(v, bounds[k]) if k in bounds else v for k, v in theta.items()}
     typical = {
         key: p.typical
-        for c in problem.candidates.values()
+        for c in candidates.values()
         if is_on(clipped, c.key, c.lead)
         for key, p in c.keys().items()
         if key not in clipped

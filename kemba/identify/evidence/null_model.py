@@ -16,7 +16,7 @@ from kemba.identify.evidence.linear import (
     priors,
     within,
 )
-from kemba.identify.evidence.point import Colourable, Division, LinearisationPoint, Movable
+from kemba.identify.evidence.point import Division, LinearisationPoint
 from kemba.identify.evidence.problem import Array, Problem
 from kemba.identify.evidence.refit import Fit, Frozen
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis, Ranker
@@ -78,7 +78,7 @@ class Baseline:
         """Null fit, noise colour, and the linear table at the null."""
         problem, blocks = self.problem, self.division.blocks
         free = tuple(problem.nuisance)
-        moving = isinstance(problem, Movable)  # its slopes hold as far as tolerances reach
+        moving = problem.moves  # its slopes hold as far as tolerances reach
         names = names_of(problem, {}) if moving else free
         known = problem.jacobian({}, names)
         slopes = known[:, [names.index(n) for n in free]]
@@ -116,12 +116,13 @@ class Baseline:
         """
         (effect,) = hypothesis
         candidate, theta = self.problem.candidates[effect], self.point.fit.theta
-        if isinstance(self.problem, Movable) and self.problem.is_straight(candidate.key):
+        if self.problem.is_straight(candidate.key):
             return self.table[hypothesis]
         starts: list[dict[str, float]] = [dict(theta)]
         if candidate.lead.unit == "s":
             signs = (1.0, -1.0) if candidate.lead.signed else (1.0,)
-            starts += [{**theta, **within(self.problem, candidate.typical(s))} for s in signs]
+            sizes = [within(self.problem.candidates, candidate.typical(sign)) for sign in signs]
+            starts += [{**theta, **size} for size in sizes]
         return max(self._descend(hypothesis, start) for start in starts)
 
     def _descend(self, hypothesis: Hypothesis, theta: dict[str, float]) -> float:
@@ -140,7 +141,7 @@ class Baseline:
             score = self.ranker(linear).score(hypothesis)
             best = max(best, score.log_evidence)
             at = np.where(own, score.z, linear.at)
-            theta = within(self.problem, estimate(self.problem, linear, at))
+            theta = within(self.problem.candidates, estimate(self.problem, linear, at))
         return best
 
     def _learn_noise(self, theta: Mapping[str, float], keep: bool) -> Array | None:
@@ -148,14 +149,13 @@ class Baseline:
 
         Returns the Jacobian at theta under the new colour when it is wanted (`keep`).
         """
-        problem = self.problem
-        if not isinstance(problem, Colourable):
+        if not self.problem.learns_colour:
             return None
-        problem.recolour(None)
-        linear, jacobian, r = linearise(problem, theta, self.division.blocks)
+        bare = self.problem.recolour(None)
+        linear, jacobian, r = linearise(bare, theta, self.division.blocks)
         left = r + jacobian @ (best_fit(linear) - linear.at)
-        problem.recolour(left, careful=not keep)
-        return problem.whiten(jacobian) if keep else None
+        self.problem = bare.recolour(left, careful=not keep)
+        return self.problem.whiten(jacobian) if keep else None
 
 
 def best_fit(linear: Linear) -> Array:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -29,29 +28,6 @@ class LinearisationPoint:
     @property
     def log_evidence(self) -> float:
         return self.score.log_evidence
-
-
-@runtime_checkable
-class Colourable(Protocol):
-    """A problem whose noise colour can be learnt from the residuals of a flexible model."""
-
-    def recolour(self, residual: Array | None, careful: bool = False) -> None:
-        """Learn from residuals (n,) that were not whitened; None: forget. `careful`: the model
-        behind them is good, so that spikes are no physics and may be silenced."""
-
-    def whiten(self, columns: Array) -> Array:
-        """Columns (n, k) computed before any colour as they are under the present one."""
-
-
-@runtime_checkable
-class Movable(Protocol):
-    """A problem that is linearised along a motion, which depends on the model."""
-
-    def relinearise(self, base: Mapping[str, float]) -> None:
-        """Find the motion again with the model at `base`; rows may be others than before."""
-
-    def is_straight(self, name: str) -> bool:
-        """Whether residuals are linear in this parameter, so that slopes tell all."""
 
 
 class Division:

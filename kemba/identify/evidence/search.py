@@ -10,7 +10,7 @@ import numpy as np
 
 from kemba.identify.evidence.linear import Linear, estimate, names_of
 from kemba.identify.evidence.null_model import Baseline
-from kemba.identify.evidence.point import LinearisationPoint, Movable
+from kemba.identify.evidence.point import LinearisationPoint
 from kemba.identify.evidence.problem import Problem
 from kemba.identify.evidence.refit import Fit, refit
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis, log_prior, probabilities
@@ -81,11 +81,12 @@ class Search:
         self.start()
         best = self._round(NULL, leaders)
         self.say(f"first guess: {' + '.join(best) or 'nothing'}")
-        if isinstance(self.problem, Movable):
-            return self._follow(self.problem, best)
+        if self.problem.moves:
+            return self._follow(best)
         if best != NULL:
             promising = self._promising()
             self.base.seen_from(self.points[best].fit.theta)
+            self.problem = self.base.problem
             self.points = {NULL: self.base.point}
             for hypothesis in promising:
                 self.visit(hypothesis)
@@ -93,7 +94,7 @@ class Search:
             best = self._grow(best)
         return best
 
-    def _follow(self, problem: Movable, best: Hypothesis) -> Hypothesis:
+    def _follow(self, best: Hypothesis) -> Hypothesis:
         """Look again along the motion that the best guess makes of the data, until it stays.
 
         A guess far from the first motion looks bad only for being far: what the slopes promise
@@ -107,7 +108,7 @@ class Search:
             point = self.points[guess]
             self.say(f"looking again as if {' + '.join(guess)} were there")
             among = self._contenders()
-            problem.relinearise(point.fit.theta)
+            self.problem = self.problem.relinearise(point.fit.theta)
             self.start(among)
             self.visit(guess)
             best = self._round(NULL, settings.leaders)
@@ -136,6 +137,7 @@ class Search:
     def start(self, among: frozenset[Hypothesis] | None = None) -> None:
         """Null fit, noise colour, and the linear table at the null."""
         self.base = Baseline(self.problem, self.heat, among)
+        self.problem = self.base.problem
         self.points = {NULL: self.base.point}
 
     def _round(self, given: Hypothesis, leaders: int) -> Hypothesis:
@@ -193,7 +195,7 @@ class Search:
         """
         problem, (effect, *others) = self.problem, hypothesis
         candidate = problem.candidates[effect]
-        if others or not isinstance(problem, Movable) or problem.is_straight(candidate.key):
+        if others or not problem.moves or problem.is_straight(candidate.key):
             return
         size = fit.theta[candidate.key] - candidate.lead.off
         if abs(size) > SearchSettings.current().least * candidate.lead.size:

@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from kemba.identify.evidence.operating_point import region_labels
-from kemba.identify.evidence.problem import Array, Labels, Problem, Rows
+from kemba.identify.evidence.problem import Array, Labels, Problem, Rows, Texts
 
 
 @dataclass(frozen=True)
@@ -20,32 +19,25 @@ class Windows:
     noise: Array
 
     def sums(self, columns: Array) -> Array:
-        """Columns (n, ...) summed over every grain, (k, ...), in units of noise."""
+        """Columns (n, ...) summed over every window, (k, ...), in units of noise."""
         scale = self.noise.reshape(-1, *[1] * (columns.ndim - 1))
         return np.asarray(np.add.reduceat(columns, self.first, axis=0) / scale)
 
 
-def aggregation_windows(problem: Problem, rows: Rows, region: Labels) -> Windows:
-    """Grains of as many rows as the problem says (`window`, else one), each under one condition."""
+def aggregation_windows(problem: Problem, rows: Rows, region: Texts) -> Windows:
+    """Windows of `problem.window` rows, each under one condition."""
     begin = np.flatnonzero(changes(rows, region))
     place = np.arange(len(rows)) - np.repeat(begin, np.diff(np.append(begin, len(rows))))
-    first = np.flatnonzero(place % getattr(problem, "window", 1) == 0)
-    return Windows(first, np.sqrt(np.add.reduceat(expected(problem, len(rows)), first)))
+    first = np.flatnonzero(place % problem.window == 0)
+    return Windows(first, np.sqrt(np.add.reduceat(problem.expected_power(), first)))
 
 
 def windows_of(problem: Problem) -> Windows:
-    """Grains of a problem by all its conditions."""
-    rows = problem.rows()
-    return aggregation_windows(problem, rows, region_labels(problem, rows)[1])
+    """Aggregation windows of a problem under all its conditions."""
+    return aggregation_windows(problem, problem.rows(), problem.operating_point().regions())
 
 
-def expected(problem: Problem, count: int) -> Array:
-    """Mean square (n,) of each row if the model were right: one, or what the problem knows."""
-    known = getattr(problem, "expected_power", None)
-    return np.asarray(known() if known else np.ones(count))
-
-
-def changes(rows: Rows, region: Labels) -> np.ndarray[Any, np.dtype[np.bool_]]:
+def changes(rows: Rows, region: Texts) -> np.ndarray[Any, np.dtype[np.bool_]]:
     """Rows (n,) whose run, channel or condition differs from that of the row before."""
     fresh = np.ones(len(rows), dtype=bool)
     labels = (rows.run, rows.channel, *(codes(x) for x in (rows.phase, rows.mode, region)))

@@ -7,13 +7,17 @@ none. In stance the contact forces are unknown too, so only what they cannot exp
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from kemba.identify.compare.missing_force import Missing, spans
-from kemba.identify.evidence.problem import Array, Theta
+from kemba.identify.compare.missing_force import spans
+from kemba.identify.evidence.problem import Array, MissingForce, Theta
 from kemba.identify.robot.dynamics.reference import Floor, densities
 from kemba.identify.robot.motion.filter import System, gains, smooth_with_band
-from kemba.identify.robot.problem import RobotProblem
+
+if TYPE_CHECKING:
+    from kemba.identify.robot.problem import RobotProblem
 
 MEMORY = 0.025  # s, of the missing force
 ROUNDS = 6
@@ -25,7 +29,7 @@ QUIET = Floor(body=1e-5, pitch=1e-6, hip=1e-6, rod=1e-5)
 
 def robot_missing(
     problem: RobotProblem, theta: Theta | None = None, strength: Array | None = None
-) -> list[Missing]:
+) -> list[MissingForce]:
     """d(t) per run: force on the body, moments at pitch and hips, force on the rods."""
     names = problem.physics.channels
     kinds = [_kind(name) for name in names]
@@ -45,7 +49,7 @@ def robot_missing(
         n = len(track.time)
         force, spread = x[:n, i, -k:], np.sqrt(variance[:n, i, -k:])
         down = spans(track.time, problem.plan[i].phase != "flight")
-        found.append(Missing(track.name, track.time, names, units, force, spread, used, down))
+        found.append(MissingForce(track.name, track.time, names, units, force, spread, used, down))
     return found
 
 

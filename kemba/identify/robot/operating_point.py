@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kemba.identify.evidence.operating_point import OperatingPoint, air_force
-from kemba.identify.evidence.problem import Array
+from kemba.identify.evidence.operating_point import air_force
+from kemba.identify.evidence.problem import Array, OperatingPoint
 from kemba.identify.robot.labels import row_channels
 from kemba.identify.robot.motion.resampled import ResampledLog
 

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kemba.identify.compare.force_profiles import ForceChannel, lags, risen
+from kemba.identify.compare.force_profiles import lags, risen
 from kemba.identify.evidence.operating_point import air_force
-from kemba.identify.evidence.problem import Array, Flags
+from kemba.identify.evidence.problem import Array, Flags, ForceChannel
 from kemba.identify.robot.motion.filter import innovations
 from kemba.identify.robot.operating_point import SIDES
 

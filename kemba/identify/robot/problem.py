@@ -9,14 +9,22 @@ are free, contact and stop forces unknown where the data show contact, impacts i
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from copy import copy
 from typing import Any
 
 import numpy as np
+from typing_extensions import Self
 
-from kemba.identify.compare.force_profiles import ForceChannel
 from kemba.identify.evidence.candidates import sensor_candidates
-from kemba.identify.evidence.operating_point import OperatingPoint
-from kemba.identify.evidence.problem import Candidate, Parameter, Rows, Theta, parameter_steps
+from kemba.identify.evidence.problem import (
+    Candidate,
+    ForceChannel,
+    MissingForce,
+    OperatingPoint,
+    Problem,
+    Rows,
+    Theta,
+)
 from kemba.identify.logs.gate import BadData
 from kemba.identify.robot.candidates import (
     DELAYS,
@@ -43,6 +51,7 @@ from kemba.identify.robot.dynamics.reference import (
 from kemba.identify.robot.dynamics.tolerance import SHARE
 from kemba.identify.robot.formulas import formula_columns
 from kemba.identify.robot.labels import describe
+from kemba.identify.robot.missing import robot_missing
 from kemba.identify.robot.motion.batch import Batch
 from kemba.identify.robot.motion.contact import loaded
 from kemba.identify.robot.motion.expected import expected_power, predicted_error
@@ -61,13 +70,14 @@ ROUNDS = 2
 LEAD_IN = 4  # nodes whose innovations only tell where the run starts
 
 
-class RobotProblem:
+class RobotProblem(Problem):
     """`Problem` for robot logs; see the module's text.
 
     `base`: theta at which the motion is smoothed and the model linearised.
     """
 
-    window = 20  # rows over which a comparison sums: innovations are one-step errors
+    window = 20  # innovations are one-step errors
+    moves = True
 
     def __init__(
         self, logs: Sequence[Trajectory], model: Model, floor: Floor | None = None
@@ -92,11 +102,16 @@ class RobotProblem:
             **sensor_candidates(dict(zip(channels, sigma.tolist(), strict=True))),
         }
         self.nuisance: dict[str, tuple[float, float]] = dict(self.physics.nuisance)
-        self.relinearise({})
+        self._linearise_at({})
         self.nuisance |= dict.fromkeys(self.physics.masses, (0.0, SHARE))
 
-    def relinearise(self, base: Theta) -> None:
-        """Smooth and linearise anew with the model at `base`."""
+    def relinearise(self, base: Theta) -> Self:
+        """The same problem, smoothed and linearised anew with the model at `base`."""
+        found = copy(self)
+        found._linearise_at(base)
+        return found
+
+    def _linearise_at(self, base: Theta) -> None:
         self.base = dict(base)
         self._linear: dict[str, tuple[Array, float]] = {}
         physics, batch = self.physics, self.batch
@@ -180,8 +195,7 @@ class RobotProblem:
         if not names:
             return np.empty((len(self.residual(theta, runs)), 0))
         columns = self._direct(theta, [n for n in names if self._is_direct(n)])
-        known = self._parameters()
-        steps = {n: list(parameter_steps(self, known, theta, n)) for n in names if n not in columns}
+        steps = {n: list(self.steps(theta, n)) for n in names if n not in columns}
         moved = [{**theta, **step} for group in steps.values() for step, _ in group]
         shifted = self.columns([theta, *moved]) if moved else np.empty(0)
         k = 1
@@ -208,7 +222,7 @@ class RobotProblem:
         """Columns (n, L, m) of parameters in which the force is linear."""
         if not names:
             return {}
-        typical = {k: v.typical for k, v in self._parameters().items() if np.isfinite(v.typical)}
+        typical = {k: v.typical for k, v in self.parameters().items() if np.isfinite(v.typical)}
         slopes = self._forces.slopes(*self._values({**typical, **theta}))
         place = {n: i for i, n in enumerate(self.physics.names)}
         forces = [
@@ -218,9 +232,6 @@ class RobotProblem:
         g = np.stack([self.point.response(f) for f in forces], axis=-1)
         y = np.zeros((*self.point.system.R.shape, len(names)))
         return dict(zip(names, np.moveaxis(self._whitened(y, g), -1, 0), strict=True))
-
-    def _parameters(self) -> dict[str, Parameter]:
-        return {key: p for c in self.candidates.values() for key, p in c.keys().items()}
 
     def rows(self, runs: Collection[int] | None = None) -> Rows:
         """What each row of `residual` is."""
@@ -257,11 +268,17 @@ class RobotProblem:
         """The piston of each row's leg."""
         return robot_operating_point(self)
 
+    def missing_force(
+        self, theta: Theta | None = None, strength: Array | None = None
+    ) -> list[MissingForce]:
+        """Force on the body, moments at pitch and hips, force on the rods."""
+        return robot_missing(self, theta, strength)
+
     def ports(self) -> list[ForceChannel]:
         """Where a force may be missing: on rods, hips and the body."""
         return robot_ports(self)
 
-    def plausible(self) -> list[str]:
+    def validate(self) -> list[str]:
         """Raise BadData where a log contradicts itself or any model; no remarks."""
         faults = list(contradictions(self))
         if faults:

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure, SubFigure
 from kemba.identify.compare.bins import ConditionBin
 from kemba.identify.compare.compare import Comparison
 from kemba.identify.compare.force_profiles import ForceProfile
-from kemba.identify.compare.missing_force import Missing
+from kemba.identify.evidence.types import MissingForce
 from kemba.plotting.bands import Band, draw_band
 from kemba.plotting.heat import LEVEL, ROW, add_bar, draw_heat, name_conditions
 from kemba.plotting.style import BLUE, GREY, key_above, paper_figure, paper_style
@@ -83,7 +83,7 @@ def _heat(
         add_bar(room, image, list(grid), "")
 
 
-def bands_of(missing: Sequence[Missing], after: Sequence[Missing] = ()) -> list[Band]:
+def bands_of(missing: Sequence[MissingForce], after: Sequence[MissingForce] = ()) -> list[Band]:
     """d(t) of the channels that lack most, in the run that lacks most; with `after`, the part of
     it that is gone there counts as explained."""
     if not missing:

@@ -10,7 +10,6 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from kemba.identify.compare.compare import conditions
-from kemba.identify.compare.smoother import missing_force
 from kemba.identify.compare.tolerance import free_starts
 from kemba.identify.discover import Discovery
 from kemba.identify.evidence.problem import Array, Rows
@@ -72,11 +71,11 @@ def plot_cells(found: Discovery) -> Figure:
 def plot_explained(found: Discovery) -> Figure:
     """d(t) of the model as it stood, with its 95 % band, and what was found of it."""
     problem = found.search.problem
-    before = missing_force(problem, free_starts(problem))
+    before = problem.missing_force(free_starts(problem))
     if not found.best:
         return plot_bands(bands_of(before))
     theta = free_starts(problem, theta_of(found, found.best))
-    after = missing_force(problem, theta, before[0].strength)
+    after = problem.missing_force(theta, before[0].strength)
     return plot_bands(bands_of(before, after), " + ".join(found.best))
 
 

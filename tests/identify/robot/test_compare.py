@@ -15,8 +15,7 @@ from twin import catalogue
 from kemba.identify.compare.bins import excess
 from kemba.identify.compare.compare import Comparison, compare
 from kemba.identify.compare.force_profiles import ForceProfile
-from kemba.identify.compare.smoother import missing_force
-from kemba.identify.robot import robot_problem
+from kemba.identify.robot.problem import robot_problem
 from kemba.model.spec import load_model
 from kemba.plotting.study.comparison import plot_comparison
 
@@ -127,7 +126,7 @@ def test_the_band_of_the_missing_force_covers_the_truth() -> None:
     logs, forces = hops(runs=4, pushes=sigma)
     problem = robot_problem(logs, load_model("planning"))
     inside, strength = [], []
-    for found, force, log in zip(missing_force(problem), forces, logs, strict=True):
+    for found, force, log in zip(problem.missing_force(), forces, logs, strict=True):
         truth = np.stack([np.interp(found.time, log.time, f) for f in force.T], axis=1)
         low, high = found.band()
         inside.append((low < truth) & (truth < high))
@@ -138,5 +137,5 @@ def test_the_band_of_the_missing_force_covers_the_truth() -> None:
 
 def test_where_nothing_is_missing_the_force_is_small() -> None:
     logs, _ = hops(runs=2)
-    for found in missing_force(robot_problem(logs, load_model("planning"))):
+    for found in robot_problem(logs, load_model("planning")).missing_force():
         assert np.abs(found.force[:, 5:]).mean() < 2.0

@@ -11,7 +11,7 @@ from robot_logs import hops
 from twin import catalogue, measure
 
 from kemba.identify.evidence.problem import Problem
-from kemba.identify.robot import RobotProblem, robot_problem
+from kemba.identify.robot.problem import RobotProblem, robot_problem
 from kemba.model.spec import load_model
 from kemba.trajectory import Trajectory
 
