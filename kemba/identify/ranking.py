@@ -3,24 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
 
 import numpy as np
 
 from kemba.identify.answer import Ranked, Value
-from kemba.identify.doubt.cross_validation import heldout_error, left_out, predicted_error
+from kemba.identify.doubt.cross_validation import left_out, left_out_error
 from kemba.identify.evidence.linear import is_shape
 from kemba.identify.evidence.problem import Array, Candidate, Problem
 from kemba.identify.evidence.search import Search, share_of
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis, SpikeSlabSettings
+from kemba.identify.evidence.windows import error_ratio
 from kemba.identify.settings import RankingSettings
 
 
 def error(search: Search, hypothesis: Hypothesis, holdout: Problem | None) -> float:
-    """Whitened RMS on data the fit has not seen."""
-    point = search.points[hypothesis]
+    """Error in units of the noise on data that the fit has not seen: the one number that sentence,
+    ranking, ladder and figures show. Of the held-out logs; without any, of left-out blocks."""
     if holdout is None:
-        return predicted_error(search, point)
-    return heldout_error(holdout, point.fit.theta)
+        return left_out_error(search, hypothesis)
+    unknown = set(holdout.nuisance) - set(search.problem.nuisance)  # of sensors not seen before
+    return error_ratio(holdout, search.points[hypothesis].fit.theta, unknown)
 
 
 def ranked(
@@ -116,12 +119,17 @@ def reported(candidate: Candidate, name: str, unit: str, triple: Array) -> tuple
     return name, unit, np.array([value, high, low])
 
 
-def ladder(search: Search, best: Hypothesis, holdout: Problem | None) -> list[tuple[str, float]]:
-    """Held-out error as effects are added, the strongest first."""
-    steps = [("model as it is", error(search, NULL, holdout))]
+def rungs(search: Search, best: Hypothesis) -> list[Hypothesis]:
+    """Nothing, then the effects of the best answer as they join, the strongest first; parts that
+    were not refitted are passed over."""
     order = sorted(best, key=lambda e: -strength(search, e, best))
-    for i in range(len(order)):
-        part = tuple(sorted(order[: i + 1]))
-        if part in search.points:
-            steps.append((order[i], error(search, part, holdout)))
-    return steps
+    parts = [tuple(sorted(order[: i + 1])) for i in range(len(order))]
+    return [NULL, *(part for part in parts if part in search.points)]
+
+
+def ladder(search: Search, best: Hypothesis, holdout: Problem | None) -> list[tuple[str, float]]:
+    """Error on unseen data at every rung, by what joins there."""
+    steps, names = rungs(search, best), ["model as it is"]
+    for before, after in pairwise(steps):
+        names.append(" + ".join(e for e in after if e not in before))
+    return [(n, error(search, step, holdout)) for n, step in zip(names, steps, strict=True)]

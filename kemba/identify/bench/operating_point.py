@@ -35,7 +35,7 @@ def switchings(log: BenchLog) -> Changes:
     return found
 
 
-def bench_port(predicted: PredictedLogs, rows: Rows, at: OperatingPoint) -> ForceChannel:
+def bench_force_channel(predicted: PredictedLogs, rows: Rows, at: OperatingPoint) -> ForceChannel:
     """The rod: a missing force shows in the force channel, sample by sample."""
     force = rows.channel == rows.channels.index("piston/F")
     sigma = _sigma(predicted)

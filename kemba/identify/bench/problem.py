@@ -12,7 +12,11 @@ from typing_extensions import Self
 from kemba.identify.bench.bench_log import BenchLog, prepare
 from kemba.identify.bench.beyond import formula_columns, leftover, weight
 from kemba.identify.bench.missing import bench_missing
-from kemba.identify.bench.operating_point import bench_operating_point, bench_port, switchings
+from kemba.identify.bench.operating_point import (
+    bench_force_channel,
+    bench_operating_point,
+    switchings,
+)
 from kemba.identify.bench.predicted import PredictedLogs, settle_starts
 from kemba.identify.bench.prediction import Predictor
 from kemba.identify.bench.validate import contradictions
@@ -136,9 +140,9 @@ class BenchProblem(Problem):
         """Per run: valve -> instants and signs of its switchings."""
         return [switchings(log) for log in self.logs]
 
-    def ports(self) -> list[ForceChannel]:
+    def force_channels(self) -> list[ForceChannel]:
         """Where a force may be missing: on the rod."""
-        return [bench_port(self.predicted, self.rows(), self.operating_point())]
+        return [bench_force_channel(self.predicted, self.rows(), self.operating_point())]
 
     def missing_force(
         self, theta: Theta | None = None, strength: Array | None = None

@@ -40,7 +40,7 @@ class BinSettings(Settings):
 @dataclass(frozen=True)
 class ConditionBin:
     """One channel in one phase of motion, valve mode and region of the stroke (`in`, `mid`,
-    `out`); `q_value` controls false discoveries over all cells of a comparison."""
+    `out`); `q_value` controls false discoveries over all bins of a comparison."""
 
     channel: str
     phase: str
@@ -55,8 +55,11 @@ class ConditionBin:
 
 
 def condition_bins(rows: Rows, region: Texts, first: Labels, sums: Array) -> Iterable[ConditionBin]:
-    """Every condition with enough data, of grains that begin at row `first` (k,) and sum to `sums`
-    (k,) in units of noise; q values over all of them."""
+    """Every condition with enough data.
+
+    The aggregation windows begin at row `first` (k,) and sum to `sums` (k,) in units of noise;
+    `region` (n,): region of the stroke of every row. The q values are over all bins returned.
+    """
     parts = (rows.phase, rows.mode, region)
     names = [np.unique(a.astype(str)) for a in parts]
     table = np.stack([rows.channel, *(codes(a) for a in parts)], axis=1)[first]
@@ -76,17 +79,19 @@ def condition_bins(rows: Rows, region: Texts, first: Labels, sums: Array) -> Ite
 
 
 def doubtful(rows: Rows) -> np.ndarray[Any, np.dtype[np.bool_]]:
-    """Rows (n,) of places that stand still by assumption, where the assumption is doubtful: when
-    feet come and go, a contact read a moment early or late is no fault of the model."""
+    """Flags (n,) of rows that assume a foot or a stop to stand still when it may not.
+
+    When feet come and go, a contact may be read a moment early or late: no fault of the model.
+    """
     assumed = np.array([name.endswith(ASSUMED) for name in rows.channels])
     return np.asarray(assumed[rows.channel] & ~np.isin(rows.phase.astype(str), STEADY))
 
 
 def excess(z: Array) -> float:
-    """p value of the errors (n,) of a good model being as large as these.
+    """p value of errors z (n,), in units of noise, under a good model.
 
-    Correlated errors count for less. The largest error does not count: a foot that lifts a moment
-    early makes one large error, also where the model is right.
+    Correlated errors count for less. The largest error is left out: a foot that lifts a moment
+    early makes one large error, which is no evidence against the model.
     """
     if len(z) > 1:
         z = np.delete(z, np.argmax(np.abs(z)))

@@ -13,9 +13,9 @@ from kemba.identify.compare.bins import ConditionBin, condition_bins
 from kemba.identify.compare.force_profiles import ForceProfile, force_profiles
 from kemba.identify.compare.hints import Hint, Response, conflicts, lacking, lagged
 from kemba.identify.compare.missing_force import Peak, peaks
-from kemba.identify.compare.tolerance import free_starts, slopes, within_tolerance
+from kemba.identify.compare.tolerance import slopes, within_tolerance
 from kemba.identify.evidence.problem import Array, MissingForce, Problem, Rows, Texts, Theta
-from kemba.identify.evidence.windows import Windows, aggregation_windows, rms
+from kemba.identify.evidence.windows import Windows, aggregation_windows, free_starts, rms
 from kemba.settings import BY_HAND, Settings, setting
 
 
@@ -43,8 +43,9 @@ class ChannelError:
 class Comparison:
     """What `compare` says; `good` where the error is within the noise.
 
-    `tolerant_ratio`: what the error would be if the model's nominal figures were off by their
-    usual tolerance, in the best way; `tolerable`: that would be within the noise everywhere.
+    `noise_ratio`: error in units of the noise (see `error_ratio`). `tolerant_ratio`: the same if
+    the model's nominal figures took the best values within their usual tolerance; `tolerable`: that
+    would be within the noise everywhere.
     """
 
     logs: tuple[str, ...]
@@ -107,7 +108,7 @@ def compare(problem: Problem, model: str, logs: Sequence[str] = ()) -> Compariso
         tuple(_channels(problem, rows, r, window, start)),
         tuple(condition_bins(rows, region, window.first, sums)),
         ratio,
-        clean and not any(law.matters for law in force_profiles(problem, left)),
+        clean and not any(profile.matters for profile in force_profiles(problem, left)),
         (*sent, *conflicts(problem, rows, r, known)),
         responses,
         forces,
@@ -118,17 +119,13 @@ def compare(problem: Problem, model: str, logs: Sequence[str] = ()) -> Compariso
     return replace(found, sentence=phrase(found))
 
 
-def conditions(
-    problem: Problem, theta: Theta | None = None, regions: bool = False
-) -> tuple[float, list[ConditionBin]]:
-    """Error ratio and cells of the model with `theta` added, told apart by region or not."""
+def conditions(problem: Problem, theta: Theta | None = None) -> list[ConditionBin]:
+    """Error by condition of the model with `theta` added; regions of the stroke are not told
+    apart."""
     rows, r = problem.rows(), problem.residual(free_starts(problem, theta))
     region = np.full(len(rows), "", dtype=object)
-    if regions:
-        region = problem.operating_point().regions()
     window = aggregation_windows(problem, rows, region)
-    sums = window.sums(r)
-    return rms(sums), list(condition_bins(rows, region, window.first, sums))
+    return list(condition_bins(rows, region, window.first, window.sums(r)))
 
 
 def _tolerant(rows: Rows, region: Texts, window: Windows, left: Array) -> tuple[float, bool]:
@@ -197,8 +194,8 @@ def phrase(found: Comparison) -> str:
     return "; ".join(parts) + "."
 
 
-def _place(cell: ConditionBin) -> str:
+def _place(at: ConditionBin) -> str:
     valves = {"00": "valves off", "10": "extend valve on", "01": "retract valve on"}
     stroke = {"in": ", piston retracted", "mid": ", piston mid-stroke", "out": ", piston extended"}
-    mode = valves.get(cell.mode, "both valves on")
-    return f"{cell.channel} in {cell.phase} with {mode}{stroke.get(cell.region, '')}"
+    mode = valves.get(at.mode, "both valves on")
+    return f"{at.channel} in {at.phase} with {mode}{stroke.get(at.region, '')}"

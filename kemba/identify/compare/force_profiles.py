@@ -1,8 +1,7 @@
 """The missing force as a function of one quantity: speed, position, load, time since a command.
 
-The force is taken as constant within bins of the quantity. Its values follow by least squares in
-the same whitened residuals that all else is judged by, so that they carry honest intervals and
-are not shrunk as a smoothed force is.
+The force is taken as constant within bins of the quantity. Its values follow by least squares from
+the whitened residuals. So their intervals are those of the noise, and no smoothing shrinks them.
 """
 
 from __future__ import annotations
@@ -61,9 +60,9 @@ class ForceProfileSettings(Settings):
 @dataclass(frozen=True)
 class ForceProfile:
     """Missing `force` [unit] and its 1 sigma per bin (b,) around `centre` of a quantity; `gain`:
-    what it explains beyond its number of bins [nats]; `usual` as of its port."""
+    what it explains beyond its number of bins [nats]; `usual` as of its channel."""
 
-    port: str
+    channel: str
     unit: str
     quantity: str
     centre: Array
@@ -74,13 +73,13 @@ class ForceProfile:
 
     @property
     def matters(self) -> bool:
-        """Whether a force is there beyond doubt, and is not negligible."""
+        """Whether a force is certainly there, and is not negligible."""
         settings = ForceProfileSettings.current()
         return self.gain > settings.doubt and self.largest > settings.negligible * self.usual
 
     @property
     def largest(self) -> float:
-        """Of the forces that are plainly not nought, the largest."""
+        """The largest force [unit] that differs from zero by more than its error."""
         plain = np.abs(self.force) > ForceProfileSettings.current().sure * self.sigma
         return float(np.max(np.abs(self.force[plain]), initial=0.0))
 
@@ -96,50 +95,57 @@ class ForceProfile:
     def __str__(self) -> str:
         what = self.quantity.partition(" [")[0]
         if self.constant is not None:
-            return (
-                f"a constant force on the {self.port} is missing ({self.constant:+.2g} {self.unit})"
-            )
+            force = f"{self.constant:+.2g} {self.unit}"
+            return f"a constant force on the {self.channel} is missing ({force})"
         going = "comes" if what.startswith("after ") else "goes with"
         size = f"up to {self.largest:.2g} {self.unit}"
-        return f"a force on the {self.port} is missing that {going} {what} ({size})"
+        return f"a force on the {self.channel} is missing that {going} {what} ({size})"
 
 
 def force_profiles(problem: Problem, residual: Array) -> list[ForceProfile]:
-    """Every port against every quantity of its own, the most telling port first."""
-    found = [[p for p in _of(port, residual) if p is not None] for port in problem.ports()]
+    """Every force channel against each of its quantities, the channel that explains most first.
+
+    `residual` (n,): whitened.
+    """
+    found = [
+        [p for p in _of(channel, residual) if p is not None] for channel in problem.force_channels()
+    ]
     found = [group for group in found if group]
     found.sort(key=lambda group: -max(p.gain for p in group))
     return [p for group in found for p in group]
 
 
-def _of(port: ForceChannel, residual: Array) -> list[ForceProfile | None]:
-    by_value = [force_profile(port, label, residual) for label in port.quantities]
-    return by_value + [_solved(port, f"after {n} [ms]", 1e3 * middle(lags()), rise, residual)
-                       for n, rise in port.after.items()]  # fmt: skip
+def _of(channel: ForceChannel, residual: Array) -> list[ForceProfile | None]:
+    by_value = [force_profile(channel, label, residual) for label in channel.quantities]
+    return by_value + [_solved(channel, f"after {n} [ms]", 1e3 * middle(lags()), rise, residual)
+                       for n, rise in channel.after.items()]  # fmt: skip
 
 
-def force_profile(port: ForceChannel, label: str, residual: Array) -> ForceProfile | None:
-    """The missing force of a port by bins of one of its quantities; None where it hardly varies."""
-    values = port.quantities[label]
+def force_profile(channel: ForceChannel, label: str, residual: Array) -> ForceProfile | None:
+    """The missing force of a channel by bins of one of its quantities; None where the quantity
+    hardly varies."""
+    values = channel.quantities[label]
     edges = bins(values)
     if edges is None:
         return None
     flags = _flags(values, edges)
     sides = flags.reshape(-1, flags.shape[-1])
     centre = np.array([float(np.median(values.ravel()[own])) for own in sides.T])
-    return _solved(port, label, centre, flags.astype(float), residual)
+    return _solved(channel, label, centre, flags.astype(float), residual)
 
 
 def _solved(
-    port: ForceChannel, label: str, centre: Array, shapes: Array, residual: Array
+    channel: ForceChannel, label: str, centre: Array, shapes: Array, residual: Array
 ) -> ForceProfile:
-    columns, wide = port.columns(shapes), ForceProfileSettings.current().wide
-    prior = np.eye(shapes.shape[-1]) / (wide * port.usual) ** 2
+    columns, wide = channel.columns(shapes), ForceProfileSettings.current().wide
+    prior = np.eye(shapes.shape[-1]) / (wide * channel.usual) ** 2
     gram, slope = columns.T @ columns + prior, columns.T @ residual
     force = -np.linalg.solve(gram, slope)
     sigma = np.sqrt(np.diag(np.linalg.inv(gram)))
     gain = 0.5 * float(force @ gram @ force) - len(force)
-    return ForceProfile(port.name, port.unit, label, centre, force, sigma, gain, port.usual)
+    return ForceProfile(
+        channel.name, channel.unit, label, centre, force, sigma, gain, channel.usual
+    )
 
 
 def lags() -> Array:
@@ -154,15 +160,17 @@ def middle(edges: Array) -> Array:
 
 
 def risen(times: Array, sizes: Array, at: Array) -> Array:
-    """How much a command with changes `sizes` at `times` rose within each of the `lags` before the
-    moments `at` (n,): (n, lags)."""
+    """How much a command rose within each of the `lags` before the moments `at` (n,) [s]: (n, l).
+
+    The command changes by `sizes` (c,) at `times` (c,) [s].
+    """
     total = np.concatenate([[0.0], np.cumsum(sizes)])
     level = total[np.searchsorted(times, at[:, None] - lags(), side="right")]
     return np.asarray(level[:, :-1] - level[:, 1:])
 
 
 def bins(values: Array) -> Array | None:
-    """Edges of bins with the same number of samples each; None without enough of them."""
+    """Edges (b + 1,) of bins with the same number of samples each; None with too few samples."""
     settings = ForceProfileSettings.current()
     seen = values[np.isfinite(values)]
     if len(seen) < 2 * settings.fewest:

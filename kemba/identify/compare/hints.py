@@ -1,5 +1,5 @@
 """What the error goes with: a force by speed, position or load, commands sent before it, and
-parameters that wander between runs or between valve modes."""
+parameters that would have to differ between runs or between valve modes."""
 
 from __future__ import annotations
 
@@ -45,7 +45,11 @@ class HintSettings(Settings):
 
 @dataclass(frozen=True)
 class Hint:
-    """One finding in words; `kind`: law, command, conflict; the larger `weight`, the plainer."""
+    """One thing that the error goes with, in words.
+
+    `kind`: `law` (a missing force that goes with a quantity), `command` or `conflict`. The larger
+    `weight`, the clearer it is.
+    """
 
     kind: str
     text: str
@@ -54,8 +58,10 @@ class Hint:
 
 @dataclass(frozen=True)
 class Response:
-    """Cross-correlation of a channel's error with the changes of a command before it: z score
-    (k,) per `lag` (k,) [s]; `tests`: how many were tried for this one."""
+    """Cross-correlation of a channel's error with the changes of a command before it.
+
+    `z` (k,): z score per `lag` (k,) [s]. `tests`: how many were tried to find this one.
+    """
 
     channel: str
     command: str
@@ -80,16 +86,17 @@ class Response:
 
 
 def lacking(found: Sequence[ForceProfile]) -> list[Hint]:
-    """The missing force that explains most, if it is plain."""
+    """The missing force that explains most, if it explains enough."""
     plain = ForceProfileSettings.current().plain
-    best = max(found, key=lambda law: law.gain, default=None)
+    best = max(found, key=lambda profile: profile.gain, default=None)
     return [Hint("law", str(best), best.gain)] if best and best.gain > plain else []
 
 
 def lagged(problem: Problem, rows: Rows, white: Array) -> list[Response]:
-    """Of every command the channel whose error follows its changes most plainly; these first.
+    """For every command the channel whose error follows its changes most clearly, the clearest
+    command first.
 
-    `white` (n,) has unit variance where the model is right.
+    `white` (n,): residual with unit variance where the model is right.
     """
     runs = problem.commands()
     names = sorted({n for run in runs for n in run})
@@ -121,8 +128,8 @@ def _strongest(
 
 
 def conflicts(problem: Problem, rows: Rows, r: Array, known: Slopes) -> list[Hint]:
-    """Parameters whose best value wanders more than its error allows, the clearest first: from run
-    to run, or from one valve mode to another."""
+    """Parameters whose best values differ by more than their error allows, from run to run or from
+    one valve mode to another; the clearest first. `r` (n,): the residual."""
     groups = {"from run to run": rows.run, "between valve modes": codes(rows.mode)}
     found = [
         hint
@@ -133,8 +140,11 @@ def conflicts(problem: Problem, rows: Rows, r: Array, known: Slopes) -> list[Hin
 
 
 def _wandering(r: Array, known: Slopes, group: Labels, text: str) -> Iterable[Hint]:
-    """Each effect's switch with a value per group against one value for all; the nuisance
-    parameters, free within their priors, are the same in all groups."""
+    """Each effect's switch with one value per group against one value for all.
+
+    `group` (n,): group of each row. The nuisance parameters are free within their priors, and the
+    same in all groups.
+    """
     settings = HintSettings.current()
     parts = [group == i for i in np.unique(group)]
     by_part = [(known.by_lead[own], known.by_nuisance[own], r[own]) for own in parts]
@@ -154,8 +164,11 @@ def _wandering(r: Array, known: Slopes, group: Labels, text: str) -> Iterable[Hi
 
 
 def _agreement(information: Array, pull: Array) -> float:
-    """p value of one value for all groups, from the information (g, g) on a value for each and the
-    slope (g,) of the log likelihood at nought."""
+    """p value of one value for all groups.
+
+    `information` (g, g) on a value for each group; `pull` (g,): slope of the log likelihood where
+    all values are zero.
+    """
     if len(pull) < 2:
         return 1.0
     slack = HintSettings.current().slack

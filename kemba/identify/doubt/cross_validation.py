@@ -1,4 +1,4 @@
-"""Does it hold on data it was not fitted to? Prediction of left-out blocks, and held-out logs."""
+"""Does it hold on data it was not fitted to? Each block of time is predicted from the others."""
 
 from __future__ import annotations
 
@@ -7,13 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from kemba.identify.evidence.linear import Linear, estimate, linearise, time_blocks
-from kemba.identify.evidence.null_model import best_fit
+from kemba.identify.evidence.linear import Linear
 from kemba.identify.evidence.point import LinearisationPoint
-from kemba.identify.evidence.problem import Array, Problem, Theta
+from kemba.identify.evidence.problem import Array
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
-from kemba.identify.evidence.windows import rms, windows_of
 from kemba.settings import BY_HAND, Settings, setting
 
 
@@ -66,7 +64,7 @@ def left_out(search: Search, hypothesis: Hypothesis, against: Hypothesis = NULL)
 
 def _predicted(search: Search, point: LinearisationPoint) -> Array:
     """Log likelihood (b,) of each block under the fit to all others."""
-    return -0.5 * _powers(search, point, point.linear) / search.heat
+    return -0.5 * _powers(search, point, point.linear)
 
 
 def _powers(search: Search, point: LinearisationPoint, judged: Linear) -> Array:
@@ -87,30 +85,21 @@ def _powers(search: Search, point: LinearisationPoint, judged: Linear) -> Array:
 def within_tolerance(search: Search, linear: Linear, hypothesis: Hypothesis) -> Array:
     """z (k,) of the best fit with the nominal figures within their tolerance."""
     settings = CrossValidationSettings.current()
-    ranker = search.base.ranker(linear, floor=settings.none)
+    ranker = search.base.ranker(linear, spike=settings.none)
     width = ranker.widths(hypothesis, 1.0)
     gram, slope, _ = linear.total
-    h = gram * np.outer(width, width) / search.heat + np.eye(len(width))
+    h = gram * np.outer(width, width) + np.eye(len(width))
     shift = (linear.mean - linear.at) / width
     lower = np.linalg.cholesky(h)
-    target = np.linalg.solve(lower, shift - width * slope / search.heat)
+    target = np.linalg.solve(lower, shift - width * slope)
     reach = np.where(ranker.nuisance, settings.tolerated, settings.free)
     found = lsq_linear(lower.T, target, bounds=(shift - reach, shift + reach), method="bvls")
     return np.asarray(linear.at + width * found.x)
 
 
-def predicted_error(search: Search, point: LinearisationPoint) -> float:
-    """RMS of whitened residuals summed over grains, each block predicted from all others."""
-    power = float(_powers(search, point, point.coarse).sum())
-    return float(np.sqrt(max(power, 0.0) / point.coarse.count.sum()))
-
-
-def heldout_error(problem: Problem, theta: Theta) -> float:
-    """RMS of whitened residuals summed over grains on other logs; only how their runs start is
-    fitted to them."""
-    names = tuple(n for n in problem.nuisance if n not in theta or n.startswith("start:"))
-    theta = {k: v for k, v in theta.items() if not k.startswith("start:")}
-    if names:
-        linear, _, _ = linearise(problem, theta, time_blocks(problem), names)
-        theta = theta | estimate(problem, linear, best_fit(linear))
-    return rms(windows_of(problem).sums(problem.residual(theta)))
+def left_out_error(search: Search, hypothesis: Hypothesis) -> float:
+    """RMS of whitened residuals summed over aggregation windows, as `error_ratio`, each block of
+    time predicted from all others."""
+    point = search.points[hypothesis]
+    power = float(_powers(search, point, point.windowed).sum())
+    return float(np.sqrt(max(power, 0.0) / point.windowed.count.sum()))

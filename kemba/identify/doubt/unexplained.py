@@ -148,9 +148,8 @@ def extended(
         r,
         search.base.division.blocks,
     )
-    ranker = Ranker(
-        joined, {**search.problem.candidates, **candidates}, search.problem.nuisance, search.heat
-    )
+    problem = search.problem
+    ranker = Ranker(joined, {**problem.candidates, **candidates}, problem.nuisance)
     ranker.silent = frozenset(candidates)
     return ranker, names
 

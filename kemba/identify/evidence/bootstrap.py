@@ -91,12 +91,12 @@ def _slopes(ranker: Ranker, noise: Array, rng: np.random.Generator, draws: int) 
 
 def _evidence(ranker: Ranker, hypothesis: Hypothesis, slopes: Array) -> Array:
     """Log evidence (draws,), up to a term that all hypotheses share."""
-    gram = ranker.linear.gram.sum(axis=0) / ranker.heat
+    gram = ranker.linear.gram.sum(axis=0)
     parts, tolerances = [], SpikeSlabSettings.current().tolerances
     for tolerance in tolerances:
         width = ranker.widths(hypothesis, tolerance)
         factor = cho_factor(gram * np.outer(width, width) + np.eye(len(width)), lower=True)
-        eta = -width[:, None] * slopes / ranker.heat
+        eta = -width[:, None] * slopes
         step = cho_solve(factor, eta)
         value = 0.5 * np.sum(eta * step, axis=0) - float(np.sum(np.log(np.diag(factor[0]))))
         parts.append(value + _sides(ranker, hypothesis, width, factor, step))

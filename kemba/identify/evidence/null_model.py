@@ -46,10 +46,8 @@ class Baseline:
     jacobian: Array
     residual: Array
 
-    def __init__(
-        self, problem: Problem, heat: float = 1.0, among: frozenset[Hypothesis] | None = None
-    ) -> None:
-        self.problem, self.heat, self.among = problem, heat, among
+    def __init__(self, problem: Problem, among: frozenset[Hypothesis] | None = None) -> None:
+        self.problem, self.among = problem, among
         self.division = Division(problem)
         self.table: dict[Hypothesis, float] = {}
         self._start()
@@ -61,9 +59,9 @@ class Baseline:
         at = [self.point.linear.index(n) for n in names]
         return Frozen(names, self.jacobian[:, at])
 
-    def ranker(self, linear: Linear, floor: float | None = None) -> Ranker:
+    def ranker(self, linear: Linear, spike: float | None = None) -> Ranker:
         """Evidence of hypotheses on `linear`."""
-        return Ranker(linear, self.problem.candidates, self.problem.nuisance, self.heat, floor)
+        return Ranker(linear, self.problem.candidates, self.problem.nuisance, spike)
 
     def flexible_fit(self) -> Array:
         """z (k,) at the null with every effect free at its full size."""
@@ -105,9 +103,11 @@ class Baseline:
         """The null with the slopes as they are now, at theta or where it was."""
         theta = self.point.fit.theta if theta is None else theta
         names = names or self.point.linear.names
-        linear, coarse = self.division.linear(theta, names, self.jacobian, self.residual)
+        linear, windowed = self.division.linear(theta, names, self.jacobian, self.residual)
         fit = Fit(dict(theta), 0.5 * float(self.residual @ self.residual))
-        self.point = LinearisationPoint(NULL, fit, linear, coarse, self.ranker(linear).score(NULL))
+        self.point = LinearisationPoint(
+            NULL, fit, linear, windowed, self.ranker(linear).score(NULL)
+        )
 
     def _glance(self, hypothesis: Hypothesis) -> float:
         """Log evidence where the linear estimate points to, with the true residual there.

@@ -186,7 +186,7 @@ class Problem(ABC):
         """Per run: command -> times [s] and sizes of its changes. Empty: commands are unknown."""
         return []
 
-    def ports(self) -> Sequence[ForceChannel]:
+    def force_channels(self) -> Sequence[ForceChannel]:
         """Places where a force may be missing."""
         return []
 

@@ -55,12 +55,11 @@ def refit(
     hypothesis: Hypothesis,
     start: Mapping[str, float],
     frozen: Frozen,
-    heat: float = 1.0,
 ) -> Fit:
     """The best theta with these effects on, from `start` (and, where shapes exist, others)."""
     best: Fit | None = None
     for trial in _starts(problem, hypothesis, start):
-        fit = _LeastSquares(problem, hypothesis, trial, frozen, heat).run()
+        fit = _LeastSquares(problem, hypothesis, trial, frozen).run()
         if best is None or fit.cost < best.cost - 1e-6:
             best = fit
     assert best is not None
@@ -112,9 +111,8 @@ class _LeastSquares:
         hypothesis: Hypothesis,
         start: Mapping[str, float],
         frozen: Frozen,
-        heat: float,
     ) -> None:
-        self.problem, self.frozen, self.scale = problem, frozen, 1.0 / np.sqrt(heat)
+        self.problem, self.frozen = problem, frozen
         self.own = {key: p for e in hypothesis for key, p in problem.candidates[e].keys().items()}
         self.switches = {problem.candidates[e].key for e in hypothesis}
         self.nuisance = list(frozen.names)
@@ -143,7 +141,7 @@ class _LeastSquares:
         columns = {}
         for i, (key, p) in enumerate(self.own.items(), start=n):
             unit = p.size if is_shape(self.problem, key) else self.slab * p.size
-            columns[key] = jacobian[:rows, i] / (self.scale * unit)
+            columns[key] = jacobian[:rows, i] / unit
         return columns
 
     def _nuisance_start(self) -> Iterable[float]:
@@ -187,7 +185,7 @@ class _LeastSquares:
         return theta
 
     def _residual(self, x: Array) -> Array:
-        r = self.problem.residual(self._theta(x)) * self.scale
+        r = self.problem.residual(self._theta(x))
         absurd = self.settings.absurd
         return np.concatenate([np.nan_to_num(np.clip(r, -absurd, absurd), nan=absurd), x])
 
@@ -197,7 +195,7 @@ class _LeastSquares:
         sigmas = np.array([self.problem.nuisance[name][1] for name in self.nuisance])
         jacobian = np.zeros((len(base), len(x)))
         rows = len(base) - len(x)
-        jacobian[:rows, :n] = self.frozen.jacobian * sigmas * self.scale
+        jacobian[:rows, :n] = self.frozen.jacobian * sigmas
         jacobian[rows:] = np.eye(len(x))
         for i in range(n, len(x)):
             h = self.settings.step

@@ -68,7 +68,6 @@ class Search:
     problem: Problem
     deadline: float = np.inf
     say: Callable[[str], None] = lambda text: None
-    heat: float = 1.0
     points: dict[Hypothesis, LinearisationPoint] = field(default_factory=dict)
     base: Baseline = field(init=False)
     _thetas: dict[Hypothesis, dict[str, float]] = field(default_factory=dict)
@@ -136,7 +135,7 @@ class Search:
 
     def start(self, among: frozenset[Hypothesis] | None = None) -> None:
         """Null fit, noise colour, and the linear table at the null."""
-        self.base = Baseline(self.problem, self.heat, among)
+        self.base = Baseline(self.problem, among)
         self.problem = self.base.problem
         self.points = {NULL: self.base.point}
 
@@ -178,9 +177,7 @@ class Search:
         """Refit a hypothesis (once) and score it there."""
         if hypothesis not in self.points:
             self.say(f"refitting {' + '.join(hypothesis)}")
-            fit = refit(
-                self.problem, hypothesis, self._guess(hypothesis), self.base.frozen, self.heat
-            )
+            fit = refit(self.problem, hypothesis, self._guess(hypothesis), self.base.frozen)
             self._learn_secant(hypothesis, fit)
             self.points[hypothesis] = self._point(hypothesis, fit)
             self._thetas[hypothesis] = fit.theta
@@ -214,10 +211,9 @@ class Search:
             self._stale = False
 
     def _point(self, hypothesis: Hypothesis, fit: Fit) -> LinearisationPoint:
-        linear, coarse = self._near(fit)
-        return LinearisationPoint(
-            hypothesis, fit, linear, coarse, self.base.ranker(linear).score(hypothesis)
-        )
+        linear, windowed = self._near(fit)
+        score = self.base.ranker(linear).score(hypothesis)
+        return LinearisationPoint(hypothesis, fit, linear, windowed, score)
 
     def _near(self, fit: Fit) -> tuple[Linear, Linear]:
         """Linear at a refitted point: its own slopes are fresh, the others are the null's."""

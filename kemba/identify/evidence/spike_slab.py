@@ -68,20 +68,23 @@ class Score:
 
 
 class Ranker:
-    """Scores hypotheses on one linearisation; `heat` > 1 tempers too sure a likelihood."""
+    """Scores hypotheses on one linearisation.
+
+    Every effect of the catalogue may be there with a small share of its size: the `spike` width of
+    its prior, in sizes. The effects of a hypothesis have the slab width instead.
+    """
 
     def __init__(
         self,
         linear: Linear,
         candidates: Mapping[str, Candidate],
         nuisance: Iterable[str],
-        heat: float = 1.0,
-        floor: float | None = None,
+        spike: float | None = None,
     ) -> None:
         self._prior = SpikeSlabSettings.current()
-        floor = self._prior.spike if floor is None else floor
-        self.linear, self.candidates, self.heat, self.floor = linear, candidates, heat, floor
-        self.silent: frozenset[str] = frozenset()  # effects with no floor of their own
+        spike = self._prior.spike if spike is None else spike
+        self.linear, self.candidates, self.spike = linear, candidates, spike
+        self.silent: frozenset[str] = frozenset()  # effects that are absent unless supposed
         free = set(nuisance)
         self.nuisance = np.array([name in free for name in linear.names])
         self.lead = {c.effect: linear.index(c.key) for c in candidates.values()}
@@ -91,8 +94,7 @@ class Ranker:
             ]
             for effect, c in candidates.items()
         }
-        gram, slope, power = linear.total
-        self._gram, self._slope, self._power = gram / heat, slope / heat, power / heat
+        self._gram, self._slope, self._power = linear.total
 
     def score(self, hypothesis: Hypothesis) -> Score:
         """Averaged over how far the nominal figures may be off."""
@@ -122,8 +124,8 @@ class Ranker:
         width = self.linear.width.copy()
         width[self.nuisance] *= tolerance
         for effect, i in self.lead.items():
-            floor = self._prior.silent if effect in self.silent else self.floor
-            share = np.hypot(self._prior.slab, floor) if effect in hypothesis else floor
+            spike = self._prior.silent if effect in self.silent else self.spike
+            share = np.hypot(self._prior.slab, spike) if effect in hypothesis else spike
             width[i] *= share
         return np.asarray(np.maximum(width, 1e-12))
 

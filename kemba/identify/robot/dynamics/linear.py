@@ -23,14 +23,14 @@ from kemba.identify.robot.dynamics.reference import (
 )
 from kemba.identify.robot.motion.batch import Batch
 from kemba.identify.robot.motion.contact import Schedule, steady
-from kemba.identify.robot.motion.filter import System, gains, smooth
+from kemba.identify.robot.motion.filter import Gains, System, smooth
 from kemba.identify.robot.motion.sensing import travelled
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
 @dataclass(frozen=True)
-class Linearised:
+class LinearisedMotion:
     """Everything about one reference that does not change with theta."""
 
     ref: Reference
@@ -82,15 +82,15 @@ class Linearised:
         return depth
 
 
-def linearise(
+def linearise_along(
     physics: Physics,
     batch: Batch,
-    plan: Sequence[Schedule],
+    schedules: Sequence[Schedule],
     ref: Reference,
     density: Array,
     states: tuple[Array, Array],
     p: Array,
-) -> Linearised:
+) -> LinearisedMotion:
     """The model along `ref` with unknown forces of `density` per channel and foot axis."""
     k, legs = physics.mechanism.n, len(physics.legs)
     mid = tuple(batch.flat(a) for a in ref.middle(batch.h))
@@ -100,7 +100,7 @@ def linearise(
     at_nodes = [batch.flat(ref.q), batch.flat(ref.v)]
     y, rate, Jy = (batch.deep(a) for a in physics.call("measured", *at_nodes))
     feet, feet_rate, Jf = (batch.deep(a) for a in physics.call("feet", *at_nodes))
-    slip = batch.pad([x.slides for x in plan], 0.0)
+    slip = batch.pad([x.slides for x in schedules], 0.0)
     density = density.copy()
     for leg in range(legs):  # a sliding foot pushes along the edge of its cone
         pushing = k + 2 * leg
@@ -131,7 +131,7 @@ def linearise(
     places = 3 * legs  # where each foot stands (x, z), and the stop on which each piston rests
     W = np.zeros((*batch.h.shape, k + places, k + places))
     W[..., :k, :k] = scatter(inverse @ channels, density, batch.h)
-    held = batch.pad([x.held.astype(float) for x in plan], 0.0) > 0.5
+    held = batch.pad([x.held.astype(float) for x in schedules], 0.0) > 0.5
     wander = np.array([GROUND_WANDER] * 2 * legs + [STOP_WANDER] * legs)
     free = np.array([ANCHOR_FREE, GROUND_WANDER] * legs + [ANCHOR_FREE] * legs)
     i = np.arange(places)
@@ -156,7 +156,7 @@ def linearise(
     system.W[ends], system.F[ends] = 0.0, np.eye(2 * k + places)
     inverse = np.where(ends[..., None, None], 0.0, inverse)
     masses = batch.deep(physics.call("masses", *mid)[0])
-    return Linearised(
+    return LinearisedMotion(
         ref,
         mid,
         states,
@@ -200,14 +200,15 @@ def contact_force(
     return (acting @ rigid[..., None])[..., 0], feet
 
 
-def smoothed(point: Linearised, y: Array, g: Array) -> Reference:
-    """A better reference: the smoothed deviations added."""
-    k = point.ref.q.shape[2]
-    g_all = point.extend(g[..., None])[..., 0]
-    x, w = smooth(point.system, gains(point.system), y, g_all)
-    A_q, A_v = point.A
+def smoothed(motion: LinearisedMotion, gain: Gains, y: Array, g: Array) -> Reference:
+    """A better reference: the smoothed deviations added. `y` (n, L, m) measured beyond the
+    reference, `g` (n, L, k) acceleration of the model beyond the reference's."""
+    k = motion.ref.q.shape[2]
+    g_all = motion.extend(g[..., None])[..., 0]
+    x, w = smooth(motion.system, gain, y, g_all)
+    A_q, A_v = motion.A
     dq, dv = x[..., :k], x[..., k : 2 * k]
     turn = (A_q @ dq[..., None] + A_v @ dv[..., None])[..., 0]
-    live = np.any(point.inverse != 0.0, axis=(2, 3))[..., None]
-    a = np.where(live, point.ref.a + turn + g + w[..., :k], 0.0)
-    return Reference(point.ref.q + dq, point.ref.v + dv, a)
+    live = np.any(motion.inverse != 0.0, axis=(2, 3))[..., None]
+    a = np.where(live, motion.ref.a + turn + g + w[..., :k], 0.0)
+    return Reference(motion.ref.q + dq, motion.ref.v + dv, a)

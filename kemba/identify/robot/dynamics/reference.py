@@ -91,39 +91,39 @@ def _kinematic(name: str) -> float:
     return KINEMATIC.get(name) or KINEMATIC["hip" if "hip" in name else "knee"]
 
 
-def schedules(physics: Physics, batch: Batch, ref: Reference) -> list[Schedule]:
+def read_schedules(physics: Physics, batch: Batch, ref: Reference) -> tuple[Schedule, ...]:
     """Contact read from the motion of each run."""
     q, v = batch.flat(ref.q), batch.flat(ref.v)
     legs = len(physics.legs)
     feet = batch.deep(physics.call("feet", q, v)[0].reshape(-1, legs, 2))
     y = batch.deep(physics.call("measured", q, v)[0])
     found = []
-    for i, track in enumerate(batch.resampled):
-        n = len(track.time)
+    for i, log in enumerate(batch.resampled):
+        n = len(log.time)
         found.append(
             read_schedule(
-                track.time,
+                log.time,
                 feet[:n, i],
                 y[:n, i, -legs:],
                 physics.mechanism.stroke,
                 ref.q[:n, i, :3],
             )
         )
-    return found
+    return tuple(found)
 
 
-def densities(physics: Physics, batch: Batch, plan: Sequence[Schedule], floor: Floor) -> Array:
+def densities(physics: Physics, batch: Batch, schedules: Sequence[Schedule], floor: Floor) -> Array:
     """(n, L, k + 2 legs): density of unknown force per measured channel and foot axis."""
     legs, parts = len(physics.legs), []
-    for track, schedule in zip(batch.resampled, plan, strict=True):
+    for log, schedule in zip(batch.resampled, schedules, strict=True):
         own = [floor.body, floor.body, floor.pitch] + [floor.hip] * legs + [floor.rod] * legs
-        density = np.tile(np.array(own + [0.0] * 2 * legs), (len(track.time), 1))
+        density = np.tile(np.array(own + [0.0] * 2 * legs), (len(log.time), 1))
         rods = density[:, 3 + legs : 3 + 2 * legs]
         rods += np.where(schedule.low | schedule.high, CONTACT, 0.0)
         rods += np.where((schedule.low | schedule.high) & schedule.struck, IMPACT, 0.0)
         rods += _edges(schedule.low | schedule.high)
         if schedule.phase[min(5, len(schedule.phase) - 1)] != "rest":
-            since = (track.time - track.time[0])[:, None]
+            since = (log.time - log.time[0])[:, None]
             rods += UNKNOWN_AIR * np.exp(-2.0 * since / AIR_FADES)
         feet = np.where(schedule.foot, CONTACT, 0.0) + np.where(schedule.struck, IMPACT, 0.0)
         density[:, 3 + 2 * legs :] = np.repeat(feet, 2, axis=1)
