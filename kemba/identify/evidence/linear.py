@@ -16,8 +16,18 @@ from kemba.identify.evidence.problem import (
     Problem,
     Theta,
 )
+from kemba.settings import BY_HAND, Settings, setting
 
-FARTHEST = 4.0  # sizes
+
+class LinearSettings(Settings):
+    """Where the linearised problem may lead."""
+
+    farthest: float = setting(
+        4.0, "1", "largest distance of a switch from off, in sizes, where it is tried", BY_HAND
+    )
+    blocks: int = setting(
+        4, "1", "fewest blocks: fewer runs are cut in time", "convention: for leaving out a quarter"
+    )
 
 
 @dataclass(frozen=True)
@@ -137,7 +147,7 @@ def within(candidates: Mapping[str, Candidate], theta: Theta) -> dict[str, float
 def _sane(value: float, parameter: Parameter) -> float:
     """Within the bounds, and within a few sizes of off where it is a switch."""
     if np.isnan(parameter.typical):
-        reach = FARTHEST * parameter.size
+        reach = LinearSettings.current().farthest * parameter.size
         value = float(np.clip(value, parameter.off - reach, parameter.off + reach))
     return float(np.clip(value, parameter.lower, parameter.upper))
 
@@ -165,8 +175,9 @@ def priors(problem: Problem, theta: Theta, names: Iterable[str]) -> tuple[Array,
     return at, mean, width
 
 
-def time_blocks(problem: Problem, wanted: int = 4, shortest: float = 0.0) -> Labels:
+def time_blocks(problem: Problem, wanted: int | None = None, shortest: float = 0.0) -> Labels:
     """A label per row: every run, cut in time where there are fewer runs than `wanted`."""
+    wanted = LinearSettings.current().blocks if wanted is None else wanted
     rows = problem.rows()
     pieces = max(1, int(np.ceil(wanted / max(len(problem.runs), 1))))
     labels = np.zeros(len(rows), dtype=int)

@@ -19,12 +19,20 @@ from kemba.identify.evidence.linear import (
 from kemba.identify.evidence.point import Division, LinearisationPoint
 from kemba.identify.evidence.problem import Array, Problem
 from kemba.identify.evidence.refit import Fit, Frozen
-from kemba.identify.evidence.spike_slab import NULL, SPIKE_WIDTH, Hypothesis, Ranker
-
-GLANCES = 1  # evaluations of each single effect before the leaders are refitted
-ABSURD = 1e5  # noise units
+from kemba.identify.evidence.spike_slab import NULL, Hypothesis, Ranker
+from kemba.settings import BY_HAND, Settings, setting
 
 Names = tuple[str, ...]
+
+
+class NullModelSettings(Settings):
+    """How single effects are looked at before the leaders are refitted."""
+
+    glances: int = setting(1, "1", "evaluations of each single effect", BY_HAND)
+    rounds: int = setting(2, "1", "refits of the model as it is", BY_HAND)
+    absurd: float = setting(
+        1e5, "1", "residual in sigmas at which nothing can be predicted", "convention: beyond data"
+    )
 
 
 class Baseline:
@@ -51,7 +59,7 @@ class Baseline:
         at = [self.point.linear.index(n) for n in names]
         return Frozen(names, self.jacobian[:, at])
 
-    def ranker(self, linear: Linear, spike: float = SPIKE_WIDTH) -> Ranker:
+    def ranker(self, linear: Linear, spike: float | None = None) -> Ranker:
         """Evidence of hypotheses on `linear`."""
         return Ranker(linear, self.problem.candidates, self.problem.nuisance, spike)
 
@@ -73,7 +81,7 @@ class Baseline:
         known = problem.jacobian({}, names)
         slopes = known[:, [names.index(n) for n in free]]
         theta: dict[str, float] = {}
-        for _ in range(2):
+        for _ in range(NullModelSettings.current().rounds):
             r = problem.residual(theta)
             linear = condense(free, *priors(problem, theta, free), slopes, r, blocks)
             theta = estimate(problem, linear, best_fit(linear))
@@ -119,13 +127,14 @@ class Baseline:
 
     def _descend(self, hypothesis: Hypothesis, theta: dict[str, float]) -> float:
         """The best log evidence on a few Newton steps from theta with the slopes of the null."""
+        settings = NullModelSettings.current()
         free = {*self.problem.nuisance, *(self.problem.candidates[e].key for e in hypothesis)}
         linear, best = self.point.linear, -np.inf
         own = np.array([name in free for name in linear.names])
-        for step in range(GLANCES + 1):
+        for step in range(settings.glances + 1):
             if step or theta != self.point.fit.theta:
                 r = self.problem.residual(theta)
-                if not np.all(np.abs(r) < ABSURD):
+                if not np.all(np.abs(r) < settings.absurd):
                     break  # a linear estimate may point to where nothing can be predicted
                 at, _, _ = priors(self.problem, theta, linear.names)
                 linear = moved(linear, at, self.jacobian, r, self.division.blocks)

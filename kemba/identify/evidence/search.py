@@ -14,14 +14,51 @@ from kemba.identify.evidence.point import LinearisationPoint
 from kemba.identify.evidence.problem import Problem
 from kemba.identify.evidence.refit import Fit, refit
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis, log_prior, probabilities
+from kemba.settings import BY_HAND, Settings, setting
 
-LEADERS = 6
-SURE = 3  # so many leaders are refitted however far behind they are,
-FAR, FAR_SHARE = 40.0, 0.7  # others when no more nats, or share of the gain, behind
-FOLLOWED = 2  # times that the motion is found again with the best guess
-LARGEST = 3  # effects in one answer; more need another experiment
-GAIN = 3.0  # nats beyond prior odds that a further effect must bring
-LEAST = 0.1  # sizes, from which on a secant tells more than a slope
+
+class SearchSettings(Settings):
+    """Which hypotheses are refitted."""
+
+    leaders: int = setting(6, "1", "effects that are refitted in a round", BY_HAND, decides=True)
+    sure: int = setting(
+        3, "1", "leaders that are refitted however far behind they are", BY_HAND, decides=True
+    )
+    far: float = setting(
+        40.0, "nats", "other leaders are refitted when not farther behind", BY_HAND, decides=True
+    )
+    far_share: float = setting(
+        0.7, "1", "or no farther behind than this share of the gain", BY_HAND, decides=True
+    )
+    promising: float = setting(
+        0.5,
+        "1",
+        "share of the best gain with which an effect is tried again",
+        BY_HAND,
+        decides=True,
+    )
+    followed: int = setting(
+        2, "1", "times that the motion is found again with the best guess", BY_HAND, decides=True
+    )
+    largest: int = setting(
+        3, "1", "effects in one answer", "convention: more need another experiment", decides=True
+    )
+    leaders_grown: int = setting(
+        3, "1", "effects that are refitted beside the best answer", BY_HAND, decides=True
+    )
+    leaders_swapped: int = setting(
+        2, "1", "effects that are refitted in place of one of the answer", BY_HAND, decides=True
+    )
+    gain: float = setting(
+        3.0, "nats", "gain from which a pair recommends its members", BY_HAND, decides=True
+    )
+    least: float = setting(
+        0.1,
+        "1",
+        "size of an effect from which its secant replaces its slope",
+        BY_HAND,
+        decides=True,
+    )
 
 
 @dataclass
@@ -38,9 +75,10 @@ class Search:
 
     def run(self) -> Hypothesis:
         """The hypothesis the evidence favours; everything seen stays in `points`."""
+        leaders = SearchSettings.current().leaders
         self.say("fitting the model as it is")
         self.start()
-        best = self._round(NULL, LEADERS)
+        best = self._round(NULL, leaders)
         self.say(f"first guess: {' + '.join(best) or 'nothing'}")
         if self.problem.moves:
             return self._follow(best)
@@ -51,7 +89,7 @@ class Search:
             self.points = {NULL: self.base.point}
             for hypothesis in promising:
                 self.visit(hypothesis)
-            best = self._round(NULL, LEADERS)
+            best = self._round(NULL, leaders)
             best = self._grow(best)
         return best
 
@@ -61,7 +99,8 @@ class Search:
         A guess far from the first motion looks bad only for being far: what the slopes promise
         counts as well as what the refit found.
         """
-        for _ in range(FOLLOWED):
+        settings = SearchSettings.current()
+        for _ in range(settings.followed):
             guess = best or self._promised()
             if guess == NULL or time.monotonic() > self.deadline:
                 return best
@@ -71,7 +110,7 @@ class Search:
             self.problem = self.problem.relinearise(point.fit.theta)
             self.start(among)
             self.visit(guess)
-            best = self._round(NULL, LEADERS)
+            best = self._round(NULL, settings.leaders)
             if best in (guess, NULL):
                 break
         return self._grow(best) if best else best
@@ -80,7 +119,7 @@ class Search:
         """Single effects that were refitted, or promise half of what the best one does."""
         null = self.points[NULL].log_evidence
         gains = {h: e - null for h, e in self.base.table.items() if len(h) == 1}
-        least = 0.5 * max(gains.values())
+        least = SearchSettings.current().promising * max(gains.values())
         return frozenset(h for h, gain in gains.items() if gain > least or h in self.points)
 
     def _promised(self) -> Hypothesis:
@@ -102,14 +141,18 @@ class Search:
 
     def _round(self, given: Hypothesis, leaders: int) -> Hypothesis:
         """Refit the most promising extensions of `given` by one; the best of all points so far."""
+        settings = SearchSettings.current()
         table = self._extensions(given)
         order = sorted(table, key=lambda h: -table[h])[:leaders]
         promise = table[order[0]] - self.points[given].log_evidence
-        reach = max(FAR, FAR_SHARE * promise)
+        reach = max(settings.far, settings.far_share * promise)
         for hypothesis in order:
             if given and table[hypothesis] < self.points[given].log_evidence:
                 break  # not even the slopes promise anything
-            if table[hypothesis] < table[order[0]] - reach and hypothesis not in order[:SURE]:
+            if (
+                table[hypothesis] < table[order[0]] - reach
+                and hypothesis not in order[: settings.sure]
+            ):
                 break
             if time.monotonic() > self.deadline:
                 break
@@ -125,7 +168,7 @@ class Search:
         base = max(single.values())
         pairs = [h for h in self.base.table if len(h) == 2]
         best_pair = max(pairs, key=self.base.table.__getitem__, default=NULL)
-        if best_pair and self.base.table[best_pair] > base + GAIN:
+        if best_pair and self.base.table[best_pair] > base + SearchSettings.current().gain:
             for name in best_pair:
                 single[(name,)] = max(single[(name,)], base)
         return single
@@ -141,17 +184,18 @@ class Search:
         return self.points[hypothesis]
 
     def _learn_secant(self, hypothesis: Hypothesis, fit: Fit) -> None:
-        """From here on, a refitted effect is known by its secant.
+        """From here on a refitted effect counts by its secant, no longer by its slope at nothing.
 
-        Everything absent may help at floor level, and slopes at nothing promise too much far from
-        where they hold: a rival would look good for what it leaves to them.
+        Under every hypothesis each absent effect may be there with a small share of its size. Far
+        from nothing its slope may promise more than the effect can do. A wrong hypothesis would
+        then look good because of an effect that it does not name.
         """
         problem, (effect, *others) = self.problem, hypothesis
         candidate = problem.candidates[effect]
         if others or not problem.moves or problem.is_straight(candidate.key):
             return
         size = fit.theta[candidate.key] - candidate.lead.off
-        if abs(size) > LEAST * candidate.lead.size:
+        if abs(size) > SearchSettings.current().least * candidate.lead.size:
             own = set(candidate.keys())
             absent = {k: v for k, v in fit.theta.items() if k not in own}
             change = problem.residual(fit.theta) - problem.residual(absent)
@@ -200,23 +244,25 @@ class Search:
         return max(self.points, key=lambda h: self.points[h].log_evidence + log_prior(h, count))
 
     def _grow(self, best: Hypothesis) -> Hypothesis:
-        """Add while it pays; then try to swap each member for another."""
-        while len(best) < LARGEST and time.monotonic() < self.deadline:
-            grown = self._round(best, 3)
+        """Add effects while the evidence grows; then try to swap each for another."""
+        settings = SearchSettings.current()
+        while len(best) < settings.largest and time.monotonic() < self.deadline:
+            grown = self._round(best, settings.leaders_grown)
             if grown == best or len(grown) <= len(best):
                 break
             best = grown
         for member in best if len(best) > 1 else ():
             rest = tuple(h for h in best if h != member)
             self.visit(rest)
-            self._round(rest, 2)
+            self._round(rest, settings.leaders_swapped)
         return self.best()
 
     def _promising(self) -> list[Hypothesis]:
-        """What was refitted and gained at least half of what the best gained."""
+        """What was refitted and gained a good share of what the best one gained."""
         null = self.points[NULL].log_evidence
         gains = {h: p.log_evidence - null for h, p in self.points.items() if h}
-        return [h for h, gain in gains.items() if gain > 0.5 * max(gains.values())]
+        least = SearchSettings.current().promising * max(gains.values())
+        return [h for h, gain in gains.items() if gain > least]
 
     def probabilities(self, dismissed: Collection[Hypothesis] = ()) -> dict[Hypothesis, float]:
         """Over everything refitted, and the rest of the singles by their linear evidence; without

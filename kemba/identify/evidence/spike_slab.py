@@ -13,10 +13,46 @@ from scipy.stats import norm
 
 from kemba.identify.evidence.linear import Linear
 from kemba.identify.evidence.problem import Array, Candidate
+from kemba.settings import BY_HAND, Settings, setting
 
-SPIKE_WIDTH = 0.05  # every effect of the catalogue may be there with this share of its size
-SLAB_WIDTH = 0.7  # width of a large effect, in sizes
-TOLERANCES = (0.5, 1.0, 1.5)  # how far nominal figures are off, in units of their prior sigma
+
+class SpikeSlabSettings(Settings):
+    """The prior: of every effect the width of its spike and of its slab, and of hypotheses."""
+
+    spike: float = setting(
+        0.05,
+        "1",
+        "width of the spike: every effect of the catalogue may be there with this share of its "
+        "size",
+        f"{BY_HAND}; that intervals count it as 5 % and not as 2 % came of benchmarks/blind",
+        decides=True,
+    )
+    slab: float = setting(
+        0.7, "1", "width of the slab: of a large effect, in sizes", BY_HAND, decides=True
+    )
+    silent: float = setting(
+        1e-6, "1", "width of the spike of a formula", "convention: none, but not singular"
+    )
+    tolerances: tuple[float, ...] = setting(
+        (0.5, 1.0, 1.5),
+        "1",
+        "how far nominal figures are off, in prior sigmas; evidence is averaged over these",
+        "convention: three nodes around one prior sigma, which is itself uncertain",
+        decides=True,
+    )
+    nothing: float = setting(
+        0.5, "1", "prior probability that nothing is missing", "convention: even odds", decides=True
+    )
+    single: float = setting(
+        0.4, "1", "prior probability of one effect, shared by all", BY_HAND, decides=True
+    )
+    pair: float = setting(
+        0.01, "1", "prior probability of two effects, shared by all pairs", BY_HAND, decides=True
+    )
+    triple: float = setting(
+        0.001, "1", "prior probability of three, shared by all triples", BY_HAND, decides=True
+    )
+
 
 Hypothesis = tuple[str, ...]  # names of the effects that are large, sorted
 NULL: Hypothesis = ()
@@ -43,8 +79,10 @@ class Ranker:
         linear: Linear,
         candidates: Mapping[str, Candidate],
         nuisance: Iterable[str],
-        spike: float = SPIKE_WIDTH,
+        spike: float | None = None,
     ) -> None:
+        self._prior = SpikeSlabSettings.current()
+        spike = self._prior.spike if spike is None else spike
         self.linear, self.candidates, self.spike = linear, candidates, spike
         self.silent: frozenset[str] = frozenset()  # effects that are absent unless supposed
         free = set(nuisance)
@@ -60,7 +98,7 @@ class Ranker:
 
     def score(self, hypothesis: Hypothesis) -> Score:
         """Averaged over how far the nominal figures may be off."""
-        parts = [self._score(hypothesis, t) for t in TOLERANCES]
+        parts = [self._score(hypothesis, t) for t in self._prior.tolerances]
         best = max(parts, key=lambda s: s.log_evidence)
         total = float(logsumexp([s.log_evidence for s in parts]) - np.log(len(parts)))
         return Score(total, best.z, best.covariance)
@@ -86,8 +124,8 @@ class Ranker:
         width = self.linear.width.copy()
         width[self.nuisance] *= tolerance
         for effect, i in self.lead.items():
-            spike = 1e-6 if effect in self.silent else self.spike
-            share = np.hypot(SLAB_WIDTH, spike) if effect in hypothesis else spike
+            spike = self._prior.silent if effect in self.silent else self.spike
+            share = np.hypot(self._prior.slab, spike) if effect in hypothesis else spike
             width[i] *= share
         return np.asarray(np.maximum(width, 1e-12))
 
@@ -120,7 +158,8 @@ class Ranker:
 
 def log_prior(hypothesis: Hypothesis, count: int) -> float:
     """Nothing is missing half of the time; each further effect is rarer, and all are alike."""
-    share = {0: 0.5, 1: 0.4, 2: 0.01, 3: 0.001}[min(len(hypothesis), 3)]
+    prior = SpikeSlabSettings.current()
+    share = (prior.nothing, prior.single, prior.pair, prior.triple)[min(len(hypothesis), 3)]
     ways = {0: 1.0, 1: count, 2: count * (count - 1) / 2}.get(
         len(hypothesis), count * (count - 1) * (count - 2) / 6
     )
