@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from kemba.effects.mechanics.friction import V_COULOMB
-from kemba.identify.bench.formulas import RANGES, STROKE, dahl
+from kemba.identify.bench.formulas import STROKE, FormulaSettings, dahl
 from kemba.identify.evidence.types import Array
 from kemba.identify.robot.force_channels import force_columns
 from kemba.identify.robot.state import LinearisedState
@@ -40,7 +40,7 @@ def formula_columns(state: LinearisedState) -> dict[str, Array]:
 def rod_terms(x: Array, v: Array) -> Iterator[tuple[str, Array]]:
     """(formula, force on the rod (n, L, legs)) of extension and its rate."""
     sign = np.tanh(v / V_COULOMB)
-    for d in RANGES:
+    for d in FormulaSettings.current().ranges:
         yield f"exp(-(x/{d:g})**2)", np.exp(-((x / d) ** 2))
         yield f"exp(-(({STROKE:g} - x)/{d:g})**2)", np.exp(-(((STROKE - x) / d) ** 2))
     yield f"{STROKE / 2:g} - x", STROKE / 2 - x
