@@ -9,11 +9,12 @@ import pytest
 
 from kemba.identify import discover as discovery
 from kemba.identify.answer import Answer, Ranked, phrase
-from kemba.identify.discover import DEFECT, discover, values
+from kemba.identify.discover import discover
 from kemba.identify.doubt.cross_validation import left_out, predicted_error
 from kemba.identify.evidence.problem import Array, Candidate, Parameter, Problem, Rows, Theta
 from kemba.identify.evidence.search import Search
-from kemba.identify.evidence.spike_slab import probabilities
+from kemba.identify.evidence.spike_slab import SpikeSlabSettings, probabilities
+from kemba.identify.ranking import values
 
 EFFECTS = ("bend", "drag", "kick", "twin", "wave")
 
@@ -189,6 +190,6 @@ def test_intervals_are_1_96_sigma_either_way(size: float) -> None:
     found = discover(problem)
     value = values(found.search, ("kick",), "kick")["a"]
     noise = 1.0 / float(np.linalg.norm(problem._shapes["kick"]))
-    sigma = np.hypot(noise, DEFECT * value.value)
+    sigma = np.hypot(noise, SpikeSlabSettings.current().spike * value.value)
     assert value.high - value.value == pytest.approx(1.96 * sigma, rel=0.05)
     assert value.value - value.low == pytest.approx(1.96 * sigma, rel=0.05)
