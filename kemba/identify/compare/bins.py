@@ -11,12 +11,30 @@ from scipy.stats import chi2, false_discovery_control
 
 from kemba.identify.evidence.problem import Array, Labels, Rows, Texts
 from kemba.identify.evidence.windows import codes, rms
+from kemba.settings import BY_HAND, Settings, setting
 
-FEWEST = 5  # windows that make a bin
-TOLERATED = 1.15  # error ratio that a good model may have: nominal figures are never exact
-FALSE_DISCOVERIES = 0.01
 ASSUMED = ("/foot/x", "/foot/z", "/stop")  # channels that no sensor measures
 STEADY = ("rest", "stance2")  # phases in which they can be relied on
+
+
+class BinSettings(Settings):
+    """When the error under one condition is called significant."""
+
+    fewest: int = setting(5, "1", "windows that make a bin", BY_HAND, decides=True)
+    tolerated: float = setting(
+        1.15,
+        "1",
+        "error ratio that a good model may have: nominal figures are never exact",
+        BY_HAND,
+        decides=True,
+    )
+    false_discoveries: float = setting(
+        0.01,
+        "1",
+        "share of the bins called significant that may be so by chance",
+        "literature: Benjamini and Hochberg 1995 control it; one in a hundred by convention",
+        decides=True,
+    )
 
 
 @dataclass(frozen=True)
@@ -33,7 +51,7 @@ class ConditionBin:
 
     @property
     def significant(self) -> bool:
-        return self.q_value < FALSE_DISCOVERIES
+        return self.q_value < BinSettings.current().false_discoveries
 
 
 def condition_bins(rows: Rows, region: Texts, first: Labels, sums: Array) -> Iterable[ConditionBin]:
@@ -48,7 +66,8 @@ def condition_bins(rows: Rows, region: Texts, first: Labels, sums: Array) -> Ite
     sound = ~doubtful(rows)[first]
     kinds, own = np.unique(table[sound], axis=0, return_inverse=True)
     groups = [sums[sound][own.ravel() == i] for i in range(len(kinds))]
-    known = [i for i, z in enumerate(groups) if len(z) >= FEWEST]
+    fewest = BinSettings.current().fewest
+    known = [i for i, z in enumerate(groups) if len(z) >= fewest]
     q = false_discovery_control([excess(groups[i]) for i in known]) if known else ()
     for i, q_value in zip(known, q, strict=True):
         channel, *place = kinds[i]
@@ -80,4 +99,4 @@ def excess(z: Array) -> float:
     spread = float(power @ power)
     echo = max(float(power[1:] @ power[:-1]) / spread, 0.0) if spread > 0 else 0.0
     count = len(z) * (1.0 - echo) / (1.0 + echo)
-    return float(chi2.sf(np.mean(z**2) / TOLERATED**2 * count, count))
+    return float(chi2.sf(np.mean(z**2) / BinSettings.current().tolerated ** 2 * count, count))

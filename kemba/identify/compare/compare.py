@@ -16,8 +16,16 @@ from kemba.identify.compare.missing_force import Peak, peaks
 from kemba.identify.compare.tolerance import slopes, within_tolerance
 from kemba.identify.evidence.problem import Array, MissingForce, Problem, Rows, Texts, Theta
 from kemba.identify.evidence.windows import Windows, aggregation_windows, free_starts, rms
+from kemba.settings import BY_HAND, Settings, setting
 
-GOOD, FAIR = 1.15, 1.5
+
+class CompareSettings(Settings):
+    """How large an error a model may have."""
+
+    good: float = setting(
+        1.15, "1", "error ratio up to which a model explains the logs", BY_HAND, decides=True
+    )
+    fair: float = setting(1.5, "1", "error ratio below which it nearly explains them", BY_HAND)
 
 
 @dataclass(frozen=True)
@@ -56,7 +64,8 @@ class Comparison:
 
     @property
     def good(self) -> bool:
-        return self.noise_ratio <= GOOD and not any(c.significant for c in self.bins)
+        good = CompareSettings.current().good
+        return self.noise_ratio <= good and not any(c.significant for c in self.bins)
 
     @property
     def peaks(self) -> list[Peak]:
@@ -123,7 +132,7 @@ def _tolerant(rows: Rows, region: Texts, window: Windows, left: Array) -> tuple[
     """Error ratio of what the figures' tolerance leaves, and whether it is within the noise."""
     sums = window.sums(left)
     clean = not any(c.significant for c in condition_bins(rows, region, window.first, sums))
-    return rms(sums), clean and rms(sums) <= GOOD
+    return rms(sums), clean and rms(sums) <= CompareSettings.current().good
 
 
 def measured_units(rows: Rows) -> dict[str, str]:
@@ -175,7 +184,11 @@ def phrase(found: Comparison) -> str:
             f"As it stands the model errs by {ratio}; {worst}; but figures off by no more than "
             f"their usual tolerance would explain the logs ({found.tolerant_ratio:.2g} times)."
         )
-    grade = "nearly explains" if found.noise_ratio < FAIR else "does not explain"
+    grade = (
+        "nearly explains"
+        if found.noise_ratio < CompareSettings.current().fair
+        else "does not explain"
+    )
     hints = [h for kind in ("law", "command", "conflict") for h in _first(found.hints, kind)]
     parts = [f"The model {grade} the logs: its error is {ratio}", worst, *(h.text for h in hints)]
     return "; ".join(parts) + "."

@@ -11,15 +11,50 @@ from dataclasses import dataclass
 import numpy as np
 
 from kemba.identify.evidence.problem import Array, Flags, ForceChannel, Problem
+from kemba.settings import BY_HAND, Settings, setting
 
-BINS = 8
-FEWEST = 30  # samples in a bin
-NARROW = 0.02  # of the middle 90 % of a quantity: no bin is narrower
-WIDE = 20.0  # times a channel's usual force: prior sigma of a bin's force
-LAGS = np.arange(0.0015, 0.042, 0.004)  # s between a command's change and the error: edges
-SAME = 0.1  # share of a force's power by which bins may differ and still be one force
-DOUBT, NEGLIGIBLE = 20.0, 0.1  # nats; share of a channel's usual force
-PLAIN = 60.0  # nats that nominal figures at the edge of their tolerance do not reach
+
+class ForceProfileSettings(Settings):
+    """How a missing force is looked for, and when it is said to be there."""
+
+    bins: int = setting(8, "1", "most bins of a quantity", BY_HAND)
+    fewest: int = setting(30, "1", "samples in a bin", BY_HAND)
+    narrow: float = setting(
+        0.02, "1", "smallest width of a bin over the middle 90 % of a quantity", BY_HAND
+    )
+    wide: float = setting(
+        20.0, "1", "prior sigma of a bin's force over a channel's usual force", BY_HAND
+    )
+    first_lag: float = setting(
+        0.0015, "s", "shortest time from a command's change to an error", "derived: over one row"
+    )
+    last_lag: float = setting(
+        0.042, "s", "longest time", "derived: beyond the slowest rise time of Table I, 37 ms"
+    )
+    lag_step: float = setting(0.004, "s", "step of these times", BY_HAND)
+    same: float = setting(
+        0.1,
+        "1",
+        "share of a force's power by which bins may differ and still be one force",
+        BY_HAND,
+        decides=True,
+    )
+    doubt: float = setting(
+        20.0, "nats", "gain beyond which a force is there without doubt", BY_HAND, decides=True
+    )
+    negligible: float = setting(
+        0.1, "1", "negligible force over a channel's usual force", BY_HAND, decides=True
+    )
+    sure: float = setting(
+        3.0, "1", "sigmas beyond which a bin's force is not nought", "convention: three sigmas"
+    )
+    plain: float = setting(
+        60.0,
+        "nats",
+        "gain that nominal figures at the edge of their tolerance do not reach",
+        BY_HAND,
+        decides=True,
+    )
 
 
 @dataclass(frozen=True)
@@ -39,12 +74,13 @@ class ForceProfile:
     @property
     def matters(self) -> bool:
         """Whether a force is certainly there, and is not negligible."""
-        return self.gain > DOUBT and self.largest > NEGLIGIBLE * self.usual
+        settings = ForceProfileSettings.current()
+        return self.gain > settings.doubt and self.largest > settings.negligible * self.usual
 
     @property
     def largest(self) -> float:
-        """The largest force [unit] that differs from zero by more than three sigma."""
-        plain = np.abs(self.force) > 3.0 * self.sigma
+        """The largest force [unit] that differs from zero by more than its error."""
+        plain = np.abs(self.force) > ForceProfileSettings.current().sure * self.sigma
         return float(np.max(np.abs(self.force[plain]), initial=0.0))
 
     @property
@@ -53,7 +89,8 @@ class ForceProfile:
         weight = 1.0 / self.sigma**2
         mean = float(np.sum(weight * self.force) / np.sum(weight))
         varies = float(np.sum(weight * (self.force - mean) ** 2))
-        return mean if varies < SAME * float(np.sum(weight)) * mean**2 else None
+        same = ForceProfileSettings.current().same
+        return mean if varies < same * float(np.sum(weight)) * mean**2 else None
 
     def __str__(self) -> str:
         what = self.quantity.partition(" [")[0]
@@ -80,7 +117,7 @@ def force_profiles(problem: Problem, residual: Array) -> list[ForceProfile]:
 
 def _of(channel: ForceChannel, residual: Array) -> list[ForceProfile | None]:
     by_value = [force_profile(channel, label, residual) for label in channel.quantities]
-    return by_value + [_solved(channel, f"after {n} [ms]", 1e3 * middle(LAGS), rise, residual)
+    return by_value + [_solved(channel, f"after {n} [ms]", 1e3 * middle(lags()), rise, residual)
                        for n, rise in channel.after.items()]  # fmt: skip
 
 
@@ -100,8 +137,8 @@ def force_profile(channel: ForceChannel, label: str, residual: Array) -> ForcePr
 def _solved(
     channel: ForceChannel, label: str, centre: Array, shapes: Array, residual: Array
 ) -> ForceProfile:
-    columns = channel.columns(shapes)
-    prior = np.eye(shapes.shape[-1]) / (WIDE * channel.usual) ** 2
+    columns, wide = channel.columns(shapes), ForceProfileSettings.current().wide
+    prior = np.eye(shapes.shape[-1]) / (wide * channel.usual) ** 2
     gram, slope = columns.T @ columns + prior, columns.T @ residual
     force = -np.linalg.solve(gram, slope)
     sigma = np.sqrt(np.diag(np.linalg.inv(gram)))
@@ -111,29 +148,36 @@ def _solved(
     )
 
 
+def lags() -> Array:
+    """Edges (k,) [s] of the times between a command's change and an error."""
+    settings = ForceProfileSettings.current()
+    return np.arange(settings.first_lag, settings.last_lag, settings.lag_step)
+
+
 def middle(edges: Array) -> Array:
     """Centres of bins."""
     return np.asarray(0.5 * (edges[1:] + edges[:-1]))
 
 
 def risen(times: Array, sizes: Array, at: Array) -> Array:
-    """How much a command rose within each of the LAGS before the moments `at` (n,) [s]: (n, lags).
+    """How much a command rose within each of the `lags` before the moments `at` (n,) [s]: (n, l).
 
     The command changes by `sizes` (c,) at `times` (c,) [s].
     """
     total = np.concatenate([[0.0], np.cumsum(sizes)])
-    level = total[np.searchsorted(times, at[:, None] - LAGS, side="right")]
+    level = total[np.searchsorted(times, at[:, None] - lags(), side="right")]
     return np.asarray(level[:, :-1] - level[:, 1:])
 
 
 def bins(values: Array) -> Array | None:
     """Edges (b + 1,) of bins with the same number of samples each; None with too few samples."""
+    settings = ForceProfileSettings.current()
     seen = values[np.isfinite(values)]
-    if len(seen) < 2 * FEWEST:
+    if len(seen) < 2 * settings.fewest:
         return None
-    count = min(BINS, len(seen) // FEWEST)
+    count = min(settings.bins, len(seen) // settings.fewest)
     edges = np.quantile(seen, np.linspace(0.0, 1.0, count + 1))
-    narrowest = NARROW * float(np.diff(np.quantile(seen, (0.05, 0.95)))[0])
+    narrowest = settings.narrow * float(np.diff(np.quantile(seen, (0.05, 0.95)))[0])
     kept = [float(edges[0])]
     for edge in edges[1:-1]:
         if min(edge - kept[-1], edges[-1] - edge) > narrowest:

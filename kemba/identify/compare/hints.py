@@ -9,15 +9,38 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2, norm
 
-from kemba.identify.compare.force_profiles import LAGS, PLAIN, ForceProfile, middle, risen
+from kemba.identify.compare.force_profiles import (
+    ForceProfile,
+    ForceProfileSettings,
+    lags,
+    middle,
+    risen,
+)
 from kemba.identify.compare.tolerance import Slopes
 from kemba.identify.evidence.problem import Array, Changes, Labels, Problem, Rows
 from kemba.identify.evidence.windows import codes
+from kemba.settings import BY_HAND, Settings, setting
 
-CERTAIN = 1e-4
-DEPENDENT = 1.5  # z scores are divided by this: rows are not quite independent
-LEAST_INFORMATION = 4.0  # sizes^-2: a run with less information about a parameter is not asked
-SLACK = 0.1  # sizes by which a parameter may differ between runs
+
+class HintSettings(Settings):
+    """When a hint is certain."""
+
+    certain: float = setting(
+        1e-4,
+        "1",
+        "p-value below which a hint is certain, over all that were tried",
+        BY_HAND,
+        decides=True,
+    )
+    dependent: float = setting(
+        1.5, "1", "z scores are divided by this: rows are not quite independent", BY_HAND
+    )
+    information: float = setting(
+        4.0, "1", "information on a parameter, per size squared, that a run must give", BY_HAND
+    )
+    slack: float = setting(
+        0.1, "1", "sizes by which a parameter may differ between runs", BY_HAND, decides=True
+    )
 
 
 @dataclass(frozen=True)
@@ -52,7 +75,8 @@ class Response:
 
     @property
     def certain(self) -> bool:
-        return bool(np.abs(self.z[self.peak]) > norm.isf(CERTAIN / (2 * self.tests)))
+        certain = HintSettings.current().certain
+        return bool(np.abs(self.z[self.peak]) > norm.isf(certain / (2 * self.tests)))
 
     @property
     def hint(self) -> Hint:
@@ -63,8 +87,9 @@ class Response:
 
 def lacking(found: Sequence[ForceProfile]) -> list[Hint]:
     """The missing force that explains most, if it explains enough."""
+    plain = ForceProfileSettings.current().plain
     best = max(found, key=lambda profile: profile.gain, default=None)
-    return [Hint("law", str(best), best.gain)] if best and best.gain > PLAIN else []
+    return [Hint("law", str(best), best.gain)] if best and best.gain > plain else []
 
 
 def lagged(problem: Problem, rows: Rows, white: Array) -> list[Response]:
@@ -83,18 +108,19 @@ def _strongest(
     rows: Rows, white: Array, runs: Sequence[Changes], name: str, commands: int
 ) -> Response:
     """A command's rise within each lag, as a regressor of every channel's error."""
-    rise = np.zeros((len(rows), len(LAGS) - 1))
+    rise = np.zeros((len(rows), len(lags()) - 1))
     for i, changes in enumerate(runs):
         if name in changes:
             own = rows.run == i
             rise[own] = risen(*changes[name], rows.time[own])
+    dependent = HintSettings.current().dependent
     best, tests = None, commands * len(rows.channels)
     for k, channel in enumerate(rows.channels):
         own = rows.channel == k
         power = np.sum(rise[own] ** 2, axis=0)
-        z = white[own] @ rise[own] / np.sqrt(np.maximum(power, 1e-12)) / DEPENDENT
+        z = white[own] @ rise[own] / np.sqrt(np.maximum(power, 1e-12)) / dependent
         z = np.where(power > 1e-9 * np.max(power, initial=1e-12), z, 0.0)
-        this = Response(channel, name, middle(LAGS), z, tests)
+        this = Response(channel, name, middle(lags()), z, tests)
         if best is None or np.max(np.abs(z)) > np.max(np.abs(best.z)):
             best = this
     assert best is not None
@@ -119,6 +145,7 @@ def _wandering(r: Array, known: Slopes, group: Labels, text: str) -> Iterable[Hi
     `group` (n,): group of each row. The nuisance parameters are free within their priors, and the
     same in all groups.
     """
+    settings = HintSettings.current()
     parts = [group == i for i in np.unique(group)]
     by_part = [(known.by_lead[own], known.by_nuisance[own], r[own]) for own in parts]
     power = np.stack([np.sum(j * j, axis=0) for j, _, _ in by_part])
@@ -127,11 +154,11 @@ def _wandering(r: Array, known: Slopes, group: Labels, text: str) -> Iterable[Hi
     n = known.by_nuisance
     solve = np.linalg.inv(n.T @ n + np.eye(n.shape[1]))
     for i, c in enumerate(known.leads):
-        told = np.flatnonzero(power[:, i] > LEAST_INFORMATION)
+        told = np.flatnonzero(power[:, i] > settings.information)
         own = cross[told, i]
         information = np.diag(power[told, i]) - own @ solve @ own.T
         p = _agreement(information, own @ solve @ (n.T @ r) - slope[told, i])
-        if p < CERTAIN / len(known.leads):
+        if p < settings.certain / len(known.leads):
             weight = float(-np.log10(max(p, 1e-300)))
             yield Hint("conflict", f"{c.key} would have to differ {text}", weight)
 
@@ -144,9 +171,10 @@ def _agreement(information: Array, pull: Array) -> float:
     """
     if len(pull) < 2:
         return 1.0
+    slack = HintSettings.current().slack
     spread = np.linalg.pinv(information, rcond=1e-9, hermitian=True)
     a = spread @ pull
-    certainty = np.linalg.inv(spread + SLACK**2 * np.eye(len(a)))
+    certainty = np.linalg.inv(spread + slack**2 * np.eye(len(a)))
     ones = np.ones(len(a))
     apart = a - ones @ certainty @ a / (ones @ certainty @ ones)
     return float(chi2.sf(apart @ certainty @ apart, len(a) - 1))

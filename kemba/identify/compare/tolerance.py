@@ -8,8 +8,19 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from kemba.identify.evidence.problem import Array, Candidate, Problem, Theta
+from kemba.settings import Settings, setting
 
-WIDEST = 2.0  # prior sigmas
+
+class ToleranceSettings(Settings):
+    """How far nominal figures may be off."""
+
+    widest: float = setting(
+        2.0,
+        "1",
+        "largest error of a figure, in prior sigmas",
+        "convention: 95 % of them",
+        decides=True,
+    )
 
 
 @dataclass(frozen=True)
@@ -38,7 +49,8 @@ def slopes(problem: Problem, at: Theta) -> Slopes:
 
 def within_tolerance(residual: Array, known: Slopes) -> Array:
     """The part (n,) of a residual (n,) that is left when every nuisance parameter takes its best
-    value within WIDEST prior sigmas."""
+    value within `widest` prior sigmas."""
+    widest = ToleranceSettings.current().widest
     q, triangle = np.linalg.qr(known.by_nuisance)
-    step = lsq_linear(triangle, -q.T @ residual, (-WIDEST, WIDEST)).x
+    step = lsq_linear(triangle, -q.T @ residual, (-widest, widest)).x
     return np.asarray(residual + known.by_nuisance @ step)

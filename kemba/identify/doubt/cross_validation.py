@@ -12,14 +12,37 @@ from kemba.identify.evidence.point import LinearisationPoint
 from kemba.identify.evidence.problem import Array
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
+from kemba.settings import BY_HAND, Settings, setting
 
-NONE = 1e-6  # spike width of an effect that is absent
-TOLERATED = 3.0  # sigma by which a nominal figure may be off
+
+class CrossValidationSettings(Settings):
+    """When left-out data refute an answer."""
+
+    refuted: float = setting(
+        2.0,
+        "nats",
+        "loss on left-out data, beyond its standard error, that refutes an answer",
+        BY_HAND,
+        decides=True,
+    )
+    tolerated: float = setting(
+        3.0,
+        "1",
+        "prior sigmas by which a nominal figure may be off",
+        "convention: three sigmas",
+        decides=True,
+    )
+    none: float = setting(
+        1e-6, "1", "width of the spike of absent effects", "convention: none, but not singular"
+    )
+    free: float = setting(
+        1e6, "1", "prior sigmas by which an effect may be off", "convention: no bound"
+    )
 
 
 @dataclass(frozen=True)
 class Gain:
-    """Log-likelihood gained on left-out data [nats], with its standard error over blocks."""
+    """Log likelihood gained on left-out data [nats], and its standard error over blocks."""
 
     nats: float
     error: float
@@ -27,7 +50,7 @@ class Gain:
     @property
     def refuted(self) -> bool:
         """Whether left-out data speak against it, by more than their scatter."""
-        return self.nats + self.error < -2.0
+        return self.nats + self.error < -CrossValidationSettings.current().refuted
 
 
 def left_out(search: Search, hypothesis: Hypothesis, against: Hypothesis = NULL) -> Gain:
@@ -47,8 +70,8 @@ def _predicted(search: Search, point: LinearisationPoint) -> Array:
 def _powers(search: Search, point: LinearisationPoint, judged: Linear) -> Array:
     """Sum of squares (b,) that `judged` has of each block under the fit to all others.
 
-    A left-out block judges the hypothesis itself: no other effect may be there, and no
-    nominal figure may leave its tolerance to do an effect's work.
+    A left-out block judges the hypothesis alone: all other effects are absent, and no nominal
+    figure may leave its tolerance to imitate an effect.
     """
     linear, found = point.linear, []
     for block in range(len(linear.count)):
@@ -61,14 +84,15 @@ def _powers(search: Search, point: LinearisationPoint, judged: Linear) -> Array:
 
 def within_tolerance(search: Search, linear: Linear, hypothesis: Hypothesis) -> Array:
     """z (k,) of the best fit with the nominal figures within their tolerance."""
-    ranker = search.base.ranker(linear, spike=NONE)
+    settings = CrossValidationSettings.current()
+    ranker = search.base.ranker(linear, spike=settings.none)
     width = ranker.widths(hypothesis, 1.0)
     gram, slope, _ = linear.total
     h = gram * np.outer(width, width) + np.eye(len(width))
     shift = (linear.mean - linear.at) / width
     lower = np.linalg.cholesky(h)
     target = np.linalg.solve(lower, shift - width * slope)
-    reach = np.where(ranker.nuisance, TOLERATED, 1e6)
+    reach = np.where(ranker.nuisance, settings.tolerated, settings.free)
     found = lsq_linear(lower.T, target, bounds=(shift - reach, shift + reach), method="bvls")
     return np.asarray(linear.at + width * found.x)
 

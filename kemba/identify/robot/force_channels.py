@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from kemba.identify.compare.force_profiles import LAGS, risen
+from kemba.identify.compare.force_profiles import lags, risen
 from kemba.identify.evidence.types import Array, Flags, ForceChannel
 from kemba.identify.robot.operating_point import SIDES, air_forces, changes
 from kemba.identify.robot.state import LinearisedState
@@ -76,7 +76,7 @@ def _after(state: LinearisedState, command: str) -> Array:
         sent = changes(log, legs)
         own = [risen(*sent[f"{leg}/{command}"], log.time) for leg in legs]
         runs.append(np.stack(own, axis=1).reshape(len(log.time), -1))
-    return batch.pad(runs, 0.0).reshape(*batch.valid.shape, -1, len(LAGS) - 1)
+    return batch.pad(runs, 0.0).reshape(*batch.valid.shape, -1, len(lags()) - 1)
 
 
 def force_columns(state: LinearisedState, channels: Sequence[int]) -> Callable[[Array], Array]:

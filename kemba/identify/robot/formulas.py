@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from kemba.effects.mechanics.friction import V_COULOMB
-from kemba.identify.bench.formulas import RANGES, dahl
+from kemba.identify.bench.formulas import FormulaSettings, dahl
 from kemba.identify.evidence.types import Array
 from kemba.identify.robot.force_channels import force_columns
 from kemba.identify.robot.state import LinearisedState
@@ -40,7 +40,7 @@ def formula_columns(state: LinearisedState) -> dict[str, Array]:
 def rod_terms(x: Array, v: Array, stroke: float) -> Iterator[tuple[str, Array]]:
     """(formula, force on the rod (n, L, legs)) of extension and its rate; `stroke` [m]."""
     sign = np.tanh(v / V_COULOMB)
-    for d in RANGES:
+    for d in FormulaSettings.current().ranges:
         yield f"exp(-(x/{d:g})**2)", np.exp(-((x / d) ** 2))
         yield f"exp(-(({stroke:g} - x)/{d:g})**2)", np.exp(-(((stroke - x) / d) ** 2))
     yield f"{stroke / 2:g} - x", stroke / 2 - x

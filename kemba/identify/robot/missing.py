@@ -1,8 +1,8 @@
 """How much force a robot model lacks: d(t) per physical channel with its 95 % band.
 
-Every channel's unknown force is a first-order lag driven by noise, as part of the filter's state.
-How strong each is, is learnt from the data; a channel that does not need one is left with almost
-none. In stance the contact forces are unknown too, so only what they cannot explain is told.
+Every channel's unknown force is a first-order lag of white noise, and a state of the filter. Its
+strength is learnt from the data; a channel that needs no force ends with almost none. In stance
+the contact forces are unknown too, so only the force that they cannot explain is found.
 """
 
 from __future__ import annotations
@@ -11,22 +11,25 @@ import numpy as np
 
 from kemba.identify.compare.missing_force import spans
 from kemba.identify.evidence.problem import Array, MissingForce, Theta
-from kemba.identify.robot.dynamics.reference import Floor, densities
+from kemba.identify.robot.dynamics.reference import ForceDensity, densities
 from kemba.identify.robot.motion.filter import System, gains, smooth_with_band
 from kemba.identify.robot.state import LinearisedState
 
 MEMORY = 0.025  # s, of the missing force
 ROUNDS = 6
-# N and N.m (1 sigma): where the search for a channel's strength begins, and what is as good as none
+# N and N.m (1 sigma): where the search for a channel's strength begins, and below what it is none
 BEGIN = {"body": 5.0, "pitch": 0.5, "hip": 0.5, "piston": 10.0}
 NEGLIGIBLE = {"body": 0.1, "pitch": 0.01, "hip": 0.01, "piston": 0.1}
-QUIET = Floor(body=1e-5, pitch=1e-6, hip=1e-6, rod=1e-5)
+QUIET = ForceDensity(body=1e-5, pitch=1e-6, hip=1e-6, rod=1e-5)
 
 
 def robot_missing(
     state: LinearisedState, theta: Theta, strength: Array | None = None
 ) -> list[MissingForce]:
-    """d(t) per run: force on the body, moments at pitch and hips, force on the rods."""
+    """d(t) per run: force on the body [N], moments at pitch and hips [N.m], force on the rods [N].
+
+    `strength` (k,): 1 sigma of each channel's force; learnt when not given.
+    """
     names = state.physics.channels
     kinds = [_kind(name) for name in names]
     sigma = np.array([BEGIN[kind] for kind in kinds]) if strength is None else strength
@@ -55,7 +58,10 @@ def _kind(channel: str) -> str:
 
 
 def with_forces(state: LinearisedState, density: Array, sigma: Array) -> System:
-    """The filter's system with a lagged force of strength `sigma` (k,) per channel as states."""
+    """The filter's system with a lagged force per channel, 1 sigma `sigma` (k,), as more states.
+
+    `density` (n, L, c): of the other unknown forces.
+    """
     base = state.motion.system_with(density, state.batch.h)
     h, k = state.batch.h, len(sigma)
     n, runs, m, d = base.H.shape

@@ -21,7 +21,7 @@ from kemba.identify.robot.dynamics.linear import LinearisedMotion, linearise_alo
 from kemba.identify.robot.dynamics.physics import Physics
 from kemba.identify.robot.dynamics.reference import (
     LOOSE,
-    Floor,
+    ForceDensity,
     Reference,
     densities,
     first_reference,
@@ -112,11 +112,11 @@ class LinearisedState:
 
 
 def linearise_at(
-    physics: Physics, batch: Batch, base: Theta, ground: Mapping[str, float], floor: Floor
+    physics: Physics, batch: Batch, base: Theta, ground: Mapping[str, float], unknown: ForceDensity
 ) -> LinearisedState:
     """The logs smoothed with the model at `base`, and the model linearised along that motion.
 
-    `floor`: density of the forces that no model explains.
+    `unknown`: density of the forces that no model explains.
     """
     reference = _without_delays(physics, batch, base, first_reference(physics, batch))
     schedules = read_schedules(physics, batch, reference)
@@ -129,7 +129,7 @@ def linearise_at(
             schedules = read_schedules(physics, batch, reference)
         normal = [state.motion.normal[: len(s.phase), i] for i, s in enumerate(schedules)]
         schedules = tuple(loaded(s, f, dt) for s, f in zip(schedules, normal, strict=True))
-    state = _along(physics, batch, base, ground, schedules, reference, floor)
+    state = _along(physics, batch, base, ground, schedules, reference, unknown)
     masses = zip(physics.masses, np.moveaxis(state.motion.masses, -1, 0), strict=True)
     linear = {name: (column, 0.0) for name, column in masses}
     return replace(state, linear={**linear, GRIP: (state.motion.less_grip, 1.0)})
@@ -149,12 +149,12 @@ def _along(
     ground: Mapping[str, float],
     schedules: tuple[Schedule, ...],
     reference: Reference,
-    floor: Floor,
+    unknown: ForceDensity,
 ) -> LinearisedState:
     """The model at `base` linearised along one reference."""
     p, delays = values_at(physics, base)
     states = air_states(physics, batch, read_inputs(physics, batch, reference, delays), p)
-    density = densities(physics, batch, schedules, floor)
+    density = densities(physics, batch, schedules, unknown)
     motion = linearise_along(physics, batch, schedules, reference, density, states, p)
     mask = np.isfinite(motion.system.R)
     mask[:LEAD_IN] = False
