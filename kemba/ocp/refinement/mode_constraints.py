@@ -13,9 +13,10 @@ from kemba.ocp.refinement.program import PhaseProgram, Where
 from kemba.ocp.refinement.settings import ModeRules
 from kemba.ocp.refinement.unilateral import Constraint
 from kemba.ocp.refinement.view import View
+from kemba.ocp.task.requirement import SCALES
 
 INF = np.inf
-LENGTH, SPEED = 0.1, 1.0  # m, m.s-1: scales of gaps and their rates
+LENGTH, SPEED = SCALES["m"], SCALES["m.s-1"]  # of gaps and their rates
 
 
 def add_mode_constraints(program: PhaseProgram, start: Independent) -> None:

@@ -15,7 +15,6 @@ from kemba.ocp.task.requirement import Requirement, quantity_expression
 from kemba.ocp.transcription.stage import as_variable
 
 INF = np.inf
-SCALES = {"m": 0.1, "m.s-1": 1.0, "rad": 0.2}
 
 
 def add_requirements(
@@ -64,7 +63,7 @@ def _put(
         program.lower[at] = np.maximum(program.lower[at], ends[0])
         program.upper[at] = np.minimum(program.upper[at], ends[1])
         return
-    scale = SCALES.get(requirement.quantity.unit, 1.0)
+    scale = requirement.scale
     label = f"{requirement.text}:{requirement.quantity.name}"
     low, high = requirement.lower / scale, requirement.upper / scale
     if not ca.depends_on(g, view.z("u lam")):
