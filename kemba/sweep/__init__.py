@@ -2,7 +2,7 @@
 
 from kemba.sweep.case import Case
 from kemba.sweep.expand import expand, load_sweep
-from kemba.sweep.farm import run_cases
+from kemba.sweep.farm import check_scheduler, run_cases
 from kemba.sweep.machine import machine
 from kemba.sweep.results import open_folder, write_results
 from kemba.sweep.schema import Sweep
@@ -10,6 +10,7 @@ from kemba.sweep.schema import Sweep
 __all__ = [
     "Case",
     "Sweep",
+    "check_scheduler",
     "expand",
     "load_sweep",
     "machine",

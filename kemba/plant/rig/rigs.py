@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
+from kemba.config import FileName
 from kemba.plant.rig.imposed import ImposedMotion, hermite, locked, stroke
 from kemba.plant.simulation.commands import Profile
 from kemba.plant.stepping.arrays import Array
@@ -53,7 +54,7 @@ class Rig(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    name: str
+    name: FileName
     notes: str = ""
     supplies: tuple[Pressure, ...] = (0.7e6,)
     repeats: int = Field(default=1, ge=1, le=100)
