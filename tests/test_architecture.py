@@ -19,6 +19,7 @@ ROOT = Path(__file__).parent.parent
 LEVELS = [
     {"errors"},
     {"files", "settings", "stopwatch", "units"},
+    {"folders"},
     {"quantity"},
     {"config"},
     {"table", "trajectory"},
@@ -43,6 +44,7 @@ ONLY_IN = {
     "statsmodels": {"sweep"},
     "pint": {"units"},
     "yaml": {"config"},
+    "filelock": {"folders"},
 }
 SOURCES = sorted([*ROOT.glob("kemba/**/*.py"), *ROOT.glob("cli/**/*.py")])
 FOLDERS = (".", ".ci", ".github", "cli", "configs", "docs", "kemba", "tests")

@@ -70,8 +70,7 @@ def _yaml(file: Path) -> dict[str, Any]:
 
 
 def _names(task: Any, document: Any) -> None:
-    """Quantities, costs and solver options that a task names."""
-    from kemba.ocp import task_model
-    from kemba.ocp.task.requirement import resolve
+    """Quantities, costs and solver options that a task names, and what cannot be met."""
+    from kemba.ocp.planning import check_feasible
 
-    resolve(task, task_model(task), document)
+    check_feasible(task, document)

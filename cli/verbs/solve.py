@@ -85,7 +85,7 @@ def solve(
         print_json(answer)
     else:
         typer.echo(answer["run"])
-        say(answer["sentence"], quiet)
+        say(answer["sentence"], quiet and answer["good"])  # why it failed is always said
     if answer["status"] == "interrupted":
         raise typer.Exit(130)
     if not answer["good"]:

@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from kemba.config import FileName
 from kemba.quantity import Param
 from kemba.units import read_si
 
@@ -145,7 +146,7 @@ AnyBlock = Annotated[SolveBlock | ExecuteBlock, Field(discriminator="kind")]
 class Sweep(Section):
     """Many cases: blocks by name, and the seed of all draws."""
 
-    name: Annotated[str, Field(pattern=r"^[\w.-]+$")] = "sweep"
+    name: FileName = "sweep"
     notes: str = ""
     seed: Annotated[int, Field(ge=0)] = 0
-    blocks: Annotated[dict[str, AnyBlock], Field(min_length=1)]
+    blocks: Annotated[dict[FileName, AnyBlock], Field(min_length=1)]

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from kemba.config import Document, apply_overrides, beside, find_config, load_yaml, parse
+from kemba.config import Document, FileName, apply_overrides, beside, find_config, load_yaml, parse
 from kemba.quantity import Param
 
 Value = float | str
@@ -81,7 +81,7 @@ class Task(Section):
     `settled: true` that every state of an effect is at its value at rest.
     """
 
-    name: str = "task"
+    name: FileName = "task"
     notes: str = ""
     model: str = "planning"
     plant: str = "plant"
