@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from kemba_cli.common import Json, Quiet, print_json
+from kemba_cli.common import Json, OwnEffects, Quiet, print_json
 from kemba_cli.failures import BAD_INPUT
 
 
@@ -16,6 +16,7 @@ def check(
     column_map: Annotated[
         str | None, typer.Option("--map", help="Column map YAML for foreign logs.")
     ] = None,
+    own_effects: OwnEffects = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -72,13 +73,11 @@ def _whole(kind: str, parsed: Any, document: Any) -> list[str]:
     """What a file names must exist too: robots, cylinders, legs, quantities, costs, options."""
     from kemba.mechanism import load_cylinder, load_robot
     from kemba.model import load_model
-    from kemba.ocp import task_model
-    from kemba.ocp.task.requirement import resolve
+    from kemba.ocp.planning import check_feasible
     from kemba.ocp.task.task import parse_task
 
     if kind == "tasks":
-        model = task_model(parse_task(document))
-        resolve(parsed, model, document)
+        model, _ = check_feasible(parse_task(document), document)
         return model.remarks
     if kind == "models":
         return load_model(document.source).remarks

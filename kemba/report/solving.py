@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import shutil
+import tempfile
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from kemba.config import Document, dump_yaml
 from kemba.errors import KembaError
+from kemba.files import WriteError
 from kemba.ocp import Plan, Task, controller_table, plan
-from kemba.ocp.nlp.ipopt import Watch
+from kemba.ocp.nlp.watcher import Watch
 from kemba.ocp.report import answer
 from kemba.ocp.starts import plan_best
 from kemba.plant.execution.certificate import replays
@@ -18,8 +23,6 @@ from kemba.plant.execution.replay import ends_standing
 from kemba.report.verdict import verdicts
 from kemba.runs import RunFolder, write_json
 from kemba.trajectory import Trajectory
-
-WORTH_REPLAYING = ("solved", "acceptable")
 
 
 @dataclass(frozen=True)
@@ -58,12 +61,13 @@ def solve_into(
             how = {"tell": listener.tell, "watch": listener.watch, "stop": listener.stop}
             found = plan(task, document, log=log, start=start, **how)  # type: ignore[arg-type]
         result = answer(found, str(folder.path))
-        if replay and found.status in WORTH_REPLAYING:
+        if replay and found.status.plan:
             listener.tell("replay")
             result |= _replayed(found, result["good"])
-        _write(found, result, folder, figure)
+        _keep(found, result, folder, figure)
     except BaseException:
-        folder.finish("failed")
+        with suppress(WriteError):  # the first error tells more
+            folder.finish("failed")
         raise
     folder.finish(found.status, sentence=result["sentence"], good=result["good"])
     return result
@@ -89,7 +93,22 @@ def _replayed(found: Plan, good: bool) -> dict[str, Any]:
     }
 
 
-def _write(found: Plan, result: dict[str, Any], folder: RunFolder, figure: bool) -> None:
+def _keep(found: Plan, result: dict[str, Any], folder: RunFolder, figure: bool) -> None:
+    """Write the run folder; when that fails, write the plan elsewhere and say where."""
+    try:
+        _write(found, result, folder.path, figure)
+    except WriteError as error:
+        elsewhere = Path(tempfile.mkdtemp(prefix="kemba-kept-"))
+        try:
+            _write(found, result, elsewhere, figure=False)
+        except WriteError:
+            shutil.rmtree(elsewhere, ignore_errors=True)
+            raise error from None
+        hint = f"the plan is kept in {elsewhere}; {error.hint}"
+        raise type(error)(error.where, error.what, hint=hint) from None
+
+
+def _write(found: Plan, result: dict[str, Any], folder: Path, figure: bool) -> None:
     write_json(folder / "certificate.json", result)
     if not found.attempts:
         return  # refused before solving: there is no motion to write
@@ -98,5 +117,5 @@ def _write(found: Plan, result: dict[str, Any], folder: RunFolder, figure: bool)
     if figure:
         from kemba import plotting
 
-        sources = plotting.load_sources([folder.path])
+        sources = plotting.load_sources([folder])
         plotting.save_figure(plotting.draw(sources), folder / "figure.png")

@@ -77,7 +77,7 @@ def test_each_rig_shows_what_it_can(test: str, effect: str, quantity: str) -> No
     found = compared(catalogue.hidden(effect, 1.0), tests=(test,))
     assert not found.good
     assert found.noise_ratio > 2.0
-    telling = max(found.force_profiles, key=lambda law: law.gain)
+    telling = max(found.force_profiles, key=lambda profile: profile.gain)
     assert telling.quantity == quantity
     assert f"goes with {quantity.split(' [')[0]}" in found.sentence
 

@@ -6,14 +6,19 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from kemba.identify.bench.bench_log import FRICTION
+from kemba.identify.bench.bench_log import BenchLogSettings
 from kemba.identify.bench.formulas import features, terms
 from kemba.identify.bench.predicted import PredictedLogs
 from kemba.identify.evidence.linear import within
-from kemba.identify.evidence.spike_slab import SPIKE_WIDTH
+from kemba.identify.evidence.spike_slab import SpikeSlabSettings
 from kemba.identify.evidence.types import Array, Candidate, Leftover, Theta
+from kemba.settings import BY_HAND, Settings, setting
 
-PEAK = 99.5  # per cent of the rows below which a force counts as its largest
+
+class BenchFormulaSettings(Settings):
+    """What counts as the largest force of a formula."""
+
+    peak: float = setting(99.5, "%", "percentile of the rows that is taken as the largest", BY_HAND)
 
 
 def formula_columns(predicted: PredictedLogs, theta: Theta) -> tuple[tuple[str, ...], Array]:
@@ -32,8 +37,9 @@ def formula_columns(predicted: PredictedLogs, theta: Theta) -> tuple[tuple[str, 
 def weight(predicted: PredictedLogs, theta: Theta, formula: str, coefficient: float) -> float:
     """Largest force of a formula as a share of what matters in practice."""
     forces = (_forces(predicted, theta, i)[formula] for i in range(len(predicted.logs)))
-    peak = max(float(np.percentile(np.abs(force), PEAK)) for force in forces)
-    return abs(coefficient) * peak / FRICTION
+    percent = BenchFormulaSettings.current().peak
+    peak = max(float(np.percentile(np.abs(force), percent)) for force in forces)
+    return abs(coefficient) * peak / BenchLogSettings.current().friction
 
 
 def leftover(
@@ -62,8 +68,8 @@ def _imperfection(
     """Spread (n,) of the force residual, in noise units, when every effect of the catalogue may
     be there with a small share of its size."""
     base = predicted.standardised({}, index)["piston/F"]
-    power = np.ones(len(base))
+    power, spike = np.ones(len(base)), SpikeSlabSettings.current().spike
     for c in candidates.values():
-        small = within(candidates, {c.key: c.lead.off + SPIKE_WIDTH * c.lead.size})
+        small = within(candidates, {c.key: c.lead.off + spike * c.lead.size})
         power += (predicted.standardised(small, index)["piston/F"] - base) ** 2
     return np.asarray(np.sqrt(power))

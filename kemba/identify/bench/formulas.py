@@ -10,19 +10,32 @@ from scipy.signal import lfilter
 from kemba.effects.mechanics.friction import V_COULOMB
 from kemba.identify.bench.motion import SmoothedMotion
 from kemba.identify.evidence.problem import Array
+from kemba.settings import BY_HAND, Settings, setting
 
-RANGES = (0.003, 0.005, 0.008, 0.013, 0.02)  # m, reach of a force at an end of the stroke
-MEMORIES = (0.001, 0.006, 0.02, 0.06, 0.2)  # s
-CREEPS = (0.002, 0.006, 0.015)  # m, travel over which a hysteresis turns round
+
+class FormulaSettings(Settings):
+    """Constants of the simple force laws that are tried."""
+
+    ranges: tuple[float, ...] = setting(
+        (0.003, 0.005, 0.008, 0.013, 0.02), "m", "reach of a force at an end of the stroke", BY_HAND
+    )
+    memories: tuple[float, ...] = setting(
+        (0.001, 0.006, 0.02, 0.06, 0.2), "s", "times for which a switching is remembered", BY_HAND
+    )
+    creeps: tuple[float, ...] = setting(
+        (0.002, 0.006, 0.015), "m", "travel over which a hysteresis turns round", BY_HAND
+    )
+    speed: float = setting(0.3, "m.s-1", "speed by which speeds are scaled", BY_HAND)
 
 
 def terms(motion: SmoothedMotion, u: Array, stroke: float) -> Iterator[tuple[str, Array]]:
     """(formula, force per unit coefficient (n,)); `u` (n, 2): share of each valve being on;
     `stroke` [m]."""
+    settings = FormulaSettings.current()
     x, v, (u_e, u_r) = motion.x, motion.v, u.T
     sign = np.tanh(v / V_COULOMB)
     out, back = np.maximum(v, 0.0), np.minimum(v, 0.0)
-    for d in RANGES:
+    for d in settings.ranges:
         yield f"exp(-(x/{d:g})**2)", np.exp(-((x / d) ** 2))
         yield f"exp(-(({stroke:g} - x)/{d:g})**2)", np.exp(-(((stroke - x) / d) ** 2))
     yield f"x - {stroke / 2:g}", x - stroke / 2
@@ -44,19 +57,19 @@ def terms(motion: SmoothedMotion, u: Array, stroke: float) -> Iterator[tuple[str
     yield "a", motion.a
     yield "u_e", u_e
     yield "u_r", u_r
-    for travel in CREEPS:
+    for travel in settings.creeps:
         yield f"dahl(x, {travel:g})", dahl(x, travel)
 
 
 def features(motion: SmoothedMotion, u: Array, stroke: float) -> Array:
     """Whatever a missing force could depend on (n, m): where, how fast, and since when which
     valve is on, each with each."""
-    step = float(np.median(np.diff(motion.time)))
-    x, v = motion.x / stroke - 0.5, motion.v / 0.3
+    settings, step = FormulaSettings.current(), float(np.median(np.diff(motion.time)))
+    x, v = motion.x / stroke - 0.5, motion.v / settings.speed
     places = [np.ones(len(x)), x, x**2, v, np.abs(v), v * x, np.tanh(motion.v / V_COULOMB)]
     histories = [np.ones(len(x)), u[:, 0] * u[:, 1]]
     for valve in u.T:
-        for memory in MEMORIES:
+        for memory in settings.memories:
             keep = np.exp(-step / memory)
             histories.append(lfilter([1 - keep], [1, -keep], valve, zi=[keep * valve[0]])[0])
     return np.stack([p * h for p in places for h in histories], axis=1)

@@ -11,11 +11,18 @@ from scipy.linalg import cholesky_banded, solveh_banded
 
 from kemba.identify.bench.predicted import PredictedLogs
 from kemba.identify.evidence.types import Array, MissingForce, Theta
+from kemba.settings import BY_HAND, Settings, setting
 
-MEMORY = 0.025  # s, of the missing force
-ROUNDS = 20
-BEGIN, NEGLIGIBLE = 5.0, 0.05  # N, 1 sigma
 FORCE = "piston/F"
+
+
+class BenchMissingSettings(Settings):
+    """The missing force of a bench log."""
+
+    memory: float = setting(0.025, "s", "correlation time of the missing force", BY_HAND)
+    rounds: int = setting(20, "1", "rounds in which its strength is learnt", BY_HAND)
+    begin: float = setting(5.0, "N", "strength (1 sigma) with which learning begins", BY_HAND)
+    negligible: float = setting(0.05, "N", "strength that is as good as none", BY_HAND)
 
 
 def bench_missing(
@@ -39,15 +46,16 @@ def lagged(
 ) -> tuple[Array, Array, float]:
     """(estimate, 1 sigma), both (n,), and strength of a lag seen as `gap` (n,) in white noise of
     `variance` (n,); its strength is learnt unless it is `known`."""
-    keep = np.exp(-np.diff(time) / MEMORY)
-    strength = known or BEGIN
-    for _ in range(1 if known else ROUNDS):
+    settings = BenchMissingSettings.current()
+    keep = np.exp(-np.diff(time) / settings.memory)
+    strength = known or settings.begin
+    for _ in range(1 if known else settings.rounds):
         used = strength
         bands = _precision(keep, strength)
         bands[1] += 1.0 / variance
         mean = solveh_banded(bands, gap / variance)
         spread = _inverse_diagonal(bands)
-        strength = max(float(np.sqrt(np.mean(mean**2 + spread))), NEGLIGIBLE)
+        strength = max(float(np.sqrt(np.mean(mean**2 + spread))), settings.negligible)
     return np.asarray(mean), np.sqrt(spread), used
 
 

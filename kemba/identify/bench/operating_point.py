@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from kemba.identify.bench.bench_log import BenchLog
+from kemba.identify.bench.bench_log import BenchLog, BenchLogSettings
 from kemba.identify.bench.predicted import PredictedLogs
 from kemba.identify.bench.switching import edges
-from kemba.identify.compare.force_profiles import LAGS, risen
+from kemba.identify.compare.force_profiles import lags, risen
 from kemba.identify.evidence.types import Array, Changes, ForceChannel, OperatingPoint, Rows
 
 
@@ -35,7 +35,7 @@ def switchings(log: BenchLog) -> Changes:
     return found
 
 
-def bench_port(predicted: PredictedLogs, rows: Rows, at: OperatingPoint) -> ForceChannel:
+def bench_force_channel(predicted: PredictedLogs, rows: Rows, at: OperatingPoint) -> ForceChannel:
     """The rod: a missing force shows in the force channel, sample by sample."""
     force = rows.channel == rows.channels.index("piston/F")
     sigma = _sigma(predicted)
@@ -51,11 +51,12 @@ def bench_port(predicted: PredictedLogs, rows: Rows, at: OperatingPoint) -> Forc
     }
     after = {}
     for side in ("extend", "retract"):
-        after[side] = np.zeros((len(rows), len(LAGS) - 1))
+        after[side] = np.zeros((len(rows), len(lags()) - 1))
         for i, log in enumerate(predicted.logs):
             own = rows.run == i
             after[side][own] = risen(*switchings(log)[f"valve/{side}"], rows.time[own])
-    return ForceChannel("rod", "N", 10.0, quantities, columns, after)
+    usual = BenchLogSettings.current().friction
+    return ForceChannel("rod", "N", usual, quantities, columns, after)
 
 
 def _sigma(predicted: PredictedLogs) -> Array:

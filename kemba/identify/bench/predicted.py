@@ -11,8 +11,18 @@ from kemba.identify.bench.bench_log import BenchLog
 from kemba.identify.bench.motion import SmoothedMotion
 from kemba.identify.bench.prediction import Predictor, true_motion
 from kemba.identify.evidence.types import Array, Theta
+from kemba.settings import Settings, setting
 
-EARLY = 0.08  # s that tell whether a valve had just been switched when a log begins
+
+class StartSettings(Settings):
+    """How a log begins."""
+
+    early: float = setting(
+        0.08,
+        "s",
+        "beginning of a log that tells whether a valve had just been switched",
+        "derived: twice the slowest rise time of Table I",
+    )
 
 
 @dataclass(frozen=True)
@@ -63,7 +73,7 @@ def settle_starts(logs: Iterable[BenchLog], predictor: Predictor) -> tuple[Bench
     """The logs with the first valve pulse as the data have it.
 
     A valve that is on in the first row may have been on for long, or may just have been switched.
-    The force in the first EARLY seconds decides.
+    The force in the first moments decides.
     """
     return tuple(_settled(log, predictor) for log in logs)
 
@@ -73,7 +83,8 @@ def _settled(log: BenchLog, predictor: Predictor) -> BenchLog:
     trials = [replace(log, commands=(e, r)) for e in options[0] for r in options[1]]
     if len(trials) == 1:
         return log
-    early = log.motion.time[log.keep["piston/F"]] < log.motion.time[0] + EARLY
+    end = log.motion.time[0] + StartSettings.current().early
+    early = log.motion.time[log.keep["piston/F"]] < end
 
     def cost(trial: BenchLog) -> float:
         r = standardised(trial, predictor.readings(trial, {}, {}))["piston/F"]

@@ -12,7 +12,11 @@ from typing_extensions import Self
 from kemba.identify.bench.bench_log import BenchLog, prepare
 from kemba.identify.bench.beyond import formula_columns, leftover, weight
 from kemba.identify.bench.missing import bench_missing
-from kemba.identify.bench.operating_point import bench_operating_point, bench_port, switchings
+from kemba.identify.bench.operating_point import (
+    bench_force_channel,
+    bench_operating_point,
+    switchings,
+)
 from kemba.identify.bench.predicted import PredictedLogs, settle_starts
 from kemba.identify.bench.prediction import Predictor
 from kemba.identify.bench.validate import contradictions
@@ -31,10 +35,33 @@ from kemba.identify.evidence.types import (
 )
 from kemba.identify.logs.gate import BadData
 from kemba.model.model import Model
+from kemba.settings import BY_HAND, Settings, setting
 from kemba.trajectory import Trajectory
 
-REMEASURED = 0.1  # what an earlier discovery put on the model's list is known less well
-JITTER = 0.02  # nominal figures are off by 1-3 %
+
+class BenchProblemSettings(Settings):
+    """How well the figures of a rig are known."""
+
+    figures: float = setting(
+        0.02,
+        "1",
+        "prior sigma of a nominal figure, as a share of it",
+        "convention: nominal figures are off by 1 to 3 %",
+        decides=True,
+    )
+    found: float = setting(
+        0.1, "1", "the same of an effect that was put on the model's list", BY_HAND, decides=True
+    )
+    pressure: float = setting(
+        2e5,
+        "Pa",
+        "prior sigma of the offset of a pressure",
+        "convention: two atmospheres, so that gauge readings fit",
+    )
+    step: float = setting(
+        0.1, "1", "step of finite differences of a start, as a share of the state's scale", BY_HAND
+    )
+    rest: float = setting(2e-3, "m.s-1", "speed below which the piston rests", BY_HAND)
 
 
 class BenchProblem(Problem):
@@ -56,15 +83,17 @@ class BenchProblem(Problem):
         states = predictor.rig({}).state_names
         starts = {f"start:{name}[{i}]": (i, name) for i in range(len(logs)) for name in states}
         self.predicted = PredictedLogs(settle_starts(logs, predictor), predictor, starts)
+        known = BenchProblemSettings.current()
         self.nuisance = {
-            name: (1.0, REMEASURED if _found(model, name) else JITTER) for name in predictor.figures
+            name: (1.0, known.found if _found(model, name) else known.figures)
+            for name in predictor.figures
         }
         self._state_scale = {q.name: q.scale for q in model.states.values()}
         for key, (_, name) in starts.items():
             self.nuisance[key] = (0.0, self._state_scale[name])
         for channel in self.channels[1:]:
-            self.nuisance[f"offset:{channel}"] = (0.0, 2e5)
-            self.nuisance[f"gain:{channel}"] = (1.0, JITTER)
+            self.nuisance[f"offset:{channel}"] = (0.0, known.pressure)
+            self.nuisance[f"gain:{channel}"] = (1.0, known.figures)
         self.colour: Mapping[tuple[int, int], Colour] = {}
 
     @property
@@ -101,26 +130,27 @@ class BenchProblem(Problem):
         """Columns (n,) of the initial states: one evaluation moves the starts of all runs."""
         if not names:
             return {}
-        starts = self.predicted.starts
+        starts, share = self.predicted.starts, BenchProblemSettings.current().step
         at = self.rows(runs).run
         base = self.residual(theta, runs)
         columns: dict[str, Array] = {}
         for state in {starts[n][1] for n in names}:
             own = {n: starts[n][0] for n in names if starts[n][1] == state}
-            step = {n: theta.get(n, 0.0) + 0.1 * self._state_scale[state] for n in own}
+            step = {n: theta.get(n, 0.0) + share * self._state_scale[state] for n in own}
             change = self.residual({**theta, **step}, runs) - base
-            slope = change / (0.1 * self._state_scale[state])
+            slope = change / (share * self._state_scale[state])
             columns |= {n: np.where(at == i, slope, 0.0) for n, i in own.items()}
         return columns
 
     def rows(self, runs: Collection[int] | None = None) -> Rows:
+        rest = BenchProblemSettings.current().rest
         parts: list[tuple[np.ndarray, ...]] = []
         for i in range(len(self.logs)) if runs is None else runs:
             log = self.logs[i]
             for c in log.measured:
                 keep = log.keep[c]
                 n, k = int(keep.sum()), self.channels.index(c)
-                label = np.where(np.abs(log.motion.v[keep]) < 2e-3, "rest", "moving")
+                label = np.where(np.abs(log.motion.v[keep]) < rest, "rest", "moving")
                 one = (np.full(n, i), np.full(n, k), log.motion.time[keep], label, log.mode[keep])
                 parts.append((*one, np.full(n, log.sigma[c])))
         run, channel, time, phase, mode, sigma = (
@@ -136,9 +166,9 @@ class BenchProblem(Problem):
         """Per run: valve -> instants and signs of its switchings."""
         return [switchings(log) for log in self.logs]
 
-    def ports(self) -> list[ForceChannel]:
+    def force_channels(self) -> list[ForceChannel]:
         """Where a force may be missing: on the rod."""
-        return [bench_port(self.predicted, self.rows(), self.operating_point())]
+        return [bench_force_channel(self.predicted, self.rows(), self.operating_point())]
 
     def missing_force(
         self, theta: Theta | None = None, strength: Array | None = None

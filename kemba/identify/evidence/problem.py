@@ -28,6 +28,7 @@ from kemba.identify.evidence.types import (
     Texts,
     Theta,
 )
+from kemba.settings import BY_HAND, Settings, setting
 
 __all__ = [
     "Array",
@@ -45,6 +46,18 @@ __all__ = [
     "Texts",
     "Theta",
 ]
+
+
+class StepSettings(Settings):
+    """Steps of finite differences."""
+
+    nuisance: float = setting(0.5, "1", "step of a nominal figure, in prior sigmas", BY_HAND)
+    switch: float = setting(
+        0.6, "1", "step of a switch that is off, in sizes: its secant", BY_HAND, decides=True
+    )
+    parameter: float = setting(
+        0.05, "1", "step of a parameter that is on, as a share of its size or value", BY_HAND
+    )
 
 
 class Problem(ABC):
@@ -102,20 +115,22 @@ class Problem(ABC):
     def steps(self, theta: Theta, name: str) -> Iterable[tuple[dict[str, float], float]]:
         """Steps for a finite difference along `name`: changed entries of theta, and how far they
         go [the parameter's unit]. Two of them where both signs are possible."""
+        settings = StepSettings.current()
         if name in self.nuisance:
             nominal, sigma = self.nuisance[name]
-            yield {name: theta.get(name, nominal) + 0.5 * sigma}, 0.5 * sigma
+            h = settings.nuisance * sigma
+            yield {name: theta.get(name, nominal) + h}, h
             return
         candidate = self.candidates[name.rsplit(".", 1)[0]]
         parameter = candidate.keys()[name]
         if name == candidate.key and theta.get(name, parameter.off) == parameter.off:
             shapes = {k: theta.get(k, p.typical) for k, p in candidate.keys().items() if k != name}
-            h = 0.6 * parameter.size
+            h = settings.switch * parameter.size
             for sign in (1.0, -1.0) if parameter.signed else (1.0,):
                 yield {**shapes, name: parameter.off + sign * h}, sign * h
             return
         value = theta[name]
-        h = 0.05 * (parameter.size if name == candidate.key else abs(value))
+        h = settings.parameter * (parameter.size if name == candidate.key else abs(value))
         h = -h if value + h > parameter.upper else h
         yield {name: value + h}, h
 
@@ -171,7 +186,7 @@ class Problem(ABC):
         """Per run: command -> times [s] and sizes of its changes. Empty: commands are unknown."""
         return []
 
-    def ports(self) -> Sequence[ForceChannel]:
+    def force_channels(self) -> Sequence[ForceChannel]:
         """Places where a force may be missing."""
         return []
 

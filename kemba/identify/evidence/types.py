@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from kemba.settings import Settings, setting
+
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Flags = np.ndarray[Any, np.dtype[np.bool_]]
 Labels = np.ndarray[Any, np.dtype[np.int_]]
@@ -20,7 +22,17 @@ Theta = Mapping[str, float]
 Changes = Mapping[str, tuple[Array, Array]]  # command -> times [s] and sizes of its changes
 
 REGIONS = ("in", "mid", "out")
-END = 0.010  # m from the end of a stroke that counts as its end; a cushion is as long
+
+
+class RegionSettings(Settings):
+    """Regions of a piston's stroke."""
+
+    end: float = setting(
+        0.010,
+        "m",
+        "length of the region at each end of the stroke",
+        "derived: as long as the cushion of the catalogue",
+    )
 
 
 @dataclass(frozen=True)
@@ -114,7 +126,8 @@ class OperatingPoint:
     def regions(self) -> Texts:
         """Label (n,) of each row: `in` near the retracted end of the stroke, `mid`, `out` near the
         extended end; an empty text without a piston."""
-        ends = np.array([END, self.stroke - END])
+        end = RegionSettings.current().end
+        ends = np.array([end, self.stroke - end])
         index = np.searchsorted(ends, self.x, side="right")
         return np.array([*REGIONS, ""], dtype=object)[np.where(np.isfinite(self.x), index, -1)]
 

@@ -1,19 +1,28 @@
-"""Residuals summed over moments: a model that is wrong errs for longer than a sample, noise not."""
+"""Aggregation windows: residuals are summed over some rows before they are judged.
+
+The error of a wrong model lasts longer than one row; noise changes from row to row.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from kemba.identify.evidence.problem import Array, Labels, Problem, Rows, Texts
+from kemba.identify.evidence.problem import Array, Labels, Problem, Rows, Texts, Theta
+
+START = "start:"  # names of nuisance parameters that say how a log begins
 
 
 @dataclass(frozen=True)
 class Windows:
-    """Stretches of successive rows of one run, channel and condition: the first row (k,) of each,
-    and the size (k,) that noise would give to the sum over it."""
+    """Groups of successive rows of one run, channel and condition.
+
+    `first` (k,): first row of each window. `noise` (k,): 1 sigma of the sum over it, if there is
+    nothing but noise.
+    """
 
     first: Labels
     noise: Array
@@ -35,6 +44,35 @@ def aggregation_windows(problem: Problem, rows: Rows, region: Texts) -> Windows:
 def windows_of(problem: Problem) -> Windows:
     """Aggregation windows of a problem under all its conditions."""
     return aggregation_windows(problem, problem.rows(), problem.operating_point().regions())
+
+
+def free_starts(
+    problem: Problem, theta: Theta | None = None, also: Iterable[str] = ()
+) -> dict[str, float]:
+    """Theta with each log beginning as its own data say, found by one linear step.
+
+    `also`: further nuisance parameters to find. All other values stay.
+    """
+    free = {n for n in problem.nuisance if n.startswith(START)} | set(also)
+    found = {k: v for k, v in (theta or {}).items() if k not in free and not k.startswith(START)}
+    names = [n for n in problem.nuisance if n in free]
+    if not names:
+        return found
+    nominal, sigma = np.array([problem.nuisance[n] for n in names]).T
+    j, r = problem.jacobian(found, names) * sigma, problem.residual(found)
+    step = np.linalg.solve(j.T @ j + np.eye(len(names)), -j.T @ r)
+    return found | dict(zip(names, (nominal + sigma * step).tolist(), strict=True))
+
+
+def error_ratio(problem: Problem, theta: Theta | None = None, also: Iterable[str] = ()) -> float:
+    """Error in units of the noise: the RMS of whitened residuals summed over aggregation windows.
+
+    It is about 1 where the model at theta is right. Nothing is fitted to these logs but how each of
+    them begins (and the nuisance parameters `also`): so it is the error of logs that a fit has not
+    seen.
+    """
+    found = free_starts(problem, theta, also)
+    return rms(windows_of(problem).sums(problem.residual(found)))
 
 
 def changes(rows: Rows, region: Texts) -> np.ndarray[Any, np.dtype[np.bool_]]:

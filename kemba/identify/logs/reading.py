@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
@@ -181,18 +181,3 @@ def _earlier(time: Array, values: Array, delay: float, hold: bool) -> Array:
         at = np.clip(np.searchsorted(time, time + delay, side="right") - 1, 0, len(time) - 1)
         return np.asarray(values[at])
     return np.interp(time + delay, time, values)
-
-
-def grouped(logs: Iterable[Trajectory]) -> dict[str, list[str]]:
-    """Runs with the same command, by group: `repeat_of` of the sidecar, else each its own."""
-    groups: dict[str, list[str]] = {}
-    for log in logs:
-        groups.setdefault(str(log.meta.get("repeat_of", log.meta["name"])), []).append(
-            log.meta["name"]
-        )
-    return groups
-
-
-def metadata(log: Trajectory) -> dict[str, Any]:
-    """What the sidecar said."""
-    return {k: v for k, v in log.meta.items() if k not in ("name", "path")}

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from kemba.effects.mechanics.friction import V_COULOMB
-from kemba.identify.bench.formulas import RANGES, dahl
-from kemba.identify.robot.ports import port_columns
-
-if TYPE_CHECKING:
-    from kemba.identify.robot.problem import Array, RobotProblem
+from kemba.identify.bench.formulas import FormulaSettings, dahl
+from kemba.identify.evidence.types import Array
+from kemba.identify.robot.force_channels import force_columns
+from kemba.identify.robot.state import LinearisedState
 
 W_COULOMB = 0.1  # rad.s-1
 CREEPS = (0.003, 0.006, 0.012)  # m, travel over which a hysteresis turns round
@@ -20,22 +18,21 @@ TEETH = (6, 8, 10, 12, 14, 16, 18, 20, 24)  # ripples of a motor per turn at the
 ROPES = (0.26, 0.28, 0.30, 0.32, 0.35)  # m, heights from which a cable pulls
 
 
-def formula_columns(problem: RobotProblem) -> dict[str, Array]:
+def formula_columns(state: LinearisedState) -> dict[str, Array]:
     """Columns (rows,) per unit of the coefficient, by the formula a model's YAML would hold."""
-    y, rate = problem.point.y, problem.point.rate
-    legs, stroke = len(problem.physics.legs), problem.physics.mechanism.stroke
+    y, rate = state.motion.y, state.motion.rate
+    legs, stroke = len(state.physics.legs), state.physics.mechanism.stroke
     hips, rods = slice(3, 3 + legs), slice(3 + legs, 3 + 2 * legs)
-    torque = problem.batch.pad([t.torque for t in problem.batch.resampled], 0.0)
     groups = (
         (range(3 + legs, 3 + 2 * legs), "rods", rod_terms(y[..., rods], rate[..., rods], stroke)),
-        (range(3, 3 + legs), "hips", hip_terms(y[..., hips], rate[..., hips], torque)),
+        (range(3, 3 + legs), "hips", hip_terms(y[..., hips], rate[..., hips], state.batch.torque)),
         ([1], "body z", body_terms("z", y[..., [1]], rate[..., [1]])),
         ([0], "body x", drag_terms("x", rate[..., [0]])),
     )
     found: dict[str, Array] = {}
     for channels, name, terms in groups:
         listed = list(terms)
-        columns = port_columns(problem, channels)(np.stack([f for _, f in listed], axis=-1))
+        columns = force_columns(state, channels)(np.stack([f for _, f in listed], axis=-1))
         found |= {f"{t} [{name}]": c for (t, _), c in zip(listed, columns.T, strict=True)}
     return found
 
@@ -43,7 +40,7 @@ def formula_columns(problem: RobotProblem) -> dict[str, Array]:
 def rod_terms(x: Array, v: Array, stroke: float) -> Iterator[tuple[str, Array]]:
     """(formula, force on the rod (n, L, legs)) of extension and its rate; `stroke` [m]."""
     sign = np.tanh(v / V_COULOMB)
-    for d in RANGES:
+    for d in FormulaSettings.current().ranges:
         yield f"exp(-(x/{d:g})**2)", np.exp(-((x / d) ** 2))
         yield f"exp(-(({stroke:g} - x)/{d:g})**2)", np.exp(-(((stroke - x) / d) ** 2))
     yield f"{stroke / 2:g} - x", stroke / 2 - x

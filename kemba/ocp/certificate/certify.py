@@ -155,7 +155,7 @@ def _requirements(
         if requirement.at is None and requirement.quantity.name in acting:
             over[0] = 0.0  # inputs and forces act on the interval before a node
         k = int(np.argmax(over)) if requirement.at is None else requirement.node(nodes)
-        size = float(over[k]) / requirement.quantity.scale
+        size = float(over[k]) / requirement.scale
         what = f"{requirement.text}:{requirement.quantity.name}"
         found.append(
             Violation(

@@ -23,11 +23,10 @@ from kemba.ocp.infeasibility.diagnostic import (
 )
 from kemba.ocp.infeasibility.flight import Flight, flight_of
 from kemba.ocp.infeasibility.pose import Gap, Poses
+from kemba.ocp.infeasibility.settings import Checks
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
 from kemba.quantity import Quantity
-
-LONGEST_STEP = 0.05  # s; with longer ones a valve cannot be timed within a push
 
 
 def check_task(
@@ -148,12 +147,13 @@ def _reason(gaps: Sequence[Gap]) -> str:
 
 def coarse_grid(task: Task, flight: Flight | None, document: Document) -> Iterator[Diagnostic]:
     """Steps too long to time a push."""
-    if flight is None or task.step <= LONGEST_STEP:
+    longest = Checks.current().longest_step
+    if flight is None or task.step <= longest:
         return
-    enough = int(-(-task.duration // LONGEST_STEP))
+    enough = int(-(-task.duration // longest))
     sentence = (
         f"{key('nodes', document)}: {task.nodes} over {task.duration:g} s make steps of "
         f"{1e3 * task.step:.0f} ms; a push by air needs steps of at most "
-        f"{1e3 * LONGEST_STEP:.0f} ms, so at least {enough} nodes"
+        f"{1e3 * longest:.0f} ms, so at least {enough} nodes"
     )
     yield Diagnostic(sentence, True)

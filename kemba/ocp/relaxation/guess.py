@@ -12,13 +12,10 @@ from numpy.polynomial.polynomial import polyder, polyval
 from kemba.mechanism import Robot
 from kemba.mechanism.knee import extension, flexion
 from kemba.model import Model
+from kemba.ocp.relaxation.settings import Guess
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.layout import Layout
-
-STRETCH = 0.92  # of the full leg length at take-off
-FILLED = 300.0 / 324.0  # of a chamber's steady force is the most that a guess asks of it
-RISE = 0.6  # of the fill time at full stroke: the chamber's in the middle of a push
 
 
 @dataclass(frozen=True)
@@ -58,7 +55,7 @@ def body_course(
 ) -> Course:
     """Height of the body over the motion; `reach` = leg length retracted and stretched [m]."""
     low, high = reach
-    top = low + STRETCH * (high - low)
+    top = low + Guess.current().stretch * (high - low)
     z0 = asked(requirements, "body/z", 0.0) or low
     z1 = asked(requirements, "body/z", 1.0)
     peaks = [
@@ -69,7 +66,7 @@ def body_course(
     if z0 > top:
         fall = float(np.sqrt(2 * (z0 - top) / g))
         course = Course([0.0, fall], [z0, top], [0.0, -g * fall], (0.0, fall))
-        return _landed(course, duration, z1 or low + 0.3 * (top - low))
+        return _landed(course, duration, z1 or low + Guess.current().landing * (top - low))
     if peak is None or peak.at is None:
         return Course([0.0, duration], [z0, z1 or z0], [0.0, 0.0], (duration, duration))
     apex, t_apex = peak.lower, peak.at * duration
@@ -80,7 +77,7 @@ def body_course(
     if apex <= top:
         course = Course([0.0, t_apex], [z0, apex], [0.0, 0.0], (t_apex, t_apex))
     else:
-        rise = min(float(np.sqrt(2 * (apex - top) / g)), 0.7 * t_apex)
+        rise = min(float(np.sqrt(2 * (apex - top) / g)), Guess.current().rise * t_apex)
         speed = g * rise
         push = min(2 * (top - z0) / speed, t_apex - rise)
         start = t_apex - rise - push
@@ -93,7 +90,7 @@ def body_course(
         if lands and end < duration:
             course = Course([*knots, end], [*z, top], [*vz, -speed], course.flight)
     if t_apex < duration and (lands or z1 is not None):
-        return _landed(course, duration, z1 or low + 0.3 * (top - low))
+        return _landed(course, duration, z1 or low + Guess.current().landing * (top - low))
     return course
 
 
@@ -134,7 +131,7 @@ def automatic_guess(
     z, az = course(t), course(t, 2)
     airborne = (t > course.flight[0]) & (t < course.flight[1])
     x0, x1 = (asked(requirements, "body/x", at) or 0.0 for at in (0.0, 1.0))
-    span = max(course.flight[1] - course.flight[0], 0.05)
+    span = max(course.flight[1] - course.flight[0], Guess.current().least_flight)
     x = x0 + (x1 - x0) * np.clip((t - course.flight[0]) / span, 0.0, 1.0)
 
     names = [c.name for c in model.mechanism.coordinates]
@@ -144,7 +141,7 @@ def automatic_guess(
     share = load / len(robot.legs)
     forces: dict[str, np.ndarray] = {}
     for leg, place in robot.legs.items():
-        reach = np.minimum(z, lengths[0] + STRETCH * (lengths[1] - lengths[0]))
+        reach = np.minimum(z, lengths[0] + Guess.current().stretch * (lengths[1] - lengths[0]))
         hip, bend = leg_pose(robot, place.fold, np.zeros_like(z), -reach)
         q[:, names.index(f"{leg}/hip/q")] = hip
         q[:, names.index(f"{leg}/knee/q")] = place.fold * bend
@@ -170,7 +167,7 @@ def _lever(robot: Robot, bend: np.ndarray) -> np.ndarray:
     def length(k: np.ndarray) -> np.ndarray:
         return np.asarray(np.hypot(f + b * np.cos(k), b * np.sin(k)))
 
-    step = 1e-4
+    step = Guess.current().difference
     ahead, behind = ([extension(robot.leg, k + d) for k in bend] for d in (step, -step))
     dx = np.array(ahead, float) - np.array(behind, float)
     return np.asarray((length(bend + step) - length(bend - step)) / dx)
@@ -183,8 +180,9 @@ def _efforts(
     u = np.zeros((len(t), len(model.inputs)))
     lam = np.zeros((len(t), len(model.forces)))
     cylinder = model.mechanism.need_cylinder()
-    full = FILLED * float(np.interp(model.supply, cylinder.pressures, cylinder.F_extend))
-    rise = RISE * max(cylinder.fill)
+    settings = Guess.current()
+    full = settings.filled * float(np.interp(model.supply, cylinder.pressures, cylinder.F_extend))
+    rise = settings.filling * max(cylinder.fill)
     for i, (leg, symbol) in enumerate(model.states):
         if symbol == "F_e" and leg in piston:
             s[:, i] = np.clip(piston[leg], 0.0, full)

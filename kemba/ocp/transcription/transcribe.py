@@ -163,7 +163,7 @@ class Transcription:
 
 
 def _requirement_row(g: ca.SX, requirement: Requirement) -> Rows:
-    scale = {"m": 0.1, "m.s-1": 1.0, "rad": 0.2}.get(requirement.quantity.unit, 1.0)
+    scale = requirement.scale
     label = f"{requirement.text}:{requirement.quantity.name}"
     return Rows(
         "requirement",

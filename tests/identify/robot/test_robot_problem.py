@@ -68,7 +68,7 @@ def test_a_right_model_leaves_white_noise(clean: RobotProblem) -> None:
 
 
 def test_the_reference_follows_the_motion(clean: RobotProblem) -> None:
-    y, seen = clean.point.y, clean.batch.y
+    y, seen = clean.state.motion.y, clean.batch.y
     error = np.sqrt(np.nanmean((y - seen) ** 2, axis=(0, 1)))
     assert np.all(error < 1.3 * clean.batch.sigma.max(axis=0))
 

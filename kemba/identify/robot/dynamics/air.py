@@ -64,19 +64,19 @@ def _mean_growth(h: ca.SX, slope: ca.SX, stiff: ca.SX) -> ca.SX:
     return h * slope * ca.if_else(small, 0.5 + z / 6, (ca.exp(z) - 1 - z) / safe**2)
 
 
-def substeps(track: ResampledLog, delays: Array) -> tuple[Array, Array, Index]:
+def substeps(log: ResampledLog, delays: Array) -> tuple[Array, Array, Index]:
     """(times (N + 1,), valves (valves, N), index of each node) with a time at every switching.
 
     `delays` (valves, 2): seconds from the command to switching on and off. As many times come back
     whatever the delays are, so that functions built for one length serve them all.
     """
     events, signs = [], []
-    for (times, change, _), (on, off) in zip(track.switches, delays, strict=True):
+    for (times, change, _), (on, off) in zip(log.switches, delays, strict=True):
         events.append(times + np.where(change > 0, on, off))
         signs.append(change)
-    first, last = track.time[0], track.time[-1]
+    first, last = log.time[0], log.time[-1]
     inner = [np.clip(e, first, last) for e in events]
-    everything = np.concatenate([track.time, *inner])
+    everything = np.concatenate([log.time, *inner])
     order = np.argsort(everything, kind="stable")
     times = everything[order]
     index = np.empty(len(order), int)
@@ -85,6 +85,6 @@ def substeps(track: ResampledLog, delays: Array) -> tuple[Array, Array, Index]:
     valves = np.zeros((len(events), len(middle)))
     for i, (event, sign) in enumerate(zip(events, signs, strict=True)):
         sorted_by = np.argsort(event, kind="stable")
-        count = np.concatenate([[0.0], np.cumsum(sign[sorted_by])]) + track.switches[i][2]
+        count = np.concatenate([[0.0], np.cumsum(sign[sorted_by])]) + log.switches[i][2]
         valves[i] = count[np.searchsorted(event[sorted_by], middle, side="right")] > 0.5
-    return times, valves, index[: len(track.time)]
+    return times, valves, index[: len(log.time)]

@@ -1,4 +1,4 @@
-"""The motion along which a model is judged: smoothed with the model's help, then linearised."""
+"""The reference: the motion along which a model is linearised, and how it is first found."""
 
 from __future__ import annotations
 
@@ -26,8 +26,9 @@ UNKNOWN_AIR, AIR_FADES = 100.0, 0.025  # N2.s at the start of a log that does no
 
 
 @dataclass(frozen=True)
-class Floor:
-    """Density of the forces that no model explains: body [N2.s], pitch, hips [N2.m2.s], rods."""
+class ForceDensity:
+    """Spectral density of the forces that no model explains: on the body and the rods [N2.s], at
+    pitch and hips [N2.m2.s]."""
 
     body: float = 5e-3
     pitch: float = 2e-4
@@ -35,12 +36,12 @@ class Floor:
     rod: float = 2e-2
 
 
-LOOSE = Floor(body=0.05, pitch=2e-3, hip=2e-3, rod=0.5)  # for smoothing: follow the data
+LOOSE = ForceDensity(body=0.05, pitch=2e-3, hip=2e-3, rod=0.5)  # for smoothing: follow the data
 
 
 @dataclass(frozen=True)
 class Reference:
-    """Motion at nodes: q, v (n, L, k); acceleration `a` over each step."""
+    """Motion: q, v (n, L, k) at the nodes, acceleration `a` (n, L, k) over each step."""
 
     q: Array
     v: Array
@@ -53,7 +54,8 @@ class Reference:
 
 
 def integrator(h: Array, k: int, extra: int) -> tuple[Array, Array]:
-    """F, G of k double integrators and `extra` constants that may wander."""
+    """F (n, L, d, d), G (n, L, d, k + extra) of k double integrators and `extra` constants that may
+    drift, over steps `h` (n, L) [s]; d = 2 k + extra."""
     n, runs = h.shape
     d = 2 * k + extra
     F = np.broadcast_to(np.eye(d), (n, runs, d, d)).copy()
@@ -67,7 +69,7 @@ def integrator(h: Array, k: int, extra: int) -> tuple[Array, Array]:
 
 
 def first_reference(physics: Physics, batch: Batch) -> Reference:
-    """Every coordinate smoothed for itself."""
+    """Every coordinate smoothed on its own, without the model."""
     k, legs = physics.mechanism.n, len(physics.legs)
     y = batch.flat(batch.y)
     pistons = y[:, -legs:]
@@ -91,39 +93,44 @@ def _kinematic(name: str) -> float:
     return KINEMATIC.get(name) or KINEMATIC["hip" if "hip" in name else "knee"]
 
 
-def schedules(physics: Physics, batch: Batch, ref: Reference) -> list[Schedule]:
+def read_schedules(physics: Physics, batch: Batch, ref: Reference) -> tuple[Schedule, ...]:
     """Contact read from the motion of each run."""
     q, v = batch.flat(ref.q), batch.flat(ref.v)
     legs = len(physics.legs)
     feet = batch.deep(physics.call("feet", q, v)[0].reshape(-1, legs, 2))
     y = batch.deep(physics.call("measured", q, v)[0])
     found = []
-    for i, track in enumerate(batch.resampled):
-        n = len(track.time)
+    for i, log in enumerate(batch.resampled):
+        n = len(log.time)
         found.append(
             read_schedule(
-                track.time,
+                log.time,
                 feet[:n, i],
                 y[:n, i, -legs:],
                 physics.mechanism.stroke,
                 ref.q[:n, i, :3],
             )
         )
-    return found
+    return tuple(found)
 
 
-def densities(physics: Physics, batch: Batch, plan: Sequence[Schedule], floor: Floor) -> Array:
-    """(n, L, k + 2 legs): density of unknown force per measured channel and foot axis."""
+def densities(
+    physics: Physics, batch: Batch, schedules: Sequence[Schedule], least: ForceDensity
+) -> Array:
+    """(n, L, k + 2 legs): density of unknown force per measured channel and foot axis.
+
+    `least`: density everywhere; contacts, impacts and stops add to it.
+    """
     legs, parts = len(physics.legs), []
-    for track, schedule in zip(batch.resampled, plan, strict=True):
-        own = [floor.body, floor.body, floor.pitch] + [floor.hip] * legs + [floor.rod] * legs
-        density = np.tile(np.array(own + [0.0] * 2 * legs), (len(track.time), 1))
+    for log, schedule in zip(batch.resampled, schedules, strict=True):
+        own = [least.body, least.body, least.pitch] + [least.hip] * legs + [least.rod] * legs
+        density = np.tile(np.array(own + [0.0] * 2 * legs), (len(log.time), 1))
         rods = density[:, 3 + legs : 3 + 2 * legs]
         rods += np.where(schedule.low | schedule.high, CONTACT, 0.0)
         rods += np.where((schedule.low | schedule.high) & schedule.struck, IMPACT, 0.0)
         rods += _edges(schedule.low | schedule.high)
         if schedule.phase[min(5, len(schedule.phase) - 1)] != "rest":
-            since = (track.time - track.time[0])[:, None]
+            since = (log.time - log.time[0])[:, None]
             rods += UNKNOWN_AIR * np.exp(-2.0 * since / AIR_FADES)
         feet = np.where(schedule.foot, CONTACT, 0.0) + np.where(schedule.struck, IMPACT, 0.0)
         density[:, 3 + 2 * legs :] = np.repeat(feet, 2, axis=1)
@@ -132,7 +139,7 @@ def densities(physics: Physics, batch: Batch, plan: Sequence[Schedule], floor: F
 
 
 def _edges(flags: np.ndarray[Any, Any]) -> Array:
-    """Large where a piston reaches a stop or leaves it."""
+    """Density (n, legs) in the eight nodes after a piston reaches a stop."""
     change = np.zeros(flags.shape, bool)
     change[1:] = flags[1:] & ~flags[:-1]
     wide = change.copy()
