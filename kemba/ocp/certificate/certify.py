@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import casadi as ca
 import numpy as np
@@ -12,6 +13,7 @@ from kemba.model import Model
 from kemba.ocp.task.costs import COSTS
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task, Tolerances
+from kemba.ocp.transcription.first_node import state_rows
 from kemba.ocp.transcription.solution import arrays
 from kemba.ocp.transcription.stage import ANGLE_ARM
 from kemba.quantity import Quantity
@@ -29,6 +31,14 @@ class Violation:
     violation: float
     unit: str
     size: float
+
+
+class Note(Protocol):
+    """Records scaled violations (nodes, rows) and returns the largest, at least zero."""
+
+    def __call__(
+        self, values: np.ndarray, labels: Iterable[tuple[str, str, float]], first: int = 1
+    ) -> float: ...
 
 
 @dataclass(frozen=True)
@@ -112,6 +122,7 @@ def certify(
         note(-pair_b / scale_b, [(b.label, b.unit, b.scale) for _, b in node.pair_rows]),
         note(-limits, [(r.label, "of the limit", 1.0) for r in node.limit_rows]),
     )
+    signs = max(signs, _first_node(model, x, note))
     acting = {q.name for q in (*model.inputs.values(), *model.forces.values())}
     boxes = [signs, *_boxes(model, x, note), _requirements(requirements, trajectory, found, acting)]
     binary = [i for i, q in enumerate(model.inputs.values()) if q.binary]
@@ -122,7 +133,7 @@ def certify(
     )
 
 
-def _boxes(model: Model, x: dict[str, np.ndarray], note) -> list[float]:  # type: ignore[no-untyped-def]
+def _boxes(model: Model, x: dict[str, np.ndarray], note: Note) -> list[float]:
     groups: dict[str, Iterable[Quantity]] = {
         "q": model.mechanism.coordinates,
         "v": model.mechanism.velocities,
@@ -136,9 +147,29 @@ def _boxes(model: Model, x: dict[str, np.ndarray], note) -> list[float]:  # type
         lower = np.array([q.lower for q in quantities])
         upper = np.array([q.upper for q in quantities])
         scale = np.array([q.scale for q in quantities])
-        over = np.maximum(lower - x[name][1:], x[name][1:] - upper) / scale
-        sizes.append(note(over, [(f"bound:{q.name}", q.unit, q.scale) for q in quantities]))
+        first = 0 if name in ("q", "v", "s") else 1  # the first node has no inputs and forces
+        values = x[name][first:]
+        over = np.maximum(lower - values, values - upper) / scale
+        labels = [(f"bound:{q.name}", q.unit, q.scale) for q in quantities]
+        sizes.append(note(over, labels, first))
     return sizes
+
+
+def _first_node(model: Model, x: dict[str, np.ndarray], note: Note) -> float:
+    """What holds in every state, at the first node."""
+    rows = state_rows(model.node)
+    if not rows:
+        return 0.0
+    values = first_state(model, *(x[name][0] for name in ("q", "v", "s")))
+    return note(-values[None, :], [(r.label, r.unit, r.scale) for r in rows], 0)
+
+
+def first_state(model: Model, q: np.ndarray, v: np.ndarray, s: np.ndarray) -> np.ndarray:
+    """What holds in every state (rows,), scaled, at q, v, s; negative where it does not."""
+    node, rows = model.node, state_rows(model.node)
+    scaled = ca.vertcat(*(row.expression / row.scale for row in rows))
+    evaluate = ca.Function("state", [node.q, node.v, node.s], [ca.densify(scaled)])
+    return np.array(evaluate(q, v, s)).ravel()
 
 
 def _requirements(

@@ -95,12 +95,12 @@ def inertia_and_weight(model: Model) -> tuple[float, float]:
     node = model.node
     row = [c.name for c in model.mechanism.coordinates].index("body/z")
     q = np.array([model.mechanism.standing[c.name] for c in model.mechanism.coordinates])
-    still, zeros = np.zeros(len(q)), [0.0 * np.ones(x.numel()) for x in (node.s, node.lam, node.u)]
+    still, s = np.zeros(len(q)), np.array([x.value for x in model.states.values()])
+    sd, lam, u, p = (np.zeros(x.numel()) for x in (node.sd, node.lam, node.u, node.p))
 
     def force(a: float) -> float:
         up = a * (np.arange(len(q)) == row)
-        s, lam, u = zeros
-        found = node.residual(q, still, up, s, s, lam, u, np.zeros(node.p.numel()))
+        found = node.residual(q, still, up, s, sd, lam, u, p)
         return float(found[0][row])
 
     return abs(force(1.0) - force(0.0)), abs(force(0.0))

@@ -18,6 +18,14 @@ class Independent:
 
     def adds(self, g: ca.SX, view: View) -> bool:
         """Whether g = 0 is independent of what holds; if so it holds from now on."""
+        row = self.rest(g, view)
+        if row is None:
+            return False
+        self.basis.append(row / np.linalg.norm(row))
+        return True
+
+    def rest(self, g: ca.SX, view: View) -> np.ndarray | None:
+        """The part of the gradient of g (1,) that is new beside what holds; None where none is."""
         z = view.z("q v s")
         slope = ca.Function("slope", [z], [ca.densify(ca.jacobian(g, z))])
         row = np.array(slope(np.concatenate([self.guess[x] for x in ("q", "v", "s")]))).ravel()
@@ -25,7 +33,4 @@ class Independent:
         for b in self.basis:
             row = row - (row @ b) * b
         small = ModeRules.current().independent
-        if np.linalg.norm(row) <= small * max(size, small):
-            return False
-        self.basis.append(row / np.linalg.norm(row))
-        return True
+        return None if np.linalg.norm(row) <= small * max(size, small) else row

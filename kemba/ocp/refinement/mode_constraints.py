@@ -10,10 +10,12 @@ import numpy as np
 from kemba.ocp.refinement.independent import Independent
 from kemba.ocp.refinement.modes import AHEAD, BACK, HELD, OPEN
 from kemba.ocp.refinement.program import PhaseProgram, Where
+from kemba.ocp.refinement.radau import STATE
 from kemba.ocp.refinement.settings import ModeRules
 from kemba.ocp.refinement.unilateral import Constraint
 from kemba.ocp.refinement.view import View
 from kemba.ocp.task.requirement import SCALES
+from kemba.ocp.transcription.first_node import state_rows
 
 INF = np.inf
 LENGTH, SPEED = SCALES["m"], SCALES["m.s-1"]  # of gaps and their rates
@@ -28,6 +30,7 @@ def add_mode_constraints(program: PhaseProgram, start: Independent) -> None:
         _held(program, view, i, constraint)
         _friction(program, view, i, constraint)
         _start(program, view, i, constraint, start)
+    _first_state(program, view, start)
     _limits(program, view)
     _durations(program)
 
@@ -119,6 +122,16 @@ def _start(
         g = view.of(expression) / scale
         if start.adds(g, view):
             program.rule(f"{constraint.label} first {name}", view.z("q v"), g, 0.0, 0.0, [at])
+
+
+def _first_state(program: PhaseProgram, view: View, start: Independent) -> None:
+    """What holds in every state, at the first node; not what equalities there already decide."""
+    node, reduction, first = program.model.node, program.reduction, program.columns.first
+    at = np.concatenate([first[g] for g in STATE])
+    for row in state_rows(node, reduction.pairs, reduction.limits):
+        g = view.of(row.expression) / (LENGTH if row.unit == "m" else row.scale)
+        if start.rest(g, view) is not None:
+            program.rule(f"{row.label} first", view.z("q v s"), g, 0.0, INF, [at])
 
 
 def _limits(program: PhaseProgram, view: View) -> None:

@@ -176,7 +176,7 @@ def _lever(robot: Robot, bend: np.ndarray) -> np.ndarray:
 def _efforts(
     model: Model, t: np.ndarray, piston: dict[str, np.ndarray], share: np.ndarray
 ) -> dict[str, np.ndarray]:
-    s = np.zeros((len(t), len(model.states)))
+    s = np.tile([q.value for q in model.states.values()], (len(t), 1))
     u = np.zeros((len(t), len(model.inputs)))
     lam = np.zeros((len(t), len(model.forces)))
     for i, (leg, symbol) in enumerate(model.states):

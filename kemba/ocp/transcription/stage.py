@@ -161,7 +161,7 @@ def _signs(
     g: ca.SX, y: ca.SX, layout: Layout, rows: Sequence[Row], scales: Sequence[float]
 ) -> Rows:
     """Rows g >= 0, except where g is a variable whose own bound says so."""
-    kept = [i for i in range(g.numel()) if not _bounded_below(g[i], y, layout)]
+    kept = [i for i in range(g.numel()) if not bounded_below(g[i], y, layout)]
     return _rows(
         "sign",
         g[kept],
@@ -184,7 +184,8 @@ def as_variable(g: ca.SX, y: ca.SX) -> tuple[int, float, float] | None:
     return index, factor, offset
 
 
-def _bounded_below(g: ca.SX, y: ca.SX, layout: Layout) -> bool:
+def bounded_below(g: ca.SX, y: ca.SX, layout: Layout) -> bool:
+    """Whether g is a variable whose own bound says g >= 0."""
     variable = as_variable(g, y)
     if variable is None:
         return False

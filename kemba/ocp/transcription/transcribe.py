@@ -12,8 +12,9 @@ from kemba.model import Model
 from kemba.ocp.nlp.blocks import Block, BlockProblem
 from kemba.ocp.task.requirement import Requirement, quantity_expression
 from kemba.ocp.task.task import Task
+from kemba.ocp.transcription.first_node import Held, granted, state_rows
 from kemba.ocp.transcription.layout import GROUPS, STEP, Layout
-from kemba.ocp.transcription.stage import INF, Rows, Stage, as_variable, build_stage
+from kemba.ocp.transcription.stage import INF, Rows, Stage, as_variable, bounded_below, build_stage
 from kemba.ocp.transcription.symmetry import Reduction
 
 RequirementBlock = tuple[Block, Rows, list[int]]  # with the nodes at which its rows hold
@@ -56,7 +57,8 @@ class Transcription:
         self._rest_before_start()
         stage = self.stage
         index = np.arange((nodes + 1) * self.shape[1]).reshape(self.shape)
-        moments = self.requirement_blocks(index)
+        self.held: list[Held] = []  # requirements that hold exactly at the first node
+        moments = self.requirement_blocks(index) + self._first_node_blocks(index)
         pairs = np.hstack([index[:-1, :n], index[1:, :n]])
         both, p = ca.vertcat(stage.y0, stage.y), ca.vertcat(stage.eps, stage.weights)
         blocks = [Block(both, stage.g, stage.cost, pairs)]
@@ -94,6 +96,8 @@ class Transcription:
         self, requirement: Requirement, g: ca.SX, where: list[int], index: np.ndarray
     ) -> RequirementBlock | None:
         """The rows of a requirement that holds exactly; None where tighter bounds do it."""
+        if 0 in where:
+            self.held.append(Held(g, requirement.lower, requirement.upper))
         variable = as_variable(g, self.stage.y)
         if variable is not None:
             self._tighten(where, variable, requirement)
@@ -102,18 +106,35 @@ class Transcription:
         at = index[where, : self.layout.size]
         return Block(self.stage.y, rows.g, ca.SX(0), at), rows, where
 
+    def _first_node_blocks(self, index: np.ndarray) -> list[RequirementBlock]:
+        """What holds in every state, at the first node; not what its requirements already say."""
+        stage, node, blocks = self.stage, self.model.node, []
+        for row in state_rows(node, self.reduction.pairs, self.reduction.limits):
+            g = self.of_state(row.expression) / row.scale
+            if bounded_below(g, stage.y, self.layout) or granted(
+                g, stage.y, self.layout, self.held
+            ):
+                continue
+            rows = Rows(row.kind, g, 0.0, INF, (row.label,), (row.unit,), (row.scale,))
+            at = index[[0], : self.layout.size]
+            blocks.append((Block(stage.y, rows.g, ca.SX(0), at), rows, [0]))
+        return blocks
+
+    def of_state(self, expression: ca.SX) -> ca.SX:
+        """An expression of the node's q, v, s, u, lam in the stage's y."""
+        full = [ca.densify(self.layout.full(self.stage.y, g)) for g in GROUPS if g != "h"]
+        node = self.model.node
+        symbols = [node.q, node.v, node.s, node.u, node.lam]
+        return ca.SX(ca.cse(ca.densify(ca.substitute([ca.SX(expression)], symbols, full)[0])))
+
     def requirement_expressions(self) -> Iterator[tuple[Requirement, ca.SX, list[int]]]:
         """Every requirement as an expression of the stage's y and the nodes at which it holds; those that
         symmetry grants or repeats are left out."""
-        full = {g: ca.densify(self.layout.full(self.stage.y, g)) for g in GROUPS if g != "h"}
         node = self.model.node
-        symbols = {"q": node.q, "v": node.v, "s": node.s, "u": node.u, "lam": node.lam}
-        values = [full[name] for name in symbols]
         seen: set[tuple[object, ...]] = set()
         for requirement in self.requirements:
             expression = quantity_expression(self.model, requirement.quantity.name)
-            g = ca.substitute([expression], list(symbols.values()), values)[0]
-            g = ca.SX(ca.cse(ca.densify(g)))
+            g = self.of_state(expression)
             key = (
                 requirement.location,
                 requirement.at,
