@@ -49,7 +49,7 @@ class Flight:
 
 
 def flight_of(model: Model, requirements: Sequence[Requirement], poses: Poses) -> Flight | None:
-    """The flight that the highest requirement on the body's height asks for, from a start at rest."""
+    """The flight to the greatest height that is required of the body, from a start at rest."""
     highest = [
         w for w in requirements if w.quantity.name == "body/z" and w.at and np.isfinite(w.lower)
     ]

@@ -1,7 +1,7 @@
-"""Optional speed: the same functions as C code, compiled once and kept by content.
+"""Optional speed: the same functions as C code, compiled once and kept in a cache.
 
-Never needed and never waited for: the compiler works beside the first solve, which goes on with
-the functions as they are; later ones find the library.
+The compiler runs beside the first solve, which uses the functions as they are and does not wait.
+Later solves find the library under the hash of the functions.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def compiled(functions: Sequence[ca.Function], wait: bool = False) -> list[ca.Fu
 
 
 def _compile(functions: Sequence[ca.Function], compiler: str, library: Path, wait: bool) -> None:
-    """Set a compiler to work, unless one is already, in a process that outlives ours."""
+    """Start a compiler, unless one is at work already, in a process that may outlive ours."""
     library.parent.mkdir(parents=True, exist_ok=True)
     folder = library.with_suffix(".making")
     if folder.exists() and time.time() - folder.stat().st_mtime > Functions.current().stale:

@@ -73,8 +73,11 @@ def _slip_speeds(
 
 
 def certificate(program: PhaseProgram, x: np.ndarray, trajectory: Trajectory) -> Certificate:
-    """What the solution violates: collocation and impacts (dynamics), modes, bounds and requirements
-    (bounds), forces times gaps at the element ends (complementarity)."""
+    """What the solution x (size,) violates.
+
+    dynamics: collocation and impacts; bounds: modes, bounds, requirements and the first state;
+    complementarity: forces times gaps at the ends of elements.
+    """
     g = np.array(program.problem.g(x, [])).ravel()
     over = np.maximum(np.maximum(program.g_lower - g, g - program.g_upper), 0.0)
     rows = program.rows

@@ -43,7 +43,7 @@ class Course:
 
 
 def asked(requirements: Sequence[Requirement], name: str, at: float) -> float | None:
-    """The value wished for a quantity at a moment, if any (the nearer end of a range)."""
+    """The value required of a quantity at a moment, or None; of a range its lower end, if any."""
     for requirement in requirements:
         if requirement.quantity.name == name and requirement.at == at:
             return requirement.lower if np.isfinite(requirement.lower) else requirement.upper

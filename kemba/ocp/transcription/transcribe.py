@@ -1,4 +1,20 @@
-"""A task on a model becomes a nonlinear program: grid, bounds, rows, and what each one means."""
+"""A task on a model becomes a nonlinear program.
+
+Legend:
+
+N   number of steps ("nodes" of a task); node k = 0 ... N ends step k, node 0 is the start
+n   size of a node's vector y = [q, v, s, u, lam, h]:
+    q, v   coordinates and velocities, of half a robot where a mirror symmetry is used
+    s      states of effects, u inputs (torques, valves), lam forces and slip speeds
+    h      the step that ends at this node
+    Every entry is divided by the scale of its quantity. u, lam and h of node 0 are fixed dummies.
+Y   (N + 1, n): all variables, row by row; the program's x is Y.ravel()
+m   rows of one step, in this order: defects of kinematics, of motion, of rates; products of the
+    pairs; signs of both sides of a pair; limits (see `stage`)
+g   all rows: m rows of step 1, ..., m rows of step N; then the requirements that are no bounds,
+    one block each over its nodes; then what holds in every state, at node 0
+p   (5,): relaxation of the pairs and four weights (see `parameters`)
+"""
 
 from __future__ import annotations
 
@@ -32,10 +48,10 @@ class Meaning:
 
 
 class Transcription:
-    """The program of one task on one grid.
+    """The program of one task on one grid, see the legend above.
 
-    Variables: Y (nodes + 1, n) row by row, `layout` tells what is where; node 0 has no inputs.
-    `lower`, `upper` bound the variables, `g_lower`, `g_upper` the rows; `meanings` names them.
+    `layout` tells what is where in y; `lower`, `upper` (N + 1, n) bound Y, `g_lower`, `g_upper`
+    (rows,) bound g; `meanings` says what each row of g is; `problem` has the functions.
     """
 
     def __init__(
@@ -73,7 +89,7 @@ class Transcription:
         self.problem = BlockProblem(blocks, index.size, p, worth_compiling=True)
 
     def _rest_before_start(self) -> None:
-        """Node 0 has no interval before it: its inputs and forces are dummies at zero."""
+        """Inputs and forces of node 0 are fixed at zero and its step at the nominal one."""
         for group in ("u", "lam"):
             part = self.layout.slices[group]
             self.lower[0, part] = self.upper[0, part] = 0.0
@@ -81,7 +97,7 @@ class Transcription:
         self.lower[0, part] = self.upper[0, part] = self.task.duration / self.nodes / STEP
 
     def extra_columns(self) -> int:
-        """Columns of Y behind the layout's own, kept at zero unless `requirement_blocks` frees them."""
+        """Columns of Y behind the layout's own; zero unless `requirement_blocks` frees them."""
         return 0
 
     def requirement_blocks(self, index: np.ndarray) -> list[RequirementBlock]:
@@ -128,8 +144,10 @@ class Transcription:
         return ca.SX(ca.cse(ca.densify(ca.substitute([ca.SX(expression)], symbols, full)[0])))
 
     def requirement_expressions(self) -> Iterator[tuple[Requirement, ca.SX, list[int]]]:
-        """Every requirement as an expression of the stage's y and the nodes at which it holds; those that
-        symmetry grants or repeats are left out."""
+        """Every requirement with its expression in the stage's y and the nodes where it holds.
+
+        Those that the symmetry grants or repeats are left out.
+        """
         node = self.model.node
         seen: set[tuple[object, ...]] = set()
         for requirement in self.requirements:
