@@ -35,15 +35,15 @@ class Flight:
     def least_time(self, other: float, generous: bool) -> float:
         """Seconds between the apex and the height `other` [m], at least.
 
-        The ground only pushes, so the centre of mass never falls, nor slows while it rises, faster
-        than by `fall`. Generous: the legs' motion lends the body their swing, in height and time.
+        The ground only pushes: the centre of mass accelerates downwards by `fall` at most.
+        `generous`: the motion of the legs may add their swing to the body's height.
         """
         lent = self.swing if generous else 0.0
         way = max(self.height - other - lent, 0.0)
         return float(np.sqrt(2 * way / self.fall) - np.sqrt(2 * lent / self.fall))
 
     def most(self, other: float, span: float) -> float:
-        """The height [m] that `span` seconds from or to `other` allow, generously."""
+        """The greatest height [m] that `span` seconds from or to the height `other` allow."""
         lent = float(np.sqrt(2 * self.swing / self.fall))
         return other + self.swing + self.fall * (span + lent) ** 2 / 2
 
@@ -80,8 +80,7 @@ def flight_of(model: Model, requirements: Sequence[Requirement], poses: Poses) -
 
 
 def leg_swing(model: Model) -> float:
-    """How much the legs can move the centre of mass, from one side of the hips to the other,
-    times the mass [kg.m]; at most."""
+    """How far moving legs can shift the centre of mass at most, times the mass [kg.m]."""
     leg = load_robot(model.mechanism.name).leg
     shank = leg.femur.length + leg.tibia.com
     rod = leg.piston.mount + leg.piston.retracted + leg.piston.stroke

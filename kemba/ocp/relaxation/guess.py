@@ -1,5 +1,8 @@
-"""Automatic start guess: the body's height as one-dimensional rest, push, flight, landing; legs by
-inverse kinematics with the feet under the hips; forces and valves by virtual work."""
+"""Automatic start guess.
+
+The body's height rests, is pushed, flies and lands, in one dimension. Legs follow by inverse
+kinematics with the feet under the hips, forces and valves by virtual work.
+"""
 
 from __future__ import annotations
 

@@ -123,7 +123,7 @@ class Transcription:
         return Block(self.stage.y, rows.g, ca.SX(0), at), rows, where
 
     def _first_node_blocks(self, index: np.ndarray) -> list[RequirementBlock]:
-        """What holds in every state, at the first node; not what its requirements already say."""
+        """What holds in every state, at the first node; without what requirements there imply."""
         stage, node, blocks = self.stage, self.model.node, []
         for row in state_rows(node, self.reduction.pairs, self.reduction.limits):
             g = self.of_state(row.expression) / row.scale
