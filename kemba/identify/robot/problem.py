@@ -163,8 +163,8 @@ class RobotProblem(Problem):
         return self.state.pick(power[..., None])[:, 0]
 
     def window_errors(self, theta: Theta) -> dict[str, Array]:
-        """Per channel, measured minus predicted (k,) in its unit, over short times that begin on the
-        measured motion; contact forces are the data's."""
+        """Per channel, measured minus predicted (k,) in its unit, over short times that begin on
+        the measured motion; contact forces are the data's."""
         state, batch = self.state, self.batch
         steps = max(
             2,
