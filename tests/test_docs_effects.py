@@ -57,7 +57,7 @@ def test_the_class_of_extending_runs_and_dissipates(tmp_path: Path) -> None:
 
 
 def test_the_formula_of_extending_runs(tmp_path: Path) -> None:
-    (text,) = blocks("extending.md", "yaml")
+    text, _ = blocks("extending.md", "yaml")
     (tmp_path / "mine.yaml").write_text(text, encoding="utf-8")
     labels = [i.label for i in load_model(tmp_path / "mine.yaml").instances]
     assert "front/magnet" in labels and "front/contact" in labels

@@ -7,13 +7,14 @@ from typing import Annotated
 
 import typer
 
-from kemba_cli.common import Json, Quiet, print_json
+from kemba_cli.common import Json, OwnEffects, Quiet, print_json
 
 
 def adopt(
     answer: Annotated[Path, typer.Argument(help="Folder written by discover.")],
     effect: Annotated[str, typer.Argument(help="Effect of its ranking, such as seal_friction.")],
     out: Annotated[Path | None, typer.Option(help="Model YAML to write.")] = None,
+    own_effects: OwnEffects = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:

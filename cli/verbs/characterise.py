@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from kemba_cli.common import Json, Quiet, print_json, results, say
+from kemba_cli.common import Json, OwnEffects, Quiet, print_json, results, say
 
 if TYPE_CHECKING:
     from kemba.plant.rig.characterise import Characteristics
@@ -25,6 +25,7 @@ def characterise(
     paper: Annotated[
         bool, typer.Option("--paper", help="No logs: what the paper's own tables imply.")
     ] = False,
+    own_effects: OwnEffects = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:

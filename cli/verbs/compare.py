@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from kemba_cli.common import Json, Quiet, print_json, results, say
+from kemba_cli.common import Json, OwnEffects, Quiet, print_json, results, say
 
 if TYPE_CHECKING:
     from kemba.identify.compare.compare import Comparison
@@ -23,6 +23,7 @@ def compare(
     column_map: Annotated[
         str | None, typer.Option("--map", help="Column map YAML for foreign logs.")
     ] = None,
+    own_effects: OwnEffects = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:

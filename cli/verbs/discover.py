@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from kemba_cli.common import Json, Quiet, print_json, say
+from kemba_cli.common import Json, OwnEffects, Quiet, print_json, say
 from kemba_cli.failures import BAD_ANSWER
 
 if TYPE_CHECKING:
@@ -28,6 +28,7 @@ def discover(
     ] = None,
     time_limit: Annotated[float, typer.Option(min=5.0, help="Seconds at most.")] = 300.0,
     figures: Annotated[bool, typer.Option(help="Draw the figures.")] = True,
+    own_effects: OwnEffects = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:

@@ -7,12 +7,13 @@ from typing import Annotated
 
 import typer
 
-from kemba_cli.common import Json, Quiet, print_json, say
+from kemba_cli.common import Json, OwnEffects, Quiet, print_json, say
 
 
 def experiment(
     answer: Annotated[Path, typer.Argument(help="Folder written by discover.")],
     out: Annotated[Path | None, typer.Option(help="Rig YAML to write.")] = None,
+    own_effects: OwnEffects = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from kemba_cli.common import Json, Quiet, print_json
+from kemba_cli.common import Json, OwnEffects, Quiet, print_json
 
 
 def export(
@@ -17,6 +17,7 @@ def export(
         str | None,
         typer.Option("--map", help="Column map YAML of the program that is to read the .csv."),
     ] = None,
+    own_effects: OwnEffects = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:

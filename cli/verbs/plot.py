@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from kemba_cli.common import Json, Quiet, print_json
+from kemba_cli.common import Json, OwnEffects, Quiet, print_json
 
 
 def plot(
@@ -30,6 +30,7 @@ def plot(
     column_map: Annotated[
         str | None, typer.Option("--map", help="Column map YAML for foreign logs.")
     ] = None,
+    own_effects: OwnEffects = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from kemba_cli.common import Json, Quiet, print_json, say
+from kemba_cli.common import Json, OwnEffects, Quiet, print_json, say
 
 
 def simulate(
@@ -19,6 +19,7 @@ def simulate(
     ] = False,
     seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same logs.")] = 0,
     out: Annotated[Path | None, typer.Option(help="Folder for the logs.")] = None,
+    own_effects: OwnEffects = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:

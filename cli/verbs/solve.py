@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from kemba_cli.common import Json, Quiet, print_json, say
+from kemba_cli.common import Json, OwnEffects, Quiet, print_json, say
 
 if TYPE_CHECKING:
     from kemba.ocp import Task
@@ -36,6 +36,7 @@ def solve(
     jobs: Annotated[int | None, typer.Option(min=1, help="Starts at a time.")] = None,
     replay: Annotated[bool, typer.Option(help="Execute the plan in simulation.")] = True,
     figure: Annotated[bool, typer.Option(help="Draw the plan.")] = True,
+    own_effects: OwnEffects = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -47,6 +48,7 @@ def solve(
     Example: kemba-opt solve jump.yaml --set "height=0.6 m"
     """
     from kemba.config import find_config
+    from kemba.effects import BY_KIND
     from kemba.ocp import load_task, task_model
     from kemba.ocp.nlp.interrupt import Interrupt
     from kemba.ocp.task.requirement import resolve
@@ -72,7 +74,7 @@ def solve(
     if built.ignored:
         say(f"no plan can use {', '.join(built.ignored)}: it changes what is measured only", quiet)
     models = [find_config(name, "models") for name in (resolved.model, resolved.plant)]
-    inputs = [find_config(task, "tasks"), *models]
+    inputs = [find_config(task, "tasks"), *models, *BY_KIND.files]
     folder = RunFolder.create(out, resolved.name, inputs)
     with Progress(quiet or json) as progress, Interrupt(lambda text: say(text, quiet)) as stop:
         listener = Listener(progress.tell, progress.watch, stop)

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from kemba_cli.common import Json, Quiet, print_json, say, talk
+from kemba_cli.common import Json, OwnEffects, Quiet, print_json, say, talk
 
 EVERY = 10.0  # s between lines where no one watches
 
@@ -31,6 +31,7 @@ def sweep(
     time_limit: Annotated[
         float | None, typer.Option(min=0.1, help="Seconds after which to stop.")
     ] = None,
+    own_effects: OwnEffects = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:

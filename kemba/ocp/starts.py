@@ -10,6 +10,8 @@ from multiprocessing import get_context
 from pathlib import Path
 
 from kemba.config import Document
+from kemba.effects import BY_KIND, load_effects
+from kemba.ocp.certificate.status import Status
 from kemba.ocp.planned import Plan
 from kemba.ocp.planning import plan
 from kemba.ocp.task.task import Task
@@ -22,7 +24,7 @@ class Start:
     """How one start ended."""
 
     seed: int
-    status: str
+    status: Status
     cost: float
 
 
@@ -45,7 +47,7 @@ def plan_best(
     ]
     found: list[Start] = []
     workers = min(jobs or os.cpu_count() or 1, starts)
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+    with ProcessPoolExecutor(workers, get_context("spawn"), load_effects, (BY_KIND.files,)) as pool:
         futures = [pool.submit(_start, one) for one in tasks]
         try:
             for future in as_completed(futures):
@@ -54,7 +56,7 @@ def plan_best(
                 tell(f"start {start.seed}: {start.status}, cost {start.cost:.4g}")
         except KeyboardInterrupt:
             pool.shutdown(wait=False, cancel_futures=True)
-    solved = [s for s in found if s.status == "solved"]
+    solved = [s for s in found if s.status is Status.SOLVED]
     if not solved:
         return plan(task, document, log=log, tell=tell)
     best = min(solved, key=lambda s: s.cost)

@@ -12,6 +12,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from kemba.effects import load_effects
 from kemba.files import plain, read_json, write_json
 from kemba.stopwatch import Stopwatch
 
@@ -54,13 +55,17 @@ class Case:
         return dict(read_json(path)) if path.is_file() else None
 
 
-def perform(function: str, work: Work, path: str) -> Record:
+def perform(
+    function: str, work: Work, path: str, effects: Mapping[str, str] | None = None
+) -> Record:
     """Do a case's work and keep its result at `path`, at once and whole. Runs in a worker.
 
     What goes wrong in it is an outcome too. Where the folder of `path` is not to be seen, the
     record is returned only. Work that is done already, by a worker that died since, is not
-    repeated.
+    repeated. `effects`: files of effects from outside, by path, with the hash of their content.
+    Raises KembaError when these cannot be loaded.
     """
+    load_effects(effects or {})
     if Path(path).is_file():
         return dict(read_json(path))
     working = Stopwatch()

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from kemba.effects import BY_KIND
 from kemba.errors import KembaError
 from kemba.files import write_json
 from kemba.sweep.case import Case, Record, perform
@@ -60,7 +61,7 @@ def _gather(
     tasks = {
         client.submit(
             perform, case.function, dict(case.work), str(case.path(folder).absolute()),
-            key=f"kemba-{case.key}", pure=False,
+            BY_KIND.files, key=f"kemba-{case.key}", pure=False,
         ): case
         for case in waiting.values()
     }  # fmt: skip
@@ -90,8 +91,10 @@ def _record(task: Any) -> Record | None:
         if task.status == "finished":
             return dict(task.result(timeout=PATIENCE))
         if task.status == "error":
-            name = type(task.exception(timeout=PATIENCE)).__name__
-            sentence = f"its worker died, again and again ({name})"
+            error = task.exception(timeout=PATIENCE)
+            sentence = f"its worker died, again and again ({type(error).__name__})"
+            if isinstance(error, KembaError):  # it could not begin
+                sentence = str(error)
             return {"status": "lost", "good": False, "sentence": sentence}
     except TimeIsUp:
         pass

@@ -9,7 +9,8 @@ import pytest
 
 from kemba.identify import discover as discovery
 from kemba.identify.answer import Answer, Ranked, phrase
-from kemba.identify.discover import discover
+from kemba.identify.discover import DEFECT, discover, values
+from kemba.identify.doubt.cross_validation import left_out, predicted_error
 from kemba.identify.evidence.problem import Array, Candidate, Parameter, Problem, Rows, Theta
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import probabilities
@@ -138,3 +139,56 @@ def test_what_was_dismissed_has_no_probability() -> None:
     left = search.probabilities(dismissed)
     assert not dismissed & set(left)
     assert sum(left.values()) == pytest.approx(1.0)
+
+
+def searched(problem: Toy) -> Search:
+    search = Search(problem)
+    search.start()
+    search.visit(("kick",))
+    return search
+
+
+def test_an_effect_in_one_block_only_does_not_hold_on_the_others() -> None:
+    """A kick in the first half of the first of three runs: fitted to all, it explains a little;
+    told from the other five halves, that half is as it was, and the others get worse."""
+    problem = Toy({})
+    first = problem.rows().run == 0
+    first[np.flatnonzero(first)[400:]] = False
+    problem.measured = problem.measured + 8.0 * problem._shapes["kick"] * first
+    search = searched(problem)
+    gain = left_out(search, ("kick",))
+    assert search.points["kick",].fit.theta["kick.a"] == pytest.approx(8.0 / 6, abs=0.4)
+    assert gain.nats < -50.0, "it speaks against the effect"
+
+
+def test_an_effect_in_every_block_holds_on_each() -> None:
+    """Its gain is at least what the residuals say, (8 u v)^2 / 2 summed: the gain and the slope
+    that stand in for it in other blocks err in this one."""
+    problem = Toy({"kick.a": 8.0})
+    search = searched(problem)
+    gain = left_out(search, ("kick",))
+    told = 0.5 * float(np.sum((8.0 * problem._shapes["kick"]) ** 2))
+    assert gain.nats > 0.95 * told and not gain.refuted
+
+
+def test_the_error_of_prediction_counts_what_the_fit_did_not_see() -> None:
+    """Five effects and a gain free on noise alone: blocks that were seen have less error than the
+    noise, left-out ones more."""
+    found = [searched(Toy({}, seed)) for seed in range(6)]
+    errors = [predicted_error(s, s.points["kick",]) for s in found]
+    fitted = [np.sqrt(2 * s.points["kick",].fit.cost / 2400) for s in found]
+    assert np.mean(errors) > np.mean(fitted)
+    assert np.mean(errors) == pytest.approx(1.0, abs=0.03)
+
+
+@pytest.mark.parametrize("size", [3.0, 9.0])
+def test_intervals_are_1_96_sigma_either_way(size: float) -> None:
+    """Sigma of a kick by hand: noise over the regressor's length, and the share of its size by
+    which models are imperfect anyway."""
+    problem = Toy({"kick.a": size})
+    found = discover(problem)
+    value = values(found.search, ("kick",), "kick")["a"]
+    noise = 1.0 / float(np.linalg.norm(problem._shapes["kick"]))
+    sigma = np.hypot(noise, DEFECT * value.value)
+    assert value.high - value.value == pytest.approx(1.96 * sigma, rel=0.05)
+    assert value.value - value.low == pytest.approx(1.96 * sigma, rel=0.05)
