@@ -9,12 +9,15 @@ from pathlib import Path
 from kemba.config import Document
 from kemba.effects.mechanics.load import Payload
 from kemba.model import Model, load_model
+from kemba.ocp.certificate.status import Status
 from kemba.ocp.infeasibility.checks import check_task
 from kemba.ocp.infeasibility.explain import explanation, refusal
-from kemba.ocp.nlp.ipopt import Watch
+from kemba.ocp.nlp.ipopt import Control
+from kemba.ocp.nlp.watcher import Watch
 from kemba.ocp.planned import Plan, explained
 from kemba.ocp.planner import Planner, searched
 from kemba.ocp.refined import refined
+from kemba.ocp.relaxation.session import Session
 from kemba.ocp.task.requirement import resolve
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.symmetry import whole
@@ -46,14 +49,13 @@ def plan(
         requirements = resolve(task, built, document)
         diagnostics = check_task(task, built, requirements, document)
         refused = refusal(diagnostics)
-    planner = Planner(
-        task, built, requirements, log, tell, watch, building=building, start=start, stop=stop
-    )
-    planner.deadline = time.monotonic() + task.solver.time_limit
+    deadline = time.monotonic() + task.solver.time_limit
+    session = Session(Control(deadline, log, watch, stop), tell, building=building)
+    planner = Planner(task, built, requirements, session, start)
     found = searched(planner, refused is not None)
-    if found.status == "solved" and task.refine == "radau":
+    if found.status is Status.SOLVED and task.refine == "radau":
         return refined(planner, found)
-    if found.status in ("solved", "acceptable", "interrupted"):
+    if found.status.plan or found.status is Status.INTERRUPTED:
         return found
     why = refused or explanation(task, built, planner.outcome, diagnostics, document)
     return found if why is None else explained(found, why)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from kemba.config import Document
 from kemba.effects import BY_KIND, load_effects
+from kemba.ocp.certificate.status import Status
 from kemba.ocp.planned import Plan
 from kemba.ocp.planning import plan
 from kemba.ocp.task.task import Task
@@ -23,7 +24,7 @@ class Start:
     """How one start ended."""
 
     seed: int
-    status: str
+    status: Status
     cost: float
 
 
@@ -55,7 +56,7 @@ def plan_best(
                 tell(f"start {start.seed}: {start.status}, cost {start.cost:.4g}")
         except KeyboardInterrupt:
             pool.shutdown(wait=False, cancel_futures=True)
-    solved = [s for s in found if s.status == "solved"]
+    solved = [s for s in found if s.status is Status.SOLVED]
     if not solved:
         return plan(task, document, log=log, tell=tell)
     best = min(solved, key=lambda s: s.cost)

@@ -9,7 +9,7 @@ from typing import Any
 from kemba.config import Document, dump_yaml
 from kemba.errors import KembaError
 from kemba.ocp import Plan, Task, controller_table, plan
-from kemba.ocp.nlp.ipopt import Watch
+from kemba.ocp.nlp.watcher import Watch
 from kemba.ocp.report import answer
 from kemba.ocp.starts import plan_best
 from kemba.plant.execution.certificate import replays
@@ -18,8 +18,6 @@ from kemba.plant.execution.replay import ends_standing
 from kemba.report.verdict import verdicts
 from kemba.runs import RunFolder, write_json
 from kemba.trajectory import Trajectory
-
-WORTH_REPLAYING = ("solved", "acceptable")
 
 
 @dataclass(frozen=True)
@@ -58,7 +56,7 @@ def solve_into(
             how = {"tell": listener.tell, "watch": listener.watch, "stop": listener.stop}
             found = plan(task, document, log=log, start=start, **how)  # type: ignore[arg-type]
         result = answer(found, str(folder.path))
-        if replay and found.status in WORTH_REPLAYING:
+        if replay and found.status.plan:
             listener.tell("replay")
             result |= _replayed(found, result["good"])
         _write(found, result, folder, figure)

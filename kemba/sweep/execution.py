@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -21,18 +21,14 @@ from kemba.plant.simulation.valves import scattered
 from kemba.quantity import to_si
 from kemba.runs import load_run, sha256
 from kemba.sweep.case import Case, Work, content_hash
+from kemba.sweep.expand import Expansion, model_hash, model_name
 from kemba.sweep.sampling import sample
 from kemba.sweep.schema import Conditions, ExecuteBlock
 from kemba.trajectory import Trajectory
 
-if TYPE_CHECKING:
-    from kemba.sweep.expand import Expansion
-
 
 def execute_cases(expansion: Expansion, name: str, block: ExecuteBlock, folder: Path) -> list[Case]:
     """The cases of a block; its plan is made first when it is not there yet."""
-    from kemba.sweep.expand import model_hash, model_name
-
     plant = model_name(expansion, block.plant)
     base = Document({**_planned(expansion, name, block), **_given(block.conditions)})
     works = []
@@ -94,7 +90,7 @@ def _plan_folder(expansion: Expansion, name: str, block: ExecuteBlock, folder: P
     path = folder / "plans" / content_hash(task.model_dump(exclude_none=True))
     if not (path / "controller.csv").is_file():
         found = plan(task, document)
-        if found.status not in ("solved", "acceptable"):
+        if not found.status.plan:
             at = ("blocks", name, "task")
             raise expansion.document.error(at, f"{block.task}: {found.sentence}")
         found.trajectory.write(path / "trajectory.csv")

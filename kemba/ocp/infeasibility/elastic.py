@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
@@ -13,26 +12,18 @@ import numpy as np
 from kemba.model import Model
 from kemba.ocp.infeasibility.pose import SCALE
 from kemba.ocp.nlp.blocks import Block
-from kemba.ocp.nlp.ipopt import Ipopt, Iterate, Parameters
+from kemba.ocp.nlp.ending import Ending
+from kemba.ocp.nlp.ipopt import Iterate, warm
 from kemba.ocp.relaxation.guess import automatic_guess
-from kemba.ocp.relaxation.schedule import (
-    LOOSE,
-    SWITCHING,
-    VALVE,
-    Schedule,
-    Stopped,
-    fix,
-    tighten,
-    warm,
-)
+from kemba.ocp.relaxation.schedule import fix, interior, tighten
+from kemba.ocp.relaxation.session import Schedule, Session, Stopped
+from kemba.ocp.relaxation.settings import Ends, Relaxation, Starts
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
+from kemba.ocp.transcription.parameters import Parameters
 from kemba.ocp.transcription.stage import Rows
 from kemba.ocp.transcription.symmetry import Reduction
 from kemba.ocp.transcription.transcribe import RequirementBlock, Transcription
-
-if TYPE_CHECKING:
-    from kemba.ocp.planner import Planner
 
 BUDGET = 30.0  # s
 NODES = 40  # a coarser grid is enough to say what is too much
@@ -136,57 +127,71 @@ class Outcome:
         return bool(self.given)
 
 
-def elastic(planner: Planner, reduction: Reduction) -> Outcome | None:
+def elastic(
+    model: Model,
+    task: Task,
+    requirements: Sequence[Requirement],
+    reduction: Reduction,
+    session: Session,
+) -> Outcome | None:
     """Solve the task with soft requirements on a coarse grid; None when even that failed.
 
     Raises Stopped when the user stopped it.
     """
-    deadline = min(planner.deadline, time.monotonic() + BUDGET)
-    sections = {str(w.location[0]) for w in planner.requirements}
+    deadline = min(session.control.deadline, time.monotonic() + BUDGET)
+    limited = replace(session, control=replace(session.control, deadline=deadline))
+    sections = {str(w.location[0]) for w in requirements}
+    nodes = min(task.nodes, NODES)
     for soft in TIERS:
         if sections & set(soft):
-            outcome = _solve(planner, reduction, soft, deadline)
+            with session.building.running():
+                program = Elastic(model, task, requirements, reduction, nodes, soft)
+            outcome = _solve(program, limited)
             if outcome is not None:
                 return outcome
     return None
 
 
-def _solve(
-    planner: Planner, reduction: Reduction, soft: Sequence[str], deadline: float
-) -> Outcome | None:
+def _solve(program: Elastic, session: Session) -> Outcome | None:
     """The usual schedule; the last step that converged counts."""
-    task = planner.task
-    nodes = min(task.nodes, NODES)
-    with planner.building.running():
-        program = Elastic(planner.model, task, planner.requirements, reduction, nodes, soft)
-    options = {**task.solver.options, "max_iter": ITERATIONS}
-    ipopt = Ipopt(
-        program, options, planner.log, deadline, planner.watch, planner.stop, planner.building
-    )
-    search = Schedule(ipopt, task.solver.complementarity, planner.tell, planner.attempts)
-    quiet = [w for w in planner.requirements if w.location[0] not in soft]
+    options = {**program.task.solver.options, "max_iter": ITERATIONS}
+    schedule = session.schedule(program, options)
     converged: list[Iterate] = []
     try:
-        name = f"soft {' and '.join(soft)}: relax"
-        # the second guess keeps still, which is nearly feasible: far off the bounds it is not
-        for requirements, push in ((planner.requirements, 0.3), (quiet, 1e-3)):
-            interior = {"bound_push": push, "bound_frac": push, "mu_init": 0.1, "tol": 1e-3}
-            Y = automatic_guess(planner.model, task, requirements, program.layout, nodes)
-            start = Iterate(program.start(Y))
-            point = search.solve(name, start, Parameters(LOOSE), options=interior)
-            if point.solved:
-                converged.append(point)
-                break
-        else:
+        first = _first(schedule, program)
+        if first is None:
             return None
-        binary, name = Parameters(LOOSE, VALVE, SWITCHING), "its valves"
-        point = search.solve(name, converged[0], binary, options=warm(1e-3, tol=1e-3))
+        converged.append(first)
+        relaxation = Relaxation.current()
+        parameters = Parameters(relaxation.loose, relaxation.valve, relaxation.switching)
+        how = warm(Starts.current().changed_mu, tol=Ends.current().tol)
+        point = schedule.solve("its valves", first, parameters, options=how)
         converged.append(point)
-        converged.append(tighten(search, fix(search, point)))
+        converged.append(tighten(schedule, fix(schedule, point)))
     except Stopped as stop:
-        if stop.point.message == "User_Requested_Stop":
+        if stop.point.ending is Ending.INTERRUPTED:
             raise
     best = next((p for p in reversed(converged) if p.solved), None)
     if best is None:
         return None
     return Outcome(program, best, tuple(g for g in program.given(best.Y) if g[2] > SHORT))
+
+
+def _first(schedule: Schedule, program: Elastic) -> Iterate | None:
+    """The program with relaxed pairs, from two guesses; None where neither converges.
+
+    The second guess keeps still, which is nearly feasible: far off the bounds it is not.
+    """
+    name = f"soft {' and '.join(program.soft)}: relax"
+    still = [w for w in program.requirements if w.location[0] not in program.soft]
+    starts = Starts.current()
+    guesses = ((program.requirements, starts.interior_push), (still, starts.changed))
+    for requirements, push in guesses:
+        Y = automatic_guess(
+            program.model, program.task, requirements, program.layout, program.nodes
+        )
+        start, loose = Iterate(program.start(Y)), Parameters(Relaxation.current().loose)
+        point = schedule.solve(name, start, loose, options=interior(push))
+        if point.solved:
+            return point
+    return None

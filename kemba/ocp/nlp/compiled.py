@@ -17,8 +17,9 @@ from pathlib import Path
 
 import casadi as ca
 
+from kemba.ocp.nlp.settings import Functions
+
 FLAGS = ("-O1", "-fPIC", "-shared", "-ffp-contract=off")  # contraction would change the last bits
-STALE = 600.0  # s after which an unfinished compilation is thought dead
 
 
 def cache_folder() -> Path:
@@ -53,7 +54,7 @@ def _compile(functions: Sequence[ca.Function], compiler: str, library: Path, wai
     """Set a compiler to work, unless one is already, in a process that outlives ours."""
     library.parent.mkdir(parents=True, exist_ok=True)
     folder = library.with_suffix(".making")
-    if folder.exists() and time.time() - folder.stat().st_mtime > STALE:
+    if folder.exists() and time.time() - folder.stat().st_mtime > Functions.current().stale:
         shutil.rmtree(folder, ignore_errors=True)
     try:
         folder.mkdir()

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import casadi as ca
 import numpy as np
 
-if TYPE_CHECKING:
-    from kemba.ocp.refinement.mode_constraints import View
-
-SMALL = 1e-6
+from kemba.ocp.refinement.settings import ModeRules
+from kemba.ocp.refinement.view import View
 
 
 class Independent:
@@ -28,7 +24,8 @@ class Independent:
         size = float(np.linalg.norm(row))
         for b in self.basis:
             row = row - (row @ b) * b
-        if np.linalg.norm(row) <= SMALL * max(size, SMALL):
+        small = ModeRules.current().independent
+        if np.linalg.norm(row) <= small * max(size, small):
             return False
         self.basis.append(row / np.linalg.norm(row))
         return True

@@ -9,39 +9,16 @@ import numpy as np
 
 from kemba.ocp.refinement.independent import Independent
 from kemba.ocp.refinement.modes import AHEAD, BACK, HELD, OPEN
-from kemba.ocp.refinement.program import Program, Where
-from kemba.ocp.refinement.radau import node_vector, scaled
+from kemba.ocp.refinement.program import PhaseProgram, Where
+from kemba.ocp.refinement.settings import ModeRules
 from kemba.ocp.refinement.unilateral import Constraint
+from kemba.ocp.refinement.view import View
 
 INF = np.inf
 LENGTH, SPEED = 0.1, 1.0  # m, m.s-1: scales of gaps and their rates
-CLEAR = 2e-4  # m; a gap that only just stays open closes when executed
-AWAY = 3  # elements before and after a touch in which it may
-LANDS = 0.1  # m.s-1; a foot that comes down slower touches at no certain time
 
 
-class View:
-    """Expressions of the node in half symbols: `q`, `v`, `s`, `u`, `lam` scaled."""
-
-    def __init__(self, program: Program) -> None:
-        self.layout, self.node = program.layout, program.model.node
-        groups = ("q", "v", "s", "u", "lam")
-        self.symbols = {g: scaled(self.layout, g, g) for g in groups}
-        y = node_vector(self.layout, self.symbols)
-        self._full = [ca.densify(self.layout.full(y, g)) for g in groups]
-
-    def of(self, expression: ca.SX) -> ca.SX:
-        """An expression of the node's symbols in the half ones."""
-        node = self.node
-        symbols = [node.q, node.v, node.s, node.u, node.lam]
-        return ca.SX(ca.cse(ca.densify(ca.substitute([ca.SX(expression)], symbols, self._full)[0])))
-
-    def z(self, groups: str) -> ca.SX:
-        """The symbols of some groups, such as "q v"."""
-        return ca.vertcat(*(self.symbols[g] for g in groups.split()))
-
-
-def add_mode_constraints(program: Program, start: Independent) -> None:
+def add_mode_constraints(program: PhaseProgram, start: Independent) -> None:
     """Rows of every constraint in every phase and at every impact; `start` knows what the task
     already fixes at the first node."""
     view = View(program)
@@ -54,9 +31,10 @@ def add_mode_constraints(program: Program, start: Independent) -> None:
     _durations(program)
 
 
-def _gaps(program: Program, view: View, i: int, constraint: Constraint) -> None:
+def _gaps(program: PhaseProgram, view: View, i: int, constraint: Constraint) -> None:
     """Open gaps stay open; where one closes it is zero, and a foot comes down."""
     c, phases = program.columns, program.phases
+    rules = ModeRules.current()
     closing = {phases[p].first: p for p in program.impacts if program.closes(p, i)}
     closed = np.array([phases[p].active(i) for p in c.phase_of])
     g = view.of(constraint.gap) / LENGTH
@@ -66,19 +44,19 @@ def _gaps(program: Program, view: View, i: int, constraint: Constraint) -> None:
             for e in np.flatnonzero(~closed)
             for stage in range(len(c.stages[e]))
             if not (stage == len(c.stages[e]) - 1 and e + 1 in closing)
-            and clear != closed[max(e - AWAY, 0) : e + AWAY + 1].any()
+            and clear != closed[max(e - rules.away, 0) : e + rules.away + 1].any()
         ]
-        low = CLEAR / LENGTH if clear else 0.0
+        low = rules.clear / LENGTH if clear else 0.0
         program.mode_rule(i, "gap", view.z("q"), g, low, INF, apart)
     touching = [(closing[node], c.end(node)["q"]) for node in sorted(closing)]
     program.mode_rule(i, "touch", view.z("q"), g, 0.0, 0.0, touching)
     if constraint.friction is not None:
         rate = view.of(constraint.rate) / SPEED
         before = [(p, np.concatenate([c.end(n)["q"], c.end(n)["v"]])) for n, p in closing.items()]
-        program.mode_rule(i, "approach", view.z("q v"), rate, -INF, -LANDS / SPEED, before)
+        program.mode_rule(i, "approach", view.z("q v"), rate, -INF, -rules.lands / SPEED, before)
 
 
-def _held(program: Program, view: View, i: int, constraint: Constraint) -> None:
+def _held(program: PhaseProgram, view: View, i: int, constraint: Constraint) -> None:
     """The rate of a closed gap is zero, and the slip of a sticking contact."""
     c, phases = program.columns, program.phases
     rate = view.of(constraint.rate) / SPEED
@@ -106,7 +84,7 @@ def _held(program: Program, view: View, i: int, constraint: Constraint) -> None:
     program.mode_rule(i, "settles", view.z("q v"), slip, 0.0, 0.0, settling)
 
 
-def _friction(program: Program, view: View, i: int, constraint: Constraint) -> None:
+def _friction(program: PhaseProgram, view: View, i: int, constraint: Constraint) -> None:
     """Forces and impulses in the cone; on its edge while sliding."""
     if constraint.friction is None:
         return
@@ -126,7 +104,7 @@ def _friction(program: Program, view: View, i: int, constraint: Constraint) -> N
 
 
 def _start(
-    program: Program, view: View, i: int, constraint: Constraint, start: Independent
+    program: PhaseProgram, view: View, i: int, constraint: Constraint, start: Independent
 ) -> None:
     """A constraint that is closed at first touches at rest there, unless the task says so."""
     mode, first = program.phases[0].modes[i], program.columns.first
@@ -142,7 +120,7 @@ def _start(
             program.rule(f"{constraint.label} first {name}", view.z("q v"), g, 0.0, 0.0, [at])
 
 
-def _limits(program: Program, view: View) -> None:
+def _limits(program: PhaseProgram, view: View) -> None:
     c = program.columns
     for j in program.reduction.limits:
         label = program.model.node.limit_rows[j].label
@@ -155,7 +133,7 @@ def _limits(program: Program, view: View) -> None:
         program.rule(label, view.z("q v s u lam"), g, 0.0, INF, where)
 
 
-def _durations(program: Program) -> None:
+def _durations(program: PhaseProgram) -> None:
     """The whole motion lasts what the task allows, and valves dwell between switches."""
     task, phases, h = program.task, program.phases, ca.SX.sym("h", len(program.phases))
     scale = program.layout.scale[program.layout.slices["h"]][0]

@@ -10,18 +10,12 @@ import casadi as ca
 import numpy as np
 
 from kemba.model import Model
+from kemba.ocp.refinement.settings import Reading
 from kemba.ocp.refinement.unilateral import Constraint
 from kemba.ocp.transcription.solution import arrays
 from kemba.trajectory import Trajectory
 
 OPEN, HELD, AHEAD, BACK = 0, 1, 2, 3  # open; closed and sticking; sliding forward, backward
-STIFF = 1e-3  # m; body weight over this tells a force from a gap of the relaxation
-CLOSED = 1e-6  # m
-SLIDES = 0.05  # m.s-1
-LIGHT = 0.1  # of body weight; a foot that bears less for a step or two does not stand
-SHUDDER = 5e-5  # m; what opens less for a step or two stays closed
-BRIEF = 2  # steps
-HOP = 5e-3  # m; a foot that rises less for a step or two stays down
 
 
 @dataclass(frozen=True)
@@ -79,7 +73,7 @@ def _settling(phases: Sequence[Phase]) -> list[Phase]:
 
 def _modes(model: Model, constraint: Constraint, plan: Trajectory, trim: bool) -> np.ndarray:
     """Mode of a constraint at every row (rows,)."""
-    x, node = arrays(model, plan), model.node
+    x, node, reading = arrays(model, plan), model.node, Reading.current()
     names = [constraint.gap]
     if constraint.friction is not None:
         names.append(constraint.friction.slip)
@@ -87,19 +81,19 @@ def _modes(model: Model, constraint: Constraint, plan: Trajectory, trim: bool) -
     found = _listed(evaluate.map(len(plan))(x["q"].T, x["v"].T))
     values = [np.array(value).ravel() for value in found]
     force = x["lam"][:, constraint.force] / model.mechanism.weight
-    modes = np.where(force * STIFF > np.maximum(values[0], 0.0), HELD, OPEN)
-    if values[0][0] < CLOSED and modes[1] == OPEN:
+    modes = np.where(force * reading.stiff > np.maximum(values[0], 0.0), HELD, OPEN)
+    if values[0][0] < reading.closed and modes[1] == OPEN:
         modes[1] = HELD  # what touches at the start leaves no sooner than its force is gone
-    _fill_hops(modes, values[0], SHUDDER)
+    _fill_hops(modes, values[0], reading.shudder)
     if constraint.friction is not None:
-        light = force < LIGHT
-        slides = np.abs(values[1]) > SLIDES
+        light = force < reading.light
+        slides = np.abs(values[1]) > reading.slides
         for a, b in _runs(modes):
-            if b - a <= BRIEF and light[a:b].all():
+            if b - a <= reading.brief and light[a:b].all():
                 modes[a:b] = OPEN
         if trim:
             modes[light & slides] = OPEN
-        _fill_hops(modes, values[0], HOP)
+        _fill_hops(modes, values[0], reading.hop)
         closed = modes != OPEN
         modes[closed & slides] = np.where(values[1] > 0, AHEAD, BACK)[closed & slides]
     return np.asarray(modes)
@@ -109,7 +103,7 @@ def _fill_hops(modes: np.ndarray, gap: np.ndarray, hop: float) -> None:
     """Keep closed what opens less than `hop` [m], and briefly, between two touches."""
     runs = _runs(modes)
     for (_, a), (b, _) in itertools.pairwise(runs):
-        if b - a <= BRIEF and gap[a:b].max() < hop:
+        if b - a <= Reading.current().brief and gap[a:b].max() < hop:
             modes[a:b] = HELD
 
 

@@ -14,15 +14,13 @@ from kemba.ocp.nlp.blocks import Block, BlockProblem
 from kemba.ocp.refinement.columns import Columns
 from kemba.ocp.refinement.modes import OPEN, Phase
 from kemba.ocp.refinement.radau import STATE, Scheme, element, impact
+from kemba.ocp.refinement.settings import Elements
 from kemba.ocp.refinement.unilateral import Constraint
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.layout import Layout
 from kemba.ocp.transcription.symmetry import Reduction
 
 INF = np.inf
-SLACK = 0.01  # of a state's range: a vented chamber stays exactly at its bound
-SHORT, LONG = 0.03, 3.0  # times the nominal step: bounds of an element
-LEEWAY = 1e-4  # of slack at the start, scaled
 Where = list[tuple[int, np.ndarray]]  # phases and the columns of z there
 
 
@@ -63,7 +61,7 @@ class Row:
     upper: float
 
 
-class Program:
+class PhaseProgram:
     """The program of a phase sequence; `lower`, `upper`, `g_lower`, `g_upper` and `problem` as a
     Transcription has them.
 
@@ -102,7 +100,7 @@ class Program:
         return p > 0 and self.phases[p - 1].modes[i] == OPEN != self.phases[p].modes[i]
 
     def _bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        layout, c = self.layout, self.columns
+        layout, c, elements = self.layout, self.columns, Elements.current()
         lower, upper = np.full(c.size, -INF), np.full(c.size, INF)
 
         def put(index: np.ndarray, group: str) -> None:
@@ -111,7 +109,8 @@ class Program:
 
         for g in STATE:
             put(c.first[g], g)
-        vented = layout.lower[layout.slices["s"]] - SLACK * layout.upper[layout.slices["s"]]
+        states = layout.slices["s"]
+        vented = layout.lower[states] - elements.vented * layout.upper[states]
         for e, stages in enumerate(c.stages):
             for stage in stages:
                 for g in STATE:
@@ -120,7 +119,8 @@ class Program:
                 self._forces(lower, upper, stage["lam"], self.phases[c.phase_of[e]].modes)
             put(c.u[e], "u")
         nominal = self.task.duration / self.nodes / layout.scale[layout.slices["h"]]
-        lower[c.h[:, 0]], upper[c.h[:, 0]] = SHORT * nominal, LONG * nominal
+        lower[c.h[:, 0]] = elements.shortest * nominal
+        upper[c.h[:, 0]] = elements.longest * nominal
         for phase in self.phases:
             where = c.u[phase.first][[i - layout.slices["u"].start for i in layout.binary]]
             lower[where] = upper[where] = phase.valves
@@ -176,9 +176,9 @@ class Program:
         at, price = np.hstack([np.array(columns), own]), self.elastic * ca.sum1(slack)
         self.rules.append(Part((label,), ca.vertcat(z, slack), g, price, low, high, at, soft))
 
-    def anchor(self, x: np.ndarray, weight: float) -> np.ndarray:
-        """Draw states, inputs and durations to where they are in x (size,), by weight / 2 times
-        the square of the scaled distance; x with the anchors behind it."""
+    def proximal(self, x: np.ndarray, weight: float) -> np.ndarray:
+        """Add weight / 2 times the squared scaled distance of states, inputs and durations from
+        where they are in x (size,); returns x with these places as fixed variables behind it."""
         c = self.columns
         stages = [stage for element in c.stages for stage in element]
         drawn = [at[g] for at in (c.first, *stages) for g in STATE]
@@ -195,7 +195,8 @@ class Program:
     def keep_short(self, x: np.ndarray, steps: float) -> None:
         """Bound elements by `steps` times the nominal one, but for those that x has longer."""
         index = self.columns.h[:, 0]
-        self.upper[index] = np.maximum(self.upper[index] * steps / LONG, x[index])
+        longest = self.upper[index] * steps / Elements.current().longest
+        self.upper[index] = np.maximum(longest, x[index])
 
     @property
     def soft(self) -> list[Soft]:
@@ -204,7 +205,7 @@ class Program:
 
     def loosened(self, x: np.ndarray) -> np.ndarray:
         """The same with every rule giving way as far as it must, and a little more."""
-        x, row = x.copy(), 0
+        x, row, leeway = x.copy(), 0, Elements.current().leeway
         g = np.array(self.problem.g(x, [])).ravel()
         for part in self._parts:
             values = g[row : row + len(part.columns) * len(part.labels)]
@@ -216,7 +217,7 @@ class Program:
                 (part.soft.below, part.lower - values),
             ):
                 if way is not None:
-                    x[way] = np.maximum(over, 0.0) + LEEWAY
+                    x[way] = np.maximum(over, 0.0) + leeway
         return x
 
     @cached_property

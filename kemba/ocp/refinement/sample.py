@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 
 from kemba.ocp.certificate.certify import Certificate, Violation
-from kemba.ocp.refinement.program import Program
+from kemba.ocp.refinement.program import PhaseProgram
 from kemba.ocp.transcription.layout import STEP
 from kemba.ocp.transcription.solution import arrays, written
 from kemba.trajectory import Trajectory
@@ -15,7 +15,7 @@ PHYSICS = ("kinematics", "dynamics", "rate", "impact")  # first words of their r
 WORST = 8
 
 
-def to_trajectory(program: Program, x: np.ndarray) -> Trajectory:
+def to_trajectory(program: PhaseProgram, x: np.ndarray) -> Trajectory:
     """Every quantity of the model at element ends, just before an impact there. Inputs and
     forces of a row act on the interval before it; at the first node they are zero."""
     layout, c = program.layout, program.columns
@@ -43,7 +43,7 @@ def to_trajectory(program: Program, x: np.ndarray) -> Trajectory:
     return written(program.model, program.task.name, times, values, a, sd)
 
 
-def _split_friction(program: Program, Y: np.ndarray) -> None:
+def _split_friction(program: PhaseProgram, Y: np.ndarray) -> None:
     """One signed friction force as its forward and backward part."""
     offset = program.layout.slices["lam"].start
     for constraint in program.constraints:
@@ -54,7 +54,9 @@ def _split_friction(program: Program, Y: np.ndarray) -> None:
             Y[:, forward], Y[:, backward] = np.maximum(force, 0.0), np.maximum(-force, 0.0)
 
 
-def _slip_speeds(program: Program, q: np.ndarray, v: np.ndarray, lam: np.ndarray) -> np.ndarray:
+def _slip_speeds(
+    program: PhaseProgram, q: np.ndarray, v: np.ndarray, lam: np.ndarray
+) -> np.ndarray:
     """Forces with every slip speed that the pairs ask for: its size."""
     node, B = program.model.node, program.reduction.B["lam"]
     lam = lam.copy()
@@ -69,7 +71,7 @@ def _slip_speeds(program: Program, q: np.ndarray, v: np.ndarray, lam: np.ndarray
     return lam
 
 
-def certificate(program: Program, x: np.ndarray, trajectory: Trajectory) -> Certificate:
+def certificate(program: PhaseProgram, x: np.ndarray, trajectory: Trajectory) -> Certificate:
     """What the solution violates: collocation and impacts (dynamics), modes, bounds and requirements
     (bounds), forces times gaps at the element ends (complementarity)."""
     g = np.array(program.problem.g(x, [])).ravel()
@@ -92,7 +94,7 @@ def certificate(program: Program, x: np.ndarray, trajectory: Trajectory) -> Cert
     )
 
 
-def _complementarity(program: Program, trajectory: Trajectory) -> float:
+def _complementarity(program: PhaseProgram, trajectory: Trajectory) -> float:
     model, node = program.model, program.model.node
     x = arrays(model, trajectory)
     q, v, s, lam, u = (x[name][1:].T for name in ("q", "v", "s", "lam", "u"))
