@@ -12,8 +12,6 @@ from kemba.identify.bench.motion import SmoothedMotion
 from kemba.identify.evidence.problem import Array
 from kemba.settings import BY_HAND, Settings, setting
 
-STROKE = 0.070  # m
-
 
 class FormulaSettings(Settings):
     """Constants of the simple force laws that are tried."""
@@ -30,18 +28,19 @@ class FormulaSettings(Settings):
     speed: float = setting(0.3, "m.s-1", "speed by which speeds are scaled", BY_HAND)
 
 
-def terms(motion: SmoothedMotion, u: Array) -> Iterator[tuple[str, Array]]:
-    """(formula, force per unit coefficient (n,)); `u` (n, 2): share of each valve being on."""
+def terms(motion: SmoothedMotion, u: Array, stroke: float) -> Iterator[tuple[str, Array]]:
+    """(formula, force per unit coefficient (n,)); `u` (n, 2): share of each valve being on;
+    `stroke` [m]."""
     settings = FormulaSettings.current()
     x, v, (u_e, u_r) = motion.x, motion.v, u.T
     sign = np.tanh(v / V_COULOMB)
     out, back = np.maximum(v, 0.0), np.minimum(v, 0.0)
     for d in settings.ranges:
         yield f"exp(-(x/{d:g})**2)", np.exp(-((x / d) ** 2))
-        yield f"exp(-(({STROKE:g} - x)/{d:g})**2)", np.exp(-(((STROKE - x) / d) ** 2))
-    yield f"x - {STROKE / 2:g}", x - STROKE / 2
-    yield f"(x - {STROKE / 2:g})**2", (x - STROKE / 2) ** 2
-    yield f"(x - {STROKE / 2:g})**3", (x - STROKE / 2) ** 3
+        yield f"exp(-(({stroke:g} - x)/{d:g})**2)", np.exp(-(((stroke - x) / d) ** 2))
+    yield f"x - {stroke / 2:g}", x - stroke / 2
+    yield f"(x - {stroke / 2:g})**2", (x - stroke / 2) ** 2
+    yield f"(x - {stroke / 2:g})**3", (x - stroke / 2) ** 3
     yield "x*u_e", x * u_e
     yield "x*u_r", x * u_r
     yield "max(v, 0)", out
@@ -62,11 +61,11 @@ def terms(motion: SmoothedMotion, u: Array) -> Iterator[tuple[str, Array]]:
         yield f"dahl(x, {travel:g})", dahl(x, travel)
 
 
-def features(motion: SmoothedMotion, u: Array) -> Array:
+def features(motion: SmoothedMotion, u: Array, stroke: float) -> Array:
     """Whatever a missing force could depend on (n, m): where, how fast, and since when which
     valve is on, each with each."""
     settings, step = FormulaSettings.current(), float(np.median(np.diff(motion.time)))
-    x, v = motion.x / STROKE - 0.5, motion.v / settings.speed
+    x, v = motion.x / stroke - 0.5, motion.v / settings.speed
     places = [np.ones(len(x)), x, x**2, v, np.abs(v), v * x, np.tanh(motion.v / V_COULOMB)]
     histories = [np.ones(len(x)), u[:, 0] * u[:, 1]]
     for valve in u.T:
