@@ -1,4 +1,4 @@
-"""Simple force laws beyond the catalogue on rods, hips and body, as columns of residual."""
+"""Simple force terms beyond the catalogue on rods, hips and body, as columns of residual."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from kemba.effects.mechanics.friction import V_COULOMB
-from kemba.identify.bench.formulas import FormulaSettings, dahl
+from kemba.identify.doubt.force_terms import dahl, end_terms
 from kemba.identify.evidence.types import Array
 from kemba.identify.robot.force_channels import force_columns
 from kemba.identify.robot.state import LinearisedState
@@ -15,7 +15,7 @@ from kemba.settings import BY_HAND, Settings, setting
 
 
 class RobotFormulaSettings(Settings):
-    """Constants of the simple force laws that are tried on robots."""
+    """Constants of the simple force terms that are tried on robots."""
 
     speed: float = setting(
         0.1, "rad.s-1", "speed over which friction at a hip turns round", BY_HAND
@@ -53,9 +53,7 @@ def formula_columns(state: LinearisedState) -> dict[str, Array]:
 def rod_terms(x: Array, v: Array, stroke: float) -> Iterator[tuple[str, Array]]:
     """(formula, force on the rod (n, L, legs)) of extension and its rate; `stroke` [m]."""
     sign = np.tanh(v / V_COULOMB)
-    for d in FormulaSettings.current().ranges:
-        yield f"exp(-(x/{d:g})**2)", np.exp(-((x / d) ** 2))
-        yield f"exp(-(({stroke:g} - x)/{d:g})**2)", np.exp(-(((stroke - x) / d) ** 2))
+    yield from end_terms(x, stroke)
     yield f"{stroke / 2:g} - x", stroke / 2 - x
     yield f"(x - {stroke / 2:g})**3", (x - stroke / 2) ** 3
     yield "max(v, 0)", np.maximum(v, 0.0)
