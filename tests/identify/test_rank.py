@@ -9,11 +9,12 @@ import pytest
 
 from kemba.identify import discover as discovery
 from kemba.identify.answer import Answer, Ranked, phrase
-from kemba.identify.discover import DEFECT, discover, values
-from kemba.identify.doubt.cross_validation import left_out, predicted_error
+from kemba.identify.discover import discover
+from kemba.identify.doubt.cross_validation import left_out, left_out_error
 from kemba.identify.evidence.problem import Array, Candidate, Parameter, Problem, Rows, Theta
 from kemba.identify.evidence.search import Search
-from kemba.identify.evidence.spike_slab import probabilities
+from kemba.identify.evidence.spike_slab import SpikeSlabSettings, probabilities
+from kemba.identify.ranking import values
 
 EFFECTS = ("bend", "drag", "kick", "twin", "wave")
 
@@ -175,7 +176,7 @@ def test_the_error_of_prediction_counts_what_the_fit_did_not_see() -> None:
     """Five effects and a gain free on noise alone: blocks that were seen have less error than the
     noise, left-out ones more."""
     found = [searched(Toy({}, seed)) for seed in range(6)]
-    errors = [predicted_error(s, s.points["kick",]) for s in found]
+    errors = [left_out_error(s, ("kick",)) for s in found]
     fitted = [np.sqrt(2 * s.points["kick",].fit.cost / 2400) for s in found]
     assert np.mean(errors) > np.mean(fitted)
     assert np.mean(errors) == pytest.approx(1.0, abs=0.03)
@@ -189,6 +190,6 @@ def test_intervals_are_1_96_sigma_either_way(size: float) -> None:
     found = discover(problem)
     value = values(found.search, ("kick",), "kick")["a"]
     noise = 1.0 / float(np.linalg.norm(problem._shapes["kick"]))
-    sigma = np.hypot(noise, DEFECT * value.value)
+    sigma = np.hypot(noise, SpikeSlabSettings.current().spike * value.value)
     assert value.high - value.value == pytest.approx(1.96 * sigma, rel=0.05)
     assert value.value - value.low == pytest.approx(1.96 * sigma, rel=0.05)
