@@ -61,8 +61,8 @@ class Proposal:
         return f"The test '{self.rig.name}' separates {first} from {second} ({self.nats:.0f} nats)."
 
 
-def menu() -> list[Rig]:
-    """Standard tests of one piston."""
+def menu(stroke: float) -> list[Rig]:
+    """Standard tests of one piston of this stroke [m]."""
     modes = ("extend", "retract", "both", "none")
     slow = DynamometerRig.model_validate(
         {"name": "slow_stroke", "speeds": {m: [0.01, 0.02, 0.05] for m in modes}}
@@ -70,7 +70,7 @@ def menu() -> list[Rig]:
     fast = DynamometerRig.model_validate(
         {"name": "dynamometer", "speeds": {m: [0.1, 0.3, 0.6, 1.0] for m in modes}}
     )
-    both_ends = {"positions": [0.0, 0.035, 0.07]}
+    both_ends = {"positions": [0.0, stroke / 2, stroke]}
     return [
         LockedRig.model_validate({"name": "locked_extend", "chamber": "extend", **both_ends}),
         LockedRig.model_validate({"name": "locked_retract", "chamber": "retract", **both_ends}),
@@ -86,7 +86,9 @@ def propose(folder: str | Path, out: Path) -> Proposal:
     answer = read_json(Path(folder) / "answer.json")
     rivals = contenders(answer)
     model = load_model(str(answer.get("base") or "planning"), rig=True)
-    proposals = [p for rig in menu() if (p := _judge(rig, model, rivals)) is not None]
+    proposals = [
+        p for rig in menu(model.mechanism.stroke) if (p := _judge(rig, model, rivals)) is not None
+    ]
     if not proposals:
         names = ", ".join(rivals)
         raise KembaError(str(folder), f"no rig test shows a difference between {names}")
@@ -113,7 +115,7 @@ def contenders(answer: Mapping[str, Any]) -> dict[str, dict[str, float]]:
 
 def _judge(rig: Rig, model: Any, rivals: Mapping[str, Mapping[str, float]]) -> Proposal | None:
     """How well a rig separates the first rival from the one most like it."""
-    runs = [prepare(t.meta["name"], t) for t in _logs(rig)]
+    runs = [prepare(t.meta["name"], t) for t in _logs(rig, model.mechanism.stroke)]
     problem = BenchProblem(runs, model)
     known = {n: t for n, t in rivals.items() if n in problem.candidates}
     if len(known) < 2:
@@ -136,10 +138,10 @@ def _distance(gap: Array, jacobian: Array, width: Array) -> float:
     return 0.5 * float(gap @ gap - (scaled.T @ gap) @ np.linalg.solve(h, scaled.T @ gap))
 
 
-def _logs(rig: Rig) -> Iterator[Trajectory]:
+def _logs(rig: Rig, stroke: float) -> Iterator[Trajectory]:
     """The rig's tests as logs with ideal sensors and no force yet."""
     settings, rng = ExperimentSettings.current(), np.random.default_rng(0)
-    for number, test in enumerate(rig.tests(rng)):
+    for number, test in enumerate(rig.tests(rng, stroke)):
         if number >= settings.tests:
             return
         times = test.times[:: max(1, round(rig.rate / settings.rows))]

@@ -90,7 +90,7 @@ def test_pressures_are_read_when_there_are_any(bench_log: BenchLog) -> None:
     from kemba.identify.bench.pressure import absolute_pressure
 
     columns = {
-        f"{c} [Pa]": absolute_pressure(c, states)
+        f"{c} [Pa]": absolute_pressure(c, states, model.mechanism.need_cylinder())
         + 500 * np.random.default_rng(0).standard_normal(len(log))
         for c in ("chamber/extend/P", "chamber/retract/P")
     }

@@ -50,7 +50,7 @@ def leftover(
     for i, log in enumerate(predicted.logs):
         spread = _imperfection(predicted, i, candidates)
         r = predicted.standardised(theta, i)["piston/F"] / spread
-        seen = features(predicted.motion(theta, i), predicted.acting(theta, i))
+        seen = features(predicted.motion(theta, i), predicted.acting(theta, i), predicted.stroke)
         parts.append((r, seen[log.keep["piston/F"]], np.full(len(r), i)))
     residual, columns, run = (np.concatenate(p) for p in zip(*parts, strict=True))
     return Leftover(residual, columns, run)
@@ -58,7 +58,8 @@ def leftover(
 
 def _forces(predicted: PredictedLogs, theta: Theta, index: int) -> dict[str, Array]:
     """Formula -> force (n,) per unit of its coefficient along one log."""
-    return dict(terms(predicted.motion(theta, index), predicted.acting(theta, index)))
+    motion, acting = predicted.motion(theta, index), predicted.acting(theta, index)
+    return dict(terms(motion, acting, predicted.stroke))
 
 
 def _imperfection(

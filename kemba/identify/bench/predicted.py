@@ -37,6 +37,11 @@ class PredictedLogs:
     predictor: Predictor
     starts: Mapping[str, tuple[int, str]]
 
+    @property
+    def stroke(self) -> float:
+        """Stroke of the cylinder [m]."""
+        return self.predictor.model.mechanism.stroke
+
     def readings(self, theta: Theta, index: int) -> dict[str, tuple[Array, Array]]:
         """Channel of log `index` -> what should have been measured (n,) and its variance (n,), in
         the channel's unit."""

@@ -217,7 +217,9 @@ class BenchProblem(Problem):
         faults = [
             fault
             for log in self.logs
-            for fault in contradictions(log, lambda trial: predictor.predict(trial, {}).force)
+            for fault in contradictions(
+                log, self.model.mechanism.stroke, lambda trial: predictor.predict(trial, {}).force
+            )
         ]
         if faults:
             raise BadData(faults)

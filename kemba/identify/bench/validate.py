@@ -1,4 +1,4 @@
-"""Is it these columns at all? The nominal prediction against each way to mix them up."""
+"""Are columns of a bench log mixed up? The nominal prediction is tried on each usual mistake."""
 
 from __future__ import annotations
 
@@ -13,8 +13,6 @@ from kemba.identify.bench.bench_log import BenchLog
 from kemba.identify.bench.motion import SmoothedMotion
 from kemba.identify.evidence.problem import Array
 from kemba.settings import BY_HAND, Settings, setting
-
-STROKE = 0.070  # m
 
 Predict = Callable[[BenchLog], Array]  # the nominal force along a run
 
@@ -46,8 +44,9 @@ class BenchValidateSettings(Settings):
     )
 
 
-def mix_ups(run: BenchLog) -> Iterator[tuple[str, BenchLog]]:
-    """The run as it would be, were a column's mistake undone."""
+def mix_ups(run: BenchLog, stroke: float) -> Iterator[tuple[str, BenchLog]]:
+    """What may be wrong with a log, and the log with that put right; `stroke` [m] of the
+    cylinder."""
     extend, retract = run.commands
     force = run.measured["piston/F"]
     yield (
@@ -62,7 +61,7 @@ def mix_ups(run: BenchLog) -> Iterator[tuple[str, BenchLog]]:
         "valve/extend and valve/retract are inverted (1 is on)",
         replace(run, commands=(_inverted(extend), _inverted(retract))),
     )
-    flipped = _flipped(run.motion)
+    flipped = _flipped(run.motion, stroke)
     yield "piston/x counts from the extended end (0 is retracted)", replace(run, motion=flipped)
     for factor, unit in ((1e3, "kN"), (1e-3, "mN"), (4.4482, "lbf"), (9.81, "kgf")):
         yield (
@@ -75,13 +74,13 @@ def mix_ups(run: BenchLog) -> Iterator[tuple[str, BenchLog]]:
         yield f"piston/x seems to be in {unit}", replace(run, motion=scaled)
 
 
-def contradictions(run: BenchLog, predict: Predict) -> list[KembaError]:
+def contradictions(run: BenchLog, stroke: float, predict: Predict) -> list[KembaError]:
     """What must be wrong with a run's columns, if anything."""
     path, limits = run.name, BenchValidateSettings.current()
     error, scale = _misfit(run, predict)
     if error < limits.small * run.sigma["piston/F"]:
         return []
-    trials = [(text, _misfit(trial, predict)) for text, trial in mix_ups(run)]
+    trials = [(text, _misfit(trial, predict)) for text, trial in mix_ups(run, stroke)]
     text, (best, spread) = min(trials, key=lambda t: t[1][0] / t[1][1])
     if best / spread < limits.close and best / spread * limits.better < error / scale:
         return [KembaError(path, text, "the force answers the valves so much better then")]
@@ -148,5 +147,5 @@ def _inverted(intervals: list[tuple[float, float]]) -> list[tuple[float, float]]
     return [(a, b) for a, b in pairs if b > a]
 
 
-def _flipped(motion: SmoothedMotion) -> SmoothedMotion:
-    return replace(motion, x=STROKE - motion.x, v=-motion.v, a=-motion.a)
+def _flipped(motion: SmoothedMotion, stroke: float) -> SmoothedMotion:
+    return replace(motion, x=stroke - motion.x, v=-motion.v, a=-motion.a)

@@ -42,7 +42,7 @@ class CrossValidationSettings(Settings):
 
 @dataclass(frozen=True)
 class Gain:
-    """Log-likelihood gained on left-out data [nats], with its standard error over blocks."""
+    """Log likelihood gained on left-out data [nats], and its standard error over blocks."""
 
     nats: float
     error: float

@@ -50,7 +50,10 @@ class RunConsistencySettings(Settings):
 
 @dataclass(frozen=True)
 class Drift:
-    """A parameter whose values per run contradict each other."""
+    """A parameter whose values per run contradict each other.
+
+    `values`: one per run that tells the parameter [its unit]; `nats`: gain of these over one value.
+    """
 
     effect: str
     key: str
@@ -103,4 +106,5 @@ def _tolerant(search: Search) -> Array:
 
 
 def _sums(values: Array, run: Labels) -> Array:
+    """Sum (runs,) of values (n,) over the rows of each run."""
     return np.asarray(np.bincount(run, weights=values), dtype=float)

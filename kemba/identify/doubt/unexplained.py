@@ -73,12 +73,17 @@ def structured(search: Search, hypothesis: Hypothesis) -> tuple[float, float]:
     columns = columns / np.maximum(np.sqrt(np.mean(columns**2, axis=0)), 1e-9)
     folds = _folds(left_over.run)
     power = float(np.mean(r**2))
-    left = min(float(np.mean((r - _foretold(r, columns, folds, k)) ** 2)) for k in settings.ridges)
+    left = min(
+        float(np.mean((r - _predicted_folds(r, columns, folds, k)) ** 2)) for k in settings.ridges
+    )
     return power, max(power - left, 0.0)
 
 
-def _foretold(r: Array, columns: Array, folds: Labels, ridge: float) -> Array:
-    """Each fold as the regression on the others foretells it."""
+def _predicted_folds(r: Array, columns: Array, folds: Labels, ridge: float) -> Array:
+    """Residual (n,) that a ridge regression on the other folds predicts for each fold.
+
+    `columns` (n, m): regressors; `folds` (n,): fold of each row.
+    """
     predicted = np.zeros(len(r))
     for fold in np.unique(folds):
         out = folds == fold
@@ -99,7 +104,7 @@ def _folds(run: Labels) -> Labels:
 
 
 def unfinished(search: Search, best: Hypothesis) -> bool:
-    """Whether so much structure is left that the answer cannot be the whole of it."""
+    """Whether so much structure is left that the answer cannot be complete."""
     settings = UnexplainedSettings.current()
     power, structure = structured(search, best)
     if not best:
@@ -110,7 +115,10 @@ def unfinished(search: Search, best: Hypothesis) -> bool:
 
 @dataclass(frozen=True)
 class Formula:
-    """Terms found, coefficients (value, sigma), and how much evidence they add [nats]."""
+    """A force as a sum of simple terms.
+
+    `coefficients`: value and sigma of each term; `gain` [nats]: log evidence that they add.
+    """
 
     terms: tuple[str, ...]
     coefficients: tuple[tuple[float, float], ...]
@@ -126,7 +134,10 @@ class Formula:
 def extended(
     search: Search, linear: Linear, jacobian: Array, r: Array, formulas: Mapping[str, Array]
 ) -> tuple[Ranker, dict[str, str]]:
-    """A ranker that knows these terms as further candidates; their names by formula."""
+    """A ranker with these formulas as further candidates, and name of a candidate -> formula.
+
+    `jacobian` (n, k) and `r` (n,) as in `linear`; `formulas`: columns (n,).
+    """
     settings = UnexplainedSettings.current()
     names = {f"term{i}": formula for i, formula in enumerate(formulas)}
     columns = np.stack([formulas[f] for f in names.values()], axis=1)
@@ -149,9 +160,8 @@ def extended(
         search.base.division.blocks,
     )
     problem = search.problem
-    ranker = Ranker(joined, {**problem.candidates, **candidates}, problem.nuisance)
-    ranker.silent = frozenset(candidates)
-    return ranker, names
+    known = {**problem.candidates, **candidates}
+    return Ranker(joined, known, problem.nuisance, silent=candidates), names
 
 
 def look(search: Search, best: Hypothesis) -> Formula | None:

@@ -1,4 +1,4 @@
-"""Is nothing missing? The whole linear search, repeated on data in which nothing is."""
+"""Is nothing missing? The linear search, repeated on simulated logs in which nothing is."""
 
 from __future__ import annotations
 
@@ -32,7 +32,10 @@ class BootstrapSettings(Settings):
 
 @dataclass(frozen=True)
 class NullTest:
-    """`scores` (draws,): best log evidence over nothing, in logs in which nothing is missing."""
+    """The best score that a single effect reaches in logs in which nothing is missing.
+
+    `scores` (draws,): its log evidence less that of nothing [nats]. `names` of the parameters.
+    """
 
     scores: Array
     names: tuple[str, ...]
@@ -99,13 +102,14 @@ def _evidence(ranker: Ranker, hypothesis: Hypothesis, slopes: Array) -> Array:
         eta = -width[:, None] * slopes
         step = cho_solve(factor, eta)
         value = 0.5 * np.sum(eta * step, axis=0) - float(np.sum(np.log(np.diag(factor[0]))))
-        parts.append(value + _sides(ranker, hypothesis, width, factor, step))
+        parts.append(value + _sign_terms(ranker, hypothesis, width, factor, step))
     return np.asarray(logsumexp(parts, axis=0) - np.log(len(tolerances)))
 
 
-def _sides(
+def _sign_terms(
     ranker: Ranker, hypothesis: Hypothesis, width: Array, factor: tuple[Array, bool], step: Array
 ) -> Array:
+    """What the sign of switches that cannot be negative adds to the evidence (draws,)."""
     total = np.zeros(step.shape[1])
     for effect in hypothesis:
         if not ranker.candidates[effect].lead.signed:
@@ -118,7 +122,8 @@ def _sides(
 
 
 def smallest_detectable(ranker: Ranker, threshold: float) -> dict[str, float]:
-    """Per effect, the size that these data would show above the threshold nine times in ten."""
+    """Effect -> size [its switch's unit] that these data would show above the threshold [nats] nine
+    times in ten."""
     found, prior = {}, SpikeSlabSettings.current()
     for effect, i in ranker.lead.items():
         size = ranker.candidates[effect].lead.size

@@ -6,14 +6,16 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from kemba.effects.pneumatics.constants import AREA_E, AREA_R, ATMOSPHERE
+from kemba.effects.pneumatics.constants import ATMOSPHERE
 from kemba.identify.evidence.types import Array
+from kemba.mechanism import Cylinder
 
 
-def air_force(states: Mapping[str, Array], prefix: str = "") -> Array:
+def air_force(states: Mapping[str, Array], cylinder: Cylinder, prefix: str = "") -> Array:
     """Push of the air on a rod [N] from the chambers' states by name, in force or in pressure."""
     push = []
-    for chamber, area in (("extend", AREA_E), ("retract", AREA_R)):
+    areas = {"extend": cylinder.area_extend, "retract": cylinder.area_retract}
+    for chamber, area in areas.items():
         name = f"{prefix}chamber/{chamber}/"
         known = states.get(f"{name}F")
         push.append((states[f"{name}P"] - ATMOSPHERE) * area if known is None else known)

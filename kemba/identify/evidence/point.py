@@ -16,8 +16,11 @@ from kemba.identify.evidence.windows import Windows, windows_of
 
 @dataclass(frozen=True)
 class LinearisationPoint:
-    """A fit, what the problem looks like there, row by row (`linear`) and summed over
-    aggregation windows (`windowed`), and how the hypothesis scores."""
+    """A hypothesis refitted, with the problem linearised there.
+
+    `linear`: by rows; `windowed`: by sums over aggregation windows. `score`: evidence of the
+    hypothesis.
+    """
 
     hypothesis: Hypothesis
     fit: Fit
@@ -27,6 +30,7 @@ class LinearisationPoint:
 
     @property
     def log_evidence(self) -> float:
+        """Log evidence [nats] of the hypothesis."""
         return self.score.log_evidence
 
     @property

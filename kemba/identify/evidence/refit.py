@@ -1,4 +1,5 @@
-"""Nonlinear refit of one hypothesis: least squares with priors, nuisance columns kept frozen."""
+"""Nonlinear refit of one hypothesis: least squares with priors; slopes along nuisance parameters
+are those of the null."""
 
 from __future__ import annotations
 
@@ -34,17 +35,20 @@ class RefitSettings(Settings):
 
 @dataclass(frozen=True)
 class Fit:
-    """Theta of a hypothesis at its best, half the sum of squares (priors included), and the
-    slopes of the residual along its own parameters there."""
+    """The best theta of a hypothesis.
+
+    `cost`: half the sum of squares, priors included. `columns`: name -> slope (n,) of the residual
+    along a parameter of the hypothesis, there; of shapes along their logarithm.
+    """
 
     theta: dict[str, float]
     cost: float
-    columns: dict[str, Array] = field(default_factory=dict)  # (n,) by name; shapes by ln
+    columns: dict[str, Array] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class Frozen:
-    """Columns of the nuisance parameters (n, k), good enough at every point of a search."""
+    """Slopes (n, k) along the nuisance parameters, which hold at every point of a search."""
 
     names: tuple[str, ...]
     jacobian: Array
@@ -137,6 +141,7 @@ class _LeastSquares:
         return Fit(self._theta(found.x), float(found.cost), self._columns(found.jac))
 
     def _columns(self, jacobian: Array) -> dict[str, Array]:
+        """Slopes of the residual per unit of each own parameter, from those per prior width."""
         rows, n = len(self.frozen.jacobian), len(self.nuisance)
         columns = {}
         for i, (key, p) in enumerate(self.own.items(), start=n):
@@ -150,13 +155,14 @@ class _LeastSquares:
             yield (self.start.get(name, nominal) - nominal) / sigma
 
     def _in(self, key: str, value: float) -> float:
-        """A parameter in prior widths: shapes by their logarithm."""
+        """A parameter in prior widths, shapes by their logarithm."""
         p = self.own[key]
         if is_shape(self.problem, key):
             return float(np.log(value / p.typical)) / p.size
         return (value - p.off) / (self.slab * p.size)
 
     def _out(self, key: str, x: float) -> float:
+        """The parameter of a value in prior widths, within its bounds."""
         p = self.own[key]
         if is_shape(self.problem, key):
             return float(np.clip(p.typical * np.exp(p.size * x), p.lower, p.upper))
@@ -185,6 +191,7 @@ class _LeastSquares:
         return theta
 
     def _residual(self, x: Array) -> Array:
+        """Residuals (n,), then the distances (k,) from the prior means in widths."""
         r = self.problem.residual(self._theta(x))
         absurd = self.settings.absurd
         return np.concatenate([np.nan_to_num(np.clip(r, -absurd, absurd), nan=absurd), x])

@@ -1,4 +1,4 @@
-"""The search: null fit, ranking, refits of the leaders, growth, and what each step believed."""
+"""The search: fit of the null, ranking, refits of the leaders, further effects one by one."""
 
 from __future__ import annotations
 
@@ -63,7 +63,12 @@ class SearchSettings(Settings):
 
 @dataclass
 class Search:
-    """State of one search on one problem; `run` fills it."""
+    """State of one search; `run` fills it.
+
+    `problem`: the problem as it is now; it is replaced when its noise colour is learnt or its
+    motion found again. `deadline`: when to stop refitting, by `time.monotonic` [s]. `say`: told of
+    progress. `points`: every hypothesis that was refitted. `base`: the null model.
+    """
 
     problem: Problem
     deadline: float = np.inf
@@ -74,7 +79,7 @@ class Search:
     _stale: bool = False
 
     def run(self) -> Hypothesis:
-        """The hypothesis the evidence favours; everything seen stays in `points`."""
+        """The likeliest hypothesis; everything that was refitted stays in `points`."""
         leaders = SearchSettings.current().leaders
         self.say("fitting the model as it is")
         self.start()
@@ -94,14 +99,15 @@ class Search:
         return best
 
     def _follow(self, best: Hypothesis) -> Hypothesis:
-        """Look again along the motion that the best guess makes of the data, until it stays.
+        """Repeat the search along the motion that the best hypothesis makes of the data, until the
+        best hypothesis stays the same.
 
-        A guess far from the first motion looks bad only for being far: what the slopes promise
-        counts as well as what the refit found.
+        An effect that changes the motion much is underrated along the first motion. So where no
+        refit is better than nothing, the linear evidence may choose the hypothesis to follow.
         """
         settings = SearchSettings.current()
         for _ in range(settings.followed):
-            guess = best or self._promised()
+            guess = best or self._first_of_table()
             if guess == NULL or time.monotonic() > self.deadline:
                 return best
             point = self.points[guess]
@@ -116,22 +122,24 @@ class Search:
         return self._grow(best) if best else best
 
     def _contenders(self) -> frozenset[Hypothesis]:
-        """Single effects that were refitted, or promise half of what the best one does."""
+        """Single effects that were refitted, or whose linear evidence gains a good share of the
+        best."""
         null = self.points[NULL].log_evidence
         gains = {h: e - null for h, e in self.base.table.items() if len(h) == 1}
         least = SearchSettings.current().promising * max(gains.values())
         return frozenset(h for h, gain in gains.items() if gain > least or h in self.points)
 
-    def _promised(self) -> Hypothesis:
-        """The refitted single effect that the table puts first, if it pays there."""
+    def _first_of_table(self) -> Hypothesis:
+        """Of the refitted single effects the one with the largest linear evidence, if that beats
+        nothing."""
         count = len(self.problem.candidates)
         null = self.points[NULL].log_evidence + log_prior(NULL, count)
         tables: dict[Hypothesis, float] = {
             h: e for h, e in self.base.table.items() if h in self.points and len(h) == 1
         }
         first = max(tables, key=tables.__getitem__, default=NULL)
-        pays = first and tables[first] + log_prior(first, count) > null
-        return first if pays else NULL
+        better = first and tables[first] + log_prior(first, count) > null
+        return first if better else NULL
 
     def start(self, among: frozenset[Hypothesis] | None = None) -> None:
         """Null fit, noise colour, and the linear table at the null."""
@@ -140,15 +148,15 @@ class Search:
         self.points = {NULL: self.base.point}
 
     def _round(self, given: Hypothesis, leaders: int) -> Hypothesis:
-        """Refit the most promising extensions of `given` by one; the best of all points so far."""
+        """Refit `given` with one more effect, the likeliest ones; the best of all points so far."""
         settings = SearchSettings.current()
         table = self._extensions(given)
         order = sorted(table, key=lambda h: -table[h])[:leaders]
-        promise = table[order[0]] - self.points[given].log_evidence
-        reach = max(settings.far, settings.far_share * promise)
+        gain = table[order[0]] - self.points[given].log_evidence
+        reach = max(settings.far, settings.far_share * gain)
         for hypothesis in order:
             if given and table[hypothesis] < self.points[given].log_evidence:
-                break  # not even the slopes promise anything
+                break  # even the linear evidence gains nothing
             if (
                 table[hypothesis] < table[order[0]] - reach
                 and hypothesis not in order[: settings.sure]
@@ -160,7 +168,8 @@ class Search:
         return self.best()
 
     def _extensions(self, given: Hypothesis) -> dict[Hypothesis, float]:
-        """Linear evidence of `given` plus one effect, pairs lending theirs to their members."""
+        """Linear evidence of `given` plus one effect. The members of a pair that is much better
+        than any single effect count as much as the best single effect."""
         if given != NULL:
             ranker = self.base.ranker(self.points[given].linear)
             return ranker.table((len(given) + 1,), given=given)
@@ -174,7 +183,7 @@ class Search:
         return single
 
     def visit(self, hypothesis: Hypothesis) -> LinearisationPoint:
-        """Refit a hypothesis (once) and score it there."""
+        """Refit a hypothesis, once, and score it there."""
         if hypothesis not in self.points:
             self.say(f"refitting {' + '.join(hypothesis)}")
             fit = refit(self.problem, hypothesis, self._guess(hypothesis), self.base.frozen)
@@ -203,7 +212,7 @@ class Search:
             self._stale = True
 
     def _refresh(self) -> None:
-        """Score everything again by the secants learnt."""
+        """Score everything again with the secants learnt."""
         if self._stale:
             self.base.rescore()
             self.points = {h: self._point(h, p.fit) for h, p in self.points.items() if h}
@@ -216,7 +225,8 @@ class Search:
         return LinearisationPoint(hypothesis, fit, linear, windowed, score)
 
     def _near(self, fit: Fit) -> tuple[Linear, Linear]:
-        """Linear at a refitted point: its own slopes are fresh, the others are the null's."""
+        """The problem about a refitted point, by rows and by windows: slopes of its own parameters
+        are those of the fit, all others are the null's."""
         names, base = names_of(self.problem, fit.theta), self.base
         known = base.point.linear
         columns = [
@@ -226,8 +236,8 @@ class Search:
         return base.division.linear(fit.theta, names, np.stack(columns, axis=1), r)
 
     def _guess(self, hypothesis: Hypothesis) -> dict[str, float]:
-        """Where it was before, or the largest part that was refitted, moved by the linear
-        estimate there."""
+        """Where a refit starts: at its last result, or at the linear estimate from the largest part
+        of the hypothesis that was refitted."""
         if hypothesis in self._thetas:
             return self._thetas[hypothesis]
         parts = [h for h in self.points if set(h) < set(hypothesis)]
@@ -238,7 +248,7 @@ class Search:
         return {**guess, **{k: v for k, v in point.fit.theta.items() if k not in guess}}
 
     def best(self) -> Hypothesis:
-        """The likeliest of everything refitted."""
+        """The likeliest of all refitted hypotheses."""
         self._refresh()
         count = len(self.problem.candidates)
         return max(self.points, key=lambda h: self.points[h].log_evidence + log_prior(h, count))
@@ -258,15 +268,15 @@ class Search:
         return self.best()
 
     def _promising(self) -> list[Hypothesis]:
-        """What was refitted and gained a good share of what the best one gained."""
+        """Refitted hypotheses that gained a good share of what the best one gained."""
         null = self.points[NULL].log_evidence
         gains = {h: p.log_evidence - null for h, p in self.points.items() if h}
         least = SearchSettings.current().promising * max(gains.values())
         return [h for h, gain in gains.items() if gain > least]
 
     def probabilities(self, dismissed: Collection[Hypothesis] = ()) -> dict[Hypothesis, float]:
-        """Over everything refitted, and the rest of the singles by their linear evidence; without
-        what was `dismissed`, as too small or refuted by left-out data."""
+        """Of all refitted hypotheses, and of the other single effects by their linear evidence;
+        without the hypotheses `dismissed` as too small or as refuted by left-out data."""
         evidence: dict[Hypothesis, float] = {
             h: e for h, e in self.base.table.items() if len(h) == 1
         }

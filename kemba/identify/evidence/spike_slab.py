@@ -71,7 +71,8 @@ class Ranker:
     """Scores hypotheses on one linearisation.
 
     Every effect of the catalogue may be there with a small share of its size: the `spike` width of
-    its prior, in sizes. The effects of a hypothesis have the slab width instead.
+    its prior, in sizes (None: the setting). The effects of a hypothesis have the slab width
+    instead. `silent`: effects that are absent where the hypothesis does not name them.
     """
 
     def __init__(
@@ -80,24 +81,19 @@ class Ranker:
         candidates: Mapping[str, Candidate],
         nuisance: Iterable[str],
         spike: float | None = None,
+        silent: Iterable[str] = (),
     ) -> None:
         self._prior = SpikeSlabSettings.current()
         spike = self._prior.spike if spike is None else spike
         self.linear, self.candidates, self.spike = linear, candidates, spike
-        self.silent: frozenset[str] = frozenset()  # effects that are absent unless supposed
+        self.silent = frozenset(silent)
         free = set(nuisance)
         self.nuisance = np.array([name in free for name in linear.names])
         self.lead = {c.effect: linear.index(c.key) for c in candidates.values()}
-        self._shape = {
-            effect: [
-                linear.index(key) for key in tuple(c.keys()) if key != c.key and key in linear.names
-            ]
-            for effect, c in candidates.items()
-        }
         self._gram, self._slope, self._power = linear.total
 
     def score(self, hypothesis: Hypothesis) -> Score:
-        """Averaged over how far the nominal figures may be off."""
+        """Evidence, averaged over how far the nominal figures may be off."""
         parts = [self._score(hypothesis, t) for t in self._prior.tolerances]
         best = max(parts, key=lambda s: s.log_evidence)
         total = float(logsumexp([s.log_evidence for s in parts]) - np.log(len(parts)))
@@ -117,10 +113,12 @@ class Ranker:
         quadratic = self._power + float(precision @ shift**2) - float(eta @ step)
         covariance = np.outer(width, width) * cho_solve(factor, np.eye(len(width)))
         z = self.linear.at + step
-        log_evidence = -0.5 * quadratic - 0.5 * log_det + self._sides(hypothesis, z, covariance)
+        log_evidence = -0.5 * quadratic - 0.5 * log_det + self._sign_term(hypothesis, z, covariance)
         return Score(log_evidence, z, covariance)
 
     def widths(self, hypothesis: Hypothesis, tolerance: float) -> Array:
+        """Prior widths (k,) under a hypothesis; nominal figures are off by `tolerance` prior
+        sigmas."""
         width = self.linear.width.copy()
         width[self.nuisance] *= tolerance
         for effect, i in self.lead.items():
@@ -129,8 +127,9 @@ class Ranker:
             width[i] *= share
         return np.asarray(np.maximum(width, 1e-12))
 
-    def _sides(self, hypothesis: Hypothesis, z: Array, covariance: Array) -> float:
-        """A switch that cannot be negative halves its prior, and may rule out its posterior."""
+    def _sign_term(self, hypothesis: Hypothesis, z: Array, covariance: Array) -> float:
+        """What the sign of switches that cannot be negative adds to the log evidence: the prior has
+        one side only, and so has the posterior."""
         total = 0.0
         for effect in hypothesis:
             lead, i = self.candidates[effect].lead, self.lead[effect]
@@ -157,7 +156,8 @@ class Ranker:
 
 
 def log_prior(hypothesis: Hypothesis, count: int) -> float:
-    """Nothing is missing half of the time; each further effect is rarer, and all are alike."""
+    """Log prior probability of a hypothesis among `count` effects: all effects are equally likely,
+    and each further one makes a hypothesis less likely."""
     prior = SpikeSlabSettings.current()
     share = (prior.nothing, prior.single, prior.pair, prior.triple)[min(len(hypothesis), 3)]
     ways = {0: 1.0, 1: count, 2: count * (count - 1) / 2}.get(
@@ -167,7 +167,7 @@ def log_prior(hypothesis: Hypothesis, count: int) -> float:
 
 
 def probabilities(evidence: Mapping[Hypothesis, float], count: int) -> dict[Hypothesis, float]:
-    """Posterior over the hypotheses listed."""
+    """Posterior probability of each hypothesis, from log evidence [nats], among `count` effects."""
     logs = np.array([e + log_prior(h, count) for h, e in evidence.items()])
     weights = np.exp(logs - logsumexp(logs))
     return dict(zip(evidence, weights.tolist(), strict=True))

@@ -1,4 +1,7 @@
-"""Residuals summed over moments: a model that is wrong errs for longer than a sample, noise not."""
+"""Aggregation windows: residuals are summed over some rows before they are judged.
+
+The error of a wrong model lasts longer than one row; noise changes from row to row.
+"""
 
 from __future__ import annotations
 
@@ -15,8 +18,11 @@ START = "start:"  # names of nuisance parameters that say how a log begins
 
 @dataclass(frozen=True)
 class Windows:
-    """Stretches of successive rows of one run, channel and condition: the first row (k,) of each,
-    and the size (k,) that noise would give to the sum over it."""
+    """Groups of successive rows of one run, channel and condition.
+
+    `first` (k,): first row of each window. `noise` (k,): 1 sigma of the sum over it, if there is
+    nothing but noise.
+    """
 
     first: Labels
     noise: Array

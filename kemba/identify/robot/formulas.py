@@ -1,4 +1,4 @@
-"""Simple force laws beyond the catalogue on rods, hips and body, as columns of residual."""
+"""Simple force terms beyond the catalogue on rods, hips and body, as columns of residual."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from kemba.effects.mechanics.friction import V_COULOMB
-from kemba.identify.bench.formulas import STROKE, FormulaSettings, dahl
+from kemba.identify.doubt.force_terms import dahl, end_terms
 from kemba.identify.evidence.types import Array
 from kemba.identify.robot.force_channels import force_columns
 from kemba.identify.robot.state import LinearisedState
@@ -15,7 +15,7 @@ from kemba.settings import BY_HAND, Settings, setting
 
 
 class RobotFormulaSettings(Settings):
-    """Constants of the simple force laws that are tried on robots."""
+    """Constants of the simple force terms that are tried on robots."""
 
     speed: float = setting(
         0.1, "rad.s-1", "speed over which friction at a hip turns round", BY_HAND
@@ -34,10 +34,10 @@ class RobotFormulaSettings(Settings):
 def formula_columns(state: LinearisedState) -> dict[str, Array]:
     """Columns (rows,) per unit of the coefficient, by the formula a model's YAML would hold."""
     y, rate = state.motion.y, state.motion.rate
-    legs = len(state.physics.legs)
+    legs, stroke = len(state.physics.legs), state.physics.mechanism.stroke
     hips, rods = slice(3, 3 + legs), slice(3 + legs, 3 + 2 * legs)
     groups = (
-        (range(3 + legs, 3 + 2 * legs), "rods", rod_terms(y[..., rods], rate[..., rods])),
+        (range(3 + legs, 3 + 2 * legs), "rods", rod_terms(y[..., rods], rate[..., rods], stroke)),
         (range(3, 3 + legs), "hips", hip_terms(y[..., hips], rate[..., hips], state.batch.torque)),
         ([1], "body z", body_terms("z", y[..., [1]], rate[..., [1]])),
         ([0], "body x", drag_terms("x", rate[..., [0]])),
@@ -50,14 +50,12 @@ def formula_columns(state: LinearisedState) -> dict[str, Array]:
     return found
 
 
-def rod_terms(x: Array, v: Array) -> Iterator[tuple[str, Array]]:
-    """(formula, force on the rod (n, L, legs)) of extension and its rate."""
+def rod_terms(x: Array, v: Array, stroke: float) -> Iterator[tuple[str, Array]]:
+    """(formula, force on the rod (n, L, legs)) of extension and its rate; `stroke` [m]."""
     sign = np.tanh(v / V_COULOMB)
-    for d in FormulaSettings.current().ranges:
-        yield f"exp(-(x/{d:g})**2)", np.exp(-((x / d) ** 2))
-        yield f"exp(-(({STROKE:g} - x)/{d:g})**2)", np.exp(-(((STROKE - x) / d) ** 2))
-    yield f"{STROKE / 2:g} - x", STROKE / 2 - x
-    yield f"(x - {STROKE / 2:g})**3", (x - STROKE / 2) ** 3
+    yield from end_terms(x, stroke)
+    yield f"{stroke / 2:g} - x", stroke / 2 - x
+    yield f"(x - {stroke / 2:g})**3", (x - stroke / 2) ** 3
     yield "max(v, 0)", np.maximum(v, 0.0)
     yield "min(v, 0)", np.minimum(v, 0.0)
     yield "v**3", v**3

@@ -55,7 +55,7 @@ def describe(
 
 
 def valve_modes(physics: Physics, inputs: Array, channels: Sequence[str]) -> Texts:
-    """Mode (n, m) of the channel's own leg; of the body: the front leg's."""
+    """Mode (n, m) of the channel's own leg; of the body: the first leg's."""
     texts = {}
     for leg in physics.legs:
         on = [

@@ -1,8 +1,8 @@
 """How much force a robot model lacks: d(t) per physical channel with its 95 % band.
 
-Every channel's unknown force is a first-order lag driven by noise, as part of the filter's state.
-How strong each is, is learnt from the data; a channel that does not need one is left with almost
-none. In stance the contact forces are unknown too, so only what they cannot explain is told.
+Every channel's unknown force is a first-order lag of white noise, and a state of the filter. Its
+strength is learnt from the data; a channel that needs no force ends with almost none. In stance
+the contact forces are unknown too, so only the force that they cannot explain is found.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import numpy as np
 from kemba.identify.compare.missing_force import spans
 from kemba.identify.evidence.problem import Array, MissingForce, Theta
 from kemba.identify.robot.dynamics.reference import densities
-from kemba.identify.robot.dynamics.settings import QuietFloor
+from kemba.identify.robot.dynamics.settings import QuietForceDensity
 from kemba.identify.robot.motion.filter import System, gains, smooth_with_band
 from kemba.identify.robot.state import LinearisedState
 from kemba.settings import BY_HAND, Settings, setting
@@ -34,7 +34,10 @@ class RobotMissingSettings(Settings):
 def robot_missing(
     state: LinearisedState, theta: Theta, strength: Array | None = None
 ) -> list[MissingForce]:
-    """d(t) per run: force on the body, moments at pitch and hips, force on the rods."""
+    """d(t) per run: force on the body [N], moments at pitch and hips [N.m], force on the rods [N].
+
+    `strength` (k,): 1 sigma of each channel's force; learnt when not given.
+    """
     names = state.physics.channels
     kinds = [_kind(name) for name in names]
     settings = RobotMissingSettings.current()
@@ -42,7 +45,7 @@ def robot_missing(
     sigma = begin if strength is None else strength
     moment = np.isin(kinds, ("pitch", "hip"))
     least = np.where(moment, settings.negligible_moment, settings.negligible)
-    quiet = densities(state.physics, state.batch, state.schedules, QuietFloor.current())
+    quiet = densities(state.physics, state.batch, state.schedules, QuietForceDensity.current())
     y, g = state.measurement(theta), state.acceleration(theta)
     valid, k = state.batch.valid, len(names)
     for _ in range(settings.rounds if strength is None else 1):
@@ -66,7 +69,10 @@ def _kind(channel: str) -> str:
 
 
 def with_forces(state: LinearisedState, density: Array, sigma: Array) -> System:
-    """The filter's system with a lagged force of strength `sigma` (k,) per channel as states."""
+    """The filter's system with a lagged force per channel, 1 sigma `sigma` (k,), as more states.
+
+    `density` (n, L, c): of the other unknown forces.
+    """
     base = state.motion.system_with(density, state.batch.h)
     h, k = state.batch.h, len(sigma)
     n, runs, m, d = base.H.shape

@@ -24,14 +24,15 @@ def robot_operating_point(state: LinearisedState) -> OperatingPoint:
     owners = [channel.split("/")[0] for channel in row_channels(state.physics)]
     own = [per_leg[legs.index(o) if o in legs else 0] for o in owners]
     x, v, force = state.pick(np.stack(own, axis=2)).T
-    return OperatingPoint(x, v, force, float(state.physics.mechanism.stroke))
+    return OperatingPoint(x, v, force, state.physics.mechanism.need_cylinder().stroke)
 
 
 def air_forces(state: LinearisedState) -> Array:
     """Push of the model's air [N] on every leg's rod (n, L, legs)."""
     names = [q.name for q in state.physics.model.states.values()]
     states = dict(zip(names, np.moveaxis(state.motion.states[0], -1, 0), strict=True))
-    return np.stack([air_force(states, f"{leg}/") for leg in state.physics.legs], axis=-1)
+    cylinder, legs = state.physics.mechanism.need_cylinder(), state.physics.legs
+    return np.stack([air_force(states, cylinder, f"{leg}/") for leg in legs], axis=-1)
 
 
 def changes(log: ResampledLog, legs: Sequence[str]) -> Changes:

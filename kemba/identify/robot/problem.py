@@ -29,7 +29,7 @@ from kemba.identify.robot.candidates import (
     robot_candidates,
 )
 from kemba.identify.robot.dynamics.physics import Physics
-from kemba.identify.robot.dynamics.settings import Floor
+from kemba.identify.robot.dynamics.settings import ForceDensity
 from kemba.identify.robot.dynamics.tolerance import SHARE
 from kemba.identify.robot.force_channels import robot_force_channels
 from kemba.identify.robot.formulas import formula_columns
@@ -60,7 +60,7 @@ class RobotProblemSettings(Settings):
 class RobotProblem(Problem):
     """`Problem` for robot logs; see the text of `kemba.identify.robot.state`.
 
-    `state`: the logs with the model linearised along their motion. `floor`: density of the forces
+    `state`: the logs with the model linearised along their motion. `unknown`: density of the forces
     that no model explains.
     """
 
@@ -68,10 +68,10 @@ class RobotProblem(Problem):
     state: LinearisedState
 
     def __init__(
-        self, logs: Sequence[Trajectory], model: Model, floor: Floor | None = None
+        self, logs: Sequence[Trajectory], model: Model, unknown: ForceDensity | None = None
     ) -> None:
         self.window = RobotProblemSettings.current().window  # innovations are one-step errors
-        self.model, self.floor = model, floor or Floor.current()
+        self.model, self.unknown = model, unknown or ForceDensity.current()
         found = robot_candidates(model)
         effects = in_the_air(found)
         grip, ground = ground_of(model)
@@ -86,7 +86,7 @@ class RobotProblem(Problem):
         )
         sigma = dict(zip(physics.channels, np.median(batch.sigma, axis=0).tolist(), strict=True))
         self.candidates: dict[str, Candidate] = {**found, **sensor_candidates(sigma)}
-        self.state = linearise_at(physics, batch, {}, ground, self.floor)
+        self.state = linearise_at(physics, batch, {}, ground, self.unknown)
         masses = dict.fromkeys(physics.masses, (0.0, SHARE))
         self.nuisance: dict[str, tuple[float, float]] = {**physics.nuisance, **masses}
 
@@ -103,7 +103,7 @@ class RobotProblem(Problem):
     def relinearise(self, base: Theta) -> Self:
         """The same problem, smoothed and linearised anew with the model at `base`."""
         found, old = copy(self), self.state
-        found.state = linearise_at(old.physics, old.batch, base, old.ground, self.floor)
+        found.state = linearise_at(old.physics, old.batch, base, old.ground, self.unknown)
         return found
 
     def residual(self, theta: Theta, runs: Collection[int] | None = None) -> Array:

@@ -25,7 +25,7 @@ from kemba.identify.robot.dynamics.reference import (
     first_reference,
     read_schedules,
 )
-from kemba.identify.robot.dynamics.settings import Floor, LooseFloor
+from kemba.identify.robot.dynamics.settings import ForceDensity, LooseForceDensity
 from kemba.identify.robot.motion.batch import Batch
 from kemba.identify.robot.motion.contact import Schedule, loaded
 from kemba.identify.robot.motion.filter import Gains, gains, innovations
@@ -116,24 +116,26 @@ class LinearisedState:
 
 
 def linearise_at(
-    physics: Physics, batch: Batch, base: Theta, ground: Mapping[str, float], floor: Floor
+    physics: Physics, batch: Batch, base: Theta, ground: Mapping[str, float], unknown: ForceDensity
 ) -> LinearisedState:
     """The logs smoothed with the model at `base`, and the model linearised along that motion.
 
-    `floor`: density of the forces that no model explains.
+    `unknown`: density of the forces that no model explains.
     """
     reference = _without_delays(physics, batch, base, first_reference(physics, batch))
     schedules = read_schedules(physics, batch, reference)
     dt = float(np.median(batch.h[batch.valid]))
     for _ in range(StateSettings.current().rounds):
-        state = _along(physics, batch, base, ground, schedules, reference, LooseFloor.current())
+        state = _along(
+            physics, batch, base, ground, schedules, reference, LooseForceDensity.current()
+        )
         y, g = state.measurement(base), state.acceleration(base)
         reference = smoothed(state.motion, state.gain, y, g)
         if any(name.startswith("sensor") for name in base):  # as true sensors would have seen it
             schedules = read_schedules(physics, batch, reference)
         normal = [state.motion.normal[: len(s.phase), i] for i, s in enumerate(schedules)]
         schedules = tuple(loaded(s, f, dt) for s, f in zip(schedules, normal, strict=True))
-    state = _along(physics, batch, base, ground, schedules, reference, floor)
+    state = _along(physics, batch, base, ground, schedules, reference, unknown)
     masses = zip(physics.masses, np.moveaxis(state.motion.masses, -1, 0), strict=True)
     linear = {name: (column, 0.0) for name, column in masses}
     return replace(state, linear={**linear, GRIP: (state.motion.less_grip, 1.0)})
@@ -153,12 +155,12 @@ def _along(
     ground: Mapping[str, float],
     schedules: tuple[Schedule, ...],
     reference: Reference,
-    floor: Floor,
+    unknown: ForceDensity,
 ) -> LinearisedState:
     """The model at `base` linearised along one reference."""
     p, delays = values_at(physics, base)
     states = air_states(physics, batch, read_inputs(physics, batch, reference, delays), p)
-    density = densities(physics, batch, schedules, floor)
+    density = densities(physics, batch, schedules, unknown)
     motion = linearise_along(physics, batch, schedules, reference, density, states, p)
     mask = np.isfinite(motion.system.R)
     mask[: StateSettings.current().lead_in] = False

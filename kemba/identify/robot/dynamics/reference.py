@@ -1,4 +1,4 @@
-"""The motion along which a model is judged: smoothed with the model's help, then linearised."""
+"""The reference: the motion along which a model is linearised, and how it is first found."""
 
 from __future__ import annotations
 
@@ -9,7 +9,11 @@ from typing import Any
 import numpy as np
 
 from kemba.identify.robot.dynamics.physics import Physics
-from kemba.identify.robot.dynamics.settings import ContactForceSettings, Floor, KinematicSettings
+from kemba.identify.robot.dynamics.settings import (
+    ContactForceSettings,
+    ForceDensity,
+    KinematicSettings,
+)
 from kemba.identify.robot.motion.batch import Batch
 from kemba.identify.robot.motion.contact import Schedule, read_schedule
 from kemba.identify.robot.motion.filter import System, gains, smooth
@@ -19,7 +23,7 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 @dataclass(frozen=True)
 class Reference:
-    """Motion at nodes: q, v (n, L, k); acceleration `a` over each step."""
+    """Motion: q, v (n, L, k) at the nodes, acceleration `a` (n, L, k) over each step."""
 
     q: Array
     v: Array
@@ -32,7 +36,8 @@ class Reference:
 
 
 def integrator(h: Array, k: int, extra: int) -> tuple[Array, Array]:
-    """F, G of k double integrators and `extra` constants that may wander."""
+    """F (n, L, d, d), G (n, L, d, k + extra) of k double integrators and `extra` constants that may
+    drift, over steps `h` (n, L) [s]; d = 2 k + extra."""
     n, runs = h.shape
     d = 2 * k + extra
     F = np.broadcast_to(np.eye(d), (n, runs, d, d)).copy()
@@ -46,7 +51,7 @@ def integrator(h: Array, k: int, extra: int) -> tuple[Array, Array]:
 
 
 def first_reference(physics: Physics, batch: Batch) -> Reference:
-    """Every coordinate smoothed for itself."""
+    """Every coordinate smoothed on its own, without the model."""
     k, legs = physics.mechanism.n, len(physics.legs)
     y = batch.flat(batch.y)
     pistons = y[:, -legs:]
@@ -90,11 +95,16 @@ def read_schedules(physics: Physics, batch: Batch, ref: Reference) -> tuple[Sche
     return tuple(found)
 
 
-def densities(physics: Physics, batch: Batch, schedules: Sequence[Schedule], floor: Floor) -> Array:
-    """(n, L, k + 2 legs): density of unknown force per measured channel and foot axis."""
+def densities(
+    physics: Physics, batch: Batch, schedules: Sequence[Schedule], least: ForceDensity
+) -> Array:
+    """(n, L, k + 2 legs): density of unknown force per measured channel and foot axis.
+
+    `least`: density everywhere; contacts, impacts and stops add to it.
+    """
     legs, parts, unknown = len(physics.legs), [], ContactForceSettings.current()
     for log, schedule in zip(batch.resampled, schedules, strict=True):
-        own = [floor.body, floor.body, floor.pitch] + [floor.hip] * legs + [floor.rod] * legs
+        own = [least.body, least.body, least.pitch] + [least.hip] * legs + [least.rod] * legs
         density = np.tile(np.array(own + [0.0] * 2 * legs), (len(log.time), 1))
         rods = density[:, 3 + legs : 3 + 2 * legs]
         rods += np.where(schedule.low | schedule.high, unknown.contact, 0.0)
@@ -111,7 +121,7 @@ def densities(physics: Physics, batch: Batch, schedules: Sequence[Schedule], flo
 
 
 def _edges(flags: np.ndarray[Any, Any]) -> Array:
-    """Large where a piston reaches a stop or leaves it."""
+    """Density (n, legs) in the nodes after a piston reaches a stop."""
     unknown = ContactForceSettings.current()
     change = np.zeros(flags.shape, bool)
     change[1:] = flags[1:] & ~flags[:-1]

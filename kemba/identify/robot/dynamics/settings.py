@@ -10,7 +10,7 @@ import math
 from kemba.settings import BY_HAND, Settings, setting
 
 
-class Floor(Settings):
+class ForceDensity(Settings):
     """Density of the forces that no model explains, by channel."""
 
     body: float = setting(5e-3, "N2.s", "force on the body", BY_HAND, decides=True)
@@ -19,7 +19,7 @@ class Floor(Settings):
     rod: float = setting(2e-2, "N2.s", "force on a rod", BY_HAND, decides=True)
 
 
-class LooseFloor(Floor):
+class LooseForceDensity(ForceDensity):
     """The same while the motion is smoothed: the motion follows the data."""
 
     body: float = setting(0.05, "N2.s", "force on the body", BY_HAND)
@@ -28,7 +28,7 @@ class LooseFloor(Floor):
     rod: float = setting(0.5, "N2.s", "force on a rod", BY_HAND)
 
 
-class QuietFloor(Floor):
+class QuietForceDensity(ForceDensity):
     """The same while a missing force is estimated: all that is unknown belongs to it."""
 
     body: float = setting(1e-5, "N2.s", "force on the body", "convention: as good as none")
