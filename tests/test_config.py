@@ -203,11 +203,14 @@ def test_overrides_that_do_not_fit_the_schema() -> None:
 
 def test_overrides_that_lead_nowhere() -> None:
     with pytest.raises(ConfigErrors) as caught:
-        apply_overrides(document(), ["nodes", "nodes.x=1", "effects.7.T_c=3", "a..b=4"])
+        apply_overrides(
+            document(), ["nodes", "nodes.x=1", "effects.7.T_c=3", "effects[2].T_c=3", "a..b=4"]
+        )
     assert [str(error) for error in caught.value.errors] == [
         "--set nodes: is not key=value; such as --set 'goals.apex=0.5 m'",
         "--set nodes.x=1: nodes is a plain value and has no key 'x'",
         "--set effects.7.T_c=3: effects has no item '7'; 0 to 1 was expected",
+        "--set effects[2].T_c=3: effects has no item '2'; 0 to 1 was expected",
         "--set a..b=4: is not key=value; such as --set 'goals.apex=0.5 m'",
     ]
 

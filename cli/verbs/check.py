@@ -64,13 +64,25 @@ def _yaml(file: Path) -> dict[str, Any]:
     document = load_yaml(locate(file, SCHEMAS))
     kind = kind_of(document)
     parsed = parse(document, schema_of(kind))
-    if kind == "tasks":
-        _names(parsed, document)
-    return {"kind": kind, "sentence": f"one of the {kind}"}
+    remarks = _whole(kind, parsed, document)
+    sentence = "; ".join([f"one of the {kind}", *remarks])
+    return {"kind": kind, "sentence": sentence, "remarks": remarks}
 
 
-def _names(task: Any, document: Any) -> None:
-    """Quantities, costs and solver options that a task names, and what cannot be met."""
+def _whole(kind: str, parsed: Any, document: Any) -> list[str]:
+    """What a file names must exist too: robots, cylinders, legs, quantities, costs, options."""
+    from kemba.mechanism import load_cylinder, load_robot
+    from kemba.model import load_model
     from kemba.ocp.planning import check_feasible
+    from kemba.ocp.task.task import parse_task
 
-    check_feasible(task, document)
+    if kind == "tasks":
+        model, _ = check_feasible(parse_task(document), document)
+        return model.remarks
+    if kind == "models":
+        return load_model(document.source).remarks
+    if kind == "robots":
+        load_robot(document.source)
+    if kind == "cylinders":
+        load_cylinder(document.source)
+    return []

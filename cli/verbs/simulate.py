@@ -15,7 +15,9 @@ if TYPE_CHECKING:
 
 def simulate(
     source: Annotated[str, typer.Argument(help="Run folder, controller.csv, or rig YAML.")],
-    model: Annotated[str, typer.Option(help="Model YAML of the plant.")] = "plant",
+    model: Annotated[
+        str | None, typer.Option(help="Model YAML of the plant; else the task's own.")
+    ] = None,
     repeat: Annotated[int, typer.Option(min=1, help="How often to execute the run.")] = 1,
     noise: Annotated[
         bool, typer.Option("--noise", help="Noisy sensors, scattering valves.")
@@ -40,7 +42,7 @@ def simulate(
 
         rig = load_rig(source)
         with claimed(out, Path("bench") / rig.name, "*.csv", force) as folder:
-            answer = _rig(rig, model, folder, seed, noise)
+            answer = _rig(rig, model or "plant", folder, seed, noise)
     else:
         default = (Path(source) if Path(source).is_dir() else Path(source).parent) / "logs"
         with claimed(out, default, "*.csv", force) as folder:
@@ -52,7 +54,9 @@ def simulate(
         say(answer["sentence"], quiet)
 
 
-def _run(source: str, model: str, out: Path, seed: int, noise: bool, repeat: int) -> dict[str, Any]:
+def _run(
+    source: str, model: str | None, out: Path, seed: int, noise: bool, repeat: int
+) -> dict[str, Any]:
     from kemba.plant.execution.repeat import plant_of, repeat_run
 
     plant = plant_of(source, model)

@@ -83,9 +83,11 @@ def find_config(name: str | Path, folder: str) -> Path:
 
 
 def beside(name: str, folder: Path) -> str:
-    """The whole path of the file `name` in `folder` where there is one, else `name` as given."""
-    near = folder / name
-    return str(near.resolve()) if _is_file(near) else name
+    """The whole path of the file `name` in `folder` or else in the current folder; where there is
+    neither, `name` as given, which may be that of a shipped file."""
+    near = (path for path in (folder / name, Path(name)) if _is_file(path))
+    found = next(near, None)
+    return name if found is None else str(found.resolve())
 
 
 def locate(name: str | Path, folders: Collection[str]) -> Path:

@@ -94,6 +94,11 @@ class Placed:
         return example(self.effect)
 
     @cached_property
+    def resolved(self) -> Effect:
+        """The effect with the figures that it takes from the model, such as its cylinder's."""
+        return self.model.effect(self.on.name)
+
+    @cached_property
     def model(self) -> Model:
         """The model in which it stands."""
         return model_of(self.on, rig=self.rig)
@@ -101,12 +106,12 @@ class Placed:
     @cached_property
     def slopes(self) -> ca.Function:
         """`slopes` of that model by the effect's own parameters."""
-        return slopes(self.model, [f"{self.on.name}.{n}" for n in self.on.parameters()])
+        return slopes(self.model, [f"{self.on.name}.{n}" for n in self.resolved.parameters()])
 
     @cached_property
     def values(self) -> list[Any]:
         """The values of those parameters."""
-        return [self.on.value(n) for n in self.on.parameters()]
+        return [self.resolved.value(n) for n in self.resolved.parameters()]
 
     @property
     def fits_rig(self) -> bool:

@@ -46,6 +46,7 @@ def every_parameter_matters(placed: Placed) -> None:
             if effect.bind({name: effect.value(name) + 0.001}).timing() == effect.timing():
                 raise Broken(f"{name} changes no time")
         return
+    effect = placed.resolved
     slope = sum(
         np.abs(np.asarray(placed.slopes(**point, p=placed.values)["dp"]))
         for point in points(placed.model, 12)

@@ -70,7 +70,7 @@ def _parameter(effect: type[Effect], name: str) -> dict[str, Any]:
         "name": name,
         "unit": "channel's" if name in getattr(effect, "in_channel_unit", ()) else param.unit,
         "size": param.size,
-        "default": effect.model_fields[name].default,
+        "default": _usual(effect, effect.model_fields[name].default),
         "off": "infinity" if off is not None and math.isinf(off) else off,
         "lower": param.lower if math.isfinite(param.lower) else None,
         "upper": param.upper if math.isfinite(param.upper) else None,
@@ -83,7 +83,20 @@ def _tables(effect: type[Effect]) -> Iterator[dict[str, Any]]:
     for name, info in effect.model_fields.items():
         param = _param_in(info.annotation)
         if param is not None and name not in effect.declared():
-            yield {"name": name, "unit": param.unit, "default": info.default, "doc": param.doc}
+            yield {
+                "name": name,
+                "unit": param.unit,
+                "default": _usual(effect, info.default),
+                "doc": param.doc,
+            }
+
+
+def _usual(effect: type[Effect], default: Any) -> Any:
+    """A default as people read it; figures that are left open come from the robot's file."""
+    if default is not None:
+        return default
+    own = effect.of_cylinder is not Effect.of_cylinder
+    return "that of the robot's cylinder" if own else "as the description says"
 
 
 def _param_in(annotation: Any) -> Param | None:

@@ -70,7 +70,7 @@ class Expression(Effect):
 
     kind: Literal["expression"] = "expression"
     called: str = Field(alias="name", pattern=r"^[A-Za-z]\w*$")
-    on: str  # type: ignore[assignment]
+    on: str
     force: str
     constants: dict[str, Number] = Field(default_factory=dict, alias="parameters")
 

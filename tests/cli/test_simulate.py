@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
-from kemba.mechanism import robot_mechanism
+from kemba.mechanism import load_robot, robot_mechanism
 from kemba.plant.execution.controller import read_controller
 from kemba.trajectory import Trajectory
 from kemba_cli.main import app
@@ -31,7 +31,7 @@ def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def folder() -> Path:
     """A run whose plan is to stand still for 30 ms, and push a little."""
-    time, pose = np.arange(0, 0.03, 1e-3), robot_mechanism().standing
+    time, pose = np.arange(0, 0.03, 1e-3), robot_mechanism(load_robot("kemba")).standing
     same = np.ones(len(time))
     columns = {"body/x [m]": 0 * same, "body/z [m]": pose["body/z"] * same}
     for leg in ("front", "rear"):

@@ -145,7 +145,6 @@ def test_killing_workers_loses_and_repeats_nothing(tmp_path: Path, seed: int) ->
     check_all_done(tmp_path, listed, finished(tmp_path))
 
 
-@pytest.mark.slow
 def test_a_case_that_kills_its_workers_does_not_end_the_sweep(tmp_path: Path) -> None:
     bad, good = cases(tmp_path, 1, 0.0, "kill_own_worker"), cases(tmp_path, 3, 0.0)
     records = run_cases([good[0], *bad, *good[1:]], tmp_path, jobs=1)
