@@ -23,6 +23,7 @@ from contract.cases import (
 from kemba.config import parse
 from kemba.config.document import dump_yaml, load_yaml
 from kemba.effects.sensors import SensorEffect
+from kemba.effects.series import Series
 from kemba.model.spec import ModelSpec
 from kemba.ocp.transcription.symmetry import find_symmetry
 from kemba.quantity import is_si
@@ -95,8 +96,9 @@ def test_every_parameter_matters(kind: str) -> None:
     effect = example(kind)
     if isinstance(effect, SensorEffect):
         time = np.linspace(0.0, 1.0, 50)
-        true = np.sin(9 * time)
-        assert np.abs(effect.measured(time, true) - true).max() > 1e-3
+        true = Series(time, np.sin(9 * time), (9 * np.cos(9 * time),))
+        assert np.abs(effect.measured(true).value - true.value).max() > 1e-3
+        assert effect.undone(effect.measured(true)).value == pytest.approx(true.value, abs=1e-3)
         return
     if effect.timing():
         for name in effect.parameters():

@@ -8,7 +8,6 @@ import numpy as np
 
 from kemba.identify.bench.bench_log import FRICTION
 from kemba.identify.bench.formulas import features, terms
-from kemba.identify.bench.prediction import true_motion
 from kemba.identify.evidence.linear import within
 from kemba.identify.evidence.problem import Array, Theta
 from kemba.identify.evidence.spike_slab import SPIKE_WIDTH
@@ -49,7 +48,7 @@ def leftover(problem: BenchProblem, theta: Theta) -> tuple[Array, Array, Array]:
         keep = run.keep["piston/F"]
         r = problem.standardised(theta, i)["piston/F"] / _imperfection(problem, i)
         u = problem.predictor.acting(run, theta)
-        seen = features(true_motion(run.motion, theta), u)[keep]
+        seen = features(problem.predictor.true_motion(run, theta), u)[keep]
         parts.append((r, seen, np.full(len(r), i)))
     residual, columns, index = (np.concatenate(p) for p in zip(*parts, strict=True))
     return residual, columns, index
@@ -57,7 +56,8 @@ def leftover(problem: BenchProblem, theta: Theta) -> tuple[Array, Array, Array]:
 
 def _terms(problem: BenchProblem, theta: Theta, index: int) -> dict[str, Array]:
     run = problem.logs[index]
-    return dict(terms(true_motion(run.motion, theta), problem.predictor.acting(run, theta)))
+    predictor = problem.predictor
+    return dict(terms(predictor.true_motion(run, theta), predictor.acting(run, theta)))
 
 
 def _imperfection(problem: BenchProblem, index: int) -> Array:

@@ -29,6 +29,8 @@ from kemba.model.model import Model
 EARLY = 0.08  # s that tell whether a valve had just been switched when a log begins
 REMEASURED = 0.1  # what an earlier discovery put on the model's list is known less well
 JITTER = 0.02  # nominal figures are off by 1-3 %
+# 1 sigma of a pressure sensor: its zero is the atmosphere's or none's [Pa], its gain as nominal
+PRESSURE_ZERO, PRESSURE_GAIN = 2e5, 0.02
 
 
 class BenchProblem:
@@ -40,12 +42,13 @@ class BenchProblem:
         self.runs = tuple(run.name for run in self._runs)
         self.candidates = effect_candidates(model)
         if sensors:
-            self.candidates |= sensor_candidates(self._sensor_sigmas())
+            self.candidates |= sensor_candidates(self._sensor_sigmas(), model)
         self.predictor = Predictor(model, self.candidates)
         self.nuisance = {
             name: (1.0, REMEASURED if _found(model, name) else JITTER)
             for name in self.predictor.figures
         }
+        self.nuisance |= self.predictor.sensors.nuisance
         self._starts = {
             f"start:{name}[{i}]": (i, name)
             for i in range(len(self._runs))
@@ -54,8 +57,8 @@ class BenchProblem:
         for key, (_, name) in self._starts.items():
             self.nuisance[key] = (0.0, self._state_scale[name])
         for channel in self.channels[1:]:
-            self.nuisance[f"offset:{channel}"] = (0.0, 2e5)
-            self.nuisance[f"gain:{channel}"] = (1.0, JITTER)
+            self.nuisance[f"sensor_bias:{channel}.b"] = (0.0, PRESSURE_ZERO)
+            self.nuisance[f"sensor_scale:{channel}.k"] = (0.0, PRESSURE_GAIN)
         self.colour: dict[tuple[int, int], Colour] = {}
         self._settle_starts()
 

@@ -6,9 +6,12 @@ from collections.abc import Mapping
 
 from kemba.effects import BY_KIND
 from kemba.effects.base import Effect
+from kemba.effects.sensors import SensorEffect
 from kemba.identify.evidence.problem import Candidate, Parameter
+from kemba.identify.evidence.sensor_faults import possible_faults
 from kemba.model.model import Model
 from kemba.model.scene import port_name
+from kemba.quantity import Param
 
 FASTEST = 6e-4  # s
 REACH = 10.0  # a shape parameter is looked for within this factor of its typical value
@@ -19,8 +22,7 @@ def effect_candidates(model: Model) -> dict[str, Candidate]:
     present = {e.kind for e in model.effects}
     found = {}
     for kind, effect in BY_KIND.items():
-        sensor = effect.family == "sensors"
-        if effect.off and not sensor and kind not in present and _fits(model, effect):
+        if effect.off and not issubclass(effect, SensorEffect) and kind not in present and _fits(model, effect):
             found[kind] = candidate(effect)
     return found
 
@@ -32,37 +34,34 @@ def by_default(kind: str) -> Effect:
 
 def candidate(effect: type[Effect]) -> Candidate:
     """What `effect` declares: the parameter in `off` switches it, the others are shapes."""
-    fields, declared = effect.model_fields, effect.declared()
+    return _candidate(effect.model_fields["kind"].default, effect, effect.declared())
+
+
+def sensor_candidates(sigmas: Mapping[str, float], model: Model) -> dict[str, Candidate]:
+    """Every sensor fault that the model's list lacks; `sigmas`: noise per sample by channel."""
+    present = {e.name for e in model.effects}
+    found = {}
+    for channel, sigma in sigmas.items():
+        for name, fault in possible_faults(channel).items():
+            if name not in present:
+                found[name] = _candidate(name, type(fault), fault.sized(sigma), sensor=True)
+    return found
+
+
+def _candidate(
+    name: str, effect: type[Effect], declared: Mapping[str, Param], sensor: bool = False
+) -> Candidate:
     (lead, off), *_ = effect.off.items()
     param = declared[lead]
     # a time constant far below the sampling interval is no different from none
     lower = max(param.lower, FASTEST) if param.unit == "s" and param.lower > 0 else param.lower
     switch = Parameter(lead, param.unit, off, param.size, lower, param.upper)
     shapes = []
-    for name in (n for n in declared if n != lead):
-        p, typical = declared[name], float(fields[name].default)
+    for other in (n for n in declared if n != lead):
+        p, typical = declared[other], float(effect.model_fields[other].default)
         bounds = (max(p.lower, typical / REACH), min(p.upper, typical * REACH))
-        shapes.append(Parameter(name, p.unit, typical, 0.7, *bounds, typical))
-    return Candidate(fields["kind"].default, switch, tuple(shapes))
-
-
-def sensor_candidates(sigmas: Mapping[str, float]) -> dict[str, Candidate]:
-    """Bias, scale and delay of each channel; `sigmas` is the noise per sample."""
-    found = {}
-    for channel, sigma in sigmas.items():
-        for kind, lead in (
-            ("sensor_bias", Parameter("b", _unit(channel), 0.0, 5.0 * sigma)),
-            ("sensor_scale", Parameter("k", "1", 0.0, 0.02)),
-            ("sensor_delay", Parameter("dt", "s", 0.0, 0.003)),
-        ):
-            name = f"{kind}:{channel}"
-            found[name] = Candidate(name, lead, sensor=True)
-    return found
-
-
-def _unit(channel: str) -> str:
-    last = channel.rsplit("/", 1)[-1]
-    return {"F": "N", "x": "m", "z": "m", "q": "rad", "pitch": "rad", "P": "Pa"}.get(last, "1")
+        shapes.append(Parameter(other, p.unit, typical, 0.7, *bounds, typical))
+    return Candidate(name, switch, tuple(shapes), sensor)
 
 
 def _fits(model: Model, effect: type[Effect]) -> bool:

@@ -17,6 +17,7 @@ from kemba.identify.compare.force_profiles import ForceChannel
 from kemba.identify.evidence.candidates import sensor_candidates
 from kemba.identify.evidence.operating_point import OperatingPoint
 from kemba.identify.evidence.problem import Candidate, Parameter, Rows, Theta, parameter_steps
+from kemba.identify.evidence.sensor_faults import SensorFaults, is_fault, is_straight
 from kemba.identify.logs.gate import BadData
 from kemba.identify.robot.candidates import (
     DELAYS,
@@ -89,9 +90,10 @@ class RobotProblem:
         sigma = np.median(self.batch.sigma, axis=0)
         self.candidates: dict[str, Candidate] = {
             **found,
-            **sensor_candidates(dict(zip(channels, sigma.tolist(), strict=True))),
+            **sensor_candidates(dict(zip(channels, sigma.tolist(), strict=True)), model),
         }
-        self.nuisance: dict[str, tuple[float, float]] = dict(self.physics.nuisance)
+        self.sensors = SensorFaults(model.effects)
+        self.nuisance = self.physics.nuisance | self.sensors.nuisance
         self.relinearise({})
         self.nuisance |= dict.fromkeys(self.physics.masses, (0.0, SHARE))
 
@@ -101,7 +103,7 @@ class RobotProblem:
         self._linear: dict[str, tuple[Array, float]] = {}
         physics, batch = self.physics, self.batch
         ref = first_reference(physics, batch)
-        late = np.array([base.get(f"sensor_delay:{c}.dt", 0.0) for c in physics.channels])
+        late = np.array([self.sensors.lateness(base, c) for c in physics.channels])
         rates = ((ref.q, ref.v), (ref.v, ref.a), (ref.a, np.zeros_like(ref.a)))
         ref = Reference(*(ahead(a, rate, batch.resampled, late) for a, rate in rates))
         self.plan = schedules(physics, batch, ref)
@@ -110,7 +112,7 @@ class RobotProblem:
             point = self._linearise(ref, densities(physics, batch, self.plan, LOOSE))
             forces = Forces(physics, batch, point)
             ref = smoothed(point, self._measurement(point, base), self._push(point, base, forces))
-            if any(name.startswith("sensor") for name in base):
+            if self.sensors.listed or any(map(is_fault, base)):
                 self.plan = schedules(physics, batch, ref)  # as true sensors would have seen it
             normal = [point.normal[: len(s.phase), i] for i, s in enumerate(self.plan)]
             self.plan = [loaded(s, f, dt) for s, f in zip(self.plan, normal, strict=True)]
@@ -147,7 +149,8 @@ class RobotProblem:
 
     def _measurement(self, point: Linearised, theta: Theta) -> Array:
         """Measured minus reference (n, L, m), the reference as the sensors at theta see it."""
-        seen = sensed(self.physics.channels, self.batch.resampled, point.y, point.way, theta)
+        faults = {c: self.sensors.at(theta, c) for c in self.physics.channels}
+        seen = sensed(faults, self.batch.resampled, point.y, point.way)
         soft = {**self._soft, **theta}
         depth = point.penetration(soft.get(SOFTNESS, 0.0), soft.get("ground_compliance.d", 1.0))
         return np.concatenate([self.batch.y - seen, -point.places - depth], axis=2)
@@ -202,7 +205,7 @@ class RobotProblem:
 
     def is_straight(self, name: str) -> bool:
         """Whether residuals are linear in it: effects without memory, bias and scale of sensors."""
-        return self._is_direct(name) or name.startswith(("sensor_bias:", "sensor_scale:"))
+        return self._is_direct(name) or is_straight(name)
 
     def _direct(self, theta: Theta, names: Sequence[str]) -> dict[str, Array]:
         """Columns (n, L, m) of parameters in which the force is linear."""
