@@ -95,7 +95,7 @@ def test_residual_and_gradient_are_finite(kind: str, rig: bool) -> None:
 def test_every_parameter_matters(kind: str) -> None:
     effect = example(kind)
     if isinstance(effect, SensorEffect):
-        time = np.linspace(0.0, 1.0, 50)
+        time = np.linspace(0.0, 1.0, 2001)
         true = Series(time, np.sin(9 * time), (9 * np.cos(9 * time),))
         assert np.abs(effect.measured(true).value - true.value).max() > 1e-3
         assert effect.undone(effect.measured(true)).value == pytest.approx(true.value, abs=1e-3)

@@ -11,11 +11,11 @@ import pytest
 
 from kemba.effects import BY_KIND
 from kemba.effects.base import Effect
+from kemba.effects.pneumatics.switching import delayed, is_on, pulses
 from kemba.identify.adopt import adopt_effect
 from kemba.identify.bench import bench_problem
 from kemba.identify.bench.motion import SmoothedMotion
 from kemba.identify.bench.rig_model import RigModel
-from kemba.identify.bench.switching import delayed, is_on, pulses
 from kemba.identify.experiment import propose
 from kemba.identify.published import published
 from kemba.identify.workflow import discover_logs

@@ -80,7 +80,7 @@ def test_one_class_brings_a_fault_to_simulator_and_bench(bench_log: BenchLog, he
 def test_one_class_brings_a_fault_to_the_robot() -> None:
     pytest.importorskip("numba")
     (log, *_), _ = hops(runs=1)
-    name, rate = "sensor_drift:body/pitch", 0.05
+    name, rate = "sensor_drift:body/pitch", 0.1
     model = load_model("planning")
     clean = np.mean(robot_problem([log], model).residual({}) ** 2)
     problem = robot_problem([drifted(log, "body/pitch [rad]", rate)], model)
@@ -88,7 +88,7 @@ def test_one_class_brings_a_fault_to_the_robot() -> None:
     assert problem.candidates[name].sensor and problem.is_straight(f"{name}.rate")
     assert np.mean(problem.residual({}) ** 2) > 1.2 * clean
     problem.relinearise(theta)
-    assert np.mean(problem.residual(theta) ** 2) == pytest.approx(clean, rel=0.02)
+    assert np.mean(problem.residual(theta) ** 2) == pytest.approx(clean, rel=0.05)
 
 
 def test_a_fault_on_the_models_list_is_in_the_prediction(bench_log: BenchLog) -> None:

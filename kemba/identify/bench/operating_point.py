@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kemba.identify.bench.switching import edges
+from kemba.effects.pneumatics.switching import changes
 from kemba.identify.compare.force_profiles import LAGS, ForceChannel, risen
 from kemba.identify.evidence.operating_point import OperatingPoint
 from kemba.identify.evidence.problem import Array
@@ -31,12 +31,8 @@ def bench_operating_point(problem: BenchProblem) -> OperatingPoint:
 
 def switchings(run: BenchLog) -> Switchings:
     """Valve name -> instants of the commands and +1 or -1 for on and off."""
-    found = {}
-    for side, intervals in zip(("extend", "retract"), run.commands, strict=True):
-        ends = np.array(intervals, dtype=float).reshape(-1, 2)
-        signs = np.tile([1.0, -1.0], len(ends))
-        found[f"valve/{side}"] = (edges(ends), signs[np.isfinite(ends.ravel())])
-    return found
+    sides = zip(("extend", "retract"), run.commands, strict=True)
+    return {f"valve/{side}": changes(sent) for side, sent in sides}
 
 
 def bench_port(problem: BenchProblem) -> ForceChannel:

@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 
 from kemba.effects.base import Effect
+from kemba.effects.pneumatics.switching import delayed
 from kemba.effects.series import Series
 from kemba.identify.bench.bench_log import PRESSURES, BenchLog
 from kemba.identify.bench.motion import SmoothedMotion
 from kemba.identify.bench.pressure import absolute_pressure
 from kemba.identify.bench.rig_model import Prediction, RigModel, share
-from kemba.identify.bench.switching import delayed
 from kemba.identify.evidence.candidates import by_default
 from kemba.identify.evidence.problem import Array, Candidate, Theta
 from kemba.identify.evidence.sensor_faults import SensorFaults

@@ -10,9 +10,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from kemba.effects.base import Effect
+from kemba.effects.pneumatics.switching import Pulse, delayed, instants, is_on
 from kemba.identify.bench.motion import SmoothedMotion
-from kemba.identify.bench.switching import delayed, edges, is_on
 from kemba.identify.evidence.problem import Array
 from kemba.model.model import Model
 
@@ -24,7 +23,7 @@ CHUNK = 512  # steps per call of a compiled map
 V_NODES, V_MIDDLE = ((-np.sqrt(3.0), 1 / 6), (np.sqrt(3.0), 1 / 6)), 2 / 3  # sigma, weight
 BLUR = 0.75e-3  # s; no log says on which side of a switching instant its sample was taken
 
-Pulses = tuple[list[tuple[float, float]], list[tuple[float, float]]]  # of both valves
+Pulses = tuple[list[Pulse], list[Pulse]]  # of the extend and the retract valve
 
 
 @dataclass(frozen=True)
@@ -60,11 +59,8 @@ class RigModel:
 
     def timing(self, values: Mapping[str, float]) -> tuple[float, float]:
         """Seconds by which the valves switch on and off late, with these parameters."""
-        on = off = 0.0
-        for effect in self.model.effects:
-            times = effect.bind(_own(effect, values)).timing()
-            on, off = on + times.get("on", 0.0), off + times.get("off", 0.0)
-        return on, off
+        (leg,) = self.model.mechanism.legs
+        return self.model.timing(leg, values)
 
     def predict(
         self,
@@ -80,7 +76,7 @@ class RigModel:
         on, off = self.timing(values)
         valves = [delayed(c, on, off) for c in commands]
         p = np.array([values[name] for name in self.names])
-        times, at_sample = _breakpoints(motion.time, np.concatenate([edges(v) for v in valves]))
+        times, at_sample = _breakpoints(motion.time, np.concatenate([instants(v) for v in valves]))
         u = np.stack([is_on(v, times) for v in valves])
         s = self._integrate(times, motion, u, p, start or {})[:, at_sample]
         blurred = np.stack([share(v, motion.time) for v in valves])
@@ -214,9 +210,3 @@ def share(intervals: Array, times: Array) -> Array:
 
 def _columns(motion: SmoothedMotion) -> tuple[Array, Array, Array]:
     return motion.x, motion.v, motion.a
-
-
-def _own(effect: Effect, values: Mapping[str, float]) -> dict[str, float]:
-    """The scalar parameters among `values` that belong to this effect."""
-    prefix = f"{effect.name}."
-    return {k[len(prefix) :]: v for k, v in values.items() if k.startswith(prefix) and "[" not in k}

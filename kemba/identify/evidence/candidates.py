@@ -22,7 +22,8 @@ def effect_candidates(model: Model) -> dict[str, Candidate]:
     present = {e.kind for e in model.effects}
     found = {}
     for kind, effect in BY_KIND.items():
-        if effect.off and not issubclass(effect, SensorEffect) and kind not in present and _fits(model, effect):
+        missing = effect.off and kind not in present
+        if missing and not issubclass(effect, SensorEffect) and _fits(model, effect):
             found[kind] = candidate(effect)
     return found
 

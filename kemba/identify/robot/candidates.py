@@ -8,7 +8,6 @@ from kemba.identify.evidence.problem import Candidate, Parameter
 from kemba.model.model import Model
 
 GROUND = ("ground_compliance", "ground_friction", "contact")
-DELAYS = ("valve_delay.dt", "valve_close_delay.dt")
 SOFTNESS = "ground_compliance.softness"
 GRIP = "ground_friction.mu"
 LAGS = {"hose_lag.T": 6e-4, "motor_lag.T": 6e-4}  # s; shorter is as good as none

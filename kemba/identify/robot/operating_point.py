@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kemba.effects.pneumatics.switching import changes as switchings
 from kemba.identify.evidence.operating_point import OperatingPoint, air_force
 from kemba.identify.evidence.problem import Array
 from kemba.identify.robot.labels import row_channels
@@ -39,9 +40,7 @@ def robot_operating_point(problem: RobotProblem) -> OperatingPoint:
 def changes(track: ResampledLog, legs: Sequence[str]) -> dict[str, tuple[Array, Array]]:
     """Command -> times and sizes of its changes in one run: valves, then hip torques [N.m]."""
     valves = [f"{leg}/valve/{side}" for leg in legs for side in SIDES]
-    found = {
-        n: (times, change) for n, (times, change, _) in zip(valves, track.switches, strict=True)
-    }
+    found = {name: switchings(sent) for name, sent in zip(valves, track.sent, strict=True)}
     steps = np.diff(track.torque, axis=0)
     for i, leg in enumerate(legs):
         found[f"{leg}/hip/tau"] = (track.time[1:], steps[:, i])

@@ -20,7 +20,6 @@ from kemba.identify.evidence.problem import Candidate, Parameter, Rows, Theta, p
 from kemba.identify.evidence.sensor_faults import SensorFaults, is_fault, is_straight
 from kemba.identify.logs.gate import BadData
 from kemba.identify.robot.candidates import (
-    DELAYS,
     GRIP,
     SOFTNESS,
     extended,
@@ -135,9 +134,8 @@ class RobotProblem:
         """Free parameters (k,) and delays (valves, 2) to switching on and off, at theta."""
         names = zip(self.physics.names, self.physics.nominal, strict=True)
         p = np.array([without_delay(n, theta.get(n, value)) for n, value in names])
-        both, off = (theta.get(name, 0.0) for name in DELAYS)
-        own = [self.physics.base.timing(leg) for leg in self.physics.legs for _ in range(2)]
-        return p, np.array([(a + both, b + both + off) for a, b in own])
+        valves = [leg for leg in self.physics.legs for _ in range(2)]
+        return p, np.array([self.physics.base.timing(leg, theta) for leg in valves])
 
     def _push(self, point: Linearised, theta: Theta, forces: Forces | None = None) -> Array:
         """Acceleration (n, L, k) that the model at theta adds to the reference's."""
@@ -196,7 +194,7 @@ class RobotProblem:
 
     def _is_direct(self, name: str) -> bool:
         """Whether the force is linear in it: shapes, states and delays are not."""
-        if name in self.physics.moving or name in DELAYS:
+        if name in self.physics.moving or name in self.physics.base.delays:
             return False
         lead = any(name == c.key for c in self.candidates.values())
         return name in self._linear or (

@@ -7,6 +7,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from kemba.effects.pneumatics.switching import delayed, instants, is_on
 from kemba.identify.robot.motion.resampled import ResampledLog
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -70,21 +71,16 @@ def substeps(track: ResampledLog, delays: Array) -> tuple[Array, Array, Index]:
     `delays` (valves, 2): seconds from the command to switching on and off. As many times come back
     whatever the delays are, so that functions built for one length serve them all.
     """
-    events, signs = [], []
-    for (times, change, _), (on, off) in zip(track.switches, delays, strict=True):
-        events.append(times + np.where(change > 0, on, off))
-        signs.append(change)
     first, last = track.time[0], track.time[-1]
-    inner = [np.clip(e, first, last) for e in events]
-    everything = np.concatenate([track.time, *inner])
+    events = [track.time]
+    for sent, late in zip(track.sent, delays, strict=True):
+        events.append(np.clip(instants(np.reshape(sent, (-1, 2)) + late), first, last))
+    everything = np.concatenate(events)
     order = np.argsort(everything, kind="stable")
     times = everything[order]
     index = np.empty(len(order), int)
     index[order] = np.arange(len(order))
     middle = 0.5 * (times[1:] + times[:-1])
-    valves = np.zeros((len(events), len(middle)))
-    for i, (event, sign) in enumerate(zip(events, signs, strict=True)):
-        sorted_by = np.argsort(event, kind="stable")
-        count = np.concatenate([[0.0], np.cumsum(sign[sorted_by])]) + track.switches[i][2]
-        valves[i] = count[np.searchsorted(event[sorted_by], middle, side="right")] > 0.5
+    acting = (delayed(sent, *late) for sent, late in zip(track.sent, delays, strict=True))
+    valves = np.stack([is_on(pulses, middle) for pulses in acting])
     return times, valves, index[: len(track.time)]

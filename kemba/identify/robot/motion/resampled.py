@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from kemba.effects.pneumatics.switching import Pulse, pulses
 from kemba.trajectory import Trajectory
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -19,14 +20,14 @@ TRIMMED = 0.97  # share of third differences that count for the noise: impacts a
 @dataclass(frozen=True)
 class ResampledLog:
     """One run: `time` (n,) of the nodes, `y` (n, m) with NaN where nothing was measured,
-    `torque` (n, legs) held from each node, `switches` per valve as (times, +-1, at the start),
-    `sigma` (m,) of one value of `y`."""
+    `torque` (n, legs) held from each node, the pulses `sent` to each valve, `sigma` (m,) of one
+    value of `y`."""
 
     name: str
     time: Array
     y: Array
     torque: Array
-    switches: tuple[tuple[Array, Array, float], ...]
+    sent: tuple[list[Pulse], ...]
     sigma: Array
 
 
@@ -39,23 +40,17 @@ def resample(
     raw = np.stack([log[c][keep] for c in channels], axis=1)
     torque = np.stack([_held(log[f"{leg}/hip/tau"][keep]) for leg in legs], axis=1)
     valves = [f"{leg}/valve/{side}" for leg in legs for side in ("extend", "retract")]
-    switches = tuple(_switches(time, _held(log[v][keep])) for v in valves)
+    sent = tuple(pulses(time, _held(log[v][keep])) for v in valves)
     sigma = np.array([_sigma(log, c, raw[:, i]) for i, c in enumerate(channels)])
     time, raw, torque, count = _thin(time, raw, torque)
     time, raw, torque = _fill(time, raw, torque)
-    return ResampledLog(name, time, raw, torque, switches, sigma / np.sqrt(count))
+    return ResampledLog(name, time, raw, torque, sent, sigma / np.sqrt(count))
 
 
 def _held(values: Array) -> Array:
     """Commands with gaps filled by the last one sent."""
     index = np.where(np.isfinite(values), np.arange(len(values)), 0)
     return np.nan_to_num(values[np.maximum.accumulate(index)])
-
-
-def _switches(time: Array, command: Array) -> tuple[Array, Array, float]:
-    on = (command > 0.5).astype(int)
-    edges = np.flatnonzero(np.diff(on)) + 1
-    return time[edges], np.diff(on)[edges - 1].astype(float), float(on[0])
 
 
 def _sigma(log: Trajectory, channel: str, values: Array) -> float:
