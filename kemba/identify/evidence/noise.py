@@ -14,19 +14,24 @@ from kemba.identify.evidence.problem import Array
 ORDER = 4
 SPIKE, AROUND, SPIKY = 7, 151, 5.0  # rows, rows, ratio of mean squares
 LEAST = 0.6  # of the white noise: what a flexible model leaves is never believed to be less
+FEWEST, KEPT = 11, 0.9  # values, and share of their third differences, that tell the noise
+KEPT_SPREAD = 0.7893  # 1 sigma of a normal's smallest 90 % in size, by its own sigma
 TRIM = 5.0  # rows beyond so many sigma are switching instants, not noise
 
 
 def difference_sigma(values: Array) -> float:
-    """White noise per sample, robustly from third differences (smooth motion cancels)."""
-    d = np.diff(values[np.isfinite(values)], n=3)
-    if len(d) < 8:
+    """White noise (1 sigma) per sample of a channel (n,); 0 where there are too few values.
+
+    From third differences, in which smooth motion cancels. The largest tenth is left out: impacts
+    and switching valves are no noise. A quantised channel is never better than its own steps.
+    """
+    known = values[np.isfinite(values)]
+    if len(known) < FEWEST:
         return 0.0
-    # the mean of |d| as well as its median: a quantised signal has a median of zero
-    median = float(np.median(np.abs(d))) / 0.6745
-    trimmed = np.sort(np.abs(d))[: int(0.9 * len(d))]
-    mean = float(np.mean(trimmed)) / 0.6287  # E|d| of a normal below its 90 % point
-    return max(median, mean) / float(np.sqrt(20.0))
+    rough = np.sort(np.abs(np.diff(known, n=3)))[: int(KEPT * (len(known) - 3))]
+    noise = float(np.sqrt(np.mean(rough**2))) / KEPT_SPREAD / np.sqrt(20.0)  # 1 + 9 + 9 + 1
+    steps = np.diff(np.unique(known))
+    return max(noise, float(steps.min()) / np.sqrt(12.0) if len(steps) else 0.0)
 
 
 @dataclass(frozen=True)

@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 
 from kemba.effects.pneumatics.switching import Pulse, pulses
+from kemba.effects.sensors import CHANNELS
+from kemba.identify.evidence.noise import FEWEST, difference_sigma
 from kemba.trajectory import Trajectory
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 SHORTEST, LONGEST = 0.7e-3, 1.6e-3  # s between nodes; denser rows are averaged, gaps filled
-TRIMMED = 0.97  # share of third differences that count for the noise: impacts are no noise
+FINEST = 1e-6  # m or rad: noise that is never undercut
 
 
 @dataclass(frozen=True)
@@ -54,24 +56,14 @@ def _held(values: Array) -> Array:
 
 
 def _sigma(log: Trajectory, channel: str, values: Array) -> float:
-    """Noise of one sample: as the sidecar says, else from third differences."""
+    """Noise of one sample: as the sidecar says, else as its values tell, else the usual one."""
     noise = log.meta.get("noise") or {}
     for key in (channel, f"{channel} [{log.unit(channel)}]"):
         if key in noise:
             return float(noise[key])
-    return learnt_sigma(values)
-
-
-def learnt_sigma(values: Array) -> float:
-    """White noise (1 sigma) of a smooth signal, from its third differences."""
-    values = values[np.isfinite(values)]
-    rough = np.abs(np.diff(values, 3)) / np.sqrt(20.0)
-    if not len(rough):
-        return 1e-3
-    inner = rough[rough <= np.quantile(rough, TRIMMED)]
-    steps = np.diff(np.unique(values))
-    quantum = float(np.min(steps)) / np.sqrt(12.0) if len(steps) else 1e-6
-    return max(float(np.sqrt(np.mean(inner**2))) * 1.075, min(quantum, 5e-4), 1e-6)
+    if np.isfinite(values).sum() < FEWEST:
+        return CHANNELS[channel.split("/")[-1]][1]
+    return max(difference_sigma(values), FINEST)
 
 
 def _thin(time: Array, raw: Array, torque: Array) -> tuple[Array, Array, Array, int]:
