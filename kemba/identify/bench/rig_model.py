@@ -14,10 +14,9 @@ from kemba.effects.pneumatics.switching import Pulse, delayed, instants, is_on
 from kemba.identify.bench.motion import SmoothedMotion
 from kemba.identify.evidence.problem import Array
 from kemba.model.model import Model
+from kemba.model.rest import Rest, rate_of
 
 LONGEST_STEP = 1.5e-3  # s; the fastest chamber answers in 8 ms
-NEWTON, STILL = 12, 1e-9  # steps to equilibrium, and share of a state per second that is rest
-WAITING = 0.5e-3  # s, steps in which chambers are left to settle
 CHUNK = 512  # steps per call of a compiled map
 # The velocity is known within v_sigma: the force is its mean over three Gauss-Hermite nodes
 V_NODES, V_MIDDLE = ((-np.sqrt(3.0), 1 / 6), (np.sqrt(3.0), 1 / 6)), 2 / 3  # sigma, weight
@@ -44,9 +43,9 @@ class RigModel:
         self.model, self.names = model, (*free, *scaled)
         node = model.build(free, scaled)
         self._state_names = [q.name for q in model.states.values()]
-        rate = ca.substitute(-node.rate, node.sd, ca.SX.zeros(node.sd.numel()))
+        rate = rate_of(node)
         inputs = [node.s, node.q, node.v, node.a, node.u, node.p]
-        self._rate = ca.Function("rate", inputs, [rate, ca.jacobian(rate, node.s)])
+        self._rest = Rest(node.s, inputs[1:], rate, list(model.states.values()))
         force = node.outputs["piston/F"]
         results = ca.vertcat(force, ca.jacobian(force, node.v), ca.jacobian(force, node.u).T)
         self._functions = {
@@ -55,7 +54,6 @@ class RigModel:
             "output": ca.Function("output", inputs, [ca.densify(results)]),
         }
         self._maps: dict[tuple[str, int], _Call] = {}
-        self._start = np.array([q.value for q in model.states.values()])
 
     def timing(self, values: Mapping[str, float]) -> tuple[float, float]:
         """Seconds by which the valves switch on and off late, with these parameters."""
@@ -69,7 +67,7 @@ class RigModel:
         values: Mapping[str, float],
         start: Mapping[str, float] | None = None,
     ) -> Prediction:
-        """Integrate from equilibrium (plus `start` by state name) with exact switching instants.
+        """Integrate from rest (plus `start` by state name) with exact switching instants.
 
         `values` holds every name this rig was compiled for.
         """
@@ -96,7 +94,7 @@ class RigModel:
         middle = 0.5 * (times[:-1] + times[1:])
         paths = [np.interp(t, motion.time, c) for t in (times, middle) for c in _columns(motion)]
         x, v, a, xm, vm, am = paths
-        s0 = self._equilibrium(np.array([x[0], 0.0, 0.0]), u[:, 0], p)
+        s0 = self._rest(x[0], 0.0, 0.0, u[:, 0], p)
         s0 += np.array([start.get(name, 0.0) for name in self._state_names])
         n = len(times) - 1
         drive = np.stack(
@@ -108,32 +106,6 @@ class RigModel:
         for i in range(0, drive.shape[1], CHUNK):
             states.append(step(states[-1][:, -1], drive[:, i : i + CHUNK], fixed))
         return np.concatenate(states, axis=1)[:, : n + 1]
-
-    def _equilibrium(self, motion: Array, u: Array, p: Array) -> Array:
-        """Where the states come to rest under constant commands."""
-        s, done = self._newton(self._start, motion, u, p)
-        if (
-            not done
-        ):  # the flow through an orifice is steep: wait until the chambers are nearly there
-            drive = np.concatenate([[WAITING], motion, motion, motion, u])
-            still = np.repeat(drive[:, None], CHUNK, axis=1)
-            waited = self._mapped("step", CHUNK)(
-                self._start, still, np.repeat(p[:, None], CHUNK, 1)
-            )
-            s, done = self._newton(waited[:, -1], motion, u, p)
-            s = s if done else waited[:, -1]
-        return s
-
-    def _newton(self, s: Array, motion: Array, u: Array, p: Array) -> tuple[Array, bool]:
-        """States at rest near s, and whether they were found."""
-        for _ in range(NEWTON):
-            rate, slope = (np.asarray(part) for part in self._rate(s, *motion, u, p))
-            if np.all(np.abs(rate.ravel()) <= STILL * (1.0 + np.abs(s))):
-                return s, True
-            if not (np.all(np.isfinite(rate)) and np.all(np.isfinite(slope))):
-                break
-            s = s - np.linalg.lstsq(slope, rate.ravel(), rcond=None)[0]
-        return s, False
 
     def _mapped(self, kind: str, n: int) -> _Call:
         if (kind, n) not in self._maps:

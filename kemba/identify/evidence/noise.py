@@ -29,9 +29,9 @@ def difference_sigma(values: Array) -> float:
     if len(known) < FEWEST:
         return 0.0
     rough = np.sort(np.abs(np.diff(known, n=3)))[: int(KEPT * (len(known) - 3))]
-    noise = float(np.sqrt(np.mean(rough**2))) / KEPT_SPREAD / np.sqrt(20.0)  # 1 + 9 + 9 + 1
+    noise = float(np.sqrt(np.mean(rough**2) / 20.0)) / KEPT_SPREAD  # 20 = 1 + 9 + 9 + 1
     steps = np.diff(np.unique(known))
-    return max(noise, float(steps.min()) / np.sqrt(12.0) if len(steps) else 0.0)
+    return max(noise, float(steps.min() / np.sqrt(12.0)) if len(steps) else 0.0)
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import casadi as ca
@@ -9,24 +10,25 @@ import numpy as np
 
 from kemba.effects.pneumatics.switching import delayed, instants, is_on
 from kemba.identify.robot.motion.resampled import ResampledLog
+from kemba.model.rest import Rest
+from kemba.quantity import Quantity
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Index = np.ndarray[Any, np.dtype[np.int_]]
 
-SETTLING = np.full(40, 0.01)  # s: steps at the first command before the log starts
-
 
 class StateRunner:
-    """Integrates s' = rate(q, v, s, u, p) for given motion.
+    """Integrates s' = rate(q, v, s, u, p) for given motion, from rest at its first place.
 
     Exponential midpoint rule: second order, exact for a lag of constant input however short.
     """
 
-    def __init__(self, symbols: list[ca.SX], rate: ca.SX, start: Array) -> None:
+    def __init__(self, symbols: list[ca.SX], rate: ca.SX, quantities: Sequence[Quantity]) -> None:
         q, v, s, u, p = symbols
-        self.start = start
-        if not s.numel():
+        self.count = s.numel()
+        if not self.count:
             return
+        self._rest = Rest(s, [q, v, u, p], rate, quantities)
         h = ca.SX.sym("h")
         f = ca.Function("f", [q, v, s, u, p], [rate, ca.diag(ca.jacobian(rate, s))])
         middle = s + _grown(h / 2, *f(q, v, s, u, p))
@@ -39,15 +41,16 @@ class StateRunner:
     def run(self, h: ca.DM, q: ca.DM, v: ca.DM, u: ca.DM, p: Array) -> Array:
         """Mean of the states (ns, N) over steps h (1, N) with q, v, u (., N) held over each."""
         count = h.shape[1]
-        if not len(self.start):
+        if not self.count:
             return np.empty((0, count))
+        start = self._rest(q[:, 0], 0.0 * v[:, 0], u[:, 0], p)
         if count not in self._runs:
             whole = self._step.mapaccum(count)
             args = [ca.MX.sym(f"i{i}", *whole.size_in(i)) for i in range(5)]
             one = ca.MX.sym("p", self._step.size1_in(5))
             means = whole(*args, ca.repmat(one, 1, count))[1]
             self._runs[count] = ca.Function("means", [*args, one], [means])
-        return np.asarray(self._runs[count](self.start, h, q, v, u, p).full())
+        return np.asarray(self._runs[count](start, h, q, v, u, p).full())
 
 
 def _grown(h: ca.SX, slope: ca.SX, stiff: ca.SX) -> ca.SX:

@@ -9,7 +9,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from kemba.identify.robot.dynamics.air import SETTLING, Index, substeps
+from kemba.identify.robot.dynamics.air import Index, substeps
 from kemba.identify.robot.dynamics.physics import Physics
 from kemba.identify.robot.dynamics.reference import Reference
 from kemba.identify.robot.motion.batch import Batch
@@ -20,7 +20,7 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 @dataclass(frozen=True)
 class Inputs:
     """One run cut at every switching: `given` are steps, q, v and inputs of the integration;
-    `h` (N,) the steps from the log's start on, `index` of each node among them."""
+    `h` (N,) the steps, `index` of each node among them."""
 
     given: tuple[ca.DM, ca.DM, ca.DM, ca.DM]
     h: Array
@@ -46,10 +46,7 @@ def read_inputs(physics: Physics, batch: Batch, ref: Reference, delays: Array) -
         q, v = (_at(track.time, a[:n, i], middle) for a in (ref.q, ref.v))
         held = np.clip(np.searchsorted(track.time, middle, side="right") - 1, 0, n - 1)
         u = physics.arrange(track.torque[held].T, valves)
-        lead = [np.repeat(a[:, :1], len(SETTLING), axis=1) for a in (q, 0 * v, u)]
-        whole = (np.hstack(pair) for pair in zip(lead, (q, v, u), strict=True))
-        steps = np.append(SETTLING, h)[None, :]
-        given = tuple(ca.DM(a) for a in (steps, *whole))
+        given = tuple(ca.DM(a) for a in (h[None, :], q, v, u))
         width = np.append(np.diff(track.time), 1.0)
         drive = Inputs(given, h, index, width, np.empty(0))  # type: ignore[arg-type]
         found.append(Inputs(drive.given, h, index, width, drive.means(u)))
@@ -61,7 +58,7 @@ def air_states(
 ) -> tuple[Array, Array]:
     """Effect states (n, L, ns) and inputs (n, L, nu), both the mean over each step."""
     moving = p[physics.moves]
-    states = [d.means(physics.states.run(*d.given, moving)[:, len(SETTLING) :]) for d in driven]
+    states = [d.means(physics.states.run(*d.given, moving)) for d in driven]
     return batch.pad(states, 0.0), batch.pad([d.inputs for d in driven], 0.0)
 
 

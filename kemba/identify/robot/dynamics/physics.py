@@ -11,6 +11,7 @@ import numpy as np
 from kemba.identify.robot.dynamics.air import StateRunner
 from kemba.identify.robot.dynamics.tolerance import mass_regressors, with_tolerances
 from kemba.model.model import Model
+from kemba.model.rest import rate_of
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Flags = np.ndarray[Any, np.dtype[np.bool_]]
@@ -35,12 +36,12 @@ class Physics:
         self.p = ca.vertcat(node.p, further)
         self.mechanism, self.legs = model.mechanism, model.mechanism.legs
         self.inputs = tuple(q.name for q in self.model.inputs.values())
-        rate = -ca.substitute(node.rate, node.sd, ca.SX.zeros(node.sd.numel()))
-        start = np.array([q.value for q in self.model.states.values()])
+        rate = rate_of(node)
         self.moves = np.array(ca.which_depends(rate, self.p, 1), dtype=bool)
         self.moving = [n for n, moves in zip(self.names, self.moves, strict=True) if moves]
         p = ca.vertcat(*(self.p[int(i)] for i in np.flatnonzero(self.moves)))
-        self.states = StateRunner([node.q, node.v, node.s, node.u, p], rate, start)
+        states = list(self.model.states.values())
+        self.states = StateRunner([node.q, node.v, node.s, node.u, p], rate, states)
         self.grip = grip
         self._maps: dict[tuple[str, int], ca.Function] = {}
 
