@@ -12,8 +12,10 @@ import numpy as np
 
 from kemba.effects.pneumatics.switching import Pulse, delayed, instants, is_on
 from kemba.identify.bench.motion import SmoothedMotion
+from kemba.identify.evidence.exponential import midpoint_step
 from kemba.identify.evidence.problem import Array
 from kemba.model.model import Model
+from kemba.model.node import Node
 from kemba.model.rest import Rest, rate_of
 
 LONGEST_STEP = 1.5e-3  # s; the fastest chamber answers in 8 ms
@@ -49,7 +51,7 @@ class RigModel:
         force = node.outputs["piston/F"]
         results = ca.vertcat(force, ca.jacobian(force, node.v), ca.jacobian(force, node.u).T)
         self._functions = {
-            "step": _runge_kutta(node, rate),
+            "step": _step(node, rate),
             "force": ca.Function("force", inputs, [ca.densify(force)]),
             "output": ca.Function("output", inputs, [ca.densify(results)]),
         }
@@ -92,14 +94,11 @@ class RigModel:
         self, times: Array, motion: SmoothedMotion, u: Array, p: Array, start: Mapping[str, float]
     ) -> Array:
         middle = 0.5 * (times[:-1] + times[1:])
-        paths = [np.interp(t, motion.time, c) for t in (times, middle) for c in _columns(motion)]
-        x, v, a, xm, vm, am = paths
-        s0 = self._rest(x[0], 0.0, 0.0, u[:, 0], p)
+        s0 = self._rest(motion.x[0], 0.0, 0.0, u[:, 0], p)
         s0 += np.array([start.get(name, 0.0) for name in self._state_names])
         n = len(times) - 1
-        drive = np.stack(
-            [np.diff(times), x[:-1], v[:-1], a[:-1], xm, vm, am, x[1:], v[1:], a[1:], *u[:, :-1]]
-        )
+        moved = [np.interp(middle, motion.time, c) for c in (motion.x, motion.v, motion.a)]
+        drive = np.stack([np.diff(times), *moved, *u[:, :-1]])
         drive = np.pad(drive, ((0, 0), (0, -n % CHUNK)))  # steps of no length at the end
         fixed = np.repeat(p[:, None], CHUNK, axis=1)
         step, states = self._mapped("step", CHUNK), [s0[:, None]]
@@ -135,18 +134,13 @@ class _Call:
         return out.reshape(self._shape, order="F")
 
 
-def _runge_kutta(node: Any, rate: ca.SX) -> ca.Function:
-    """(s, drive, p) -> s after one classical step of fourth order."""
-    f = ca.Function("f", [node.s, node.q, node.v, node.a, node.u, node.p], [rate])
-    s, d, p = (
-        ca.SX.sym(n, k) for n, k in (("s", node.s.numel()), ("d", 12), ("p", node.p.numel()))
-    )
-    h, u = d[0], d[10:12]
-    k1 = f(s, d[1], d[2], d[3], u, p)
-    k2 = f(s + h / 2 * k1, d[4], d[5], d[6], u, p)
-    k3 = f(s + h / 2 * k2, d[4], d[5], d[6], u, p)
-    k4 = f(s + h * k3, d[7], d[8], d[9], u, p)
-    return ca.Function("step", [s, d, p], [ca.densify(s + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4))])
+def _step(node: Node, rate: ca.SX) -> ca.Function:
+    """(s, drive, p) -> s after one step; `drive`: its length, x, v, a in its middle, the valves."""
+    d = ca.SX.sym("d", 6)
+    inputs = [node.q, node.v, node.a, node.u, node.p]
+    given = [d[1], d[2], d[3], d[4:6], node.p]
+    after, _ = midpoint_step(rate, node.s, inputs, given, d[0])
+    return ca.Function("step", [node.s, d, node.p], [ca.densify(after)], {"cse": True})
 
 
 def _breakpoints(samples: Array, events: Array) -> tuple[Array, Any]:
@@ -178,7 +172,3 @@ def share(intervals: Array, times: Array) -> Array:
     later = np.interp(times + BLUR, knots, on_time)
     earlier = np.interp(times - BLUR, knots, on_time)
     return np.asarray(np.clip((later - earlier) / (2 * BLUR), 0.0, 1.0))
-
-
-def _columns(motion: SmoothedMotion) -> tuple[Array, Array, Array]:
-    return motion.x, motion.v, motion.a

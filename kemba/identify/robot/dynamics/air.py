@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 
 from kemba.effects.pneumatics.switching import delayed, instants, is_on
+from kemba.identify.evidence.exponential import midpoint_step
 from kemba.identify.robot.motion.resampled import ResampledLog
 from kemba.model.rest import Rest
 from kemba.quantity import Quantity
@@ -18,10 +19,7 @@ Index = np.ndarray[Any, np.dtype[np.int_]]
 
 
 class StateRunner:
-    """Integrates s' = rate(q, v, s, u, p) for given motion, from rest at its first place.
-
-    Exponential midpoint rule: second order, exact for a lag of constant input however short.
-    """
+    """Integrates s' = rate(q, v, s, u, p) for given motion, from rest at its first place."""
 
     def __init__(self, symbols: list[ca.SX], rate: ca.SX, quantities: Sequence[Quantity]) -> None:
         q, v, s, u, p = symbols
@@ -30,11 +28,8 @@ class StateRunner:
             return
         self._rest = Rest(s, [q, v, u, p], rate, quantities)
         h = ca.SX.sym("h")
-        f = ca.Function("f", [q, v, s, u, p], [rate, ca.diag(ca.jacobian(rate, s))])
-        middle = s + _grown(h / 2, *f(q, v, s, u, p))
-        slope, stiff = f(q, v, middle, u, p)
-        slope = slope - stiff * (middle - s)
-        after, mean = s + _grown(h, slope, stiff), s + _mean_growth(h, slope, stiff)
+        held = [q, v, u, p]
+        after, mean = midpoint_step(rate, s, held, held, h)
         self._step = ca.Function("step", [s, h, q, v, u, p], [after, mean], {"cse": True})
         self._runs: dict[int, ca.Function] = {}
 
@@ -51,21 +46,6 @@ class StateRunner:
             means = whole(*args, ca.repmat(one, 1, count))[1]
             self._runs[count] = ca.Function("means", [*args, one], [means])
         return np.asarray(self._runs[count](start, h, q, v, u, p).full())
-
-
-def _grown(h: ca.SX, slope: ca.SX, stiff: ca.SX) -> ca.SX:
-    """h phi(h stiff) slope with phi(z) = (exp(z) - 1)/z."""
-    z = h * stiff
-    small = ca.fabs(z) < 1e-6
-    return h * slope * ca.if_else(small, 1 + z / 2, (ca.exp(z) - 1) / ca.if_else(small, 1, z))
-
-
-def _mean_growth(h: ca.SX, slope: ca.SX, stiff: ca.SX) -> ca.SX:
-    """Mean of the growth over the step: h slope (exp(z) - 1 - z)/z^2."""
-    z = h * stiff
-    small = ca.fabs(z) < 1e-3
-    safe = ca.if_else(small, 1, z)
-    return h * slope * ca.if_else(small, 0.5 + z / 6, (ca.exp(z) - 1 - z) / safe**2)
 
 
 def substeps(track: ResampledLog, delays: Array) -> tuple[Array, Array, Index]:
