@@ -102,9 +102,10 @@ def values_of(model: Model, point: dict[str, np.ndarray], p: Any = ()) -> dict[s
     return {name: np.asarray(value).ravel() for name, value in result.items()}
 
 
-def slopes(model: Model, free: list[str]) -> ca.Function:
-    """Residual and its derivatives by every variable and by the parameters `free`."""
-    node = model.build(free)
+def slopes(model: Model, free: list[str], scaled: list[str] | None = None) -> ca.Function:
+    """Residual and its derivatives by every variable, by the parameters `free` and by factors on
+    the figures `scaled`."""
+    node = model.build(free, scaled or ())
     parts = [node.dynamics, node.rate, node.pair_a, node.pair_b, node.limits]
     F = ca.vertcat(*parts)
     y = ca.vertcat(node.q, node.v, node.a, node.s, node.lam, node.u)

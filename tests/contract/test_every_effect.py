@@ -15,6 +15,7 @@ from contract.cases import (
     model_of,
     placed,
     points,
+    slopes,
     values_of,
     with_slopes,
     without,
@@ -111,6 +112,24 @@ def test_every_parameter_matters(kind: str) -> None:
     for i, name in enumerate(effect.parameters()):
         bounds = effect.bind({name: 1.1 * effect.value(name)}).inputs() != effect.inputs()
         assert bounds or slope[:, i].max() > 1e-9, f"{kind}.{name} changes nothing"
+
+
+@EVERY
+def test_nominal_figures_exist_and_matter(kind: str) -> None:
+    """What a fit leaves free within a tolerance is a figure of the effect and changes the model."""
+    effect, model = placed(kind)
+    assert set(effect.nominal) <= set(type(effect).model_fields)
+    assert all(t.source and t.sigma > 0 and t.unit for t in effect.nominal.values())
+    tolerances = effect.tolerances()
+    assert all(0.0 < share <= 0.1 for share in tolerances.values())
+    assert {name.partition("[")[0] for name in tolerances} >= set(effect.nominal)
+    if not tolerances:
+        return
+    scaled = slopes(model, [], [f"{effect.name}.{figure}" for figure in tolerances])
+    ones = [1.0] * len(tolerances)
+    slope = sum(np.abs(np.asarray(scaled(**x, p=ones)["dp"])) for x in points(model, 12))
+    for i, figure in enumerate(tolerances):
+        assert slope[:, i].max() > 1e-9, f"{kind}.{figure} changes nothing"
 
 
 @SWITCHED

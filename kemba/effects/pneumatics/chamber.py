@@ -7,11 +7,14 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 
 from kemba.effects.base import At, Contribution, Effect
-from kemba.quantity import Param, Quantity
+from kemba.quantity import Param, Quantity, Tolerance
 
 Newton = Annotated[float, Param("N", 10.0, lower=0.0, doc="of Table II")]
 Pascal = Annotated[float, Param("Pa", 1e4, lower=0.0, doc="pressure")]
 Second = Annotated[float, Param("s", 2e-3, lower=0.0, doc="of Table I")]
+
+OF_A_KIND = Tolerance(0.02, source="assumed: parts of one make differ by 1 to 3 %")
+ENTRY = Tolerance(0.02, each=True, source="assumed: parts of one make differ by 1 to 3 %")
 
 TABLE_PRESSURES = (0.6e6, 0.7e6, 0.8e6)
 
@@ -48,6 +51,13 @@ class Chamber(Effect):
         "tau_e",
         "tau_r",
     )
+
+    nominal: ClassVar[dict[str, Tolerance]] = {
+        "F_extend": OF_A_KIND,
+        "F_retract": OF_A_KIND,
+        "fill": ENTRY,
+        "vent": ENTRY,
+    }
 
     def states(self) -> dict[str, Quantity]:
         top = max(self.F_extend) * 1.3

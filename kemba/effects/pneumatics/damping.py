@@ -6,7 +6,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from kemba.effects.base import At, Contribution, Effect
 from kemba.effects.pneumatics.chamber import TABLE_PRESSURES, Pascal, at_supply
-from kemba.quantity import Param
+from kemba.quantity import Param, Tolerance
 
 Damping = Annotated[float, Param("N.s.m-1", 10.0, lower=0.0, doc="of Table II")]
 
@@ -26,6 +26,10 @@ class ModeDamping(Effect):
     source: ClassVar[str] = "paper eq. 6, 7, Table II"
     ports: ClassVar[tuple[str, ...]] = ("piston",)
     dissipative: ClassVar[bool] = True
+    nominal: ClassVar[dict[str, Tolerance]] = dict.fromkeys(
+        ("c_extend", "c_retract", "c_both", "c_none"),
+        Tolerance(2.0, "N.s.m-1", source="assumed: 2 to 3 % of Table II, more of the small c_none"),
+    )
 
     def c_d(self, u_e: Any, u_r: Any, supply: float) -> Any:
         """Damping [N.s.m-1] in a valve mode at a supply pressure [Pa] (eq. 6)."""

@@ -6,10 +6,10 @@ import math
 from typing import Annotated, Any, ClassVar, Literal
 
 from kemba.effects.base import At, Contribution, Effect
-from kemba.effects.pneumatics.chamber import TABLE_PRESSURES, Pascal, at_supply
+from kemba.effects.pneumatics.chamber import OF_A_KIND, TABLE_PRESSURES, Pascal, at_supply
 from kemba.effects.pneumatics.constants import AREA_E, AREA_R, ATMOSPHERE, GAS, KAPPA, TEMPERATURE
 from kemba.effects.pneumatics.flow import CHOKED, mass_flow, phi
-from kemba.quantity import Param, Quantity
+from kemba.quantity import Param, Quantity, Tolerance
 
 Area = Annotated[float, Param("m2", 1e-6, lower=0.0, doc="effective orifice area")]
 Volume = Annotated[float, Param("m3", 3e-6, lower=1e-7, doc="tubing and ports")]
@@ -46,6 +46,9 @@ class OrificeChamber(Effect):
     )
     carried_by: ClassVar[dict[str, str]] = {"F_e": "P_e", "F_r": "P_r"}
     replaces: ClassVar[tuple[str, ...]] = ("chamber", "mode_damping")
+    nominal: ClassVar[dict[str, Tolerance]] = dict.fromkeys(
+        ("gauge", "a_fill", "a_vent", "V_e", "V_r"), OF_A_KIND
+    )
 
     def states(self) -> dict[str, Quantity]:
         low, high, size = 1e4, 3e6, 2e5

@@ -15,6 +15,7 @@ from kemba.identify.bench.motion import SmoothedMotion
 from kemba.identify.bench.pressure import absolute_pressure
 from kemba.identify.bench.rig_model import Prediction, RigModel, share
 from kemba.identify.evidence.candidates import by_default
+from kemba.identify.evidence.nominal import nominal_figures
 from kemba.identify.evidence.problem import Array, Candidate, Theta
 from kemba.identify.evidence.sensor_faults import SensorFaults
 from kemba.model.model import Model
@@ -23,12 +24,12 @@ from kemba.model.model import Model
 class Predictor:
     """Rigs of one model, each compiled once with the effects that theta switches on.
 
-    `figures`: nominal numbers of the model that theta may change, by name.
+    `figures`: nominal numbers of the model that theta may scale, with factor and 1 sigma, by name.
     """
 
     def __init__(self, model: Model, candidates: Mapping[str, Candidate]) -> None:
         self.model, self.candidates = model, candidates
-        self.figures = _figures(model)
+        self.figures = nominal_figures(model)
         self.sensors = SensorFaults(model.effects)
         self._rigs: dict[tuple[str, ...], RigModel] = {}
 
@@ -44,7 +45,7 @@ class Predictor:
             model = self.model.with_effects(_unlike(self.model, extra))
             keys = (key for name in active for key in tuple(self.candidates[name].keys()))
             free = tuple(key for key in keys if key in model.parameters)
-            self._rigs[active] = RigModel(model, free, self.figures)
+            self._rigs[active] = RigModel(model, free, tuple(self.figures))
         return self._rigs[active]
 
     def predict(
@@ -53,7 +54,7 @@ class Predictor:
         """What happens on the rig, before any sensor. `start`: by how much states differ from rest
         when the log begins."""
         rig = self.rig(theta)
-        nominal = dict.fromkeys(self.figures, 1.0)
+        nominal = {name: factor for name, (factor, _) in self.figures.items()}
         values = {name: theta.get(name, nominal.get(name, 0.0)) for name in rig.names}
         return rig.predict(self.true_motion(run, theta), run.commands, values, start or {})
 
@@ -92,22 +93,6 @@ class Predictor:
         delays = self.rig(theta).timing(theta)
         times = run.motion.time
         return np.stack([share(delayed(c, *delays), times) for c in run.commands], axis=1)
-
-
-def _figures(model: Model) -> tuple[str, ...]:
-    """Nominal numbers that a rig of the same make may have a little different."""
-    known = {
-        "chamber": ("F_extend", "F_retract", "fill[0]", "fill[1]", "vent[0]", "vent[1]"),
-        "mode_damping": ("c_extend", "c_retract", "c_both", "c_none"),
-        "orifice_chamber": ("gauge", "a_fill", "a_vent", "V_e", "V_r"),
-    }
-    names = []
-    for effect in model.effects:
-        if effect.kind in known:
-            names += [f"{effect.name}.{f}" for f in known[effect.kind]]
-        elif effect.off and all(p.unit != "s" for p in effect.parameters().values()):
-            names += [f"{effect.name}.{f}" for f in effect.off]
-    return tuple(names)
 
 
 def _unlike(model: Model, extra: list[Effect]) -> list[Effect]:

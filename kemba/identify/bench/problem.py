@@ -27,8 +27,6 @@ from kemba.identify.logs.gate import BadData
 from kemba.model.model import Model
 
 EARLY = 0.08  # s that tell whether a valve had just been switched when a log begins
-REMEASURED = 0.1  # what an earlier discovery put on the model's list is known less well
-JITTER = 0.02  # nominal figures are off by 1-3 %
 # 1 sigma of a pressure sensor: its zero is the atmosphere's or none's [Pa], its gain as nominal
 PRESSURE_ZERO, PRESSURE_GAIN = 2e5, 0.02
 
@@ -44,11 +42,7 @@ class BenchProblem:
         if sensors:
             self.candidates |= sensor_candidates(self._sensor_sigmas(), model)
         self.predictor = Predictor(model, self.candidates)
-        self.nuisance = {
-            name: (1.0, REMEASURED if _found(model, name) else JITTER)
-            for name in self.predictor.figures
-        }
-        self.nuisance |= self.predictor.sensors.nuisance
+        self.nuisance = self.predictor.figures | self.predictor.sensors.nuisance
         self._starts = {
             f"start:{name}[{i}]": (i, name)
             for i in range(len(self._runs))
@@ -216,8 +210,3 @@ def _begun(intervals: list[tuple[float, float]], start: float) -> list[list[tupl
     if not intervals or np.isfinite(intervals[0][0]):
         return [intervals]
     return [intervals, [(start, intervals[0][1]), *intervals[1:]]]
-
-
-def _found(model: Model, name: str) -> bool:
-    """Whether a number belongs to an effect that the plain machine would not have."""
-    return bool(model.effect(name.rsplit(".", 1)[0]).off)

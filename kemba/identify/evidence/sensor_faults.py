@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from kemba.effects import BY_KIND
-from kemba.effects.base import Effect
+from kemba.effects.base import REMEASURED, Effect
 from kemba.effects.sensors import SensorEffect, as_measured, as_true
 from kemba.effects.series import Series
 from kemba.identify.evidence.problem import Theta
-
-REMEASURED = 0.1  # 1 sigma, as a share: a fault that an earlier discovery put on a model's list
 
 
 def fault_kinds() -> dict[str, type[SensorEffect]]:
@@ -37,12 +35,13 @@ class SensorFaults:
     @property
     def nuisance(self) -> dict[str, tuple[float, float]]:
         """Nominal value and 1 sigma of the listed faults' figures, by their name in theta."""
-        return {
-            f"{name}.{figure}": (fault.value(figure), REMEASURED * abs(fault.value(figure)))
+        share = REMEASURED.share(1.0)
+        values = {
+            f"{name}.{figure}": float(fault.value(figure))
             for name, fault in self.listed.items()
             for figure in fault.off
-            if fault.value(figure)
         }
+        return {name: (value, share * abs(value)) for name, value in values.items() if value}
 
     def at(self, theta: Theta, channel: str) -> list[SensorEffect]:
         """The faults of a channel at theta."""
