@@ -69,8 +69,8 @@ def test_a_log_may_begin_with_a_valve_on_for_long(name: str, sent: tuple[float, 
 
 
 def test_stiff_air_is_predicted_as_it_is_simulated() -> None:
-    """The supply line answers within a fifth of a millisecond when its pressures are nearly equal:
-    explicit steps of a millisecond would be off by as much as 4 N."""
+    """The supply line answers within a fifth of a millisecond when its pressures are nearly equal.
+    Runge and Kutta's steps of a millisecond are unstable there: 0.8 N off, 2.1 N at worst."""
     model, times = load_model("plant", rig=True), np.arange(600) / 1e3
     x, v = 0.035 + 0.02 * np.sin(9 * times), 0.18 * np.cos(9 * times)
     valves = {"extend": [(0.05, 0.2), (0.3, 0.4)], "retract": [(0.17, 0.33), (0.45, 0.6)]}
@@ -79,8 +79,8 @@ def test_stiff_air_is_predicted_as_it_is_simulated() -> None:
     motion = SmoothedMotion(times, x, v, np.gradient(v, times), np.zeros(600), 0.0)
     rig = RigModel(model, (), ())
     error = rig.predict(motion, (valves["extend"], valves["retract"]), {}).force - simulated
-    assert np.sqrt(np.mean(error**2)) < 0.3
-    assert np.abs(error).max() < 1.5
+    assert np.sqrt(np.mean(error**2)) < 0.5
+    assert np.abs(error).max() < 1.8
 
 
 def test_a_delay_has_a_slope(bench_log: BenchLog) -> None:
