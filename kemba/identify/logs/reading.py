@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from kemba.config import find_config, load_yaml, parse
 from kemba.errors import KembaError, suggest
+from kemba.identify.logs.sidecar import check_kind, check_noise
 from kemba.quantity import Quantity, convert
 from kemba.table import read_table
 from kemba.trajectory import Array, Trajectory, sidecar
@@ -27,6 +28,7 @@ ROBOT = (
     ),
 )
 BENCH = ("piston/x", "valve/extend", "valve/retract", "piston/F")
+ABSURD = 1e12  # in any SI unit of a channel: a broken record, not a measured value
 NEEDED: dict[str, tuple[str, ...]] = {"robot": ROBOT, "bench": BENCH}
 
 
@@ -77,11 +79,20 @@ def read_log(path: str | Path, columns: ColumnMap | None = None) -> Trajectory:
     log.meta.setdefault("kind", (columns and columns.kind) or kind_of(log, path))
     log.meta["name"] = path.stem
     log.meta["path"] = str(path)
-    if log.meta["kind"] not in NEEDED:
-        raise KembaError(
-            str(sidecar(path)), f"kind: '{log.meta['kind']}'", hint=suggest("robot", NEEDED)
-        )
-    return log
+    beside = str(sidecar(path))
+    log.meta["kind"] = check_kind(log.meta["kind"], NEEDED, beside)
+    if "noise" in log.meta:
+        units = {name: log.unit(name) for name in log.names}
+        log.meta["noise"] = check_noise(log.meta["noise"], units, beside)
+    return _without_absurd(log)
+
+
+def _without_absurd(log: Trajectory) -> Trajectory:
+    """The log with readings that no channel can have as missing ones: their squares overflow."""
+    columns = {h: log[name] for h, name in zip(log.headers, log.names, strict=True)}
+    wild = {h: np.abs(values) > ABSURD for h, values in columns.items()}
+    broken = {h: np.where(wild[h], np.nan, columns[h]) for h in columns if wild[h].any()}
+    return log.with_columns(broken) if broken else log
 
 
 def read_logs(paths: Sequence[str | Path], columns: ColumnMap | None = None) -> list[Trajectory]:
