@@ -264,9 +264,7 @@ def main() -> None:
     parser.add_argument("--bench", type=int, default=12, help="so many bench cases")
     parser.add_argument("--robot", type=int, default=8, help="so many robot cases")
     parser.add_argument("--schedule", action="store_true", help="the shipped tasks instead")
-    parser.add_argument(
-        "--only", default="", help="settings whose Class.field matches this"
-    )
+    parser.add_argument("--only", default="", help="settings whose Class.field matches this")
     parser.add_argument("--out", type=Path, default=Path("sensitivity.jsonl"))
     parser.add_argument("--part", default="1/1", help="i/n: every n-th case, from the i-th on")
     parser.add_argument("--jobs", type=int, default=1, help="cases at the same time")

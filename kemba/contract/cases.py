@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -155,9 +155,10 @@ def values_of(model: Model, point: Point, p: Any = ()) -> Point:
     return {name: np.asarray(value).ravel() for name, value in result.items()}
 
 
-def slopes(model: Model, free: list[str]) -> ca.Function:
-    """The residual F, its derivatives dy by every variable and dp by the parameters `free`."""
-    node = model.build(free)
+def slopes(model: Model, free: Sequence[str], scaled: Sequence[str] = ()) -> ca.Function:
+    """The residual F, its derivatives dy by every variable, and dp by the parameters `free` and by
+    factors on the figures `scaled`."""
+    node = model.build(free, scaled)
     parts = [node.dynamics, node.rate, node.pair_a, node.pair_b, node.limits]
     F = ca.vertcat(*parts)
     y = ca.vertcat(node.q, node.v, node.a, node.s, node.lam, node.u)

@@ -9,9 +9,9 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from kemba.effects.mechanics.friction import V_COULOMB
+from kemba.effects.pneumatics.switching import pulses
 from kemba.identify.bench.motion import SmoothedMotion, smooth_motion
 from kemba.identify.bench.rig_model import Pulses
-from kemba.identify.bench.switching import pulses
 from kemba.identify.evidence.noise import difference_sigma
 from kemba.identify.evidence.problem import Array, Flags
 from kemba.identify.logs.excerpt import held

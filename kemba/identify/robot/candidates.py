@@ -9,7 +9,6 @@ from kemba.model.model import Model
 from kemba.settings import BY_HAND, Settings, setting
 
 GROUND = ("ground_compliance", "ground_friction", "contact")
-DELAYS = ("valve_delay.dt", "valve_close_delay.dt")
 SOFTNESS = "ground_compliance.softness"
 GRIP = "ground_friction.mu"
 LAGS = ("hose_lag.T", "motor_lag.T")
