@@ -30,7 +30,7 @@ from kemba.identify.robot.candidates import (
 )
 from kemba.identify.robot.dynamics.physics import Physics
 from kemba.identify.robot.dynamics.settings import ForceDensity
-from kemba.identify.robot.dynamics.tolerance import SHARE
+from kemba.identify.robot.dynamics.tolerance import ToleranceShareSettings
 from kemba.identify.robot.force_channels import robot_force_channels
 from kemba.identify.robot.formulas import formula_columns
 from kemba.identify.robot.labels import describe
@@ -87,7 +87,7 @@ class RobotProblem(Problem):
         sigma = dict(zip(physics.channels, np.median(batch.sigma, axis=0).tolist(), strict=True))
         self.candidates: dict[str, Candidate] = {**found, **sensor_candidates(sigma)}
         self.state = linearise_at(physics, batch, {}, ground, self.unknown)
-        masses = dict.fromkeys(physics.masses, (0.0, SHARE))
+        masses = dict.fromkeys(physics.masses, (0.0, ToleranceShareSettings.current().share))
         self.nuisance: dict[str, tuple[float, float]] = {**physics.nuisance, **masses}
 
     @property

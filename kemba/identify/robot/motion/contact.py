@@ -1,4 +1,4 @@
-"""Who touches what, and when: read from measured kinematics, never from a plan."""
+"""Contacts of feet and stops, read from the measured motion and never from a plan."""
 
 from __future__ import annotations
 
@@ -134,7 +134,7 @@ def read_schedule(time: Array, feet: Array, pistons: Array, stroke: float, body:
 
 
 def _after(flags: Flags, steps: float) -> Flags:
-    """So many steps from where each stretch of `flags` begins."""
+    """The first `steps` nodes of each stretch of true `flags` (n,)."""
     begin = flags & ~np.append(True, flags[:-1])
     return np.asarray(np.convolve(begin, np.ones(max(1, round(steps))))[: len(flags)] > 0)
 
@@ -145,7 +145,7 @@ def loaded(schedule: Schedule, normal: Array, dt: float) -> Schedule:
     width = max(3, round(settings.rate_window / dt))
     firm = minimum_filter1d(normal, width, axis=0) > settings.firm_load
     slides = schedule.slides * firm
-    for leg in slides.T:  # a slip that lasts: a foot that just lifts off drags along for a moment
+    for leg in slides.T:  # short slips do not count: a foot that lifts off drags for a moment
         leg *= binary_opening(leg != 0.0, np.ones(width, bool))
     return replace(
         schedule, settled=schedule.settled & (normal > settings.least_load), slides=slides
@@ -153,7 +153,7 @@ def loaded(schedule: Schedule, normal: Array, dt: float) -> Schedule:
 
 
 def steady(values: Array, dt: float) -> Array:
-    """Forces or rates (n, ...) without what changes from sample to sample, which is noise."""
+    """Forces or rates (n, ...), smoothed: changes from sample to sample are noise."""
     return np.asarray(gaussian_filter1d(values, ContactSettings.current().steady / dt, axis=0))
 
 
@@ -175,7 +175,7 @@ def ground_level(z: Array, rate: Array) -> float:
 
 
 def stop_levels(x: Array, stroke: float) -> tuple[float, float]:
-    """Readings at the two stops: the furthest ones, where these are near an end at all."""
+    """Readings at the two stops: the extreme ones, if they are near the ends of the stroke."""
     search, ordered = ContactSettings.current().stop_search, np.sort(x)
     few = min(ContactSettings.current().stop_rows, len(x) - 1)
     low, high = float(ordered[few]), float(ordered[-1 - few])
