@@ -37,6 +37,7 @@ OwnEffects = Annotated[
         help="Python file with effects of your own (its code is run); may be repeated.",
     ),
 ]
+Force = Annotated[bool, typer.Option("--force", help="Replace results that are there already.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing but the result.")]
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from kemba_cli.common import Json, OwnEffects, Quiet, print_json, results, say
+from kemba_cli.common import Force, Json, OwnEffects, Quiet, print_json, results, say
 
 if TYPE_CHECKING:
     from kemba.plant.rig.characterise import Characteristics
@@ -28,6 +28,7 @@ def characterise(
     paper: Annotated[
         bool, typer.Option("--paper", help="No logs: what the paper's own tables imply.")
     ] = False,
+    force: Force = False,
     own_effects: OwnEffects = None,
     json: Json = False,
     quiet: Quiet = False,
@@ -41,11 +42,14 @@ def characterise(
         return
     if not logs:
         raise typer.BadParameter("logs are missing: give CSV files, or --paper", param_hint="LOGS")
+    from kemba.folders import fresh
     from kemba.model import load_model
     from kemba.plant.rig.characterise import characterise as fit
     from kemba.plant.rig.tables import as_json
     from kemba.trajectory import Trajectory
 
+    if out:
+        fresh(out, force)
     files = [f for item in logs for f in (sorted(item.glob("*.csv")) if item.is_dir() else [item])]
     read = {str(file): Trajectory.read(file) for file in files}
     found = fit(read, load_model(model, rig=True).mechanism.need_cylinder())

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from kemba_cli.common import Json, OwnEffects, Quiet, print_json, results, say
+from kemba_cli.common import Force, Json, OwnEffects, Quiet, print_json, results, say
 
 if TYPE_CHECKING:
     from kemba.identify.compare.compare import Comparison
@@ -23,6 +23,7 @@ def compare(
     column_map: Annotated[
         str | None, typer.Option("--map", help="Column map YAML for foreign logs.")
     ] = None,
+    force: Force = False,
     own_effects: OwnEffects = None,
     json: Json = False,
     quiet: Quiet = False,
@@ -35,8 +36,11 @@ def compare(
 
     # many small products: more BLAS threads only wait for each other
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    from kemba.folders import fresh
     from kemba.identify.compare_logs import compare_logs
 
+    if figure is not None:
+        fresh(figure, force, "--figure")
     found, _ = compare_logs(logs, model, column_map, run)
     if figure is not None:
         from kemba.plotting.study.comparison import plot_comparison

@@ -57,7 +57,9 @@ def place_effects(mechanism: Mechanism, effects: Iterable[Effect]) -> list[Insta
         if effect.leg is not None:
             if effect.leg not in mechanism.legs:
                 raise KembaError(
-                    f"effects.{effect.name}", f"{mechanism.name} has no leg '{effect.leg}'"
+                    f"effects.{effect.name}",
+                    f"{mechanism.name} has no leg '{effect.leg}'",
+                    hint=suggest(effect.leg, filter(None, mechanism.legs)),
                 )
             legs = (effect.leg,)
         for leg in legs:

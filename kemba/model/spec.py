@@ -11,13 +11,14 @@ from pydantic import BaseModel, ConfigDict, Field
 from kemba.config import Document, find_config, load_yaml, parse, shipped_configs
 from kemba.effects import AnyEffect, Effect
 from kemba.effects.catalogue import CHAMBERS
+from kemba.effects.pneumatics.constants import ATMOSPHERE
 from kemba.errors import KembaError
 from kemba.mechanism import load_robot, rig_mechanism, robot_mechanism
 from kemba.mechanism.robot_file import find_file, robot_files
 from kemba.model.model import Model
 from kemba.quantity import Param
 
-Supply = Annotated[float, Param("Pa", 0.1e6, lower=0.6e6, upper=0.8e6, doc="supply pressure")]
+Supply = Annotated[float, Param("Pa", 0.1e6, lower=ATMOSPHERE, doc="supply pressure")]
 
 
 class ModelSpec(BaseModel):

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import logging
 import os
+import re
+import socket
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,6 +16,7 @@ from kemba.errors import KembaError
 from kemba.files import write_json
 from kemba.sweep.case import Case, Record, perform
 
+REACHING = 5.0  # s for a connection to a scheduler; the slowest networks take one
 PATIENCE = 30.0  # s; for a result that a worker holds
 # Instead of Dask's own, with which workers give memory back at once; a solver asks for it again at
 # once, which costs a fifth of the time.
@@ -73,7 +76,7 @@ def _gather(
             if record is None:  # its result died with the worker that held it
                 ended.add(task)
                 continue
-            if record["status"] != "lost" and not case.path(folder).is_file():
+            if record["status"] != "lost" and case.record(folder) is None:
                 write_json(case.path(folder), record)  # the worker does not see our files
             found[case.key] = record
             tell(case, record)
@@ -101,6 +104,28 @@ def _record(task: Any) -> Record | None:
     return None
 
 
+ADDRESS = re.compile(r"(?:(?:tcp|tls)://)?(?P<host>\[[^\]]+\]|[^:/\[\]]+):(?P<port>\d{1,5})")
+
+
+def check_scheduler(scheduler: str) -> None:
+    """Raise KembaError when nothing answers at the address: Dask itself tries for 40 s."""
+    match = ADDRESS.fullmatch(scheduler)
+    if match is None:
+        what = "is no address of a scheduler"
+        raise KembaError(f"--scheduler {scheduler}", what, "such as tcp://host:8786")
+    try:
+        place = (match["host"].strip("[]"), int(match["port"]))
+        socket.create_connection(place, timeout=REACHING).close()
+    except (OSError, OverflowError, UnicodeError) as error:
+        raise _unreachable(scheduler, error) from None
+
+
+def _unreachable(scheduler: str, error: Exception) -> KembaError:
+    what = f"cannot be reached: {error}".splitlines()[0]
+    hint = "start one with: dask scheduler"
+    return KembaError(f"--scheduler {scheduler}", what, "such as tcp://host:8786", hint)
+
+
 @contextmanager
 def _client(scheduler: str | None, jobs: int | None, most: int) -> Iterator[Any]:
     """A client of the cluster asked for, or of a local one that ends with the block.
@@ -112,11 +137,11 @@ def _client(scheduler: str | None, jobs: int | None, most: int) -> Iterator[Any]
     from distributed import Client, LocalCluster
 
     if scheduler is not None:
+        check_scheduler(scheduler)
         try:
             client = Client(scheduler, timeout=10, set_as_default=False)
         except (OSError, ValueError, TimeoutError) as error:
-            what = f"cannot be reached: {error}".splitlines()[0]
-            raise KembaError(f"--scheduler {scheduler}", what, "such as tcp://host:8786") from None
+            raise _unreachable(scheduler, error) from None
         with client:
             yield client
         return

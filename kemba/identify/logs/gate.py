@@ -9,13 +9,13 @@ import numpy as np
 
 from kemba.errors import ConfigErrors, KembaError, suggest
 from kemba.identify.evidence.noise import difference_sigma
-from kemba.identify.logs.reading import NEEDED
+from kemba.identify.logs.reading import legs_of, needed
 from kemba.identify.logs.settings import GateSettings
 from kemba.trajectory import TIME, Array, Trajectory
 
 # Physical limits by the last part of the name: smallest, largest, and the likely mistake.
 RANGES = {
-    "piston/x": (-0.01, 0.085, "metres from 0 (retracted) to 0.070; is it in millimetres?"),
+    "piston/x": (-0.01, 1.0, "metres from 0 (retracted) to the stroke; is it in millimetres?"),
     "piston/v": (-8.0, 8.0, "metres per second; is it in mm/s?"),
     "piston/F": (-3000.0, 3000.0, "newtons, pushing positive"),
     "hip/q": (-2 * math.pi, 2 * math.pi, "radians; is it in degrees?"),
@@ -53,7 +53,7 @@ def _faults(log: Trajectory) -> list[KembaError]:
 
 
 def _columns(log: Trajectory) -> Iterator[KembaError]:
-    for name in NEEDED[log.meta["kind"]]:
+    for name in needed(log):
         if name not in log:
             hint = f"{suggest(name, log.names)} Map foreign columns with --map".strip()
             yield _fault(log, f"needs the column '{name}', which is missing", hint=hint)
@@ -90,7 +90,7 @@ def _time(log: Trajectory) -> Iterator[KembaError]:
 
 
 def _cells(log: Trajectory) -> Iterator[KembaError]:
-    for name in NEEDED[log.meta["kind"]]:
+    for name in needed(log):
         y = log[name]
         missing = ~np.isfinite(y)
         if missing.mean() > GateSettings.current().missing:
@@ -110,13 +110,13 @@ def _valve(log: Trajectory, name: str, y: Array) -> Iterator[KembaError]:
 
 
 def _values(log: Trajectory) -> Iterator[KembaError]:
-    needed = NEEDED[log.meta["kind"]]
+    wanted = needed(log)
     for name in log.names:
         y = log[name]
         if "valve/" in name or not np.isfinite(y).any():
             continue
         yield from _range(log, name, y)
-        if name in needed:
+        if name in wanted:
             yield from _frozen(log, name, y)
         if name.endswith("piston/x"):
             yield from _leap(log, name, y)
@@ -129,9 +129,11 @@ def _range(log: Trajectory, name: str, y: Array) -> Iterator[KembaError]:
         return
     low, high, expected = known[0]
     limits = GateSettings.current()
+    if name.endswith("piston/x") and "stroke" in log.meta:
+        high = log.meta["stroke"] + limits.beyond
     outside = np.isfinite(y) & ((y < low) | (y > high))
-    needed = name in NEEDED[log.meta["kind"]]
-    few = limits.impossible if needed else limits.impossible_elsewhere
+    wanted = name in needed(log)
+    few = limits.impossible if wanted else limits.impossible_elsewhere
     if outside.mean() > few:
         i = int(np.argmax(outside))
         what = f"the reading {y[i]:.6g} {log.unit(name)} cannot be ({int(outside.sum())} rows)"
@@ -197,7 +199,7 @@ def _excitation(log: Trajectory) -> Iterator[KembaError]:
     limits = GateSettings.current()
     valves = [n for n in log.names if "valve/" in n]
     switched = any(np.ptp(log[n][np.isfinite(log[n])]) > 0 for n in valves)
-    moving = [n for n in NEEDED[log.meta["kind"]] if n.endswith("/x") or n == "body/z"]
+    moving = [n for n in needed(log) if n.endswith("/x") or n == "body/z"]
     moved = any(_travel(log[n]) > limits.moves for n in moving)
     if not switched and not moved:
         yield _fault(
@@ -206,7 +208,7 @@ def _excitation(log: Trajectory) -> Iterator[KembaError]:
         return
     if log.meta["kind"] == "bench" and _travel(log["piston/F"]) == 0.0:
         yield _fault(log, "never changes", "is the sensor dead?", column="piston/F", row=0)
-    for leg in ("front", "rear") if log.meta["kind"] == "robot" else ():
+    for leg in legs_of(log) if log.meta["kind"] == "robot" else ():
         for name in (f"{leg}/hip/q", f"{leg}/piston/x", "body/z"):
             if np.ptp(log[name][np.isfinite(log[name])]) == 0.0 and len(log) > limits.dead:
                 yield _fault(log, "never changes", "is the sensor dead?", column=name, row=0)
@@ -222,7 +224,7 @@ def _remarks(log: Trajectory) -> Iterator[str]:
     gaps = np.diff(log.time) > 5 * np.median(np.diff(log.time))
     if gaps.any():
         yield f"{name}: {int(gaps.sum())} gaps in time, the longest {np.diff(log.time).max():.3f} s"
-    for column in NEEDED[log.meta["kind"]]:
+    for column in needed(log):
         missing = int((~np.isfinite(log[column])).sum())
         if missing:
             yield f"{name}: {column}: {missing} readings missing"

@@ -62,4 +62,7 @@ class GateSettings(Settings):
     moves: float = setting(
         2e-3, "m", "a position with less travel does not move", BY_HAND, decides=True
     )
+    beyond: float = setting(
+        0.015, "m", "a position may read so far past the stroke", BY_HAND, decides=True
+    )
     dead: int = setting(200, "1", "rows without any change that mean a dead sensor", BY_HAND)

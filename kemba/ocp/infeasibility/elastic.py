@@ -1,4 +1,4 @@
-"""The same program with requirements that may give way at an l1 cost; the physics stays hard."""
+"""The same program with requirements that may give way at an l1 cost; the physics must hold."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 
 from kemba.model import Model
-from kemba.ocp.infeasibility.pose import SCALE
+from kemba.ocp.infeasibility.settings import ElasticSolve
 from kemba.ocp.nlp.blocks import Block
 from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.nlp.ipopt import Iterate, warm
@@ -25,21 +25,15 @@ from kemba.ocp.transcription.stage import Rows
 from kemba.ocp.transcription.symmetry import Reduction
 from kemba.ocp.transcription.transcribe import RequirementBlock, Transcription
 
-BUDGET = 30.0  # s
-NODES = 40  # a coarser grid is enough to say what is too much
-ITERATIONS = 500
-PRICE = 100.0  # of one unit of scaled slack, against a cost of 0.01 to 10
-SHORT = 0.05  # scaled slack (5 mm, 0.6 deg) from which a requirement counts as out of reach
-
-# Who gives way: goals first, as people would; then everything but the start, whose pose is judged
-# before solving.
+# What may give way: goals first; then everything but the start, which is checked before solving.
 TIERS = (("goals",), ("goals", "bounds", "end"))
 
 
 class Elastic(Transcription):
-    """Requirements of the sections `soft` have a pair of slack variables, shared by their nodes: how far
-    below and above what is asked the plan stays. They stand at the first node, in columns of Y
-    behind the layout's.
+    """A transcription whose requirements of the sections `soft` may give way.
+
+    Each of them has two slack variables, shared by all its nodes: how far the plan stays below and
+    above what is asked. They stand in row 0 of Y, in columns behind the layout's.
     """
 
     def __init__(
@@ -53,7 +47,8 @@ class Elastic(Transcription):
     ) -> None:
         self.soft = soft
         self.slack: list[tuple[Requirement, int, float]] = []  # requirement, first column, scale
-        cheap = {name: 0.01 * weight for name, weight in task.cost.items()}
+        factor = ElasticSolve.current().cheap
+        cheap = {name: factor * weight for name, weight in task.cost.items()}
         super().__init__(
             model, task.model_copy(update={"cost": cheap}), requirements, reduction, nodes
         )
@@ -74,7 +69,7 @@ class Elastic(Transcription):
         self, requirement: Requirement, g: ca.SX, where: list[int], index: np.ndarray
     ) -> RequirementBlock:
         """The rows of a requirement that may give way, at a price per unit of scaled slack."""
-        column, scale = self.layout.size + 2 * len(self.slack), requirement_scale(requirement)
+        column, scale = self.layout.size + 2 * len(self.slack), requirement.scale
         self.slack.append((requirement, column, scale))
         self.upper[0, column : column + 2] = np.inf
         below, above = ca.SX.sym("below"), ca.SX.sym("above")
@@ -89,28 +84,24 @@ class Elastic(Transcription):
         )
         shared = np.tile(index[0, column : column + 2], (len(where), 1))
         at = np.hstack([index[where, : self.layout.size], shared])
-        price = PRICE * (below + above) / len(where)
+        price = ElasticSolve.current().price * (below + above) / len(where)
         return Block(ca.vertcat(self.stage.y, below, above), rows.g, price, at), rows, where
 
     def start(self, Y: np.ndarray) -> np.ndarray:
         """A start guess with room for every requirement to give way."""
         wide = np.zeros(self.shape)
         wide[:, : self.layout.size] = Y
-        wide[0, self.layout.size :] = 0.1
+        wide[0, self.layout.size :] = ElasticSolve.current().room
         return wide
 
     def given(self, Y: np.ndarray) -> list[tuple[Requirement, float, float]]:
-        """Requirements that gave way: the requirement, by how much in its unit (above: positive), and scaled."""
+        """Every soft requirement: by how much it gave way, in its unit (above is positive) and
+        scaled."""
         found = []
         for requirement, column, scale in self.slack:
             by = float(Y[0, column + 1] - Y[0, column])
             found.append((requirement, by * scale, abs(by)))
         return found
-
-
-def requirement_scale(requirement: Requirement) -> float:
-    """What counts as one unit of slack."""
-    return SCALE.get(requirement.quantity.unit, requirement.quantity.scale)
 
 
 @dataclass(frozen=True)
@@ -138,10 +129,10 @@ def elastic(
 
     Raises Stopped when the user stopped it.
     """
-    deadline = min(session.control.deadline, time.monotonic() + BUDGET)
+    deadline = min(session.control.deadline, time.monotonic() + ElasticSolve.current().budget)
     limited = replace(session, control=replace(session.control, deadline=deadline))
     sections = {str(w.location[0]) for w in requirements}
-    nodes = min(task.nodes, NODES)
+    nodes = min(task.nodes, ElasticSolve.current().nodes)
     for soft in TIERS:
         if sections & set(soft):
             with session.building.running():
@@ -154,7 +145,7 @@ def elastic(
 
 def _solve(program: Elastic, session: Session) -> Outcome | None:
     """The usual schedule; the last step that converged counts."""
-    options = {**program.task.solver.options, "max_iter": ITERATIONS}
+    options = {**program.task.solver.options, "max_iter": ElasticSolve.current().iterations}
     schedule = session.schedule(program, options)
     converged: list[Iterate] = []
     try:
@@ -174,7 +165,8 @@ def _solve(program: Elastic, session: Session) -> Outcome | None:
     best = next((p for p in reversed(converged) if p.solved), None)
     if best is None:
         return None
-    return Outcome(program, best, tuple(g for g in program.given(best.Y) if g[2] > SHORT))
+    short = ElasticSolve.current().short
+    return Outcome(program, best, tuple(g for g in program.given(best.Y) if g[2] > short))
 
 
 def _first(schedule: Schedule, program: Elastic) -> Iterate | None:

@@ -15,13 +15,12 @@ from kemba.ocp.task.requirement import Requirement, quantity_expression
 from kemba.ocp.transcription.stage import as_variable
 
 INF = np.inf
-SCALES = {"m": 0.1, "m.s-1": 1.0, "rad": 0.2}
 
 
 def add_requirements(
     program: PhaseProgram, requirements: Sequence[Requirement], start: Independent, end: Independent
 ) -> None:
-    """Bounds where a requirement is about a variable, rows otherwise; none where modes grant it."""
+    """Bounds where a requirement is about a variable, else rows; none where modes imply it."""
     view = View(program)
     _granted_at_end(program, view, end)
     seen: set[tuple[object, ...]] = set()
@@ -64,14 +63,14 @@ def _put(
         program.lower[at] = np.maximum(program.lower[at], ends[0])
         program.upper[at] = np.minimum(program.upper[at], ends[1])
         return
-    scale = SCALES.get(requirement.quantity.unit, 1.0)
+    scale = requirement.scale
     label = f"{requirement.text}:{requirement.quantity.name}"
     low, high = requirement.lower / scale, requirement.upper / scale
     if not ca.depends_on(g, view.z("u lam")):
         columns = [_columns(program, node, full=False) for node in nodes]
-        program.rule(label, view.z("q v s"), g / scale, low, high, columns)
+        program.add(label, view.z("q v s"), g / scale, low, high, columns)
         return
-    program.rule(label, view.z("q v s u lam"), g / scale, low, high, columns)
+    program.add(label, view.z("q v s u lam"), g / scale, low, high, columns)
 
 
 def _columns(program: PhaseProgram, node: int, full: bool) -> np.ndarray:

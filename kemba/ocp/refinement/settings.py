@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from kemba.settings import Settings, setting
 
-TRIALS = "tuned: trials on the cases of benchmarks/refine.py (docs/refine.md), code not kept"
+TRIALS = "tuned: trials that docs/refine.md tells of"
+HAND = "convention: chosen by hand on the cases of benchmarks/refine.py, no comparison kept"
 STEPS = "derived: implicit Euler smears an impact over two steps"
 
 
@@ -18,21 +19,21 @@ class Reading(Settings):
     closed: float = setting(
         1e-6, "m", "a smaller gap at the start touches", "derived: the certificate's tolerance"
     )
-    slides: float = setting(0.05, "m.s-1", "a faster slip is sliding", TRIALS, decides=True)
+    slides: float = setting(0.05, "m.s-1", "a faster slip is sliding", HAND, decides=True)
     light: float = setting(
         0.1, "1", "of body weight: a foot that bears less for a step or two does not stand",
-        TRIALS, decides=True,
+        HAND, decides=True,
     )  # fmt: skip
     shudder: float = setting(
-        5e-5, "m", "what opens less for a step or two stays closed", TRIALS, decides=True
+        5e-5, "m", "what opens less for a step or two stays closed", HAND, decides=True
     )
     hop: float = setting(
-        5e-3, "m", "a foot that rises less for a step or two stays down", TRIALS, decides=True
+        5e-3, "m", "a foot that rises less for a step or two stays down", HAND, decides=True
     )
     brief: int = setting(2, "1", "steps that are few", STEPS, decides=True)
 
 
-class ModeRules(Settings):
+class ModeConstraints(Settings):
     """What modes ask beyond touching and staying apart."""
 
     clear: float = setting(
@@ -60,7 +61,7 @@ class Elements(Settings):
         0.03, "1", "times the nominal step: shortest element", TRIALS, decides=True
     )
     longest: float = setting(
-        3.0, "1", "times the nominal step: longest element", TRIALS, decides=True
+        3.0, "1", "times the nominal step: longest element", HAND, decides=True
     )
     fair: float = setting(
         2.0, "1", "times the nominal step: longest element of a good solution; on longer ones two "
@@ -84,35 +85,35 @@ class Refining(Settings):
     )  # fmt: skip
     price: float = setting(
         1000.0, "1", "of a mode giving way by its scale; cheaper, modes that could hold give way "
-        "too", TRIALS, decides=True,
+        "too", HAND, decides=True,
     )  # fmt: skip
     near: float = setting(
-        10.0, "1", "proximal weight of the first solve; without, short steps wander off", TRIALS,
+        10.0, "1", "proximal weight of the first solve; without, short steps wander off", HAND,
         decides=True,
     )  # fmt: skip
     near_elastic: float = setting(
-        1.0, "1", "proximal weight of an elastic solve", TRIALS, decides=True
+        1.0, "1", "proximal weight of an elastic solve", HAND, decides=True
     )
     near_fine: float = setting(
-        1.0, "1", "proximal weight of the finer scheme's solve", TRIALS, decides=True
+        1.0, "1", "proximal weight of the finer scheme's solve", HAND, decides=True
     )
-    rounds: int = setting(6, "1", "elastic solves of one reading", TRIALS, decides=True)
+    rounds: int = setting(6, "1", "elastic solves of one reading", HAND, decides=True)
     iterations_half: int = setting(
         300, "1", "of all solves together, half a robot", TRIALS, decides=True
     )
     iterations_whole: int = setting(
-        450, "1", "of all solves together, whole robot", TRIALS, decides=True
+        450, "1", "of all solves together, whole robot", HAND, decides=True
     )
     nearest_half: int = setting(
-        50, "1", "iterations of the first solve, half a robot", TRIALS, decides=True
+        50, "1", "iterations of the first solve, half a robot", HAND, decides=True
     )
     rough_iterations: int = setting(
-        60, "1", "iterations of other solves by either scheme", TRIALS, decides=True
+        60, "1", "iterations of other solves by either scheme", HAND, decides=True
     )
     elastic_iterations: int = setting(
-        100, "1", "iterations of an elastic solve", TRIALS, decides=True
+        100, "1", "iterations of an elastic solve", HAND, decides=True
     )
-    mu: float = setting(1e-4, "1", "barrier parameter of a warm start", TRIALS, decides=True)
+    mu: float = setting(1e-4, "1", "barrier parameter of a warm start", HAND, decides=True)
     elastic_mu: float = setting(
         0.1, "1", "barrier parameter of an elastic solve", "convention: IPOPT's default"
     )
@@ -121,33 +122,33 @@ class Refining(Settings):
         "convention: small beside every scaled variable",
     )  # fmt: skip
     rough_tol: float = setting(
-        1e-3, "1", "IPOPT's tolerance of the coarser scheme, which is solved on", TRIALS
+        1e-3, "1", "IPOPT's tolerance of the coarser scheme, which is solved on", HAND
     )
     rough_rows: float = setting(
-        1e-6, "1", "tolerance of the rows by the coarser scheme, which is solved on", TRIALS
+        1e-6, "1", "tolerance of the rows by the coarser scheme, which is solved on", HAND
     )
-    tol: float = setting(1e-4, "1", "IPOPT's tolerance of the finer scheme", TRIALS, decides=True)
+    tol: float = setting(1e-4, "1", "IPOPT's tolerance of the finer scheme", HAND, decides=True)
     rows: float = setting(
         1e-8, "1", "tolerance of the rows by the finer scheme",
         "derived: 100 times below the certificate's tolerance of 1e-6",
     )  # fmt: skip
     pivot: float = setting(
         1e-3, "1", "mumps_pivtol; IPOPT's 1e-6 counts wrong signs on three stages, and steps "
-        "shrink", TRIALS,
+        "shrink", HAND,
     )  # fmt: skip
     hessian: float = setting(
         1e6, "1", "max_hessian_perturbation; beyond, tries cost a second an iteration and lead "
-        "nowhere", TRIALS,
+        "nowhere", HAND,
     )  # fmt: skip
     stagnation_iterations: int = setting(
-        30, "1", "iterations without a smaller violation, after which a solve is given up", TRIALS,
+        30, "1", "iterations without a smaller violation, after which a solve is given up", HAND,
         decides=True,
     )  # fmt: skip
     stagnation_near: float = setting(
-        1e-4, "1", "scaled violation that is near enough to go on", TRIALS, decides=True
+        1e-4, "1", "scaled violation that is near enough to go on", HAND, decides=True
     )
     second_start: float = setting(
-        0.05, "1", "guess noise of the second start where the first plan does not refine", TRIALS,
+        0.05, "1", "guess noise of the second start where the first plan does not refine", HAND,
         decides=True,
     )  # fmt: skip
 
@@ -155,9 +156,9 @@ class Refining(Settings):
 class Repair(Settings):
     """When modes fit, and which of them change."""
 
-    fits: float = setting(3e-4, "1", "scaled: modes that give way less fit", TRIALS, decides=True)
+    fits: float = setting(3e-4, "1", "scaled: modes that give way less fit", HAND, decides=True)
     matters: float = setting(
-        0.1, "1", "of the worst misfit: smaller ones are left for the next round", TRIALS,
+        0.1, "1", "of the worst misfit: smaller ones are left for the next round", HAND,
         decides=True,
     )  # fmt: skip
     sliver: int = setting(

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
+from kemba.config import FileName
 from kemba.errors import KembaError
 from kemba.plant.rig.imposed import ImposedMotion, hermite, locked
 from kemba.plant.rig.imposed import stroke as steady_stroke
@@ -54,7 +55,7 @@ class Rig(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    name: str
+    name: FileName
     notes: str = ""
     supplies: tuple[Pressure, ...] = (0.7e6,)
     repeats: int = Field(default=1, ge=1, le=100)
