@@ -1,4 +1,8 @@
+<<<<<<< HEAD
 """Contacts of feet and stops, read from the measured motion and never from a plan."""
+=======
+"""Contacts of feet and end stops, read from the measured motion and never from a plan."""
+>>>>>>> wC
 
 from __future__ import annotations
 
@@ -65,9 +69,14 @@ class ContactSettings(Settings):
 
 @dataclass(frozen=True)
 class Schedule:
-    """Of one run, per node: `foot` may touch (n, legs), `settled` on the ground (n, legs),
-    `struck` touched down within a moment (n, legs), `slides` (n, legs; sign of the slip),
-    `low`, `high` at an end stop (n, legs), `phase` (n,) as the contract names it."""
+    """Contacts of one run at its n nodes.
+
+    Per leg, (n, legs): `foot`: it may touch the ground; `settled`: it rests on the ground;
+    `struck`: it touched down a moment ago; `slides`: sign of its slip, 0 where it does not slide;
+    `low`, `high`: the piston is at an end stop; `rests`: the piston has settled on a stop;
+    `sticks`: the foot does not move along the ground. `phase` (n,): `rest`, `stance2`, `stance1`,
+    `impact` or `flight`.
+    """
 
     foot: Flags
     settled: Flags
@@ -76,8 +85,8 @@ class Schedule:
     low: Flags
     high: Flags
     phase: np.ndarray[Any, Any]
-    rests: Flags  # (n, legs): piston settled on a stop
-    sticks: Flags  # (n, legs): foot that does not move along the ground
+    rests: Flags
+    sticks: Flags
 
     @property
     def held(self) -> Flags:
@@ -87,7 +96,11 @@ class Schedule:
 
 
 def read_schedule(time: Array, feet: Array, pistons: Array, stroke: float, body: Array) -> Schedule:
-    """The schedule of one run from feet (n, legs, [x, z]), pistons (n, legs) and body (n, k)."""
+    """The schedule of one run at `time` (n,) [s].
+
+    `feet` (n, legs, [x, z]) [m], `pistons` (n, legs) [m], `stroke` [m], `body` (n, 3): x, z [m] and
+    pitch [rad].
+    """
     limits, dt = ContactSettings.current(), max(float(np.median(np.diff(time))), 1e-4)
     feet_rate, piston_rate = slope(feet, dt), slope(pistons, dt)
     speed = np.abs(slope(body, dt)).max(axis=1)
@@ -134,7 +147,11 @@ def read_schedule(time: Array, feet: Array, pistons: Array, stroke: float, body:
 
 
 def _after(flags: Flags, steps: float) -> Flags:
+<<<<<<< HEAD
     """The first `steps` nodes of each stretch of true `flags` (n,)."""
+=======
+    """Flags (n,) of the first `steps` nodes of each stretch in which `flags` (n,) hold."""
+>>>>>>> wC
     begin = flags & ~np.append(True, flags[:-1])
     return np.asarray(np.convolve(begin, np.ones(max(1, round(steps))))[: len(flags)] > 0)
 
