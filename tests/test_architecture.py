@@ -19,6 +19,7 @@ ROOT = Path(__file__).parent.parent
 LEVELS = [
     {"errors"},
     {"files", "settings", "stopwatch", "units"},
+    {"folders"},
     {"quantity"},
     {"config"},
     {"table", "trajectory"},
@@ -26,7 +27,7 @@ LEVELS = [
     {"effects"},
     {"model"},
     {"ocp", "plant"},
-    {"identify"},
+    {"contract", "identify"},
     {"runs"},
     {"sweep"},
     {"plotting", "report"},
@@ -42,7 +43,8 @@ ONLY_IN = {
     "distributed": {"sweep"},
     "statsmodels": {"sweep"},
     "pint": {"units"},
-    "ruamel": {"config"},
+    "yaml": {"config"},
+    "filelock": {"folders"},
 }
 SOURCES = sorted([*ROOT.glob("kemba/**/*.py"), *ROOT.glob("cli/**/*.py")])
 FOLDERS = (".", ".ci", ".github", "cli", "configs", "docs", "kemba", "tests")

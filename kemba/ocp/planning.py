@@ -8,6 +8,7 @@ from pathlib import Path
 
 from kemba.config import Document
 from kemba.effects.mechanics.load import Payload
+from kemba.errors import KembaError
 from kemba.model import Model, load_model
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.infeasibility.checks import check_task
@@ -18,7 +19,7 @@ from kemba.ocp.planned import Plan, explained
 from kemba.ocp.planner import Planner, searched
 from kemba.ocp.refined import refined
 from kemba.ocp.relaxation.session import Session
-from kemba.ocp.task.requirement import resolve
+from kemba.ocp.task.requirement import Requirement, resolve
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.symmetry import whole
 from kemba.ocp.transcription.transcribe import Transcription
@@ -67,9 +68,26 @@ def task_model(task: Task, name: str | Path | None = None) -> Model:
     return load_model(name or task.model, extra, task.supply)
 
 
-def program_size(task: Task, document: Document, model: str | Path | None = None) -> dict[str, int]:
-    """Variables and rows of the whole program of a task, everything checked, nothing solved."""
+def check_feasible(
+    task: Task, document: Document, model: str | Path | None = None
+) -> tuple[Model, list[Requirement]]:
+    """The model and the requirements of a task; nothing is solved.
+
+    Raises KembaError for wrong names and units, and for what certainly cannot be met.
+    """
     built = task_model(task, model)
     requirements = resolve(task, built, document)
+    refused = refusal(check_task(task, built, requirements, document))
+    if refused is not None:
+        raise KembaError(document.source or task.name, refused.sentence)
+    return built, requirements
+
+
+def program_size(task: Task, document: Document, model: str | Path | None = None) -> dict[str, int]:
+    """Variables and rows of the whole program of a task, everything checked, nothing solved.
+
+    Raises KembaError as `check_feasible` does.
+    """
+    built, requirements = check_feasible(task, document, model)
     transcription = Transcription(built, task, requirements, whole(built.node), task.nodes)
     return {"variables": transcription.variables, "constraints": transcription.constraints}

@@ -10,6 +10,7 @@ from multiprocessing import get_context
 from pathlib import Path
 
 from kemba.config import Document
+from kemba.effects import BY_KIND, load_effects
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.planned import Plan
 from kemba.ocp.planning import plan
@@ -55,7 +56,7 @@ def plan_best(
     ]
     found: list[Start] = []
     workers = min(jobs or os.cpu_count() or 1, starts)
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+    with ProcessPoolExecutor(workers, get_context("spawn"), load_effects, (BY_KIND.files,)) as pool:
         futures = [pool.submit(_start, one) for one in tasks]
         try:
             for future in as_completed(futures):

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import shutil
+import tempfile
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from kemba.config import Document, dump_yaml
 from kemba.errors import KembaError
+from kemba.files import WriteError
 from kemba.ocp import Plan, Task, controller_table, plan
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.nlp.watcher import Watch
 from kemba.ocp.report import answer
 from kemba.ocp.starts import plan_best
 from kemba.plant.execution.certificate import replays
-from kemba.plant.execution.counterpart import counterpart
+from kemba.plant.execution.counterpart import another_robot, counterpart
 from kemba.plant.execution.replay import ends_standing
 from kemba.report.verdict import verdicts
 from kemba.runs import RunFolder, write_json
@@ -60,9 +65,10 @@ def solve_into(
         if replay and found.status.plan:
             listener.tell("replay")
             result |= _replayed(found)
-        _write(found, result, folder, figure)
+        _keep(found, result, folder, figure)
     except BaseException:
-        folder.finish("failed")
+        with suppress(WriteError):  # the first error tells more
+            folder.finish("failed")
         raise
     folder.finish(result["status"], sentence=result["sentence"], good=result["good"])
     return result
@@ -74,12 +80,14 @@ def _replayed(found: Plan) -> dict[str, Any]:
     table = controller_table(found.model, found.trajectory)
     try:
         plant = counterpart(task.model, task.payload, task.supply, task.plant)
+        other = another_robot(task.model, task.plant)
         executed = replays(found.model, found.trajectory, table, plant)
     except KembaError as error:  # a model that the simulator cannot execute still has its plan
         return _unconfirmed(found, [f"but there is no replay: {error}"])
     lands = bool(ends_standing(found.model, found.trajectory))
+    said = [f"the plant is another robot, {other}, which {task.plant} names"] if other else []
     told = verdicts(executed, task.tolerances, lands).values()
-    sentences = [verdict.sentence for verdict in told]
+    sentences = [*said, *(verdict.sentence for verdict in told)]
     if all(verdict.good for verdict in told):
         return {**executed, "sentence": "; ".join([found.sentence, *sentences])}
     return {**executed, **_unconfirmed(found, sentences)}
@@ -97,7 +105,22 @@ def _unconfirmed(found: Plan, sentences: list[str]) -> dict[str, Any]:
     }
 
 
-def _write(found: Plan, result: dict[str, Any], folder: RunFolder, figure: bool) -> None:
+def _keep(found: Plan, result: dict[str, Any], folder: RunFolder, figure: bool) -> None:
+    """Write the run folder; when that fails, write the plan elsewhere and say where."""
+    try:
+        _write(found, result, folder.path, figure)
+    except WriteError as error:
+        elsewhere = Path(tempfile.mkdtemp(prefix="kemba-kept-"))
+        try:
+            _write(found, result, elsewhere, figure=False)
+        except WriteError:
+            shutil.rmtree(elsewhere, ignore_errors=True)
+            raise error from None
+        hint = f"the plan is kept in {elsewhere}; {error.hint}"
+        raise type(error)(error.where, error.what, hint=hint) from None
+
+
+def _write(found: Plan, result: dict[str, Any], folder: Path, figure: bool) -> None:
     write_json(folder / "certificate.json", result)
     if not found.attempts:
         return  # refused before solving: there is no motion to write
@@ -106,5 +129,5 @@ def _write(found: Plan, result: dict[str, Any], folder: RunFolder, figure: bool)
     if figure:
         from kemba import plotting
 
-        sources = plotting.load_sources([folder.path])
+        sources = plotting.load_sources([folder])
         plotting.save_figure(plotting.draw(sources), folder / "figure.png")

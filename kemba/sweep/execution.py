@@ -13,9 +13,10 @@ from kemba.effects import Effect
 from kemba.effects.catalogue import BY_KIND
 from kemba.effects.mechanics.load import Payload
 from kemba.errors import KembaError, suggest
-from kemba.model import Model, load_model
+from kemba.model import Model
 from kemba.plant import Gains, Replay, execute
 from kemba.plant.execution.controller import read_controller
+from kemba.plant.execution.counterpart import PLAIN, counterpart
 from kemba.plant.execution.replay import first_row
 from kemba.plant.simulation.valves import scattered
 from kemba.quantity import to_si
@@ -29,13 +30,15 @@ from kemba.trajectory import Trajectory
 
 def execute_cases(expansion: Expansion, name: str, block: ExecuteBlock, folder: Path) -> list[Case]:
     """The cases of a block; its plan is made first when it is not there yet."""
-    plant = model_name(expansion, block.plant)
+    plant, planned = (
+        model_name(expansion, m) for m in (block.plant, _model(expansion, name, block))
+    )
     base = Document({**_planned(expansion, name, block), **_given(block.conditions)})
     works = []
     for values in sample(block, name, expansion.sweep.seed):
         conditions = parse(expansion.varied(base, name, values), Conditions)
         works.append((values, conditions))
-    model = load_model(plant)
+    model = counterpart(planned, plant=plant)
     try:
         for _, conditions in works:
             changed_effects(model, conditions)
@@ -49,6 +52,8 @@ def execute_cases(expansion: Expansion, name: str, block: ExecuteBlock, folder: 
         "plan_hash": [sha256(plan / f) for f in ("trajectory.csv", "controller.csv")],
         "plant": plant,
         "plant_hash": model_hash(plant),
+        "model": planned,
+        "model_hash": model_hash(planned),
     }
     return [
         Case(name, index, values, "kemba.sweep.work:execute_case",
@@ -69,6 +74,17 @@ def _planned(expansion: Expansion, name: str, block: ExecuteBlock) -> dict[str, 
         file = _run_folder(expansion, block.run) / "task.yaml"
         task = load_yaml(file).data if file.is_file() else {}
     return {key: task[key] for key in ("supply", "payload") if task.get(key) is not None}
+
+
+def _model(expansion: Expansion, name: str, block: ExecuteBlock) -> str:
+    """The model that the plan was made with: its robot and own effects are the plant's too."""
+    from kemba.ocp.task.task import parse_task
+
+    if block.run is None:
+        return parse_task(expansion.task_document(name)).model
+    file = _run_folder(expansion, block.run) / "task.yaml"
+    task = load_yaml(file).data if file.is_file() else {}
+    return str(task.get("model", PLAIN))
 
 
 def _run_folder(expansion: Expansion, run: str) -> Path:
@@ -101,8 +117,8 @@ def _plan_folder(expansion: Expansion, name: str, block: ExecuteBlock, folder: P
 def run_on_plant(work: Work) -> Replay:
     """The execution that a case asks for, compared with its plan."""
     conditions = parse(work["conditions"], Conditions)
-    plain = load_model(work["plant"])
-    model = load_model(work["plant"], changed_effects(plain, conditions), conditions.supply)
+    plain = counterpart(work["model"], supply=conditions.supply, plant=work["plant"])
+    model = plain.with_effects(changed_effects(plain, conditions))
     table = read_controller(work["plan"])
     rng = np.random.default_rng(conditions.seed)
     done = execute(

@@ -10,8 +10,9 @@ from typing import Any
 
 from kemba.config import Document, apply_overrides, find_config, load_yaml, parse, shipped_configs
 from kemba.config.document import Location
+from kemba.effects import BY_KIND
 from kemba.errors import KembaError
-from kemba.model.spec import load_spec
+from kemba.model.spec import load_spec, model_files
 from kemba.runs import sha256
 from kemba.sweep.case import content_hash
 from kemba.sweep.schema import Sweep
@@ -76,7 +77,7 @@ def model_name(expansion: Expansion, name: str) -> str:
 
 
 def model_hash(name: str) -> str:
-    """What a model's YAML and its robot's hold."""
-    spec = load_spec(name)
-    robot = find_config(spec.robot or "kemba", "robots")
-    return content_hash([spec.model_dump(mode="json"), sha256(robot)])
+    """What a model's YAML and its robot's hold, and the files of effects from outside."""
+    spec = load_spec(name).model_dump(mode="json", exclude={"robot"})  # its place does not matter
+    files = [sha256(path) for path in model_files(name)]
+    return content_hash([spec, *files, *BY_KIND.files.values()])

@@ -86,7 +86,7 @@ def bead(axes: str = "x", gravity: float = 0.0) -> Mechanism:
     weight = ca.SX([gravity if axis == "z" else 0.0 for axis in axes])
     named = zip(coordinates, velocities, strict=True)
     ports = {c.name: Port(c, w, q[i]) for i, (c, w) in enumerate(named)}
-    return Mechanism("bead", q, v, a, coordinates, velocities, a + weight, ports, ())
+    return Mechanism("bead", q, v, a, coordinates, velocities, a + weight, ports, (), gravity=9.81)
 
 
 def solve(

@@ -1,5 +1,6 @@
 """Contact and end stops: impacts, penetration, friction, step size."""
 
+import casadi as ca
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -64,6 +65,27 @@ def test_no_step_of_a_landing_adds_energy() -> None:
     assert done.impacts
     assert all(impact.lost >= 0.0 for impact in done.impacts)
     assert {label.split(":")[0] for i in done.impacts for label in i.labels} >= {"front/contact"}
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.1, 1.0])
+def test_the_energy_an_impact_loses_is_what_the_motion_loses(mu: float) -> None:
+    """Kinetic energy before less after, from the mass matrix alone; feet slide on at mu < 1."""
+    model = planning().with_effects([GroundFriction(mu=mu)])
+    q, _, s = initial_values(model, {})
+    v = np.zeros(len(q))
+    v[:2] = 1.0, -2.0  # forward and down
+    eq = equations_of(model)
+    advance = Advance(eq, 1e-4)
+    after = advance.begin(0.0, q, v, s)
+    (impact,) = advance.impacts
+    M = eq.now(q=q, v=v, s=s, u=np.zeros(eq.nu))["M"]
+    lost = 0.5 * float(v @ M @ v - after.v @ M @ after.v)
+    assert impact.lost == pytest.approx(lost, rel=1e-9) and lost > 1.0
+    q_, v_ = model.mechanism.q, model.mechanism.v
+    feet = ca.vertcat(*(model.mechanism.port(f"{leg}/foot/x").phi for leg in LEGS))
+    slip = ca.Function("slip", [q_, v_], [ca.jtimes(feet, q_, v_)])
+    slides = np.abs(np.asarray(slip(q, after.v))).max() > 0.1
+    assert slides == (mu < 1.0)
 
 
 def test_friction_stays_in_its_cone_and_against_the_slip() -> None:

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from kemba.mechanism import load_robot
 from kemba.model import Model
 from kemba.ocp.infeasibility.pose import Poses
 from kemba.ocp.task.requirement import Requirement
@@ -59,7 +58,7 @@ def flight_of(model: Model, requirements: Sequence[Requirement], poses: Poses) -
     if not highest or not resting or not grounded:
         return None
     requirement = max(highest, key=lambda w: w.lower)
-    robot = load_robot(model.mechanism.name)
+    robot = model.mechanism.need_robot()
     leg = robot.leg.femur.length + robot.leg.tibia.length
     if requirement.lower <= leg:
         return None
@@ -81,12 +80,13 @@ def flight_of(model: Model, requirements: Sequence[Requirement], poses: Poses) -
 
 def leg_swing(model: Model) -> float:
     """How far moving legs can shift the centre of mass at most, times the mass [kg.m]."""
-    leg = load_robot(model.mechanism.name).leg
+    robot = model.mechanism.need_robot()
+    leg = robot.leg
     shank = leg.femur.length + leg.tibia.com
-    rod = leg.piston.mount + leg.piston.retracted + leg.piston.stroke
+    rod = leg.piston.mount + leg.piston.retracted + robot.stroke
     arms = leg.femur.mass * leg.femur.com + leg.tibia.mass * shank
     arms += leg.cylinder.mass * (leg.piston.mount + leg.cylinder.com) + leg.rod.mass * rod
-    return 2 * len(model.mechanism.legs) * arms
+    return 2 * len(robot.legs) * arms
 
 
 def inertia_and_weight(model: Model) -> tuple[float, float]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial.polynomial import polyder, polyval
 
-from kemba.mechanism import Robot, load_robot
+from kemba.mechanism import Robot
 from kemba.mechanism.knee import extension, flexion
 from kemba.model import Model
 from kemba.ocp.relaxation.settings import Guess
@@ -106,7 +106,7 @@ def _landed(course: Course, duration: float, z: float) -> Course:
 def leg_pose(robot: Robot, fold: int, dx: np.ndarray, dz: np.ndarray) -> tuple[np.ndarray, ...]:
     """Hip angle and flexion [rad] (n,) that put the foot at (dx, dz) from the hip [m]."""
     f, t = robot.leg.femur.length, robot.leg.tibia.length
-    bends = sorted(flexion(robot.leg, x) for x in (0.0, robot.leg.piston.stroke))
+    bends = sorted(flexion(robot.leg, x) for x in (0.0, robot.stroke))
     length = np.hypot(dx, dz)
     cosine = np.clip((length**2 - f**2 - t**2) / (2 * f * t), -1, 1)
     bend = np.clip(np.arccos(cosine), bends[0], bends[1])
@@ -118,12 +118,12 @@ def automatic_guess(
     model: Model, task: Task, requirements: Sequence[Requirement], layout: Layout, nodes: int
 ) -> np.ndarray:
     """Start guess Y (nodes + 1, n) in the layout's scaled coordinates."""
-    robot = load_robot(model.mechanism.name)
+    robot = model.mechanism.need_robot()
     t = np.linspace(0.0, task.duration, nodes + 1)
     lengths = [
         np.hypot(f + b * np.cos(k), b * np.sin(k))
         for f, b in [(robot.leg.femur.length, robot.leg.tibia.length)]
-        for k in (flexion(robot.leg, x) for x in (0.0, robot.leg.piston.stroke))
+        for k in (flexion(robot.leg, x) for x in (0.0, robot.stroke))
     ]
     gravity = model.mechanism.gravity
     if task.guess == "standing":
@@ -182,12 +182,16 @@ def _efforts(
     s = np.tile([q.value for q in model.states.values()], (len(t), 1))
     u = np.zeros((len(t), len(model.inputs)))
     lam = np.zeros((len(t), len(model.forces)))
+    cylinder = model.mechanism.need_cylinder()
+    settings = Guess.current()
+    full = settings.filled * float(np.interp(model.supply, cylinder.pressures, cylinder.F_extend))
+    rise = settings.filling * max(cylinder.fill)
     for i, (leg, symbol) in enumerate(model.states):
         if symbol == "F_e" and leg in piston:
-            s[:, i] = np.clip(piston[leg], 0.0, 300.0)
+            s[:, i] = np.clip(piston[leg], 0.0, full)
     for i, (leg, symbol) in enumerate(model.inputs):
-        if symbol == "u_e" and leg in piston:
-            u[:, i] = np.clip((piston[leg] + 0.015 * np.gradient(piston[leg], t)) / 300.0, 0.0, 1.0)
+        if symbol == "u_e" and leg in piston:  # eq. 4 solved for the valve
+            u[:, i] = np.clip((piston[leg] + rise * np.gradient(piston[leg], t)) / full, 0.0, 1.0)
     for i, (_, symbol) in enumerate(model.forces):
         if symbol == "lam_n":
             lam[:, i] = share

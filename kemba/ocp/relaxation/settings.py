@@ -150,6 +150,14 @@ class Guess(Settings):
         0.05, "s", "shortest time in which the guess moves forward",
         "convention: keeps the speed finite without a flight",
     )  # fmt: skip
+    filled: float = setting(
+        300.0 / 324.0, "1", "largest chamber force of the guess, of the steady force",
+        "convention: a moving piston does not reach the steady force",
+    )  # fmt: skip
+    filling: float = setting(
+        0.6, "1", "time constant of the guess, of the fill time at full stroke",
+        "derived: 15 of 25 ms, the chamber in the middle of a push (Table I)",
+    )  # fmt: skip
     difference: float = setting(
         1e-4, "rad", "step of the knee in differences for virtual work",
         "derived: near the cube root of the rounding error",

@@ -51,7 +51,8 @@ def run_rig(
     rng = np.random.default_rng(seed)
     models: dict[float, Model] = {}
     sensors = Sensors(noise={"F": FORCE_NOISE, "x": 1e-5, "P": 1e3} if noise else {})
-    for test in rig.tests(rng):
+    first = models[rig.supplies[0]] = model(rig.supplies[0])
+    for test in rig.tests(rng, first.mechanism.stroke):
         if test.supply not in models:
             models[test.supply] = model(test.supply)
         piston = models[test.supply]

@@ -10,7 +10,6 @@ import casadi as ca
 import numpy as np
 
 from kemba.effects.base import At, Contribution, Effect
-from kemba.mechanism import load_robot
 from kemba.mechanism.pin_model import build_pin_model
 from kemba.mechanism.recursion import Joint, read_joints, rnea
 from kemba.mechanism.robot import tree_angles
@@ -88,7 +87,7 @@ def _places(effect: Effect, model: Model) -> Sequence[str]:
 def mass_regressors(model: Model) -> tuple[tuple[str, ...], ca.Function]:
     """Names and (q, v, a) -> (n, k): forces per share by which a link's mass or inertia is off."""
     m = model.mechanism
-    robot = load_robot(m.name)
+    robot = m.need_robot()
     tree = tree_angles(robot, m.q)
     rate = ca.jtimes(tree, m.q, m.v)
     acc = ca.jtimes(rate, m.q, m.v) + ca.jtimes(tree, m.q, m.a)
