@@ -35,7 +35,7 @@ class BenchLogSettings(Settings):
     forget: float = setting(
         0.12,
         "s",
-        "time after a gap with a switching in it until the chambers have forgotten when",
+        "time after which chambers do not depend on the moment of a switching",
         "derived: three times the slowest rise time of Table I",
     )
     neighbours: int = setting(
@@ -98,7 +98,7 @@ def prepare(name: str, log: Trajectory) -> BenchLog:
 
 
 def noise_of(channel: str, y: Array) -> float:
-    """White noise per sample; a simulation without any is still no better than its own steps."""
+    """White noise per sample; a small least noise is added, also for simulated logs without any."""
     settings = BenchLogSettings.current()
     least = settings.finest_force if channel == "piston/F" else settings.finest_pressure
     spread = float(np.ptp(y[np.isfinite(y)]))
@@ -106,8 +106,11 @@ def noise_of(channel: str, y: Array) -> float:
 
 
 def blind(time: Array, good: Flags, sent: Array) -> Flags:
-    """Rows (n,) in and just after gaps of the position, and of the time itself; when a valve has
-    switched meanwhile, until the chambers have forgotten when."""
+    """Rows (n,) that cannot be predicted: in and just after gaps of the position and of the time.
+
+    Where a valve switched within a gap, the moment is not known. The rows after such a gap count
+    again when the chambers no longer depend on that moment.
+    """
     settings = BenchLogSettings.current()
     known = np.flatnonzero(good)
     wide = np.flatnonzero(np.diff(time[known]) > settings.gap)

@@ -107,10 +107,10 @@ def unfinished(search: Search, best: Hypothesis) -> bool:
     """Whether so much structure is left that the answer cannot be complete."""
     settings = UnexplainedSettings.current()
     power, structure = structured(search, best)
-    if not best:
+    if not best or structure <= settings.structure:
         return structure > settings.structure
     before, _ = structured(search, NULL)
-    return structure > max(settings.structure, settings.left * max(before - power, 0.0))
+    return structure > settings.left * max(before - power, 0.0)
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,19 @@ from kemba.mechanism.pin_model import build_pin_model
 from kemba.mechanism.recursion import Joint, read_joints, rnea
 from kemba.mechanism.robot import tree_angles
 from kemba.model.model import Model
+from kemba.settings import Settings, setting
 
-SHARE = 0.02  # 1 sigma of a link's mass and inertia
+
+class ToleranceShareSettings(Settings):
+    """How well the links of a robot are known."""
+
+    share: float = setting(
+        0.02,
+        "1",
+        "prior sigma of a link's mass and inertia, as a share of it",
+        "convention: nominal figures are off by 1 to 3 %",
+        decides=True,
+    )
 
 
 def mass_regressors(model: Model) -> tuple[tuple[str, ...], ca.Function]:

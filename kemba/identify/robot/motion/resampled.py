@@ -11,12 +11,23 @@ import numpy as np
 from kemba.effects.pneumatics.switching import Pulse, pulses
 from kemba.effects.sensors import CHANNELS
 from kemba.identify.evidence.noise import WhiteNoiseSettings, difference_sigma
+from kemba.settings import BY_HAND, Settings, setting
 from kemba.trajectory import Trajectory
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
-SHORTEST, LONGEST = 0.7e-3, 1.6e-3  # s between nodes; denser rows are averaged, gaps filled
-FINEST = 1e-6  # m or rad: noise that is never undercut
+
+class ResamplingSettings(Settings):
+    """Nodes of robot logs."""
+
+    shortest: float = setting(0.7e-3, "s", "denser rows are averaged", BY_HAND)
+    longest: float = setting(1.6e-3, "s", "nodes farther apart are filled", BY_HAND)
+    finest: float = setting(
+        1e-6,
+        "1",
+        "smallest noise of a channel, in m or rad",
+        "convention: far below what position sensors resolve",
+    )
 
 
 @dataclass(frozen=True)
@@ -63,13 +74,13 @@ def _sigma(log: Trajectory, channel: str, values: Array) -> float:
             return float(noise[key])
     if np.isfinite(values).sum() < WhiteNoiseSettings.current().fewest:
         return CHANNELS[channel.split("/")[-1]][1]
-    return max(difference_sigma(values), FINEST)
+    return max(difference_sigma(values), ResamplingSettings.current().finest)
 
 
 def _thin(time: Array, raw: Array, torque: Array) -> tuple[Array, Array, Array, int]:
-    """Averages of so many rows that nodes are at least SHORTEST apart."""
+    """Averages of so many rows that nodes are at least `shortest` apart."""
     count = max(1, int(np.floor(1e-3 / max(np.median(np.diff(time)), 1e-9) + 0.3)))
-    if np.median(np.diff(time)) >= SHORTEST or count == 1:
+    if np.median(np.diff(time)) >= ResamplingSettings.current().shortest or count == 1:
         return time, raw, torque, 1
     n = len(time) // count * count
     with np.errstate(invalid="ignore"):
@@ -81,7 +92,9 @@ def _thin(time: Array, raw: Array, torque: Array) -> tuple[Array, Array, Array, 
 
 def _fill(time: Array, raw: Array, torque: Array) -> tuple[Array, Array, Array]:
     """Nodes without measurement where rows are far apart."""
-    pieces = np.maximum(1, np.ceil(np.diff(time) / LONGEST)).astype(int)
+    pieces = np.maximum(1, np.ceil(np.diff(time) / ResamplingSettings.current().longest)).astype(
+        int
+    )
     if (pieces == 1).all():
         return time, raw, torque
     start = np.repeat(np.arange(len(pieces)), pieces)
