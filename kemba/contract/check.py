@@ -67,7 +67,7 @@ CHECKS = (
     Check(physics.keeps_the_mirror, _on_legs),
     Check(physics.one_leg_only, _on_one_leg),
     Check(measuring.sensor_fault_can_be_undone, measuring.measures),
-    Check(measuring.nominal_figures_matter),
+    Check(measuring.nominal_figures_matter, measuring.moves),
 )
 
 

@@ -20,6 +20,11 @@ def measures(effect: type[Effect]) -> bool:
     return issubclass(effect, SensorEffect)
 
 
+def moves(effect: type[Effect]) -> bool:
+    """Whether the effect stands in the equations of motion."""
+    return effect.moves
+
+
 def sensor_fault_can_be_undone(placed: Placed) -> None:
     """A sensor fault changes what is measured, and `undone` is the inverse of `measured`."""
     fault = placed.on
@@ -40,6 +45,8 @@ def nominal_figures_matter(placed: Placed) -> None:
     for name, tolerance in effect.nominal.items():
         if name not in type(effect).model_fields:
             raise Broken(f"`nominal` names '{name}', which is no field")
+        if not getattr(effect, name):
+            raise Broken(f"{name} has a tolerance, but no value")
         if not tolerance.source:
             raise Broken(f"{name}: its tolerance has no source")
     tolerances = effect.tolerances()
