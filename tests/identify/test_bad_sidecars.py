@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from kemba.errors import KembaError
-from kemba.identify.compare.from_logs import compare_logs
+from kemba.identify.compare_logs import compare_logs
 from kemba.identify.logs.gate import BadData, check_logs
 from kemba.identify.logs.reading import read_log
 from kemba.trajectory import Trajectory

@@ -13,8 +13,8 @@ from robot_logs import hops
 from kemba.effects import BY_KIND
 from kemba.effects.sensors import SensorBias, SensorEffect
 from kemba.effects.series import Series
-from kemba.identify.bench import bench_problem
-from kemba.identify.robot import robot_problem
+from kemba.identify.bench.problem import bench_problem
+from kemba.identify.robot.problem import robot_problem
 from kemba.model import load_model
 from kemba.plant.execution.sensors import Sensors, take_log
 from kemba.quantity import Param
@@ -53,7 +53,8 @@ class SensorDrift(SensorEffect):
 @pytest.fixture
 def drift(monkeypatch: pytest.MonkeyPatch) -> None:
     """The catalogue with one more kind of fault."""
-    monkeypatch.setitem(BY_KIND, "sensor_drift", SensorDrift)
+    monkeypatch.setattr(BY_KIND, "_kinds", {**BY_KIND, "sensor_drift": SensorDrift})
+    monkeypatch.setattr(BY_KIND, "_union", None)
 
 
 def drifted(log: Trajectory, header: str, rate: float) -> Trajectory:
@@ -87,7 +88,7 @@ def test_one_class_brings_a_fault_to_the_robot() -> None:
     theta = {f"{name}.rate": rate}
     assert problem.candidates[name].sensor and problem.is_straight(f"{name}.rate")
     assert np.mean(problem.residual({}) ** 2) > 1.2 * clean
-    problem.relinearise(theta)
+    problem = problem.relinearise(theta)
     assert np.mean(problem.residual(theta) ** 2) == pytest.approx(clean, rel=0.05)
 
 
