@@ -1,8 +1,4 @@
-<<<<<<< HEAD
-"""Contacts of feet and stops, read from the measured motion and never from a plan."""
-=======
 """Contacts of feet and end stops, read from the measured motion and never from a plan."""
->>>>>>> wC
 
 from __future__ import annotations
 
@@ -147,11 +143,7 @@ def read_schedule(time: Array, feet: Array, pistons: Array, stroke: float, body:
 
 
 def _after(flags: Flags, steps: float) -> Flags:
-<<<<<<< HEAD
-    """The first `steps` nodes of each stretch of true `flags` (n,)."""
-=======
     """Flags (n,) of the first `steps` nodes of each stretch in which `flags` (n,) hold."""
->>>>>>> wC
     begin = flags & ~np.append(True, flags[:-1])
     return np.asarray(np.convolve(begin, np.ones(max(1, round(steps))))[: len(flags)] > 0)
 
