@@ -16,11 +16,12 @@ from kemba.effects.catalogue import (
     ValveCloseDelay,
     ValveDelay,
 )
-from kemba.effects.pneumatics.constants import AREA_E, AREA_R
 from kemba.errors import KembaError
-from kemba.model import Model, load_model, load_spec
-from kemba.model.spec import build_model
+from kemba.mechanism import load_cylinder
+from kemba.model import Model, build_model, load_model, load_spec
 
+CYLINDER = load_cylinder("dsnu-25-70")
+AREA_E, AREA_R = CYLINDER.area_extend, CYLINDER.area_retract
 X, V = 0.02, 0.3
 
 

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Literal, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol
 
 import casadi as ca
 from pydantic import BaseModel, ConfigDict, field_validator
+from typing_extensions import Self
 
 from kemba.quantity import Param, Quantity
+
+if TYPE_CHECKING:
+    from kemba.mechanism import Cylinder
 
 
 @dataclass(frozen=True)
@@ -67,7 +71,6 @@ class At(Protocol):
 
     supply: float  # Pa
     gravity: float  # m.s-2
-    stroke: float  # m
     body_mass: float  # kg, of the body link alone
     piston: PortAt
     hip: PortAt
@@ -76,6 +79,14 @@ class At(Protocol):
     body_x: PortAt
     body_z: PortAt
     pitch: PortAt
+
+    @property
+    def cylinder(self) -> Cylinder:
+        """The cylinder of every leg: bore, areas, tube volume."""
+
+    @property
+    def stroke(self) -> float:
+        """Way of the piston [m]."""
 
     @property
     def legs(self) -> list[At]:
@@ -104,7 +115,7 @@ class Effect(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     kind: str
-    on: Literal["front", "rear"] | None = None
+    on: str | None = None
 
     place: ClassVar[Literal["leg", "body"]] = "leg"
     family: ClassVar[str] = ""
@@ -168,7 +179,7 @@ class Effect(BaseModel):
         found = {}
         for name, info in cls.model_fields.items():
             params = [m for m in info.metadata if isinstance(m, Param)]
-            if params and info.annotation is float:
+            if params and info.annotation in (float, float | None):
                 found[name] = params[0]
         return found
 
@@ -187,6 +198,15 @@ class Effect(BaseModel):
     def bind(self, values: Mapping[str, Any]) -> Effect:
         """The same effect with parameters replaced, by numbers or by symbols, unchecked."""
         return self.model_copy(update=dict(values))
+
+    def of_cylinder(self, cylinder: Cylinder) -> Self:
+        """The same effect with the figures that it leaves open (None) taken from the cylinder."""
+        return self
+
+    def remarks(self, supply: float) -> list[str]:
+        """What a user should know of the figures at this supply pressure [Pa]. Raises KembaError
+        where they cannot be."""
+        return []
 
     def listed(self) -> dict[str, Any]:
         """The effect as an item of a model's YAML list."""

@@ -50,7 +50,7 @@ class SensorEffect(Effect):
             endings = ", ".join(CHANNELS)
             raise ValueError(
                 f"'{channel}' is not a measured channel; a column such as body/pitch or "
-                f"front/piston/x was expected (ending in one of: {endings})"
+                f"<leg>/piston/x was expected (ending in one of: {endings})"
             )
         return path
 
@@ -58,7 +58,7 @@ class SensorEffect(Effect):
     @classmethod
     def _one_leg(cls, on: str | None) -> str | None:
         if on is not None:
-            raise ValueError("a sensor is chosen by `channel`, such as front/piston/x, not by `on`")
+            raise ValueError("a sensor is chosen by `channel`, such as <leg>/piston/x, not by `on`")
         return on
 
     @property

@@ -20,7 +20,8 @@ from kemba.quantity import Param, Quantity
 class Model:
     """A mechanism with effects; the order of the list does not matter.
 
-    `supply` is the air pressure [Pa] at which the tables of the effects are read.
+    `supply` is the air pressure [Pa] at which the tables of the effects are read; `remarks` say
+    where that is outside of what was measured. What an effect leaves open is the cylinder's.
     """
 
     def __init__(
@@ -30,8 +31,11 @@ class Model:
         supply: float = 0.7e6,
         name: str = "model",
     ) -> None:
-        self.mechanism, self.effects = mechanism, tuple(effects)
+        self.mechanism = mechanism
+        cylinder = mechanism.cylinder
+        self.effects = tuple(e.of_cylinder(cylinder) if cylinder else e for e in effects)
         self.supply, self.name = supply, name
+        self.remarks = [text for e in self.effects for text in e.remarks(supply)]
         self.instances = place_effects(mechanism, self.effects)
         self.states = self._variables("states")
         self.inputs = self._variables("inputs")

@@ -12,8 +12,8 @@ import pytest
 from kemba.effects import BY_KIND
 from kemba.effects.base import Effect
 from kemba.identify.adopt import adopt_effect
-from kemba.identify.bench import bench_problem
 from kemba.identify.bench.motion import SmoothedMotion
+from kemba.identify.bench.problem import bench_problem
 from kemba.identify.bench.rig_model import RigModel
 from kemba.identify.bench.switching import delayed, is_on, pulses
 from kemba.identify.experiment import propose
@@ -86,11 +86,11 @@ def test_pressures_are_read_when_there_are_any(bench_log: BenchLog) -> None:
     log = bench_log()
     model = load_model(rig=True)
     bare = bench_problem([log], model)
-    states = bare.predictor.predict(bare.logs[0], {}).states
+    states = bare.predicted.predictor.predict(bare.logs[0], {}).states
     from kemba.identify.bench.pressure import absolute_pressure
 
     columns = {
-        f"{c} [Pa]": absolute_pressure(c, states)
+        f"{c} [Pa]": absolute_pressure(c, states, model.mechanism.need_cylinder())
         + 500 * np.random.default_rng(0).standard_normal(len(log))
         for c in ("chamber/extend/P", "chamber/retract/P")
     }

@@ -3,29 +3,23 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Mapping
 
 import numpy as np
 import pytest
 
 from kemba.identify.answer import Answer, Ranked, phrase
-from kemba.identify.discover import DEFECT, discover, doubts_about, material, values
-from kemba.identify.doubt.cross_validation import Gain, left_out, predicted_error
-from kemba.identify.evidence.problem import (
-    Array,
-    Candidate,
-    Parameter,
-    Rows,
-    Theta,
-    secant_jacobian,
-)
+from kemba.identify.discover import discover, doubts_about, material
+from kemba.identify.doubt.cross_validation import Gain, left_out, left_out_error
+from kemba.identify.evidence.problem import Array, Candidate, Parameter, Problem, Rows, Theta
 from kemba.identify.evidence.search import Search
-from kemba.identify.evidence.spike_slab import probabilities
+from kemba.identify.evidence.spike_slab import SpikeSlabSettings, probabilities
+from kemba.identify.ranking import values
 
 EFFECTS = ("bend", "drag", "kick", "twin", "wave")
 
 
-class Toy:
+class Toy(Problem):
     """y(t) = gain * u(t) + effects; `twin` is nearly `drag`, so the two cannot be told apart."""
 
     def __init__(self, truth: Mapping[str, float], seed: int = 0, runs: int = 3) -> None:
@@ -55,11 +49,6 @@ class Toy:
         for name, shape in self._shapes.items():
             y = y + theta.get(f"{name}.a", 0.0) * shape
         return np.asarray(y - self.measured)
-
-    def jacobian(
-        self, theta: Theta, names: Iterable[str], runs: Collection[int] | None = None
-    ) -> Array:
-        return secant_jacobian(self, theta, names, runs)
 
     def rows(self, runs: Collection[int] | None = None) -> Rows:
         n = len(self._time)
@@ -198,7 +187,7 @@ def test_the_error_of_prediction_counts_what_the_fit_did_not_see() -> None:
     """Five effects and a gain free on noise alone: blocks that were seen have less error than the
     noise, left-out ones more."""
     found = [searched(Toy({}, seed)) for seed in range(6)]
-    errors = [predicted_error(s, s.points["kick",]) for s in found]
+    errors = [left_out_error(s, ("kick",)) for s in found]
     fitted = [np.sqrt(2 * s.points["kick",].fit.cost / 2400) for s in found]
     assert np.mean(errors) > np.mean(fitted)
     assert np.mean(errors) == pytest.approx(1.0, abs=0.03)
@@ -212,7 +201,7 @@ def test_intervals_are_1_96_sigma_either_way(size: float) -> None:
     found = discover(problem)
     value = values(found.search, ("kick",), "kick")["a"]
     noise = 1.0 / float(np.linalg.norm(problem._shapes["kick"]))
-    sigma = np.hypot(noise, DEFECT * value.value)
+    sigma = np.hypot(noise, SpikeSlabSettings.current().spike * value.value)
     assert value.high - value.value == pytest.approx(1.96 * sigma, rel=0.05)
     assert value.value - value.low == pytest.approx(1.96 * sigma, rel=0.05)
 

@@ -11,19 +11,21 @@ from ocp.toys import Push, bead, solve
 
 from kemba.model import load_model
 from kemba.ocp import load_task
-from kemba.ocp.nlp.ipopt import Ipopt, Iterate, Parameters
+from kemba.ocp.nlp.ending import Ending
+from kemba.ocp.nlp.ipopt import Ipopt, Iterate
 from kemba.ocp.relaxation.lifting import confirm
-from kemba.ocp.relaxation.schedule import Schedule
+from kemba.ocp.relaxation.session import Schedule
 from kemba.ocp.task.requirement import resolve
+from kemba.ocp.transcription.parameters import Parameters
 from kemba.ocp.transcription.symmetry import whole
 from kemba.ocp.transcription.transcribe import Transcription
 
 
 def test_a_plan_that_falls_short_on_the_whole_robot_is_solved_there() -> None:
     """A start guess is no plan of the whole robot, whatever is said of it on the half one."""
-    half, full = program(True), Ipopt(program(False), {"max_iter": 1})
-    search = Schedule(full, 1e-6)
-    confirm(search, half, Iterate(guess(half), message="Solve_Succeeded"))
+    half, full = program(True), program(False)
+    search = Schedule(full, Ipopt(full, {"max_iter": 1}))
+    confirm(search, half, Iterate(guess(half), ending=Ending.SOLVED))
     (attempt,) = search.attempts
     assert (attempt.name, attempt.iterations) == ("whole robot", 1)
 
@@ -53,8 +55,8 @@ def test_bounds_count_where_the_rows_are_met() -> None:
     )
     near = good.copy()
     near[3, layout.slices["v"]] += 0.01
-    search = Schedule(Ipopt(found), 1e-6)
-    kept = search.better(Iterate(strong), Iterate(near, message="stop"), Parameters(0.0))
+    search = Schedule(found, Ipopt(found))
+    kept = search.better(Iterate(strong), Iterate(near, ending=Ending.INTERRUPTED), Parameters(0.0))
     assert np.array_equal(kept.Y, near)
 
 
@@ -67,7 +69,7 @@ def test_valves_are_rounded_to_what_the_task_lets_dwell() -> None:
         Y, column = np.zeros(t.shape), t.layout.binary[0]
         Y[:, t.layout.slices["h"]] = guess(t)[:, t.layout.slices["h"]]
         Y[3, column] = 0.9
-        rounded = Schedule(Ipopt(t), 1e-6).valves(Iterate(Y))[column]
+        rounded = Schedule(t, Ipopt(t)).valves(Iterate(Y))[column]
         assert rounded.tolist() == [0.0, 0.0, 0.0, float(stays), 0.0, 0.0]
 
 
@@ -79,10 +81,10 @@ def test_a_stop_keeps_the_less_violated_iterate(group: str, solved_last: bool) -
     bad = good.copy()
     bad[3, found.layout.slices[group]] += 10.0
     start, point = (bad, good) if solved_last else (good, bad)
-    search, stopped = Schedule(Ipopt(found), 1e-6), Iterate(point, message="User_Requested_Stop")
+    search, stopped = Schedule(found, Ipopt(found)), Iterate(point, ending=Ending.INTERRUPTED)
     kept = search.better(Iterate(start), stopped, Parameters(0.0))
     assert np.array_equal(kept.Y, good)
-    assert kept.message == "User_Requested_Stop"
+    assert kept.ending is Ending.INTERRUPTED
 
 
 def test_relaxing_allows_pairs_as_much_as_it_says_and_nothing_else() -> None:

@@ -89,10 +89,11 @@ def test_half_a_plan_is_a_whole_one() -> None:
     requirements = resolve(task, model, document)
     half = find_symmetry(model)
     assert half is not None
-    search = Planner(task, model, requirements, deadline=math.inf).search(task.nodes, half)
-    transcription = search.transcription
-    point = find(search, Planner(task, model, requirements).guess(transcription))
-    point = tighten(search, fix(search, point))
+    planner = Planner(task, model, requirements)
+    schedule = planner.schedule(task.nodes, half)
+    transcription = schedule.transcription
+    point = find(schedule, planner.guess(transcription))
+    point = tighten(schedule, fix(schedule, point))
     assert point.solved
     found = certify(model, task, requirements, to_trajectory(transcription, point.Y))
     assert found.within(task.tolerances), found.worst

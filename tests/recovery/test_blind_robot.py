@@ -13,7 +13,7 @@ from twin.cases import robot_case
 
 from kemba.identify.answer import Answer
 from kemba.identify.discover import discover
-from kemba.identify.robot import robot_problem
+from kemba.identify.robot.problem import robot_problem
 from kemba.identify.workflow import discover_logs
 from kemba.model.spec import load_model
 

@@ -59,9 +59,11 @@ class Predictor:
         """Per channel (n,): what should have been measured, and its variance."""
         p = self.predict(run, theta, start)
         out = {"piston/F": _force(p, run, theta)}
+        cylinder = self.model.mechanism.need_cylinder()
         for channel in PRESSURES:
             if channel in run.measured:
-                out[channel] = _pressure(channel, p, run, theta)
+                value = absolute_pressure(channel, p.states, cylinder)
+                out[channel] = _pressure(channel, value, run, theta)
         return out
 
     def acting(self, run: BenchLog, theta: Theta) -> Array:
@@ -98,8 +100,7 @@ def _force(p: Prediction, run: BenchLog, theta: Theta) -> tuple[Array, Array]:
     return force, variance
 
 
-def _pressure(channel: str, p: Prediction, run: BenchLog, theta: Theta) -> tuple[Array, Array]:
-    value = absolute_pressure(channel, p.states)
+def _pressure(channel: str, value: Array, run: BenchLog, theta: Theta) -> tuple[Array, Array]:
     gain, offset = theta.get(f"gain:{channel}", 1.0), theta.get(f"offset:{channel}", 0.0)
     return gain * value + offset, np.full(len(value), run.sigma[channel] ** 2)
 

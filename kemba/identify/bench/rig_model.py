@@ -15,16 +15,35 @@ from kemba.identify.bench.motion import SmoothedMotion
 from kemba.identify.bench.switching import delayed, edges, is_on
 from kemba.identify.evidence.problem import Array
 from kemba.model.model import Model
+from kemba.settings import BY_HAND, Settings, setting
 
-LONGEST_STEP = 1.5e-3  # s; the fastest chamber answers in 8 ms
-NEWTON, STILL = 12, 1e-9  # steps to equilibrium, and share of a state per second that is rest
-WAITING = 0.5e-3  # s, steps in which chambers are left to settle
-CHUNK = 512  # steps per call of a compiled map
 # The velocity is known within v_sigma: the force is its mean over three Gauss-Hermite nodes
 V_NODES, V_MIDDLE = ((-np.sqrt(3.0), 1 / 6), (np.sqrt(3.0), 1 / 6)), 2 / 3  # sigma, weight
-BLUR = 0.75e-3  # s; no log says on which side of a switching instant its sample was taken
 
 Pulses = tuple[list[tuple[float, float]], list[tuple[float, float]]]  # of both valves
+
+
+class RigModelSettings(Settings):
+    """Integration of the chambers along an imposed motion."""
+
+    step: float = setting(
+        1.5e-3, "s", "longest step", "derived: a fifth of the fastest rise time of Table I, 8 ms"
+    )
+    newton: int = setting(12, "1", "most Newton steps to equilibrium", BY_HAND)
+    still: float = setting(
+        1e-9, "s-1", "relative rate of a state below which it rests", "convention: near rounding"
+    )
+    waiting: float = setting(
+        0.5e-3, "s", "steps in which chambers settle where Newton's method fails", BY_HAND
+    )
+    chunk: int = setting(512, "1", "steps per call of a compiled function", BY_HAND)
+    blur: float = setting(
+        0.75e-3,
+        "s",
+        "time around a switching in which its effect on a sample is uncertain",
+        "derived: over half a row of 1 ms; a log does not say on which side its sample was taken",
+        decides=True,
+    )
 
 
 @dataclass(frozen=True)
@@ -106,11 +125,12 @@ class RigModel:
         drive = np.stack(
             [np.diff(times), x[:-1], v[:-1], a[:-1], xm, vm, am, x[1:], v[1:], a[1:], *u[:, :-1]]
         )
-        drive = np.pad(drive, ((0, 0), (0, -n % CHUNK)))  # steps of no length at the end
-        fixed = np.repeat(p[:, None], CHUNK, axis=1)
-        step, states = self._mapped("step", CHUNK), [s0[:, None]]
-        for i in range(0, drive.shape[1], CHUNK):
-            states.append(step(states[-1][:, -1], drive[:, i : i + CHUNK], fixed))
+        chunk = RigModelSettings.current().chunk
+        drive = np.pad(drive, ((0, 0), (0, -n % chunk)))  # steps of no length at the end
+        fixed = np.repeat(p[:, None], chunk, axis=1)
+        step, states = self._mapped("step", chunk), [s0[:, None]]
+        for i in range(0, drive.shape[1], chunk):
+            states.append(step(states[-1][:, -1], drive[:, i : i + chunk], fixed))
         return np.concatenate(states, axis=1)[:, : n + 1]
 
     def _equilibrium(self, motion: Array, u: Array, p: Array) -> Array:
@@ -119,10 +139,12 @@ class RigModel:
         if (
             not done
         ):  # the flow through an orifice is steep: wait until the chambers are nearly there
-            drive = np.concatenate([[WAITING], motion, motion, motion, u])
-            still = np.repeat(drive[:, None], CHUNK, axis=1)
-            waited = self._mapped("step", CHUNK)(
-                self._start, still, np.repeat(p[:, None], CHUNK, 1)
+            settings = RigModelSettings.current()
+            chunk = settings.chunk
+            drive = np.concatenate([[settings.waiting], motion, motion, motion, u])
+            still = np.repeat(drive[:, None], chunk, axis=1)
+            waited = self._mapped("step", chunk)(
+                self._start, still, np.repeat(p[:, None], chunk, 1)
             )
             s, done = self._newton(waited[:, -1], motion, u, p)
             s = s if done else waited[:, -1]
@@ -130,9 +152,10 @@ class RigModel:
 
     def _newton(self, s: Array, motion: Array, u: Array, p: Array) -> tuple[Array, bool]:
         """States at rest near s, and whether they were found."""
-        for _ in range(NEWTON):
+        settings = RigModelSettings.current()
+        for _ in range(settings.newton):
             rate, slope = (np.asarray(part) for part in self._rate(s, *motion, u, p))
-            if np.all(np.abs(rate.ravel()) <= STILL * (1.0 + np.abs(s))):
+            if np.all(np.abs(rate.ravel()) <= settings.still * (1.0 + np.abs(s))):
                 return s, True
             if not (np.all(np.isfinite(rate)) and np.all(np.isfinite(slope))):
                 break
@@ -187,7 +210,7 @@ def _breakpoints(samples: Array, events: Array) -> tuple[Array, Any]:
     Their number depends on the number of events only, so that compiled maps are reused.
     """
     inside = np.clip(events, samples[0], samples[-1])
-    pieces = np.ceil(np.diff(samples) / LONGEST_STEP - 1e-6).astype(int)
+    pieces = np.ceil(np.diff(samples) / RigModelSettings.current().step - 1e-6).astype(int)
     fill = [
         np.linspace(samples[i], samples[i + 1], pieces[i] + 1)[1:-1]
         for i in np.flatnonzero(pieces > 1)
@@ -200,16 +223,17 @@ def _breakpoints(samples: Array, events: Array) -> tuple[Array, Any]:
 
 
 def share(intervals: Array, times: Array) -> Array:
-    """Share of [t - BLUR, t + BLUR] in which the valve is on: continuous in any delay."""
+    """Share of [t - blur, t + blur] in which the valve is on: continuous in any delay."""
     flat = np.clip(intervals, times[0] - 1.0, times[-1] + 1.0).ravel()
     if not len(flat):
         return np.zeros(len(times))
     knots = np.concatenate([[times[0] - 1.5], flat, [times[-1] + 1.5]])
     slope = np.arange(len(knots) - 1) % 2
     on_time = np.concatenate([[0.0], np.cumsum(slope * np.diff(knots))])
-    later = np.interp(times + BLUR, knots, on_time)
-    earlier = np.interp(times - BLUR, knots, on_time)
-    return np.asarray(np.clip((later - earlier) / (2 * BLUR), 0.0, 1.0))
+    blur = RigModelSettings.current().blur
+    later = np.interp(times + blur, knots, on_time)
+    earlier = np.interp(times - blur, knots, on_time)
+    return np.asarray(np.clip((later - earlier) / (2 * blur), 0.0, 1.0))
 
 
 def _columns(motion: SmoothedMotion) -> tuple[Array, Array, Array]:

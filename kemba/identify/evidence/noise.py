@@ -10,11 +10,30 @@ from scipy.ndimage import maximum_filter1d, uniform_filter1d
 from scipy.signal import lfilter
 
 from kemba.identify.evidence.problem import Array
+from kemba.settings import BY_HAND, Settings, setting
 
-ORDER = 4
-SPIKE, AROUND, SPIKY = 7, 151, 5.0  # rows, rows, ratio of mean squares
-LEAST = 0.6  # of the white noise: what a flexible model leaves is never believed to be less
-TRIM = 5.0  # rows beyond so many sigma are switching instants, not noise
+
+class NoiseSettings(Settings):
+    """How the colour of the noise is learnt."""
+
+    order: int = setting(
+        4, "1", "largest order of the autoregression", "literature: BIC chooses among 0 to this"
+    )
+    fewest: int = setting(50, "1", "rows below which no colour is learnt", BY_HAND)
+    least: float = setting(
+        0.6,
+        "1",
+        "smallest noise that is believed, as a share of the sensor's white noise; a flexible model "
+        "fits some of the noise",
+        BY_HAND,
+    )
+    trim: float = setting(
+        5.0, "1", "residuals beyond so many sigma are clipped: they are switching instants", BY_HAND
+    )
+    softest: float = setting(0.2, "1", "smallest sigma that the clipping assumes", BY_HAND)
+    spike: int = setting(7, "1", "rows that a spike lasts", BY_HAND)
+    around: int = setting(151, "1", "rows around a spike that it is compared with", BY_HAND)
+    spiky: float = setting(5.0, "1", "ratio of mean squares that makes a spike", BY_HAND)
 
 
 def difference_sigma(values: Array) -> float:
@@ -46,19 +65,24 @@ class Colour:
         return float(self.sigma * np.sqrt(np.sum(response**2)))
 
 
-def learn(residual: Array, order: int = ORDER, careful: bool = False) -> Colour:
-    """Yule-Walker fit, order by BIC; `careful`: spikes get less weight from now on."""
+def learn(residual: Array, order: int | None = None, careful: bool = False) -> Colour:
+    """Yule-Walker fit to a residual (n,), its order by BIC up to `order` (None: the setting).
+
+    `careful`: spikes get less weight from now on.
+    """
+    order = NoiseSettings.current().order if order is None else order
     weight = caution(residual) if careful else None
     found = _yule_walker(residual if weight is None else residual * weight, order)
     return replace(found, weight=weight)
 
 
 def _yule_walker(residual: Array, order: int) -> Colour:
-    scale = max(1.4826 * float(np.median(np.abs(residual))), 0.2)
-    r = np.clip(residual, -TRIM * scale, TRIM * scale)
+    settings = NoiseSettings.current()
+    scale = max(1.4826 * float(np.median(np.abs(residual))), settings.softest)
+    r = np.clip(residual, -settings.trim * scale, settings.trim * scale)
     n = len(r)
-    if n < 50:
-        return Colour(np.zeros(0), max(float(np.sqrt(np.mean(r**2))), LEAST))
+    if n < settings.fewest:
+        return Colour(np.zeros(0), max(float(np.sqrt(np.mean(r**2))), settings.least))
     c = np.array([np.dot(r[: n - k], r[k:]) / n for k in range(order + 1)])
     best, chosen = np.inf, (np.zeros(0), float(c[0]))
     for p in range(order + 1):
@@ -67,19 +91,19 @@ def _yule_walker(residual: Array, order: int) -> Colour:
         bic = n * np.log(power) + p * np.log(n)
         if bic < best - 1e-9:
             best, chosen = bic, (phi, power)
-    return Colour(chosen[0], max(float(np.sqrt(chosen[1])), LEAST))
+    return Colour(chosen[0], max(float(np.sqrt(chosen[1])), settings.least))
 
 
 def caution(residual: Array) -> Array:
-    """Weights (n,) that silence spikes: a few rows far off amid rows that are not.
+    """Weights (n,) that silence spikes: a few rows with a large error among rows with a small one.
 
-    Switching instants and reversals are where the imposed motion is known worst. What is off for
-    long is left alone: it may be physics.
+    At switching instants and reversals the imposed motion is known worst. An error that lasts is
+    left alone: it may be physics.
     """
-    power = residual**2
-    near, around = uniform_filter1d(power, SPIKE), uniform_filter1d(power, AROUND)
-    spike = near > SPIKY * np.maximum(around, 1.0)
-    spike = maximum_filter1d(spike, SPIKE)
+    settings, power = NoiseSettings.current(), residual**2
+    near, around = (uniform_filter1d(power, rows) for rows in (settings.spike, settings.around))
+    spike = near > settings.spiky * np.maximum(around, 1.0)
+    spike = maximum_filter1d(spike, settings.spike)
     return np.where(spike, 1.0 / np.sqrt(np.maximum(near, 1.0)), 1.0)
 
 

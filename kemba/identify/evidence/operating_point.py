@@ -1,56 +1,21 @@
-"""In what surroundings each residual row was taken: where its piston was, how fast, how loaded."""
+"""Where each residual row was taken: region of the stroke, and the push of the air on the rod."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from kemba.effects.pneumatics.constants import AREA_E, AREA_R, ATMOSPHERE
-from kemba.identify.evidence.problem import Array, Labels, Problem, Rows
-
-END = 0.010  # m from the end of a stroke that counts as its end; a cushion is as long
-REGIONS = ("in", "mid", "out")
+from kemba.effects.pneumatics.constants import ATMOSPHERE
+from kemba.identify.evidence.types import Array
+from kemba.mechanism import Cylinder
 
 
-@dataclass(frozen=True)
-class OperatingPoint:
-    """Per row (n,): the piston of the row's leg (of the body: the front leg's) at `x` [m], moving
-    at `v` [m.s-1], pushed by the model's air with `force` [N]; `stroke` [m]."""
-
-    x: Array
-    v: Array
-    force: Array
-    stroke: float
-
-    def regions(self) -> Labels:
-        """Index (n,) into REGIONS: near the retracted end, between, near the extended end."""
-        ends = np.array([END, self.stroke - END])
-        return np.asarray(np.searchsorted(ends, self.x, side="right"))
-
-
-@runtime_checkable
-class HasOperatingPoint(Protocol):
-    """A problem that knows the surroundings of its rows."""
-
-    def operating_point(self) -> OperatingPoint:
-        """Those of every row of `rows()`, in the same order."""
-
-
-def region_labels(problem: Problem, rows: Rows) -> tuple[OperatingPoint | None, Labels]:
-    """Surroundings where the problem knows them, and the region's label of every row."""
-    if not isinstance(problem, HasOperatingPoint):
-        return None, np.full(len(rows), "", dtype=object)
-    around = problem.operating_point()
-    return around, np.array(REGIONS, dtype=object)[around.regions()]
-
-
-def air_force(states: Mapping[str, Array], prefix: str = "") -> Array:
+def air_force(states: Mapping[str, Array], cylinder: Cylinder, prefix: str = "") -> Array:
     """Push of the air on a rod [N] from the chambers' states by name, in force or in pressure."""
     push = []
-    for chamber, area in (("extend", AREA_E), ("retract", AREA_R)):
+    areas = {"extend": cylinder.area_extend, "retract": cylinder.area_retract}
+    for chamber, area in areas.items():
         name = f"{prefix}chamber/{chamber}/"
         known = states.get(f"{name}F")
         push.append((states[f"{name}P"] - ATMOSPHERE) * area if known is None else known)

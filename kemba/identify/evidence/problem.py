@@ -1,165 +1,224 @@
-"""The contract between data and search: logs under one model as whitened residuals.
+"""The contract between logs and search: a set of logs under one model, as whitened residuals.
 
-A bench log and a robot log differ in everything but this. Whoever implements `Problem` owns the
-prediction and the noise; ranking, search, confirmation and the answer work on any of them.
+A bench log and a robot log differ in everything but this contract. A subclass of `Problem` owns
+the prediction and the noise. Ranking, search, doubts and the answer work on any `Problem`.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass, field
-from typing import Any, Protocol, runtime_checkable
+from abc import ABC, abstractmethod
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
 import numpy as np
+from typing_extensions import Self
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
-Flags = np.ndarray[Any, np.dtype[np.bool_]]
-Labels = np.ndarray[Any, np.dtype[np.int_]]
-Theta = Mapping[str, float]  # "seal_friction.F_c" and nuisance names; absent = off, or nominal
+from kemba.identify.evidence.types import (
+    Array,
+    Candidate,
+    Changes,
+    Flags,
+    ForceChannel,
+    Labels,
+    Leftover,
+    MissingForce,
+    OperatingPoint,
+    Parameter,
+    Rows,
+    Texts,
+    Theta,
+)
+from kemba.settings import BY_HAND, Settings, setting
 
-
-@dataclass(frozen=True)
-class Parameter:
-    """One number of an effect: `off` is its value when the effect is absent.
-
-    `size` is the prior width about `off` (a switch) or, in ln units, about `typical` (a shape).
-    """
-
-    name: str
-    unit: str = "1"
-    off: float = 0.0
-    size: float = 1.0
-    lower: float = -math.inf
-    upper: float = math.inf
-    typical: float = math.nan  # of a shape parameter: where a fit starts
-
-    @property
-    def signed(self) -> bool:
-        """Whether values on both sides of `off` are possible."""
-        return self.lower < self.off
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """An effect that may be missing: `lead` switches it on, `shapes` matter only when it is on."""
-
-    effect: str
-    lead: Parameter
-    shapes: tuple[Parameter, ...] = ()
-    sensor: bool = False
-    # searched as 1/value, reported as the catalogue has it: {"softness": ("k", "N.m-1")}
-    reciprocal: Mapping[str, tuple[str, str]] = field(default_factory=dict)
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        return (self.lead, *self.shapes)
-
-    @property
-    def key(self) -> str:
-        """Name of the switch in theta: `seal_friction.F_c`."""
-        return f"{self.effect}.{self.lead.name}"
-
-    def keys(self) -> dict[str, Parameter]:
-        """Every parameter by its name in theta."""
-        return {f"{self.effect}.{p.name}": p for p in self.parameters}
-
-    def typical(self, sign: float = 1.0) -> dict[str, float]:
-        """Theta of this effect at its size."""
-        values = {f"{self.effect}.{p.name}": p.typical for p in self.shapes}
-        return {self.key: self.lead.off + sign * self.lead.size, **values}
+__all__ = [
+    "Array",
+    "Candidate",
+    "Changes",
+    "Flags",
+    "ForceChannel",
+    "Labels",
+    "Leftover",
+    "MissingForce",
+    "OperatingPoint",
+    "Parameter",
+    "Problem",
+    "Rows",
+    "Texts",
+    "Theta",
+]
 
 
-@dataclass(frozen=True)
-class Rows:
-    """What each residual row is: arrays of one length.
+class StepSettings(Settings):
+    """Steps of finite differences."""
 
-    `run` indexes Problem.runs, `channel` indexes `channels`; `time` [s] in its run; `phase` and
-    `mode` are labels ("flight", "10"); rows of one run and channel stand in the order of time.
-    `sigma` is the noise (1 sigma, in the channel's unit) that the raw residual was divided by.
-    """
-
-    run: np.ndarray[Any, np.dtype[np.int_]]
-    channel: np.ndarray[Any, np.dtype[np.int_]]
-    time: Array
-    phase: np.ndarray[Any, Any]
-    mode: np.ndarray[Any, Any]
-    channels: tuple[str, ...]
-    sigma: Array
-
-    def __len__(self) -> int:
-        return len(self.time)
+    nuisance: float = setting(0.5, "1", "step of a nominal figure, in prior sigmas", BY_HAND)
+    switch: float = setting(
+        0.6, "1", "step of a switch that is off, in sizes: its secant", BY_HAND, decides=True
+    )
+    parameter: float = setting(
+        0.05, "1", "step of a parameter that is on, as a share of its size or value", BY_HAND
+    )
 
 
-@runtime_checkable
-class Problem(Protocol):
-    """One set of logs under one model as whitened residuals.
+class Problem(ABC):
+    """One set of logs under one model.
 
-    Residuals (predicted - measured) / noise are about N(0, 1) and white if the model is right.
+    The prediction. `residual(theta)` is (predicted - measured) / noise, one number per row,
+    whitened: about N(0, 1) and independent from row to row if the model at `theta` is right. Rows
+    stand run by run in the order of `runs`, then channel by channel, then in time; `rows()`
+    describes them in the same order. Physical values are in SI units, as `Parameter.unit` says.
+    The rows do not depend on theta.
+
+    A problem does not change. What learns something (`recolour`, `relinearise`) returns a new
+    problem; the old one stays as it was.
+
+    `runs`: names of the runs. `candidates`: effects that may be missing, by name. `nuisance`:
+    nominal value and prior sigma of every figure that is never exactly known, by name; it is always
+    free within its prior. `window`: number of successive rows over which errors are summed before
+    they are judged: 1 where each row is a prediction over a long time, more where rows are one-step
+    errors.
+
+    Everything below `rows` is a capability with a default: a problem that lacks it inherits "none".
     """
 
     runs: tuple[str, ...]
     candidates: dict[str, Candidate]
-    nuisance: dict[str, tuple[float, float]]  # nominal, prior sigma; always free within the prior
+    nuisance: dict[str, tuple[float, float]]
+    window: int = 1
 
+    @abstractmethod
     def residual(self, theta: Theta, runs: Collection[int] | None = None) -> Array:
         """Whitened residuals (n,) of the runs with these indices, in their order (None: all)."""
+
+    @abstractmethod
+    def rows(self, runs: Collection[int] | None = None) -> Rows:
+        """What each row (n,) of `residual` is."""
+
+    # Slopes
 
     def jacobian(
         self, theta: Theta, names: Iterable[str], runs: Collection[int] | None = None
     ) -> Array:
-        """d residual / d names (n, k); a switch that is off is linearised at its size (secant)."""
+        """d residual / d names (n, k), per unit of each parameter.
 
-    def rows(self, runs: Collection[int] | None = None) -> Rows:
-        """What each row of `residual` is."""
+        A switch that is off has no useful derivative; it is linearised at its size (a secant). The
+        default takes finite differences with steps of physical size for all parameters.
+        """
+        base = self.residual(theta, runs)
+        columns = []
+        for name in names:
+            steps = list(self.steps(theta, name))
+            slopes = [(self.residual({**theta, **step}, runs) - base) / h for step, h in steps]
+            columns.append(np.mean(slopes, axis=0))
+        return np.stack(columns, axis=1) if columns else np.empty((len(base), 0))
+
+    def steps(self, theta: Theta, name: str) -> Iterable[tuple[dict[str, float], float]]:
+        """Steps for a finite difference along `name`: changed entries of theta, and how far they
+        go [the parameter's unit]. Two of them where both signs are possible."""
+        settings = StepSettings.current()
+        if name in self.nuisance:
+            nominal, sigma = self.nuisance[name]
+            h = settings.nuisance * sigma
+            yield {name: theta.get(name, nominal) + h}, h
+            return
+        candidate = self.candidates[name.rsplit(".", 1)[0]]
+        parameter = candidate.keys()[name]
+        if name == candidate.key and theta.get(name, parameter.off) == parameter.off:
+            shapes = {k: theta.get(k, p.typical) for k, p in candidate.keys().items() if k != name}
+            h = settings.switch * parameter.size
+            for sign in (1.0, -1.0) if parameter.signed else (1.0,):
+                yield {**shapes, name: parameter.off + sign * h}, sign * h
+            return
+        value = theta[name]
+        h = settings.parameter * (parameter.size if name == candidate.key else abs(value))
+        h = -h if value + h > parameter.upper else h
+        yield {name: value + h}, h
+
+    def parameters(self) -> dict[str, Parameter]:
+        """Every parameter of every candidate, by its name in theta."""
+        return {key: p for c in self.candidates.values() for key, p in c.keys().items()}
+
+    # What a right model would leave
+
+    def expected_power(self) -> Array:
+        """Mean square (n,) that each row would have if the model were right. Default: one."""
+        return np.ones(len(self.rows()))
+
+    def window_errors(self, theta: Theta) -> Mapping[str, Array]:
+        """Channel -> measured minus predicted (k,), in the channel's unit, each predicted over a
+        short time from the measured motion. Channels that are missing here have none."""
+        return {}
+
+    # Noise colour
+
+    learns_colour: bool = False  # whether the colour of the noise is learnt from residuals
+
+    def recolour(self, residual: Array | None, careful: bool = False) -> Self:
+        """This problem with the noise colour learnt from residuals (n,) of a problem without
+        colour; None: without colour. `careful`: the model behind these residuals is good, so that
+        spikes are no physics and get less weight."""
+        return self
+
+    def whiten(self, columns: Array) -> Array:
+        """Columns (n, k) of a problem without colour as they are under this one's colour."""
+        return columns
+
+    # Motion along which the model is linearised
+
+    moves: bool = False  # whether residuals are linearised along a motion that depends on the model
+
+    def relinearise(self, base: Theta) -> Self:
+        """This problem, linearised along the motion that the model at `base` makes of the data.
+        Its rows may differ from those of the old one."""
+        return self
+
+    def is_straight(self, name: str) -> bool:
+        """Whether the residual is linear in this parameter, so that its slope tells everything."""
+        return False
+
+    # Where each row was taken, and which forces may be missing
+
+    def operating_point(self) -> OperatingPoint:
+        """Piston position, speed and force of every row. Default: no row has a piston."""
+        return OperatingPoint.nowhere(len(self.rows()))
+
+    def commands(self) -> Sequence[Changes]:
+        """Per run: command -> times [s] and sizes of its changes. Empty: commands are unknown."""
+        return []
+
+    def force_channels(self) -> Sequence[ForceChannel]:
+        """Places where a force may be missing."""
+        return []
+
+    def missing_force(
+        self, theta: Theta | None = None, strength: Array | None = None
+    ) -> list[MissingForce]:
+        """Estimate of the missing force of every run with its 95 % band.
+
+        `strength` (k,): 1 sigma of each channel's force, learnt when not given. With the same
+        strength, estimates at two thetas differ by what the change of theta explains.
+        """
+        return []
+
+    # Physics that the catalogue lacks
 
     def formulas(self, theta: Theta) -> Mapping[str, Array]:
-        """Whitened columns (n,) of simple terms beyond the catalogue, by formula; may be empty."""
+        """Simple terms beyond the catalogue: formula -> whitened column (n,) per unit of its
+        coefficient."""
+        return {}
 
+    def weight(self, theta: Theta, formula: str, coefficient: float) -> float:
+        """Largest force of a formula as a share of what matters in practice. Default: infinite,
+        so that every formula counts."""
+        return math.inf
 
-def secant_jacobian(
-    problem: Problem, theta: Theta, names: Iterable[str], runs: Collection[int] | None = None
-) -> Array:
-    """Finite differences of `residual` with steps of physical size: the default `jacobian`."""
-    base = problem.residual(theta, runs)
-    known = {key: p for c in problem.candidates.values() for key, p in c.keys().items()}
-    columns = []
-    for name in names:
-        steps = list(parameter_steps(problem, known, theta, name))
-        slopes = [(problem.residual({**theta, **step}, runs) - base) / h for step, h in steps]
-        columns.append(np.mean(slopes, axis=0))
-    return np.stack(columns, axis=1) if columns else np.empty((len(base), 0))
+    def leftover(self, theta: Theta) -> Leftover | None:
+        """What the model at theta leaves over, with what it may depend on; None: not known."""
+        return None
 
+    # Gate
 
-def parameter_steps(
-    problem: Problem, known: Mapping[str, Parameter], theta: Theta, name: str
-) -> Iterable[tuple[dict[str, float], float]]:
-    """Changed entries of theta and the step they mean."""
-    if name in problem.nuisance:
-        nominal, sigma = problem.nuisance[name]
-        yield {name: theta.get(name, nominal) + 0.5 * sigma}, 0.5 * sigma
-        return
-    parameter = known[name]
-    candidate = problem.candidates[name.rsplit(".", 1)[0]]
-    if name == candidate.key and theta.get(name, parameter.off) == parameter.off:
-        shapes = {k: theta.get(k, p.typical) for k, p in candidate.keys().items() if k != name}
-        h = 0.6 * parameter.size
-        for sign in (1.0, -1.0) if parameter.signed else (1.0,):
-            yield {**shapes, name: parameter.off + sign * h}, sign * h
-        return
-    value = theta[name]
-    h = 0.05 * (parameter.size if name == candidate.key else abs(value))
-    h = -h if value + h > parameter.upper else h
-    yield {name: value + h}, h
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """A fitted theta with its covariance over `names` and what it leaves."""
-
-    theta: dict[str, float]
-    names: tuple[str, ...]
-    covariance: Array
-    cost: float  # 1/2 sum of squared whitened residuals
-    log_evidence: float = math.nan
-    notes: dict[str, Any] = field(default_factory=dict)
+    def validate(self) -> list[str]:
+        """Remarks on the logs. Raises BadData where the logs and the model contradict each other so
+        grossly that a column must be wrong."""
+        return []

@@ -11,12 +11,11 @@ import numpy as np
 
 from kemba.ocp.nlp.compiled import compiled
 from kemba.ocp.nlp.constants import parameterised
+from kemba.ocp.nlp.settings import Functions
 from kemba.ocp.nlp.signs import canonical_signs
 from kemba.ocp.nlp.vectorised import vectorised
 
 Entries = tuple[ca.MX, np.ndarray, np.ndarray]  # nonzeros, their rows, their columns
-
-LARGE = 1000  # instructions of a Hessian block that make compiling worth while
 
 
 @dataclass(frozen=True)
@@ -162,7 +161,7 @@ def _functions(block: Block, p: ca.SX, worth_compiling: bool) -> list[ca.Functio
         ca.Function("first", at, ca.cse([g, _column(block.jacobian)])),
         ca.Function("second", [*at, *block.multipliers], ca.cse([_column(block.hessian)])),
     ]
-    large = functions[-1].n_instructions() > LARGE
+    large = functions[-1].n_instructions() > Functions.current().large
     return plain + (compiled(functions) if worth_compiling and large else functions)
 
 

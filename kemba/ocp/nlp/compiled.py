@@ -1,30 +1,46 @@
-"""Optional speed: the same functions as C code, compiled once and kept by content.
+"""Optional speed: the same functions as C code, compiled once and kept in a cache.
 
-Never needed and never waited for: the compiler works beside the first solve, which goes on with
-the functions as they are; later ones find the library.
+The compiler runs beside the first solve, which uses the functions as they are and does not wait.
+Later solves find the library under the hash of the functions. Code is loaded only from a folder
+that belongs to the user and that nobody else can write, and only when the file is what the
+compiler made. Anything else is compiled again, or not used.
 """
 
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import shlex
 import shutil
+import stat
 import subprocess
+import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
 
 import casadi as ca
 
+from kemba.ocp.nlp.settings import Functions
+
 FLAGS = ("-O1", "-fPIC", "-shared", "-ffp-contract=off")  # contraction would change the last bits
-STALE = 600.0  # s after which an unfinished compilation is thought dead
+BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 
 
-def cache_folder() -> Path:
-    """Where compiled functions are kept: KEMBA_CACHE, or the user's cache folder."""
-    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(os.environ.get("KEMBA_CACHE") or Path(base) / "kemba")
+def cache_folder() -> Path | None:
+    """Where compiled functions are kept: KEMBA_CACHE, or the user's cache folder.
+
+    None for a user without a home.
+    """
+    if own := os.environ.get("KEMBA_CACHE"):
+        return Path(own)
+    if base := os.environ.get("XDG_CACHE_HOME"):
+        return Path(base) / "kemba"
+    try:
+        return Path.home() / ".cache" / "kemba"
+    except RuntimeError:  # neither HOME nor an entry in the list of users
+        return None
 
 
 def compiled(functions: Sequence[ca.Function], wait: bool = False) -> list[ca.Function]:
@@ -34,42 +50,84 @@ def compiled(functions: Sequence[ca.Function], wait: bool = False) -> list[ca.Fu
     without.
     """
     compiler = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
-    if compiler is None or os.name != "posix" or os.environ.get("KEMBA_COMPILE") == "0":
+    folder = cache_folder()
+    off = os.environ.get("KEMBA_COMPILE") == "0" or os.name != "posix"
+    if compiler is None or folder is None or off:
         return list(functions)
     text = "".join(f.serialize() for f in functions) + ca.CasadiMeta.version() + " ".join(FLAGS)
     key = hashlib.sha256(text.encode()).hexdigest()[:24]
-    library = cache_folder() / f"{key}.so"
+    library = folder / f"{key}.so"
     try:
-        if not library.exists():
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        if not is_own(folder):
+            return list(functions)
+        if not is_whole(library):
             _compile(functions, compiler, library, wait)
-        if not library.exists():
+        if not is_whole(library):
             return list(functions)
         return [ca.external(f.name(), str(library)) for f in functions]
     except (OSError, RuntimeError):
         return list(functions)
 
 
+def is_own(path: Path) -> bool:
+    """Whether a file or folder is the user's and nobody else could have written it.
+
+    A folder above it may be the user's or the system's, and open to others only where these
+    cannot rename what is not theirs (as in a shared folder for temporary files).
+    """
+    if not _mine(path.lstat()):
+        return False
+    for above in path.resolve().parents:
+        facts = above.stat()
+        open_to_all = facts.st_mode & stat.S_IWOTH and not facts.st_mode & stat.S_ISVTX
+        if facts.st_uid not in (0, os.geteuid()) or open_to_all:
+            return False
+    return True
+
+
+def _mine(facts: os.stat_result) -> bool:
+    linked = stat.S_ISLNK(facts.st_mode)
+    return not linked and facts.st_uid == os.geteuid() and not facts.st_mode & BY_OTHERS
+
+
+def is_whole(library: Path) -> bool:
+    """Whether a library in the user's own folder is what the compiler made.
+
+    A file that was cut, overwritten with zeros or exchanged would kill the process that loads it.
+    """
+    manifest = library.with_suffix(".json")
+    try:
+        if not (_mine(library.lstat()) and _mine(manifest.lstat())):
+            return False
+        facts = json.loads(manifest.read_text(encoding="utf-8"))
+        content = library.read_bytes()
+    except (OSError, ValueError):
+        return False
+    known = facts.get("sha256") if isinstance(facts, dict) else None
+    return bool(known == hashlib.sha256(content).hexdigest())
+
+
 def _compile(functions: Sequence[ca.Function], compiler: str, library: Path, wait: bool) -> None:
-    """Set a compiler to work, unless one is already, in a process that outlives ours."""
-    library.parent.mkdir(parents=True, exist_ok=True)
+    """Start a compiler, unless one is at work already, in a process that may outlive ours."""
     folder = library.with_suffix(".making")
-    if folder.exists() and time.time() - folder.stat().st_mtime > STALE:
+    if folder.exists() and time.time() - folder.stat().st_mtime > Functions.current().stale:
         shutil.rmtree(folder, ignore_errors=True)
     try:
-        folder.mkdir()
+        folder.mkdir(mode=0o700)
     except FileExistsError:
         return
     generator = ca.CodeGenerator("functions.c")
     for function in functions:
         generator.add(function)
     generator.generate(f"{folder}/")
-    source, product = str(folder / "functions.c"), str(folder / "functions.so")
-    build = shlex.join(["nice", compiler, *FLAGS, source, "-o", product, "-lm"])
-    keep = shlex.join(["mv", product, str(library)])  # whole, so that nobody loads half of it
-    script = f"{build} && {keep}; {shlex.join(['rm', '-rf', str(folder)])}"
+    places = [folder, library, library.with_suffix(".json")]
+    script = Path(__file__).with_name("build.py")
+    command = [sys.executable, "-I", "-S", script, *places, compiler, *FLAGS]
+    build = shlex.join(str(part) for part in command)
     quiet = subprocess.DEVNULL
     subprocess.run(
-        ["sh", "-c", script if wait else f"({script}) &"],
+        ["sh", "-c", build if wait else f"({build}) &"],
         stdin=quiet,
         stdout=quiet,
         stderr=quiet,

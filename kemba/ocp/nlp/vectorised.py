@@ -1,7 +1,7 @@
 """A function at many points at once, each instruction a loop over the points.
 
-CasADi's own map evaluates point by point, instruction by instruction: deciding what to do takes
-several times as long as doing it. Here that is decided once for all points.
+CasADi's own map evaluates point by point, and looks up every instruction again at each point, which
+takes several times as long as the arithmetic. Here an instruction is looked up once for all points.
 """
 
 from __future__ import annotations
@@ -12,14 +12,13 @@ from contextlib import contextmanager
 import casadi as ca
 
 from kemba.ocp.nlp.rewriting import replay
-
-FEW = 8  # points at which one by one is as fast
+from kemba.ocp.nlp.settings import Functions
 
 
 def vectorised(f: ca.Function, points: int, shared: Collection[int] = ()) -> ca.Function:
     """f of SX at `points` at once: its inputs (n, points), except the `shared` ones (n,), which
     are the same at all; dense outputs (m, points). Equal to f at every point to the last bit."""
-    if points < FEW or f.class_name() != "SXFunction":
+    if points < Functions.current().few or f.class_name() != "SXFunction":
         return f.map(f.name(), "serial", points, list(shared), [])
     widths = [1 if i in shared else points for i in range(f.n_in())]
     inputs = [ca.MX.sym(f.name_in(i), f.numel_in(i), w) for i, w in enumerate(widths)]
@@ -44,7 +43,7 @@ def _stacked(elements: list[ca.MX], points: int) -> ca.MX:
 
 @contextmanager
 def _as_written() -> Iterator[None]:
-    """Expressions stay as they are built: simplified ones may round otherwise."""
+    """Without CasADi's simplifications, which may change the rounding."""
     before = ca.GlobalOptions.getSimplificationOnTheFly()
     ca.GlobalOptions.setSimplificationOnTheFly(False)
     try:

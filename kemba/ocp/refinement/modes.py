@@ -1,4 +1,4 @@
-"""The mode sequence of an implicit Euler plan: what touches, slides and stands open, and when."""
+"""The mode sequence of an implicit Euler plan: which contacts and stops are closed, which slide."""
 
 from __future__ import annotations
 
@@ -10,23 +10,17 @@ import casadi as ca
 import numpy as np
 
 from kemba.model import Model
+from kemba.ocp.refinement.settings import Reading
 from kemba.ocp.refinement.unilateral import Constraint
 from kemba.ocp.transcription.solution import arrays
 from kemba.trajectory import Trajectory
 
 OPEN, HELD, AHEAD, BACK = 0, 1, 2, 3  # open; closed and sticking; sliding forward, backward
-STIFF = 1e-3  # m; body weight over this tells a force from a gap of the relaxation
-CLOSED = 1e-6  # m
-SLIDES = 0.05  # m.s-1
-LIGHT = 0.1  # of body weight; a foot that bears less for a step or two does not stand
-SHUDDER = 5e-5  # m; what opens less for a step or two stays closed
-BRIEF = 2  # steps
-HOP = 5e-3  # m; a foot that rises less for a step or two stays down
 
 
 @dataclass(frozen=True)
 class Phase:
-    """Intervals first+1 .. last in which constraints keep their mode and valves their place."""
+    """Intervals first+1 .. last with the same modes of constraints and valve positions."""
 
     first: int
     last: int
@@ -66,9 +60,12 @@ def read_phases(
 
 
 def _settling(phases: Sequence[Phase]) -> list[Phase]:
-    """The last two of three phases. Where a stop or a foot closes one interval before the last
-    valve switch, the switch comes first: implicit Euler spreads an impact over two intervals, and
-    air that still flows pushes a piston off the stop on which the motion shall end at rest."""
+    """The last two of three phases.
+
+    A stop or a foot may close one interval before the last valve switch. Then the switch is put
+    first. Implicit Euler spreads an impact over two intervals; in continuous time it is over at
+    once, and air that still flows would push the piston off the stop.
+    """
     before, hit, last = phases
     closes = any(a == OPEN != b for a, b in zip(before.modes, hit.modes, strict=True))
     between = hit.modes == last.modes and hit.valves == before.valves != last.valves
@@ -79,7 +76,7 @@ def _settling(phases: Sequence[Phase]) -> list[Phase]:
 
 def _modes(model: Model, constraint: Constraint, plan: Trajectory, trim: bool) -> np.ndarray:
     """Mode of a constraint at every row (rows,)."""
-    x, node = arrays(model, plan), model.node
+    x, node, reading = arrays(model, plan), model.node, Reading.current()
     names = [constraint.gap]
     if constraint.friction is not None:
         names.append(constraint.friction.slip)
@@ -87,35 +84,37 @@ def _modes(model: Model, constraint: Constraint, plan: Trajectory, trim: bool) -
     found = _listed(evaluate.map(len(plan))(x["q"].T, x["v"].T))
     values = [np.array(value).ravel() for value in found]
     force = x["lam"][:, constraint.force] / model.mechanism.weight
-    modes = np.where(force * STIFF > np.maximum(values[0], 0.0), HELD, OPEN)
-    if values[0][0] < CLOSED and modes[1] == OPEN:
-        modes[1] = HELD  # what touches at the start leaves no sooner than its force is gone
-    _fill_hops(modes, values[0], SHUDDER)
+    modes = np.where(force * reading.stiff > np.maximum(values[0], 0.0), HELD, OPEN)
+    if values[0][0] < reading.closed and modes[1] == OPEN:
+        modes[1] = HELD  # a contact that is closed at the start has a force
+    _fill_hops(modes, values[0], reading.shudder)
     if constraint.friction is not None:
-        light = force < LIGHT
-        slides = np.abs(values[1]) > SLIDES
+        light = force < reading.light
+        slides = np.abs(values[1]) > reading.slides
         for a, b in _runs(modes):
-            if b - a <= BRIEF and light[a:b].all():
+            if b - a <= reading.brief and light[a:b].all():
                 modes[a:b] = OPEN
         if trim:
             modes[light & slides] = OPEN
-        _fill_hops(modes, values[0], HOP)
+        _fill_hops(modes, values[0], reading.hop)
         closed = modes != OPEN
         modes[closed & slides] = np.where(values[1] > 0, AHEAD, BACK)[closed & slides]
     return np.asarray(modes)
 
 
 def _fill_hops(modes: np.ndarray, gap: np.ndarray, hop: float) -> None:
-    """Keep closed what opens less than `hop` [m], and briefly, between two touches."""
+    """Close a gap that opens by less than `hop` [m] for a step or two between two touches."""
     runs = _runs(modes)
     for (_, a), (b, _) in itertools.pairwise(runs):
-        if b - a <= BRIEF and gap[a:b].max() < hop:
+        if b - a <= Reading.current().brief and gap[a:b].max() < hop:
             modes[a:b] = HELD
 
 
 def _valves_first(modes: np.ndarray, valves: np.ndarray) -> None:
-    """Where modes and valves change at one node, let the modes follow a step later: the
-    program shall be free to tell one from the other."""
+    """Where modes and valves change at one node, change the modes one step later.
+
+    Their times are free in the program; a phase between them lets both be found.
+    """
     for k in range(2, len(modes) - 1):
         both = (modes[k] != modes[k - 1]).any() and (valves[k] != valves[k - 1]).any()
         if both and (modes[k + 1] == modes[k]).all():

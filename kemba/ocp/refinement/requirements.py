@@ -8,20 +8,19 @@ import casadi as ca
 import numpy as np
 
 from kemba.ocp.refinement.independent import Independent
-from kemba.ocp.refinement.mode_constraints import View
 from kemba.ocp.refinement.modes import HELD
-from kemba.ocp.refinement.program import Program
+from kemba.ocp.refinement.program import PhaseProgram
+from kemba.ocp.refinement.view import View
 from kemba.ocp.task.requirement import Requirement, quantity_expression
 from kemba.ocp.transcription.stage import as_variable
 
 INF = np.inf
-SCALES = {"m": 0.1, "m.s-1": 1.0, "rad": 0.2}
 
 
 def add_requirements(
-    program: Program, requirements: Sequence[Requirement], start: Independent, end: Independent
+    program: PhaseProgram, requirements: Sequence[Requirement], start: Independent, end: Independent
 ) -> None:
-    """Bounds where a requirement is about a variable, rows otherwise; none where modes grant it."""
+    """Bounds where a requirement is about a variable, else rows; none where modes imply it."""
     view = View(program)
     _granted_at_end(program, view, end)
     seen: set[tuple[object, ...]] = set()
@@ -42,7 +41,7 @@ def add_requirements(
         _put(program, view, requirement, g, list(nodes))
 
 
-def _about_valves(program: Program, view: View, g: ca.SX) -> bool:
+def _about_valves(program: PhaseProgram, view: View, g: ca.SX) -> bool:
     """Whether a requirement is about valves alone: phases keep them as the plan has them."""
     inputs = view.layout.slices["u"].start
     valves = [view.symbols["u"][c - inputs] for c in view.layout.binary]
@@ -51,7 +50,7 @@ def _about_valves(program: Program, view: View, g: ca.SX) -> bool:
 
 
 def _put(
-    program: Program, view: View, requirement: Requirement, g: ca.SX, nodes: list[int]
+    program: PhaseProgram, view: View, requirement: Requirement, g: ca.SX, nodes: list[int]
 ) -> None:
     variable = as_variable(g, view.z("q v s"))
     columns = [_columns(program, node, full=variable is None) for node in nodes]
@@ -64,17 +63,17 @@ def _put(
         program.lower[at] = np.maximum(program.lower[at], ends[0])
         program.upper[at] = np.minimum(program.upper[at], ends[1])
         return
-    scale = SCALES.get(requirement.quantity.unit, 1.0)
+    scale = requirement.scale
     label = f"{requirement.text}:{requirement.quantity.name}"
     low, high = requirement.lower / scale, requirement.upper / scale
     if not ca.depends_on(g, view.z("u lam")):
         columns = [_columns(program, node, full=False) for node in nodes]
-        program.rule(label, view.z("q v s"), g / scale, low, high, columns)
+        program.add(label, view.z("q v s"), g / scale, low, high, columns)
         return
-    program.rule(label, view.z("q v s u lam"), g / scale, low, high, columns)
+    program.add(label, view.z("q v s u lam"), g / scale, low, high, columns)
 
 
-def _columns(program: Program, node: int, full: bool) -> np.ndarray:
+def _columns(program: PhaseProgram, node: int, full: bool) -> np.ndarray:
     c = program.columns
     at = c.end(node)
     parts = [at["q"], at["v"], at["s"]]
@@ -83,7 +82,7 @@ def _columns(program: Program, node: int, full: bool) -> np.ndarray:
     return np.concatenate(parts)
 
 
-def _granted_at_end(program: Program, view: View, end: Independent) -> None:
+def _granted_at_end(program: PhaseProgram, view: View, end: Independent) -> None:
     """What the last phase's closed constraints imply at the last node."""
     for constraint, mode in zip(program.constraints, program.phases[-1].modes, strict=True):
         if mode == 0:

@@ -1,20 +1,18 @@
 """The model's residual as the stepper needs it: one compiled function per stage.
 
-The residual is affine in accelerations and forces: 0 = M(q) a - F - B lam. The parts are taken
-by AD from the model's own expressions, so the plant has no physics of its own.
+See `forms` for the parts of the residual and `scheme` for the stages.
 """
 
 from __future__ import annotations
 
-from typing import Any
 from weakref import WeakKeyDictionary
 
 import casadi as ca
 
-from kemba.errors import KembaError
 from kemba.model import Model
 from kemba.plant.stepping.compiled import Compiled
-from kemba.plant.stepping.pairs import PairTable, read_pairs
+from kemba.plant.stepping.forms import Forms
+from kemba.plant.stepping.pairs import PairTable
 from kemba.plant.stepping.scheme import first_stage, impose, second_stage
 
 
@@ -52,24 +50,6 @@ class Equations:
         self.free = Compiled("free", step, {key: free[key] for key in wanted})
 
 
-class Forms:
-    """Expressions of a node split into what a time step needs, as functions of (q, v, s, u)."""
-
-    def __init__(self, node: Any) -> None:
-        self.pairs = read_pairs(node)
-        self.parts = M, F, B, f = _affine(node)
-        state = [node.q, node.v, node.s, node.u]
-        self.rows = {
-            "W": self.pairs.W,
-            "L": self.pairs.L,
-            "w0": self.pairs.w0,
-            "gap": self.pairs.gap,
-        }
-        self.smooth = ca.Function("smooth", state, [M, F, B, f])
-        self.stiff = ca.Function("stiff", state, [ca.jacobian(F, node.v), ca.jacobian(f, node.s)])
-        self.pair_rows = ca.Function("pairs", state, list(self.rows.values()))
-
-
 _KNOWN: WeakKeyDictionary[Model, Equations] = WeakKeyDictionary()
 
 
@@ -78,20 +58,3 @@ def equations_of(model: Model) -> Equations:
     if model not in _KNOWN:
         _KNOWN[model] = Equations(model)
     return _KNOWN[model]
-
-
-def _affine(node: Any) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
-    """M, F, B and f of a node. Raises KembaError where an effect breaks the affine form."""
-    M, B = ca.jacobian(node.dynamics, node.a), -ca.jacobian(node.dynamics, node.lam)
-    f = -ca.substitute([node.rate], [node.sd], [ca.SX.zeros(node.sd.numel())])[0]
-    moving = ca.vertcat(node.a, node.lam, node.sd)
-    for rows, form in ((node.dynamics_rows, ca.horzcat(M, B)), (node.rate_rows, f)):
-        if form.numel() and any(ca.which_depends(ca.vec(ca.densify(form)), moving, 1, True)):
-            raise KembaError(
-                rows[0].label,
-                "is not affine in accelerations and forces",
-                "the plant steps only such models",
-            )
-    zero = [ca.SX.zeros(node.a.numel()), ca.SX.zeros(node.lam.numel())]
-    bias = ca.substitute([node.dynamics], [node.a, node.lam], zero)[0]
-    return M, -bias, B, f

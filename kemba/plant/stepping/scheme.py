@@ -13,14 +13,10 @@ methods do for index 2; lam1 and lam2 solve small complementarity problems w = A
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import casadi as ca
 
 from kemba.plant.stepping.compiled import eliminate
-
-if TYPE_CHECKING:
-    from kemba.plant.stepping.equations import Forms
+from kemba.plant.stepping.forms import Forms
 
 Symbols = dict[str, ca.SX]
 GAMMA = 1.0 - 0.5**0.5

@@ -11,7 +11,7 @@ from robot_logs import hops
 from twin import catalogue, measure
 
 from kemba.identify.evidence.problem import Problem
-from kemba.identify.robot import RobotProblem, robot_problem
+from kemba.identify.robot.problem import RobotProblem, robot_problem
 from kemba.model.spec import load_model
 from kemba.trajectory import Trajectory
 
@@ -68,7 +68,7 @@ def test_a_right_model_leaves_white_noise(clean: RobotProblem) -> None:
 
 
 def test_the_reference_follows_the_motion(clean: RobotProblem) -> None:
-    y, seen = clean.point.y, clean.batch.y
+    y, seen = clean.state.motion.y, clean.batch.y
     error = np.sqrt(np.nanmean((y - seen) ** 2, axis=(0, 1)))
     assert np.all(error < 1.3 * clean.batch.sigma.max(axis=0))
 

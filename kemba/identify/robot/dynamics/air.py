@@ -8,11 +8,26 @@ import casadi as ca
 import numpy as np
 
 from kemba.identify.robot.motion.resampled import ResampledLog
+from kemba.settings import Settings, setting
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Index = np.ndarray[Any, np.dtype[np.int_]]
 
-SETTLING = np.full(40, 0.01)  # s: steps at the first command before the log starts
+
+class SettlingSettings(Settings):
+    """How the chambers settle at the first command before a log starts."""
+
+    count: int = setting(
+        40, "1", "number of steps", "derived: 0.4 s, ten times the slowest rise time of Table I"
+    )
+    step: float = setting(
+        0.01, "s", "length of a step", "convention: the integration is exact for lags"
+    )
+
+    @property
+    def steps(self) -> Array:
+        """All steps (count,) [s]."""
+        return np.full(self.count, self.step)
 
 
 class StateRunner:
@@ -64,19 +79,19 @@ def _mean_growth(h: ca.SX, slope: ca.SX, stiff: ca.SX) -> ca.SX:
     return h * slope * ca.if_else(small, 0.5 + z / 6, (ca.exp(z) - 1 - z) / safe**2)
 
 
-def substeps(track: ResampledLog, delays: Array) -> tuple[Array, Array, Index]:
+def substeps(log: ResampledLog, delays: Array) -> tuple[Array, Array, Index]:
     """(times (N + 1,), valves (valves, N), index of each node) with a time at every switching.
 
     `delays` (valves, 2): seconds from the command to switching on and off. As many times come back
     whatever the delays are, so that functions built for one length serve them all.
     """
     events, signs = [], []
-    for (times, change, _), (on, off) in zip(track.switches, delays, strict=True):
+    for (times, change, _), (on, off) in zip(log.switches, delays, strict=True):
         events.append(times + np.where(change > 0, on, off))
         signs.append(change)
-    first, last = track.time[0], track.time[-1]
+    first, last = log.time[0], log.time[-1]
     inner = [np.clip(e, first, last) for e in events]
-    everything = np.concatenate([track.time, *inner])
+    everything = np.concatenate([log.time, *inner])
     order = np.argsort(everything, kind="stable")
     times = everything[order]
     index = np.empty(len(order), int)
@@ -85,6 +100,6 @@ def substeps(track: ResampledLog, delays: Array) -> tuple[Array, Array, Index]:
     valves = np.zeros((len(events), len(middle)))
     for i, (event, sign) in enumerate(zip(events, signs, strict=True)):
         sorted_by = np.argsort(event, kind="stable")
-        count = np.concatenate([[0.0], np.cumsum(sign[sorted_by])]) + track.switches[i][2]
+        count = np.concatenate([[0.0], np.cumsum(sign[sorted_by])]) + log.switches[i][2]
         valves[i] = count[np.searchsorted(event[sorted_by], middle, side="right")] > 0.5
-    return times, valves, index[: len(track.time)]
+    return times, valves, index[: len(log.time)]

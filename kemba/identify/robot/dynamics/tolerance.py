@@ -10,17 +10,27 @@ import casadi as ca
 import numpy as np
 
 from kemba.effects.base import At, Contribution, Effect
-from kemba.mechanism import load_robot
 from kemba.mechanism.pin_model import build_pin_model
 from kemba.mechanism.recursion import Joint, read_joints, rnea
 from kemba.mechanism.robot import tree_angles
 from kemba.model.model import Model
 from kemba.quantity import Param
+from kemba.settings import Settings, setting
 
 Share = Annotated[float, Param("1", 0.02)]
 Damping = Annotated[float, Param("N.s.m-1", 2.0)]
 
-SHARE = 0.02  # 1 sigma of a nominal figure
+
+class ToleranceShareSettings(Settings):
+    """How well the figures of a robot are known."""
+
+    share: float = setting(
+        0.02,
+        "1",
+        "prior sigma of a nominal figure, as a share of it",
+        "convention: nominal figures are off by 1 to 3 %",
+        decides=True,
+    )
 
 
 class AirTolerance(Effect):
@@ -52,6 +62,7 @@ class AirTolerance(Effect):
 def with_tolerances(model: Model) -> tuple[Model, ca.SX, dict[str, tuple[float, float]]]:
     """The model with its cylinders' tolerances, the symbols of the further ones, and of all the
     nuisance parameters nominal value and prior sigma; those of `further` come last."""
+    share = ToleranceShareSettings.current().share
     further: list[ca.SX] = []
     late: dict[str, tuple[float, float]] = {}
     effects: list[Effect] = []
@@ -62,7 +73,7 @@ def with_tolerances(model: Model) -> tuple[Model, ca.SX, dict[str, tuple[float, 
         for leg in _places(effect, model):
             shares = [ca.SX.sym(f"{leg}:{i}") for i in range(4)]
             further += shares
-            late |= {f"tolerance.{leg}.{n}": (0.0, SHARE) for n in ("f0", "f1", "v0", "v1")}
+            late |= {f"tolerance.{leg}.{n}": (0.0, share) for n in ("f0", "f1", "v0", "v1")}
             fill, vent = effect.fill, effect.vent  # type: ignore[attr-defined]
             scaled = [c * (1 + x) for c, x in zip((*fill, *vent), shares, strict=True)]
             effects.append(effect.bind({"on": leg, "fill": scaled[:2], "vent": scaled[2:]}))
@@ -76,7 +87,7 @@ def with_tolerances(model: Model) -> tuple[Model, ca.SX, dict[str, tuple[float, 
     for name in ("boom.inertia", "boom.mass"):
         if name in model.parameters:
             value = model.parameters[name][1]
-            nuisance[name] = (value, SHARE * value)
+            nuisance[name] = (value, share * value)
     built = Model(model.mechanism, effects, model.supply, model.name)
     return built, ca.SX(ca.vertcat(*further)), nuisance | late
 
@@ -88,7 +99,7 @@ def _places(effect: Effect, model: Model) -> Sequence[str]:
 def mass_regressors(model: Model) -> tuple[tuple[str, ...], ca.Function]:
     """Names and (q, v, a) -> (n, k): forces per share by which a link's mass or inertia is off."""
     m = model.mechanism
-    robot = load_robot(m.name)
+    robot = m.need_robot()
     tree = tree_angles(robot, m.q)
     rate = ca.jtimes(tree, m.q, m.v)
     acc = ca.jtimes(rate, m.q, m.v) + ca.jtimes(tree, m.q, m.a)

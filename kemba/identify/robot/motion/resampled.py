@@ -8,12 +8,20 @@ from typing import Any
 
 import numpy as np
 
+from kemba.settings import BY_HAND, Settings, setting
 from kemba.trajectory import Trajectory
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
-SHORTEST, LONGEST = 0.7e-3, 1.6e-3  # s between nodes; denser rows are averaged, gaps filled
-TRIMMED = 0.97  # share of third differences that count for the noise: impacts are no noise
+
+class ResamplingSettings(Settings):
+    """Nodes of robot logs."""
+
+    shortest: float = setting(0.7e-3, "s", "denser rows are averaged", BY_HAND)
+    longest: float = setting(1.6e-3, "s", "nodes farther apart are filled", BY_HAND)
+    trimmed: float = setting(
+        0.97, "1", "share of third differences that count as noise; impacts are none", BY_HAND
+    )
 
 
 @dataclass(frozen=True)
@@ -73,16 +81,16 @@ def learnt_sigma(values: Array) -> float:
     rough = np.abs(np.diff(values, 3)) / np.sqrt(20.0)
     if not len(rough):
         return 1e-3
-    inner = rough[rough <= np.quantile(rough, TRIMMED)]
+    inner = rough[rough <= np.quantile(rough, ResamplingSettings.current().trimmed)]
     steps = np.diff(np.unique(values))
     quantum = float(np.min(steps)) / np.sqrt(12.0) if len(steps) else 1e-6
     return max(float(np.sqrt(np.mean(inner**2))) * 1.075, min(quantum, 5e-4), 1e-6)
 
 
 def _thin(time: Array, raw: Array, torque: Array) -> tuple[Array, Array, Array, int]:
-    """Averages of so many rows that nodes are at least SHORTEST apart."""
+    """Averages of so many rows that nodes are at least `shortest` apart."""
     count = max(1, int(np.floor(1e-3 / max(np.median(np.diff(time)), 1e-9) + 0.3)))
-    if np.median(np.diff(time)) >= SHORTEST or count == 1:
+    if np.median(np.diff(time)) >= ResamplingSettings.current().shortest or count == 1:
         return time, raw, torque, 1
     n = len(time) // count * count
     with np.errstate(invalid="ignore"):
@@ -94,7 +102,9 @@ def _thin(time: Array, raw: Array, torque: Array) -> tuple[Array, Array, Array, 
 
 def _fill(time: Array, raw: Array, torque: Array) -> tuple[Array, Array, Array]:
     """Nodes without measurement where rows are far apart."""
-    pieces = np.maximum(1, np.ceil(np.diff(time) / LONGEST)).astype(int)
+    pieces = np.maximum(1, np.ceil(np.diff(time) / ResamplingSettings.current().longest)).astype(
+        int
+    )
     if (pieces == 1).all():
         return time, raw, torque
     start = np.repeat(np.arange(len(pieces)), pieces)

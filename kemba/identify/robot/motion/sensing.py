@@ -10,10 +10,20 @@ from scipy.ndimage import gaussian_filter1d
 
 from kemba.identify.evidence.problem import Theta
 from kemba.identify.robot.motion.resampled import ResampledLog
+from kemba.settings import BY_HAND, Settings, setting
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
-CALM = 2.0  # nodes, of about 1 ms, over which rates are smoothed before a delay reads them
+
+class SensingSettings(Settings):
+    """How late sensors read a motion."""
+
+    calm: float = setting(
+        2.0,
+        "1",
+        "nodes over which rates are smoothed before a delay reads them",
+        f"{BY_HAND}; noise in the rate makes delays look shorter, by as much as a half",
+    )
 
 
 def travelled(rate: Array, h: Array) -> Array:
@@ -22,7 +32,7 @@ def travelled(rate: Array, h: Array) -> Array:
     Smoothed: noise in the rate that a delay is multiplied with makes delays look shorter than they
     are, by as much as a half.
     """
-    calm: Array = gaussian_filter1d(rate, CALM, axis=0, mode="nearest")
+    calm: Array = gaussian_filter1d(rate, SensingSettings.current().calm, axis=0, mode="nearest")
     steps = 0.5 * (calm[1:] + calm[:-1]) * h[:-1, :, None]
     return np.concatenate([np.zeros_like(rate[:1]), np.cumsum(steps, axis=0)])
 
