@@ -85,6 +85,30 @@ def test_imports_go_one_way(path: Path) -> None:
             assert LEVEL[target] <= LEVEL[own], f"{path}:{line}: {own} must not import {target}"
 
 
+# Within planning, from the bottom up.
+PLANNING = ["task", "nlp", "transcription", "certificate", "relaxation", "refinement"]
+PLANNING += ["infeasibility", "planned", "planner", "refined", "planning", "starts"]
+
+
+def test_planning_is_built_from_the_bottom_up() -> None:
+    """A room of planning imports no room above it, so that `nlp` knows no robot and no task."""
+    for path in (ROOT / "kemba/ocp").rglob("*.py"):
+        own = module_name(path).split(".")[2:3]
+        for module, line in imported(path):
+            target = module.split(".")[2:3] if module.startswith("kemba.ocp.") else []
+            if own and target and own[0] in PLANNING and target[0] in PLANNING:
+                above = PLANNING.index(target[0]) > PLANNING.index(own[0])
+                assert not above, f"{path}:{line}: {own[0]} must not import {target[0]}"
+
+
+def test_functions_for_ipopt_know_no_model() -> None:
+    """`nlp` is about nonlinear programs alone."""
+    for path in (ROOT / "kemba/ocp/nlp").glob("*.py"):
+        for module, line in imported(path):
+            known = module.split(".")[:2] != ["kemba", "model"]
+            assert known and not module.startswith("kemba.ocp.task"), f"{path}:{line}: {module}"
+
+
 # Rooms whose circles are being cut; a name may only leave this list.
 STILL_CIRCULAR = {"kemba.identify.bench", "kemba.identify.robot"}
 

@@ -118,9 +118,8 @@ def material(search: Search, hypothesis: Hypothesis) -> Hypothesis:
         return float(abs(score.z[linear.index(c.key)] - c.lead.off) / c.lead.size)
 
     strongest = max(hypothesis, key=lambda e: strength(search, e, hypothesis))
-    return tuple(
-        e for e in hypothesis if share(e) >= (settings.matters if e == strongest else least)
-    )
+    wanted = {e: settings.matters if e == strongest else least for e in hypothesis}
+    return tuple(e for e in hypothesis if share(e) >= wanted[e])
 
 
 def doubts_about(

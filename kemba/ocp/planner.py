@@ -140,8 +140,8 @@ class Planner:
         return schedule.transcription, penalise(schedule, start, self.task.method)
 
     def run(self) -> tuple[Transcription, Iterate]:
-        """The first strategy that solves, else where the first one ended; a stop keeps its
-        iterate."""
+        """The result of the first strategy that solves, else of the first one; the best iterate of
+        a solve that was stopped."""
         try:
             if self.task.method in METHODS:
                 return self.penalty()

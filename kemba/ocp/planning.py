@@ -1,4 +1,4 @@
-"""From a task to a certified plan: checked, searched, refined; what stands in its way if not."""
+"""From a task to a certified plan: checked, solved, refined; or why there is none."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ def plan(
     """Solve a task. Never raises for a task that cannot be met: the status says so.
 
     Raises ConfigErrors for wrong names, units and solver options. `log` collects IPOPT's text,
-    `tell` hears what is being done, `watch` every iteration; `start` is a trajectory to go on
-    from, `stop` is asked between iterations whether to end with the best one.
+    `tell` gets the name of every solve, `watch` is called after every iteration; `start` is a
+    trajectory to begin with; `stop` is asked after every iteration whether to end.
     """
     document = document or Document(task.model_dump())
     building = Stopwatch()

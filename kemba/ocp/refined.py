@@ -16,8 +16,11 @@ from kemba.stopwatch import Stopwatch
 
 
 def refined(planner: Planner, found: Plan) -> Plan:
-    """The plan on its own phases; where that fails, another start's, which often differs little
-    and yet refines. Not on a whole robot, where one failure takes long enough."""
+    """The plan on its own phases; where that fails, one from another start.
+
+    A second start often gives a similar plan that can be refined. It is tried on half a robot
+    only: on a whole one, one failure takes long enough.
+    """
     first = on_phases(planner, found)
     half = next(planner.reductions()).symmetric and planner.start is None
     if first.refined or first.status is not Status.SOLVED or not half:

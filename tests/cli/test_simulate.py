@@ -58,6 +58,18 @@ def test_three_noisy_logs_of_a_run(folder: Path) -> None:
     assert not np.array_equal(logs[0]["body/z"], logs[1]["body/z"])
 
 
+def test_no_log_is_replaced_without_force(folder: Path) -> None:
+    words = ["simulate", str(folder), "--model", "planning"]
+    for name in ("logs", "logs-2"):
+        assert run(*words).stdout == f"runs/still-1/{name}/log-1.csv\n"
+    before = Path("runs/still-1/logs/log-1.csv").read_bytes()
+    done = run(*words, "--noise", "--out", "runs/still-1/logs")
+    assert done.exit_code == 2 and "holds results already (log-1.csv)" in done.stderr
+    assert Path("runs/still-1/logs/log-1.csv").read_bytes() == before
+    assert run(*words, "--noise", "--out", "runs/still-1/logs", "--force").exit_code == 0
+    assert Path("runs/still-1/logs/log-1.csv").read_bytes() != before
+
+
 def test_the_plant_meets_the_supply_and_payload_of_the_task(folder: Path) -> None:
     heights = []
     for task in ("supply: 0.6 MPa\n", "supply: 800000.0\n", "supply: 0.8 MPa\npayload: 2 kg\n"):

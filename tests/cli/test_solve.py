@@ -209,7 +209,9 @@ def test_the_path_on_stdout_and_talk_on_stderr() -> None:
 
 def test_a_failed_solve_ends_with_one() -> None:
     done = run("jump.yaml", *COARSE, "--set", "solver.max_iterations=2", "--no-figure", "-q")
-    assert (done.exit_code, done.stdout, done.stderr) == (1, "runs/jump-1\n", "")
+    assert (done.exit_code, done.stdout) == (1, "runs/jump-1\n")
+    assert done.stderr.startswith("stopped by a limit before a plan was found")  # not hidden
+    assert done.stderr.count("\n") == 1
     assert load_run("runs/jump-1").certificate["status"] == "limit"
 
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Mapping
 
 import numpy as np
 import pytest
 
-from kemba.identify import discover as discovery
 from kemba.identify.answer import Answer, Ranked, phrase
-from kemba.identify.discover import discover
+from kemba.identify.discover import discover, doubts_about
 from kemba.identify.doubt.cross_validation import left_out, left_out_error
 from kemba.identify.evidence.problem import Array, Candidate, Parameter, Problem, Rows, Theta
 from kemba.identify.evidence.search import Search
@@ -107,14 +107,25 @@ def test_probabilities_prefer_the_simpler_of_equals() -> None:
     assert found["a",] > 0.9 > found["a", "b"]
 
 
-@pytest.mark.parametrize(("before", "after", "doubted"), [(20.0, 19.1, True), (9.0, 1.6, False)])
+@pytest.mark.parametrize(
+    ("noise", "size", "doubted"),
+    [(5.0, 3.0, True), (5.0, 12.0, False), (1.0, 3.0, False)],
+    ids=["most is left", "little is left", "noise is left"],
+)
 def test_an_answer_that_leaves_most_of_the_error_is_doubted(
-    monkeypatch: pytest.MonkeyPatch, before: float, after: float, doubted: bool
+    noise: float, size: float, doubted: bool
 ) -> None:
-    monkeypatch.setattr(discovery, "unfinished", lambda search, best: False)
-    monkeypatch.setattr(discovery, "error", lambda search, h, holdout: after if h else before)
-    found = discovery.doubts_about(object(), ("seal_friction",), None, None)  # type: ignore[arg-type]
+    """A kick is there, and errors `noise` times as large as sensors have: where it explains less
+    than a tenth of the error, something else is missing."""
+    problem = Toy({"kick.a": size}, seed=4)
+    rng = np.random.default_rng(5)
+    problem.measured += np.sqrt(noise**2 - 1.0) * rng.standard_normal(len(problem.measured))
+    found = doubts_about(searched(problem), ("kick",), None, None)
     assert bool(found) == doubted
+    if doubted:
+        (doubt,) = found
+        left = re.fullmatch("kick fits best, but leaves an error of (.*) times the noise", doubt)
+        assert left and float(left[1]) == pytest.approx(noise, rel=0.05)
 
 
 @pytest.mark.parametrize(

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from ocp.runs import solved
 from ocp.toys import Push, bead
 
-from kemba.config import Document
+from kemba.config import Document, load_yaml
 from kemba.model import Model
 from kemba.ocp.certificate.certify import Certificate, certify
 from kemba.ocp.certificate.status import verdict
@@ -48,10 +49,10 @@ def test_an_exact_plan_violates_nothing() -> None:
 
 @pytest.mark.parametrize("force", [1.25, -1.25])
 def test_an_input_above_or_below_its_range_is_told(force: float) -> None:
-    """Push may give 1 N either way."""
-    found = measured(FORCE * force / 0.5)
+    """Push may give 1 N either way; here it gives more in one step, one way."""
+    found = measured(np.array([0.0, 0.0, force, 0.0, 0.0]))
     assert found.bounds == pytest.approx(0.25)
-    assert found.worst[0].what == "bound:push/F"
+    assert (found.worst[0].what, found.worst[0].node) == ("bound:push/F", 2)
     assert found.worst[0].violation == pytest.approx(0.25)
     assert not found.within(Tolerances())
 
@@ -77,6 +78,24 @@ def test_a_position_that_no_speed_explains_is_a_defect() -> None:
     assert found.worst[0].what == "kinematics:body/x"
     assert (found.worst[0].node, found.worst[0].violation) == (2, pytest.approx(1e-3))
     assert found.dynamics == pytest.approx(1e-3)
+
+
+def test_a_foot_below_the_ground_and_a_pulling_one_are_told() -> None:
+    """A jump that is solved, sunk by 1 mm, or with the ground's forces turned."""
+    run = solved("jump")
+    requirements = resolve(run.task, run.model, load_yaml(run.run.task))
+
+    def changed(name: str, values: np.ndarray) -> Certificate:
+        plan = run.plan.with_columns({f"{name} [{run.plan.unit(name)}]": values})
+        return certify(run.model, run.task, requirements, plan, most=1000)
+
+    sunk = changed("body/z", run.plan["body/z"] - 1e-3)
+    told = [v for v in sunk.worst if (v.what, v.unit) == ("front/contact:gap", "m")]
+    assert [v.violation for v in told] == [pytest.approx(1e-3, abs=1e-5)]
+    assert sunk.bounds >= 0.9e-3
+    pulling = changed("front/foot/Fz", -run.plan["front/foot/Fz"])
+    assert pulling.bounds > 0.1
+    assert run.measured.bounds < 1e-6
 
 
 NAMES = ("complementarity", "binary", "dynamics", "bounds")

@@ -10,18 +10,18 @@ import pytest
 from ocp.runs import solved
 
 from kemba.config import load_yaml
+from kemba.ocp.nlp.ipopt import Control
 from kemba.ocp.refinement.modes import read_phases
-from kemba.ocp.refinement.program import Program
+from kemba.ocp.refinement.program import PhaseProgram
 from kemba.ocp.refinement.radau import RADAU3
 from kemba.ocp.refinement.refine import Refiner, reduction_of
-from kemba.ocp.refinement.solve import Control
 from kemba.ocp.refinement.unilateral import read_constraints
 from kemba.ocp.task.requirement import resolve
 from kemba.ocp.transcription.solution import arrays
 
 
 @cache
-def built() -> tuple[Program, np.ndarray]:
+def built() -> tuple[PhaseProgram, np.ndarray]:
     """The program of a jump's phases, and its start: the implicit Euler plan."""
     run = solved("jump")
     model, task, plan = run.model, run.task, run.plan
@@ -38,7 +38,7 @@ def built() -> tuple[Program, np.ndarray]:
 def values(label: str) -> tuple[np.ndarray, float, float]:
     """Values of the rows called `label` at the start, and the bounds they must keep."""
     program, x = built()
-    (part,) = (rule for rule in program.rules if rule.labels == (label,))
+    (part,) = (part for part in program.added if part.labels == (label,))
     g = ca.Function("g", [part.z], [part.g])
     return np.array([float(g(x[c])) for c in part.columns]), part.lower, part.upper
 

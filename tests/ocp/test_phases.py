@@ -19,7 +19,7 @@ from kemba.ocp.refinement.modes import OPEN, Phase
 from kemba.ocp.refinement.radau import RADAU3, RADAU5, Scheme
 from kemba.ocp.refinement.refine import Refiner, reduction_of
 from kemba.ocp.refinement.repair import merged, misfit, repaired
-from kemba.ocp.refinement.settings import ModeRules, Refining, Repair
+from kemba.ocp.refinement.settings import ModeConstraints, Refining, Repair
 from kemba.ocp.refinement.unilateral import read_constraints
 from kemba.ocp.relaxation.valve_search import switching
 from kemba.ocp.transcription.solution import arrays
@@ -45,7 +45,8 @@ CASES = [
 ]
 QUICK = [CASES[1], CASES[5]]
 UNSTABLE = pytest.mark.xfail(reason="after touchdown it drifts, to a knee down; docs/refine.md")
-MARKS = {case: [] if case in QUICK else [pytest.mark.slow] for case in CASES}
+FORWARD = CASES[-1]  # the quickest of those on a whole robot
+MARKS = {case: [] if case in (*QUICK, FORWARD) else [pytest.mark.slow] for case in CASES}
 MARKS["jump_forward", "distance=0.1 m"].append(UNSTABLE)
 EVERY = [pytest.param(*case, marks=marks) for case, marks in MARKS.items()]
 
@@ -128,7 +129,7 @@ def test_open_gaps_keep_clear_away_from_touches(name: str, override: str) -> Non
     assert found.trajectory is not None
     half = reduction_of(euler.model, euler.task, euler.requirements, euler.trajectory)
     x, node = arrays(euler.model, found.trajectory), euler.model.node
-    away, clear = ModeRules.current().away, ModeRules.current().clear
+    away, clear = ModeConstraints.current().away, ModeConstraints.current().clear
     for i, constraint in enumerate(read_constraints(euler.model, half)):
         gap = ca.Function("gap", [node.q], [constraint.gap]).map(len(x["q"]))
         values = np.array(gap(x["q"].T)).ravel()[1:]

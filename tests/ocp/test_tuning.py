@@ -19,6 +19,7 @@ PLAIN = {
     "refinement/radau.py": {"RADAU3", "RADAU5", "_R"},  # coefficients of the schemes
     "refinement/sample.py": {"WORST"},  # violations that a report lists
     "task/requirement.py": {"MOMENTS", "SCALES"},  # the format; units of requirements
+    "transcription/first_node.py": {"SAME"},  # rounding
     "transcription/layout.py": {"STEP"},  # unit of steps, shared by all grids
     "transcription/stage.py": {"ANGLE_ARM", "COST_SCALE"},  # units of moments and costs
 }

@@ -1,4 +1,4 @@
-"""Simple force laws beyond the catalogue, by the formula that a model's YAML would hold."""
+"""Simple force terms beyond the catalogue, each with the formula that a model's YAML would hold."""
 
 from __future__ import annotations
 
@@ -9,16 +9,14 @@ from scipy.signal import lfilter
 
 from kemba.effects.mechanics.friction import V_COULOMB
 from kemba.identify.bench.motion import SmoothedMotion
+from kemba.identify.doubt.force_terms import dahl, end_terms
 from kemba.identify.evidence.problem import Array
 from kemba.settings import BY_HAND, Settings, setting
 
 
 class FormulaSettings(Settings):
-    """Constants of the simple force laws that are tried."""
+    """Constants of the simple force terms that are tried."""
 
-    ranges: tuple[float, ...] = setting(
-        (0.003, 0.005, 0.008, 0.013, 0.02), "m", "reach of a force at an end of the stroke", BY_HAND
-    )
     memories: tuple[float, ...] = setting(
         (0.001, 0.006, 0.02, 0.06, 0.2), "s", "times for which a switching is remembered", BY_HAND
     )
@@ -35,9 +33,7 @@ def terms(motion: SmoothedMotion, u: Array, stroke: float) -> Iterator[tuple[str
     x, v, (u_e, u_r) = motion.x, motion.v, u.T
     sign = np.tanh(v / V_COULOMB)
     out, back = np.maximum(v, 0.0), np.minimum(v, 0.0)
-    for d in settings.ranges:
-        yield f"exp(-(x/{d:g})**2)", np.exp(-((x / d) ** 2))
-        yield f"exp(-(({stroke:g} - x)/{d:g})**2)", np.exp(-(((stroke - x) / d) ** 2))
+    yield from end_terms(x, stroke)
     yield f"x - {stroke / 2:g}", x - stroke / 2
     yield f"(x - {stroke / 2:g})**2", (x - stroke / 2) ** 2
     yield f"(x - {stroke / 2:g})**3", (x - stroke / 2) ** 3
@@ -62,8 +58,8 @@ def terms(motion: SmoothedMotion, u: Array, stroke: float) -> Iterator[tuple[str
 
 
 def features(motion: SmoothedMotion, u: Array, stroke: float) -> Array:
-    """Whatever a missing force could depend on (n, m): where, how fast, and since when which
-    valve is on, each with each."""
+    """Quantities (n, m) that a missing force could depend on: functions of position and speed,
+    times functions of how long ago each valve was on. `u` (n, 2): share of each valve being on."""
     settings, step = FormulaSettings.current(), float(np.median(np.diff(motion.time)))
     x, v = motion.x / stroke - 0.5, motion.v / settings.speed
     places = [np.ones(len(x)), x, x**2, v, np.abs(v), v * x, np.tanh(motion.v / V_COULOMB)]
@@ -73,14 +69,3 @@ def features(motion: SmoothedMotion, u: Array, stroke: float) -> Array:
             keep = np.exp(-step / memory)
             histories.append(lfilter([1 - keep], [1, -keep], valve, zi=[keep * valve[0]])[0])
     return np.stack([p * h for p in places for h in histories], axis=1)
-
-
-def dahl(x: Array, travel: float) -> Array:
-    """Hysteresis: z' = (v - abs(v) z)/travel along the path x (n,), which remembers its turns."""
-    z, out = 0.0, np.empty(len(x))
-    out[0] = z
-    for i, step in enumerate(np.diff(x), start=1):
-        target = 1.0 if step > 0 else -1.0
-        z = target + (z - target) * np.exp(-abs(step) / travel)
-        out[i] = z
-    return out

@@ -1,7 +1,7 @@
-"""How much force a bench model lacks: the measured force less the predicted, freed of noise.
+"""How much force a bench model lacks: the measured force less the predicted one, smoothed.
 
-The missing force is a first-order lag driven by noise, as on the robot; how strong it is, is learnt
-from the log. Prior and noise make a tridiagonal system, so that long logs cost nothing.
+The missing force is a first-order lag of white noise, as on the robot; its strength is learnt from
+the log. Prior and noise make a tridiagonal system, which is fast for long logs.
 """
 
 from __future__ import annotations
@@ -28,15 +28,16 @@ class BenchMissingSettings(Settings):
 def bench_missing(
     predicted: PredictedLogs, theta: Theta, strength: Array | None = None
 ) -> list[MissingForce]:
-    """d(t) per run: the force on the rod, with its band."""
+    """d(t) [N] per run: the force on the rod, with its band; `strength` (1,) [N], learnt when not
+    given."""
     found = []
-    for i, run in enumerate(predicted.logs):
+    for i, log in enumerate(predicted.logs):
         expected, variance = predicted.readings(theta, i)[FORCE]
-        keep = run.keep[FORCE]
-        time, gap = run.motion.time[keep], (run.measured[FORCE] - expected)[keep]
+        keep = log.keep[FORCE]
+        time, gap = log.motion.time[keep], (log.measured[FORCE] - expected)[keep]
         known = None if strength is None else float(strength[0])
         force, sigma, used = lagged(time, gap, variance[keep], known)
-        found.append(MissingForce(run.name, time, (FORCE,), ("N",), force[:, None], sigma[:, None],
+        found.append(MissingForce(log.name, time, (FORCE,), ("N",), force[:, None], sigma[:, None],
                              np.array([used])))  # fmt: skip
     return found
 
@@ -44,8 +45,11 @@ def bench_missing(
 def lagged(
     time: Array, gap: Array, variance: Array, known: float | None = None
 ) -> tuple[Array, Array, float]:
-    """(estimate, 1 sigma), both (n,), and strength of a lag seen as `gap` (n,) in white noise of
-    `variance` (n,); its strength is learnt unless it is `known`."""
+    """Estimate (n,) and 1 sigma (n,) of a first-order lag, and its strength.
+
+    `time` (n,) [s]; `gap` (n,): the lag plus white noise of `variance` (n,). The strength (1 sigma
+    of the lag) is learnt unless it is `known`.
+    """
     settings = BenchMissingSettings.current()
     keep = np.exp(-np.diff(time) / settings.memory)
     strength = known or settings.begin
@@ -60,7 +64,10 @@ def lagged(
 
 
 def _precision(keep: Array, strength: float) -> Array:
-    """Inverse covariance of the lag: upper bands (2, n), the diagonal below."""
+    """Inverse covariance of the lag as bands (2, n): the upper one, then the diagonal.
+
+    `keep` (n - 1,): share of the lag that is left after each step.
+    """
     driven = strength**2 * np.maximum(1.0 - keep**2, 1e-12)
     bands = np.zeros((2, len(keep) + 1))
     bands[1, 0] = 1.0 / strength**2

@@ -25,9 +25,7 @@ class MotionSettings(Settings):
     measured: float = setting(
         0.5, "1", "share of valid readings that a measured velocity needs", BY_HAND
     )
-    width: int = setting(
-        6, "1", "half width, in samples, that smooths a measured velocity", BY_HAND
-    )
+    width: int = setting(6, "1", "half width, in samples, of its smoothing", BY_HAND)
     finest_speed: float = setting(1e-6, "m.s-1", "smallest noise of a velocity sensor", BY_HAND)
     contradicts: float = setting(
         3.0, "1", "sigmas by which a measured velocity may differ", "convention: three sigmas"

@@ -56,7 +56,7 @@ class BenchProblemSettings(Settings):
         2e5,
         "Pa",
         "prior sigma of the offset of a pressure",
-        "convention: two atmospheres, so that gauge readings fit",
+        "convention: two atmospheres",
     )
     step: float = setting(
         0.1, "1", "step of finite differences of a start, as a share of the state's scale", BY_HAND

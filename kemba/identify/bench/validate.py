@@ -1,4 +1,4 @@
-"""Is it these columns at all? The nominal prediction against each way to mix them up."""
+"""Are columns of a bench log mixed up? The nominal prediction is tried on each usual mistake."""
 
 from __future__ import annotations
 
@@ -45,7 +45,8 @@ class BenchValidateSettings(Settings):
 
 
 def mix_ups(run: BenchLog, stroke: float) -> Iterator[tuple[str, BenchLog]]:
-    """The run as it would be, were a column's mistake undone; `stroke` [m] of the cylinder."""
+    """What may be wrong with a log, and the log with that put right; `stroke` [m] of the
+    cylinder."""
     extend, retract = run.commands
     force = run.measured["piston/F"]
     yield (

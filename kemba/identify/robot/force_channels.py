@@ -1,4 +1,4 @@
-"""Ports of robot logs: forces on rods, hips and body as columns of whitened residuals."""
+"""Force channels of robot logs: rods, hips and body, as columns of whitened residuals."""
 
 from __future__ import annotations
 
@@ -10,8 +10,19 @@ from kemba.identify.compare.force_profiles import lags, risen
 from kemba.identify.evidence.types import Array, Flags, ForceChannel
 from kemba.identify.robot.operating_point import SIDES, air_forces, changes
 from kemba.identify.robot.state import LinearisedState
+from kemba.settings import BY_HAND, Settings, setting
 
 BODY = {"body z": 1, "body x": 0}  # place among the channels
+
+
+class UsualForceSettings(Settings):
+    """A force of each channel that is neither small nor large."""
+
+    body: float = setting(3.0, "N", "on the body", BY_HAND)
+    hip: float = setting(0.5, "N.m", "at a hip", BY_HAND)
+    rod: float = setting(
+        10.0, "N", "on a rod", "derived: friction of 6 to 8 N by the paper's tables"
+    )
 
 
 def robot_force_channels(state: LinearisedState) -> list[ForceChannel]:
@@ -22,13 +33,14 @@ def robot_force_channels(state: LinearisedState) -> list[ForceChannel]:
     flying = [(s.phase == "flight").astype(float) for s in state.schedules]
     where = state.batch.pad(flying, 0.0)[..., None] > 0.5
     y, rate = state.motion.y, state.motion.rate
+    usual = UsualForceSettings.current()
     found = [_rods(state), _hips(state, where)]
     for name, k in BODY.items():
         quantities = {
             "speed [m/s]": np.where(where, rate[..., [k]], np.nan),
             "position [m]": np.where(where, y[..., [k]], np.nan),
         }
-        found.append(ForceChannel(name, "N", 3.0, quantities, force_columns(state, [k])))
+        found.append(ForceChannel(name, "N", usual.body, quantities, force_columns(state, [k])))
     return found
 
 
@@ -44,7 +56,7 @@ def _rods(state: LinearisedState) -> ForceChannel:
     return ForceChannel(
         "rods",
         "N",
-        10.0,
+        UsualForceSettings.current().rod,
         {label: np.where(where, values, np.nan) for label, values in quantities.items()},
         force_columns(state, range(3 + legs, 3 + 2 * legs)),
         {side: _after(state, f"valve/{side}") for side in SIDES},
@@ -61,7 +73,7 @@ def _hips(state: LinearisedState, where: Flags) -> ForceChannel:
     return ForceChannel(
         "hips",
         "N.m",
-        0.5,
+        UsualForceSettings.current().hip,
         {label: np.where(where, values, np.nan) for label, values in quantities.items()},
         force_columns(state, legs),
         {"hip/tau": _after(state, "hip/tau")},

@@ -8,7 +8,7 @@ import numpy as np
 
 from kemba.identify.evidence.types import Array, Flags, Rows, Texts
 from kemba.identify.robot.dynamics.physics import Physics
-from kemba.identify.robot.dynamics.reference import GROUND_SIGMA
+from kemba.identify.robot.dynamics.settings import PlaceSettings
 from kemba.identify.robot.motion.batch import Batch
 from kemba.identify.robot.motion.contact import Schedule
 
@@ -39,7 +39,7 @@ def describe(
         time[: len(log.time)] = log.time
         phase = np.full(batch.n, "", dtype=object)
         phase[: len(log.time)] = schedules[i].phase
-        sigma = np.append(log.sigma, [GROUND_SIGMA] * (m - len(log.sigma)))
+        sigma = np.append(log.sigma, [PlaceSettings.current().ground] * (m - len(log.sigma)))
         whole = {
             "run": np.full(own.shape, i),
             "channel": np.broadcast_to(np.arange(m)[:, None], own.shape),

@@ -11,16 +11,24 @@ import numpy as np
 
 from kemba.identify.compare.missing_force import spans
 from kemba.identify.evidence.problem import Array, MissingForce, Theta
-from kemba.identify.robot.dynamics.reference import ForceDensity, densities
+from kemba.identify.robot.dynamics.reference import densities
+from kemba.identify.robot.dynamics.settings import QuietForceDensity
 from kemba.identify.robot.motion.filter import System, gains, smooth_with_band
 from kemba.identify.robot.state import LinearisedState
+from kemba.settings import BY_HAND, Settings, setting
 
-MEMORY = 0.025  # s, of the missing force
-ROUNDS = 6
-# N and N.m (1 sigma): where the search for a channel's strength begins, and below what it is none
-BEGIN = {"body": 5.0, "pitch": 0.5, "hip": 0.5, "piston": 10.0}
-NEGLIGIBLE = {"body": 0.1, "pitch": 0.01, "hip": 0.01, "piston": 0.1}
-QUIET = ForceDensity(body=1e-5, pitch=1e-6, hip=1e-6, rod=1e-5)
+
+class RobotMissingSettings(Settings):
+    """The missing force of robot logs. Its strength (1 sigma) is learnt per channel."""
+
+    memory: float = setting(0.025, "s", "correlation time of the missing force", BY_HAND)
+    rounds: int = setting(6, "1", "rounds in which its strength is learnt", BY_HAND)
+    body: float = setting(5.0, "N", "strength with which learning begins", BY_HAND)
+    pitch: float = setting(0.5, "N.m", "the same of the moment on the body", BY_HAND)
+    hip: float = setting(0.5, "N.m", "the same of the torque at a hip", BY_HAND)
+    piston: float = setting(10.0, "N", "the same of the force on a rod", BY_HAND)
+    negligible: float = setting(0.1, "N", "strength of a force that is as good as none", BY_HAND)
+    negligible_moment: float = setting(0.01, "N.m", "the same of a moment", BY_HAND)
 
 
 def robot_missing(
@@ -32,12 +40,15 @@ def robot_missing(
     """
     names = state.physics.channels
     kinds = [_kind(name) for name in names]
-    sigma = np.array([BEGIN[kind] for kind in kinds]) if strength is None else strength
-    least = np.array([NEGLIGIBLE[kind] for kind in kinds])
-    quiet = densities(state.physics, state.batch, state.schedules, QUIET)
+    settings = RobotMissingSettings.current()
+    begin = np.array([getattr(settings, kind) for kind in kinds])
+    sigma = begin if strength is None else strength
+    moment = np.isin(kinds, ("pitch", "hip"))
+    least = np.where(moment, settings.negligible_moment, settings.negligible)
+    quiet = densities(state.physics, state.batch, state.schedules, QuietForceDensity.current())
     y, g = state.measurement(theta), state.acceleration(theta)
     valid, k = state.batch.valid, len(names)
-    for _ in range(ROUNDS if strength is None else 1):
+    for _ in range(settings.rounds if strength is None else 1):
         system = with_forces(state, quiet, sigma)
         x, variance = smooth_with_band(system, gains(system), y, g)
         power = (x[..., -k:] ** 2 + variance[..., -k:])[valid].mean(axis=0)
@@ -70,7 +81,7 @@ def with_forces(state: LinearisedState, density: Array, sigma: Array) -> System:
     F[..., :d, :d] = base.F
     accelerations = base.G[..., : pushes.shape[2]] @ state.motion.inverse @ pushes
     F[..., :d, d:] = accelerations
-    keep = np.exp(-h / MEMORY)
+    keep = np.exp(-h / RobotMissingSettings.current().memory)
     i = np.arange(k)
     F[..., d + i, d + i] = np.where(state.batch.valid, keep, 1.0)[..., None]
     j = base.G.shape[3]

@@ -29,7 +29,7 @@ from kemba.identify.robot.candidates import (
     robot_candidates,
 )
 from kemba.identify.robot.dynamics.physics import Physics
-from kemba.identify.robot.dynamics.reference import ForceDensity
+from kemba.identify.robot.dynamics.settings import ForceDensity
 from kemba.identify.robot.dynamics.tolerance import SHARE
 from kemba.identify.robot.force_channels import robot_force_channels
 from kemba.identify.robot.formulas import formula_columns
@@ -42,9 +42,19 @@ from kemba.identify.robot.operating_point import changes, robot_operating_point
 from kemba.identify.robot.state import LinearisedState, linearise_at
 from kemba.identify.robot.validate import contradictions
 from kemba.model.model import Model
+from kemba.settings import BY_HAND, Settings, setting
 from kemba.trajectory import Trajectory
 
-WINDOW = 0.05  # s, over which a motion is predicted to tell an error in a channel's unit
+
+class RobotProblemSettings(Settings):
+    """Over how long the errors of robot logs are summed."""
+
+    window: int = setting(
+        20, "1", "rows over which one-step errors are summed", BY_HAND, decides=True
+    )
+    predicted: float = setting(
+        0.05, "s", "time of a prediction that tells an error in a channel's unit", BY_HAND
+    )
 
 
 class RobotProblem(Problem):
@@ -54,14 +64,14 @@ class RobotProblem(Problem):
     that no model explains.
     """
 
-    window = 20  # innovations are one-step errors
     moves = True
     state: LinearisedState
 
     def __init__(
         self, logs: Sequence[Trajectory], model: Model, unknown: ForceDensity | None = None
     ) -> None:
-        self.model, self.unknown = model, unknown or ForceDensity()
+        self.window = RobotProblemSettings.current().window  # innovations are one-step errors
+        self.model, self.unknown = model, unknown or ForceDensity.current()
         found = robot_candidates(model)
         effects = in_the_air(found)
         grip, ground = ground_of(model)
@@ -153,10 +163,15 @@ class RobotProblem(Problem):
         return self.state.pick(power[..., None])[:, 0]
 
     def window_errors(self, theta: Theta) -> dict[str, Array]:
-        """Per channel, measured minus predicted (k,) in its unit, over windows of WINDOW that begin
-        on the measured motion; contact forces are the data's."""
+        """Per channel, measured minus predicted (k,) in its unit, over short times that begin on
+        the measured motion; contact forces are the data's."""
         state, batch = self.state, self.batch
-        steps = max(2, round(WINDOW / float(np.median(batch.h[batch.valid]))))
+        steps = max(
+            2,
+            round(
+                RobotProblemSettings.current().predicted / float(np.median(batch.h[batch.valid]))
+            ),
+        )
         y = np.nan_to_num(state.measurement(theta))
         g = state.motion.extend(state.acceleration(theta)[..., None])[..., 0]
         errors = predicted_error(state.motion.system, y, g, steps)

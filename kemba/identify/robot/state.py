@@ -20,20 +20,24 @@ from kemba.identify.robot.dynamics.inputs import air_states, read_inputs
 from kemba.identify.robot.dynamics.linear import LinearisedMotion, linearise_along, smoothed
 from kemba.identify.robot.dynamics.physics import Physics
 from kemba.identify.robot.dynamics.reference import (
-    LOOSE,
-    ForceDensity,
     Reference,
     densities,
     first_reference,
     read_schedules,
 )
+from kemba.identify.robot.dynamics.settings import ForceDensity, LooseForceDensity
 from kemba.identify.robot.motion.batch import Batch
 from kemba.identify.robot.motion.contact import Schedule, loaded
 from kemba.identify.robot.motion.filter import Gains, gains, innovations
 from kemba.identify.robot.motion.sensing import ahead, sensed
+from kemba.settings import BY_HAND, Settings, setting
 
-ROUNDS = 2
-LEAD_IN = 4  # nodes whose innovations only tell where the run starts
+
+class StateSettings(Settings):
+    """How the motion of robot logs is found."""
+
+    rounds: int = setting(2, "1", "times that the motion is smoothed with the model", BY_HAND)
+    lead_in: int = setting(4, "1", "nodes at the start that only tell where a run begins", BY_HAND)
 
 
 @dataclass(frozen=True)
@@ -121,8 +125,10 @@ def linearise_at(
     reference = _without_delays(physics, batch, base, first_reference(physics, batch))
     schedules = read_schedules(physics, batch, reference)
     dt = float(np.median(batch.h[batch.valid]))
-    for _ in range(ROUNDS):
-        state = _along(physics, batch, base, ground, schedules, reference, LOOSE)
+    for _ in range(StateSettings.current().rounds):
+        state = _along(
+            physics, batch, base, ground, schedules, reference, LooseForceDensity.current()
+        )
         y, g = state.measurement(base), state.acceleration(base)
         reference = smoothed(state.motion, state.gain, y, g)
         if any(name.startswith("sensor") for name in base):  # as true sensors would have seen it
@@ -157,7 +163,7 @@ def _along(
     density = densities(physics, batch, schedules, unknown)
     motion = linearise_along(physics, batch, schedules, reference, density, states, p)
     mask = np.isfinite(motion.system.R)
-    mask[:LEAD_IN] = False
+    mask[: StateSettings.current().lead_in] = False
     forces = Forces(physics, batch, motion)
     gain = gains(motion.system)
     return LinearisedState(

@@ -10,10 +10,30 @@ from scipy.optimize import lsq_linear
 from kemba.errors import KembaError
 from kemba.identify.evidence.types import Array, Flags, Rows
 from kemba.identify.robot.state import LinearisedState
+from kemba.settings import BY_HAND, Settings, setting
 
-DEEP, OFTEN = -0.04, 0.03  # m below the ground, in this share of the rows: no sensor's fault
-ABSURD = 15.0  # one-step errors in units of noise, rms, that no missing effect makes
-FAULTY = 4.0  # sizes that a sensor's fault may have and still be one
+
+class RobotValidateSettings(Settings):
+    """When robot logs contradict themselves or any model."""
+
+    deep: float = setting(
+        0.04,
+        "m",
+        "depth of a foot below the ground that no sensor's fault makes",
+        BY_HAND,
+        decides=True,
+    )
+    often: float = setting(
+        0.03, "1", "share of the rows in which it must be so deep", BY_HAND, decides=True
+    )
+    absurd: float = setting(
+        15.0,
+        "1",
+        "rms one-step error, in sigmas, that no missing effect makes",
+        BY_HAND,
+        decides=True,
+    )
+    faulty: float = setting(4.0, "1", "largest fault of a sensor, in sizes", BY_HAND, decides=True)
 
 
 def contradictions(
@@ -24,17 +44,18 @@ def contradictions(
     `rows` and `r` (n,): the residual of the model as it is. `sensor_columns`: gives the columns
     (n, k) of all sensor faults per size; it is called only where a residual is too large.
     """
+    absurd = RobotValidateSettings.current().absurd
     forgiven: Array | None = None
     for i, log in enumerate(state.batch.resampled):
         sunk = list(_sunk(state, i))
         yield from sunk
         own = rows.run == i
         power = _power(state.physics.channels, r, rows, own)
-        if max(power.values(), default=0.0) > ABSURD:
+        if max(power.values(), default=0.0) > absurd:
             forgiven = _forgiven(r, sensor_columns()) if forgiven is None else forgiven
             power = _power(state.physics.channels, forgiven, rows, own)
         worst = max(power, key=power.__getitem__, default="")
-        if worst and power[worst] > ABSURD and not sunk:
+        if worst and power[worst] > absurd and not sunk:
             yield KembaError(
                 log.name,
                 f"{worst} moves as no robot would: {power[worst]:.0f} times its noise off per row",
@@ -45,10 +66,11 @@ def contradictions(
 
 def _sunk(state: LinearisedState, run: int) -> Iterator[KembaError]:
     """Feet that would be far below the ground for long."""
+    limits = RobotValidateSettings.current()
     legs, log = state.physics.legs, state.batch.resampled[run]
     heights = state.motion.places[: len(log.time), run, 1 : 2 * len(legs) : 2]
     for leg, height in zip(legs, heights.T, strict=True):
-        if np.mean(height < DEEP) > OFTEN:
+        if np.mean(height < -limits.deep) > limits.often:
             at = int(np.argmin(height))
             yield KembaError(
                 log.name,
@@ -73,7 +95,8 @@ def _forgiven(r: Array, columns: Array) -> Array:
     """The residual (n,) less what faults of sensors can explain: these are to be found, not
     refused. `columns` (n, k) per size of each fault."""
     gram = columns.T @ columns + 1e-9 * np.eye(columns.shape[1])
+    faulty = RobotValidateSettings.current().faulty
     lower = np.linalg.cholesky(gram)
     wanted = np.linalg.solve(lower, -columns.T @ r)
-    found = lsq_linear(lower.T, wanted, bounds=(-FAULTY, FAULTY))
+    found = lsq_linear(lower.T, wanted, bounds=(-faulty, faulty))
     return np.asarray(r + columns @ found.x)

@@ -1,4 +1,4 @@
-"""The same program with requirements that may give way at an l1 cost; the physics stays hard."""
+"""The same program with requirements that may give way at an l1 cost; the physics must hold."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ from kemba.ocp.transcription.stage import Rows
 from kemba.ocp.transcription.symmetry import Reduction
 from kemba.ocp.transcription.transcribe import RequirementBlock, Transcription
 
-# Who gives way: goals first, as people would; then everything but the start, whose pose is judged
-# before solving.
+# What may give way: goals first; then everything but the start, which is checked before solving.
 TIERS = (("goals",), ("goals", "bounds", "end"))
 
 
 class Elastic(Transcription):
-    """Requirements of the sections `soft` have a pair of slack variables, shared by their nodes: how far
-    below and above what is asked the plan stays. They stand at the first node, in columns of Y
-    behind the layout's.
+    """A transcription whose requirements of the sections `soft` may give way.
+
+    Each of them has two slack variables, shared by all its nodes: how far the plan stays below and
+    above what is asked. They stand in row 0 of Y, in columns behind the layout's.
     """
 
     def __init__(
@@ -95,7 +95,8 @@ class Elastic(Transcription):
         return wide
 
     def given(self, Y: np.ndarray) -> list[tuple[Requirement, float, float]]:
-        """Requirements that gave way: the requirement, by how much in its unit (above: positive), and scaled."""
+        """Every soft requirement: by how much it gave way, in its unit (above is positive) and
+        scaled."""
         found = []
         for requirement, column, scale in self.slack:
             by = float(Y[0, column + 1] - Y[0, column])

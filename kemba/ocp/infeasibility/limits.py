@@ -1,4 +1,4 @@
-"""Which limits of the robot a plan leans on, in words."""
+"""Which limits of the robot a plan reaches, in words."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ def silent() -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Gap:
-    """A requirement and the value nearest to it that a pose can have while the other requirements hold."""
+    """A requirement, and the nearest value that a pose reaches while the others hold."""
 
     requirement: Requirement
     asked: float
@@ -57,7 +57,7 @@ class Poses:
 
     @cached_property
     def walls(self) -> ca.SX:
-        """What is never negative in any pose: gaps of the feet, way left to the end stops."""
+        """Expressions that no pose makes negative: gaps of feet, distances to the end stops."""
         node = self.model.node
         others = ca.vertcat(node.v, node.a, node.s, node.sd, node.lam, node.u)
         rows = ca.vertsplit(ca.vertcat(node.pair_a, node.pair_b))

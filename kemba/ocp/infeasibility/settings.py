@@ -80,7 +80,7 @@ class ElasticSolve(Settings):
 
 
 class Leaning(Settings):
-    """When a plan leans on a limit of the robot."""
+    """When a plan counts as being at a limit of the robot."""
 
     near: float = setting(0.99, "1", "part of the stroke that counts as all", "convention: 1 %")
     often: float = setting(

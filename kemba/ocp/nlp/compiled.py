@@ -1,9 +1,9 @@
-"""Optional speed: the same functions as C code, compiled once and kept by content.
+"""Optional speed: the same functions as C code, compiled once and kept in a cache.
 
-Never needed and never waited for: the compiler works beside the first solve, which goes on with
-the functions as they are. Later solves find the library. Code is loaded only from a folder that
-belongs to the user and that nobody else can write, and only when the file has the very content
-that the compiler made: anything else is made anew, or done without.
+The compiler runs beside the first solve, which uses the functions as they are and does not wait.
+Later solves find the library under the hash of the functions. Code is loaded only from a folder
+that belongs to the user and that nobody else can write, and only when the file is what the
+compiler made. Anything else is compiled again, or not used.
 """
 
 from __future__ import annotations
@@ -109,7 +109,7 @@ def is_whole(library: Path) -> bool:
 
 
 def _compile(functions: Sequence[ca.Function], compiler: str, library: Path, wait: bool) -> None:
-    """Set a compiler to work, unless one is already, in a process that outlives ours."""
+    """Start a compiler, unless one is at work already, in a process that may outlive ours."""
     folder = library.with_suffix(".making")
     if folder.exists() and time.time() - folder.stat().st_mtime > Functions.current().stale:
         shutil.rmtree(folder, ignore_errors=True)

@@ -1,4 +1,4 @@
-"""Expressions with their numbers taken out, so that code is shared by all that differ in them."""
+"""Constants of expressions as parameters: tasks that differ only in numbers share their code."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from kemba.ocp.nlp.rewriting import replay
 
-SHAPING = (-1.0, 0.0, 0.5, 1.0, 2.0)  # numbers that decide what an expression simplifies to
+SHAPING = (-1.0, 0.0, 0.5, 1.0, 2.0)  # CasADi simplifies expressions with these numbers
 
 
 def parameterised(

@@ -1,7 +1,7 @@
-"""A small cost on leaving a start, for solves that shall end near it.
+"""A proximal term: a small cost on the distance from the start.
 
-Where the cost is flat, as in forces that legs share, Newton steps run far along it for no gain and
-lose feasibility on the way. The anchor bends these directions and hardly moves the optimum.
+Where the cost is flat, as for forces that legs share, Newton steps become long without any gain and
+lose feasibility. The proximal term gives these directions curvature and hardly moves the optimum.
 """
 
 from __future__ import annotations

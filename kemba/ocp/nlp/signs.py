@@ -1,8 +1,8 @@
 """Expressions in which what differs by a sign alone is written once.
 
-A mirrored leg's sines and lever arms are the negatives of the other's, which CasADi takes for new
-expressions. Signs are pushed outwards here, past even and odd functions, products and sums, until
-both legs share all they can. Nothing is rounded differently: IEEE arithmetic is symmetric.
+The sines and lever arms of a mirrored leg are the negatives of the other leg's. CasADi does not see
+this and computes both. Here signs are moved out of even and odd functions, products and sums, so
+that both legs share the same expressions. Rounding does not change: IEEE arithmetic is symmetric.
 """
 
 from __future__ import annotations
@@ -26,16 +26,19 @@ def canonical_signs(inputs: Sequence[ca.SX], outputs: Sequence[ca.SX]) -> list[c
     """The same outputs, dense, of symbols, with mirrored subexpressions shared."""
     f = ca.Function("f", list(inputs), [ca.densify(y) for y in outputs])
     given = [[(False, x) for x in ca.vertsplit(ca.vec(symbols))] for symbols in inputs]
-    fold = _Canonical()
-    found = replay(f, given, fold.number, fold.apply)
+    signed = _Canonical()
+    found = replay(f, given, signed.number, signed.apply)
     elements = [ca.vertcat(*(_plain(x) for x in nonzeros)) for nonzeros in found]
     return [ca.reshape(ca.SX(e), y.shape) for e, y in zip(elements, outputs, strict=True)]
 
 
 @dataclass
 class _Canonical:
-    """Builds signed expressions, each once; `order` numbers them as they come
-    (and keeps them, since a hash is unique among the living only)."""
+    """Builds signed expressions, each once.
+
+    `order` numbers expressions by their hash, in the order in which they come. It also keeps them:
+    CasADi may give the hash of a deleted expression to a new one.
+    """
 
     known: dict[tuple[int, ...], ca.SX] = field(default_factory=dict)
     order: dict[int, tuple[int, ca.SX]] = field(default_factory=dict)

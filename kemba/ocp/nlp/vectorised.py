@@ -1,7 +1,7 @@
 """A function at many points at once, each instruction a loop over the points.
 
-CasADi's own map evaluates point by point, instruction by instruction: deciding what to do takes
-several times as long as doing it. Here that is decided once for all points.
+CasADi's own map evaluates point by point, and looks up every instruction again at each point, which
+takes several times as long as the arithmetic. Here an instruction is looked up once for all points.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def _stacked(elements: list[ca.MX], points: int) -> ca.MX:
 
 @contextmanager
 def _as_written() -> Iterator[None]:
-    """Expressions stay as they are built: simplified ones may round otherwise."""
+    """Without CasADi's simplifications, which may change the rounding."""
     before = ca.GlobalOptions.getSimplificationOnTheFly()
     ca.GlobalOptions.setSimplificationOnTheFly(False)
     try:

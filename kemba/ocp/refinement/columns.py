@@ -12,7 +12,12 @@ from kemba.ocp.transcription.layout import Layout
 
 
 class Columns:
-    """Where everything stands in the vector: indices by group, for nodes, stages and phases."""
+    """Indices of everything in the vector x of a multi-phase program.
+
+    `first`: state at the start, by group; `stages[e][i]`: state and forces at stage i of element e;
+    `u` (elements, nu): inputs; `h` (phases, 1): element durations; `after`, `impulse`: velocities
+    after and impulses at the impact that begins a phase.
+    """
 
     def __init__(
         self, layout: Layout, phases: Sequence[Phase], impacts: Sequence[int], stages: int

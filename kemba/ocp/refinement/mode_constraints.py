@@ -1,4 +1,4 @@
-"""What every mode asks: closed constraints hold, open ones stay apart, friction in its cone."""
+"""Mode constraints: closed gaps stay zero, open ones positive, friction stays in its cone."""
 
 from __future__ import annotations
 
@@ -10,32 +10,37 @@ import numpy as np
 from kemba.ocp.refinement.independent import Independent
 from kemba.ocp.refinement.modes import AHEAD, BACK, HELD, OPEN
 from kemba.ocp.refinement.program import PhaseProgram, Where
-from kemba.ocp.refinement.settings import ModeRules
+from kemba.ocp.refinement.radau import STATE
+from kemba.ocp.refinement.settings import ModeConstraints
 from kemba.ocp.refinement.unilateral import Constraint
 from kemba.ocp.refinement.view import View
 from kemba.ocp.task.requirement import SCALES
+from kemba.ocp.transcription.first_node import state_rows
 
 INF = np.inf
 LENGTH, SPEED = SCALES["m"], SCALES["m.s-1"]  # of gaps and their rates
 
 
 def add_mode_constraints(program: PhaseProgram, start: Independent) -> None:
-    """Rows of every constraint in every phase and at every impact; `start` knows what the task
-    already fixes at the first node."""
+    """Add the rows of every mode in every phase and at every impact.
+
+    `start`: the equalities that the task already asks for at the first node.
+    """
     view = View(program)
     for i, constraint in enumerate(program.constraints):
         _gaps(program, view, i, constraint)
         _held(program, view, i, constraint)
         _friction(program, view, i, constraint)
         _start(program, view, i, constraint, start)
+    _first_state(program, view, start)
     _limits(program, view)
     _durations(program)
 
 
 def _gaps(program: PhaseProgram, view: View, i: int, constraint: Constraint) -> None:
-    """Open gaps stay open; where one closes it is zero, and a foot comes down."""
+    """Open gaps stay positive; where one closes it is zero, and a foot moves downwards."""
     c, phases = program.columns, program.phases
-    rules = ModeRules.current()
+    settings = ModeConstraints.current()
     closing = {phases[p].first: p for p in program.impacts if program.closes(p, i)}
     closed = np.array([phases[p].active(i) for p in c.phase_of])
     g = view.of(constraint.gap) / LENGTH
@@ -45,16 +50,18 @@ def _gaps(program: PhaseProgram, view: View, i: int, constraint: Constraint) -> 
             for e in np.flatnonzero(~closed)
             for stage in range(len(c.stages[e]))
             if not (stage == len(c.stages[e]) - 1 and e + 1 in closing)
-            and clear != closed[max(e - rules.away, 0) : e + rules.away + 1].any()
+            and clear != closed[max(e - settings.away, 0) : e + settings.away + 1].any()
         ]
-        low = rules.clear / LENGTH if clear else 0.0
-        program.mode_rule(i, "gap", view.z("q"), g, low, INF, apart)
+        low = settings.clear / LENGTH if clear else 0.0
+        program.mode_constraint(i, "gap", view.z("q"), g, low, INF, apart)
     touching = [(closing[node], c.end(node)["q"]) for node in sorted(closing)]
-    program.mode_rule(i, "touch", view.z("q"), g, 0.0, 0.0, touching)
+    program.mode_constraint(i, "touch", view.z("q"), g, 0.0, 0.0, touching)
     if constraint.friction is not None:
         rate = view.of(constraint.rate) / SPEED
         before = [(p, np.concatenate([c.end(n)["q"], c.end(n)["v"]])) for n, p in closing.items()]
-        program.mode_rule(i, "approach", view.z("q v"), rate, -INF, -rules.lands / SPEED, before)
+        program.mode_constraint(
+            i, "approach", view.z("q v"), rate, -INF, -settings.lands / SPEED, before
+        )
 
 
 def _held(program: PhaseProgram, view: View, i: int, constraint: Constraint) -> None:
@@ -68,7 +75,7 @@ def _held(program: PhaseProgram, view: View, i: int, constraint: Constraint) -> 
     ]
     states += [(p, np.concatenate([c.end(phases[p].first)["q"], c.after[p]])) for p in c.after]
     closed = [(p, z) for p, z in states if phases[p].active(i)]
-    program.mode_rule(i, "rate", view.z("q v"), rate, 0.0, 0.0, closed)
+    program.mode_constraint(i, "rate", view.z("q v"), rate, 0.0, 0.0, closed)
     if constraint.friction is None:
         return
     slip = view.of(constraint.friction.slip) / SPEED
@@ -81,8 +88,8 @@ def _held(program: PhaseProgram, view: View, i: int, constraint: Constraint) -> 
     sets = [(HELD, 0.0, 0.0), (AHEAD, 0.0, INF), (BACK, -INF, 0.0)]
     for wanted, low, high in sets:
         where = [(p, z) for p, z in states if phases[p].modes[i] == wanted]
-        program.mode_rule(i, "slip", view.z("q v"), slip, low, high, where)
-    program.mode_rule(i, "settles", view.z("q v"), slip, 0.0, 0.0, settling)
+        program.mode_constraint(i, "slip", view.z("q v"), slip, low, high, where)
+    program.mode_constraint(i, "settles", view.z("q v"), slip, 0.0, 0.0, settling)
 
 
 def _friction(program: PhaseProgram, view: View, i: int, constraint: Constraint) -> None:
@@ -101,13 +108,13 @@ def _friction(program: PhaseProgram, view: View, i: int, constraint: Constraint)
         g = view.of(cone) / weight
         for wanted, high in ((HELD, INF), (sliding, 0.0)):
             where = [(p, lam) for p, lam in forces if phases[p].modes[i] == wanted]
-            program.mode_rule(i, f"cone {way}", view.z("lam"), g, 0.0, high, where)
+            program.mode_constraint(i, f"cone {way}", view.z("lam"), g, 0.0, high, where)
 
 
 def _start(
     program: PhaseProgram, view: View, i: int, constraint: Constraint, start: Independent
 ) -> None:
-    """A constraint that is closed at first touches at rest there, unless the task says so."""
+    """Gap and rate of a constraint that is closed at first are zero; not where the task says so."""
     mode, first = program.phases[0].modes[i], program.columns.first
     if mode == OPEN:
         return
@@ -118,7 +125,17 @@ def _start(
     for name, expression, scale in rows:
         g = view.of(expression) / scale
         if start.adds(g, view):
-            program.rule(f"{constraint.label} first {name}", view.z("q v"), g, 0.0, 0.0, [at])
+            program.add(f"{constraint.label} first {name}", view.z("q v"), g, 0.0, 0.0, [at])
+
+
+def _first_state(program: PhaseProgram, view: View, start: Independent) -> None:
+    """What holds in every state, at the first node; not where equalities there decide it."""
+    node, reduction, first = program.model.node, program.reduction, program.columns.first
+    at = np.concatenate([first[g] for g in STATE])
+    for row in state_rows(node, reduction.pairs, reduction.limits):
+        g = view.of(row.expression) / (LENGTH if row.unit == "m" else row.scale)
+        if start.rest(g, view) is not None:
+            program.add(f"{row.label} first", view.z("q v s"), g, 0.0, INF, [at])
 
 
 def _limits(program: PhaseProgram, view: View) -> None:
@@ -131,7 +148,7 @@ def _limits(program: PhaseProgram, view: View) -> None:
             for stage in c.stages[e]
         ]
         g = view.of(program.model.node.limits[j])
-        program.rule(label, view.z("q v s u lam"), g, 0.0, INF, where)
+        program.add(label, view.z("q v s u lam"), g, 0.0, INF, where)
 
 
 def _durations(program: PhaseProgram) -> None:
@@ -141,10 +158,10 @@ def _durations(program: PhaseProgram) -> None:
     lasting = [phase.elements * scale * h[p] / task.duration for p, phase in enumerate(phases)]
     columns = [program.columns.h[:, 0]]
     low, high = 1 - task.step_variation, 1 + task.step_variation
-    program.rule("duration", h, sum(lasting), low, high, columns)
+    program.add("duration", h, sum(lasting), low, high, columns)
     for valve in range(len(phases[0].valves)):
         places = [phase.valves[valve] for phase in phases]
         switches = [p for p in range(1, len(phases)) if places[p] != places[p - 1]]
         for a, b in itertools.pairwise(switches):
             dwell = sum(lasting[a:b], ca.SX(0))
-            program.rule("dwell", h, dwell, task.min_dwell / task.duration, INF, columns)
+            program.add("dwell", h, dwell, task.min_dwell / task.duration, INF, columns)

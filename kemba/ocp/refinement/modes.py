@@ -1,4 +1,4 @@
-"""The mode sequence of an implicit Euler plan: what touches, slides and stands open, and when."""
+"""The mode sequence of an implicit Euler plan: which contacts and stops are closed, which slide."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ OPEN, HELD, AHEAD, BACK = 0, 1, 2, 3  # open; closed and sticking; sliding forwa
 
 @dataclass(frozen=True)
 class Phase:
-    """Intervals first+1 .. last in which constraints keep their mode and valves their place."""
+    """Intervals first+1 .. last with the same modes of constraints and valve positions."""
 
     first: int
     last: int
@@ -60,9 +60,12 @@ def read_phases(
 
 
 def _settling(phases: Sequence[Phase]) -> list[Phase]:
-    """The last two of three phases. Where a stop or a foot closes one interval before the last
-    valve switch, the switch comes first: implicit Euler spreads an impact over two intervals, and
-    air that still flows pushes a piston off the stop on which the motion shall end at rest."""
+    """The last two of three phases.
+
+    A stop or a foot may close one interval before the last valve switch. Then the switch is put
+    first. Implicit Euler spreads an impact over two intervals; in continuous time it is over at
+    once, and air that still flows would push the piston off the stop.
+    """
     before, hit, last = phases
     closes = any(a == OPEN != b for a, b in zip(before.modes, hit.modes, strict=True))
     between = hit.modes == last.modes and hit.valves == before.valves != last.valves
@@ -83,7 +86,7 @@ def _modes(model: Model, constraint: Constraint, plan: Trajectory, trim: bool) -
     force = x["lam"][:, constraint.force] / model.mechanism.weight
     modes = np.where(force * reading.stiff > np.maximum(values[0], 0.0), HELD, OPEN)
     if values[0][0] < reading.closed and modes[1] == OPEN:
-        modes[1] = HELD  # what touches at the start leaves no sooner than its force is gone
+        modes[1] = HELD  # a contact that is closed at the start has a force
     _fill_hops(modes, values[0], reading.shudder)
     if constraint.friction is not None:
         light = force < reading.light
@@ -100,7 +103,7 @@ def _modes(model: Model, constraint: Constraint, plan: Trajectory, trim: bool) -
 
 
 def _fill_hops(modes: np.ndarray, gap: np.ndarray, hop: float) -> None:
-    """Keep closed what opens less than `hop` [m], and briefly, between two touches."""
+    """Close a gap that opens by less than `hop` [m] for a step or two between two touches."""
     runs = _runs(modes)
     for (_, a), (b, _) in itertools.pairwise(runs):
         if b - a <= Reading.current().brief and gap[a:b].max() < hop:
@@ -108,8 +111,10 @@ def _fill_hops(modes: np.ndarray, gap: np.ndarray, hop: float) -> None:
 
 
 def _valves_first(modes: np.ndarray, valves: np.ndarray) -> None:
-    """Where modes and valves change at one node, let the modes follow a step later: the
-    program shall be free to tell one from the other."""
+    """Where modes and valves change at one node, change the modes one step later.
+
+    Their times are free in the program; a phase between them lets both be found.
+    """
     for k in range(2, len(modes) - 1):
         both = (modes[k] != modes[k - 1]).any() and (valves[k] != valves[k - 1]).any()
         if both and (modes[k + 1] == modes[k]).all():

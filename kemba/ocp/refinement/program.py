@@ -26,9 +26,12 @@ Where = list[tuple[int, np.ndarray]]  # phases and the columns of z there
 
 @dataclass(frozen=True)
 class Soft:
-    """One rule of a mode that may give way: which constraint it is about, what it asks, in which
-    phases it holds (repeats,), and how far it gives way: `above` and `below` its bounds, columns
-    (repeats,) or None."""
+    """A mode constraint that may give way.
+
+    `constraint`: the index of its unilateral constraint; `kind`: what it asks (gap, slip, ...);
+    `phases` (repeats,): where it holds; `above`, `below` (repeats,) or None: columns of the slacks
+    by which it leaves its upper and its lower bound.
+    """
 
     constraint: int
     kind: str
@@ -62,11 +65,11 @@ class Row:
 
 
 class PhaseProgram:
-    """The program of a phase sequence; `lower`, `upper`, `g_lower`, `g_upper` and `problem` as a
-    Transcription has them.
+    """The program of a phase sequence.
 
-    `elastic`: 0 where modes hold exactly, else the price of every rule of a mode giving way by
-    its scale.
+    `lower`, `upper` (size,) bound the variables x, `columns` tells where each stands; `g_lower`,
+    `g_upper` (rows,) bound the rows, `rows` says what each means. `elastic`: 0 where modes hold
+    exactly, else the price of a mode constraint that gives way by its scale.
     """
 
     def __init__(
@@ -89,7 +92,7 @@ class PhaseProgram:
         self.lower, self.upper = self._bounds()
         self.element = element(model, self.layout, reduction, task.cost, scheme)
         self.jump = impact(model, self.layout, reduction)
-        self.rules: list[Part] = []
+        self.added: list[Part] = []
 
     def _closes(self, p: int) -> bool:
         """Whether a constraint that was open is closed from phase p on."""
@@ -132,7 +135,7 @@ class PhaseProgram:
     def _forces(
         self, lower: np.ndarray, upper: np.ndarray, index: np.ndarray, modes: Sequence[int]
     ) -> None:
-        """Forces are zero where open; friction is one signed force while closed."""
+        """Forces are zero while open; while closed, friction is one signed force."""
         top = self.layout.upper[self.layout.slices["lam"]]
         lower[index] = upper[index] = 0.0
         for constraint, mode in zip(self.constraints, modes, strict=True):
@@ -148,21 +151,21 @@ class PhaseProgram:
         """Column of a force of the whole robot among the half's."""
         return int(np.flatnonzero(self.reduction.B["lam"][force])[0])
 
-    def rule(
+    def add(
         self, label: str, z: ca.SX, g: ca.SX, low: float, high: float, columns: list[np.ndarray]
     ) -> None:
-        """Add a row wherever `columns` say."""
+        """Add the row low <= g(z) <= high, once for each z in `columns` (repeats, len(z))."""
         if columns:
             part = Part((label,), z, ca.SX(g), ca.SX(0), low, high, np.array(columns))
-            self.rules.append(part)
+            self.added.append(part)
 
-    def mode_rule(
+    def mode_constraint(
         self, i: int, kind: str, z: ca.SX, g: ca.SX, low: float, high: float, where: Where
     ) -> None:
-        """Add what a mode of constraint i asks; it gives way for a price in an elastic program."""
+        """The same for a mode of constraint i; in an elastic program it gives way for a price."""
         label, columns = f"{self.constraints[i].label} {kind}", [at for _, at in where]
         if not self.elastic or not columns:
-            self.rule(label, z, g, low, high, columns)
+            self.add(label, z, g, low, high, columns)
             return
         slack = ca.SX.sym("slack", int(high < INF) + int(low > -INF))
         own = self.columns.more(len(columns), slack.numel())
@@ -174,7 +177,7 @@ class PhaseProgram:
         g = g - slack[0] * float(high < INF) + slack[-1] * float(low > -INF)
         soft = Soft(i, kind, np.array([p for p, _ in where]), above, below)
         at, price = np.hstack([np.array(columns), own]), self.elastic * ca.sum1(slack)
-        self.rules.append(Part((label,), ca.vertcat(z, slack), g, price, low, high, at, soft))
+        self.added.append(Part((label,), ca.vertcat(z, slack), g, price, low, high, at, soft))
 
     def proximal(self, x: np.ndarray, weight: float) -> np.ndarray:
         """Add weight / 2 times the squared scaled distance of states, inputs and durations from
@@ -189,22 +192,22 @@ class PhaseProgram:
         self.upper = np.concatenate([self.upper, x[index]])
         z, nothing = ca.SX.sym("z", 2), ca.SX(0, 1)
         pull, at = weight / 2 * (z[0] - z[1]) ** 2, np.column_stack([index, fixed])
-        self.rules.append(Part((), z, nothing, pull, 0.0, 0.0, at))
+        self.added.append(Part((), z, nothing, pull, 0.0, 0.0, at))
         return np.concatenate([x, x[index]])
 
     def keep_short(self, x: np.ndarray, steps: float) -> None:
-        """Bound elements by `steps` times the nominal one, but for those that x has longer."""
+        """Bound elements by `steps` times the nominal step, or by their length in x if longer."""
         index = self.columns.h[:, 0]
         longest = self.upper[index] * steps / Elements.current().longest
         self.upper[index] = np.maximum(longest, x[index])
 
     @property
     def soft(self) -> list[Soft]:
-        """The rules that may give way."""
-        return [part.soft for part in self.rules if part.soft is not None]
+        """The mode constraints that may give way."""
+        return [part.soft for part in self.added if part.soft is not None]
 
     def loosened(self, x: np.ndarray) -> np.ndarray:
-        """The same with every rule giving way as far as it must, and a little more."""
+        """x (size,) with slacks a little larger than every mode constraint needs there."""
         x, row, leeway = x.copy(), 0, Elements.current().leeway
         g = np.array(self.problem.g(x, [])).ravel()
         for part in self._parts:
@@ -239,7 +242,7 @@ class PhaseProgram:
         if hits:
             jump = self.jump
             found.append(Part(jump.labels, jump.z, jump.g, zero, 0.0, 0.0, np.array(hits)))
-        return found + self.rules
+        return found + self.added
 
     @cached_property
     def rows(self) -> list[Row]:

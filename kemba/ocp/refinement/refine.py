@@ -75,7 +75,7 @@ def refine(
     reduction: Reduction | None = None,
     control: Control | None = None,
 ) -> Refined:
-    """The plan with its modes kept, phase durations free, and events where they happen.
+    """The plan solved again with its modes kept and the durations of its phases free.
 
     `reduction`: half or whole robot; by default the half where plan and task allow it.
     """
@@ -89,7 +89,7 @@ def refine(
 
 @dataclass
 class Refiner:
-    """Readings of a plan's modes, each repaired where it does not fit, until one solves."""
+    """Reads the modes of a plan, solves, and repairs modes that do not fit, until one solves."""
 
     model: Model
     task: Task
@@ -98,7 +98,7 @@ class Refiner:
     reduction: Reduction
     control: Control
     iterations: int = 0
-    seen: list[list[Phase]] = field(default_factory=list)  # whose modes were put to the test
+    seen: list[list[Phase]] = field(default_factory=list)  # phases that were tried
 
     @property
     def marks(self) -> list[int]:
@@ -151,7 +151,7 @@ class Refiner:
         return found
 
     def exact(self, phases: Sequence[Phase], start: Trajectory) -> Refined:
-        """The nearest solution on some phases by the coarser scheme, then the best by both."""
+        """The solution nearest to the plan by the coarser scheme, then the best one by both."""
         program, x = self.build(phases, start, RADAU3)
         settings = Refining.current()
         half = self.reduction.symmetric

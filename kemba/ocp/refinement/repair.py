@@ -1,4 +1,4 @@
-"""Modes that do not fit, changed where an elastic program had to give way."""
+"""Modes that do not fit: they are changed where an elastic program had to give way."""
 
 from __future__ import annotations
 
@@ -85,8 +85,10 @@ def _collapsed(program: PhaseProgram) -> float:
 
 
 def _shortest_near(program: PhaseProgram, x: np.ndarray, p: int) -> int | None:
-    """The shortest of phase p and its neighbours that may give way: by the plan, then by x, where
-    the elastic program may have bent durations."""
+    """The shortest of phase p and its neighbours whose modes may be replaced, or None.
+
+    Shortest by its elements, then by its duration in x, which the elastic program may distort.
+    """
     h = x[program.columns.h[:, 0]] * program.layout.scale[program.layout.slices["h"]][0]
     least = _collapsed(program)
     last = len(program.phases) - 1
@@ -112,7 +114,7 @@ def _nearest_modes(phases: Sequence[Phase], p: int) -> tuple[int, ...]:
 
 
 def _changed(program: PhaseProgram, x: np.ndarray, p: int, i: int) -> tuple[int, ...]:
-    """The modes of phase p with that of constraint i as its worst rule suggests."""
+    """The modes of phase p; constraint i gets the mode that its worst violation suggests."""
     worst, kind, sign = 0.0, "", 0
     for soft in program.soft:
         here = soft.phases == p

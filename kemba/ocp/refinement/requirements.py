@@ -20,7 +20,7 @@ INF = np.inf
 def add_requirements(
     program: PhaseProgram, requirements: Sequence[Requirement], start: Independent, end: Independent
 ) -> None:
-    """Bounds where a requirement is about a variable, rows otherwise; none where modes grant it."""
+    """Bounds where a requirement is about a variable, else rows; none where modes imply it."""
     view = View(program)
     _granted_at_end(program, view, end)
     seen: set[tuple[object, ...]] = set()
@@ -68,9 +68,9 @@ def _put(
     low, high = requirement.lower / scale, requirement.upper / scale
     if not ca.depends_on(g, view.z("u lam")):
         columns = [_columns(program, node, full=False) for node in nodes]
-        program.rule(label, view.z("q v s"), g / scale, low, high, columns)
+        program.add(label, view.z("q v s"), g / scale, low, high, columns)
         return
-    program.rule(label, view.z("q v s u lam"), g / scale, low, high, columns)
+    program.add(label, view.z("q v s u lam"), g / scale, low, high, columns)
 
 
 def _columns(program: PhaseProgram, node: int, full: bool) -> np.ndarray:

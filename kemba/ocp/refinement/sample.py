@@ -5,8 +5,9 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
-from kemba.ocp.certificate.certify import Certificate, Violation
+from kemba.ocp.certificate.certify import Certificate, Violation, first_state
 from kemba.ocp.refinement.program import PhaseProgram
+from kemba.ocp.refinement.radau import STATE
 from kemba.ocp.transcription.layout import STEP
 from kemba.ocp.transcription.solution import arrays, written
 from kemba.trajectory import Trajectory
@@ -72,8 +73,11 @@ def _slip_speeds(
 
 
 def certificate(program: PhaseProgram, x: np.ndarray, trajectory: Trajectory) -> Certificate:
-    """What the solution violates: collocation and impacts (dynamics), modes, bounds and requirements
-    (bounds), forces times gaps at the element ends (complementarity)."""
+    """What the solution x (size,) violates.
+
+    dynamics: collocation and impacts; bounds: modes, bounds, requirements and the first state;
+    complementarity: forces times gaps at the ends of elements.
+    """
     g = np.array(program.problem.g(x, [])).ravel()
     over = np.maximum(np.maximum(program.g_lower - g, g - program.g_upper), 0.0)
     rows = program.rows
@@ -85,11 +89,13 @@ def certificate(program: PhaseProgram, x: np.ndarray, trajectory: Trajectory) ->
             found.append(Violation(rows[i].label, node, time, size, "of its scale", size))
     physics = np.array([row.label.split(":")[0] in PHYSICS for row in rows])
     boxes = np.maximum(program.lower - x, x - program.upper)
+    start = arrays(program.model, trajectory)
+    first = first_state(program.model, *(start[name][0] for name in STATE))
     return Certificate(
         complementarity=_complementarity(program, trajectory),
         binary=0.0,  # valves are rounded constants of their phase
         dynamics=float(np.max(over[physics], initial=0.0)),
-        bounds=float(max(np.max(boxes, initial=0.0), np.max(over[~physics], initial=0.0))),
+        bounds=max(float(np.max(part, initial=0.0)) for part in (boxes, over[~physics], -first)),
         worst=tuple(found),
     )
 

@@ -33,7 +33,7 @@ class Reading(Settings):
     brief: int = setting(2, "1", "steps that are few", STEPS, decides=True)
 
 
-class ModeRules(Settings):
+class ModeConstraints(Settings):
     """What modes ask beyond touching and staying apart."""
 
     clear: float = setting(

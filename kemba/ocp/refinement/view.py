@@ -9,7 +9,7 @@ from kemba.ocp.refinement.radau import node_vector, scaled
 
 
 class View:
-    """Expressions of the node in half symbols: `q`, `v`, `s`, `u`, `lam` scaled."""
+    """The node's expressions as functions of scaled half symbols q, v, s, u, lam."""
 
     def __init__(self, program: PhaseProgram) -> None:
         self.layout, self.node = program.layout, program.model.node

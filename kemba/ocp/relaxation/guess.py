@@ -1,5 +1,8 @@
-"""Automatic start guess: the body's height as one-dimensional rest, push, flight, landing; legs by
-inverse kinematics with the feet under the hips; forces and valves by virtual work."""
+"""Automatic start guess.
+
+The body's height rests, is pushed, flies and lands, in one dimension. Legs follow by inverse
+kinematics with the feet under the hips, forces and valves by virtual work.
+"""
 
 from __future__ import annotations
 
@@ -43,7 +46,7 @@ class Course:
 
 
 def asked(requirements: Sequence[Requirement], name: str, at: float) -> float | None:
-    """The value wished for a quantity at a moment, if any (the nearer end of a range)."""
+    """The value required of a quantity at a moment, or None; of a range its lower end, if any."""
     for requirement in requirements:
         if requirement.quantity.name == name and requirement.at == at:
             return requirement.lower if np.isfinite(requirement.lower) else requirement.upper
@@ -176,7 +179,7 @@ def _lever(robot: Robot, bend: np.ndarray) -> np.ndarray:
 def _efforts(
     model: Model, t: np.ndarray, piston: dict[str, np.ndarray], share: np.ndarray
 ) -> dict[str, np.ndarray]:
-    s = np.zeros((len(t), len(model.states)))
+    s = np.tile([q.value for q in model.states.values()], (len(t), 1))
     u = np.zeros((len(t), len(model.inputs)))
     lam = np.zeros((len(t), len(model.forces)))
     cylinder = model.mechanism.need_cylinder()

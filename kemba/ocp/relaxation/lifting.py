@@ -1,4 +1,4 @@
-"""From half the robot to the whole one: a plan confirmed there, or grown where legs differ."""
+"""Symmetry lifting: from a plan of half the robot to one of the whole robot."""
 
 from __future__ import annotations
 
@@ -23,8 +23,10 @@ def widen(half: Transcription, whole: Transcription, Y: np.ndarray) -> np.ndarra
 
 
 def confirm(schedule: Schedule, half: Transcription, point: Iterate) -> Iterate:
-    """A solved plan of the half robot on the whole one: checked there, and solved on where it falls
-    short (its forces and moments vanish by symmetry, so that it rarely does)."""
+    """A solved plan of the half robot on the whole one, solved again where a row is not met.
+
+    That is rare: what the half robot leaves out is zero by symmetry.
+    """
     whole = schedule.transcription
     start = replace(point, Y=widen(half, whole, point.Y), lam_x=None, lam_g=None)
     parameters = Parameters(Relaxation.current().margin * schedule.final_eps)
@@ -40,8 +42,8 @@ def grow(schedule: Schedule, half: Transcription, point: Iterate, guess: Iterate
     """A plan of the whole robot, its pairs still a little loose, from one of the half robot for
     what the task asks of both legs alike.
 
-    All switches are released by a few nodes, and rounded again. What the mirror keeps at zero, as
-    the way ahead, starts from `guess`.
+    All switches are released by a few nodes, and rounded again. Coordinates that are zero by
+    symmetry, such as the way forward, start from `guess`.
     """
     whole, starts, ends = schedule.transcription, Starts.current(), Ends.current()
     Y = widen(half, whole, point.Y)

@@ -27,8 +27,10 @@ def interior(push: float | None = None) -> dict[str, Any]:
 
 
 def exact(mu: float) -> dict[str, Any]:
-    """IPOPT options of a last solve at barrier parameter `mu`: feasible to the last digit, optimal
-    to a few, since the certificate measures the former."""
+    """IPOPT options of a last solve at barrier parameter `mu`.
+
+    Rows are met tightly, since the certificate measures them; the cost needs few digits.
+    """
     ends = Ends.current()
     return warm(mu, tol=ends.exact_tol, constr_viol_tol=ends.exact_rows, acceptable_iter=0)
 
@@ -40,7 +42,7 @@ def find(schedule: Schedule, start: Iterate) -> Iterate:
     parameters = Parameters(relaxation.loose, forces=relaxation.forces)
     point = schedule.solve(RELAX, start, parameters, options=options)
     if point.ending in (Ending.INFEASIBLE, Ending.ITERATION_LIMIT):
-        return point  # what the relaxed pairs forbid, tighter ones do not allow
+        return point  # tighter pairs allow even less
     return binary(schedule, point)
 
 
@@ -114,8 +116,10 @@ def _released(valves: dict[int, np.ndarray]) -> dict[int, Bounds]:
 
 
 def refine_grid(schedule: Schedule, coarse: Transcription, point: Iterate) -> Iterate:
-    """A coarse plan on the finer grid of `schedule`, with its valves kept; where that takes too
-    long, as where they no longer fit, with its valves free again."""
+    """A coarse plan on the finer grid of `schedule`, with its valves kept.
+
+    Where that takes too long, the valves do not fit the finer grid, and are sought again there.
+    """
     ends = Ends.current()
     start = Iterate(prolong(coarse, schedule.transcription, point.Y))
     longest = schedule.at_most(ends.misfit_iterations)

@@ -28,7 +28,7 @@ class Attempt:
 
 
 class Stopped(Exception):  # noqa: N818 (a way out, not an error)
-    """The user or the time limit ended a solve; the best iterate travels along."""
+    """Raised when the user or the time limit ended a solve; holds the best iterate."""
 
     def __init__(self, transcription: Transcription, point: Iterate) -> None:
         super().__init__(str(point.ending))

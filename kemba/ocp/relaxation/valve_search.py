@@ -1,4 +1,4 @@
-"""Valve sequences: moving switches while it pays, and counting them."""
+"""Valve neighbourhood search: switches are moved while the cost falls; switches are counted."""
 
 from __future__ import annotations
 

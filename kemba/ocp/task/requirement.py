@@ -19,7 +19,7 @@ from kemba.quantity import Quantity, to_si
 
 # `rest`: every rate is zero; `settled`: every state of an effect is where it comes to rest
 SPECIAL = ("rest", "settled")
-# By unit, since the scale of a foot's height is not that of a jump: how much matters of each.
+# How much of each unit matters in a requirement; other units have the scale of the quantity.
 SCALES = {"m": 0.1, "rad": 0.2, "m.s-1": 1.0, "rad.s-1": 5.0}
 MOMENTS = {"start": 0.0, "middle": 0.5, "end": 1.0}
 

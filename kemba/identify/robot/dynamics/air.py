@@ -8,11 +8,26 @@ import casadi as ca
 import numpy as np
 
 from kemba.identify.robot.motion.resampled import ResampledLog
+from kemba.settings import Settings, setting
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Index = np.ndarray[Any, np.dtype[np.int_]]
 
-SETTLING = np.full(40, 0.01)  # s: steps at the first command before the log starts
+
+class SettlingSettings(Settings):
+    """How the chambers settle at the first command before a log starts."""
+
+    count: int = setting(
+        40, "1", "number of steps", "derived: 0.4 s, ten times the slowest rise time of Table I"
+    )
+    step: float = setting(
+        0.01, "s", "length of a step", "convention: the integration is exact for lags"
+    )
+
+    @property
+    def steps(self) -> Array:
+        """All steps (count,) [s]."""
+        return np.full(self.count, self.step)
 
 
 class StateRunner:

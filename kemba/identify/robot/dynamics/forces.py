@@ -12,10 +12,15 @@ from kemba.identify.robot.dynamics.inputs import Inputs, air_states, read_inputs
 from kemba.identify.robot.dynamics.linear import LinearisedMotion
 from kemba.identify.robot.dynamics.physics import Physics, prepared
 from kemba.identify.robot.motion.batch import Batch
+from kemba.settings import BY_HAND, Settings, setting
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
-KEPT = 4
+
+class ForcesSettings(Settings):
+    """What is kept of computed forces."""
+
+    kept: int = setting(4, "1", "results that are kept beside the first one", BY_HAND)
 
 
 @dataclass
@@ -85,6 +90,6 @@ class Forces:
 
 def _keep(store: dict[bytes, Any], key: bytes, value: Any) -> None:
     """Add to a store that holds the first one and the last few."""
-    if len(store) > KEPT:
+    if len(store) > ForcesSettings.current().kept:
         del store[list(store)[1]]
     store[key] = value

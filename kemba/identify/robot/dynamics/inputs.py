@@ -9,7 +9,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from kemba.identify.robot.dynamics.air import SETTLING, Index, substeps
+from kemba.identify.robot.dynamics.air import Index, SettlingSettings, substeps
 from kemba.identify.robot.dynamics.physics import Physics
 from kemba.identify.robot.dynamics.reference import Reference
 from kemba.identify.robot.motion.batch import Batch
@@ -45,7 +45,7 @@ def _means(values: Array, h: Array, index: Index, width: Array) -> Array:
 
 def read_inputs(physics: Physics, batch: Batch, ref: Reference, delays: Array) -> list[Inputs]:
     """Per run; `delays` (valves, 2) in seconds to switching on and off."""
-    found = []
+    found, settling = [], SettlingSettings.current().steps
     for i, log in enumerate(batch.resampled):
         n = len(log.time)
         times, valves, index = substeps(log, delays)
@@ -54,8 +54,8 @@ def read_inputs(physics: Physics, batch: Batch, ref: Reference, delays: Array) -
         q, v = (_at(log.time, a[:n, i], middle) for a in (ref.q, ref.v))
         held = np.clip(np.searchsorted(log.time, middle, side="right") - 1, 0, n - 1)
         u = physics.arrange(log.torque[held].T, valves)
-        lead = [np.repeat(a[:, :1], len(SETTLING), axis=1) for a in (q, 0 * v, u)]
-        steps = ca.DM(np.append(SETTLING, h)[None, :])
+        lead = [np.repeat(a[:, :1], len(settling), axis=1) for a in (q, 0 * v, u)]
+        steps = ca.DM(np.append(settling, h)[None, :])
         path = [ca.DM(np.hstack(pair)) for pair in zip(lead, (q, v, u), strict=True)]
         width = np.append(np.diff(log.time), 1.0)
         given = (steps, path[0], path[1], path[2])
@@ -67,8 +67,8 @@ def air_states(
     physics: Physics, batch: Batch, inputs: Sequence[Inputs], p: Array
 ) -> tuple[Array, Array]:
     """Effect states (n, L, ns) and inputs (n, L, nu), both the mean over each step."""
-    moving = p[physics.moves]
-    states = [d.means(physics.states.run(*d.given, moving)[:, len(SETTLING) :]) for d in inputs]
+    moving, settling = p[physics.moves], SettlingSettings.current().count
+    states = [d.means(physics.states.run(*d.given, moving)[:, settling:]) for d in inputs]
     return batch.pad(states, 0.0), batch.pad([d.inputs for d in inputs], 0.0)
 
 

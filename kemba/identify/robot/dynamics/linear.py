@@ -9,18 +9,8 @@ import numpy as np
 
 from kemba.identify.evidence.types import Array, Flags
 from kemba.identify.robot.dynamics.physics import Physics
-from kemba.identify.robot.dynamics.reference import (
-    ANCHOR_FREE,
-    ANCHOR_PRIOR,
-    GROUND_PRIOR,
-    GROUND_SIGMA,
-    GROUND_WANDER,
-    SLIPPING,
-    STOP_SIGMA,
-    STOP_WANDER,
-    Reference,
-    integrator,
-)
+from kemba.identify.robot.dynamics.reference import Reference, integrator
+from kemba.identify.robot.dynamics.settings import ContactForceSettings, PlaceSettings
 from kemba.identify.robot.motion.batch import Batch
 from kemba.identify.robot.motion.contact import Schedule, steady
 from kemba.identify.robot.motion.filter import Gains, System, smooth
@@ -80,7 +70,7 @@ class LinearisedMotion:
     def penetration(self, softness: float, d: float) -> Array:
         """Depth (n, L, 3 legs) [m] of the feet in a ground of stiffness 1/softness [N.m-1] and
         damping `d` [s.m-1]."""
-        growth = np.maximum(1.0 + d * self.sinking, 0.5)
+        growth = np.maximum(1.0 + d * self.sinking, PlaceSettings.current().thinnest)
         legs = self.normal.shape[2]
         depth = np.zeros_like(self.places)
         depth[..., 1 : 2 * legs : 2] = softness * np.maximum(self.normal, 0.0) / growth
@@ -109,10 +99,10 @@ def linearise_along(
     y, rate, Jy = (batch.deep(a) for a in physics.call("measured", *at_nodes))
     feet, feet_rate, Jf = (batch.deep(a) for a in physics.call("feet", *at_nodes))
     slip = batch.pad([x.slides for x in schedules], 0.0)
-    density = density.copy()
+    density, slipping = density.copy(), ContactForceSettings.current().slipping
     for leg in range(legs):  # a sliding foot pushes along the edge of its cone
         pushing = k + 2 * leg
-        density[..., pushing] = np.where(slip[..., leg] != 0.0, SLIPPING, density[..., pushing])
+        density[..., pushing] = np.where(slip[..., leg] != 0.0, slipping, density[..., pushing])
     Jf_force = Jf.copy()
     Jf_force[..., 1::2, :] -= physics.grip * slip[..., None] * Jf[..., 0::2, :]
     channels = np.concatenate([Jy, Jf_force], axis=2).swapaxes(-1, -2)
@@ -173,19 +163,21 @@ def _filter_system(
     F[..., k : 2 * k, k : 2 * k] += h * A_v
     W = np.zeros((*batch.h.shape, k + places, k + places))
     W[..., :k, :k] = unknown
+    still = PlaceSettings.current()
     held = batch.pad([x.held.astype(float) for x in schedules], 0.0) > 0.5
-    wander = np.array([GROUND_WANDER] * 2 * legs + [STOP_WANDER] * legs)
-    free = np.array([ANCHOR_FREE, GROUND_WANDER] * legs + [ANCHOR_FREE] * legs)
+    wander = np.array([still.ground_wander] * 2 * legs + [still.stop_wander] * legs)
+    free = np.array([still.free, still.ground_wander] * legs + [still.free] * legs)
     i = np.arange(places)
     W[..., k + i, k + i] = np.where(held, wander, free) ** 2 * batch.h[..., None]
     H = np.zeros((*batch.h.shape, k + places, 2 * k + places))
     H[..., :k, :k] = Jy
     H[..., k:, :k] = np.concatenate([Jf, Jy[..., k - legs :, :]], axis=2)
     H[..., k + i, 2 * k + i] = 1.0
-    sharp = np.array([GROUND_SIGMA] * 2 * legs + [STOP_SIGMA] * legs)
+    sharp = np.array([still.ground] * 2 * legs + [still.stop] * legs)
     read = np.where(np.isfinite(batch.y), batch.sigma**2, np.inf)
     R = np.concatenate([read, np.where(held, sharp**2, np.inf)], axis=2)
-    prior = [0.03] * k + [3.0] * k + [ANCHOR_PRIOR, GROUND_PRIOR] * legs + [ANCHOR_PRIOR] * legs
+    prior = [still.position] * k + [still.velocity] * k
+    prior += [still.unknown, still.ground_level] * legs + [still.unknown] * legs
     P0 = np.diag(prior) ** 2
     ends = run_ends(batch)
     W[ends], F[ends] = 0.0, np.eye(2 * k + places)
@@ -217,12 +209,13 @@ def contact_force(
     (n, L, k, c) with the smallest norm, each channel weighted by the `density` (n, L, c) of its
     unknown force.
     """
+    stopped = ContactForceSettings.current().stopped
     weighted = channels * density[..., None, :]
     S = weighted @ channels.swapaxes(-1, -2)
     S = S + 1e-9 * np.eye(k)
     share = (weighted.swapaxes(-1, -2) @ np.linalg.solve(S, force[..., None]))[..., 0]
     feet = share[..., k:]
-    stops = share[..., k - legs : k] * (density[..., k - legs : k] > 50.0)
+    stops = share[..., k - legs : k] * (density[..., k - legs : k] > stopped)
     rigid = np.concatenate([stops, feet], axis=-1)
     acting = channels[..., k - legs :]
     return (acting @ rigid[..., None])[..., 0], feet
