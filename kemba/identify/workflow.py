@@ -44,7 +44,7 @@ def discover_logs(
         _apart(fitted, kept)
         built = model_of(fitted, model)
         taken_on([*fitted, *kept], built.mechanism)
-        remarks = check_logs([*fitted, *kept])
+        remarks = [*built.remarks, *check_logs([*fitted, *kept])]
         say("preparing the logs")
         fitted, cut = excerpts(fitted)
         kept, _ = excerpts(kept)

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import model_validator
 
+from kemba.errors import KembaError
 from kemba.mechanism.table import Table
 from kemba.quantity import Param
 
@@ -49,7 +50,7 @@ class Cylinder(Table):
     @model_validator(mode="after")
     def _consistent(self) -> Cylinder:
         if self.rod >= self.bore:
-            raise ValueError(f"the rod ({self.rod:g} m) is as thick as the bore ({self.bore:g} m)")
+            raise ValueError(_thick(self.rod, self.bore))
         if list(self.pressures) != sorted(set(self.pressures)) or not self.pressures:
             raise ValueError("`pressures` must increase from entry to entry")
         for name in (*FORCES, *DAMPINGS, "c_both"):
@@ -114,14 +115,21 @@ class CylinderTable(Table):
         return {name: value for name, value in values.items() if value is not None}
 
 
+def _thick(rod: float, bore: float) -> str:
+    return f"the rod ({rod:g} m) is as thick as the bore ({bore:g} m)"
+
+
 def scaled(known: Cylinder, given: dict[str, Any]) -> dict[str, Any]:
     """All figures of a cylinder: those `given`, the others from `known`, scaled to its size.
 
     Sources: force = pressure x area, so steady forces and what moving air takes off them (the
     damping of eq. 6) are scaled with the chamber's area; a chamber behind a valve of unchanged
     size fills in a time proportional to its volume (eq. 1: dP/dt = n R T mdot/V at dV = 0).
+    Raises KembaError where the rod would not fit.
     """
     sizes = {k: given.get(k, getattr(known, k)) for k in ("bore", "rod", "stroke", "tube")}
+    if sizes["rod"] >= sizes["bore"]:
+        raise KembaError("", _thick(sizes["rod"], sizes["bore"]))
     new = known.model_copy(update=sizes)
     extend = new.area_extend / known.area_extend
     retract = new.area_retract / known.area_retract

@@ -38,6 +38,7 @@ def answer(plan: Plan, run: str) -> dict[str, Any]:
         "plant_replay": None,
         "good": plan.status is Status.SOLVED,
         "ignored": plan.model.ignored,
+        "remarks": plan.model.remarks,
         "relax": [
             {
                 name: getattr(r, name)

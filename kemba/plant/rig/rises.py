@@ -23,9 +23,8 @@ class Rise:
     """One switching of one chamber of a locked rod.
 
     `u`: the valve's new value; `x` [m]: the chamber's own extension, of `stroke` [m] at most;
-    `time` [s] from the command and `level` (n,) from 0 to 1 along the step;
-    `dead` [s]; `plateau` [N] the steady force of the
-    chamber when full.
+    `time` [s] from the command and `level` (n,) from 0 to 1 along the step; `dead` [s]; `plateau`
+    [N] the steady force of the chamber when full.
     """
 
     u: float
