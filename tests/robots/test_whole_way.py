@@ -34,7 +34,8 @@ def whole_way(task: str | Path, model: str, home: Path, *settings: str) -> dict[
     log = logs / "log-1.csv"
     found["compare"] = run("compare", log, "--model", model)
     out = home / "answer"
-    found["discover"] = run("discover", log, "--model", model, "--no-figures", "--out", out)
+    short = ("--no-figures", "--time-limit", "20")
+    found["discover"] = run("discover", log, "--model", model, "--out", out, *short)
     return found
 
 
