@@ -7,7 +7,7 @@ import pytest
 
 from kemba.identify.compare.bins import ConditionBin, condition_bins, excess
 from kemba.identify.evidence.bootstrap import NullTest
-from kemba.identify.evidence.problem import Rows
+from kemba.identify.problem.problem import Rows
 
 
 def binned(errors: list[np.ndarray]) -> list[ConditionBin]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kemba.identify.bench.motion import smooth_motion
-from kemba.identify.evidence.noise import caution, difference_sigma, learn, whiten
+from kemba.identify.problem.noise import caution, difference_sigma, learn, whiten
 
 
 @pytest.mark.parametrize("step", [0.0, 5e-5, 2e-4, 5e-4])

@@ -11,9 +11,9 @@ import pytest
 from kemba.identify.answer import Answer, Ranked, phrase
 from kemba.identify.discover import discover, doubts_about, material
 from kemba.identify.doubt.cross_validation import Gain, left_out, left_out_error
-from kemba.identify.evidence.problem import Array, Candidate, Parameter, Problem, Rows, Theta
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import SpikeSlabSettings, probabilities
+from kemba.identify.problem.problem import Array, Candidate, Parameter, Problem, Rows, Theta
 from kemba.identify.ranking import values
 
 EFFECTS = ("bend", "drag", "kick", "twin", "wave")

@@ -12,9 +12,9 @@ from kemba.effects.mechanics.friction import V_COULOMB
 from kemba.effects.pneumatics.switching import pulses
 from kemba.identify.bench.motion import SmoothedMotion, smooth_motion
 from kemba.identify.bench.rig_model import Pulses
-from kemba.identify.evidence.noise import difference_sigma
-from kemba.identify.evidence.problem import Array, Flags
 from kemba.identify.logs.excerpt import held
+from kemba.identify.problem.noise import difference_sigma
+from kemba.identify.problem.problem import Array, Flags
 from kemba.settings import BY_HAND, Settings, setting
 from kemba.trajectory import Trajectory
 

@@ -8,7 +8,7 @@ from kemba.effects.pneumatics.switching import changes
 from kemba.identify.bench.bench_log import BenchLog, BenchLogSettings
 from kemba.identify.bench.predicted import PredictedLogs
 from kemba.identify.compare.force_profiles import lags, risen
-from kemba.identify.evidence.types import Array, Changes, ForceChannel, OperatingPoint, Rows
+from kemba.identify.problem.types import Array, Changes, ForceChannel, OperatingPoint, Rows
 
 
 def bench_operating_point(predicted: PredictedLogs, stroke: float) -> OperatingPoint:

@@ -10,7 +10,7 @@ import numpy as np
 from kemba.identify.bench.bench_log import BenchLog
 from kemba.identify.bench.motion import SmoothedMotion
 from kemba.identify.bench.prediction import Predictor
-from kemba.identify.evidence.types import Array, Theta
+from kemba.identify.problem.types import Array, Theta
 from kemba.settings import Settings, setting
 
 

@@ -20,10 +20,11 @@ from kemba.identify.bench.operating_point import (
 from kemba.identify.bench.predicted import PredictedLogs, settle_starts
 from kemba.identify.bench.prediction import Predictor
 from kemba.identify.bench.validate import contradictions
-from kemba.identify.evidence.candidates import effect_candidates, sensor_candidates
-from kemba.identify.evidence.noise import Colour, learn, whiten
-from kemba.identify.evidence.problem import Problem
-from kemba.identify.evidence.types import (
+from kemba.identify.logs.gate import BadData
+from kemba.identify.problem.candidates import effect_candidates, sensor_candidates
+from kemba.identify.problem.noise import Colour, learn, whiten
+from kemba.identify.problem.problem import Problem
+from kemba.identify.problem.types import (
     Array,
     Changes,
     ForceChannel,
@@ -33,7 +34,6 @@ from kemba.identify.evidence.types import (
     Rows,
     Theta,
 )
-from kemba.identify.logs.gate import BadData
 from kemba.model.model import Model
 from kemba.settings import BY_HAND, Settings, setting
 from kemba.trajectory import Trajectory

@@ -14,8 +14,8 @@ from kemba.identify.compare.force_profiles import ForceProfile, force_profiles
 from kemba.identify.compare.hints import Hint, Response, conflicts, lacking, lagged
 from kemba.identify.compare.missing_force import Peak, peaks
 from kemba.identify.compare.tolerance import slopes, within_tolerance
-from kemba.identify.evidence.problem import Array, MissingForce, Problem, Rows, Texts, Theta
 from kemba.identify.evidence.windows import Windows, aggregation_windows, free_starts, rms
+from kemba.identify.problem.problem import Array, MissingForce, Problem, Rows, Texts, Theta
 from kemba.settings import BY_HAND, Settings, setting
 
 

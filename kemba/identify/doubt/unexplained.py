@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kemba.identify.evidence.linear import Linear, condense
-from kemba.identify.evidence.problem import Array, Candidate, Labels, Parameter
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis, Ranker
+from kemba.identify.problem.problem import Array, Candidate, Labels, Parameter
 from kemba.identify.settings import DiscoverSettings
 from kemba.settings import BY_HAND, Settings, setting
 

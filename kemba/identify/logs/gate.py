@@ -9,9 +9,9 @@ import numpy as np
 
 from kemba.effects.sensors import CHANNELS
 from kemba.errors import ConfigErrors, KembaError, suggest
-from kemba.identify.evidence.noise import difference_sigma
 from kemba.identify.logs.reading import legs_of, needed
 from kemba.identify.logs.settings import GateSettings
+from kemba.identify.problem.noise import difference_sigma
 from kemba.trajectory import TIME, Array, Trajectory
 
 # Physical limits by the last part of the name: smallest, largest, and the likely mistake.

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from kemba.effects.pneumatics.switching import changes as switchings
-from kemba.identify.evidence.operating_point import air_force
-from kemba.identify.evidence.types import Array, Changes, OperatingPoint
+from kemba.identify.problem.operating_point import air_force
+from kemba.identify.problem.types import Array, Changes, OperatingPoint
 from kemba.identify.robot.labels import row_channels
 from kemba.identify.robot.motion.resampled import ResampledLog
 from kemba.identify.robot.state import LinearisedState

@@ -8,10 +8,11 @@ from copy import copy
 import numpy as np
 from typing_extensions import Self
 
-from kemba.identify.evidence.candidates import sensor_candidates
-from kemba.identify.evidence.problem import Problem
-from kemba.identify.evidence.sensor_faults import SensorFaults, is_straight
-from kemba.identify.evidence.types import (
+from kemba.identify.logs.gate import BadData
+from kemba.identify.problem.candidates import sensor_candidates
+from kemba.identify.problem.problem import Problem
+from kemba.identify.problem.sensor_faults import SensorFaults, is_straight
+from kemba.identify.problem.types import (
     Array,
     Candidate,
     Changes,
@@ -21,7 +22,6 @@ from kemba.identify.evidence.types import (
     Rows,
     Theta,
 )
-from kemba.identify.logs.gate import BadData
 from kemba.identify.robot.candidates import (
     extended,
     ground_of,

@@ -13,8 +13,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from kemba.identify.evidence.sensor_faults import SensorFaults, is_fault
-from kemba.identify.evidence.types import Array, Flags, Theta
+from kemba.identify.problem.sensor_faults import SensorFaults, is_fault
+from kemba.identify.problem.types import Array, Flags, Theta
 from kemba.identify.robot.candidates import GRIP, SOFTNESS, without_delay
 from kemba.identify.robot.dynamics.forces import Forces
 from kemba.identify.robot.dynamics.inputs import air_states, read_inputs

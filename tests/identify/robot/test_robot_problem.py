@@ -10,7 +10,7 @@ pytest.importorskip("numba")
 from robot_logs import hops
 from twin import catalogue, measure
 
-from kemba.identify.evidence.problem import Problem
+from kemba.identify.problem.problem import Problem
 from kemba.identify.robot.problem import RobotProblem, robot_problem
 from kemba.model.spec import load_model
 from kemba.trajectory import Trajectory

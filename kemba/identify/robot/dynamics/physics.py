@@ -8,7 +8,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from kemba.identify.evidence.nominal import leg_by_leg, nominal_figures
+from kemba.identify.problem.nominal import leg_by_leg, nominal_figures
 from kemba.identify.robot.dynamics.air import StateRunner
 from kemba.identify.robot.dynamics.tolerance import mass_regressors
 from kemba.model.model import Model

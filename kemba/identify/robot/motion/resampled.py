@@ -10,7 +10,7 @@ import numpy as np
 
 from kemba.effects.pneumatics.switching import Pulse, pulses
 from kemba.effects.sensors import CHANNELS
-from kemba.identify.evidence.noise import WhiteNoiseSettings, difference_sigma
+from kemba.identify.problem.noise import WhiteNoiseSettings, difference_sigma
 from kemba.settings import BY_HAND, Settings, setting
 from kemba.trajectory import Trajectory
 

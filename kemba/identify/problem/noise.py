@@ -10,7 +10,7 @@ from scipy.linalg import solve_toeplitz
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 from scipy.signal import lfilter
 
-from kemba.identify.evidence.problem import Array
+from kemba.identify.problem.problem import Array
 from kemba.settings import BY_HAND, Settings, setting
 
 
