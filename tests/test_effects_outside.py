@@ -16,7 +16,7 @@ from typer.testing import CliRunner, Result
 
 from kemba.effects import BY_KIND, load_effects
 from kemba.errors import KembaError
-from kemba.identify.evidence.candidates import effect_candidates
+from kemba.identify.unknowns.candidates import effect_candidates
 from kemba.model import load_model
 from kemba_cli.main import app
 

@@ -14,10 +14,10 @@ from kemba.identify.bench.bench_log import PRESSURES, BenchLog
 from kemba.identify.bench.motion import SmoothedMotion
 from kemba.identify.bench.pressure import absolute_pressure
 from kemba.identify.bench.rig_model import Prediction, RigModel, share
-from kemba.identify.evidence.candidates import by_default
-from kemba.identify.evidence.nominal import nominal_figures
 from kemba.identify.evidence.problem import Array, Candidate, Theta
-from kemba.identify.evidence.sensor_faults import SensorFaults
+from kemba.identify.unknowns.candidates import by_default
+from kemba.identify.unknowns.nominal import nominal_figures
+from kemba.identify.unknowns.sensor_faults import SensorFaults
 from kemba.model.model import Model
 
 

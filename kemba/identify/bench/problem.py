@@ -20,7 +20,6 @@ from kemba.identify.bench.operating_point import (
 from kemba.identify.bench.predicted import PredictedLogs, settle_starts
 from kemba.identify.bench.prediction import Predictor
 from kemba.identify.bench.validate import contradictions
-from kemba.identify.evidence.candidates import effect_candidates, sensor_candidates
 from kemba.identify.evidence.noise import Colour, learn, whiten
 from kemba.identify.evidence.problem import Problem
 from kemba.identify.evidence.types import (
@@ -34,6 +33,7 @@ from kemba.identify.evidence.types import (
     Theta,
 )
 from kemba.identify.logs.gate import BadData
+from kemba.identify.unknowns.candidates import effect_candidates, sensor_candidates
 from kemba.model.model import Model
 from kemba.settings import BY_HAND, Settings, setting
 from kemba.trajectory import Trajectory

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from kemba.effects import BY_KIND
-from kemba.identify.evidence.candidates import CandidateSettings, effect_candidates
 from kemba.identify.evidence.problem import Candidate, Parameter
+from kemba.identify.unknowns.candidates import CandidateSettings, effect_candidates
 from kemba.model.model import Model
 from kemba.settings import BY_HAND, Settings, setting
 

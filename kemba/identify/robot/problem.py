@@ -8,9 +8,7 @@ from copy import copy
 import numpy as np
 from typing_extensions import Self
 
-from kemba.identify.evidence.candidates import sensor_candidates
 from kemba.identify.evidence.problem import Problem
-from kemba.identify.evidence.sensor_faults import SensorFaults, is_straight
 from kemba.identify.evidence.types import (
     Array,
     Candidate,
@@ -41,6 +39,8 @@ from kemba.identify.robot.motion.resampled import resample
 from kemba.identify.robot.operating_point import changes, robot_operating_point
 from kemba.identify.robot.state import LinearisedState, linearise_at
 from kemba.identify.robot.validate import contradictions
+from kemba.identify.unknowns.candidates import sensor_candidates
+from kemba.identify.unknowns.sensor_faults import SensorFaults, is_straight
 from kemba.model.model import Model
 from kemba.settings import BY_HAND, Settings, setting
 from kemba.trajectory import Trajectory

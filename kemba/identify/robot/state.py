@@ -13,7 +13,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from kemba.identify.evidence.sensor_faults import SensorFaults, is_fault
 from kemba.identify.evidence.types import Array, Flags, Theta
 from kemba.identify.robot.candidates import GRIP, SOFTNESS, without_delay
 from kemba.identify.robot.dynamics.forces import Forces
@@ -31,6 +30,7 @@ from kemba.identify.robot.motion.batch import Batch
 from kemba.identify.robot.motion.contact import Schedule, loaded
 from kemba.identify.robot.motion.filter import Gains, gains, innovations
 from kemba.identify.robot.motion.sensing import ahead, sensed
+from kemba.identify.unknowns.sensor_faults import SensorFaults, is_fault
 from kemba.settings import BY_HAND, Settings, setting
 
 

@@ -8,9 +8,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from kemba.identify.evidence.nominal import leg_by_leg, nominal_figures
 from kemba.identify.robot.dynamics.air import StateRunner
 from kemba.identify.robot.dynamics.tolerance import mass_regressors
+from kemba.identify.unknowns.nominal import leg_by_leg, nominal_figures
 from kemba.model.model import Model
 from kemba.model.rest import rate_of
 

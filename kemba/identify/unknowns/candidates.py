@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from kemba.effects import BY_KIND
 from kemba.effects.base import Effect
 from kemba.effects.sensors import SensorEffect
-from kemba.identify.evidence.problem import Candidate, Parameter
-from kemba.identify.evidence.sensor_faults import possible_faults
+from kemba.identify.evidence.types import Candidate, Parameter
+from kemba.identify.unknowns.sensor_faults import possible_faults
 from kemba.model.model import Model
 from kemba.model.scene import port_name
 from kemba.quantity import Param

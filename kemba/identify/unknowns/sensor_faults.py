@@ -8,7 +8,7 @@ from kemba.effects import BY_KIND
 from kemba.effects.base import REMEASURED, Effect
 from kemba.effects.sensors import SensorEffect, as_measured, as_true
 from kemba.effects.series import Series
-from kemba.identify.evidence.problem import Theta
+from kemba.identify.evidence.types import Theta
 
 
 def fault_kinds() -> dict[str, type[SensorEffect]]:

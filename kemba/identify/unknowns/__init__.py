@@ -1,0 +1,1 @@
+"""What may differ from the model: effects that it lacks, sensor faults, nominal figures."""
