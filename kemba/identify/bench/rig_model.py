@@ -12,8 +12,8 @@ import numpy as np
 
 from kemba.effects.pneumatics.switching import Pulse, delayed, instants, is_on
 from kemba.identify.bench.motion import SmoothedMotion
-from kemba.identify.problem.exponential import midpoint_step
 from kemba.identify.problem.problem import Array
+from kemba.model.exponential import midpoint_step
 from kemba.model.model import Model
 from kemba.model.node import Node
 from kemba.model.rest import Rest, rate_of

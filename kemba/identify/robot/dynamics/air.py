@@ -9,8 +9,8 @@ import casadi as ca
 import numpy as np
 
 from kemba.effects.pneumatics.switching import delayed, instants, is_on
-from kemba.identify.problem.exponential import midpoint_step
 from kemba.identify.robot.motion.resampled import ResampledLog
+from kemba.model.exponential import midpoint_step
 from kemba.model.rest import Rest
 from kemba.quantity import Quantity
 
