@@ -2,11 +2,11 @@
 """What hangs on the thresholds? Each one is halved and doubled over a fixed sample of cases.
 
     python benchmarks/sensitivity.py --bench 12 --robot 8 --part 1/2 --jobs 1
-    python benchmarks/sensitivity.py --schedule --only Relaxation
+    python benchmarks/sensitivity.py --verbs schedule --only Relaxation
     python benchmarks/sensitivity.py --report                     # writes docs/sensitivity.md
 
 `discover` and `compare`: the first cases of the blind studies, made by the twin in tests/twin.
-`--schedule`: the shipped tasks. Only settings marked `decides` are changed, one at a time. A case
+`schedule`: the shipped tasks. Only settings marked `decides` are changed, one at a time. A case
 is run again from the first stage on that reads the setting; where no stage reads it, nothing can
 change and nothing is run. Results are kept in the file, so an interrupted study goes on where it
 stopped; its parts may run at the same time.
@@ -209,11 +209,11 @@ def planning(name: str) -> Case:
 
 def names(options: argparse.Namespace) -> list[str]:
     """Names of all cases asked for: study:number, or schedule:task."""
-    if options.schedule:
-        return [f"schedule:{task}" for task in TASKS]
     kinds = [("bench", options.bench), ("robot", options.robot)]
     numbers = [(i, kind) for kind, count in kinds for i in range(count)]
-    return [f"{verb}:{kind}:{i}" for i, kind in sorted(numbers) for verb in ("discover", "compare")]
+    logs = [v for v in ("discover", "compare") if v in options.verbs]
+    found = [f"{verb}:{kind}:{i}" for i, kind in sorted(numbers) for verb in logs]
+    return found + [f"schedule:{task}" for task in TASKS if "schedule" in options.verbs]
 
 
 def make(name: str, folder: Path) -> Case:
@@ -263,10 +263,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--bench", type=int, default=12, help="so many bench cases")
     parser.add_argument("--robot", type=int, default=8, help="so many robot cases")
-    parser.add_argument("--schedule", action="store_true", help="the shipped tasks instead")
-    parser.add_argument(
-        "--only", default="", help="settings whose Class.field matches this"
-    )
+    parser.add_argument("--verbs", default="discover,compare", help="also: schedule")
+    parser.add_argument("--only", default="", help="settings whose Class.field matches this")
     parser.add_argument("--out", type=Path, default=Path("sensitivity.jsonl"))
     parser.add_argument("--part", default="1/1", help="i/n: every n-th case, from the i-th on")
     parser.add_argument("--jobs", type=int, default=1, help="cases at the same time")

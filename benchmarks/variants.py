@@ -22,7 +22,7 @@ import numpy as np
 
 from kemba.config import parse
 from kemba.ocp import Task, plan
-from kemba.ocp.nlp.settings import Newton
+from kemba.ocp.functions.settings import Newton
 from kemba.ocp.relaxation.settings import Starts
 from kemba.settings import Settings, changed
 from kemba.sweep import expand, load_sweep, machine

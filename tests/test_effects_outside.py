@@ -16,7 +16,7 @@ from typer.testing import CliRunner, Result
 
 from kemba.effects import BY_KIND, load_effects
 from kemba.errors import KembaError
-from kemba.identify.evidence.candidates import effect_candidates
+from kemba.identify.problem.candidates import effect_candidates
 from kemba.model import load_model
 from kemba_cli.main import app
 
@@ -55,7 +55,7 @@ def test_the_example_of_the_page_passes_every_check(own: Path) -> None:
     assert done.exit_code == 0, done.output
     assert "seal_hysteresis: off is absent: good" in done.stdout
     told = json.loads(kemba("effects", "--test", own, "--json").stdout)
-    assert told["good"] and len(told["checks"]) == 10
+    assert told["good"] and len(told["checks"]) == 11
 
 
 def test_the_rest_of_the_page_runs(own: Path) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import lstsq
 
-from kemba.identify.evidence.problem import Problem
+from kemba.identify.problem.problem import Problem
 
 NAMES = ("one_by_bic", "all_by_least_squares")
 

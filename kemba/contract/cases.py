@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -12,8 +12,9 @@ import casadi as ca
 import numpy as np
 
 from kemba.effects import Effect
-from kemba.effects.catalogue import PHYSICAL, SENSORS
+from kemba.effects.catalogue import PHYSICAL
 from kemba.effects.registry import kind_of
+from kemba.effects.sensors import SensorEffect
 from kemba.errors import KembaError
 from kemba.model import Model, load_spec
 from kemba.model.spec import build_model
@@ -23,7 +24,6 @@ Point = dict[str, Array]
 
 # values of the fields that have no default, of effects that kemba ships
 REQUIRED: dict[str, dict[str, Any]] = {
-    **{kind_of(effect): {"channel": "body/pitch"} for effect in SENSORS},
     "expression": {
         "name": "magnet",
         "on": "piston",
@@ -46,9 +46,12 @@ def example(effect: type[Effect]) -> Effect:
     for name, off in effect.off.items():
         size = effect.declared()[name].size
         values[name] = size if math.isinf(off) else off + size
-    given = {"kind": kind_of(effect), **REQUIRED.get(kind_of(effect), {}), **values}
+    required = REQUIRED.get(kind_of(effect), {})
+    if issubclass(effect, SensorEffect):
+        required = {"channel": "body/pitch"}
+    given = {"kind": kind_of(effect), **required, **values}
     bare = [n for n, f in effect.model_fields.items() if f.is_required() and n not in given]
-    if bare and kind_of(effect) not in REQUIRED:
+    if bare and not required:
         raise Broken(f"the field '{bare[0]}' has no default, so it cannot be a candidate")
     return effect.model_validate(given)
 
@@ -155,9 +158,10 @@ def values_of(model: Model, point: Point, p: Any = ()) -> Point:
     return {name: np.asarray(value).ravel() for name, value in result.items()}
 
 
-def slopes(model: Model, free: list[str]) -> ca.Function:
-    """The residual F, its derivatives dy by every variable and dp by the parameters `free`."""
-    node = model.build(free)
+def slopes(model: Model, free: Sequence[str], scaled: Sequence[str] = ()) -> ca.Function:
+    """The residual F, its derivatives dy by every variable, and dp by the parameters `free` and by
+    factors on the figures `scaled`."""
+    node = model.build(free, scaled)
     parts = [node.dynamics, node.rate, node.pair_a, node.pair_b, node.limits]
     F = ca.vertcat(*parts)
     y = ca.vertcat(node.q, node.v, node.a, node.s, node.lam, node.u)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from kemba.contract import physics, words
+from kemba.contract import measuring, physics, words
 from kemba.contract.cases import Broken, Placed
 from kemba.effects import Effect
 from kemba.effects.registry import kind_of
@@ -66,6 +66,8 @@ CHECKS = (
     Check(physics.order_does_not_matter),
     Check(physics.keeps_the_mirror, _on_legs),
     Check(physics.one_leg_only, _on_one_leg),
+    Check(measuring.sensor_fault_can_be_undone, measuring.measures),
+    Check(measuring.nominal_figures_matter, measuring.moves),
 )
 
 

@@ -36,11 +36,7 @@ def every_parameter_matters(placed: Placed) -> None:
     """Each parameter changes what the effect does."""
     effect = placed.on
     if isinstance(effect, SensorEffect):
-        time = np.linspace(0.0, 1.0, 50)
-        true = np.sin(9 * time)
-        if np.abs(effect.measured(time, true) - true).max() <= 1e-3:
-            raise Broken("it changes nothing that is measured")
-        return
+        return  # see `measuring`
     if effect.timing():
         for name in effect.parameters():
             if effect.bind({name: effect.value(name) + 0.001}).timing() == effect.timing():

@@ -10,7 +10,10 @@ import casadi as ca
 from pydantic import BaseModel, ConfigDict, field_validator
 from typing_extensions import Self
 
-from kemba.quantity import Param, Quantity
+from kemba.quantity import Param, Quantity, Tolerance
+
+# 1 sigma as a share: a figure that an earlier discovery put on a model's list is known less well
+REMEASURED = Tolerance(0.1, source="assumed: a discovery from a few logs is that sure of a size")
 
 if TYPE_CHECKING:
     from kemba.mechanism import Cylinder
@@ -130,6 +133,7 @@ class Effect(BaseModel):
     mirror: ClassVar[Mapping[str, str]] = {}  # symbols that change sign or name in the mirror
     dissipative: ClassVar[bool] = False
     moves: ClassVar[bool] = True  # False: in what is measured only; plans and simulations ignore it
+    nominal: ClassVar[Mapping[str, Tolerance]] = {}  # figures that differ from machine to machine
     on_rod: ClassVar[bool] = True  # False: its piston effort is not felt by a rod force sensor
 
     @field_validator("on")
@@ -186,6 +190,25 @@ class Effect(BaseModel):
     def parameters(self) -> dict[str, Param]:
         """Scalar parameters of this effect by name."""
         return self.declared()
+
+    def tolerances(self) -> dict[str, float]:
+        """1 sigma, as a share, of the figures that a machine of the same make may have a little
+        different; the entries of a table as `fill[0]`.
+
+        These are the `nominal` ones. An effect that a plain machine lacks was found by an earlier
+        discovery: its switch is known less well. Delays are left out: they move instants.
+        """
+        found: dict[str, float] = {}
+        for name, tolerance in self.nominal.items():
+            value = self.value(name)
+            if tolerance.each:
+                found |= {f"{name}[{i}]": tolerance.share(x) for i, x in enumerate(value)}
+            else:
+                middle = value[len(value) // 2] if isinstance(value, tuple) else value
+                found[name] = tolerance.share(middle)
+        if self.off and self.moves and all(p.unit != "s" for p in self.parameters().values()):
+            found |= {name: REMEASURED.share(1.0) for name in self.off}
+        return found
 
     def shapes(self) -> tuple[str, ...]:
         """Parameters that matter only when the effect is on."""

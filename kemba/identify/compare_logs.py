@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from kemba.identify.compare.compare import Comparison, compare
-from kemba.identify.evidence.problem import Problem
 from kemba.identify.logs.gate import check_logs
 from kemba.identify.logs.reading import load_map, read_logs, taken_on
+from kemba.identify.problem.problem import Problem
 from kemba.identify.workflow import make_problem, model_of
 from kemba.trajectory import Trajectory
 

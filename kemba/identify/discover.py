@@ -14,9 +14,9 @@ from kemba.identify.doubt.run_consistency import Drift, drifting
 from kemba.identify.doubt.unexplained import Formula, look, unfinished
 from kemba.identify.evidence.bootstrap import NullTest, bootstrap, smallest_detectable
 from kemba.identify.evidence.linear import time_blocks
-from kemba.identify.evidence.problem import Problem
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
+from kemba.identify.problem.problem import Problem
 from kemba.identify.ranking import error, ladder, ranked, strength
 from kemba.identify.settings import DiscoverSettings
 

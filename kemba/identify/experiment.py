@@ -15,7 +15,7 @@ from kemba.files import read_json
 from kemba.identify.bench.bench_log import prepare
 from kemba.identify.bench.problem import BenchProblem
 from kemba.identify.evidence.linear import linearise, time_blocks
-from kemba.identify.evidence.problem import Array
+from kemba.identify.problem.problem import Array
 from kemba.model.spec import load_model
 from kemba.plant.rig.rigs import DynamometerRig, LockedRig, RandomRig, Rig
 from kemba.settings import BY_HAND, Settings, setting

@@ -7,10 +7,10 @@ from dataclasses import replace
 from kemba.ocp.certificate.certify import costs
 from kemba.ocp.certificate.status import Status, verdict
 from kemba.ocp.nlp.ending import Ending
+from kemba.ocp.phases.settings import Refining
 from kemba.ocp.planned import Plan
 from kemba.ocp.planner import Planner, searched
 from kemba.ocp.refinement import refine
-from kemba.ocp.refinement.settings import Refining
 from kemba.ocp.relaxation.session import Attempt
 from kemba.stopwatch import Stopwatch
 

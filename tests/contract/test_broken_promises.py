@@ -9,7 +9,9 @@ import pytest
 
 from kemba.contract import CHECKS, examine
 from kemba.effects import BY_KIND, At, Contribution, Effect
-from kemba.quantity import Param
+from kemba.effects.sensors import SensorEffect
+from kemba.effects.series import Series
+from kemba.quantity import Param, Tolerance
 
 
 class Drag(Effect):
@@ -111,6 +113,43 @@ class Everywhere(Drag):
         return None
 
 
+class Gain(SensorEffect):
+    """A good sensor fault: the gain is off."""
+
+    kind: Literal["drag"] = "drag"
+    k: Annotated[float, Param("1", 0.02, doc="relative error of the gain")] = 0.0
+
+    equation: ClassVar[str] = "measured = (1 + k) true"
+    source: ClassVar[str] = "this test"
+    off: ClassVar[dict[str, float]] = {"k": 0.0}
+    stage: ClassVar[Literal["clock", "gain", "zero"]] = "gain"
+
+    def measured(self, true: Series) -> Series:
+        return true.times(1 + self.k)
+
+    def undone(self, measured: Series) -> Series:
+        return measured.times(1 / (1 + self.k))
+
+
+class NotUndone(Gain):
+    """Undoes half of what it does."""
+
+    def undone(self, measured: Series) -> Series:
+        return measured.times(1 / (1 + 0.5 * self.k))
+
+
+class NoSuchFigure(Drag):
+    """Has a tolerance for a figure that is not there."""
+
+    nominal: ClassVar[dict[str, Tolerance]] = {"d": Tolerance(0.02, source="this test")}
+
+
+class IdleFigure(Idle):
+    """Has a tolerance for a figure that does nothing."""
+
+    nominal: ClassVar[dict[str, Tolerance]] = {"idle": Tolerance(0.02, source="this test")}
+
+
 BREAKS = {
     "documented": Undocumented,
     "off is admissible": WrongOff,
@@ -123,6 +162,8 @@ BREAKS = {
     "order does not matter": Counting,
     "keeps the mirror": OneSided,
     "one leg only": Everywhere,
+    "sensor fault can be undone": NotUndone,
+    "nominal figures matter": NoSuchFigure,
 }
 
 
@@ -137,11 +178,24 @@ def test_there_is_an_example_for_every_check() -> None:
     assert set(BREAKS) == {check.name for check in CHECKS}
 
 
+@pytest.mark.parametrize("good", [Drag, Gain])
 @pytest.mark.usefixtures("_drag_is_known")
-def test_a_good_effect_passes_all() -> None:
-    found = list(examine(Drag))
+def test_a_good_effect_passes_all(good: type[Effect], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(BY_KIND._kinds, "drag", good)
+    found = list(examine(good))
     assert [result.sentence for result in found if not result.good] == []
-    assert len(found) == len(CHECKS)
+    assert len(found) == sum(check.applies(good) for check in CHECKS)
+
+
+def test_every_check_applies_to_some_good_effect() -> None:
+    assert all(check.applies(Drag) or check.applies(Gain) for check in CHECKS)
+
+
+@pytest.mark.usefixtures("_drag_is_known")
+def test_a_tolerance_of_what_does_nothing_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(BY_KIND._kinds, "drag", IdleFigure)
+    bad = {result.check.name: result.sentence for result in examine(IdleFigure) if not result.good}
+    assert "idle has a tolerance" in bad["nominal figures matter"]
 
 
 @pytest.mark.parametrize("name", BREAKS)

@@ -7,7 +7,7 @@ import pytest
 
 from kemba.identify.compare.bins import ConditionBin, condition_bins, excess
 from kemba.identify.evidence.bootstrap import NullTest
-from kemba.identify.evidence.problem import Rows
+from kemba.identify.problem.problem import Rows
 
 
 def binned(errors: list[np.ndarray]) -> list[ConditionBin]:
@@ -69,3 +69,17 @@ def test_the_threshold_is_the_quantile_of_the_draws() -> None:
     draws = np.arange(101.0) / 10
     assert NullTest(draws, ()).threshold == pytest.approx(9.8)
     assert NullTest(draws / 100, ()).threshold == 1.0, "less than a nat is nothing"
+
+
+def test_one_moment_convicts_nobody() -> None:
+    """The largest error does not count: a foot that lifts a moment early is no missing force."""
+    calm = np.full(40, 0.5)
+    calm[17] = 20.0
+    assert excess(calm) > 0.5
+    calm[18:23] = 20.0
+    assert excess(calm) < 1e-6
+
+
+@pytest.mark.parametrize(("q", "significant"), [(0.009, True), (0.011, False), (0.5, False)])
+def test_one_false_discovery_in_a_hundred_is_allowed(q: float, significant: bool) -> None:
+    assert ConditionBin("body/z", "flight", "00", "in", 2.0, q).significant == significant

@@ -24,7 +24,7 @@ def bench_log(**columns: np.ndarray) -> Trajectory:
     units = {"piston/x": "m", "piston/F": "N"}
     named = {f"{n} [{units.get(n, '1')}]": columns.get(n, y) for n, y in good.items()}
     more = {n: y for n, y in columns.items() if n not in good}
-    return Trajectory(time, named | more, {"kind": "bench", "name": "log"})
+    return Trajectory(time, named | more, {"kind": "bench", "name": "log", "stroke": 0.07})
 
 
 def spoilt(name: str, value: float, count: int) -> np.ndarray:

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from kemba.identify.answer import Answer, Ranked, phrase
-from kemba.identify.discover import discover, doubts_about
-from kemba.identify.doubt.cross_validation import left_out, left_out_error
-from kemba.identify.evidence.problem import Array, Candidate, Parameter, Problem, Rows, Theta
+from kemba.identify.discover import discover, doubts_about, material
+from kemba.identify.doubt.cross_validation import Gain, left_out, left_out_error
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import SpikeSlabSettings, probabilities
+from kemba.identify.problem.problem import Array, Candidate, Parameter, Problem, Rows, Theta
 from kemba.identify.ranking import values
 
 EFFECTS = ("bend", "drag", "kick", "twin", "wave")
@@ -204,3 +204,32 @@ def test_intervals_are_1_96_sigma_either_way(size: float) -> None:
     sigma = np.hypot(noise, SpikeSlabSettings.current().spike * value.value)
     assert value.high - value.value == pytest.approx(1.96 * sigma, rel=0.05)
     assert value.value - value.low == pytest.approx(1.96 * sigma, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("nats", "error", "refuted"), [(-3.0, 0.5, True), (-3.0, 1.5, False), (3.0, 0.5, False)]
+)
+def test_left_out_data_refute_by_more_than_their_scatter(
+    nats: float, error: float, refuted: bool
+) -> None:
+    assert Gain(nats, error).refuted == refuted
+
+
+@pytest.mark.parametrize(("size", "found"), [(1.5, ()), (3.0, ("kick",))])
+def test_less_than_a_fifth_of_an_effects_size_is_no_finding(
+    size: float, found: tuple[str, ...]
+) -> None:
+    """A kick of 15 % of its size is measured well, and no more than models are wrong by."""
+    search = searched(Toy({"kick.a": size}))
+    assert search.points["kick",].fit.theta["kick.a"] == pytest.approx(size, abs=0.1)
+    assert material(search, ("kick",)) == found
+
+
+def test_an_effect_that_explains_nothing_costs_evidence() -> None:
+    """Occam: its prior is spread over sizes that the data exclude. Here by a factor of about 14
+    (slab over spike width), 2.6 nats, less what noise brings by chance."""
+    loss = []
+    for seed in range(6):
+        search = searched(Toy({}, seed))
+        loss.append(search.points[()].log_evidence - search.points["kick",].log_evidence)
+    assert 1.5 < np.mean(loss) < 3.5

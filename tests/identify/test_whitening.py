@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kemba.identify.evidence.noise import Colour, difference_sigma, learn, whiten
+from kemba.identify.problem.noise import Colour, difference_sigma, learn, whiten
 
 
 def series(phi: float, sigma: float, count: int, rng: np.random.Generator) -> np.ndarray:

@@ -11,6 +11,7 @@ from kemba.config import Document, load_yaml
 from kemba.model import Model
 from kemba.ocp.certificate.certify import Certificate, certify
 from kemba.ocp.certificate.status import verdict
+from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.task.requirement import resolve
 from kemba.ocp.task.task import Task, Tolerances
 from kemba.trajectory import Trajectory
@@ -120,4 +121,4 @@ def test_the_status_follows_what_was_measured(name: str, times: float, status: s
     size = times * getattr(task.tolerances, name)
     found = Certificate(**dict.fromkeys(NAMES, 0.0) | {name: size}, worst=())
     plan = Trajectory(np.arange(3.0), {"body/z [m]": np.zeros(3)})
-    assert verdict(task, found, plan, "Solve_Succeeded")[0] == status
+    assert verdict(task, found, plan, Ending.STALLED)[0] == status

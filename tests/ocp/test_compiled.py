@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 from kemba.ocp import load_task
-from kemba.ocp.nlp.blocks import Block
-from kemba.ocp.nlp.compiled import cache_folder, compiled, is_whole
-from kemba.ocp.nlp.constants import parameterised
+from kemba.ocp.functions.blocks import Block
+from kemba.ocp.functions.compiled import cache_folder, compiled, is_whole
+from kemba.ocp.functions.constants import parameterised
 from kemba.ocp.planning import task_model
 from kemba.ocp.task.requirement import resolve
 from kemba.ocp.transcription.symmetry import whole

@@ -12,7 +12,7 @@ import pytest
 
 import kemba.ocp
 from kemba.ocp.certificate.status import Status
-from kemba.ocp.nlp.blocks import Block, BlockProblem
+from kemba.ocp.functions.blocks import Block, BlockProblem
 from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.nlp.ipopt import Control, Ipopt, Iterate
 

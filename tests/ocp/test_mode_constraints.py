@@ -11,11 +11,11 @@ from ocp.runs import solved
 
 from kemba.config import load_yaml
 from kemba.ocp.nlp.ipopt import Control
-from kemba.ocp.refinement.modes import read_phases
-from kemba.ocp.refinement.program import PhaseProgram
-from kemba.ocp.refinement.radau import RADAU3
+from kemba.ocp.phases.modes import read_phases
+from kemba.ocp.phases.program import PhaseProgram
+from kemba.ocp.phases.radau import RADAU3
+from kemba.ocp.phases.unilateral import read_constraints
 from kemba.ocp.refinement.refine import Refiner, reduction_of
-from kemba.ocp.refinement.unilateral import read_constraints
 from kemba.ocp.task.requirement import resolve
 from kemba.ocp.transcription.solution import arrays
 

@@ -14,13 +14,13 @@ import pytest
 from kemba.ocp import Plan, load_task, plan
 from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.nlp.ipopt import Control
+from kemba.ocp.phases.modes import OPEN, Phase
+from kemba.ocp.phases.radau import RADAU3, RADAU5, Scheme
+from kemba.ocp.phases.settings import ModeConstraints, Refining, Repair
+from kemba.ocp.phases.unilateral import read_constraints
 from kemba.ocp.refinement import Refined, refine
-from kemba.ocp.refinement.modes import OPEN, Phase
-from kemba.ocp.refinement.radau import RADAU3, RADAU5, Scheme
 from kemba.ocp.refinement.refine import Refiner, reduction_of
 from kemba.ocp.refinement.repair import merged, misfit, repaired
-from kemba.ocp.refinement.settings import ModeConstraints, Refining, Repair
-from kemba.ocp.refinement.unilateral import read_constraints
 from kemba.ocp.relaxation.valve_search import switching
 from kemba.ocp.transcription.solution import arrays
 from kemba.plant.execution.replay import replay

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from kemba.ocp.refinement.modes import HELD, OPEN, Phase, _fill_hops, _settling
-from kemba.ocp.refinement.settings import Reading
+from kemba.ocp.phases.modes import HELD, OPEN, Phase, _fill_hops, _settling
+from kemba.ocp.phases.settings import Reading
 
 FALLS = Phase(84, 97, (HELD, OPEN), (1.0, 0.0))
 HITS = Phase(97, 98, (HELD, HELD), (1.0, 0.0))

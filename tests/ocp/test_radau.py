@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kemba.ocp.refinement.radau import RADAU3, RADAU5, Scheme
+from kemba.ocp.phases.radau import RADAU3, RADAU5, Scheme
 
 SCHEMES = pytest.mark.parametrize("scheme", [RADAU3, RADAU5], ids=["order 3", "order 5"])
 

@@ -8,12 +8,12 @@ import pytest
 
 from kemba.model import load_model
 from kemba.ocp import load_task
-from kemba.ocp.nlp.blocks import Block, BlockProblem
-from kemba.ocp.nlp.proximal import Proximal
-from kemba.ocp.nlp.regularised import regularised_hessian
-from kemba.ocp.nlp.settings import Functions, Newton
-from kemba.ocp.nlp.signs import canonical_signs
-from kemba.ocp.nlp.vectorised import vectorised
+from kemba.ocp.functions.blocks import Block, BlockProblem
+from kemba.ocp.functions.proximal import Proximal
+from kemba.ocp.functions.regularised import regularised_hessian
+from kemba.ocp.functions.settings import Functions, Newton
+from kemba.ocp.functions.signs import canonical_signs
+from kemba.ocp.functions.vectorised import vectorised
 from kemba.ocp.task.requirement import resolve
 from kemba.ocp.transcription.symmetry import find_symmetry
 from kemba.ocp.transcription.transcribe import Transcription

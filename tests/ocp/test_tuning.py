@@ -14,9 +14,9 @@ from kemba.settings import Settings
 FOLDER = Path(kemba.ocp.__file__).parent
 PLAIN = {
     "controller.py": {"PERIOD"},  # of the robot's controller
-    "nlp/constants.py": {"SHAPING"},  # numbers that CasADi simplifies
-    "refinement/modes.py": {"OPEN", "HELD", "AHEAD", "BACK"},  # names of modes
-    "refinement/radau.py": {"RADAU3", "RADAU5", "_R"},  # coefficients of the schemes
+    "functions/constants.py": {"SHAPING"},  # numbers that CasADi simplifies
+    "phases/modes.py": {"OPEN", "HELD", "AHEAD", "BACK"},  # names of modes
+    "phases/radau.py": {"RADAU3", "RADAU5", "_R"},  # coefficients of the schemes
     "refinement/sample.py": {"WORST"},  # violations that a report lists
     "task/requirement.py": {"MOMENTS", "SCALES"},  # the format; units of requirements
     "transcription/first_node.py": {"SAME"},  # rounding

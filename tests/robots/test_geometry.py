@@ -108,7 +108,7 @@ def test_supply_beyond_the_tables_goes_on_linearly(supply: float, force: float) 
 
 
 def test_a_supply_that_cannot_be_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(KembaError, match="would make F_extend -.*, which cannot be"):
+    with pytest.raises(KembaError, match=r"would make F_extend -.*, which cannot be"):
         steep = Chamber(pressures=(0.6e6, 0.7e6), F_extend=(50.0, 300.0), F_retract=(50.0, 60.0))
         load_model("planning", [steep], supply=0.3e6)
     (tmp_path / "m.yaml").write_text("base: planning\nsupply: 0.8 bar\n")

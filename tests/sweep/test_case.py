@@ -11,6 +11,7 @@ from kemba.files import read_json, write_json
 from kemba.sweep.case import Case, content_hash, perform
 
 WORK = {"task": {"height": "0.5 m", "nodes": 40}, "model": "planning"}
+DONE = {"status": "solved", "good": True, "sentence": "solved"}
 TURNED = {"model": "planning", "task": {"nodes": 40, "height": "0.5 m"}}
 
 
@@ -47,14 +48,14 @@ def test_the_order_of_a_list_is_content() -> None:
 def test_a_record_is_found_again_in_the_folder(tmp_path: Path) -> None:
     assert case(WORK).record(tmp_path) is None
     case(WORK).path(tmp_path).parent.mkdir()
-    write_json(case(WORK).path(tmp_path), {"status": "solved"})
-    assert case(TURNED).record(tmp_path) == {"status": "solved"}
+    write_json(case(WORK).path(tmp_path), DONE)
+    assert case(TURNED).record(tmp_path) == DONE
 
 
 def test_work_that_is_done_is_not_repeated(tmp_path: Path) -> None:
     path = tmp_path / "done.json"
-    write_json(path, {"status": "solved"})
-    assert perform("nowhere:none", {}, str(path)) == {"status": "solved"}
+    write_json(path, DONE)
+    assert perform("nowhere:none", {}, str(path)) == DONE
 
 
 def test_what_goes_wrong_is_kept_as_an_outcome(tmp_path: Path) -> None:

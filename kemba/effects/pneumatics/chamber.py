@@ -9,7 +9,7 @@ from typing_extensions import Self
 
 from kemba.effects.base import At, Contribution, Effect
 from kemba.effects.pneumatics.tables import at_supply, beyond, filled
-from kemba.quantity import Param, Quantity
+from kemba.quantity import Param, Quantity, Tolerance
 
 if TYPE_CHECKING:
     from kemba.mechanism import Cylinder
@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 Newton = Annotated[float, Param("N", 10.0, lower=0.0, doc="of Table II")]
 Pascal = Annotated[float, Param("Pa", 1e4, lower=0.0, doc="pressure")]
 Second = Annotated[float, Param("s", 2e-3, lower=0.0, doc="of Table I")]
+
+OF_A_KIND = Tolerance(0.02, source="assumed: parts of one make differ by 1 to 3 %")
+ENTRY = Tolerance(0.02, each=True, source="assumed: parts of one make differ by 1 to 3 %")
 
 
 STEADY = ("F_extend", "F_retract")
@@ -50,6 +53,13 @@ class Chamber(Effect):
         "tau_e",
         "tau_r",
     )
+
+    nominal: ClassVar[dict[str, Tolerance]] = {
+        "F_extend": OF_A_KIND,
+        "F_retract": OF_A_KIND,
+        "fill": ENTRY,
+        "vent": ENTRY,
+    }
 
     def of_cylinder(self, cylinder: Cylinder) -> Self:
         return filled(self, cylinder, FIGURES, STEADY)

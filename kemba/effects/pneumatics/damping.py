@@ -9,7 +9,7 @@ from typing_extensions import Self
 from kemba.effects.base import At, Contribution, Effect
 from kemba.effects.pneumatics.chamber import Pascal
 from kemba.effects.pneumatics.tables import at_supply, beyond, filled
-from kemba.quantity import Param
+from kemba.quantity import Param, Tolerance
 
 if TYPE_CHECKING:
     from kemba.mechanism import Cylinder
@@ -37,6 +37,10 @@ class ModeDamping(Effect):
     source: ClassVar[str] = "paper eq. 6, 7, Table II"
     ports: ClassVar[tuple[str, ...]] = ("piston",)
     dissipative: ClassVar[bool] = True
+    nominal: ClassVar[dict[str, Tolerance]] = dict.fromkeys(
+        ("c_extend", "c_retract", "c_both", "c_none"),
+        Tolerance(2.0, "N.s.m-1", source="assumed: 2 to 3 % of Table II, more of the small c_none"),
+    )
 
     def of_cylinder(self, cylinder: Cylinder) -> Self:
         return filled(self, cylinder, ("pressures", *MODES, "c_none"), MODES)

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 from typing_extensions import Self
 
 from kemba.effects.base import At, Contribution, Effect
-from kemba.effects.pneumatics.chamber import Pascal
+from kemba.effects.pneumatics.chamber import OF_A_KIND, Pascal
 from kemba.effects.pneumatics.constants import ATMOSPHERE, GAS, KAPPA, TEMPERATURE
 from kemba.effects.pneumatics.flow import CHOKED, mass_flow, phi
 from kemba.effects.pneumatics.tables import at_supply, beyond, filled
-from kemba.quantity import Param, Quantity
+from kemba.quantity import Param, Quantity, Tolerance
 
 if TYPE_CHECKING:
     from kemba.mechanism import Cylinder
@@ -53,6 +53,9 @@ class OrificeChamber(Effect):
     )
     carried_by: ClassVar[dict[str, str]] = {"F_e": "P_e", "F_r": "P_r"}
     replaces: ClassVar[tuple[str, ...]] = ("chamber", "mode_damping")
+    nominal: ClassVar[dict[str, Tolerance]] = dict.fromkeys(
+        ("gauge", "a_fill", "a_vent", "V_e", "V_r"), OF_A_KIND
+    )
 
     def of_cylinder(self, cylinder: Cylinder) -> Self:
         open_ = {name: cylinder.tube for name in ("V_e", "V_r") if getattr(self, name) is None}

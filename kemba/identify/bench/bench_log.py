@@ -9,12 +9,12 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from kemba.effects.mechanics.friction import V_COULOMB
+from kemba.effects.pneumatics.switching import pulses
 from kemba.identify.bench.motion import SmoothedMotion, smooth_motion
 from kemba.identify.bench.rig_model import Pulses
-from kemba.identify.bench.switching import pulses
-from kemba.identify.evidence.noise import difference_sigma
-from kemba.identify.evidence.problem import Array, Flags
 from kemba.identify.logs.excerpt import held
+from kemba.identify.problem.noise import difference_sigma
+from kemba.identify.problem.problem import Array, Flags
 from kemba.settings import BY_HAND, Settings, setting
 from kemba.trajectory import Trajectory
 
@@ -35,7 +35,7 @@ class BenchLogSettings(Settings):
     forget: float = setting(
         0.12,
         "s",
-        "time after a gap with a switching in it until the chambers have forgotten when",
+        "time after which chambers do not depend on the moment of a switching",
         "derived: three times the slowest rise time of Table I",
     )
     neighbours: int = setting(
@@ -98,7 +98,7 @@ def prepare(name: str, log: Trajectory) -> BenchLog:
 
 
 def noise_of(channel: str, y: Array) -> float:
-    """White noise per sample; a simulation without any is still no better than its own steps."""
+    """White noise per sample; a small least noise is added, also for simulated logs without any."""
     settings = BenchLogSettings.current()
     least = settings.finest_force if channel == "piston/F" else settings.finest_pressure
     spread = float(np.ptp(y[np.isfinite(y)]))
@@ -106,8 +106,11 @@ def noise_of(channel: str, y: Array) -> float:
 
 
 def blind(time: Array, good: Flags, sent: Array) -> Flags:
-    """Rows (n,) in and just after gaps of the position, and of the time itself; when a valve has
-    switched meanwhile, until the chambers have forgotten when."""
+    """Rows (n,) that cannot be predicted: in and just after gaps of the position and of the time.
+
+    Where a valve switched within a gap, the moment is not known. The rows after such a gap count
+    again when the chambers no longer depend on that moment.
+    """
     settings = BenchLogSettings.current()
     known = np.flatnonzero(good)
     wide = np.flatnonzero(np.diff(time[known]) > settings.gap)

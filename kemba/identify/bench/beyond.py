@@ -11,7 +11,7 @@ from kemba.identify.bench.formulas import features, terms
 from kemba.identify.bench.predicted import PredictedLogs
 from kemba.identify.evidence.linear import within
 from kemba.identify.evidence.spike_slab import SpikeSlabSettings
-from kemba.identify.evidence.types import Array, Candidate, Leftover, Theta
+from kemba.identify.problem.types import Array, Candidate, Leftover, Theta
 from kemba.settings import BY_HAND, Settings, setting
 
 

@@ -10,7 +10,7 @@ from scipy.signal import lfilter
 from kemba.effects.mechanics.friction import V_COULOMB
 from kemba.identify.bench.motion import SmoothedMotion
 from kemba.identify.doubt.force_terms import dahl, end_terms
-from kemba.identify.evidence.problem import Array
+from kemba.identify.problem.problem import Array
 from kemba.settings import BY_HAND, Settings, setting
 
 

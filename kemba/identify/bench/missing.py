@@ -10,7 +10,7 @@ import numpy as np
 from scipy.linalg import cholesky_banded, solveh_banded
 
 from kemba.identify.bench.predicted import PredictedLogs
-from kemba.identify.evidence.types import Array, MissingForce, Theta
+from kemba.identify.problem.types import Array, MissingForce, Theta
 from kemba.settings import BY_HAND, Settings, setting
 
 FORCE = "piston/F"

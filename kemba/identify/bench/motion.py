@@ -7,8 +7,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from kemba.identify.evidence.noise import difference_sigma
-from kemba.identify.evidence.problem import Array
+from kemba.identify.problem.noise import difference_sigma
+from kemba.identify.problem.problem import Array
 from kemba.settings import BY_HAND, Settings, setting
 
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from kemba.effects.pneumatics.switching import changes
 from kemba.identify.bench.bench_log import BenchLog, BenchLogSettings
 from kemba.identify.bench.predicted import PredictedLogs
-from kemba.identify.bench.switching import edges
 from kemba.identify.compare.force_profiles import lags, risen
-from kemba.identify.evidence.types import Array, Changes, ForceChannel, OperatingPoint, Rows
+from kemba.identify.problem.types import Array, Changes, ForceChannel, OperatingPoint, Rows
 
 
 def bench_operating_point(predicted: PredictedLogs, stroke: float) -> OperatingPoint:
@@ -27,12 +27,8 @@ def bench_operating_point(predicted: PredictedLogs, stroke: float) -> OperatingP
 
 def switchings(log: BenchLog) -> Changes:
     """Valve name -> instants [s] of the commands, and +1 or -1 for on and off."""
-    found = {}
-    for side, intervals in zip(("extend", "retract"), log.commands, strict=True):
-        ends = np.array(intervals, dtype=float).reshape(-1, 2)
-        signs = np.tile([1.0, -1.0], len(ends))
-        found[f"valve/{side}"] = (edges(ends), signs[np.isfinite(ends.ravel())])
-    return found
+    sides = zip(("extend", "retract"), log.commands, strict=True)
+    return {f"valve/{side}": changes(sent) for side, sent in sides}
 
 
 def bench_force_channel(predicted: PredictedLogs, rows: Rows, at: OperatingPoint) -> ForceChannel:

@@ -9,8 +9,8 @@ import numpy as np
 
 from kemba.identify.bench.bench_log import BenchLog
 from kemba.identify.bench.motion import SmoothedMotion
-from kemba.identify.bench.prediction import Predictor, true_motion
-from kemba.identify.evidence.types import Array, Theta
+from kemba.identify.bench.prediction import Predictor
+from kemba.identify.problem.types import Array, Theta
 from kemba.settings import Settings, setting
 
 
@@ -54,7 +54,7 @@ class PredictedLogs:
 
     def motion(self, theta: Theta, index: int) -> SmoothedMotion:
         """The motion of log `index` without the position sensor's faults."""
-        return true_motion(self.logs[index].motion, theta)
+        return self.predictor.true_motion(self.logs[index], theta)
 
     def acting(self, theta: Theta, index: int) -> Array:
         """Share of each sample's neighbourhood in which the two valves act (n, 2)."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from kemba.effects.pneumatics.constants import ATMOSPHERE
-from kemba.identify.evidence.problem import Array
+from kemba.identify.problem.problem import Array
 from kemba.mechanism import Cylinder
 
 

@@ -20,10 +20,11 @@ from kemba.identify.bench.operating_point import (
 from kemba.identify.bench.predicted import PredictedLogs, settle_starts
 from kemba.identify.bench.prediction import Predictor
 from kemba.identify.bench.validate import contradictions
-from kemba.identify.evidence.candidates import effect_candidates, sensor_candidates
-from kemba.identify.evidence.noise import Colour, learn, whiten
-from kemba.identify.evidence.problem import Problem
-from kemba.identify.evidence.types import (
+from kemba.identify.logs.gate import BadData
+from kemba.identify.problem.candidates import effect_candidates, sensor_candidates
+from kemba.identify.problem.noise import Colour, learn, whiten
+from kemba.identify.problem.problem import Problem
+from kemba.identify.problem.types import (
     Array,
     Changes,
     ForceChannel,
@@ -33,30 +34,26 @@ from kemba.identify.evidence.types import (
     Rows,
     Theta,
 )
-from kemba.identify.logs.gate import BadData
 from kemba.model.model import Model
 from kemba.settings import BY_HAND, Settings, setting
 from kemba.trajectory import Trajectory
 
 
 class BenchProblemSettings(Settings):
-    """How well the figures of a rig are known."""
+    """How well pressure sensors are known, and what counts as a change and as rest."""
 
-    figures: float = setting(
-        0.02,
-        "1",
-        "prior sigma of a nominal figure, as a share of it",
-        "convention: nominal figures are off by 1 to 3 %",
-        decides=True,
-    )
-    found: float = setting(
-        0.1, "1", "the same of an effect that was put on the model's list", BY_HAND, decides=True
-    )
-    pressure: float = setting(
+    pressure_zero: float = setting(
         2e5,
         "Pa",
-        "prior sigma of the offset of a pressure",
-        "convention: two atmospheres",
+        "prior sigma of the bias of a pressure sensor",
+        "convention: two atmospheres; its zero is the atmosphere's or that of a vacuum",
+    )
+    pressure_gain: float = setting(
+        0.02,
+        "1",
+        "prior sigma of the scale error of a pressure sensor",
+        "convention: nominal figures are off by 1 to 3 %",
+        decides=True,
     )
     step: float = setting(
         0.1, "1", "step of finite differences of a start, as a share of the state's scale", BY_HAND
@@ -78,22 +75,19 @@ class BenchProblem(Problem):
         self.runs = tuple(log.name for log in logs)
         self.candidates = effect_candidates(model)
         if sensors:
-            self.candidates |= sensor_candidates(_sensor_sigmas(logs))
+            self.candidates |= sensor_candidates(_sensor_sigmas(logs), model)
         predictor = Predictor(model, self.candidates)
         states = predictor.rig({}).state_names
         starts = {f"start:{name}[{i}]": (i, name) for i in range(len(logs)) for name in states}
         self.predicted = PredictedLogs(settle_starts(logs, predictor), predictor, starts)
-        known = BenchProblemSettings.current()
-        self.nuisance = {
-            name: (1.0, known.found if _found(model, name) else known.figures)
-            for name in predictor.figures
-        }
+        self.nuisance = predictor.figures | predictor.sensors.nuisance
         self._state_scale = {q.name: q.scale for q in model.states.values()}
         for key, (_, name) in starts.items():
             self.nuisance[key] = (0.0, self._state_scale[name])
+        known = BenchProblemSettings.current()
         for channel in self.channels[1:]:
-            self.nuisance[f"offset:{channel}"] = (0.0, known.pressure)
-            self.nuisance[f"gain:{channel}"] = (1.0, known.figures)
+            self.nuisance[f"sensor_bias:{channel}.b"] = (0.0, known.pressure_zero)
+            self.nuisance[f"sensor_scale:{channel}.k"] = (0.0, known.pressure_gain)
         self.colour: Mapping[tuple[int, int], Colour] = {}
 
     @property
@@ -238,8 +232,3 @@ def _sensor_sigmas(logs: Sequence[BenchLog]) -> dict[str, float]:
     force = float(np.median([log.sigma["piston/F"] for log in logs]))
     position = float(np.median([log.motion.x_sigma for log in logs]))
     return {"piston/F": force, "piston/x": position}
-
-
-def _found(model: Model, name: str) -> bool:
-    """Whether a number belongs to an effect that the plain machine would not have."""
-    return bool(model.effect(name.rsplit(".", 1)[0]).off)

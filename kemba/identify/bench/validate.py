@@ -11,7 +11,7 @@ from scipy.signal import correlate
 from kemba.errors import KembaError
 from kemba.identify.bench.bench_log import BenchLog
 from kemba.identify.bench.motion import SmoothedMotion
-from kemba.identify.evidence.problem import Array
+from kemba.identify.problem.problem import Array
 from kemba.settings import BY_HAND, Settings, setting
 
 Predict = Callable[[BenchLog], Array]  # the nominal force along a run

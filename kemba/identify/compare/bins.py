@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from scipy.stats import chi2, false_discovery_control
 
-from kemba.identify.evidence.problem import Array, Labels, Rows, Texts
 from kemba.identify.evidence.windows import codes, rms
+from kemba.identify.problem.problem import Array, Labels, Rows, Texts
 from kemba.settings import BY_HAND, Settings, setting
 
 ASSUMED = ("/foot/x", "/foot/z", "/stop")  # channels that no sensor measures

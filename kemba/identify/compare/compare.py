@@ -9,22 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from kemba.identify.compare.bins import ConditionBin, condition_bins
+from kemba.identify.compare.bins import BinSettings, ConditionBin, condition_bins
 from kemba.identify.compare.force_profiles import ForceProfile, force_profiles
 from kemba.identify.compare.hints import Hint, Response, conflicts, lacking, lagged
 from kemba.identify.compare.missing_force import Peak, peaks
 from kemba.identify.compare.tolerance import slopes, within_tolerance
-from kemba.identify.evidence.problem import Array, MissingForce, Problem, Rows, Texts, Theta
 from kemba.identify.evidence.windows import Windows, aggregation_windows, free_starts, rms
+from kemba.identify.problem.problem import Array, MissingForce, Problem, Rows, Texts, Theta
 from kemba.settings import BY_HAND, Settings, setting
 
 
 class CompareSettings(Settings):
-    """How large an error a model may have."""
+    """How an error is spoken of that is too large for a good model."""
 
-    good: float = setting(
-        1.15, "1", "error ratio up to which a model explains the logs", BY_HAND, decides=True
-    )
     fair: float = setting(1.5, "1", "error ratio below which it nearly explains them", BY_HAND)
 
 
@@ -64,7 +61,7 @@ class Comparison:
 
     @property
     def good(self) -> bool:
-        good = CompareSettings.current().good
+        good = BinSettings.current().tolerated
         return self.noise_ratio <= good and not any(c.significant for c in self.bins)
 
     @property
@@ -132,7 +129,7 @@ def _tolerant(rows: Rows, region: Texts, window: Windows, left: Array) -> tuple[
     """Error ratio of what the figures' tolerance leaves, and whether it is within the noise."""
     sums = window.sums(left)
     clean = not any(c.significant for c in condition_bins(rows, region, window.first, sums))
-    return rms(sums), clean and rms(sums) <= CompareSettings.current().good
+    return rms(sums), clean and rms(sums) <= BinSettings.current().tolerated
 
 
 def measured_units(rows: Rows) -> dict[str, str]:

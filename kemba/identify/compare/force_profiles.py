@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kemba.identify.evidence.problem import Array, Flags, ForceChannel, Problem
+from kemba.identify.problem.problem import Array, Flags, ForceChannel, Problem
 from kemba.settings import BY_HAND, Settings, setting
 
 

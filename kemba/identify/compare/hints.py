@@ -17,8 +17,8 @@ from kemba.identify.compare.force_profiles import (
     risen,
 )
 from kemba.identify.compare.tolerance import Slopes
-from kemba.identify.evidence.problem import Array, Changes, Labels, Problem, Rows
 from kemba.identify.evidence.windows import codes
+from kemba.identify.problem.problem import Array, Changes, Labels, Problem, Rows
 from kemba.settings import BY_HAND, Settings, setting
 
 

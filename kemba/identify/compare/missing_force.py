@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kemba.identify.evidence.problem import Array, MissingForce
+from kemba.identify.problem.problem import Array, MissingForce
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from kemba.identify.evidence.problem import Array, Candidate, Problem, Theta
+from kemba.identify.problem.problem import Array, Candidate, Problem, Theta
 from kemba.settings import Settings, setting
 
 

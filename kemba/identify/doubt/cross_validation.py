@@ -9,9 +9,9 @@ from scipy.optimize import lsq_linear
 
 from kemba.identify.evidence.linear import Linear
 from kemba.identify.evidence.point import LinearisationPoint
-from kemba.identify.evidence.problem import Array
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
+from kemba.identify.problem.problem import Array
 from kemba.settings import BY_HAND, Settings, setting
 
 

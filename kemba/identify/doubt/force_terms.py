@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from kemba.identify.evidence.types import Array
+from kemba.identify.problem.types import Array
 from kemba.settings import BY_HAND, Settings, setting
 
 

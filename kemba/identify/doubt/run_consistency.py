@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from kemba.identify.doubt.cross_validation import within_tolerance
-from kemba.identify.evidence.problem import Array, Labels
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis, SpikeSlabSettings
+from kemba.identify.problem.problem import Array, Labels
 from kemba.settings import BY_HAND, Settings, setting
 
 

@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kemba.identify.evidence.linear import Linear, condense
-from kemba.identify.evidence.problem import Array, Candidate, Labels, Parameter
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis, Ranker
+from kemba.identify.problem.problem import Array, Candidate, Labels, Parameter
+from kemba.identify.settings import DiscoverSettings
 from kemba.settings import BY_HAND, Settings, setting
 
 
@@ -23,12 +24,6 @@ class UnexplainedSettings(Settings):
         "prior of a term's force, in sigmas of the noise where it acts most",
         BY_HAND,
         decides=True,
-    )
-    ahead: float = setting(
-        6.0, "nats", "gain of a formula over the catalogue that is asked for", BY_HAND, decides=True
-    )
-    each: float = setting(
-        2.0, "nats", "and beyond that, gain of every further term", BY_HAND, decides=True
     )
     terms: int = setting(2, "1", "most terms of a formula", "convention: a formula can be read")
     structure: float = setting(
@@ -107,10 +102,10 @@ def unfinished(search: Search, best: Hypothesis) -> bool:
     """Whether so much structure is left that the answer cannot be complete."""
     settings = UnexplainedSettings.current()
     power, structure = structured(search, best)
-    if not best:
+    if not best or structure <= settings.structure:
         return structure > settings.structure
     before, _ = structured(search, NULL)
-    return structure > max(settings.structure, settings.left * max(before - power, 0.0))
+    return structure > settings.left * max(before - power, 0.0)
 
 
 @dataclass(frozen=True)
@@ -164,6 +159,16 @@ def extended(
     return Ranker(joined, known, problem.nuisance, silent=candidates), names
 
 
+def by_chance(count: int) -> float:
+    """Gain [nats] that the best of `count` terms reaches by chance at most as often as a p-value
+    may be significant.
+
+    A Bayes factor exceeds exp(g) with a probability of exp(-g) at most where its term is not there
+    (Markov's inequality); `count` of them do so with `count` times that probability at most.
+    """
+    return float(np.log(count / DiscoverSettings.current().significant))
+
+
 def look(search: Search, best: Hypothesis) -> Formula | None:
     """The formula that explains what the best catalogue answer cannot, if there is one."""
     null = search.points[NULL]
@@ -173,7 +178,7 @@ def look(search: Search, best: Hypothesis) -> Formula | None:
     ranker, names = extended(
         search, null.linear, search.base.jacobian, search.base.residual, formulas
     )
-    alone, ahead = _grow(ranker, names, ()), UnexplainedSettings.current().ahead
+    alone, ahead = _grow(ranker, names, ()), by_chance(len(names))
     catalogue = search.points[best].log_evidence - null.log_evidence
     if alone is not None and alone.gain > catalogue + ahead and _matters(search, alone):
         return replace(alone, gain=alone.gain - catalogue)
@@ -190,15 +195,15 @@ def _matters(search: Search, formula: Formula) -> bool:
 
 def _grow(ranker: Ranker, names: Mapping[str, str], start: Hypothesis) -> Formula | None:
     """Terms chosen one after the other; each must add enough evidence."""
-    settings = UnexplainedSettings.current()
+    least, most = by_chance(len(names)), UnexplainedSettings.current().terms
     base = ranker.score(start).log_evidence
     chosen, reached = start, base
-    for _ in range(settings.terms):
+    for _ in range(most):
         table = {n: ranker.score((*chosen, n)).log_evidence for n in names if n not in chosen}
         if not table:
             break
         name = max(table, key=table.__getitem__)
-        if table[name] < reached + settings.ahead + settings.each:
+        if table[name] < reached + least:
             break
         chosen, reached = (*chosen, name), table[name]
     terms = tuple(n for n in chosen if n not in start)

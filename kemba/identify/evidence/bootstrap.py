@@ -10,8 +10,8 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.special import logsumexp
 from scipy.stats import norm
 
-from kemba.identify.evidence.problem import Array
 from kemba.identify.evidence.spike_slab import Hypothesis, Ranker, SpikeSlabSettings
+from kemba.identify.problem.problem import Array
 from kemba.identify.settings import DiscoverSettings
 from kemba.settings import Settings, setting
 

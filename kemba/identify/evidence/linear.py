@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kemba.identify.evidence.problem import (
+from kemba.identify.problem.problem import (
     Array,
     Candidate,
     Flags,

@@ -17,9 +17,9 @@ from kemba.identify.evidence.linear import (
     within,
 )
 from kemba.identify.evidence.point import Division, LinearisationPoint
-from kemba.identify.evidence.problem import Array, Problem
 from kemba.identify.evidence.refit import Fit, Frozen
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis, Ranker
+from kemba.identify.problem.problem import Array, Problem
 from kemba.settings import BY_HAND, Settings, setting
 
 Names = tuple[str, ...]

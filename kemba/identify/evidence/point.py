@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from kemba.identify.evidence.linear import Linear, condense, priors, time_blocks
-from kemba.identify.evidence.problem import Array, Labels, Problem
 from kemba.identify.evidence.refit import Fit
 from kemba.identify.evidence.spike_slab import Hypothesis, Score
 from kemba.identify.evidence.windows import Windows, windows_of
+from kemba.identify.problem.problem import Array, Labels, Problem
 
 
 @dataclass(frozen=True)

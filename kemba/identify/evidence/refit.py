@@ -10,8 +10,8 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from kemba.identify.evidence.linear import is_shape
-from kemba.identify.evidence.problem import Array, Parameter, Problem
 from kemba.identify.evidence.spike_slab import Hypothesis, SpikeSlabSettings
+from kemba.identify.problem.problem import Array, Parameter, Problem
 from kemba.settings import BY_HAND, Settings, setting
 
 

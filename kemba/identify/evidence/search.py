@@ -11,9 +11,9 @@ import numpy as np
 from kemba.identify.evidence.linear import Linear, estimate, names_of
 from kemba.identify.evidence.null_model import Baseline
 from kemba.identify.evidence.point import LinearisationPoint
-from kemba.identify.evidence.problem import Problem
 from kemba.identify.evidence.refit import Fit, refit
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis, log_prior, probabilities
+from kemba.identify.problem.problem import Problem
 from kemba.settings import BY_HAND, Settings, setting
 
 

@@ -12,7 +12,7 @@ from scipy.special import logsumexp
 from scipy.stats import norm
 
 from kemba.identify.evidence.linear import Linear
-from kemba.identify.evidence.problem import Array, Candidate
+from kemba.identify.problem.problem import Array, Candidate
 from kemba.settings import BY_HAND, Settings, setting
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from kemba.identify.evidence.problem import Array, Labels, Problem, Rows, Texts, Theta
+from kemba.identify.problem.problem import Array, Labels, Problem, Rows, Texts, Theta
 
 START = "start:"  # names of nuisance parameters that say how a log begins
 

@@ -7,10 +7,11 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
+from kemba.effects.sensors import CHANNELS
 from kemba.errors import ConfigErrors, KembaError, suggest
-from kemba.identify.evidence.noise import difference_sigma
 from kemba.identify.logs.reading import legs_of, needed
 from kemba.identify.logs.settings import GateSettings
+from kemba.identify.problem.noise import difference_sigma
 from kemba.trajectory import TIME, Array, Trajectory
 
 # Physical limits by the last part of the name: smallest, largest, and the likely mistake.
@@ -57,6 +58,20 @@ def _columns(log: Trajectory) -> Iterator[KembaError]:
         if name not in log:
             hint = f"{suggest(name, log.names)} Map foreign columns with --map".strip()
             yield _fault(log, f"needs the column '{name}', which is missing", hint=hint)
+    for name in log.names:
+        unit = _unit_of(name)
+        if unit is not None and log.unit(name) != unit:
+            what = f"the column's unit is [{log.unit(name)}]"
+            expected, hint = f"'{name} [{unit}]' was expected", "convert it with --map"
+            yield _fault(log, what, expected, hint, column=name)
+
+
+def _unit_of(name: str) -> str | None:
+    """The unit that a column must have; None where the gate does not know the column."""
+    if "valve/" in name:
+        return "1"
+    known = any(name == k or name.endswith(f"/{k}") for k in RANGES)
+    return CHANNELS[name.split("/")[-1]][0] if known else None
 
 
 def _time(log: Trajectory) -> Iterator[KembaError]:
@@ -101,12 +116,14 @@ def _cells(log: Trajectory) -> Iterator[KembaError]:
 
 
 def _valve(log: Trajectory, name: str, y: Array) -> Iterator[KembaError]:
-    wrong = np.isfinite(y) & (np.abs(y - np.round(y)) > 1e-6) | (y < 0) | (y > 1)
+    far, state = GateSettings.current().valve, np.clip(np.round(y), 0.0, 1.0)
+    wrong = np.isfinite(y) & (np.abs(y - state) > far)
     if wrong.any():
         i = int(np.argmax(wrong))
         what = f"the valve command is {y[i]:g}"
         hint = "map a voltage or per cent with a scale" if y[i] > 1 else ""
-        yield _fault(log, what, "0 or 1 was expected", hint, row=i, column=name)
+        expected = f"0 or 1 within {far:g} was expected"
+        yield _fault(log, what, expected, hint, row=i, column=name)
 
 
 def _values(log: Trajectory) -> Iterator[KembaError]:

@@ -11,6 +11,8 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from kemba.config import find_config, load_yaml, parse
 from kemba.errors import KembaError, suggest
+from kemba.identify.logs.settings import GateSettings
+from kemba.identify.logs.sidecar import check_kind, check_noise
 from kemba.mechanism import Mechanism
 from kemba.quantity import Quantity, convert
 from kemba.table import read_table
@@ -70,11 +72,21 @@ def read_log(path: str | Path, columns: ColumnMap | None = None) -> Trajectory:
     log.meta.setdefault("kind", (columns and columns.kind) or kind_of(log, path))
     log.meta["name"] = path.stem
     log.meta["path"] = str(path)
-    if log.meta["kind"] not in KINDS:
-        raise KembaError(
-            str(sidecar(path)), f"kind: '{log.meta['kind']}'", hint=suggest("robot", KINDS)
-        )
-    return log
+    beside = str(sidecar(path))
+    log.meta["kind"] = check_kind(log.meta["kind"], KINDS, beside)
+    if "noise" in log.meta:
+        units = {name: log.unit(name) for name in log.names}
+        log.meta["noise"] = check_noise(log.meta["noise"], units, beside)
+    return _without_absurd(log)
+
+
+def _without_absurd(log: Trajectory) -> Trajectory:
+    """The log with readings that no channel can have as missing ones: their squares overflow."""
+    limit = GateSettings.current().absurd
+    columns = {h: log[name] for h, name in zip(log.headers, log.names, strict=True)}
+    wild = {h: np.abs(values) > limit for h, values in columns.items()}
+    broken = {h: np.where(wild[h], np.nan, columns[h]) for h in columns if wild[h].any()}
+    return log.with_columns(broken) if broken else log
 
 
 def read_logs(paths: Sequence[str | Path], columns: ColumnMap | None = None) -> list[Trajectory]:

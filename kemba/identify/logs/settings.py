@@ -39,6 +39,18 @@ class GateSettings(Settings):
     impossible_elsewhere: float = setting(
         0.05, "1", "the same for columns that are not needed", BY_HAND, decides=True
     )
+    valve: float = setting(
+        0.02,
+        "1",
+        "a valve column may be off 0 or 1 by this",
+        "convention: a scaled voltage is off by a few per mille to a few per cent",
+    )
+    absurd: float = setting(
+        1e12,
+        "1",
+        "readings beyond this, in the channel's SI unit, count as missing",
+        "convention: a broken record, not a measured value; its square would overflow",
+    )
     quiet: float = setting(
         1e-4,
         "1",

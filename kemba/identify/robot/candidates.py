@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from kemba.effects import BY_KIND
-from kemba.identify.evidence.candidates import CandidateSettings, effect_candidates
-from kemba.identify.evidence.problem import Candidate, Parameter
+from kemba.identify.problem.candidates import CandidateSettings, effect_candidates
+from kemba.identify.problem.problem import Candidate, Parameter
 from kemba.model.model import Model
 from kemba.settings import BY_HAND, Settings, setting
 
 GROUND = ("ground_compliance", "ground_friction", "contact")
-DELAYS = ("valve_delay.dt", "valve_close_delay.dt")
 SOFTNESS = "ground_compliance.softness"
 GRIP = "ground_friction.mu"
 LAGS = ("hose_lag.T", "motor_lag.T")

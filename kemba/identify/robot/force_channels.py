@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from kemba.identify.compare.force_profiles import lags, risen
-from kemba.identify.evidence.types import Array, Flags, ForceChannel
+from kemba.identify.problem.types import Array, Flags, ForceChannel
 from kemba.identify.robot.operating_point import SIDES, air_forces, changes
 from kemba.identify.robot.state import LinearisedState
 from kemba.settings import BY_HAND, Settings, setting

@@ -8,7 +8,7 @@ import numpy as np
 
 from kemba.effects.mechanics.friction import V_COULOMB
 from kemba.identify.doubt.force_terms import dahl, end_terms
-from kemba.identify.evidence.types import Array
+from kemba.identify.problem.types import Array
 from kemba.identify.robot.force_channels import force_columns
 from kemba.identify.robot.state import LinearisedState
 from kemba.settings import BY_HAND, Settings, setting

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from kemba.identify.evidence.types import Array, Flags, Rows, Texts
+from kemba.identify.problem.types import Array, Flags, Rows, Texts
 from kemba.identify.robot.dynamics.physics import Physics
 from kemba.identify.robot.dynamics.settings import PlaceSettings
 from kemba.identify.robot.motion.batch import Batch

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from kemba.identify.compare.missing_force import spans
-from kemba.identify.evidence.problem import Array, MissingForce, Theta
+from kemba.identify.problem.problem import Array, MissingForce, Theta
 from kemba.identify.robot.dynamics.reference import densities
 from kemba.identify.robot.dynamics.settings import QuietForceDensity
 from kemba.identify.robot.motion.filter import System, gains, smooth_with_band

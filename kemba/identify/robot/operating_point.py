@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from kemba.identify.evidence.operating_point import air_force
-from kemba.identify.evidence.types import Array, Changes, OperatingPoint
+from kemba.effects.pneumatics.switching import changes as switchings
+from kemba.identify.problem.operating_point import air_force
+from kemba.identify.problem.types import Array, Changes, OperatingPoint
 from kemba.identify.robot.labels import row_channels
 from kemba.identify.robot.motion.resampled import ResampledLog
 from kemba.identify.robot.state import LinearisedState
@@ -38,7 +39,7 @@ def air_forces(state: LinearisedState) -> Array:
 def changes(log: ResampledLog, legs: Sequence[str]) -> Changes:
     """Command -> times [s] and sizes of its changes in one run: valves, then hip torques [N.m]."""
     valves = [f"{leg}/valve/{side}" for leg in legs for side in SIDES]
-    found = {n: (times, change) for n, (times, change, _) in zip(valves, log.switches, strict=True)}
+    found = {name: switchings(sent) for name, sent in zip(valves, log.sent, strict=True)}
     steps = np.diff(log.torque, axis=0)
     for i, leg in enumerate(legs):
         found[f"{leg}/hip/tau"] = (log.time[1:], steps[:, i])

@@ -8,9 +8,11 @@ from copy import copy
 import numpy as np
 from typing_extensions import Self
 
-from kemba.identify.evidence.candidates import sensor_candidates
-from kemba.identify.evidence.problem import Problem
-from kemba.identify.evidence.types import (
+from kemba.identify.logs.gate import BadData
+from kemba.identify.problem.candidates import sensor_candidates
+from kemba.identify.problem.problem import Problem
+from kemba.identify.problem.sensor_faults import SensorFaults, is_straight
+from kemba.identify.problem.types import (
     Array,
     Candidate,
     Changes,
@@ -20,9 +22,7 @@ from kemba.identify.evidence.types import (
     Rows,
     Theta,
 )
-from kemba.identify.logs.gate import BadData
 from kemba.identify.robot.candidates import (
-    DELAYS,
     extended,
     ground_of,
     in_the_air,
@@ -30,7 +30,7 @@ from kemba.identify.robot.candidates import (
 )
 from kemba.identify.robot.dynamics.physics import Physics
 from kemba.identify.robot.dynamics.settings import ForceDensity
-from kemba.identify.robot.dynamics.tolerance import SHARE
+from kemba.identify.robot.dynamics.tolerance import ToleranceShareSettings
 from kemba.identify.robot.force_channels import robot_force_channels
 from kemba.identify.robot.formulas import formula_columns
 from kemba.identify.robot.labels import describe
@@ -85,10 +85,11 @@ class RobotProblem(Problem):
             )
         )
         sigma = dict(zip(physics.channels, np.median(batch.sigma, axis=0).tolist(), strict=True))
-        self.candidates: dict[str, Candidate] = {**found, **sensor_candidates(sigma)}
-        self.state = linearise_at(physics, batch, {}, ground, self.unknown)
-        masses = dict.fromkeys(physics.masses, (0.0, SHARE))
-        self.nuisance: dict[str, tuple[float, float]] = {**physics.nuisance, **masses}
+        self.candidates: dict[str, Candidate] = {**found, **sensor_candidates(sigma, model)}
+        sensors = SensorFaults(model.effects)
+        self.state = linearise_at(physics, batch, sensors, {}, ground, self.unknown)
+        masses = dict.fromkeys(physics.masses, (0.0, ToleranceShareSettings.current().share))
+        self.nuisance = {**physics.nuisance, **sensors.nuisance, **masses}
 
     @property
     def physics(self) -> Physics:
@@ -103,7 +104,9 @@ class RobotProblem(Problem):
     def relinearise(self, base: Theta) -> Self:
         """The same problem, smoothed and linearised anew with the model at `base`."""
         found, old = copy(self), self.state
-        found.state = linearise_at(old.physics, old.batch, base, old.ground, self.unknown)
+        found.state = linearise_at(
+            old.physics, old.batch, old.sensors, base, old.ground, self.unknown
+        )
         return found
 
     def residual(self, theta: Theta, runs: Collection[int] | None = None) -> Array:
@@ -138,7 +141,7 @@ class RobotProblem(Problem):
     def _is_direct(self, name: str) -> bool:
         """Whether the force is linear in it: shapes, states and delays are not."""
         physics = self.physics
-        if name in physics.moving or name in DELAYS:
+        if name in physics.moving or name in physics.base.delays:
             return False
         lead = any(name == c.key for c in self.candidates.values())
         return name in self.state.linear or (
@@ -147,7 +150,7 @@ class RobotProblem(Problem):
 
     def is_straight(self, name: str) -> bool:
         """Whether residuals are linear in it: effects without memory, bias and scale of sensors."""
-        return self._is_direct(name) or name.startswith(("sensor_bias:", "sensor_scale:"))
+        return self._is_direct(name) or is_straight(name)
 
     def rows(self, runs: Collection[int] | None = None) -> Rows:
         """What each row of `residual` is."""

@@ -13,8 +13,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from kemba.identify.evidence.types import Array, Flags, Theta
-from kemba.identify.robot.candidates import DELAYS, GRIP, SOFTNESS, without_delay
+from kemba.identify.problem.sensor_faults import SensorFaults, is_fault
+from kemba.identify.problem.types import Array, Flags, Theta
+from kemba.identify.robot.candidates import GRIP, SOFTNESS, without_delay
 from kemba.identify.robot.dynamics.forces import Forces
 from kemba.identify.robot.dynamics.inputs import air_states, read_inputs
 from kemba.identify.robot.dynamics.linear import LinearisedMotion, linearise_along, smoothed
@@ -47,15 +48,16 @@ class LinearisedState:
     Arrays have n nodes, L runs, k coordinates and m measured values per node: one per channel, then
     the places of feet and stops.
 
-    `schedules`: contacts of each run. `motion`: the reference, and the model linearised along it.
-    `gain`: gains of the filter. `mask` (n, L, m): rows that are data. `forces`: the model's force
-    along the motion at any parameters. `linear`: name -> generalised force (n, L, k) per unit of a
-    parameter that stands beside the model, and its nominal value. `ground`: parameters of the
-    model's soft ground, empty where it is rigid.
+    `sensors`: what sensors make of the motion. `schedules`: contacts of each run. `motion`: the
+    reference, and the model linearised along it. `gain`: gains of the filter. `mask` (n, L, m):
+    rows that are data. `forces`: the model's force along the motion at any parameters. `linear`:
+    name -> generalised force (n, L, k) per unit of a parameter that stands beside the model, and
+    its nominal value. `ground`: parameters of the model's soft ground, empty where it is rigid.
     """
 
     physics: Physics
     batch: Batch
+    sensors: SensorFaults
     base: Theta
     ground: Mapping[str, float]
     schedules: tuple[Schedule, ...]
@@ -69,7 +71,8 @@ class LinearisedState:
         """Measured minus reference (n, L, m) in the channel's unit, the reference as the sensors at
         theta see it; NaN where nothing was measured."""
         motion, batch = self.motion, self.batch
-        seen = sensed(self.physics.channels, batch.resampled, motion.y, motion.way, theta)
+        faults = {c: self.sensors.at(theta, c) for c in self.physics.channels}
+        seen = sensed(faults, batch.resampled, motion.y, motion.way)
         soft = {**self.ground, **theta}
         depth = motion.penetration(soft.get(SOFTNESS, 0.0), soft.get("ground_compliance.d", 1.0))
         return np.concatenate([batch.y - seen, -motion.places - depth], axis=2)
@@ -116,34 +119,41 @@ class LinearisedState:
 
 
 def linearise_at(
-    physics: Physics, batch: Batch, base: Theta, ground: Mapping[str, float], unknown: ForceDensity
+    physics: Physics,
+    batch: Batch,
+    sensors: SensorFaults,
+    base: Theta,
+    ground: Mapping[str, float],
+    unknown: ForceDensity,
 ) -> LinearisedState:
     """The logs smoothed with the model at `base`, and the model linearised along that motion.
 
     `unknown`: density of the forces that no model explains.
     """
-    reference = _without_delays(physics, batch, base, first_reference(physics, batch))
+    reference = _without_delays(physics, batch, sensors, base, first_reference(physics, batch))
     schedules = read_schedules(physics, batch, reference)
     dt = float(np.median(batch.h[batch.valid]))
     for _ in range(StateSettings.current().rounds):
         state = _along(
-            physics, batch, base, ground, schedules, reference, LooseForceDensity.current()
+            physics, batch, sensors, base, ground, schedules, reference, LooseForceDensity.current()
         )
         y, g = state.measurement(base), state.acceleration(base)
         reference = smoothed(state.motion, state.gain, y, g)
-        if any(name.startswith("sensor") for name in base):  # as true sensors would have seen it
+        if sensors.listed or any(map(is_fault, base)):  # as true sensors would have seen it
             schedules = read_schedules(physics, batch, reference)
         normal = [state.motion.normal[: len(s.phase), i] for i, s in enumerate(schedules)]
         schedules = tuple(loaded(s, f, dt) for s, f in zip(schedules, normal, strict=True))
-    state = _along(physics, batch, base, ground, schedules, reference, unknown)
+    state = _along(physics, batch, sensors, base, ground, schedules, reference, unknown)
     masses = zip(physics.masses, np.moveaxis(state.motion.masses, -1, 0), strict=True)
     linear = {name: (column, 0.0) for name, column in masses}
     return replace(state, linear={**linear, GRIP: (state.motion.less_grip, 1.0)})
 
 
-def _without_delays(physics: Physics, batch: Batch, base: Theta, ref: Reference) -> Reference:
-    """The reference as sensors without the delays in `base` would have seen it."""
-    late = np.array([base.get(f"sensor_delay:{c}.dt", 0.0) for c in physics.channels])
+def _without_delays(
+    physics: Physics, batch: Batch, sensors: SensorFaults, base: Theta, ref: Reference
+) -> Reference:
+    """The reference as sensors that are not late would have seen it."""
+    late = np.array([sensors.lateness(base, c) for c in physics.channels])
     rates = ((ref.q, ref.v), (ref.v, ref.a), (ref.a, np.zeros_like(ref.a)))
     return Reference(*(ahead(a, rate, batch.resampled, late) for a, rate in rates))
 
@@ -151,6 +161,7 @@ def _without_delays(physics: Physics, batch: Batch, base: Theta, ref: Reference)
 def _along(
     physics: Physics,
     batch: Batch,
+    sensors: SensorFaults,
     base: Theta,
     ground: Mapping[str, float],
     schedules: tuple[Schedule, ...],
@@ -167,7 +178,7 @@ def _along(
     forces = Forces(physics, batch, motion)
     gain = gains(motion.system)
     return LinearisedState(
-        physics, batch, dict(base), ground, schedules, motion, gain, mask, forces
+        physics, batch, sensors, dict(base), ground, schedules, motion, gain, mask, forces
     )
 
 
@@ -176,6 +187,5 @@ def values_at(physics: Physics, theta: Theta) -> tuple[Array, Array]:
     on and off, at theta."""
     names = zip(physics.names, physics.nominal, strict=True)
     p = np.array([without_delay(n, theta.get(n, value)) for n, value in names])
-    both, off = (theta.get(name, 0.0) for name in DELAYS)
-    own = [physics.base.timing(leg) for leg in physics.legs for _ in range(2)]
-    return p, np.array([(a + both, b + both + off) for a, b in own])
+    valves = [leg for leg in physics.legs for _ in range(2)]
+    return p, np.array([physics.base.timing(leg, theta) for leg in valves])

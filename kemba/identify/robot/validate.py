@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from kemba.errors import KembaError
-from kemba.identify.evidence.types import Array, Flags, Rows
+from kemba.identify.problem.types import Array, Flags, Rows
 from kemba.identify.robot.state import LinearisedState
 from kemba.settings import BY_HAND, Settings, setting
 

@@ -111,9 +111,12 @@ class Measurement:
         return float(max(values.max(), 0.0))
 
     def worst(self, most: int) -> tuple[Violation, ...]:
-        """The worst violations noted so far, worst first; rounding errors aside."""
-        kept = sorted((v for v in self.found if v.size > 1e-9), key=lambda v: -v.size)
-        return tuple(kept[:most])
+        """The worst violations noted so far, each law once, worst first; not rounding errors."""
+        kept: dict[tuple[str, str], Violation] = {}
+        for violation in sorted(self.found, key=lambda v: -v.size):
+            if violation.size > 1e-9:
+                kept.setdefault((violation.what, violation.unit), violation)
+        return tuple(kept.values())[:most]
 
     def dynamics(self) -> float:
         """Equations of motion, forces by body weight and moments by that at an arm."""

@@ -10,8 +10,8 @@ import casadi as ca
 import numpy as np
 
 from kemba.model import Model
+from kemba.ocp.functions.blocks import Block
 from kemba.ocp.infeasibility.settings import ElasticSolve
-from kemba.ocp.nlp.blocks import Block
 from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.nlp.ipopt import Iterate, warm
 from kemba.ocp.relaxation.guess import automatic_guess

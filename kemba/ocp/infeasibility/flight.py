@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import casadi as ca
 import numpy as np
 
 from kemba.model import Model
+from kemba.model.rest import at_rest
 from kemba.ocp.infeasibility.pose import Poses
 from kemba.ocp.task.requirement import Requirement
 
@@ -111,12 +111,8 @@ def air_work(model: Model) -> float:
     q = np.array([model.mechanism.standing[c.name] for c in model.mechanism.coordinates])
     v, lam = np.zeros(len(q)), np.zeros(node.lam.numel())
     u = np.array([float(symbol == "u_e") for _, symbol in model.inputs])
-    s = np.array([s.value for s in model.states.values()])
+    s = at_rest(model, q, u)
     p = np.zeros(node.p.numel())
-    if len(s):
-        rate = -node.residual(q, v, v, node.s, 0 * node.s, lam, u, p)[1]
-        settle = ca.integrator("settle", "cvodes", {"x": node.s, "ode": rate}, 0.0, 0.5)
-        s = np.array(settle(x0=s)["xf"]).ravel()
     measured = np.array(node.measure(q, v, v, s, 0 * s, lam, u, p)).ravel()
     forces = [
         value

@@ -12,12 +12,12 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from kemba.ocp.nlp.blocks import BlockProblem
+from kemba.ocp.functions.blocks import BlockProblem
+from kemba.ocp.functions.proximal import Proximal
+from kemba.ocp.functions.regularised import regularised_hessian
+from kemba.ocp.functions.settings import Newton
 from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.nlp.program import Program
-from kemba.ocp.nlp.proximal import Proximal
-from kemba.ocp.nlp.regularised import regularised_hessian
-from kemba.ocp.nlp.settings import Newton
 from kemba.ocp.nlp.stagnation import Stagnation
 from kemba.ocp.nlp.watcher import Watch, Watcher
 from kemba.stopwatch import Stopwatch

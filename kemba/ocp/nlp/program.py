@@ -6,7 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
-from kemba.ocp.nlp.blocks import BlockProblem
+from kemba.ocp.functions.blocks import BlockProblem
 
 
 class Program(Protocol):

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kemba.ocp.nlp.settings import Newton
+from kemba.ocp.functions.settings import Newton
 
 
 @dataclass

@@ -12,18 +12,18 @@ from kemba.model import Model
 from kemba.ocp.certificate.certify import Certificate
 from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.nlp.ipopt import Control, Iterate
-from kemba.ocp.refinement.independent import Independent
-from kemba.ocp.refinement.mode_constraints import add_mode_constraints
-from kemba.ocp.refinement.modes import Phase, read_phases
-from kemba.ocp.refinement.program import PhaseProgram
-from kemba.ocp.refinement.radau import RADAU3, RADAU5, STATE, Scheme
+from kemba.ocp.phases.independent import Independent
+from kemba.ocp.phases.mode_constraints import add_mode_constraints
+from kemba.ocp.phases.modes import Phase, read_phases
+from kemba.ocp.phases.program import PhaseProgram
+from kemba.ocp.phases.radau import RADAU3, RADAU5, STATE, Scheme
+from kemba.ocp.phases.requirements import add_requirements
+from kemba.ocp.phases.settings import Elements, Refining, Repair
+from kemba.ocp.phases.unilateral import read_constraints
 from kemba.ocp.refinement.repair import misfit, repaired, simplified
-from kemba.ocp.refinement.requirements import add_requirements
 from kemba.ocp.refinement.sample import certificate, to_trajectory
-from kemba.ocp.refinement.settings import Elements, Refining, Repair
 from kemba.ocp.refinement.solve import rough, solve, warm
 from kemba.ocp.refinement.start import carried, start_vector
-from kemba.ocp.refinement.unilateral import read_constraints
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.solution import arrays

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from kemba.ocp.refinement.modes import AHEAD, BACK, HELD, OPEN, Phase
-from kemba.ocp.refinement.program import PhaseProgram
-from kemba.ocp.refinement.settings import Elements, Repair
+from kemba.ocp.phases.modes import AHEAD, BACK, HELD, OPEN, Phase
+from kemba.ocp.phases.program import PhaseProgram
+from kemba.ocp.phases.settings import Elements, Repair
 
 
 def misfit(program: PhaseProgram, x: np.ndarray) -> np.ndarray:

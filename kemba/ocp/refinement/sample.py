@@ -6,8 +6,8 @@ import casadi as ca
 import numpy as np
 
 from kemba.ocp.certificate.certify import Certificate, Violation, first_state
-from kemba.ocp.refinement.program import PhaseProgram
-from kemba.ocp.refinement.radau import STATE
+from kemba.ocp.phases.program import PhaseProgram
+from kemba.ocp.phases.radau import STATE
 from kemba.ocp.transcription.layout import STEP
 from kemba.ocp.transcription.solution import arrays, written
 from kemba.trajectory import Trajectory

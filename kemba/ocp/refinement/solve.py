@@ -8,8 +8,8 @@ import numpy as np
 
 from kemba.ocp.nlp.ipopt import Control, Ipopt, Iterate
 from kemba.ocp.nlp.stagnation import Stagnation
-from kemba.ocp.refinement.program import PhaseProgram
-from kemba.ocp.refinement.settings import Refining
+from kemba.ocp.phases.program import PhaseProgram
+from kemba.ocp.phases.settings import Refining
 
 
 def solve(

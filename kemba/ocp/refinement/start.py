@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from kemba.ocp.refinement.program import PhaseProgram
-from kemba.ocp.refinement.radau import STATE
+from kemba.ocp.phases.program import PhaseProgram
+from kemba.ocp.phases.radau import STATE
 from kemba.ocp.transcription.layout import STEP
 from kemba.ocp.transcription.solution import arrays
 from kemba.trajectory import Trajectory

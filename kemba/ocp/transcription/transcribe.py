@@ -25,7 +25,7 @@ import casadi as ca
 import numpy as np
 
 from kemba.model import Model
-from kemba.ocp.nlp.blocks import Block, BlockProblem
+from kemba.ocp.functions.blocks import Block, BlockProblem
 from kemba.ocp.task.requirement import Requirement, quantity_expression
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.first_node import Held, granted, state_rows

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure, SubFigure
 from kemba.identify.compare.bins import ConditionBin
 from kemba.identify.compare.compare import Comparison
 from kemba.identify.compare.force_profiles import ForceProfile
-from kemba.identify.evidence.types import MissingForce
+from kemba.identify.problem.types import MissingForce
 from kemba.plotting.bands import Band, draw_band
 from kemba.plotting.heat import LEVEL, ROW, add_bar, draw_heat, name_conditions
 from kemba.plotting.style import BLUE, GREY, key_above, paper_figure, paper_style

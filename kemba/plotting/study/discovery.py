@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 
 from kemba.identify.compare.compare import conditions
 from kemba.identify.discover import Discovery
-from kemba.identify.evidence.problem import Array, Rows
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
 from kemba.identify.evidence.windows import free_starts
+from kemba.identify.problem.problem import Array, Rows
 from kemba.identify.ranking import rungs
 from kemba.plotting.bands import plot_bands, plot_ladder
 from kemba.plotting.heat import plot_heat_map

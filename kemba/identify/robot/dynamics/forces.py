@@ -1,4 +1,4 @@
-"""Forces of the model along a reference as its parameters change; only what changes is redone."""
+"""Forces of the model along a reference at any parameters; results that recur are kept."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class ForcesSettings(Settings):
 
 @dataclass
 class Line:
-    """Force (N, k) at p, and its slopes along parameters in which it is straight."""
+    """Force (N, k) at p, and its slopes (N, k) along parameters in which it is linear."""
 
     p: Array
     force: Array
@@ -33,7 +33,8 @@ class Line:
 
 
 class Forces:
-    """What `motion` needs beyond the model at any parameters p (k,) and delays (valves, 2)."""
+    """Force that a motion needs beyond the model, at any parameters p (k,) and delays (valves, 2)
+    [s]."""
 
     def __init__(self, physics: Physics, batch: Batch, motion: LinearisedMotion) -> None:
         self.physics, self.batch, self.motion = physics, batch, motion

@@ -9,7 +9,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from kemba.identify.robot.dynamics.air import Index, SettlingSettings, substeps
+from kemba.identify.robot.dynamics.air import Index, substeps
 from kemba.identify.robot.dynamics.physics import Physics
 from kemba.identify.robot.dynamics.reference import Reference
 from kemba.identify.robot.motion.batch import Batch
@@ -21,9 +21,9 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 class Inputs:
     """One run cut at every switching.
 
-    `given`: steps (1, N) [s], q, v and inputs (., N) of the integration, which begins with a time
-    to settle. `h` (N',) [s]: the steps from the log's start on; `index` (n,) of each node among
-    them; `width` (n,) [s] of each node's step. `inputs` (n, nu): mean over each node's step.
+    `given`: steps (1, N) [s], q, v and inputs (., N) of the integration. `h` (N,) [s]: the same
+    steps; `index` (n,) of each node among them; `width` (n,) [s] of each node's step. `inputs`
+    (n, nu): mean over each node's step.
     """
 
     given: tuple[ca.DM, ca.DM, ca.DM, ca.DM]
@@ -33,7 +33,7 @@ class Inputs:
     inputs: Array
 
     def means(self, values: Array) -> Array:
-        """(n, k): values (k, N') averaged over the step from each node."""
+        """(n, k): values (k, N) averaged over the step from each node."""
         return _means(values, self.h, self.index, self.width)
 
 
@@ -45,7 +45,7 @@ def _means(values: Array, h: Array, index: Index, width: Array) -> Array:
 
 def read_inputs(physics: Physics, batch: Batch, ref: Reference, delays: Array) -> list[Inputs]:
     """Per run; `delays` (valves, 2) in seconds to switching on and off."""
-    found, settling = [], SettlingSettings.current().steps
+    found = []
     for i, log in enumerate(batch.resampled):
         n = len(log.time)
         times, valves, index = substeps(log, delays)
@@ -54,11 +54,8 @@ def read_inputs(physics: Physics, batch: Batch, ref: Reference, delays: Array) -
         q, v = (_at(log.time, a[:n, i], middle) for a in (ref.q, ref.v))
         held = np.clip(np.searchsorted(log.time, middle, side="right") - 1, 0, n - 1)
         u = physics.arrange(log.torque[held].T, valves)
-        lead = [np.repeat(a[:, :1], len(settling), axis=1) for a in (q, 0 * v, u)]
-        steps = ca.DM(np.append(settling, h)[None, :])
-        path = [ca.DM(np.hstack(pair)) for pair in zip(lead, (q, v, u), strict=True)]
+        given = (ca.DM(h[None, :]), ca.DM(q), ca.DM(v), ca.DM(u))
         width = np.append(np.diff(log.time), 1.0)
-        given = (steps, path[0], path[1], path[2])
         found.append(Inputs(given, h, index, width, _means(u, h, index, width)))
     return found
 
@@ -67,8 +64,8 @@ def air_states(
     physics: Physics, batch: Batch, inputs: Sequence[Inputs], p: Array
 ) -> tuple[Array, Array]:
     """Effect states (n, L, ns) and inputs (n, L, nu), both the mean over each step."""
-    moving, settling = p[physics.moves], SettlingSettings.current().count
-    states = [d.means(physics.states.run(*d.given, moving)[:, settling:]) for d in inputs]
+    moving = p[physics.moves]
+    states = [d.means(physics.states.run(*d.given, moving)) for d in inputs]
     return batch.pad(states, 0.0), batch.pad([d.inputs for d in inputs], 0.0)
 
 

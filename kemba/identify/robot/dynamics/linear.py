@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kemba.identify.evidence.types import Array, Flags
+from kemba.identify.problem.types import Array, Flags
 from kemba.identify.robot.dynamics.physics import Physics
 from kemba.identify.robot.dynamics.reference import Reference, integrator
 from kemba.identify.robot.dynamics.settings import ContactForceSettings, PlaceSettings

@@ -1,4 +1,4 @@
-"""Who touches what, and when: read from measured kinematics, never from a plan."""
+"""Contacts of feet and end stops, read from the measured motion and never from a plan."""
 
 from __future__ import annotations
 
@@ -65,9 +65,14 @@ class ContactSettings(Settings):
 
 @dataclass(frozen=True)
 class Schedule:
-    """Of one run, per node: `foot` may touch (n, legs), `settled` on the ground (n, legs),
-    `struck` touched down within a moment (n, legs), `slides` (n, legs; sign of the slip),
-    `low`, `high` at an end stop (n, legs), `phase` (n,) as the contract names it."""
+    """Contacts of one run at its n nodes.
+
+    Per leg, (n, legs): `foot`: it may touch the ground; `settled`: it rests on the ground;
+    `struck`: it touched down a moment ago; `slides`: sign of its slip, 0 where it does not slide;
+    `low`, `high`: the piston is at an end stop; `rests`: the piston has settled on a stop;
+    `sticks`: the foot does not move along the ground. `phase` (n,): `rest`, `stance2`, `stance1`,
+    `impact` or `flight`.
+    """
 
     foot: Flags
     settled: Flags
@@ -76,8 +81,8 @@ class Schedule:
     low: Flags
     high: Flags
     phase: np.ndarray[Any, Any]
-    rests: Flags  # (n, legs): piston settled on a stop
-    sticks: Flags  # (n, legs): foot that does not move along the ground
+    rests: Flags
+    sticks: Flags
 
     @property
     def held(self) -> Flags:
@@ -87,7 +92,11 @@ class Schedule:
 
 
 def read_schedule(time: Array, feet: Array, pistons: Array, stroke: float, body: Array) -> Schedule:
-    """The schedule of one run from feet (n, legs, [x, z]), pistons (n, legs) and body (n, k)."""
+    """The schedule of one run at `time` (n,) [s].
+
+    `feet` (n, legs, [x, z]) [m], `pistons` (n, legs) [m], `stroke` [m], `body` (n, 3): x, z [m] and
+    pitch [rad].
+    """
     limits, dt = ContactSettings.current(), max(float(np.median(np.diff(time))), 1e-4)
     feet_rate, piston_rate = slope(feet, dt), slope(pistons, dt)
     speed = np.abs(slope(body, dt)).max(axis=1)
@@ -134,7 +143,7 @@ def read_schedule(time: Array, feet: Array, pistons: Array, stroke: float, body:
 
 
 def _after(flags: Flags, steps: float) -> Flags:
-    """So many steps from where each stretch of `flags` begins."""
+    """Flags (n,) of the first `steps` nodes of each stretch in which `flags` (n,) hold."""
     begin = flags & ~np.append(True, flags[:-1])
     return np.asarray(np.convolve(begin, np.ones(max(1, round(steps))))[: len(flags)] > 0)
 
@@ -145,7 +154,7 @@ def loaded(schedule: Schedule, normal: Array, dt: float) -> Schedule:
     width = max(3, round(settings.rate_window / dt))
     firm = minimum_filter1d(normal, width, axis=0) > settings.firm_load
     slides = schedule.slides * firm
-    for leg in slides.T:  # a slip that lasts: a foot that just lifts off drags along for a moment
+    for leg in slides.T:  # short slips do not count: a foot that lifts off drags for a moment
         leg *= binary_opening(leg != 0.0, np.ones(width, bool))
     return replace(
         schedule, settled=schedule.settled & (normal > settings.least_load), slides=slides
@@ -153,7 +162,7 @@ def loaded(schedule: Schedule, normal: Array, dt: float) -> Schedule:
 
 
 def steady(values: Array, dt: float) -> Array:
-    """Forces or rates (n, ...) without what changes from sample to sample, which is noise."""
+    """Forces or rates (n, ...), smoothed: changes from sample to sample are noise."""
     return np.asarray(gaussian_filter1d(values, ContactSettings.current().steady / dt, axis=0))
 
 
@@ -175,7 +184,7 @@ def ground_level(z: Array, rate: Array) -> float:
 
 
 def stop_levels(x: Array, stroke: float) -> tuple[float, float]:
-    """Readings at the two stops: the furthest ones, where these are near an end at all."""
+    """Readings at the two stops: the extreme ones, if they are near the ends of the stroke."""
     search, ordered = ContactSettings.current().stop_search, np.sort(x)
     few = min(ContactSettings.current().stop_rows, len(x) - 1)
     low, high = float(ordered[few]), float(ordered[-1 - few])

@@ -1,4 +1,4 @@
-"""What the residuals of a right model would be: pure sensor noise through the same filter."""
+"""The residuals that a right model would leave: sensor noise alone, through the same filter."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ class ExpectedSettings(Settings):
 def expected_power(system: System, gain: Gains, seed: int = 0) -> Array:
     """Mean square (n, L, m) of the whitened innovations that sensor noise alone makes.
 
-    Below 1 where the filter allows for contact forces that a steady stance does not use up.
-    Averaged over a fiftieth of a second, for the draws are few.
+    It is below 1 where the filter allows for contact forces that a steady stance does not need.
+    The draws are few, so that their power is averaged over some nodes.
     """
     settings = ExpectedSettings.current()
     rng = np.random.default_rng(seed)

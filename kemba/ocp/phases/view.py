@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import casadi as ca
 
-from kemba.ocp.refinement.program import PhaseProgram
-from kemba.ocp.refinement.radau import node_vector, scaled
+from kemba.ocp.phases.program import PhaseProgram
+from kemba.ocp.phases.radau import node_vector, scaled
 
 
 class View:

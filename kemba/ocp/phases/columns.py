@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from kemba.ocp.refinement.modes import Phase
-from kemba.ocp.refinement.radau import STATE, width
+from kemba.ocp.phases.modes import Phase
+from kemba.ocp.phases.radau import STATE, width
 from kemba.ocp.transcription.layout import Layout
 
 

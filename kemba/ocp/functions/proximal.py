@@ -10,7 +10,7 @@ from functools import cached_property
 
 import casadi as ca
 
-from kemba.ocp.nlp.blocks import BlockProblem
+from kemba.ocp.functions.blocks import BlockProblem
 
 
 class Proximal:

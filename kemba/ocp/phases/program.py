@@ -10,12 +10,12 @@ import casadi as ca
 import numpy as np
 
 from kemba.model import Model
-from kemba.ocp.nlp.blocks import Block, BlockProblem
-from kemba.ocp.refinement.columns import Columns
-from kemba.ocp.refinement.modes import OPEN, Phase
-from kemba.ocp.refinement.radau import STATE, Scheme, element, impact
-from kemba.ocp.refinement.settings import Elements
-from kemba.ocp.refinement.unilateral import Constraint
+from kemba.ocp.functions.blocks import Block, BlockProblem
+from kemba.ocp.phases.columns import Columns
+from kemba.ocp.phases.modes import OPEN, Phase
+from kemba.ocp.phases.radau import STATE, Scheme, element, impact
+from kemba.ocp.phases.settings import Elements
+from kemba.ocp.phases.unilateral import Constraint
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.layout import Layout
 from kemba.ocp.transcription.symmetry import Reduction

@@ -13,7 +13,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 import numpy as np
 from typing_extensions import Self
 
-from kemba.identify.evidence.types import (
+from kemba.identify.problem.types import (
     Array,
     Candidate,
     Changes,

@@ -22,7 +22,7 @@ from pathlib import Path
 
 import casadi as ca
 
-from kemba.ocp.nlp.settings import Functions
+from kemba.ocp.functions.settings import Functions
 
 FLAGS = ("-O1", "-fPIC", "-shared", "-ffp-contract=off")  # contraction would change the last bits
 BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH

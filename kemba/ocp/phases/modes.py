@@ -10,8 +10,8 @@ import casadi as ca
 import numpy as np
 
 from kemba.model import Model
-from kemba.ocp.refinement.settings import Reading
-from kemba.ocp.refinement.unilateral import Constraint
+from kemba.ocp.phases.settings import Reading
+from kemba.ocp.phases.unilateral import Constraint
 from kemba.ocp.transcription.solution import arrays
 from kemba.trajectory import Trajectory
 

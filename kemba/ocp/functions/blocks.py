@@ -9,11 +9,11 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
-from kemba.ocp.nlp.compiled import compiled
-from kemba.ocp.nlp.constants import parameterised
-from kemba.ocp.nlp.settings import Functions
-from kemba.ocp.nlp.signs import canonical_signs
-from kemba.ocp.nlp.vectorised import vectorised
+from kemba.ocp.functions.compiled import compiled
+from kemba.ocp.functions.constants import parameterised
+from kemba.ocp.functions.settings import Functions
+from kemba.ocp.functions.signs import canonical_signs
+from kemba.ocp.functions.vectorised import vectorised
 
 Entries = tuple[ca.MX, np.ndarray, np.ndarray]  # nonzeros, their rows, their columns
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
-from kemba.ocp.refinement.settings import ModeConstraints
-from kemba.ocp.refinement.view import View
+from kemba.ocp.phases.settings import ModeConstraints
+from kemba.ocp.phases.view import View
 
 
 class Independent:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from kemba.effects.pneumatics.constants import ATMOSPHERE
-from kemba.identify.evidence.types import Array
+from kemba.identify.problem.types import Array
 from kemba.mechanism import Cylinder
 
 

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import casadi as ca
 import numpy as np
 
-from kemba.ocp.refinement.independent import Independent
-from kemba.ocp.refinement.modes import HELD
-from kemba.ocp.refinement.program import PhaseProgram
-from kemba.ocp.refinement.view import View
+from kemba.ocp.phases.independent import Independent
+from kemba.ocp.phases.modes import HELD
+from kemba.ocp.phases.program import PhaseProgram
+from kemba.ocp.phases.view import View
 from kemba.ocp.task.requirement import Requirement, quantity_expression
 from kemba.ocp.transcription.stage import as_variable
 

@@ -11,8 +11,8 @@ from contextlib import contextmanager
 
 import casadi as ca
 
-from kemba.ocp.nlp.rewriting import replay
-from kemba.ocp.nlp.settings import Functions
+from kemba.ocp.functions.rewriting import replay
+from kemba.ocp.functions.settings import Functions
 
 
 def vectorised(f: ca.Function, points: int, shared: Collection[int] = ()) -> ca.Function:

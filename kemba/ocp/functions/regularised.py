@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from kemba.ocp.nlp.settings import Newton
+from kemba.ocp.functions.settings import Newton
 
 
 def regularised_hessian(hess_lag: ca.Function) -> ca.Function:

@@ -7,13 +7,13 @@ import itertools
 import casadi as ca
 import numpy as np
 
-from kemba.ocp.refinement.independent import Independent
-from kemba.ocp.refinement.modes import AHEAD, BACK, HELD, OPEN
-from kemba.ocp.refinement.program import PhaseProgram, Where
-from kemba.ocp.refinement.radau import STATE
-from kemba.ocp.refinement.settings import ModeConstraints
-from kemba.ocp.refinement.unilateral import Constraint
-from kemba.ocp.refinement.view import View
+from kemba.ocp.phases.independent import Independent
+from kemba.ocp.phases.modes import AHEAD, BACK, HELD, OPEN
+from kemba.ocp.phases.program import PhaseProgram, Where
+from kemba.ocp.phases.radau import STATE
+from kemba.ocp.phases.settings import ModeConstraints
+from kemba.ocp.phases.unilateral import Constraint
+from kemba.ocp.phases.view import View
 from kemba.ocp.task.requirement import SCALES
 from kemba.ocp.transcription.first_node import state_rows
 

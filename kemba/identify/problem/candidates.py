@@ -6,9 +6,12 @@ from collections.abc import Mapping
 
 from kemba.effects import BY_KIND
 from kemba.effects.base import Effect
-from kemba.identify.evidence.problem import Candidate, Parameter
+from kemba.effects.sensors import SensorEffect
+from kemba.identify.problem.problem import Candidate, Parameter
+from kemba.identify.problem.sensor_faults import possible_faults
 from kemba.model.model import Model
 from kemba.model.scene import port_name
+from kemba.quantity import Param
 from kemba.settings import BY_HAND, Settings, setting
 
 
@@ -27,9 +30,6 @@ class CandidateSettings(Settings):
     shape: float = setting(
         0.7, "1", "prior width of the logarithm of a shape parameter", "convention: a factor of two"
     )
-    bias: float = setting(5.0, "1", "size of a sensor's bias, in sigmas of its noise", BY_HAND)
-    scale: float = setting(0.02, "1", "size of a sensor's scale error", BY_HAND)
-    delay: float = setting(0.003, "s", "size of a sensor's delay", BY_HAND)
 
 
 def effect_candidates(model: Model) -> dict[str, Candidate]:
@@ -37,8 +37,8 @@ def effect_candidates(model: Model) -> dict[str, Candidate]:
     present = {e.kind for e in model.effects}
     found = {}
     for kind, effect in BY_KIND.items():
-        sensor = effect.family == "sensors"
-        if effect.off and not sensor and kind not in present and _fits(model, effect):
+        missing = effect.off and kind not in present
+        if missing and not issubclass(effect, SensorEffect) and _fits(model, effect):
             found[kind] = candidate(effect)
     return found
 
@@ -50,8 +50,24 @@ def by_default(kind: str) -> Effect:
 
 def candidate(effect: type[Effect]) -> Candidate:
     """What `effect` declares: the parameter in `off` switches it, the others are shapes."""
+    return _candidate(effect.model_fields["kind"].default, effect, effect.declared())
+
+
+def sensor_candidates(sigmas: Mapping[str, float], model: Model) -> dict[str, Candidate]:
+    """Every sensor fault that the model's list lacks; `sigmas`: noise per sample by channel."""
+    present = {e.name for e in model.effects}
+    found = {}
+    for channel, sigma in sigmas.items():
+        for name, fault in possible_faults(channel).items():
+            if name not in present:
+                found[name] = _candidate(name, type(fault), fault.sized(sigma), sensor=True)
+    return found
+
+
+def _candidate(
+    name: str, effect: type[Effect], declared: Mapping[str, Param], sensor: bool = False
+) -> Candidate:
     settings = CandidateSettings.current()
-    fields, declared = effect.model_fields, effect.declared()
     (lead, off), *_ = effect.off.items()
     param = declared[lead]
     # a time constant far below the sampling interval is the same as none
@@ -60,30 +76,11 @@ def candidate(effect: type[Effect]) -> Candidate:
     )
     switch = Parameter(lead, param.unit, off, param.size, lower, param.upper)
     shapes = []
-    for name in (n for n in declared if n != lead):
-        p, typical = declared[name], float(fields[name].default)
+    for other in (n for n in declared if n != lead):
+        p, typical = declared[other], float(effect.model_fields[other].default)
         bounds = (max(p.lower, typical / settings.reach), min(p.upper, typical * settings.reach))
-        shapes.append(Parameter(name, p.unit, typical, settings.shape, *bounds, typical))
-    return Candidate(fields["kind"].default, switch, tuple(shapes))
-
-
-def sensor_candidates(sigmas: Mapping[str, float]) -> dict[str, Candidate]:
-    """Bias, scale and delay of each channel; `sigmas` is the noise per sample."""
-    found, sizes = {}, CandidateSettings.current()
-    for channel, sigma in sigmas.items():
-        for kind, lead in (
-            ("sensor_bias", Parameter("b", _unit(channel), 0.0, sizes.bias * sigma)),
-            ("sensor_scale", Parameter("k", "1", 0.0, sizes.scale)),
-            ("sensor_delay", Parameter("dt", "s", 0.0, sizes.delay)),
-        ):
-            name = f"{kind}:{channel}"
-            found[name] = Candidate(name, lead, sensor=True)
-    return found
-
-
-def _unit(channel: str) -> str:
-    last = channel.rsplit("/", 1)[-1]
-    return {"F": "N", "x": "m", "z": "m", "q": "rad", "pitch": "rad", "P": "Pa"}.get(last, "1")
+        shapes.append(Parameter(other, p.unit, typical, settings.shape, *bounds, typical))
+    return Candidate(name, switch, tuple(shapes), sensor)
 
 
 def _fits(model: Model, effect: type[Effect]) -> bool:

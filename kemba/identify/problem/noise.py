@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from statistics import NormalDist
 
 import numpy as np
 from scipy.linalg import solve_toeplitz
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 from scipy.signal import lfilter
 
-from kemba.identify.evidence.problem import Array
+from kemba.identify.problem.problem import Array
 from kemba.settings import BY_HAND, Settings, setting
 
 
@@ -36,16 +37,41 @@ class NoiseSettings(Settings):
     spiky: float = setting(5.0, "1", "ratio of mean squares that makes a spike", BY_HAND)
 
 
+class WhiteNoiseSettings(Settings):
+    """How the white noise of a channel is told from its motion."""
+
+    fewest: int = setting(11, "1", "values that are needed to tell noise", BY_HAND)
+    kept: float = setting(
+        0.9,
+        "1",
+        "share of the third differences that count as noise, the smallest ones",
+        "tuned: by hand; impacts and switching valves take less than a tenth of a log",
+    )
+
+
 def difference_sigma(values: Array) -> float:
-    """White noise per sample, robustly from third differences (smooth motion cancels)."""
-    d = np.diff(values[np.isfinite(values)], n=3)
-    if len(d) < 8:
+    """White noise (1 sigma) per sample of a channel (n,); 0 where there are too few values.
+
+    From third differences, in which smooth motion cancels. The largest ones are left out: impacts
+    and switching valves are no noise. A quantised channel is never better than its own steps.
+    """
+    settings = WhiteNoiseSettings.current()
+    known = values[np.isfinite(values)]
+    if len(known) < settings.fewest:
         return 0.0
-    # the mean of |d| as well as its median: a quantised signal has a median of zero
-    median = float(np.median(np.abs(d))) / 0.6745
-    trimmed = np.sort(np.abs(d))[: int(0.9 * len(d))]
-    mean = float(np.mean(trimmed)) / 0.6287  # E|d| of a normal below its 90 % point
-    return max(median, mean) / float(np.sqrt(20.0))
+    rough = np.sort(np.abs(np.diff(known, n=3)))[: int(settings.kept * (len(known) - 3))]
+    noise = float(np.sqrt(np.mean(rough**2) / 20.0))  # 20 = 1 + 9 + 9 + 1
+    noise /= _spread_of_smallest(settings.kept)
+    steps = np.diff(np.unique(known))
+    return max(noise, float(steps.min() / np.sqrt(12.0)) if len(steps) else 0.0)
+
+
+def _spread_of_smallest(share: float) -> float:
+    """Root mean square of the `share` of a normal's values that are smallest in size, by its own
+    sigma."""
+    normal = NormalDist()
+    end = normal.inv_cdf(0.5 * (1.0 + share))
+    return float(np.sqrt(1.0 - 2.0 * end * normal.pdf(end) / share))
 
 
 @dataclass(frozen=True)
