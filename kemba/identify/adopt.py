@@ -22,7 +22,7 @@ def write_model(
     listed = [item(name, rows[name]["parameters"]) for name in wanted]
     data = {
         "name": f"{Path(base).stem}_{'_'.join(w.split(':')[0] for w in wanted)}"[:60],
-        "base": reference(base, path),
+        "base": reference(base),
         "effects": listed,
         "notes": "found by kemba-opt discover",
     }
@@ -44,8 +44,8 @@ def item(name: str, parameters: Mapping[str, Mapping[str, Any]]) -> dict[str, An
     return {"kind": kind, **where, **values}
 
 
-def reference(base: str, path: Path) -> str:
-    """How a model in `path` names its base: shipped models by name, own ones by their path."""
+def reference(base: str) -> str:
+    """How a model elsewhere names its base: shipped models by name, own ones by their path."""
     if not Path(base).is_file():
         return base
     return str(Path(base).resolve())

@@ -9,7 +9,7 @@ from typing import Any
 
 from kemba.errors import KembaError
 from kemba.files import write_json
-from kemba.identify.adopt import write_model
+from kemba.identify.adopt import reference, write_model
 from kemba.identify.answer import Answer
 from kemba.identify.discover import Discovery, discover
 from kemba.identify.logs.excerpt import excerpts
@@ -87,10 +87,9 @@ def write_answer(answer: Answer, out: Path, model: str) -> None:
     for stale in ("model.yaml", "answer.json"):
         (out / stale).unlink(missing_ok=True)
     if answer.verdict == "missing":
-        base = model if not Path(model).is_file() else str(Path(model).resolve())
-        path = write_model(out / "model.yaml", base, data["ranking"], answer.added)
+        path = write_model(out / "model.yaml", model, data["ranking"], answer.added)
         answer.model = data["model"] = str(path)
-    write_json(out / "answer.json", data | {"base": model})
+    write_json(out / "answer.json", data | {"base": reference(model)})
 
 
 def _apart(fitted: Sequence[Trajectory], kept: Sequence[Trajectory]) -> None:
