@@ -58,6 +58,14 @@ def test_an_input_above_or_below_its_range_is_told(force: float) -> None:
     assert not found.within(Tolerances())
 
 
+@pytest.mark.parametrize("speed", [60.0, -60.0])
+def test_the_first_node_keeps_its_bounds_as_well(speed: float) -> None:
+    """A bead goes 50 m/s at most."""
+    found = measured(kicked=np.array([speed, 0.0, 0.0, 0.0, 0.0]))
+    beyond = next(v for v in found.worst if v.what == "bound:body/vx")
+    assert (beyond.node, beyond.violation) == (0, pytest.approx(10.0))
+
+
 @pytest.mark.parametrize("speed", [0.03, -0.03])
 def test_a_requirement_missed_on_either_side_is_told(speed: float) -> None:
     """The plan comes to rest; 1 cm/s either way is allowed at its end."""

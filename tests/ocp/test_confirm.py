@@ -13,6 +13,7 @@ from kemba.model import load_model
 from kemba.ocp import load_task
 from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.nlp.ipopt import Ipopt, Iterate
+from kemba.ocp.nlp.program import violation
 from kemba.ocp.relaxation.lifting import confirm
 from kemba.ocp.relaxation.session import Schedule
 from kemba.ocp.task.requirement import resolve
@@ -99,3 +100,13 @@ def test_relaxing_allows_pairs_as_much_as_it_says_and_nothing_else() -> None:
     assert rows.any() and np.all(t.g_upper[rows] == 0.0)
     assert loose[rows] - tight[rows] == pytest.approx(-1e-3)
     assert np.array_equal(loose[~rows], tight[~rows])
+
+
+@pytest.mark.parametrize(
+    ("change", "size"), [(0.0, 0.0), (0.25, 0.25), (-0.25, 0.25)], ids=["kept", "above", "below"]
+)
+def test_a_row_is_violated_on_either_side(change: float, size: float) -> None:
+    found, good = metre()
+    g = np.array(found.problem.g(good.ravel(), Parameters(0.0).vector(found.nodes))).ravel()
+    g[4] += change
+    assert violation(found, g) == pytest.approx(size, abs=1e-9)
