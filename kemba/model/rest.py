@@ -31,13 +31,13 @@ class RestSettings(Settings):
         1e-6,
         "s-1",
         "rate, in scales of a state, below which it rests",
-        "convention: chosen by hand, no comparison kept",
+        CHOSEN,
     )
     tolerance: float = setting(
         1e-9,
         "1",
         "of the integration, in scales of the states",
-        "convention: chosen by hand, no comparison kept",
+        CHOSEN,
     )
 
 

@@ -18,7 +18,7 @@ class InfluenceSettings(Settings):
         5,
         "1",
         "cases below which a correlation says nothing",
-        "convention: chosen by hand, no comparison kept",
+        CHOSEN,
     )
     chance: float = setting(
         0.05, "1", "p-value above which it may be chance", "convention: the usual 5 %"

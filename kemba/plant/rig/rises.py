@@ -11,7 +11,7 @@ import numpy as np
 from kemba.errors import KembaError
 from kemba.plant.rig.estimate import Estimate, linear, mean
 from kemba.plant.stepping.arrays import Array
-from kemba.settings import Settings, setting
+from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Trajectory
 
 
@@ -22,29 +22,27 @@ class RiseSettings(Settings):
         2e-4,
         "m",
         "way below which the rod counts as locked",
-        "convention: chosen by hand, no comparison kept",
+        CHOSEN,
     )
     step: float = setting(
         20.0,
         "N",
         "smallest step of the force that is read",
-        "convention: chosen by hand, no comparison kept",
+        CHOSEN,
     )
     low: float = setting(
         0.02,
         "1",
         "lower share of the step for the line to its start",
-        "convention: chosen by hand, no comparison kept",
+        CHOSEN,
     )
     high: float = setting(
         0.10,
         "1",
         "upper share of the step for the line to its start",
-        "convention: chosen by hand, no comparison kept",
+        CHOSEN,
     )
-    rows: int = setting(
-        20, "1", "rows that an answer needs", "convention: chosen by hand, no comparison kept"
-    )
+    rows: int = setting(20, "1", "rows that an answer needs", CHOSEN)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kemba.plant.rig.estimate import Estimate, linear
-from kemba.settings import Settings, setting
+from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Trajectory
 
 MODES = {(1, 0): "extend", (0, 1): "retract", (1, 1): "both", (0, 0): "none"}
@@ -21,35 +21,33 @@ class StrokeSettings(Settings):
         0.01,
         "m",
         "way below which the rod does not move",
-        "convention: chosen by hand, no comparison kept",
+        CHOSEN,
     )
     moving: float = setting(
         0.2,
         "1",
         "share of the top speed from which the rod moves",
-        "convention: chosen by hand, no comparison kept",
+        CHOSEN,
     )
     begin: float = setting(
         0.5,
         "1",
         "share of the way after which chambers have settled",
-        "convention: chosen by hand, no comparison kept",
+        CHOSEN,
     )
     end: float = setting(
         0.85,
         "1",
         "share of the way after which the end is near",
-        "convention: chosen by hand, no comparison kept",
+        CHOSEN,
     )
     steady: float = setting(
         0.03,
         "1",
         "deviation from the median speed that counts",
-        "convention: chosen by hand, no comparison kept",
+        CHOSEN,
     )
-    fewest: int = setting(
-        3, "1", "samples that a steady part needs", "convention: chosen by hand, no comparison kept"
-    )
+    fewest: int = setting(3, "1", "samples that a steady part needs", CHOSEN)
 
 
 @dataclass(frozen=True)
