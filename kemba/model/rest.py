@@ -13,7 +13,7 @@ from kemba.errors import KembaError
 from kemba.model.model import Model
 from kemba.model.node import Node
 from kemba.quantity import Quantity
-from kemba.settings import Settings, setting
+from kemba.settings import CHOSEN, Settings, setting
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
