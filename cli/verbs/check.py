@@ -45,7 +45,7 @@ def _tell(answers: list[dict[str, Any]], json: bool, quiet: bool) -> None:
         if not answer["good"]:
             typer.echo(answer["sentence"], err=True)
         elif not json and not quiet:
-            typer.echo(f"{answer['file']}: good: {answer['sentence']}")
+            typer.echo(f"{answer['file']}: {answer['sentence']}")
 
 
 def _log(file: Path, column_map: str | None) -> dict[str, Any]:
@@ -53,7 +53,7 @@ def _log(file: Path, column_map: str | None) -> dict[str, Any]:
     from kemba.trajectory import Trajectory
 
     log = read_log(file, load_map(column_map)) if column_map else Trajectory.read(file)
-    sentence = f"{len(log)} rows, {len(log.names)} columns, {log.time[-1] - log.time[0]:.3g} s"
+    sentence = f"valid table: {len(log)} rows, {len(log.names)} columns, {log.time[-1] - log.time[0]:.3g} s"
     return {"kind": "table", "rows": len(log), "columns": log.headers, "sentence": sentence}
 
 
@@ -65,7 +65,7 @@ def _yaml(file: Path) -> dict[str, Any]:
     kind = kind_of(document)
     parsed = parse(document, schema_of(kind))
     remarks = _whole(kind, parsed, document)
-    sentence = "; ".join([f"one of the {kind}", *remarks])
+    sentence = "; ".join([f"valid {kind.removesuffix('s')} file", *remarks])
     return {"kind": kind, "sentence": sentence, "remarks": remarks}
 
 

@@ -9,6 +9,12 @@ from kemba.ocp.certificate.status import Status
 from kemba.ocp.planned import Plan
 
 
+def sentence_of(plan: Plan) -> str:
+    """The plan's sentence for the user; that of a plan which is not what was asked says so."""
+    asked = plan.status in (Status.SOLVED, Status.INTERRUPTED)
+    return plan.sentence if asked else f"FAILED: {plan.sentence}"
+
+
 def answer(plan: Plan, run: str) -> dict[str, Any]:
     """The JSON of `solve`, also written as certificate.json."""
     trajectory, certificate = plan.trajectory, plan.certificate
@@ -16,7 +22,7 @@ def answer(plan: Plan, run: str) -> dict[str, Any]:
     limit = max(tolerances.complementarity, tolerances.dynamics, tolerances.bounds)
     return {
         "status": plan.status,
-        "sentence": plan.sentence,
+        "sentence": sentence_of(plan),
         "run": run,
         "task": plan.task.name,
         "apex_m": float(max(trajectory["body/z"])),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +16,7 @@ from kemba.files import WriteError
 from kemba.ocp import Plan, Task, controller_table, plan
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.nlp.watcher import Watch
-from kemba.ocp.report import answer
+from kemba.ocp.report import answer, sentence_of
 from kemba.ocp.starts import plan_best
 from kemba.plant.execution.certificate import replays
 from kemba.plant.execution.counterpart import another_robot, counterpart
@@ -28,7 +28,7 @@ from kemba.trajectory import Trajectory
 
 @dataclass(frozen=True)
 class Listener:
-    """Who hears about stages and iterations, and who may ask to stop."""
+    """What is called at each stage and iteration, and what may ask to stop."""
 
     tell: Callable[[str], None] = lambda text: None
     watch: Watch | None = None
@@ -48,10 +48,10 @@ def solve_into(
 ) -> dict[str, Any]:
     """Solve `task` and fill its run folder; returns the JSON of `solve`.
 
-    `start`: a trajectory to go on from; `starts`, `jobs`: several guesses on the cores; `replay`:
-    execute the plan on the same model and on the plant, and hold both against the task's
-    tolerances: a plan that misses them is `acceptable`, not `solved`. The manifest says `failed`
-    when this raises.
+    `start`: a trajectory to begin from. `starts`, `jobs`: how many start guesses, on how many
+    cores. `replay`: execute the plan on the same model and on the plant, and compare both with the
+    task's tolerances; a plan that misses them is `acceptable`, not `solved`. Raises KembaError
+    where the task or a file is wrong; the manifest then says `failed`.
     """
     dump_yaml(task.model_dump(exclude_none=True), folder / "task.yaml")
     log = folder / "solver.log"
@@ -67,7 +67,7 @@ def solve_into(
             result |= _replayed(found)
         _keep(found, result, folder, figure)
     except BaseException:
-        with suppress(WriteError):  # the first error tells more
+        with suppress(WriteError):  # the first error says more
             folder.finish("failed")
         raise
     folder.finish(result["status"], sentence=result["sentence"], good=result["good"])
@@ -83,26 +83,27 @@ def _replayed(found: Plan) -> dict[str, Any]:
         other = another_robot(task.model, task.plant)
         executed = replays(found.model, found.trajectory, table, plant)
     except KembaError as error:  # a model that the simulator cannot execute still has its plan
-        return _unconfirmed(found, [f"but there is no replay: {error}"])
+        return _unconfirmed(found, f"it cannot be simulated: {error}")
     lands = bool(ends_standing(found.model, found.trajectory))
-    said = [f"the plant is another robot, {other}, which {task.plant} names"] if other else []
-    told = verdicts(executed, task.tolerances, lands).values()
-    sentences = [*said, *(verdict.sentence for verdict in told)]
-    if all(verdict.good for verdict in told):
-        return {**executed, "sentence": "; ".join([found.sentence, *sentences])}
-    return {**executed, **_unconfirmed(found, sentences)}
+    names = [f"the plant is another robot, {other}, which {task.plant} names"] if other else []
+    judged = verdicts(executed, task.tolerances, lands).values()
+    if all(verdict.good for verdict in judged):
+        parts = [sentence_of(found), *names, *(verdict.sentence for verdict in judged)]
+        return {**executed, "sentence": "; ".join(parts)}
+    causes = [verdict.sentence for verdict in judged if not verdict.good]
+    matches = [verdict.sentence for verdict in judged if verdict.good]
+    return {**executed, **_unconfirmed(found, " and ".join(causes), [*names, *matches])}
 
 
-def _unconfirmed(found: Plan, sentences: list[str]) -> dict[str, Any]:
-    """Status and sentence of a plan whose executions do not keep what it promises: it is not
-    solved, however well it fulfils its own equations."""
-    solved = found.status is Status.SOLVED
-    plan = f"{Status.ACCEPTABLE}, the plan is {found.sentence}" if solved else found.sentence
-    return {
-        "status": Status.ACCEPTABLE,
-        "good": False,
-        "sentence": "; ".join([plan, *sentences]),
-    }
+def _unconfirmed(found: Plan, cause: str, remarks: Sequence[str] = ()) -> dict[str, Any]:
+    """Status and sentence of a plan that its executions do not confirm: it is not solved, even
+    where it fulfils its own equations."""
+    if found.status is Status.SOLVED:
+        what = found.sentence.removeprefix("solved: ")
+        parts = [f"FAILED: a plan was found, but {cause}", *remarks, f"the plan: {what}"]
+    else:
+        parts = [sentence_of(found), cause, *remarks]
+    return {"status": Status.ACCEPTABLE, "good": False, "sentence": "; ".join(parts)}
 
 
 def _keep(found: Plan, result: dict[str, Any], folder: RunFolder, figure: bool) -> None:

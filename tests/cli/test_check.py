@@ -55,7 +55,7 @@ def test_all_files_are_checked() -> None:
     assert done.exit_code == 2
     assert done.stderr == "bad.csv:2:2: body/z [m]: 'high' is not a number\n"
     assert done.stdout == (
-        "log.csv: good: 2 rows, 1 columns, 0.5 s\nkemba.yaml: good: one of the robots\n"
+        "log.csv: valid table: 2 rows, 1 columns, 0.5 s\nkemba.yaml: valid robot file\n"
     )
 
 

@@ -140,7 +140,7 @@ def test_check_tells_the_same_mistakes() -> None:
     Path("mine.yaml").write_text(BAD_NAMES)
     done = CliRunner().invoke(app, ["check", "mine.yaml", "jump.yaml"])
     assert (done.exit_code, done.stderr) == (2, BAD_NAMES_TOLD)
-    assert done.stdout == "jump.yaml: good: one of the tasks\n"
+    assert done.stdout == "jump.yaml: valid task file\n"
 
 
 @pytest.mark.parametrize(
@@ -210,7 +210,7 @@ def test_the_path_on_stdout_and_talk_on_stderr() -> None:
 def test_a_failed_solve_ends_with_one() -> None:
     done = run("jump.yaml", *COARSE, "--set", "solver.max_iterations=2", "--no-figure", "-q")
     assert (done.exit_code, done.stdout) == (1, "runs/jump-1\n")
-    assert done.stderr.startswith("stopped by a limit before a plan was found")  # not hidden
+    assert done.stderr.startswith("FAILED: a limit came before a plan was found")  # not hidden
     assert done.stderr.count("\n") == 1
     assert load_run("runs/jump-1").certificate["status"] == "limit"
 
@@ -219,7 +219,7 @@ def test_a_failed_solve_draws_what_it_has() -> None:
     done = run("jump.yaml", *COARSE, "--time-limit", "0.2", "--out", "short")
     assert done.exit_code == 1
     assert Path("short/figure.png").is_file()
-    assert done.stderr.splitlines()[-1].startswith("stopped by a limit before a plan was found")
+    assert done.stderr.splitlines()[-1].startswith("FAILED: a limit came before a plan was found")
 
 
 def test_dry_run_says_the_size_and_solves_nothing() -> None:

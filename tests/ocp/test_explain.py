@@ -39,7 +39,7 @@ def holds(case: Impossible, exit_code: int, answer: dict[str, Any]) -> None:
     assert (exit_code, answer["status"]) == (1, "infeasible")
     for words in case.named:
         assert words in answer["sentence"]
-    assert answer["sentence"].startswith("cannot be met: ")
+    assert answer["sentence"].startswith("FAILED: cannot be met: ")
     requirements = [r["requirement"] for r in answer["relax"]]
     assert case.relax in requirements if case.relax else not requirements
     for r in answer["relax"]:

@@ -37,7 +37,7 @@ def test_a_failed_solve_writes_the_same_files() -> None:
     answer = failed.run.certificate
     assert failed.exit_code == 1
     assert answer["status"] == failed.run.manifest["status"] == "limit"
-    assert answer["sentence"].startswith("stopped by a limit before a plan was found: worst: ")
+    assert answer["sentence"].startswith("FAILED: a limit came before a plan was found: worst: ")
 
 
 def test_the_worst_violation_is_named() -> None:

@@ -34,7 +34,7 @@ def test_a_plan_that_is_true_replays_exactly() -> None:
     found = replay(planning(), plan)
     assert abs(found.apex_error_m) < 2e-4  # the apex lies between nodes
     assert found.final_error_m < 1e-9
-    assert (found.landed, found.fault) == (False, "the plan ends in the air")
+    assert (found.landed, found.fault) == (False, "ends in the air")
     assert set(found.summary()) == {
         "apex_error_m", "touchdown_error_s", "final_error_m", "landed", "fault",
     }  # fmt: skip
@@ -128,9 +128,9 @@ def test_a_landing_is_judged_by_how_it_ends() -> None:
         assert fault_of(body__pitch=pitch) == "tips over"
     for point in ("front/hip", "rear/hip", "front/knee", "rear/knee"):
         name = f"{point.replace('/', '__')}__z"
-        assert fault_of(**{name: -1e-3}) == f"the {point.replace('/', ' ')} meets the ground"
+        assert fault_of(**{name: -1e-3}) == f"meets the ground with the {point.replace('/', ' ')}"
     for leg in ("front", "rear"):
-        assert fault_of(**{f"{leg}__foot__z": 0.02}) == f"the {leg} foot does not stand"
+        assert fault_of(**{f"{leg}__foot__z": 0.02}) == f"ends with the {leg} foot in the air"
 
 
 def test_the_controller_brings_a_hip_back() -> None:

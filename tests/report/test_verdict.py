@@ -19,33 +19,38 @@ LANDED = {
     "landed": True,
     "fault": None,
 }
+FAILED = "FAILED: a plan was found, but the re-simulation reaches "
 FELL = {"landed": False, "fault": "tips over"}
-AIR = {"touchdown_error_s": None, "landed": False, "fault": "the plan ends in the air"}
+AIR = {"touchdown_error_s": None, "landed": False, "fault": "ends in the air"}
 
 
 @pytest.mark.parametrize(
     ("key", "facts", "lands", "good", "told"),
     [
-        ("replay", {}, True, True, "replay reaches 0.0 mm above the plan, touches down 0.0 ms "
-         "early and lands"),
-        ("replay", AIR, False, True, "replay reaches 0.0 mm above the plan"),
-        ("replay", AIR, True, False, "but the replay reaches 0.0 mm above the plan and does not "
-         "land (the plan ends in the air)"),
-        ("replay", {"apex_error_m": -0.0262}, True, False, "but the replay reaches 26.2 mm below "
-         "the plan (2 mm allowed), touches down 0.0 ms early and lands"),
-        ("replay", {"touchdown_error_s": 0.0174}, True, False, "but the replay reaches 0.0 mm "
-         "above the plan, touches down 17.4 ms late (2 ms allowed) and lands"),
-        ("replay", {"final_error_m": 0.12}, True, False, "but the replay reaches 0.0 mm above the "
-         "plan, touches down 0.0 ms early, ends 120.0 mm from the plan (30 mm allowed) and lands"),
+        ("replay", {}, True, True,
+         "re-simulation matches the plan (apex 0.0 mm higher, 2 mm allowed)"),
+        ("replay", {"touchdown_error_s": 1e-3}, True, True,
+         "re-simulation matches the plan (touchdown 1.0 ms late, 2 ms allowed)"),
+        ("replay", {"final_error_m": 0.029}, True, True,
+         "re-simulation matches the plan (end 29.0 mm away, 30 mm allowed)"),
+        ("replay", AIR, False, True,
+         "re-simulation matches the plan (apex 0.0 mm higher, 2 mm allowed)"),
+        ("replay", AIR, True, False, "the re-simulation ends in the air"),
+        ("replay", {"apex_error_m": -0.0262}, True, False,
+         "the re-simulation reaches 26.2 mm below the planned apex (2 mm allowed)"),
+        ("replay", {"touchdown_error_s": 0.0174}, True, False,
+         "the re-simulation touches down 17.4 ms late (2 ms allowed)"),
+        ("replay", {"final_error_m": 0.12, "apex_error_m": 0.003}, True, False,
+         "the re-simulation reaches 3.0 mm above the planned apex (2 mm allowed) and ends 120.0 mm "
+         "from the plan (30 mm allowed)"),
         ("plant_replay", {"apex_error_m": 0.04, "touchdown_error_s": 0.03, "final_error_m": 0.1},
-         True, True, "plant reaches 40.0 mm above the plan, touches down 30.0 ms late and lands"),
-        ("plant_replay", {"apex_error_m": -0.06}, True, False, "but the plant reaches 60.0 mm "
-         "below the plan (50 mm allowed), touches down 0.0 ms early and lands"),
-        ("plant_replay", FELL, True, False, "but the plant reaches 0.0 mm above the plan, touches "
-         "down 0.0 ms early and does not land (tips over)"),
+         True, True, "simulated robot matches the plan (apex 40.0 mm higher, 50 mm allowed)"),
+        ("plant_replay", {"apex_error_m": -0.06}, True, False,
+         "the simulated robot reaches 60.0 mm below the planned apex (50 mm allowed)"),
+        ("plant_replay", FELL, True, False, "the simulated robot tips over"),
     ],
 )  # fmt: skip
-def test_misses_are_told_with_what_is_allowed(
+def test_a_verdict_says_what_matches_or_what_fails(
     key: str, facts: dict[str, object], lands: bool, good: bool, told: str
 ) -> None:
     found = verdicts({key: {**LANDED, **facts}}, Tolerances(), lands)[key]
@@ -54,7 +59,7 @@ def test_misses_are_told_with_what_is_allowed(
 
 def test_what_cannot_be_started_confirms_nothing() -> None:
     found = verdicts({"replay": None}, Tolerances(), True)["replay"]
-    assert (found.good, found.sentence) == (False, "but the replay cannot be started")
+    assert (found.good, found.sentence) == (False, "the re-simulation cannot be started")
 
 
 def test_tolerances_are_the_tasks() -> None:
@@ -76,8 +81,8 @@ def test_a_plan_whose_replay_misses_is_not_solved_and_ends_with_one(
     answer = json.loads(done.stdout)
     status = "acceptable" if code else "solved"
     assert (done.exit_code, answer["status"], answer["good"]) == (code, status, code == 0)
-    assert answer["sentence"].startswith("acceptable, the plan is solved: " if code else "solved: ")
-    told = "but the replay reaches" in answer["sentence"] and "(2 mm allowed)" in answer["sentence"]
+    assert answer["sentence"].startswith(FAILED if code else "solved: ")
+    told = "planned apex (2 mm allowed)" in answer["sentence"]
     assert told == (code == 1)
     manifest = json.loads((tmp_path / "run" / "manifest.json").read_text())
     assert (manifest["good"], manifest["status"]) == (answer["good"], status)

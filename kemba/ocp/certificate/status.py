@@ -12,7 +12,7 @@ from kemba.trajectory import Trajectory
 
 
 class Judging(Settings):
-    """How a plan is judged that misses its tolerances."""
+    """When a plan that misses its tolerances is still usable."""
 
     acceptable: float = setting(
         100.0, "1", "times the tolerances within which a plan is usable, but not what was asked",
@@ -53,14 +53,14 @@ def verdict(
     loose = {name: factor * getattr(task.tolerances, name) for name in names}
     worst = _worst(certificate)
     if certificate.within(task.tolerances.model_copy(update=loose)):
-        return Status.ACCEPTABLE, f"acceptable, short of tolerance: {facts}; {worst}"
+        return Status.ACCEPTABLE, f"the plan misses its tolerances: {worst}; {facts}"
     if ending is None:
-        return Status.STALLED, f"not solved: {worst}"
+        return Status.STALLED, f"no plan was found: {worst}"
     if ending.limit:
-        return Status.LIMIT, f"stopped by a limit before a plan was found: {worst}"
+        return Status.LIMIT, f"a limit came before a plan was found: {worst}"
     if ending in (Ending.INFEASIBLE, Ending.REFUSED):
-        return Status.INFEASIBLE, f"infeasible as far as the solver sees: {worst}"
-    return Status.STALLED, f"stalled, {ending.sentence}: {worst}"
+        return Status.INFEASIBLE, f"the solver finds no motion that meets the task: {worst}"
+    return Status.STALLED, f"no plan was found, {ending.sentence}: {worst}"
 
 
 def _worst(certificate: Certificate) -> str:

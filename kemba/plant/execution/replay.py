@@ -20,9 +20,9 @@ UPRIGHT = 0.35  # rad; a landing with more pitch has failed
 class Replay:
     """How far an executed plan ends from the plan; errors are executed minus planned.
 
-    `touchdown_error_s` is None when either does not touch down after its apex. `fault`: what is
-    wrong with the landing; none if at the end the feet stand where the plan has them stand, the
-    body is upright, and neither hip nor knee met the ground.
+    `touchdown_error_s` is None when either does not touch down after its apex. `fault`: what the
+    robot does wrong (`tips over`). It is None when at the end the feet that stand in the plan
+    stand, the body is upright, and neither a hip nor a knee met the ground.
     """
 
     apex_error_m: float
@@ -126,13 +126,13 @@ def ends_standing(model: Model, plan: Trajectory) -> list[str]:
 def _fault(model: Model, plan: Trajectory, real: Trajectory, apex_time: float) -> str | None:
     standing = ends_standing(model, plan)
     if not standing:
-        return "the plan ends in the air"
+        return "ends in the air"
     if abs(real["body/pitch"][-1]) > UPRIGHT:
         return "tips over"
     late = real.time > apex_time
     for point in ("hip", "knee"):
         for leg in model.mechanism.legs:
             if (real[f"{leg}/{point}/z"][late] <= 0.0).any():
-                return f"the {leg} {point} meets the ground"
+                return f"meets the ground with the {leg} {point}"
     up = [leg for leg in standing if real[f"{leg}/foot/z"][-1] > 5 * ON_GROUND]
-    return f"the {up[0]} foot does not stand" if up else None
+    return f"ends with the {up[0]} foot in the air" if up else None
