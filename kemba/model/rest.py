@@ -13,14 +13,32 @@ from kemba.errors import KembaError
 from kemba.model.model import Model
 from kemba.model.node import Node
 from kemba.quantity import Quantity
+from kemba.settings import CHOSEN, Settings, setting
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
-# s; ten times the recovery of a usual supply. Waiting for ever would be wrong: a leak empties any
-# tank in the end, which a compressor fills again.
-LONG = 3.0
-STILL = 1e-6  # s-1; a state that moves by less of its scale is at rest
-TOLERANCE = 1e-9  # of the integration, in the scales of the states
+
+class RestSettings(Settings):
+    """How long states are given to come to rest, and how exactly that is computed."""
+
+    wait: float = setting(
+        3.0,
+        "s",
+        "time after which states count as at rest; a leak would empty any tank in the end",
+        "derived: ten times the recovery of a usual supply, 0.3 s",
+    )
+    still: float = setting(
+        1e-6,
+        "s-1",
+        "rate, in scales of a state, below which it rests",
+        CHOSEN,
+    )
+    tolerance: float = setting(
+        1e-9,
+        "1",
+        "of the integration, in scales of the states",
+        CHOSEN,
+    )
 
 
 class Rest:
@@ -36,9 +54,10 @@ class Rest:
         x, p = ca.SX.sym("x", s.numel()), ca.SX(ca.vertcat(*held))
         scaled = ca.substitute(rate, s, x * self._scale) / self._scale
         self._rate = ca.Function("rate", [x, p], [ca.densify(scaled)])
-        options = {"abstol": TOLERANCE, "reltol": TOLERANCE}
+        settings = RestSettings.current()
+        options = {"abstol": settings.tolerance, "reltol": settings.tolerance}
         equation = {"x": x, "p": p, "ode": scaled}
-        self._wait = ca.integrator("wait", "cvodes", equation, 0.0, LONG, options)
+        self._wait = ca.integrator("wait", "cvodes", equation, 0.0, settings.wait, options)
 
     def __call__(self, *held: Any) -> Array:
         """The states (ns,) with `held` in the order of the symbols; they begin at their nominal
@@ -47,7 +66,7 @@ class Rest:
             return np.empty(0)
         x, p = self._start / self._scale, ca.vertcat(*(ca.DM(h) for h in held))
         moving = np.asarray(self._rate(x, p)).ravel()
-        if np.all(np.abs(moving) <= STILL):
+        if np.all(np.abs(moving) <= RestSettings.current().still):
             return np.array(self._start)
         try:
             found = self._wait(x0=x, p=p)["xf"]

@@ -56,7 +56,17 @@ def test_cases_without_an_answer_are_failures() -> None:
     cases = [case(0), case(1)]
     summary = summarise(sweep(expect=0.0), cases, {cases[0].key: solved(1.0, 1.0)})
     assert summary["blocks"]["a"]["unfinished"] == 1 and not summary["good"]
+    assert summary["blocks"]["a"]["interval"] == pytest.approx(wilson(1, 2))
     assert "1 of 2 solved" in summary["sentence"] and "without an answer" in summary["sentence"]
+
+
+def test_a_bad_plan_has_no_cost() -> None:
+    """Cheap because it does not arrive: it is not the best known, and has no ratio."""
+    cases = [case(0), case(1), case(2)]
+    found = [solved(1.0, 2.0), solved(1.0, 3.0), solved(1.0, 0.1) | {"good": False}]
+    records = {c.key: r for c, r in zip(cases, found, strict=True)}
+    ratio = summarise(sweep(), cases, records)["blocks"]["a"]["cost_ratio"]
+    assert (ratio["min"], ratio["max"]) == (1.0, 1.5)
 
 
 def test_influence_names_what_costs_most() -> None:

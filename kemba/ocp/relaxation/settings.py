@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from kemba.settings import Settings, setting
+from kemba.settings import CHOSEN, Settings, setting
 
 # Both on the jumps of configs/sweeps/reliability.yaml; the code of the trials was not kept.
 TRIALS = "tuned: trials that docs/solving.md tells of"
-HAND = "convention: chosen by hand, no comparison kept"
+
 VARIANTS = "tuned: benchmarks/variants.py"
 PAIR = "body weights x m (or m/s)"
 
@@ -15,17 +15,17 @@ class Relaxation(Settings):
     """How far the pairs are relaxed, and what the cost holds beside the task's own."""
 
     loose: float = setting(
-        1e-3, PAIR, "relaxation of the pairs while valves are sought", HAND, decides=True
+        1e-3, PAIR, "relaxation of the pairs while valves are sought", CHOSEN, decides=True
     )
     tight: float = setting(
-        1e-4, PAIR, "relaxation of the pairs once valves are fixed", HAND, decides=True
+        1e-4, PAIR, "relaxation of the pairs once valves are fixed", CHOSEN, decides=True
     )
     margin: float = setting(
         0.8, "1", "the last relaxation, as a part of what the certificate asks",
         "convention: room for IPOPT's own tolerance on the rows", decides=True,
     )  # fmt: skip
     valve: float = setting(
-        0.1, "1", "weight of u(1 - u), per valve and node of the grid's mean", HAND, decides=True
+        0.1, "1", "weight of u(1 - u), per valve and node of the grid's mean", CHOSEN, decides=True
     )
     switching: float = setting(
         0.05, "1", "weight of squared changes of a valve; without it valves chatter in flight",
@@ -65,11 +65,11 @@ class Starts(Settings):
     )  # fmt: skip
     rounded_mu: float = setting(1e-2, "1", "barrier parameter after rounding", TRIALS, decides=True)
     changed_mu: float = setting(
-        1e-3, "1", "barrier parameter after releasing valves or refining the grid", HAND,
+        1e-3, "1", "barrier parameter after releasing valves or refining the grid", CHOSEN,
         decides=True,
     )  # fmt: skip
     tighten_mu: float = setting(
-        1e-5, "1", "barrier parameter of the last solve", HAND, decides=True
+        1e-5, "1", "barrier parameter of the last solve", CHOSEN, decides=True
     )
     confirm_mu: float = setting(
         1e-7, "1", "barrier parameter of the whole robot's confirming solve",
@@ -82,11 +82,11 @@ class Ends(Settings):
 
     tol: float = setting(
         1e-3, "1", "IPOPT's tolerance while valves are sought; these plans are changed again",
-        HAND, decides=True,
+        CHOSEN, decides=True,
     )  # fmt: skip
     exact_tol: float = setting(
         1e-2, "1", "IPOPT's tolerance of the last solve: optimal to a few digits of the cost",
-        HAND, decides=True,
+        CHOSEN, decides=True,
     )  # fmt: skip
     exact_rows: float = setting(
         1e-8, "1", "tolerance of the rows in the last solve",
@@ -102,14 +102,14 @@ class Ends(Settings):
     )  # fmt: skip
     moved_iterations: int = setting(
         80, "1", "limit of a solve with moved switches; plans that take longer are seldom better",
-        HAND, decides=True,
+        CHOSEN, decides=True,
     )  # fmt: skip
     stagnation_iterations: int = setting(
         40, "1", "iterations without a smaller violation, after which a finer grid's valves do not "
-        "fit", HAND, decides=True,
+        "fit", CHOSEN, decides=True,
     )  # fmt: skip
     stagnation_near: float = setting(
-        0.05, "1", "scaled violation that is near enough to go on", HAND, decides=True
+        0.05, "1", "scaled violation that is near enough to go on", CHOSEN, decides=True
     )
     confirmed: float = setting(
         1e-7, "1", "scaled violation of the whole robot's rows that needs no further solve",
@@ -120,14 +120,14 @@ class Ends(Settings):
 class ValveSearch(Settings):
     """How valve switches are moved, and on which grids valves are sought."""
 
-    reach: int = setting(4, "1", "nodes by which a switch may move at a time", HAND, decides=True)
+    reach: int = setting(4, "1", "nodes by which a switch may move at a time", CHOSEN, decides=True)
     pays: float = setting(
         0.02, "1", "relative fall of the cost that makes another round worth while",
         "convention: plans of one task differ by more from start to start", decides=True,
     )  # fmt: skip
-    coarsest: int = setting(24, "1", "nodes of the coarsest grid", HAND, decides=True)
+    coarsest: int = setting(24, "1", "nodes of the coarsest grid", CHOSEN, decides=True)
     finest: int = setting(
-        80, "1", "nodes of the finest grid on which valves are sought", HAND, decides=True
+        80, "1", "nodes of the finest grid on which valves are sought", CHOSEN, decides=True
     )
 
 

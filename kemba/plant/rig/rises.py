@@ -11,11 +11,38 @@ import numpy as np
 from kemba.errors import KembaError
 from kemba.plant.rig.estimate import Estimate, linear, mean
 from kemba.plant.stepping.arrays import Array
+from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Trajectory
 
-STILL = 2e-4  # m; a rod that moves less is locked
-STEP_SIZE = 20.0  # N; smaller steps of the force tell nothing
-ONSET = (0.02, 0.10)  # shares of the step through which its beginning is extrapolated
+
+class RiseSettings(Settings):
+    """Which switchings of a locked rod are read, and where their answer begins."""
+
+    still: float = setting(
+        2e-4,
+        "m",
+        "way below which the rod counts as locked",
+        CHOSEN,
+    )
+    step: float = setting(
+        20.0,
+        "N",
+        "smallest step of the force that is read",
+        CHOSEN,
+    )
+    low: float = setting(
+        0.02,
+        "1",
+        "lower share of the step for the line to its start",
+        CHOSEN,
+    )
+    high: float = setting(
+        0.10,
+        "1",
+        "upper share of the step for the line to its start",
+        CHOSEN,
+    )
+    rows: int = setting(20, "1", "rows that an answer needs", CHOSEN)
 
 
 @dataclass(frozen=True)
@@ -65,7 +92,7 @@ def find_rises(log: Trajectory, stroke: float) -> Iterator[Rise]:
     """Every switching of a chamber in a bench log of a cylinder of `stroke` [m], while the rod is
     locked."""
     x = log["piston/x"]
-    if np.ptp(x) > STILL:
+    if np.ptp(x) > RiseSettings.current().still:
         return
     valves = {name: log[f"valve/{name}"] > 0.5 for name in ("extend", "retract")}
     edges = {name: np.flatnonzero(np.diff(v.astype(int))) + 1 for name, v in valves.items()}
@@ -85,14 +112,15 @@ def _rise(
     log: Trajectory, edge: int, stop: int, sign: float, chamber: str
 ) -> dict[str, Any] | None:
     """The answer to the switching at row `edge`, until row `stop`; None where it tells nothing."""
+    limits = RiseSettings.current()
     force, time = sign * log["piston/F"], log.time[edge - 1 : stop] - log.time[edge]
     before = float(force[max(edge - 20, 0) : edge].mean())
     after = float(force[stop - max((stop - edge) // 10, 3) : stop].mean())
-    if abs(after - before) < STEP_SIZE or stop - edge < 20:
+    if abs(after - before) < limits.step or stop - edge < limits.rows:
         return None
     level = (force[edge - 1 : stop] - before) / (after - before)
-    low, high = (_crossing(time, level, share) for share in ONSET)
-    dead = low - (high - low) * ONSET[0] / (ONSET[1] - ONSET[0])
+    low, high = (_crossing(time, level, share) for share in (limits.low, limits.high))
+    dead = low - (high - low) * limits.low / (limits.high - limits.low)
     supply = float(log.meta.get("supply", 0.7e6))
     return {
         "supply": supply,

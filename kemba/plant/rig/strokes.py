@@ -8,11 +8,46 @@ from dataclasses import dataclass
 import numpy as np
 
 from kemba.plant.rig.estimate import Estimate, linear
+from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Trajectory
 
 MODES = {(1, 0): "extend", (0, 1): "retract", (1, 1): "both", (0, 0): "none"}
-USED = (0.5, 0.85)  # shares of the way between which chambers have settled and ends are far
-STEADY = 0.03  # deviation of the speed from its median within which a sample counts
+
+
+class StrokeSettings(Settings):
+    """Which samples of a stroke count as steady."""
+
+    travel: float = setting(
+        0.01,
+        "m",
+        "way below which the rod does not move",
+        CHOSEN,
+    )
+    moving: float = setting(
+        0.2,
+        "1",
+        "share of the top speed from which the rod moves",
+        CHOSEN,
+    )
+    begin: float = setting(
+        0.5,
+        "1",
+        "share of the way after which chambers have settled",
+        CHOSEN,
+    )
+    end: float = setting(
+        0.85,
+        "1",
+        "share of the way after which the end is near",
+        CHOSEN,
+    )
+    steady: float = setting(
+        0.03,
+        "1",
+        "deviation from the median speed that counts",
+        CHOSEN,
+    )
+    fewest: int = setting(3, "1", "samples that a steady part needs", CHOSEN)
 
 
 @dataclass(frozen=True)
@@ -37,21 +72,25 @@ class Line:
 
 
 def find_stroke(log: Trajectory) -> Stroke | None:
-    """The steady part of a bench log in which the rod moves at one speed in one valve mode."""
+    """The steady part of a bench log in which the rod moves at one speed in one valve mode.
+
+    None where there is no such part.
+    """
+    limits = StrokeSettings.current()
     modes = {
         (int(a > 0.5), int(b > 0.5))
         for a, b in zip(log["valve/extend"], log["valve/retract"], strict=True)
     }
     x = log["piston/x"]
-    if len(modes) > 1 or np.ptp(x) < 0.01:
+    if len(modes) > 1 or np.ptp(x) < limits.travel:
         return None
     v = log["piston/v"] if "piston/v" in log else np.gradient(x, log.time)
-    moving = np.abs(v) > 0.2 * np.abs(v).max()
+    moving = np.abs(v) > limits.moving * np.abs(v).max()
     usual = float(np.median(v[moving]))
     progress = np.abs(x - x[0]) / float(np.abs(x - x[0]).max())
-    used = moving & (progress > USED[0]) & (progress < USED[1])
-    used &= np.abs(v - usual) < STEADY * abs(usual)
-    if used.sum() < 3:
+    used = moving & (progress > limits.begin) & (progress < limits.end)
+    used &= np.abs(v - usual) < limits.steady * abs(usual)
+    if used.sum() < limits.fewest:
         return None
     mode = MODES[modes.pop()]
     supply = 0.0 if mode == "none" else float(log.meta.get("supply", 0.7e6))
