@@ -103,9 +103,10 @@ def build_model(
     supply: float | None = None,
     rig: bool = False,
 ) -> Model:
-    """The model of a spec: `extra` effects added, `supply` [Pa] overriding the spec's.
+    """The model of a spec: `extra` effects added, `supply` [Pa] instead of the spec's.
 
-    `rig`: the same effects on the bench piston; those whose ports it lacks stay away.
+    `rig`: the same effects on the piston of the bench; effects whose ports it lacks are left out.
+    Raises KembaError where the spec names no robot, or a file or an effect is wrong.
     """
     if spec.robot is None:
         expected = "robot: a robot's file, or base: a model that names one, was expected"
