@@ -24,7 +24,10 @@ INTERRUPTED = 130
 
 
 def guarded(verb: Callable[..., None]) -> Callable[..., None]:
-    """The verb, with exceptions turned into messages on stderr and exit codes."""
+    """The verb, with exceptions turned into messages on stderr and exit codes.
+
+    It raises typer.Exit with the exit code. A broken output pipe is passed on to click.
+    """
 
     @functools.wraps(verb)
     def run(*args: Any, **options: Any) -> None:

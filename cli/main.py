@@ -81,7 +81,7 @@ def main() -> None:
 
 
 def _flush() -> None:
-    """Write out what is left, so that a full disk is told and not only a strange exit code."""
+    """Write out what is left, so that a full disk gives a message, not only an exit code."""
     try:
         sys.stdout.flush()
     except OSError as error:

@@ -9,7 +9,7 @@ from kemba_cli.common import say, talk
 
 
 class Progress:
-    """Tells stages and iterations: live on a terminal, one line a stage elsewhere."""
+    """Shows stages and iterations: live on a terminal, one line a stage elsewhere."""
 
     def __init__(self, quiet: bool) -> None:
         self.quiet, self.live = quiet, not quiet and talk().is_terminal

@@ -25,7 +25,10 @@ SCHEMAS = {
 
 
 def schema_of(kind: str) -> type[BaseModel]:
-    """The pydantic model of a kind of file; KembaError when there is no such kind."""
+    """The pydantic model of a kind of file.
+
+    Raises KembaError where there is no such kind, with the nearest one.
+    """
     if kind not in SCHEMAS:
         raise KembaError(kind, "no such kind of file", hint=suggest(kind, SCHEMAS))
     module, name = SCHEMAS[kind].split(":")
@@ -34,7 +37,10 @@ def schema_of(kind: str) -> type[BaseModel]:
 
 
 def kind_of(document: Document) -> str:
-    """The kind of a document: by its folder, else by the schema that shares most keys with it."""
+    """The kind of a document: by its folder, else by the schema that shares most keys with it.
+
+    Raises KembaError where it shares no key with any schema.
+    """
     folder = Path(document.source).resolve().parent.name
     if folder in SCHEMAS:
         return folder

@@ -83,7 +83,7 @@ def _mode(path: Path) -> int:
 
 
 def plain(data: Any) -> Any:
-    """`data` as JSON knows it: numpy numbers and arrays unpacked, NaN and infinity as null."""
+    """`data` as JSON can hold it: numpy numbers and arrays unpacked, NaN and infinity as null."""
     if isinstance(data, Mapping):
         return {str(key): plain(value) for key, value in data.items()}
     if isinstance(data, (list, tuple, set, frozenset)):
@@ -103,7 +103,7 @@ def write_json(path: str | Path, data: Any) -> None:
 
 
 def read_json(path: str | Path) -> Any:
-    """What a JSON file holds; KembaError when it cannot be read or is not JSON."""
+    """What a JSON file holds. Raises KembaError where it cannot be read or is not JSON."""
     try:
         return json.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:

@@ -42,7 +42,8 @@ class Quantity:
 
     @classmethod
     def from_header(cls, text: str) -> Quantity:
-        """The quantity of a column header; KembaError when the header is malformed."""
+        """The quantity of a column header such as `body/z [m]`. Raises KembaError where it is
+        malformed."""
         match = HEADER.fullmatch(text)
         if match is None:
             raise KembaError(
@@ -73,7 +74,8 @@ class Param:
     doc: str = ""
 
     def validate(self, value: Any) -> float:
-        """`value` in `unit`; ValueError when it has another dimension or is out of bounds."""
+        """`value` in `unit`. Raises ValueError where its dimension is another or it is out of
+        bounds."""
         number = to_si(value, self.unit)
         if not self.lower <= number <= self.upper:
             raise ValueError(f"'{value}' is out of range; {self.bounds} was expected")

@@ -100,7 +100,10 @@ class Run:
 
     @cached_property
     def certificate(self) -> dict[str, Any]:
-        """The outcome, residuals and replay of the plan."""
+        """The outcome, residuals and replay of the plan.
+
+        Raises KembaError where the file is missing or is no certificate.
+        """
         found = read_json(self._file("certificate.json"))
         if not isinstance(found, dict):
             expected = "a group of keys, as solve writes it, was expected"
@@ -120,7 +123,10 @@ class Run:
 
 
 def load_run(path: str | Path) -> Run:
-    """The run in a folder (or the folder of the file given); KembaError when it is none."""
+    """The run in a folder, or in the folder of the file given.
+
+    Raises KembaError where there is no such folder, or it holds no run.
+    """
     folder = Path(path)
     if folder.is_file():
         folder = folder.parent

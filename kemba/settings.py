@@ -32,9 +32,9 @@ S = TypeVar("S", bound="Settings")
 def setting(value: Any, unit: str, doc: str, origin: str, decides: bool = False) -> Any:
     """A field of `Settings`.
 
-    `unit` as in columns ("1" for none); `origin` begins with one of `ORIGINS`, such as
-    `literature: Higham 2002` or `tuned: benchmarks/sensitivity.py`. `decides`: a verdict hangs on
-    this threshold, so that the sensitivity study halves and doubles it.
+    `unit` as in columns ("1" for none). `origin` begins with one of `ORIGINS`, such as `literature:
+    Higham 2002` or `tuned: benchmarks/sensitivity.py`. `decides`: a verdict depends on this
+    threshold, so the sensitivity study halves and doubles it. Raises ValueError for another origin.
     """
     if origin.partition(":")[0] not in ORIGINS:
         raise ValueError(f"origin {origin!r} must begin with one of {', '.join(ORIGINS)}")

@@ -171,7 +171,8 @@ def _split(text: str, unit: str) -> tuple[float, str]:
 
 @lru_cache(maxsize=256)
 def parse_unit(text: str) -> pint.Unit:
-    """The pint unit of `m.s-1`, `m/s`, `N m` or `m/s^2`."""
+    """The pint unit of `m.s-1`, `m/s`, `N m` or `m/s^2`. Raises ValueError where it is
+    unreadable."""
     unit, end = registry().Unit(""), 0
     for match in FACTOR.finditer(text.strip()):
         if match.start() != end:

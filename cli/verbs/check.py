@@ -53,7 +53,8 @@ def _log(file: Path, column_map: str | None) -> dict[str, Any]:
     from kemba.trajectory import Trajectory
 
     log = read_log(file, load_map(column_map)) if column_map else Trajectory.read(file)
-    sentence = f"valid table: {len(log)} rows, {len(log.names)} columns, {log.time[-1] - log.time[0]:.3g} s"
+    seconds = f"{log.time[-1] - log.time[0]:.3g} s"
+    sentence = f"valid table: {len(log)} rows, {len(log.names)} columns, {seconds}"
     return {"kind": "table", "rows": len(log), "columns": log.headers, "sentence": sentence}
 
 

@@ -18,7 +18,7 @@ def experiment(
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Write the rig test that best tells the rivals of an answer apart.
+    """Write the rig test that best separates the rivals of an answer.
 
     Example: kemba-opt experiment answer --out next.yaml
     """

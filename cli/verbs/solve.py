@@ -26,7 +26,7 @@ def solve(
     overrides: Set = None,
     model: Annotated[str | None, typer.Option(help="Model YAML instead of the task's.")] = None,
     resume: Annotated[
-        Path | None, typer.Option(help="Go on from this run; its task unless TASK is given.")
+        Path | None, typer.Option(help="Continue from this run; its task unless TASK is given.")
     ] = None,
     time_limit: Annotated[float | None, typer.Option(help="Seconds of solving at most.")] = None,
     dry_run: Annotated[
@@ -98,7 +98,7 @@ def solve(
 def _resumed(
     run: Path, task: str | None, out: Path | None
 ) -> tuple[str, Path | None, Trajectory | None]:
-    """Task, folder and start of a run that goes on: in its own folder when it never finished."""
+    """Task, folder and start of a run to continue: in its own folder when it never finished."""
     from kemba.runs import load_run
 
     found = load_run(run)

@@ -35,7 +35,7 @@ def sweep(
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Run many cases and tell how many succeeded; the same command continues what was stopped.
+    """Run many cases and show how many succeeded; the same command continues what was stopped.
 
     Exit code 1 when a block succeeded less often than it `expect`s, or cases have no answer.
 

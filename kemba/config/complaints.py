@@ -53,7 +53,7 @@ def complaints(
 ) -> list[KembaError]:
     """One KembaError for each place in the document that is wrong, in the file's order.
 
-    Of more than MOST mistakes only the first are told.
+    When there are more than MOST mistakes, only the first are shown.
     """
     found: dict[Location, list[Complaint]] = {}
     for item in error.errors(include_url=False)[:MOST]:

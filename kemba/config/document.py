@@ -80,7 +80,10 @@ def load_yaml(path: str | Path) -> Document:
 
 
 def load_text(text: str, source: str) -> Document:
-    """The document in a YAML text; errors as for `load_yaml`."""
+    """The document in a YAML text; `source` names it in messages.
+
+    Raises KembaError where the text is not valid YAML or a key is given twice.
+    """
     blank = Document(None, source, text.splitlines())
     try:
         found = read(text)

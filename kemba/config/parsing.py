@@ -91,7 +91,11 @@ def beside(name: str, folder: Path) -> str:
 
 
 def locate(name: str | Path, folders: Collection[str]) -> Path:
-    """As `find_config`, looking in several folders of configs/."""
+    """The path of a YAML file: of the user's own, or one shipped in `folders` of configs/.
+
+    Raises KembaError where there is no such file, with the nearest shipped name, or where the name
+    does not end in .yaml.
+    """
     if _is_file(Path(name)):
         if Path(name).suffix not in (".yaml", ".yml"):
             raise KembaError(str(name), "is no YAML file", "a name ending in .yaml was expected")

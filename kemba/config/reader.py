@@ -86,7 +86,11 @@ class _Builder:
         self.count = self.aliases = 0
 
     def tree(self, text: str) -> Tree | None:
-        """The tree of the one document, None when the text is empty."""
+        """The tree of the one document; None when the text is empty.
+
+        Raises YamlError where the text is not valid YAML, goes beyond the limits, or holds a second
+        document.
+        """
         for event in _events(text):
             mark = (event.start_mark.line, event.start_mark.column)
             name = type(event).__name__
@@ -153,7 +157,7 @@ class _Builder:
         return self.anchors[name]
 
     def _scalar(self, event: Any, mark: Mark) -> Tree:
-        """`value`: whether it is quoted, its text, and what it stands for."""
+        """`value`: whether it is quoted, its text, and its value."""
         text: str = event.value
         if len(text) > self.limits.text:
             what = f"this text has {len(text)} characters; {self.limits.text} are allowed"
@@ -184,6 +188,10 @@ class _Walk:
         self.found, self.limits, self.count = found, limits, 0
 
     def into(self, tree: Tree, location: Location) -> None:
+        """Write down the line of every key of a tree at `location`, and which keys are given twice.
+
+        Raises YamlError where aliases make the tree too large or too deep.
+        """
         self.count += 1
         if self.count > self.limits.nodes or len(location) > self.limits.depth:
             what = f"its aliases stand for more than {self.limits.nodes} keys and values"

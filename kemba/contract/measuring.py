@@ -26,7 +26,10 @@ def moves(effect: type[Effect]) -> bool:
 
 
 def sensor_fault_can_be_undone(placed: Placed) -> None:
-    """A sensor fault changes what is measured, and `undone` is the inverse of `measured`."""
+    """A sensor fault changes what is measured, and `undone` is the inverse of `measured`.
+
+    Raises Broken where it is not so.
+    """
     fault = placed.on
     if not isinstance(fault, SensorEffect):
         return
@@ -36,11 +39,14 @@ def sensor_fault_can_be_undone(placed: Placed) -> None:
     if np.abs(shown.value - true.value).max() <= SEEN:
         raise Broken("it changes nothing that is measured")
     if np.abs(fault.undone(shown).value - true.value).max() > UNDONE:
-        raise Broken("`undone` does not give back what `measured` was told")
+        raise Broken("`undone` does not give back the input of `measured`")
 
 
 def nominal_figures_matter(placed: Placed) -> None:
-    """What a fit leaves free within a tolerance is a figure of the effect and changes the model."""
+    """What a fit leaves free within a tolerance is a figure of the effect and changes the model.
+
+    Raises Broken where it is not so.
+    """
     effect = placed.resolved
     for name, tolerance in effect.nominal.items():
         if name not in type(effect).model_fields:

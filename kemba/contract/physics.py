@@ -22,7 +22,10 @@ TINY = 1e-6  # W; rounding of a dissipated power
 
 
 def finite(placed: Placed) -> None:
-    """Residual and slopes are finite at random states and at the borders, on robot and rig."""
+    """Residual and slopes are finite at random states and at the borders, on robot and rig.
+
+    Raises Broken where it is not so.
+    """
     for case in (placed, Placed(placed.effect, rig=True)) if placed.fits_rig else (placed,):
         for point in points(case.model):
             for name, value in case.slopes(**point, p=case.values).items():
@@ -33,7 +36,10 @@ def finite(placed: Placed) -> None:
 
 
 def every_parameter_matters(placed: Placed) -> None:
-    """Each parameter changes what the effect does."""
+    """Each parameter changes what the effect does.
+
+    Raises Broken where it is not so.
+    """
     effect = placed.on
     if isinstance(effect, SensorEffect):
         return  # see `measuring`
@@ -54,7 +60,10 @@ def every_parameter_matters(placed: Placed) -> None:
 
 
 def off_is_absent(placed: Placed) -> None:
-    """At its off value the model is the same as without the effect."""
+    """At its off value the model is the same as without the effect.
+
+    Raises Broken where it is not so.
+    """
     off = placed.on.bind(placed.effect.off)
     model = model_of(off)
     base = model_of() if off.replaces else without(model, off.name)
@@ -75,7 +84,11 @@ def off_is_absent(placed: Placed) -> None:
 
 
 def settled(model: Model, point: Point, kept: list[int]) -> np.ndarray:
-    """Effect states with those that are not `kept` at rest: their rates are linear in them."""
+    """Effect states (ns,) at a point; those that are not `kept` are at rest.
+
+    Their rates must be linear in them. A state without a rate keeps its value. Units as in the
+    model.
+    """
     own = [i for i in range(len(model.states)) if i not in kept]
     s = np.array(point["s"], dtype=float)
     if not own:
@@ -93,7 +106,10 @@ def settled(model: Model, point: Point, kept: list[int]) -> np.ndarray:
 
 
 def dissipates(placed: Placed) -> None:
-    """An effect that calls itself dissipative never gives energy, and takes some."""
+    """A dissipative effect never adds energy, and it takes some.
+
+    Raises Broken where it is not so.
+    """
     base = without(placed.model, placed.on.name)
     lost = []
     for point in points(placed.model, 12):
@@ -106,7 +122,10 @@ def dissipates(placed: Placed) -> None:
 
 
 def order_does_not_matter(placed: Placed) -> None:
-    """The order of a model's list changes nothing."""
+    """The order of a model's list changes nothing.
+
+    Raises Broken where it is not so.
+    """
     model = placed.model
     turned = Model(model.mechanism, model.effects[::-1], model.supply)
     for point in points(model, 2):
@@ -116,7 +135,10 @@ def order_does_not_matter(placed: Placed) -> None:
 
 
 def keeps_the_mirror(placed: Placed) -> None:
-    """With an effect on every leg the model keeps the mirror symmetry of its robot."""
+    """With an effect on every leg the model keeps the mirror symmetry of its robot.
+
+    Raises Broken where it is not so.
+    """
     from kemba.ocp.transcription.symmetry import find_symmetry
 
     if find_symmetry(placed.model) is None:
@@ -124,7 +146,10 @@ def keeps_the_mirror(placed: Placed) -> None:
 
 
 def one_leg_only(placed: Placed) -> None:
-    """With `on` it acts at that leg and leaves the others alone."""
+    """With `on` it acts at that leg and does not change the others.
+
+    Raises Broken where it is not so.
+    """
     legs = placed.model.mechanism.legs
     here, other, kind = legs[-1], legs[0], placed.on.kind
     one = example(placed.effect).model_copy(update={"on": here})
@@ -142,5 +167,5 @@ def one_leg_only(placed: Placed) -> None:
 
 
 def same(found: np.ndarray, wanted: np.ndarray, rtol: float, atol: float) -> bool:
-    """Whether two arrays agree within the tolerances of numpy."""
+    """Whether two arrays of equal shape (any, ...) agree within numpy's tolerances."""
     return found.shape == wanted.shape and bool(np.allclose(found, wanted, rtol=rtol, atol=atol))

@@ -13,7 +13,10 @@ from kemba.quantity import is_si
 
 
 def documented(placed: Placed) -> None:
-    """Docstring, family, equation and source; every parameter has an SI unit and a meaning."""
+    """Docstring, family, equation and source are there; every parameter has an SI unit and a doc.
+
+    Raises Broken where it is not so.
+    """
     effect = placed.effect
     if not effect.__doc__ or effect.__doc__ == effect.__base__.__doc__:
         raise Broken("the class has no docstring")
@@ -34,7 +37,10 @@ def documented(placed: Placed) -> None:
 
 
 def off_is_admissible(placed: Placed) -> None:
-    """`off` names declared parameters, lies within their bounds and is their default."""
+    """`off` names declared parameters, lies within their bounds and is their default.
+
+    Raises Broken where it is not so.
+    """
     effect = placed.effect
     for name, off in effect.off.items():
         if name not in effect.declared():
@@ -50,7 +56,10 @@ def off_is_admissible(placed: Placed) -> None:
 
 
 def yaml_round_trip(placed: Placed) -> None:
-    """Written to YAML and read again it is the same effect."""
+    """Written to YAML and read again it is the same effect.
+
+    Raises Broken where it is not so.
+    """
     text = dump_text({"effects": [placed.on.listed()]})
     found = parse(load_text(text, "round trip"), ModelSpec).effects
     if found != (placed.on,):
@@ -60,7 +69,10 @@ def yaml_round_trip(placed: Placed) -> None:
 
 
 def schema_names_units(placed: Placed) -> None:
-    """The JSON Schema tells the unit of every parameter."""
+    """The JSON Schema names the unit of every parameter.
+
+    Raises Broken where it is not so.
+    """
     schema = json.dumps(placed.effect.model_json_schema())
     for name, param in placed.effect.declared().items():
         if f'"unit": "{param.unit}"' not in schema:

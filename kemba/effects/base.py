@@ -129,7 +129,7 @@ class Effect(BaseModel):
     publishes: ClassVar[tuple[str, ...]] = ()
     carried_by: ClassVar[Mapping[str, str]] = {}  # published value: the own state that moves it
     off: ClassVar[Mapping[str, float]] = {}
-    replaces: ClassVar[tuple[str, ...]] = ()  # kinds that give way when this one is listed
+    replaces: ClassVar[tuple[str, ...]] = ()  # kinds that this one replaces in a model
     mirror: ClassVar[Mapping[str, str]] = {}  # symbols that change sign or name in the mirror
     dissipative: ClassVar[bool] = False
     moves: ClassVar[bool] = True  # False: in what is measured only; plans and simulations ignore it

@@ -12,8 +12,10 @@ from kemba.units import called_dimension, parse_unit
 
 
 def check_dimension(tree: ast.expr, units: Mapping[str, str], unit: str) -> None:
-    """ValueError, with the offending part, unless the formula's value has the dimension of
-    `unit` when its names have `units`."""
+    """Check that a formula's value has the dimension of `unit`; `units` are those of its names.
+
+    Raises ValueError with the part of the formula that is wrong.
+    """
     found = _Dimensions(units).of(tree)
     if not found.fits(parse_unit(unit)):
         raise ValueError(
@@ -33,6 +35,7 @@ class _Dimension:
 
     @property
     def pure(self) -> bool:
+        """Whether it is a number without dimension."""
         return self.number == 0 or not self.unit.dimensionality
 
 
@@ -43,6 +46,8 @@ class _Dimensions:
         self.units = units
 
     def of(self, node: ast.expr) -> _Dimension:
+        """The dimension of a part of a formula. Raises ValueError where its parts do not fit
+        together."""
         if isinstance(node, ast.Constant):
             return _Dimension(parse_unit("1"), float(node.value))  # type: ignore[arg-type]
         if isinstance(node, ast.Name):

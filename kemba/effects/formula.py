@@ -37,7 +37,10 @@ OF_NUMBERS: dict[str, Callable[..., float]] = {  # the same on floats, ValueErro
 
 
 def parse_formula(text: str) -> ast.expr:
-    """The syntax tree of a formula, its constant parts computed; ValueError for its author."""
+    """The syntax tree of a formula, with its constant parts computed.
+
+    Raises ValueError where the text is no formula, is too long, or uses what is not allowed.
+    """
     if len(text) > LONGEST:
         raise ValueError(f"is longer than {LONGEST} characters")
     try:
@@ -75,9 +78,10 @@ def evaluate(node: ast.expr, values: Mapping[str, Any]) -> Any:
 
 
 def check_finite(tree: ast.expr, ranges: Mapping[str, Sequence[float]]) -> None:
-    """ValueError, with the place, unless the value is finite for every combination of `ranges`.
+    """Check that a formula is finite for every combination of `ranges`.
 
-    `ranges`: the values to try of every name that the formula reads.
+    `ranges`: the values to try of every name that the formula reads. Raises ValueError with the
+    first combination at which the value is not finite.
     """
     names = sorted(names_of(tree))
     symbols = [ca.SX.sym(name) for name in names]

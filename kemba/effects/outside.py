@@ -25,7 +25,8 @@ NAME = re.compile(r"[a-z][a-z0-9_]*")
 def effects_of_packages() -> Iterator[tuple[str, tuple[type[Effect], ...]]]:
     """Each entry point of the group `kemba.effects`: where it is from, and its effects.
 
-    An entry point names a module, all effects of which are taken, or one class.
+    An entry point names one class or a module, of which all effects are taken. Raises KembaError
+    where a package cannot be loaded.
     """
     for point in sorted(metadata.entry_points(group=GROUP), key=lambda p: p.name):
         where = f"entry point {point.name} = {point.value}"

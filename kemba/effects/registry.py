@@ -91,7 +91,7 @@ class Registry(Mapping[str, type[Effect]]):
 
     @property
     def union(self) -> TypeAdapter[Any]:
-        """Reads an effect of any kind, told apart by its `kind`."""
+        """Reads an effect of any kind; its `kind` says which."""
         from pydantic import Field, TypeAdapter
 
         known = tuple(self._all().values())
@@ -131,5 +131,5 @@ class Registered:
 
 
 def kind_of(effect: type[Effect]) -> str:
-    """The name by which YAML knows a class of effects."""
+    """The `kind` of a class of effects in YAML."""
     return str(effect.model_fields["kind"].default)

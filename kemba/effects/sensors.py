@@ -86,7 +86,7 @@ class SensorEffect(Effect):
 
     @property
     def sigma(self) -> float:
-        """Usual noise of such a channel (1 sigma); what is learnt from a log is better."""
+        """Usual noise of such a channel (1 sigma); an estimate from a log is better."""
         return CHANNELS[self.channel.split("/")[-1]][1]
 
     def sized(self, sigma: float) -> dict[str, Param]:
@@ -102,11 +102,17 @@ class SensorEffect(Effect):
         return 0.0
 
     def measured(self, true: Series) -> Series:
-        """The channel as the sensor shows it, from its true values."""
+        """The channel as the sensor shows it, from its true values.
+
+        The base class raises NotImplementedError.
+        """
         raise NotImplementedError
 
     def undone(self, measured: Series) -> Series:
-        """The true channel, from what the sensor shows: the inverse of `measured`."""
+        """The true channel, from what the sensor shows: the inverse of `measured`.
+
+        The base class raises NotImplementedError.
+        """
         raise NotImplementedError
 
 

@@ -27,7 +27,7 @@ class Series:
     def late(self, dt: float) -> Series:
         """The series as it was `dt` [s] earlier (dt < 0: as it will be later).
 
-        Beyond an end it goes on at its rate there; where no rate is known it is held.
+        Beyond an end it is extrapolated with its rate there; without a known rate it is constant.
         """
         if not dt:
             return self

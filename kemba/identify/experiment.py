@@ -44,7 +44,7 @@ class ExperimentSettings(Settings):
 
 @dataclass(frozen=True)
 class Proposal:
-    """A rig, and how many nats it should put between the rivals hardest to tell apart."""
+    """A rig test, and its expected evidence [nats] between the two effects hardest to separate."""
 
     rig: Rig
     nats: float
@@ -56,9 +56,18 @@ class Proposal:
         if self.nats < ExperimentSettings.current().clear:
             return (
                 f"No test of the menu separates {first} from {second}; "
-                f"the best, {self.rig.name}, would gain {self.nats:.1f} nats."
+                f"the best, {self.rig.name}, gives {strength(self.nats)} evidence."
             )
-        return f"The test '{self.rig.name}' separates {first} from {second} ({self.nats:.0f} nats)."
+        return (
+            f"The test '{self.rig.name}' separates {first} from {second}: "
+            f"{strength(self.nats)} evidence is expected."
+        )
+
+
+def strength(nats: float) -> str:
+    """Evidence in words after Kass and Raftery 1995: 1, 3 and 5 nats are their steps."""
+    steps = {5.0: "decisive", 3.0: "strong", 1.0: "weak"}
+    return next((word for least, word in steps.items() if nats >= least), "almost no")
 
 
 def menu(stroke: float) -> list[Rig]:
@@ -82,7 +91,10 @@ def menu(stroke: float) -> list[Rig]:
 
 
 def propose(folder: str | Path, out: Path) -> Proposal:
-    """The test that best separates the rivals of an answer, written to `out` as a rig YAML."""
+    """The test that best separates the rivals of an answer, written to `out` as a rig YAML.
+
+    Raises KembaError where no test shows a difference, or a file cannot be read or written.
+    """
     answer = read_json(Path(folder) / "answer.json")
     rivals = contenders(answer)
     model = load_model(str(answer.get("base") or "planning"), rig=True)
@@ -99,7 +111,10 @@ def propose(folder: str | Path, out: Path) -> Proposal:
 
 
 def contenders(answer: Mapping[str, Any]) -> dict[str, dict[str, float]]:
-    """Theta of the first effect of an answer and of its likeliest rivals."""
+    """Parameters of the first effect of an answer and of its likeliest rivals.
+
+    Raises KembaError where the answer ranks no effect.
+    """
     rows = {row["effect"]: row for row in answer["ranking"]}
     if not rows:
         raise KembaError("answer.json", "has no ranking", "nothing is left to be separated")

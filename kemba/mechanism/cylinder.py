@@ -21,7 +21,7 @@ Damping = Annotated[float, Param("N.s.m-1", lower=0.0, doc="damping in a valve m
 Second = Annotated[float, Param("s", lower=1e-6, doc="time constant of a chamber")]
 Ends = tuple[Second, Second]
 
-# Figures by what they grow with when another cylinder is driven through the same valves.
+# What each figure is proportional to when another cylinder has the same valves.
 FORCES, DAMPINGS, TIMES = ("F_extend", "F_retract"), ("c_extend", "c_retract"), ("fill", "vent")
 
 
@@ -69,7 +69,7 @@ class Cylinder(Table):
 
     @property
     def area_retract(self) -> float:
-        """Area [m2] on which the retract chamber pushes: the rod takes its share."""
+        """Area [m2] on which the retract chamber pushes: of the bore less the rod."""
         return math.pi / 4 * (self.bore**2 - self.rod**2)
 
     @property
@@ -110,7 +110,7 @@ class CylinderTable(Table):
         return self
 
     def given(self) -> dict[str, Any]:
-        """The figures that stand in the file."""
+        """The figures that the file gives."""
         values = {name: getattr(self, name) for name in Cylinder.model_fields}
         return {name: value for name, value in values.items() if value is not None}
 

@@ -83,7 +83,11 @@ def read_joints(model: pin.Model) -> list[Joint]:
 
 
 def forward(joints: list[Joint], q: ca.SX, v: ca.SX, a: ca.SX, gravity: float) -> list[FrameMotion]:
-    """Motion of every joint frame; gravity enters as an upward acceleration of the base."""
+    """Motion of every joint frame [m, rad, s], parents first.
+
+    `q`, `v`, `a` (n,): positions, velocities and accelerations of the tree's joints; `gravity`
+    [m.s-2] enters as an upward acceleration of the base.
+    """
     zero = ca.SX(0)
     base = FrameMotion(zero, ca.SX(1), zero, (zero, zero), zero, (zero, ca.SX(gravity)), zero)
     motions: list[FrameMotion] = []

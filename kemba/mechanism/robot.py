@@ -66,8 +66,11 @@ def standing_pose(robot: Robot, x: float = 0.0) -> dict[str, float]:
 
 
 def tree_angles(robot: Robot, q: ca.SX) -> ca.SX:
-    """The opened tree's joint positions as a function of the reduced coordinates:
-    x, z, pitch, then per leg hip, knee, cylinder, rod. The loop is closed by construction."""
+    """Joint positions (3 + 4 legs,) [m or rad] of the opened tree for reduced coordinates `q` (n,).
+
+    They are x, z, pitch, then per leg hip, knee, cylinder, rod. The loop at the knee is always
+    closed.
+    """
     legs = len(robot.legs)
     tree = [q[0], q[1], q[2]]
     for i, place in enumerate(robot.legs.values()):

@@ -59,7 +59,7 @@ def load_robot(name: str | Path) -> Robot:
 def load_cylinder(name: str | Path, asked: tuple[Path, ...] = ()) -> Cylinder:
     """The cylinder of a file: a path or a shipped name. Raises KembaError with every mistake.
 
-    `asked`: cylinder files that wait for this one, to notice when they lead in a circle.
+    `asked`: cylinder files that led to this one; they detect a circle.
     """
     path = find_file(name, "cylinders")
     document = load_yaml(path)
@@ -87,7 +87,7 @@ def _cylinder(
     at: tuple[str, ...],
     asked: tuple[Path, ...],
 ) -> Cylinder:
-    """The cylinder of a table that stands at `at` of a document, whose path is the last of
+    """The cylinder of a table at `at` of a document, whose path is the last of
     `asked`; `like`: whose figures fill the gaps."""
     like = table.like or like
     given = table.given()

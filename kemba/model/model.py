@@ -105,8 +105,9 @@ class Model:
     def build(self, free: Iterable[str] = (), scaled: Iterable[str] = ()) -> Node:
         """The residual with the parameters `free` (names as in `parameters`) left as symbols.
 
-        Every number named in `scaled`, also a whole table (`chamber.F_extend`) or one entry of it
-        (`chamber.fill[0]`), is multiplied by a symbol; these follow the free ones in p.
+        Every number named in `scaled` is multiplied by a symbol; it may be a whole table
+        (`chamber.F_extend`) or one entry of it (`chamber.fill[0]`). In the parameters p these
+        factors follow the free parameters. Raises KembaError where the model has no such parameter.
         """
         free, scaled = list(free), list(scaled)
         for name in free:

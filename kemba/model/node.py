@@ -50,7 +50,8 @@ class Node:
 
     @property
     def symbols(self) -> list[ca.SX]:
-        """Arguments in the order of every function built from this node."""
+        """Symbols q, v, a, s, sd, lam, u, p, each a column vector, in the order in which every
+        function built from this node takes them."""
         return [self.q, self.v, self.a, self.s, self.sd, self.lam, self.u, self.p]
 
     NAMES = ("q", "v", "a", "s", "sd", "lam", "u", "p")

@@ -33,6 +33,7 @@ class Instance:
 
     @property
     def label(self) -> str:
+        """Name of the instance: `hip_friction`, or `front/hip_friction` at a leg."""
         return full_name(self.leg, self.effect.name)
 
     def variables(self, role: str) -> dict[Key, Quantity]:
@@ -126,7 +127,10 @@ class Scene:
         return _Place(self, leg)
 
     def contribution(self, index: int) -> Contribution:
-        """What instance `index` adds; evaluated once."""
+        """What instance `index` adds; evaluated once.
+
+        Raises KembaError where the effect reads a value that depends on itself.
+        """
         if index not in self._contributions:
             if index in self._busy:
                 raise KembaError(self.instances[index].label, "reads a value that depends on it")
@@ -137,7 +141,10 @@ class Scene:
         return self._contributions[index]
 
     def lookup(self, leg: str | None, symbol: str) -> Any:
-        """Value of a symbol as seen from `leg`: signal, variable, or published value."""
+        """Value of a symbol as seen from `leg`: a signal, a variable, or a published value.
+
+        Raises KembaError where nothing gives it.
+        """
         if symbol in self.slots or (leg, symbol) in self.inputs:
             return self.signal(leg, symbol)
         for place in (leg, None):
@@ -207,20 +214,25 @@ class _Place:
 
     @property
     def cylinder(self) -> Cylinder:
+        """The cylinder of every leg. Raises KembaError for a mechanism without pistons."""
         return self._scene.mechanism.need_cylinder()
 
     @property
     def stroke(self) -> float:
+        """Stroke of every piston [m]. Raises KembaError for a mechanism without pistons."""
         return self._scene.mechanism.stroke
 
     @property
     def legs(self) -> list[At]:
+        """The same view at each leg."""
         return [self._scene.at(leg) for leg in self._scene.mechanism.legs]
 
     def source(self, signal: str) -> Any:
+        """A signal before any lag, as it is sent."""
         return self._scene.signal(self._leg, signal, lag=False)
 
     def standing(self, name: str) -> float:
+        """Value of a coordinate of this leg [its unit] in the standing pose."""
         return self._scene.mechanism.standing[full_name(self._leg, name)]
 
     def __getattr__(self, symbol: str) -> Any:

@@ -162,7 +162,7 @@ class Planner:
             return stop.transcription, stop.point
 
     def elastic(self) -> Outcome | None:
-        """What gives way when the requirements may."""
+        """Which requirements an elastic solve violates."""
         reduction = next(self.reductions())
         return elastic(self.model, self.task, self.requirements, reduction, self.session)
 

@@ -1,4 +1,4 @@
-"""Figures of plans, logs and diagnoses; the only room that knows matplotlib.
+"""Figures of plans, logs and diagnoses; the only package that uses matplotlib.
 
 Figures are made without pyplot, so they need no display; pass `figure=pyplot.figure()` to a
 function to have one that `pyplot.show` opens.

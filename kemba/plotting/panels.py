@@ -89,7 +89,7 @@ def widen(axes: Axes, least: float) -> None:
 
 
 def _look(number: int, place: int, sources: int) -> dict[str, Any]:
-    """Colour tells runs apart, dashes the traces of a panel; a single run colours its traces."""
+    """Colours mark runs and dashes mark traces; with a single run colours mark traces."""
     dashes = "-" if place == 0 else DASHES
     if sources == 1:
         return {"color": (BLUE, VERMILLION)[place % 2], "linestyle": dashes}

@@ -40,7 +40,10 @@ class Source:
         return kind == "bench" or (kind is None and "piston/x" in self.trajectory)
 
     def held(self, name: str) -> Array:
-        """The column of a command as it is drawn: a plan's first row acts on no interval."""
+        """The column (n,) of a command, in its unit, as it is drawn.
+
+        The first row of a plan acts on no interval; it shows the value of the second.
+        """
         values = self.trajectory[name]
         return np.concatenate([values[1:2], values[1:]]) if self.plan else values
 
@@ -59,7 +62,7 @@ def is_plan(trajectory: Trajectory, path: Path | None = None) -> bool:
 
 
 def load_source(path: str | Path, columns: ColumnMap | None = None) -> Source:
-    """The plan in a run folder, or the trajectory in a CSV, whose foreign `columns` a map tells.
+    """The plan in a run folder, or the trajectory in a CSV; `columns` maps foreign columns.
 
     Raises KembaError.
     """

@@ -1,4 +1,4 @@
-"""How figures look: paper width, readable type, colours that colour-blind readers tell apart."""
+"""How figures look: paper width, readable type, colours for colour-blind readers too."""
 
 from __future__ import annotations
 

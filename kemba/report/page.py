@@ -16,7 +16,9 @@ Rows = Iterable[tuple[str, Any]]
 
 
 def report_run(run: str | Path, out: str | Path | None = None) -> Path:
-    """Write the page of a run folder, `report.html` in it unless told; it needs nothing else.
+    """Write the page of a run folder to `out`, by default `report.html` in it.
+
+    The page needs no other file.
 
     Raises KembaError when the run has no certificate.
     """

@@ -31,7 +31,10 @@ def write_view(source: Source, path: str | Path, model: str | None = None) -> Pa
 
 
 def view_run(run: str | Path, out: str | Path | None = None, model: str | None = None) -> Path:
-    """The page of a run folder or a CSV; it lies beside the motion unless told. KembaError."""
+    """The page of a run folder or a CSV; written to `out` or beside the motion.
+
+    Raises KembaError where columns are missing or the page cannot be written.
+    """
     source = load_source(run)
     assert source.path is not None
     return write_view(source, out or source.path.with_name("view.html"), model)
@@ -46,7 +49,10 @@ def stage(source: Source, model: str | None = None) -> str:
 
 
 def scene(source: Source, model: str | None = None) -> dict[str, Any]:
-    """Times [s], points [m], valves and contacts of every pose, and how large it all is."""
+    """Times [s], points [m], valves and contacts of every pose, and the size [m] of it all.
+
+    Raises KembaError where columns are missing.
+    """
     machine, time = machine_of(source, model), source.trajectory.time
     count = max(2, round((time[-1] - time[0]) * RATE) + 1)
     shown = [] if source.bench else poses(source, machine, np.linspace(time[0], time[-1], count))
@@ -89,6 +95,7 @@ def fill(name: str, **values: str) -> str:
 
 
 def page_text(name: str) -> str:
+    """The text of a file of this room's pages."""
     return (PAGES / name).read_text(encoding="utf-8")
 
 

@@ -14,7 +14,7 @@ from kemba.sweep.expand import Expansion, model_hash, model_name
 from kemba.sweep.sampling import sample
 from kemba.sweep.schema import ExecuteBlock, SolveBlock, Sweep
 
-# Keys of a task that tell how it is solved, not what is to be found.
+# Keys of a task that say how it is solved, not what is asked.
 HOW = {"name", "notes", "guess", "guess_noise", "seed", "method", "solver", "tolerances"}
 
 

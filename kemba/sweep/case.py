@@ -30,7 +30,7 @@ def content_hash(data: Any) -> str:
 
 @dataclass(frozen=True)
 class Case:
-    """Work for `function` (`module:name`), of which `problem` tells what is being solved.
+    """Work for `function` (`module:name`), whose `problem` says what is solved.
 
     `values` are what varies, as the sweep's table shows it. Cases with equal content have equal
     keys, and their work is done once.
@@ -45,6 +45,7 @@ class Case:
 
     @cached_property
     def key(self) -> str:
+        """Hash of the function and its work: equal cases have equal keys, and are computed once."""
         return content_hash([self.function, self.work])
 
     def path(self, folder: Path) -> Path:

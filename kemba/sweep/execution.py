@@ -29,7 +29,10 @@ from kemba.trajectory import Trajectory
 
 
 def execute_cases(expansion: Expansion, name: str, block: ExecuteBlock, folder: Path) -> list[Case]:
-    """The cases of a block; its plan is made first when it is not there yet."""
+    """The cases of a block; its plan is made first where it is missing.
+
+    Raises KembaError where a condition does not fit the model.
+    """
     plant, planned = (
         model_name(expansion, m) for m in (block.plant, _model(expansion, name, block))
     )

@@ -37,7 +37,8 @@ class Expansion:
         return near if near.is_file() else find_config(name, folder)
 
     def task_document(self, name: str) -> Document:
-        """The task of a block with what it sets."""
+        """The task of a block with what it sets. Raises KembaError where the task cannot be
+        read."""
         block = self.sweep.blocks[name]
         try:
             document = load_yaml(self.found(str(block.task), "tasks"))
@@ -47,7 +48,7 @@ class Expansion:
         return self.changed(document, block.overrides, ("blocks", name, "set"))
 
     def changed(self, base: Document, values: Mapping[str, Any], at: Location) -> Document:
-        """`base` with values set; mistakes in them are told at their place in the sweep."""
+        """`base` with values set; messages about mistakes name their place in the sweep."""
         options = {f"{key}={json.dumps(value)}": key for key, value in values.items()}
         document = apply_overrides(base, options)
         places = {

@@ -17,7 +17,7 @@ from kemba.files import write_json
 from kemba.sweep.case import Case, Record, perform
 
 REACHING = 5.0  # s for a connection to a scheduler; the slowest networks take one
-PATIENCE = 30.0  # s; for a result that a worker holds
+RESULT_WAIT = 30.0  # s; for a result that a worker holds
 # Instead of Dask's own, with which workers give memory back at once; a solver asks for it again at
 # once, which costs a fifth of the time.
 ENVIRONMENT = {"OPENBLAS_NUM_THREADS": 1}
@@ -33,7 +33,7 @@ def run_cases(
     time_limit: float | None = None,
     tell: Tell = lambda case, record: None,
 ) -> dict[str, Record]:
-    """Do what is not done yet; `tell` hears of each case that ends. Records by key.
+    """Run the cases without a result; `tell` is called after each. Returns records by key.
 
     Missing from the answer: what `time_limit` [s] cut off. A case whose workers died again and
     again is an error in the answer, but not in the folder, so that the next time tries it anew.
@@ -92,9 +92,9 @@ def _record(task: Any) -> Record | None:
 
     try:
         if task.status == "finished":
-            return dict(task.result(timeout=PATIENCE))
+            return dict(task.result(timeout=RESULT_WAIT))
         if task.status == "error":
-            error = task.exception(timeout=PATIENCE)
+            error = task.exception(timeout=RESULT_WAIT)
             sentence = f"its worker died, again and again ({type(error).__name__})"
             if isinstance(error, KembaError):  # it could not begin
                 sentence = str(error)

@@ -28,7 +28,7 @@ class InfluenceSettings(Settings):
 def influence(rows: list[tuple[Case, Record | None]]) -> dict[str, Any]:
     """Spearman's rank correlations of each varied number with apex and landing.
 
-    What varies about zero may cost as much on either side, which ranks cannot tell: its size
+    What varies about zero may cost as much on either side, which ranks cannot show: its size
     stands beside it as `|start.body/pitch|`. `costs_most`: the condition with the strongest one,
     landing first, apex where all or none landed; None when each may be chance.
     """
@@ -56,7 +56,8 @@ def costliest(ranks: dict[str, dict[str, Any]]) -> str | None:
 
 
 def rank(x: np.ndarray, y: np.ndarray) -> dict[str, float] | None:
-    """Spearman's correlation and its p-value; None where either never changes."""
+    """Spearman's correlation of `x` (n,) and `y` (n,) and its p-value; None where either is
+    constant."""
     from scipy.stats import spearmanr
 
     if len(x) < InfluenceSettings.current().fewest or np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
@@ -66,13 +67,14 @@ def rank(x: np.ndarray, y: np.ndarray) -> dict[str, float] | None:
 
 
 def with_sizes(columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """The columns, and `|key|` for those with numbers on both sides of zero."""
+    """The columns, each (cases,), and `|key|` for those with numbers on both sides of zero."""
     both = {key: values for key, values in columns.items() if values.min() < 0.0 < values.max()}
     return columns | {f"|{key}|": np.abs(values) for key, values in both.items()}
 
 
 def numbers(cases: list[Case]) -> dict[str, np.ndarray]:
-    """What varies in all of the cases and is a number, in SI units, by key."""
+    """By key the column (cases,) of what varies in all of the cases and is a number, in SI
+    units."""
     columns = {}
     for key in cases[0].values if cases else ():
         try:

@@ -29,7 +29,7 @@ FIGURES = (
 
 
 def open_folder(out: str | Path | None, sweep: Sweep, document: Document) -> Path:
-    """The folder of a sweep, `sweeps/<name>` unless told; one that is there is continued.
+    """The folder of a sweep, `sweeps/<name>` by default; an existing one is continued.
 
     Raises KembaError when it holds something else, or another sweep.
     """

@@ -37,7 +37,7 @@ def filled(effect: E, cylinder: Cylinder, names: Sequence[str], tables: Sequence
 def at_supply(effect: Effect, table: str, supply: float) -> Any:
     """A table of an effect, whose entries may be symbols, at a supply pressure [Pa].
 
-    Piecewise linear; beyond the pressures of the table, the line of its last two entries goes on.
+    Piecewise linear; extrapolated from the last two entries beyond the pressures of the table.
     A table of one entry holds at every pressure.
     """
     values, pressures = effect.value(table), np.asarray(effect.value("pressures"))

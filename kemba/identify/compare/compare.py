@@ -175,11 +175,11 @@ def phrase(found: Comparison) -> str:
         return f"The model explains the logs to within the noise: its error is {ratio}."
     if not bad:
         return f"The model's error is {ratio}; no single condition stands out."
-    worst = f"worst is {_place(bad[0])} ({bad[0].ratio:.2g} times)"
+    worst = f"worst: {_place(bad[0])} ({bad[0].ratio:.2g} times)"
     if found.tolerable:
         return (
-            f"As it stands the model errs by {ratio}; {worst}; but figures off by no more than "
-            f"their usual tolerance would explain the logs ({found.tolerant_ratio:.2g} times)."
+            f"The nominal model errs by {ratio}; {worst}; but parameters within their usual "
+            f"tolerance would explain the logs ({found.tolerant_ratio:.2g} times)."
         )
     grade = (
         "nearly explains"
@@ -192,7 +192,15 @@ def phrase(found: Comparison) -> str:
 
 
 def _place(at: ConditionBin) -> str:
-    valves = {"00": "valves off", "10": "extend valve on", "01": "retract valve on"}
+    phases = {
+        "stance2": "while two feet stand",
+        "stance1": "while one foot stands",
+        "impact": "while a foot hits the ground",
+        "rest": "at rest",
+        "moving": "while moving",
+    }
+    valves = {"00": "both valves closed", "10": "extend valve open", "01": "retract valve open"}
     stroke = {"in": ", piston retracted", "mid": ", piston mid-stroke", "out": ", piston extended"}
-    mode = valves.get(at.mode, "both valves on")
-    return f"{at.channel} in {at.phase} with {mode}{stroke.get(at.region, '')}"
+    when = phases.get(at.phase, f"in {at.phase}")
+    mode = valves.get(at.mode, "both valves open")
+    return f"{at.channel} {when}, {mode}{stroke.get(at.region, '')}"

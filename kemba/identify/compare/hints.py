@@ -128,7 +128,7 @@ def _strongest(
 def conflicts(problem: Problem, rows: Rows, r: Array, known: Slopes) -> list[Hint]:
     """Parameters whose best values differ by more than their error allows, from run to run or from
     one valve mode to another; the clearest first. `r` (n,): the residual."""
-    groups = {"from run to run": rows.run, "between valve modes": codes(rows.mode)}
+    groups = {"each run": rows.run, "each valve mode": codes(rows.mode)}
     found = [
         hint
         for text, group in groups.items()
@@ -158,7 +158,8 @@ def _wandering(r: Array, known: Slopes, group: Labels, text: str) -> Iterable[Hi
         p = _agreement(information, own @ solve @ (n.T @ r) - slope[told, i])
         if p < settings.certain / len(known.leads):
             weight = float(-np.log10(max(p, 1e-300)))
-            yield Hint("conflict", f"{c.key} would have to differ {text}", weight)
+            what = f"fitting {c.key} to {text} gives different values"
+            yield Hint("conflict", f"{what}: the model lacks something here", weight)
 
 
 def _agreement(information: Array, pull: Array) -> float:

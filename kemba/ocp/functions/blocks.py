@@ -34,24 +34,28 @@ class Block:
     numbers: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     def parameterised(self, p: ca.SX) -> Block:
-        """The same with its numbers as constants, so that others can share its code, and mirrored
-        halves written once."""
+        """The same block with its numbers as constants (k,), so that equal blocks can share one
+        code.
+
+        `p`: vector of the problem's parameters. Parts that differ only in sign are written once.
+        """
         (f, g), constants, numbers = parameterised([self.z, p], [self.f, ca.densify(self.g)])
         f, g = canonical_signs([self.z, p, constants], [f, g])
         return replace(self, g=g, f=f, constants=constants, numbers=numbers)
 
     @cached_property
     def multipliers(self) -> tuple[ca.SX, ca.SX]:
-        """Symbols of the Lagrangian: of f and of g."""
+        """Symbols of the Lagrangian's multipliers: of f a scalar, of g a vector (m,)."""
         return ca.SX.sym("lam_f"), ca.SX.sym("lam_g", self.g.numel())
 
     @cached_property
     def jacobian(self) -> ca.SX:
+        """Jacobian matrix (m, n) of g, n = len(z), by z."""
         return ca.jacobian(self.g, self.z)
 
     @cached_property
     def hessian(self) -> ca.SX:
-        """Upper triangle of the Lagrangian's Hessian."""
+        """Upper triangle, a matrix (n, n) for n = len(z), of the Lagrangian's Hessian by z."""
         lam_f, lam_g = self.multipliers
         return ca.triu(ca.hessian(lam_f * self.f + ca.dot(lam_g, ca.densify(self.g)), self.z)[0])
 

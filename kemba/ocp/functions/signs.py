@@ -44,9 +44,11 @@ class _Canonical:
     order: dict[int, tuple[int, ca.SX]] = field(default_factory=dict)
 
     def number(self, value: float) -> Signed:
+        """A number as a sign and its absolute value."""
         return value < 0, ca.SX(abs(value))
 
     def apply(self, kind: int, *operands: Signed) -> Signed:
+        """The result of CasADi's operation `kind`, with the sign moved outwards where it can be."""
         if kind in SUMS:
             return self._sum(operands[0], operands[1], kind == ca.OP_SUB)
         signs = [negative for negative, _ in operands]

@@ -1,1 +1,1 @@
-"""Why a task has no plan: checks before solving, and what gives way in an elastic solve."""
+"""Why a task has no plan: checks before solving, and what an elastic solve violates."""

@@ -124,7 +124,7 @@ def impossible_poses(
 
 
 def _smallest(poses: Poses, here: Sequence[Requirement]) -> list[Gap]:
-    """How the one line of the task gives way that must give way least; [] if none helps."""
+    """The one line of the task that needs the smallest relaxation, relaxed; [] if none helps."""
     best: list[Gap] = []
     for location in dict.fromkeys(w.location for w in here if w.at is not None):
         gaps = poses.gaps(here, [w for w in here if w.location == location])

@@ -70,7 +70,7 @@ def key(name: str, document: Document) -> str:
 
 
 def relax(document: Document, requirement: Requirement, asked: float, reachable: float) -> Relax:
-    """How far a requirement must give way."""
+    """How far a requirement must be relaxed."""
     where = place(document, requirement.location)
     return Relax(
         requirement.text,
@@ -83,7 +83,7 @@ def relax(document: Document, requirement: Requirement, asked: float, reachable:
 
 
 def one_per_requirement(relaxed: Iterable[Relax]) -> tuple[Relax, ...]:
-    """The farthest of every requirement: `*/foot/z` holds for two feet and is told once."""
+    """The farthest of every requirement: `*/foot/z` holds for two feet and is named once."""
     worst: dict[tuple[str, bool], Relax] = {}
     for r in relaxed:
         known = worst.setdefault((r.requirement, r.asked > r.reachable), r)

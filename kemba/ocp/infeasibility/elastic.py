@@ -1,4 +1,4 @@
-"""The same program with requirements that may give way at an l1 cost; the physics must hold."""
+"""The same program with requirements that may be violated at an l1 cost; the physics must hold."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ from kemba.ocp.transcription.stage import Rows
 from kemba.ocp.transcription.symmetry import Reduction
 from kemba.ocp.transcription.transcribe import RequirementBlock, Transcription
 
-# What may give way: goals first; then everything but the start, which is checked before solving.
+# What may be violated: goals first; then everything but the start, which is checked before solving.
 TIERS = (("goals",), ("goals", "bounds", "end"))
 
 
 class Elastic(Transcription):
-    """A transcription whose requirements of the sections `soft` may give way.
+    """A transcription whose requirements of the sections `soft` may be violated.
 
     Each of them has two slack variables, shared by all its nodes: how far the plan stays below and
     above what is asked. They stand in row 0 of Y, in columns behind the layout's.
@@ -57,6 +57,10 @@ class Elastic(Transcription):
         return 2 * sum(w.location[0] in self.soft for w, _, _ in self.requirement_expressions())
 
     def requirement_blocks(self, index: np.ndarray) -> list[RequirementBlock]:
+        """Rows of every requirement: exact, or with slack where it is soft.
+
+        `index` (nodes + 1, n): position of each node's variables in the full vector.
+        """
         blocks = (
             (self.yielding if requirement.location[0] in self.soft else self.hard)(
                 requirement, g, where, index
@@ -68,7 +72,11 @@ class Elastic(Transcription):
     def yielding(
         self, requirement: Requirement, g: ca.SX, where: list[int], index: np.ndarray
     ) -> RequirementBlock:
-        """The rows of a requirement that may give way, at a price per unit of scaled slack."""
+        """The rows of a requirement that may be violated, at a price per unit of scaled slack.
+
+        `g`: a scalar expression. `where`: the nodes at which it holds. `index` (nodes + 1, n): as
+        above.
+        """
         column, scale = self.layout.size + 2 * len(self.slack), requirement.scale
         self.slack.append((requirement, column, scale))
         self.upper[0, column : column + 2] = np.inf
@@ -88,15 +96,20 @@ class Elastic(Transcription):
         return Block(ca.vertcat(self.stage.y, below, above), rows.g, price, at), rows, where
 
     def start(self, Y: np.ndarray) -> np.ndarray:
-        """A start guess with room for every requirement to give way."""
+        """A start guess with slack for every soft requirement.
+
+        `Y` (nodes + 1, n): scaled variables; the result has the columns of the slack as well.
+        """
         wide = np.zeros(self.shape)
         wide[:, : self.layout.size] = Y
         wide[0, self.layout.size :] = ElasticSolve.current().room
         return wide
 
     def given(self, Y: np.ndarray) -> list[tuple[Requirement, float, float]]:
-        """Every soft requirement: by how much it gave way, in its unit (above is positive) and
-        scaled."""
+        """Every soft requirement, and its violation in its unit (above is positive) and scaled [1].
+
+        `Y` (nodes + 1, n + slack): scaled variables.
+        """
         found = []
         for requirement, column, scale in self.slack:
             by = float(Y[0, column + 1] - Y[0, column])
@@ -106,7 +119,7 @@ class Elastic(Transcription):
 
 @dataclass(frozen=True)
 class Outcome:
-    """How an elastic solve ended: the program, its last converged point, and what gave way."""
+    """How an elastic solve ended: the program, its last converged point, and what it violated."""
 
     transcription: Elastic
     point: Iterate

@@ -1,4 +1,4 @@
-"""Why a task has no plan: what gave way, by how much, and which limits of the robot it reached."""
+"""Why a task has no plan: violated requirements, by how much, and the limits reached."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Poses: can the requirements at one moment hold together, and which of them must give way?"""
+"""Poses: can the requirements at one moment hold together, and which of them must be relaxed?"""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Gap:
 
 class Poses:
     """Poses and rates (q, v) of a model: joints within their range, pistons within their stroke,
-    feet not below the ground. `requirements` that speak of other things are left aside.
+    feet not below the ground. `requirements` on other quantities are ignored.
     """
 
     def __init__(self, model: Model, requirements: Iterable[Requirement]) -> None:
@@ -57,7 +57,8 @@ class Poses:
 
     @cached_property
     def walls(self) -> ca.SX:
-        """Expressions that no pose makes negative: gaps of feet, distances to the end stops."""
+        """Expressions, a vector, that no pose makes negative: gaps of feet [m], distances to the
+        end stops [m]."""
         node = self.model.node
         others = ca.vertcat(node.v, node.a, node.s, node.sd, node.lam, node.u)
         rows = ca.vertsplit(ca.vertcat(node.pair_a, node.pair_b))
@@ -81,9 +82,9 @@ class Poses:
     def gaps(
         self, requirements: Sequence[Requirement], free: Iterable[Requirement]
     ) -> list[Gap] | None:
-        """How far the requirements of `free` must give way so that all of `requirements` can hold.
+        """By how much `free` must be relaxed so that all of `requirements` can hold.
 
-        [] when they can as they are, None when giving way there does not help.
+        [] when they hold unrelaxed, None when relaxing these does not help.
         """
         may = {w.quantity.name for w in free}
         best: tuple[np.ndarray, np.ndarray] | None = None
@@ -107,7 +108,8 @@ class Poses:
         return max(heights) if heights else None
 
     def limits(self, requirements: Sequence[Requirement]) -> tuple[np.ndarray, np.ndarray]:
-        """The range of every quantity that `requirements` leave."""
+        """Lower and upper limit (names,) of every quantity, in its unit, that `requirements`
+        leave."""
         lower, upper = np.full(len(self.names), -np.inf), np.full(len(self.names), np.inf)
         for requirement in (w for w in requirements if w.quantity.name in self.names):
             i = self.names.index(requirement.quantity.name)

@@ -6,10 +6,10 @@ from kemba.settings import Settings, setting
 
 
 class Checks(Settings):
-    """What refuses a task before solving, and what is told as a hint."""
+    """What refuses a task before solving, and what is given as a hint."""
 
     heavy: float = setting(
-        0.2, "1", "payload of all that is lifted, from which it is told as a cause",
+        0.2, "1", "payload of all that is lifted, from which it is named as a cause",
         "convention: less explains little of a missing height",
     )  # fmt: skip
     strokes: int = setting(
@@ -53,7 +53,7 @@ class PoseSearch(Settings):
 
 
 class ElasticSolve(Settings):
-    """The solve in which requirements may give way."""
+    """The solve in which requirements may be violated."""
 
     budget: float = setting(30.0, "s", "time limit", "convention: a user waits no longer for it")
     nodes: int = setting(
@@ -65,7 +65,7 @@ class ElasticSolve(Settings):
     )
     price: float = setting(
         100.0, "1", "of one unit of scaled slack, beside a cost of 0.01 to 10",
-        "derived: above every cost of the task, so that nothing gives way for it", decides=True,
+        "derived: above every cost of the task, so that no violation pays", decides=True,
     )  # fmt: skip
     cheap: float = setting(
         0.01, "1", "factor on the task's costs", "convention: far below the price of slack"
@@ -84,7 +84,7 @@ class Leaning(Settings):
 
     near: float = setting(0.99, "1", "part of the stroke that counts as all", "convention: 1 %")
     often: float = setting(
-        0.3, "1", "part of the steps for which a limit must hold to be told",
+        0.3, "1", "part of the steps for which a limit must hold to be named",
         "convention: a third of the motion",
     )  # fmt: skip
     grip: float = setting(
@@ -101,5 +101,5 @@ class Leaning(Settings):
     peak: float = setting(0.95, "1", "part of the peak torque that counts", "convention: 5 %")
     step: float = setting(0.02, "1", "relative distance to a step's bound", "convention: 2 %")
     steps: float = setting(
-        0.8, "1", "part of the steps at a bound that is told", "convention: nearly all"
+        0.8, "1", "part of the steps at a bound that is named", "convention: nearly all"
     )

@@ -15,7 +15,7 @@ SHOW_CURSOR = "\x1b[?25h"
 class Interrupt:
     """A context in which SIGINT only sets a flag, which solvers read after every iteration.
 
-    Calling it tells whether to stop. `tell` gets a message at the first Ctrl-C. The second one
+    Calling it returns whether to stop. `tell` gets a message at the first Ctrl-C. The second one
     ends the process by the default handler: an exception would be lost in a solver's callback.
     Outside the main thread the context changes nothing.
     """

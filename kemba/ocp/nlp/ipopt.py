@@ -48,9 +48,9 @@ class Iterate:
 
 @dataclass(frozen=True)
 class Control:
-    """What ends a solve early and who hears of it.
+    """What ends a solve early, and what is called after every iteration.
 
-    `deadline` in time.monotonic(); `stop` is asked and `watch` told after every iteration; `log`
+    `deadline` in time.monotonic(); `stop` and `watch` are called after every iteration; `log`
     collects IPOPT's text.
     """
 
@@ -173,7 +173,7 @@ class Ipopt:
         return self._regularised[problem]
 
     def _watcher(self, stagnation: Stagnation | None, parameters: int) -> Watcher | None:
-        """The callback, where anybody wants to hear of iterations."""
+        """The callback; None where nothing needs it."""
         watch, stop = self.control.watch, self.control.stop
         if watch is None and stop is None and stagnation is None:
             return None

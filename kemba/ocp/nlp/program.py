@@ -19,13 +19,20 @@ class Program(Protocol):
     @property
     def problem(self) -> BlockProblem: ...
     @property
-    def lower(self) -> np.ndarray: ...
+    def lower(self) -> np.ndarray:
+        """Lower bounds of the variables, a vector or a matrix."""
+
     @property
-    def upper(self) -> np.ndarray: ...
+    def upper(self) -> np.ndarray:
+        """Upper bounds of the variables, a vector or a matrix."""
+
     @property
-    def g_lower(self) -> np.ndarray: ...
+    def g_lower(self) -> np.ndarray:
+        """Lower bounds (rows,) of the rows."""
+
     @property
-    def g_upper(self) -> np.ndarray: ...
+    def g_upper(self) -> np.ndarray:
+        """Upper bounds (rows,) of the rows."""
 
 
 def violation(program: Program, g: np.ndarray) -> float:

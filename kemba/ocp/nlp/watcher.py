@@ -14,7 +14,7 @@ Watch = Callable[[int, float, float], None]  # iteration, objective, worst scale
 
 
 class Watcher(ca.Callback):
-    """Tells `watch` about every iteration, and asks `stop` and `stagnation` whether to go on.
+    """Calls `watch` after every iteration; `stop` and `stagnation` decide whether to continue.
 
     `parameters`: how many parameters the solved problem has.
     """
@@ -49,6 +49,8 @@ class Watcher(ca.Callback):
         return ca.Sparsity.dense(rows.get(ca.nlpsol_out(i), self.parameters))
 
     def eval(self, arguments: Sequence[ca.DM]) -> list[int]:
+        """Called by IPOPT after each iteration with its vectors x, f, g and multipliers; [1]
+        stops it."""
         if self.watch is not None or self.stagnation is not None:
             worst = violation(self.program, np.asarray(arguments[2]).ravel())
             if self.watch is not None:

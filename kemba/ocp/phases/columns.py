@@ -67,16 +67,17 @@ class Columns:
         return self._new(repeats * count).reshape(repeats, count)
 
     def end(self, node: int) -> dict[str, np.ndarray]:
-        """q, v, s at a node, before its impact."""
+        """Columns by group, each (width,), of q, v, s at a node, before its impact."""
         return self.first if node == 0 else self.stages[node - 1][-1]
 
     def begin(self, e: int) -> dict[str, np.ndarray]:
-        """q, v, s at the start of element e, after an impact."""
+        """Columns by group, each (width,), of q, v, s at the start of element `e`, after an
+        impact."""
         before, p = self.end(e), self.starts.get(e, -1)
         return {**before, "v": self.after[p]} if p in self.after else before
 
     def element(self, e: int) -> np.ndarray:
-        """Columns of an element's z."""
+        """Columns (n,) of the variables z of element `e`."""
         start = self.begin(e)
         parts = [start[g] for g in STATE]
         parts += [stage[g] for stage in self.stages[e] for g in (*STATE, "lam")]

@@ -20,7 +20,8 @@ class Independent:
         self.basis: list[np.ndarray] = []
 
     def adds(self, g: ca.SX, view: View) -> bool:
-        """Whether g = 0 is independent of the equalities so far; if so it becomes one of them."""
+        """Whether g = 0 (g is a scalar) is independent of the equalities so far; if so it joins
+        them."""
         row = self.rest(g, view)
         if row is None:
             return False
@@ -28,7 +29,8 @@ class Independent:
         return True
 
     def rest(self, g: ca.SX, view: View) -> np.ndarray | None:
-        """The part of g's gradient that is orthogonal to all others; None where it is zero."""
+        """The part (n,) of the gradient of a scalar g that is orthogonal to all others; None if
+        zero."""
         z = view.z("q v s")
         slope = ca.Function("slope", [z], [ca.densify(ca.jacobian(g, z))])
         row = np.array(slope(np.concatenate([self.guess[x] for x in ("q", "v", "s")]))).ravel()

@@ -29,9 +29,11 @@ class Phase:
 
     @property
     def elements(self) -> int:
+        """Number of elements of the phase."""
         return self.last - self.first
 
     def active(self, i: int) -> bool:
+        """Whether constraint `i` is active: the contact is closed, the stop touched."""
         return self.modes[i] != OPEN
 
 

@@ -26,7 +26,7 @@ Where = list[tuple[int, np.ndarray]]  # phases and the columns of z there
 
 @dataclass(frozen=True)
 class Soft:
-    """A mode constraint that may give way.
+    """A mode constraint that may be violated.
 
     `constraint`: the index of its unilateral constraint; `kind`: what it asks (gap, slip, ...);
     `phases` (repeats,): where it holds; `above`, `below` (repeats,) or None: columns of the slacks
@@ -67,9 +67,9 @@ class Row:
 class PhaseProgram:
     """The program of a phase sequence.
 
-    `lower`, `upper` (size,) bound the variables x, `columns` tells where each stands; `g_lower`,
+    `lower`, `upper` (size,) bound the variables x, `columns` says where each is; `g_lower`,
     `g_upper` (rows,) bound the rows, `rows` says what each means. `elastic`: 0 where modes hold
-    exactly, else the price of a mode constraint that gives way by its scale.
+    exactly, else the price of a mode constraint that is violated by its scale.
     """
 
     def __init__(
@@ -162,7 +162,11 @@ class PhaseProgram:
     def mode_constraint(
         self, i: int, kind: str, z: ca.SX, g: ca.SX, low: float, high: float, where: Where
     ) -> None:
-        """The same for a mode of constraint i; in an elastic program it gives way for a price."""
+        """Add rows low <= g <= high for a mode of constraint `i`.
+
+        `z` (n,), `g` scalar: expressions; `where`: the phase and the columns (n,) of each repeat.
+        In an elastic program a row may be violated at a price.
+        """
         label, columns = f"{self.constraints[i].label} {kind}", [at for _, at in where]
         if not self.elastic or not columns:
             self.add(label, z, g, low, high, columns)
@@ -196,14 +200,17 @@ class PhaseProgram:
         return np.concatenate([x, x[index]])
 
     def keep_short(self, x: np.ndarray, steps: float) -> None:
-        """Bound elements by `steps` times the nominal step, or by their length in x if longer."""
+        """Bound the elements to `steps` times the nominal step, or to their length in x if longer.
+
+        `x` (size,): scaled variables.
+        """
         index = self.columns.h[:, 0]
         longest = self.upper[index] * steps / Elements.current().longest
         self.upper[index] = np.maximum(longest, x[index])
 
     @property
     def soft(self) -> list[Soft]:
-        """The mode constraints that may give way."""
+        """The mode constraints that may be violated."""
         return [part.soft for part in self.added if part.soft is not None]
 
     def loosened(self, x: np.ndarray) -> np.ndarray:
@@ -257,8 +264,10 @@ class PhaseProgram:
 
     @cached_property
     def g_lower(self) -> np.ndarray:
+        """Lower bounds (rows,) of the rows."""
         return np.array([row.lower for row in self.rows])
 
     @cached_property
     def g_upper(self) -> np.ndarray:
+        """Upper bounds (rows,) of the rows."""
         return np.array([row.upper for row in self.rows])

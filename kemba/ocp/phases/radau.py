@@ -26,11 +26,12 @@ class Scheme:
 
     @property
     def stages(self) -> int:
+        """Number of collocation points of an element."""
         return len(self.points)
 
     @cached_property
     def slopes(self) -> np.ndarray:
-        """D in h y'_i = sum_j D[i, j] (y_j - y_0)."""
+        """D (stages, stages) in h y'_i = sum_j D[i, j] (y_j - y_0)."""
         return np.linalg.inv(self.butcher)
 
 
@@ -74,7 +75,7 @@ def width(layout: Layout, group: str) -> int:
 
 
 def scaled(layout: Layout, group: str, name: str) -> ca.SX:
-    """Symbols of a group's scaled half values."""
+    """Symbols (width,) of a group's scaled half values [1]."""
     return ca.SX.sym(name, width(layout, group))
 
 
@@ -149,7 +150,10 @@ def impact(model: Model, layout: Layout, reduction: Reduction) -> Jump:
 
 
 def project(model: Model, reduction: Reduction, dynamics: ca.SX) -> ca.SX:
-    """Scaled equations of motion of the half robot, by virtual work."""
+    """Scaled equations of motion (half n,) [1] of the half robot, by virtual work.
+
+    `dynamics` (n,): the equations of the whole robot [N or N.m].
+    """
     scale = [r.scale * (1.0 if r.unit == "N" else ANGLE_ARM) for r in model.node.dynamics_rows]
     B = ca.sparsify(ca.DM(reduction.B["q"]))
     return ca.mtimes(B.T, dynamics / ca.DM(scale))

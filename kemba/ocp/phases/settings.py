@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from kemba.settings import Settings, setting
 
-TRIALS = "tuned: trials that docs/refine.md tells of"
+TRIALS = "tuned: trials that docs/refine.md describes"
 HAND = "convention: chosen by hand on the cases of benchmarks/refine.py, no comparison kept"
 STEPS = "derived: implicit Euler smears an impact over two steps"
 
@@ -13,7 +13,7 @@ class Reading(Settings):
     """How modes are read off an implicit Euler plan."""
 
     stiff: float = setting(
-        1e-3, "m", "body weight over this length tells a force from a gap of the relaxation",
+        1e-3, "m", "body weight over this length separates a force from a gap of the relaxation",
         "derived: the product of both is at most the relaxation, 1e-6", decides=True,
     )  # fmt: skip
     closed: float = setting(
@@ -55,7 +55,7 @@ class ModeConstraints(Settings):
 
 
 class Elements(Settings):
-    """Bounds of element durations and of what may give way."""
+    """Bounds of element durations and of mode constraints that may be violated."""
 
     shortest: float = setting(
         0.03, "1", "times the nominal step: shortest element", TRIALS, decides=True
@@ -84,8 +84,8 @@ class Refining(Settings):
         "derived: the certificate's tolerance",
     )  # fmt: skip
     price: float = setting(
-        1000.0, "1", "of a mode giving way by its scale; cheaper, modes that could hold give way "
-        "too", HAND, decides=True,
+        1000.0, "1", "of a mode violated by its scale; at a lower price modes that can hold are "
+        "violated too", HAND, decides=True,
     )  # fmt: skip
     near: float = setting(
         10.0, "1", "proximal weight of the first solve; without, short steps wander off", HAND,
@@ -145,7 +145,7 @@ class Refining(Settings):
         decides=True,
     )  # fmt: skip
     stagnation_near: float = setting(
-        1e-4, "1", "scaled violation that is near enough to go on", HAND, decides=True
+        1e-4, "1", "scaled violation from which the next solve may begin", HAND, decides=True
     )
     second_start: float = setting(
         0.05, "1", "guess noise of the second start where the first plan does not refine", HAND,
@@ -156,13 +156,13 @@ class Refining(Settings):
 class Repair(Settings):
     """When modes fit, and which of them change."""
 
-    fits: float = setting(3e-4, "1", "scaled: modes that give way less fit", HAND, decides=True)
+    fits: float = setting(3e-4, "1", "scaled: modes with less violation fit", HAND, decides=True)
     matters: float = setting(
         0.1, "1", "of the worst misfit: smaller ones are left for the next round", HAND,
         decides=True,
     )  # fmt: skip
     sliver: int = setting(
-        3, "1", "elements: phases up to this long give way before longer ones", STEPS, decides=True
+        3, "1", "elements: longest phase that is removed first", STEPS, decides=True
     )
     collapsed: float = setting(
         3.0, "1", "times the shortest duration: a phase that short has collapsed", TRIALS,

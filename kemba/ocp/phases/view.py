@@ -25,5 +25,5 @@ class View:
         return ca.SX(ca.cse(ca.densify(ca.substitute([ca.SX(expression)], symbols, self._full)[0])))
 
     def z(self, groups: str) -> ca.SX:
-        """The symbols of some groups, such as "q v"."""
+        """The symbols of some groups as one vector; `groups` such as "q v"."""
         return ca.vertcat(*(self.symbols[g] for g in groups.split()))

@@ -162,7 +162,8 @@ class Refiner:
         return self.simpler(program, found.Y) or self.finish(program, found.Y)
 
     def simpler(self, program: PhaseProgram, x: np.ndarray) -> Refined | None:
-        """The solution without the phases that collapsed in x; None where it has none."""
+        """The solution without the phases that collapsed in `x` (size,); None where there is
+        none."""
         phases = simplified(program, x, self.marks)
         if phases is None or self.left <= 0:
             return None
@@ -170,7 +171,8 @@ class Refiner:
         return found if found.done else None
 
     def finish(self, near: PhaseProgram, x: np.ndarray) -> Refined:
-        """From the nearest solution x by the coarser scheme to a good one, to an exact one."""
+        """An exact solution, from the nearest solution `x` (size,) with the coarser scheme
+        first."""
         program, start = self.build(near.phases, self.plan, RADAU3)
         program.keep_short(x, Elements.current().fair)
         best = self._solve(program, x[: len(start)], rough(Refining.current().rough_iterations))
@@ -194,7 +196,8 @@ class Refiner:
         return program, self._solve(program, x, options)
 
     def fine(self, coarser: PhaseProgram, x: np.ndarray) -> Refined:
-        """The exact program of the finer scheme, from a solution x of the coarser one."""
+        """The exact program with the finer scheme, from a solution `x` (size,) with the coarser
+        one."""
         settings = Refining.current()
         program, _ = self.build(coarser.phases, self.plan, RADAU5)
         start = program.proximal(carried(program, coarser, x), settings.near_fine)
@@ -209,7 +212,10 @@ class Refiner:
     def build(
         self, phases: Sequence[Phase], start: Trajectory, scheme: Scheme, elastic: float = 0.0
     ) -> tuple[PhaseProgram, np.ndarray]:
-        """The program of some phases and its start. Raises ValueError for other models."""
+        """The program of some phases and its start (size,), scaled.
+
+        Raises ValueError for a model to which the method does not apply.
+        """
         constraints = read_constraints(self.model, self.reduction)
         program = PhaseProgram(
             self.model, self.task, self.reduction, phases, constraints, scheme, elastic

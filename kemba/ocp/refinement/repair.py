@@ -1,4 +1,4 @@
-"""Modes that do not fit: they are changed where an elastic program had to give way."""
+"""Modes that do not fit: they are changed where an elastic program violates them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from kemba.ocp.phases.settings import Elements, Repair
 
 
 def misfit(program: PhaseProgram, x: np.ndarray) -> np.ndarray:
-    """How far every constraint's mode gives way in every phase (phases, constraints), by the
+    """The violation of every constraint's mode in every phase (phases, constraints), by the
     worst of its scaled rows."""
     found = np.zeros((len(program.phases), len(program.constraints)))
     for soft in program.soft:
@@ -24,10 +24,10 @@ def misfit(program: PhaseProgram, x: np.ndarray) -> np.ndarray:
 
 
 def repaired(program: PhaseProgram, x: np.ndarray, marks: Sequence[int]) -> list[Phase] | None:
-    """Phases with the modes changed where they fit worst; None where nothing is left to change.
+    """Phases with other modes where they fit worst; None where nothing is left to change.
 
-    A phase that is short or has collapsed takes the modes of a neighbour; elsewhere the constraint
-    that gives way most changes its mode.
+    A phase that is short or has collapsed takes the modes of a neighbour. In other phases the
+    constraint with the largest violation changes its mode. `x` (size,): scaled variables.
     """
     repair = Repair.current()
     blame = misfit(program, x)
@@ -53,7 +53,10 @@ def repaired(program: PhaseProgram, x: np.ndarray, marks: Sequence[int]) -> list
 
 
 def simplified(program: PhaseProgram, x: np.ndarray, marks: Sequence[int]) -> list[Phase] | None:
-    """Phases without those that collapsed between two others; None where none did."""
+    """Phases without those that collapsed between two others; None where none did.
+
+    `x` (size,): scaled variables.
+    """
     h = x[program.columns.h[:, 0]] * program.layout.scale[program.layout.slices["h"]][0]
     least = _collapsed(program)
     phases = list(program.phases)

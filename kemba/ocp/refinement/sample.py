@@ -17,8 +17,11 @@ WORST = 8
 
 
 def to_trajectory(program: PhaseProgram, x: np.ndarray) -> Trajectory:
-    """Every quantity of the model at element ends, just before an impact there. Inputs and
-    forces of a row act on the interval before it; at the first node they are zero."""
+    """Every quantity of the model at element ends, just before an impact there.
+
+    `x` (size,): scaled variables. Inputs and forces of a row act on the interval before it; at the
+    first node they are zero.
+    """
     layout, c = program.layout, program.columns
     nodes = program.nodes
     Y = np.zeros((nodes + 1, layout.size))

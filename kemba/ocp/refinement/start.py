@@ -26,7 +26,7 @@ def node_rows(program: PhaseProgram, plan: Trajectory) -> np.ndarray:
 
 
 def start_vector(program: PhaseProgram, plan: Trajectory) -> np.ndarray:
-    """The program's variables from a plan, phase by phase on even grids."""
+    """The program's scaled variables (size,) from a plan, phase by phase on even grids."""
     c, layout, t = program.columns, program.layout, plan.time
     Y = node_rows(program, plan)
     x = np.zeros(c.size)
@@ -56,7 +56,8 @@ def _between(times: np.ndarray, rows: np.ndarray, now: float) -> np.ndarray:
 
 
 def carried(program: PhaseProgram, coarse: PhaseProgram, x: np.ndarray) -> np.ndarray:
-    """The variables of `program` from a solution of the same phases by another scheme."""
+    """The scaled variables (size,) of `program` from a solution `x` (coarse size,) of the same
+    phases by another scheme."""
     c, old = program.columns, coarse.columns
     y = np.zeros(c.size)
     knots = np.concatenate([[0.0], coarse.scheme.points])

@@ -37,7 +37,7 @@ class Stopped(Exception):  # noqa: N818 (a way out, not an error)
 
 @dataclass
 class Session:
-    """What all solves of one plan share: limits, who is told, what was tried, time of building."""
+    """What all solves of one plan share: limits, the listener, what was tried, time of building."""
 
     control: Control = field(default_factory=Control)
     tell: Callable[[str], None] = lambda text: None
@@ -52,7 +52,7 @@ class Session:
 
 @dataclass
 class Schedule:
-    """A transcription being solved: its solver, who is told, what was tried."""
+    """A transcription being solved: its solver, the listener, what was tried."""
 
     transcription: Transcription
     ipopt: Ipopt
@@ -108,8 +108,11 @@ class Schedule:
         return min(iterations, int(self.ipopt.options.get("max_iter", iterations)))
 
     def valves(self, point: Iterate) -> dict[int, np.ndarray]:
-        """Columns of the valves, rounded, without pulses shorter than the task's dwell, as the
-        task's own bounds on them allow."""
+        """Columns of the valves -> values (nodes + 1,), rounded to 0 or 1, within the task's
+        bounds.
+
+        Pulses shorter than the task's dwell time are removed.
+        """
         t = self.transcription
         least, h = t.task.min_dwell, t.h(point.Y)
         rounded = {c: dwelling(point.Y[:, c], h, least) for c in t.layout.binary}

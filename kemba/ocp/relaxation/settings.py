@@ -5,7 +5,7 @@ from __future__ import annotations
 from kemba.settings import CHOSEN, Settings, setting
 
 # Both on the jumps of configs/sweeps/reliability.yaml; the code of the trials was not kept.
-TRIALS = "tuned: trials that docs/solving.md tells of"
+TRIALS = "tuned: trials that docs/solving.md describes"
 
 VARIANTS = "tuned: benchmarks/variants.py"
 PAIR = "body weights x m (or m/s)"
@@ -109,7 +109,7 @@ class Ends(Settings):
         "fit", CHOSEN, decides=True,
     )  # fmt: skip
     stagnation_near: float = setting(
-        0.05, "1", "scaled violation that is near enough to go on", CHOSEN, decides=True
+        0.05, "1", "scaled violation from which the next solve may begin", CHOSEN, decides=True
     )
     confirmed: float = setting(
         1e-7, "1", "scaled violation of the whole robot's rows that needs no further solve",

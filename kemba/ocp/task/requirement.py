@@ -51,7 +51,7 @@ class Requirement:
 
 
 def quantities(model: Model) -> dict[str, Quantity]:
-    """Everything a task may speak of: coordinates, rates, ports, states, inputs, forces."""
+    """Every quantity that a task may name: coordinates, rates, ports, states, inputs, forces."""
     mechanism = model.mechanism
     own = [*mechanism.coordinates, *mechanism.velocities]
     ports = [q for p in mechanism.ports.values() for q in (p.quantity, p.rate)]

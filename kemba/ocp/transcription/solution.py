@@ -11,8 +11,11 @@ from kemba.trajectory import Trajectory
 
 
 def to_trajectory(transcription: Transcription, Y: np.ndarray) -> Trajectory:
-    """Every quantity of the model at the nodes. Inputs and forces of a row act on the interval
-    before it (implicit Euler); at the first node they are zero."""
+    """Every quantity of the model at the nodes, from scaled variables `Y` (nodes + 1, n).
+
+    Inputs and forces of a row act on the interval before it (implicit Euler); at the first node
+    they are zero.
+    """
     layout, h = transcription.layout, transcription.h(Y)[:, None]
     x = {g: layout.full(Y, g) for g in ("q", "v", "s", "u", "lam")}
     a, sd = np.zeros_like(x["v"]), np.zeros_like(x["s"])

@@ -182,7 +182,7 @@ def as_variable(g: ca.SX, y: ca.SX) -> tuple[int, float, float] | None:
 
 
 def bounded_below(g: ca.SX, y: ca.SX, layout: Layout) -> bool:
-    """Whether g is a variable whose own bound says g >= 0."""
+    """Whether `g`, a scalar, is an entry of `y` (n,) whose own bound says g >= 0."""
     variable = as_variable(g, y)
     if variable is None:
         return False

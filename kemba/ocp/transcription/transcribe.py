@@ -50,8 +50,8 @@ class Meaning:
 class Transcription:
     """The program of one task on one grid, see the legend above.
 
-    `layout` tells what is where in y; `lower`, `upper` (N + 1, n) bound Y, `g_lower`, `g_upper`
-    (rows,) bound g; `meanings` says what each row of g is; `problem` has the functions.
+    `layout` says where each quantity is in y. `lower`, `upper` (N + 1, n) bound Y; `g_lower`,
+    `g_upper` (rows,) bound g. `meanings` says what each row of g is; `problem` has the functions.
     """
 
     def __init__(
@@ -101,7 +101,10 @@ class Transcription:
         return 0
 
     def requirement_blocks(self, index: np.ndarray) -> list[RequirementBlock]:
-        """Requirements on plain variables tighten their bounds; the others become rows at nodes."""
+        """Requirements on plain variables tighten their bounds; the others become rows at nodes.
+
+        `index` (nodes + 1, n): position of each node's variables in the full vector.
+        """
         blocks = (
             self.hard(requirement, g, where, index)
             for requirement, g, where in self.requirement_expressions()
@@ -111,7 +114,11 @@ class Transcription:
     def hard(
         self, requirement: Requirement, g: ca.SX, where: list[int], index: np.ndarray
     ) -> RequirementBlock | None:
-        """The rows of a requirement that holds exactly; None where tighter bounds do it."""
+        """The rows of a requirement that holds exactly; None where tighter bounds are enough.
+
+        `g`: a scalar expression. `where`: the nodes at which it holds. `index` (nodes + 1, n):
+        position of each node's variables in the full vector.
+        """
         if 0 in where:
             self.held.append(Held(g, requirement.lower, requirement.upper))
         variable = as_variable(g, self.stage.y)

@@ -34,7 +34,7 @@ def replays(
 
 
 def _closed(controller: Trajectory) -> bool:
-    """Whether the last command leaves every valve closed: with one open the robot would go on."""
+    """Whether the last command leaves every valve closed: an open one would keep it moving."""
     return not any(controller[name][-1] for name in controller.names if "/valve/" in name)
 
 

@@ -1,4 +1,4 @@
-"""The plant that stands for a plan's own robot: full pneumatics, all else as the planner has it."""
+"""The plant of a plan's own robot: full pneumatics, everything else as in the plan's model."""
 
 from __future__ import annotations
 

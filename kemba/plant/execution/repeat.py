@@ -90,7 +90,7 @@ def _as_sent(log: Trajectory, table: Trajectory) -> Trajectory:
 def plant_of(run: str | Path, name: str | None = None) -> Model:
     """The plant of the task that a run was made for: its robot, supply, payload, own effects.
 
-    Another plant `name` is taken as it stands, but on the task's robot, unless its own file names
+    Another plant `name` is used unchanged, but on the task's robot, unless its own file names
     one, and with the task's supply and payload.
     """
     file = (Path(run) if Path(run).is_dir() else Path(run).parent) / "task.yaml"

@@ -11,13 +11,14 @@ from kemba.plant.stepping.arrays import Array
 
 @dataclass(frozen=True)
 class Estimate:
-    """A value and its 95 % interval; the interval is NaN where too few data tell."""
+    """A value and its 95 % interval; the interval is NaN where the data are too few."""
 
     value: float
     low: float = float("nan")
     high: float = float("nan")
 
     def as_dict(self) -> dict[str, float]:
+        """The figures as plain data for JSON."""
         return {"value": self.value, "low": self.low, "high": self.high}
 
 

@@ -98,8 +98,11 @@ def locked(x: float) -> ImposedMotion:
 
 
 def stroke(begin: float, speed: float, after: float, ramp: float, stop: float) -> ImposedMotion:
-    """Held at `begin` [m] until `after` [s], then moved at `speed` [m/s] reached within `ramp`
-    [s], until `stop` [m]."""
+    """A stroke: at rest at `begin` [m] until `after` [s], then moved at `speed` [m/s] to `stop`
+    [m].
+
+    The speed is reached within `ramp` [s]. Raises KembaError where the way is too short for it.
+    """
     acceleration = speed / ramp
     reach = begin + 0.5 * acceleration * ramp**2
 

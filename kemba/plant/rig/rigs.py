@@ -87,6 +87,7 @@ class LockedRig(Rig):
     duration: Second = 0.35
 
     def tests(self, rng: np.random.Generator, stroke: float) -> Iterator[Test]:
+        """As of every rig. Raises KembaError where a position is outside of the stroke."""
         positions = (0.0, stroke) if self.positions is None else self.positions
         for x in positions:
             if x > stroke:

@@ -111,7 +111,7 @@ def find_rises(log: Trajectory, stroke: float) -> Iterator[Rise]:
 def _rise(
     log: Trajectory, edge: int, stop: int, sign: float, chamber: str
 ) -> dict[str, Any] | None:
-    """The answer to the switching at row `edge`, until row `stop`; None where it tells nothing."""
+    """The answer to the switching at row `edge`, until row `stop`; None where it shows nothing."""
     limits = RiseSettings.current()
     force, time = sign * log["piston/F"], log.time[edge - 1 : stop] - log.time[edge]
     before = float(force[max(edge - 20, 0) : edge].mean())

@@ -112,5 +112,5 @@ def _text(value: float | None, digits: int = 0) -> str:
 
 
 def _width(e: Estimate, scale: float, digits: int) -> str:
-    """Half the interval; nothing where too few data tell."""
+    """Half the interval; nothing where the data are too few."""
     return _text(0.5 * scale * (e.high - e.low), digits) if e.low == e.low else ""

@@ -53,7 +53,7 @@ class Machine:
         return np.zeros(len(trajectory)) if optional else None
 
     def _knee(self, leg: str, extension: Array) -> Array:
-        """Knee angles [rad] of piston extensions [m], from a table so fine that none can tell."""
+        """Knee angles [rad] of piston extensions [m], from a table with a fine grid."""
         table = np.linspace(-OVERTRAVEL, self.mechanism.stroke + OVERTRAVEL, 2001)
         bend = [knee.flexion(self.robot.leg, x) for x in table]
         return np.asarray(self.robot.legs[leg].fold * np.interp(extension, table, bend))
@@ -87,7 +87,7 @@ def load_machine(model: str = "planning", supply: float | None = None) -> Machin
 
 
 def _limits(model: Model) -> dict[str, tuple[float, ...]]:
-    """Stroke, peak torque and steady chamber forces, as far as the model knows them."""
+    """Stroke, peak torque and steady chamber forces, as far as the model has them."""
     known: dict[str, tuple[float, ...]] = {"piston/x": (0.0, model.mechanism.stroke)}
     for (_, symbol), quantity in model.inputs.items():
         if symbol == "tau":

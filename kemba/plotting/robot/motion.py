@@ -90,7 +90,7 @@ def name_sources(figure: Figure, sources: Sequence[Source]) -> None:
 
 
 def _legs(sources: Sequence[Source], machine: Machine) -> tuple[str, ...]:
-    """The legs that any source knows, front first as the robot lists them."""
+    """The legs of all sources, in the order of the robot."""
     named = {name.split("/")[0] for source in sources for name in source.trajectory.names}
     return tuple(leg for leg in machine.mechanism.legs if leg in named)
 

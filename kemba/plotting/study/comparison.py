@@ -56,6 +56,7 @@ def columns_of(listed: Sequence[ConditionBin]) -> list[list[Column]]:
 
 
 def place_of(column: Column) -> tuple[int, str, int]:
+    """Sort key of a column: place of its phase, valve mode, place of its region."""
     phase, mode, region = column
     return PHASES.index(phase) if phase in PHASES else len(PHASES), mode, REGIONS.index(region)
 
@@ -120,7 +121,7 @@ def _bands(room: SubFigure, bands: Sequence[Band]) -> None:
 
 
 def panels_of(found: Sequence[ForceProfile]) -> list[ForceProfile]:
-    """Of the force channel that lacks most: its quantities, and the command that tells most."""
+    """Of the force channel that lacks most: its quantities, and the command that explains most."""
     own = [profile for profile in found if profile.channel == found[0].channel]
     sent = [profile for profile in own if profile.quantity.startswith("after ")]
     best = max(sent, key=lambda profile: profile.gain, default=None)
