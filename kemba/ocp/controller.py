@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from kemba.model import Model
-from kemba.ocp.edges import rounded
+from kemba.ocp.edges import Valve, rounded
 from kemba.trajectory import Trajectory
 
 PERIOD = 1e-3  # s
@@ -55,15 +55,15 @@ def _means(time: np.ndarray, values: np.ndarray, clock: np.ndarray) -> np.ndarra
 def _valves(model: Model, plan: Trajectory, lead: int, rows: int) -> dict[str, np.ndarray]:
     """The commands (rows,) of every valve such that they act as planned."""
     names, edges = [], []
-    for leg in model.mechanism.legs:
+    for i, leg in enumerate(model.mechanism.legs):
         on, off = model.timing(leg)
-        for chamber in ("extend", "retract"):
+        for chamber, force in (("extend", 1.0), ("retract", -1.0)):
             name = f"{leg}/valve/{chamber}"
             value = np.round(plan[name][1:])  # an interrupted plan may not be binary yet
             k = np.flatnonzero(np.diff(value, prepend=0.0))
             early = plan.time[k] - plan.time[0] - np.where(value[k] > 0.5, on, off)
             names.append(name)
-            edges.append((lead + early / PERIOD).tolist())
+            edges.append(Valve((lead + early / PERIOD).tolist(), i, force))
     found = {}
     for name, switched in zip(names, rounded(edges), strict=True):
         found[name] = np.zeros(rows)
