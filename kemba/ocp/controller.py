@@ -49,7 +49,8 @@ def _means(time: np.ndarray, values: np.ndarray, clock: np.ndarray) -> np.ndarra
     knots = np.append(time, time[-1] + 2 * PERIOD)
     held = np.append(values[1:], values[-1])
     integral = np.concatenate([[0.0], np.cumsum(held * np.diff(knots))])
-    return np.diff(np.interp(np.append(clock, clock[-1] + PERIOD), knots, integral)) / PERIOD
+    means: np.ndarray = np.diff(np.interp([*clock, clock[-1] + PERIOD], knots, integral)) / PERIOD
+    return means
 
 
 def _valves(model: Model, plan: Trajectory, lead: int, rows: int) -> dict[str, np.ndarray]:
