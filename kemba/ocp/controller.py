@@ -5,34 +5,36 @@ from __future__ import annotations
 import numpy as np
 
 from kemba.model import Model
+from kemba.ocp.edges import Valve, rounded
 from kemba.trajectory import Trajectory
 
 PERIOD = 1e-3  # s
 
 
 def controller_table(model: Model, plan: Trajectory) -> Trajectory:
-    """Hip angles, rates and torques interpolated; valves held, switched the dead time early.
+    """What the controller plays, one row a tick; each row holds until the next.
 
     Time starts at the first command: plan time plus the lead, in which the first pose is held.
-    Torques stand at the middle of the step on which they act. Valves stay exactly 0 or 1.
+    Hip angles and rates are the plan's at the tick, because the controller compares them with what
+    it measures there. The torque is the mean of the plan over the tick, so that the angular
+    impulse is the plan's. Valves are exactly 0 or 1, sent their dead time early, and their edges
+    are rounded to ticks all together: see `kemba.ocp.edges`.
     """
-    lead = float(np.ceil(max(max(model.timing(leg)) for leg in model.mechanism.legs) / PERIOD))
+    lead = int(np.ceil(max(max(model.timing(leg)) for leg in model.mechanism.legs) / PERIOD - 1e-9))
     duration = plan.time[-1] - plan.time[0]
-    ticks = np.arange(int(lead + np.ceil(duration / PERIOD - 1e-9)) + 1)
+    ticks = np.arange(lead + int(np.ceil(duration / PERIOD - 1e-9)) + 1)
     clock = plan.time[0] + (ticks - lead) * PERIOD
     columns: dict[str, np.ndarray] = {}
-    states = plan.interpolate(clock)
+    states, valves = plan.interpolate(clock), _valves(model, plan, lead, len(ticks))
     for leg in model.mechanism.legs:
         for symbol in ("q", "w"):
             header = f"{leg}/hip/{symbol} [rad{'.s-1' if symbol == 'w' else ''}]"
             columns[header] = states[f"{leg}/hip/{symbol}"]
-        middle = 0.5 * (plan.time[1:] + plan.time[:-1])
-        torque = np.interp(clock, middle, plan[f"{leg}/hip/tau"][1:])
-        columns[f"{leg}/hip/tau [N.m]"] = np.where(clock < plan.time[0], 0.0, torque)
-        on, off = model.timing(leg)
+        torque = _means(plan.time, plan[f"{leg}/hip/tau"], clock)
+        columns[f"{leg}/hip/tau [N.m]"] = np.where(ticks < lead, 0.0, torque)
         for chamber in ("extend", "retract"):
             name = f"{leg}/valve/{chamber}"
-            columns[f"{name} [1]"] = _early(plan.time, plan[name], clock, on, off)
+            columns[f"{name} [1]"] = valves[name]
     for name in ("body/x", "body/z", "body/pitch"):
         columns[f"{name} [{plan.unit(name)}]"] = states[name]
     for leg in model.mechanism.legs:
@@ -42,15 +44,30 @@ def controller_table(model: Model, plan: Trajectory) -> Trajectory:
     )
 
 
-def _early(
-    time: np.ndarray, valve: np.ndarray, clock: np.ndarray, on: float, off: float
-) -> np.ndarray:
-    """A valve's command (ticks,) such that it acts as planned: value k on (t[k-1], t[k]]."""
-    command, before = np.zeros(len(clock)), 0.0
-    for k in range(1, len(time)):
-        value = float(round(valve[k]))  # an interrupted plan may not be binary yet
-        if value != before:
-            start = time[k - 1] - (on if value > before else off)
-            command[int(np.searchsorted(clock, start - PERIOD / 2)) :] = value
-            before = value
-    return command
+def _means(time: np.ndarray, values: np.ndarray, clock: np.ndarray) -> np.ndarray:
+    """Means over the ticks (n,) of what is values[k] on (t[k-1], t[k]]; the last value stays."""
+    knots = np.append(time, time[-1] + 2 * PERIOD)
+    held = np.append(values[1:], values[-1])
+    integral = np.concatenate([[0.0], np.cumsum(held * np.diff(knots))])
+    means: np.ndarray = np.diff(np.interp([*clock, clock[-1] + PERIOD], knots, integral)) / PERIOD
+    return means
+
+
+def _valves(model: Model, plan: Trajectory, lead: int, rows: int) -> dict[str, np.ndarray]:
+    """The commands (rows,) of every valve such that they act as planned."""
+    names, edges = [], []
+    for i, leg in enumerate(model.mechanism.legs):
+        on, off = model.timing(leg)
+        for chamber, force in (("extend", 1.0), ("retract", -1.0)):
+            name = f"{leg}/valve/{chamber}"
+            value = np.round(plan[name][1:])  # an interrupted plan may not be binary yet
+            k = np.flatnonzero(np.diff(value, prepend=0.0))
+            early = plan.time[k] - plan.time[0] - np.where(value[k] > 0.5, on, off)
+            names.append(name)
+            edges.append(Valve((lead + early / PERIOD).tolist(), i, force))
+    found = {}
+    for name, switched in zip(names, rounded(edges), strict=True):
+        found[name] = np.zeros(rows)
+        for i, tick in enumerate(switched):
+            found[name][tick:] = float(i % 2 == 0)
+    return found

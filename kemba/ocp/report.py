@@ -41,6 +41,7 @@ def answer(plan: Plan, run: str) -> dict[str, Any]:
             "bounds": certificate.bounds,
         },
         "replay": None,
+        "table_replay": None,
         "plant_replay": None,
         "good": plan.status is Status.SOLVED,
         "ignored": plan.model.ignored,

@@ -39,6 +39,13 @@ def report_run(run: str | Path, out: str | Path | None = None) -> Path:
     return write_page(out or found.path / "report.html", title, "\n".join(parts))
 
 
+WAYS = (
+    ("replay", "replay, same model"),
+    ("table_replay", "controller.csv, same model"),
+    ("plant_replay", "on the plant"),
+)
+
+
 def _tables(answer: Mapping[str, Any]) -> Iterable[str]:
     cost = answer["cost"]
     yield _table("plan", [
@@ -49,7 +56,7 @@ def _tables(answer: Mapping[str, Any]) -> Iterable[str]:
         ("open valves", f"{cost['valve_open_s']:.3f} s"),
     ])  # fmt: skip
     yield _table("residuals", [(k, f"{v:.1e}") for k, v in answer["residuals"].items()])
-    for key, title in (("replay", "replay, same model"), ("plant_replay", "on the plant")):
+    for key, title in WAYS:
         if answer.get(key):
             yield _table(f"{title}: off the plan by", _executed(answer[key]))
     yield _table("solving", [

@@ -136,6 +136,7 @@ def _client(scheduler: str | None, jobs: int | None, most: int) -> Iterator[Any]
     import dask
     from distributed import Client, LocalCluster
 
+    count = min(jobs or os.cpu_count() or 1, most)
     if scheduler is not None:
         check_scheduler(scheduler)
         try:
@@ -153,7 +154,7 @@ def _client(scheduler: str | None, jobs: int | None, most: int) -> Iterator[Any]
             }
         ),
         LocalCluster(
-            n_workers=min(jobs or os.cpu_count() or 1, most),
+            n_workers=count,
             threads_per_worker=1,
             processes=True,
             dashboard_address=None,
@@ -163,4 +164,6 @@ def _client(scheduler: str | None, jobs: int | None, most: int) -> Iterator[Any]
         ) as cluster,
         Client(cluster, set_as_default=False) as client,
     ):
+        # a worker that could not be started again, as on a machine short of time, is replaced
+        cluster.adapt(minimum=count, maximum=count)
         yield client

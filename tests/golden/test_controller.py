@@ -1,4 +1,4 @@
-"""The controller table of a plan made by hand, as it has always been, to the last digit."""
+"""The controller table of a plan made by hand, to the last digit."""
 
 from __future__ import annotations
 

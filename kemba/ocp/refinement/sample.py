@@ -20,7 +20,8 @@ def to_trajectory(program: PhaseProgram, x: np.ndarray) -> Trajectory:
     """Every quantity of the model at element ends, just before an impact there.
 
     `x` (size,): scaled variables. Inputs and forces of a row act on the interval before it; at the
-    first node they are zero.
+    first node they are zero. Impacts are not in the forces: their impulses on the feet have
+    columns of their own.
     """
     layout, c = program.layout, program.columns
     nodes = program.nodes
@@ -44,7 +45,27 @@ def to_trajectory(program: PhaseProgram, x: np.ndarray) -> Trajectory:
     values["lam"] = _slip_speeds(program, values["q"], values["v"], values["lam"])
     times = np.concatenate([[0.0], np.cumsum(h)])
     a, sd = layout.full(rates, "v"), layout.full(rates, "s")
-    return written(program.model, program.task.name, times, values, a, sd)
+    plan = written(program.model, program.task.name, times, values, a, sd)
+    return plan.with_columns(_impulses(program, x))
+
+
+def _impulses(program: PhaseProgram, x: np.ndarray) -> dict[str, np.ndarray]:
+    """Columns of the impulses [N.s] on the feet, in the row of their impact; zero elsewhere."""
+    layout, c = program.layout, program.columns
+    Y = np.zeros((program.nodes + 1, layout.size))
+    for p in program.impacts:
+        Y[program.phases[p].first, layout.slices["lam"]] = x[c.impulse[p]] * STEP
+    _split_friction(program, Y)
+    names = [quantity.name for quantity in program.model.forces.values()]
+    at = dict(zip(names, layout.full(Y, "lam").T, strict=True))
+    columns = {}
+    for leg in program.model.mechanism.legs:
+        forward, backward = (at.get(f"{leg}/foot/Fx_{way}") for way in ("forward", "backward"))
+        if forward is not None and backward is not None:
+            columns[f"{leg}/foot/impulse_x [N.s]"] = forward - backward
+        if f"{leg}/foot/Fz" in at:
+            columns[f"{leg}/foot/impulse_z [N.s]"] = at[f"{leg}/foot/Fz"]
+    return columns
 
 
 def _split_friction(program: PhaseProgram, Y: np.ndarray) -> None:

@@ -61,8 +61,9 @@ class Solver(Section):
 class Tolerances(Section):
     """What the certificate accepts: residuals of the plan, and how far its executions may miss.
 
-    `apex`, `touchdown` and `final` hold for the replay on the same model, `plant_apex` on the
-    plant; a plan that ends standing must land upright on both.
+    `apex`, `touchdown` and `final` hold for the replay on the same model, `table_...` for the
+    controller's table on that model, `plant_...` for the table on the plant; a plan that ends
+    standing must land upright on all three.
     """
 
     complementarity: Annotated[float, Param("1", lower=0.0)] = 1e-6
@@ -71,7 +72,12 @@ class Tolerances(Section):
     apex: Annotated[float, Param("m", lower=0.0, doc="replayed apex against plan")] = 0.002
     touchdown: Annotated[float, Param("s", lower=0.0, doc="replayed touchdown")] = 0.002
     final: Annotated[float, Param("m", lower=0.0, doc="where the replay ends")] = 0.03
+    table_apex: Annotated[float, Param("m", lower=0.0, doc="apex of the table")] = 0.002
+    table_touchdown: Annotated[float, Param("s", lower=0.0, doc="touchdown of the table")] = 0.003
+    table_final: Annotated[float, Param("m", lower=0.0, doc="where the table ends")] = 0.03
     plant_apex: Annotated[float, Param("m", lower=0.0, doc="apex on the plant")] = 0.05
+    plant_touchdown: Annotated[float, Param("s", lower=0.0, doc="touchdown on the plant")] = 0.015
+    plant_final: Annotated[float, Param("m", lower=0.0, doc="where the plant ends")] = 0.05
 
 
 class Task(Section):

@@ -1,4 +1,4 @@
-"""What a plan is worth: its replay on the same model, and its execution on the full plant."""
+"""What a plan is worth: its inputs and its table on the same model, its table on the plant."""
 
 from __future__ import annotations
 
@@ -18,16 +18,20 @@ SETTLE = 0.3  # s; the last commands are held before a landing is judged
 def replays(
     model: Model, plan: Trajectory, controller: Trajectory, plant: str | Model | None = PLANT
 ) -> dict[str, Any]:
-    """The entries `replay` and `plant_replay` of the certificate.
+    """The entries `replay`, `table_replay` and `plant_replay` of the certificate.
 
-    On the plant a plan that ends standing, with its valves closed, has a moment to come to rest
-    before its landing is judged. `plant_replay` is None without a plant; either is None where a
+    `replay` plays the inputs of the plan on its own model, `table_replay` the controller's table
+    through eq. 10 and the dead time on the same model, `plant_replay` that table on the plant.
+
+    With the table a plan that ends standing, with its valves closed, has a moment to come to rest
+    before its landing is judged. `plant_replay` is None without a plant; any is None where a
     plan that was not solved cannot even be started.
     """
     full = load_model(plant) if isinstance(plant, str) else plant
     rest = SETTLE if ends_standing(model, plan) and _closed(controller) else 0.0
     return {
         "replay": _tried(lambda: replay(model, plan)),
+        "table_replay": _tried(lambda: execute(controller, model, extra=rest).against(model, plan)),
         "plant_replay": full
         and _tried(lambda: execute(controller, full, extra=rest).against(full, plan)),
     }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +11,10 @@ import numpy as np
 from kemba.effects.mechanics.motor import Motor
 from kemba.errors import KembaError
 from kemba.model import Model
-from kemba.plant.execution.replay import Replay, first_row, judge
-from kemba.plant.simulation.commands import Commands, Feedback, Profile, Sense
+from kemba.plant.execution.replay import ON_GROUND, Replay, first_row, judge
+from kemba.plant.simulation.commands import SAME_TIME, Commands, Feedback, Profile, Sense
 from kemba.plant.simulation.simulate import STEP, Simulated, run
+from kemba.plant.simulation.start import lowest_foot
 from kemba.plant.stepping.arrays import Array
 from kemba.trajectory import Trajectory
 
@@ -60,9 +61,10 @@ def execute(
 ) -> Execution:
     """Play a controller table (a run folder, `controller.csv`, or its trajectory) on `model`.
 
-    The robot starts at rest in the table's first pose, changed by `start`; after the last row the
-    last commands stay for `extra` [s]. `valves` replace the table's. Raises KembaError when the
-    table lacks a column.
+    The robot starts at rest in the table's first pose, changed by `start`. A robot that starts in
+    the air is held until plan time 0, the end of the lead; its motion begins there. After the last
+    row the last commands stay for `extra` [s]. `valves` replace the table's. Raises KembaError when
+    the table lacks a column.
     """
     table = read_controller(controller)
     gains = gains or Gains(*(table.meta.get(k, v) for k, v in vars(Gains()).items()))
@@ -71,17 +73,28 @@ def execute(
         for quantity in model.inputs.values()
         if quantity.binary
     }
-    commands = Commands({**profiles, **(valves or {})}, hip_feedback(model, table, gains), PERIOD)
-    done = run(
-        model,
-        {**first_row(model, table), **(start or {})},
-        commands,
-        float(table.time[-1] - table.time[0]) + extra,
-        step,
-        sample,
-        dead_time,
-    )
-    return Execution(done, table, float(table.meta.get("lead", 0.0)))
+    lead = float(table.meta.get("lead", 0.0))
+    pose = {**first_row(model, table), **(start or {})}
+    held = lead if lowest_foot(model, pose) > ON_GROUND else 0.0
+    sent = {n: Profile(p.times - held, p.values) for n, p in {**profiles, **(valves or {})}.items()}
+    feedback = hip_feedback(model, table, gains)
+    commands = Commands(sent, lambda time, sense: feedback(time + held, sense), PERIOD)
+    duration = float(table.time[-1] - table.time[0]) + extra - held
+    if np.ndim(sample):
+        sample = np.asarray(sample) - held
+        sample = sample[(sample >= -SAME_TIME) & (sample <= duration + SAME_TIME)]
+    done = run(model, pose, commands, duration, step, sample, dead_time)
+    return Execution(_later(done, held), table, lead)
+
+
+def _later(done: Simulated, held: float) -> Simulated:
+    """The simulated motion with `held` [s] added to its times."""
+    if not held:
+        return done
+    t = done.trajectory
+    columns = {h: t[n] for h, n in zip(t.headers, t.names, strict=True)}
+    impacts = tuple(replace(impact, time=impact.time + held) for impact in done.impacts)
+    return Simulated(Trajectory(t.time + held, columns, t.meta), impacts)
 
 
 def read_controller(source: Trajectory | str | Path) -> Trajectory:

@@ -14,13 +14,15 @@ from kemba.trajectory import Trajectory
 
 ON_GROUND = 1e-3  # m; planned feet below this count as standing
 UPRIGHT = 0.35  # rad; a landing with more pitch has failed
+LASTS = 0.02  # s; a shorter contact is no touchdown, unless it takes as much as the weight in that
 
 
 @dataclass(frozen=True)
 class Replay:
     """How far an executed plan ends from the plan; errors are executed minus planned.
 
-    `touchdown_error_s` is None when either does not touch down after its apex. `fault`: what the
+    `touchdown_error_s`, of the first touchdown that carries the body, is None when either has none
+    after its apex. `fault`: what the
     robot does wrong (`tips over`). It is None when at the end the feet that stand in the plan
     stand, the body is upright, and neither a hip nor a knee met the ground.
     """
@@ -78,11 +80,13 @@ def judge(model: Model, plan: Trajectory, clock: Array, done: Simulated) -> Repl
     real = done.trajectory
     planned = int(np.argmax(plan["body/z"]))
     apex_time, apex = peak(real.time, real["body/z"])
-    was = touchdown(plan, clock, float(clock[planned]), ON_GROUND / 10)
-    now = touchdown(real, real.time, apex_time, 1e-6)
+    weight = model.mechanism.weight
+    was = touchdown(plan, clock, float(clock[planned]), ON_GROUND / 10, weight)
+    now = touchdown(real, real.time, apex_time, 1e-6, weight)
     impacts = [i.time for i in done.impacts if any("contact:" in label for label in i.labels)]
     if now is not None:  # the sample grid is coarser than the impact's own time
-        now = min([i for i in impacts if apex_time < i <= now + 1e-9], default=now)
+        before = max(apex_time, float(real.time[real.time < now - 1e-9].max(initial=-np.inf)))
+        now = min([i for i in impacts if before < i <= now + 1e-9], default=now)
     final = np.array([real[name][-1] - plan[name][-1] for name in ("body/x", "body/z")])
     return Replay(
         apex_error_m=apex - float(plan["body/z"][planned]),
@@ -103,14 +107,25 @@ def peak(time: Array, z: Array) -> tuple[float, float]:
     return float(time[i] + shift), float(c + shift * (b + a * shift))
 
 
-def touchdown(t: Trajectory, clock: Array, after: float, low: float) -> float | None:
-    """The first time [s] after `after` at which a foot in the air comes below `low` [m]."""
-    feet = [t[name] for name in t.names if name.endswith("foot/z")]
+def touchdown(t: Trajectory, clock: Array, after: float, low: float, weight: float) -> float | None:
+    """When [s] a foot that was in the air first stands, after `after`; None if no foot does.
+
+    A foot touches while it is below `low` [m]. A contact counts if it lasts 20 ms or to the end, or
+    if its force adds up to what the weight [N] does in 20 ms, which stops a fall of 0.2 m/s. A foot
+    that grazes the ground on its way does neither, and nobody would call it a landing.
+    """
     times = []
-    for z in feet:
-        down = (z <= low) & (clock > after)
-        was_up = np.r_[False, z[:-1] > low]
-        times += clock[down & was_up].tolist()
+    for name in (name for name in t.names if name.endswith("foot/z")):
+        down = t[name] <= low
+        force = t[f"{name[:-1]}Fz"] if f"{name[:-1]}Fz" in t else np.zeros(len(t))
+        edges = np.flatnonzero(np.diff(down.astype(int), prepend=1, append=0))
+        starts = [i for i in edges if i < len(t) and down[i]]
+        for i in starts:
+            end = int(edges[edges > i][0])  # the first row in the air again
+            took = float(np.trapezoid(force[i:end], clock[i:end]))
+            lasts = end == len(t) or clock[end] - clock[i] >= LASTS
+            if clock[i] > after and (lasts or took >= LASTS * weight):
+                times.append(float(clock[i]))
     return min(times, default=None)
 
 

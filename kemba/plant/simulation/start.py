@@ -43,8 +43,13 @@ def initial_values(model: Model, values: Mapping[str, float]) -> tuple[Array, Ar
     return q, v, s
 
 
+def lowest_foot(model: Model, values: Mapping[str, float]) -> float:
+    """Height [m] of the lowest foot in the pose of `initial_values`. Raises KembaError likewise."""
+    return _lowest_foot(model, initial_values(model, values)[0])
+
+
 def _lowest_foot(model: Model, q: Array) -> float:
-    """Height [m] of the lowest foot."""
+    """Height [m] of the lowest foot at coordinates q (nq,)."""
     mechanism = model.mechanism
     feet = [mechanism.port(f"{leg}/foot/z").phi for leg in mechanism.legs]
     height = ca.Function("feet", [mechanism.q], [ca.mmin(ca.vertcat(*feet))])
