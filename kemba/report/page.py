@@ -18,9 +18,7 @@ Rows = Iterable[tuple[str, Any]]
 def report_run(run: str | Path, out: str | Path | None = None) -> Path:
     """Write the page of a run folder to `out`, by default `report.html` in it.
 
-    The page needs no other file.
-
-    Raises KembaError when the run has no certificate.
+    The page needs no other file. Raises KembaError when the run has no certificate.
     """
     found = load_run(run)
     answer = found.certificate

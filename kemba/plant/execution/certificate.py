@@ -1,4 +1,4 @@
-"""What a plan is worth: its replay on the same model, and its execution on the full plant."""
+"""How well a plan executes: replayed on the same model, and on the full plant."""
 
 from __future__ import annotations
 
