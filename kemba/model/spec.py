@@ -129,4 +129,19 @@ def load_model(
     rig: bool = False,
 ) -> Model:
     """Load and build in one step. Raises KembaError with every mistake of the YAML."""
-    return build_model(load_spec(name), extra, supply, rig)
+    spec = load_spec(name)
+    try:
+        return build_model(spec, extra, supply, rig)
+    except KembaError as error:
+        raise _at_its_line(error, name) from None
+
+
+def _at_its_line(error: KembaError, name: str | Path) -> KembaError:
+    """An error about `effects.NAME` at the line of the file that lists this effect."""
+    for path, spec in model_chain(name):
+        for i, effect in enumerate(spec.effects):
+            if error.where == f"effects.{effect.name}":
+                what = f"effects.{effect.name}: {error.what}"
+                document = load_yaml(path)
+                return document.error(("effects", i), what, error.expected, error.hint)
+    return error

@@ -188,3 +188,12 @@ def test_a_wrong_robot_is_told(tmp_path: Path, change: dict[str, str], told: str
 
 def test_files_of_a_robot() -> None:
     assert [path.name for path in robot_files("hound")] == ["hound.yaml", "dsnu-25-70.yaml"]
+
+
+def test_an_effect_on_a_leg_that_is_not_there_is_told_at_its_line(tmp_path: Path) -> None:
+    model = tmp_path / "m.yaml"
+    model.write_text("base: planning\neffects:\n  - {kind: seal_friction, F_c: 5 N, on: fron}\n")
+    with pytest.raises(KembaError) as caught:
+        load_model(model)
+    assert caught.value.where == f"{model}:3:5"
+    assert "has no leg 'fron'" in caught.value.what and "'front'" in caught.value.hint
