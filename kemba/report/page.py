@@ -47,9 +47,9 @@ def _tables(answer: Mapping[str, Any]) -> Iterable[str]:
         ("open valves", f"{cost['valve_open_s']:.3f} s"),
     ])  # fmt: skip
     yield _table("residuals", [(k, f"{v:.1e}") for k, v in answer["residuals"].items()])
-    for key, title in (("replay", "replay, same model"), ("plant_replay", "on the plant")):
+    for key, title in (("replay", "re-simulation"), ("plant_replay", "simulated robot")):
         if answer.get(key):
-            yield _table(f"{title}: off the plan by", _executed(answer[key]))
+            yield _table(f"{title}: difference from the plan", _executed(answer[key]))
     yield _table("solving", [
         ("time", f"{answer['solve_s']:.2f} s"),
         ("CPU", f"{answer['solve_cpu_s']:.2f} s"),
