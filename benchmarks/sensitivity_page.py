@@ -77,6 +77,11 @@ def write(changes: Sequence[Change], records: Sequence[Record]) -> None:
         own = [r for r in records if r["case"].partition(":")[0] == verb]
         if own:
             parts.append(section(verb, title, changes, own))
+    studied = {r["setting"] for r in records}
+    missing = sorted({c.name for c in changes} - studied)
+    if missing:
+        listed = ", ".join(f"`{name}`" for name in missing)
+        parts.append(f"## Not studied yet\n\nNo case of these was run: {listed}.\n")
     PAGE.write_text("\n".join(parts), encoding="utf-8")
     print(f"{PAGE.name}: {len(records)} records")
 

@@ -17,6 +17,7 @@ from kemba.identify.compare.force_profiles import (
     risen,
 )
 from kemba.identify.compare.tolerance import Slopes
+from kemba.identify.evidence.spike_slab import SpikeSlabSettings
 from kemba.identify.evidence.windows import codes
 from kemba.identify.problem.problem import Array, Changes, Labels, Problem, Rows
 from kemba.settings import BY_HAND, Settings, setting
@@ -37,9 +38,6 @@ class HintSettings(Settings):
     )
     information: float = setting(
         4.0, "1", "information on a parameter, per size squared, that a run must give", BY_HAND
-    )
-    slack: float = setting(
-        0.1, "1", "sizes by which a parameter may differ between runs", BY_HAND, decides=True
     )
 
 
@@ -168,14 +166,15 @@ def _agreement(information: Array, pull: Array) -> float:
     """p value of one value for all groups.
 
     `information` (g, g) on a value for each group; `pull` (g,): slope of the log likelihood where
-    all values are zero.
+    all values are zero. No model is exact: each group's value may be off by the share of its size
+    that the spike of the prior allows.
     """
     if len(pull) < 2:
         return 1.0
-    slack = HintSettings.current().slack
+    imperfect = SpikeSlabSettings.current().spike
     spread = np.linalg.pinv(information, rcond=1e-9, hermitian=True)
     a = spread @ pull
-    certainty = np.linalg.inv(spread + slack**2 * np.eye(len(a)))
+    certainty = np.linalg.inv(spread + imperfect**2 * np.eye(len(a)))
     ones = np.ones(len(a))
     apart = a - ones @ certainty @ a / (ones @ certainty @ ones)
     return float(chi2.sf(apart @ certainty @ apart, len(a) - 1))

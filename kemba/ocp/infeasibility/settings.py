@@ -65,7 +65,7 @@ class ElasticSolve(Settings):
     )
     price: float = setting(
         100.0, "1", "of one unit of scaled slack, beside a cost of 0.01 to 10",
-        "derived: above every cost of the task, so no violation pays for one", decides=True,
+        "derived: above every cost of the task, so that no violation pays", decides=True,
     )  # fmt: skip
     cheap: float = setting(
         0.01, "1", "factor on the task's costs", "convention: far below the price of slack"
