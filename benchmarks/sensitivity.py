@@ -1,5 +1,5 @@
 # ruff: noqa: E402  (the twin is found first)
-"""What hangs on the thresholds? Each one is halved and doubled over a fixed sample of cases.
+"""How much depends on the thresholds? Each one is halved and doubled over a fixed sample of cases.
 
     python benchmarks/sensitivity.py --bench 12 --robot 8 --part 1/2 --jobs 1
     python benchmarks/sensitivity.py --verbs schedule --only Relaxation

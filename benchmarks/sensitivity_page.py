@@ -19,9 +19,9 @@ VERBS = {
     "compare": "Verdicts of `compare`: good, tolerable or bad, and the kinds of its hints",
     "schedule": "Plans: good or not",
 }
-HEAD = """# What hangs on the thresholds
+HEAD = """# Sensitivity to the thresholds
 
-A threshold on which a verdict hangs is a setting (`kemba/settings.py`) that is marked `decides`.
+A threshold on which a verdict depends is a setting (`kemba/settings.py`) that is marked `decides`.
 `benchmarks/sensitivity.py` halves and doubles each of them, one at a time, and counts the verdicts
 that change. A verdict should follow from the data, so none of these numbers should matter much. A
 threshold whose doubling changes more than 5 % of the verdicts is **bold**: it needs a reason better

@@ -1,4 +1,4 @@
-"""Streams and options shared by the verbs: results on stdout, talk on stderr."""
+"""Streams and options shared by the verbs: results on stdout, messages on stderr."""
 
 from __future__ import annotations
 

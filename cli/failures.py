@@ -43,7 +43,7 @@ def guarded(verb: Callable[..., None]) -> Callable[..., None]:
             raise typer.Exit(INTERRUPTED) from None
         except Exception as error:
             if isinstance(error, OSError) and error.errno == errno.EPIPE:
-                raise  # the reader of our output went away; click leaves quietly
+                raise  # the reader of our output has closed it; click exits without a message
             if isinstance(error, OSError) and error.errno in OF_THE_DISK:
                 typer.echo(_disk(error), err=True)
                 raise typer.Exit(BAD_ANSWER) from None
@@ -68,7 +68,7 @@ def _disk(error: OSError) -> str:
 
 
 def _crash(error: Exception) -> str:
-    """What to say about an exception nobody expected: short, or all of it with KEMBA_DEBUG."""
+    """The message on an unexpected exception: short, or the traceback with KEMBA_DEBUG."""
     whole = "".join(traceback.format_exception(error))
     if os.environ.get("KEMBA_DEBUG"):
         return whole

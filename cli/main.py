@@ -86,5 +86,5 @@ def _flush() -> None:
         sys.stdout.flush()
     except OSError as error:
         typer.echo(f"the output cannot be written: {error.strerror}", err=True)
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nothing more to fail
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # no later write fails
         sys.exit(1)

@@ -5,11 +5,11 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 
-LISTED = 12  # more names than this in a hint help nobody
+LISTED = 12  # a hint with more names than this does not help
 
 
 class KembaError(Exception):
-    """Bad input, described so that its author can mend it.
+    """Bad input, described so that its author can correct it.
 
     `where` is a file position, an option or a name; `excerpt` holds lines shown below the message.
     """
@@ -31,7 +31,7 @@ class KembaError(Exception):
 
 
 class ConfigErrors(KembaError):  # noqa: N818  several errors, not one
-    """All the errors of one or several files, so that they can be mended in one go."""
+    """All the errors of one or several files, so that they can be corrected together."""
 
     def __init__(self, errors: Iterable[KembaError]) -> None:
         self.errors = list(errors)

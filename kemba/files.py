@@ -16,11 +16,11 @@ from kemba.errors import KembaError
 
 
 class WriteError(KembaError):
-    """A file or folder that cannot be written: another place must be given."""
+    """A file or folder that cannot be written: another place is needed."""
 
 
 class DiskFull(WriteError):  # noqa: N818
-    """There is no space left: the command was right, and runs again when there is."""
+    """There is no space left: the command was right and can be repeated later."""
 
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)

@@ -1,4 +1,4 @@
-"""Places for results: numbered when nobody named one, never overwritten, one writer at a time."""
+"""Places for results: numbered unless named, never overwritten, one writer at a time."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def held(folder: Path) -> Iterator[Path]:
 
 
 def lock_folder(folder: Path) -> BaseFileLock | None:
-    """Hold a folder against other processes, until `unlock` or the end of this process.
+    """Lock a folder against other processes, until `unlock` or the end of this process.
 
     None on a file system without locks. Raises KembaError when another process holds it.
     """
@@ -105,7 +105,7 @@ def lock_folder(folder: Path) -> BaseFileLock | None:
 
 
 def unlock(lock: BaseFileLock | None, folder: Path) -> None:
-    """Let a folder go."""
+    """Release a folder."""
     if lock is not None:
         with suppress(OSError):
             (folder / LOCK).unlink(missing_ok=True)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 @dataclass
 class Stopwatch:
-    """Wall and processor time [s] of everything done while it ran; not to be nested."""
+    """Wall and processor time [s] of everything done while it runs; do not nest it."""
 
     wall: float = 0.0
     cpu: float = 0.0

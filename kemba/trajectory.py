@@ -92,7 +92,7 @@ class Trajectory:
     def interpolate(self, times: Any, hold: Collection[str] = ()) -> Trajectory:
         """The columns at `times` (m,) in s, linear in between; those in `hold` keep their value.
 
-        Before the first and after the last row the end values stand.
+        Before the first and after the last row the end values are used.
         """
         for name in hold:
             self._known(name)

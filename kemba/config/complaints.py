@@ -1,4 +1,4 @@
-"""pydantic's errors in the words of the person who wrote the file."""
+"""pydantic's errors as messages for the author of the file."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ EXPECTED = {
     "dataclass_type": "a group of keys",
     "none_required": "nothing",
 }
-MOST = 50  # mistakes of one file; more help nobody and take long to find
+MOST = 50  # mistakes of one file; more do not help and take long to find
 SHOWN = 80  # characters of a value in a message
 UNKNOWN_KEY = ("extra_forbidden", "unexpected_keyword_argument")
 
@@ -80,7 +80,7 @@ def _all_types(entries: list[Complaint]) -> bool:
 
 
 def _any_below(place: Location, found: dict[Location, list[Complaint]]) -> bool:
-    """Whether another branch of the union got further, so that its error is the telling one."""
+    """Whether another branch of the union got further, so that its error is the one to show."""
     return any(len(other) > len(place) and other[: len(place)] == place for other in found)
 
 
@@ -99,7 +99,7 @@ def _merged(entries: list[Complaint], document: Document) -> tuple[Location, Kem
 
 
 def _report(found: Complaint, document: Document) -> KembaError:
-    """The report on an error that is more than a wrong type."""
+    """The report on an error other than a wrong type."""
     place = found.place
     if found.kind in UNKNOWN_KEY:
         names = [name for schema in found.holders for name in fields_of(schema)]
@@ -151,7 +151,7 @@ def _at(place: Location, what: str) -> str:
 
 
 def _shown(value: Any) -> str:
-    """A value as an author recognises it, long ones by their kind only."""
+    """A value as it is written in the file; of a long one only its kind."""
     names = {dict: "a group of keys", list: "a list", type(None): "nothing"}
     text = str(value)
     return names.get(type(value), f"'{text if len(text) <= SHOWN else text[:SHOWN] + '...'}'")

@@ -1,4 +1,4 @@
-"""YAML documents that remember where everything stands."""
+"""YAML documents with the line and column of every part."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def written(location: Location) -> str:
 
 
 def _excerpt(line: str, column: int) -> str:
-    """A line with a caret below the column, of a long one the part around it."""
+    """A line with a caret below the column; of a long line only the part around it."""
     start = max(0, column - WIDE // 2) if len(line) > WIDE else 0
     shown, column = line[start : start + WIDE], column - start
     before = "".join("\t" if char == "\t" else " " for char in shown[:column])
@@ -115,7 +115,7 @@ def _excerpt(line: str, column: int) -> str:
 
 
 def _twice(document: Document, location: Location, first: Mark, second: Mark) -> KembaError:
-    """A key that stands twice, at its second place; the first is named."""
+    """The error of a key that is given twice: at its second place, with the line of the first."""
     what = f"{written(location)}: this key stands twice"
     return document.error_at(*second, what, hint=f"its first value is in line {first[0] + 1}")
 

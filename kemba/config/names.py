@@ -12,7 +12,7 @@ NAME = rf"\w[\w .+-]{{0,{LONGEST - 1}}}"
 
 
 def check_name(name: str) -> str:
-    """The name, if it can be that of a file anywhere and leads nowhere else. Raises ValueError."""
+    """The name, if every system allows it as a file name and it is no path. Raises ValueError."""
     if not re.fullmatch(NAME, name):
         shown = name if len(name) <= LONGEST else f"{name[:LONGEST]}..."
         raise ValueError(

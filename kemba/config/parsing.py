@@ -53,10 +53,10 @@ def apply_overrides(document: Document, options: Iterable[str]) -> Document:
     """A copy of the document with `--set` options such as `goals.apex=0.5 m` applied.
 
     Values are YAML. A plain value for a group of `equals`, `at_least` or `at_most` means `equals`;
-    what else the group says stays. Whether the keys exist is judged by `parse`.
+    the rest of the group is kept. `parse` checks whether the keys exist.
 
-    Raises ConfigErrors with all options that are not `key=value` or lead through something that has
-    no keys.
+    Raises ConfigErrors with all options that are not `key=value` or that lead into a value without
+    keys.
     """
     data, overrides = document.data, dict(document.overrides)
     errors = []
@@ -119,7 +119,7 @@ def shipped_configs(folder: str) -> dict[str, Path]:
 
 
 def _is_file(path: Path) -> bool:
-    """Whether there is such a file; not for names that no file can have."""
+    """Whether there is such a file; False for names that no file can have."""
     try:
         return path.is_file()
     except (OSError, ValueError):  # too long, or with a zero in it
@@ -150,7 +150,7 @@ def _option(option: str, data: Any) -> tuple[Location, Any]:
 
 
 def _replaced(data: Any, location: Location, value: Any) -> Any:
-    """A copy of `data` with `value` at `location`; missing groups on the way are made."""
+    """A copy of `data` with `value` at `location`; missing groups are created."""
     if not location:
         plain = not isinstance(value, (dict, list)) and value is not None
         if plain and isinstance(data, dict) and RANGE & data.keys():

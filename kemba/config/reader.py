@@ -1,4 +1,4 @@
-"""Reading YAML text: plain data and where each part stands, within limits, running no code.
+"""Reading YAML text: plain data with the place of each part. Sizes are limited; no code is run.
 
 The parser is PyYAML's (libyaml where it is installed). Only its events are used; tags never
 choose a Python class.
@@ -22,7 +22,7 @@ CORE = "tag:yaml.org,2002:"
 
 
 class YamlLimits(Settings):
-    """How large a YAML file may be. Files of people are far below; a bomb is refused at once."""
+    """How large a YAML file may be. Real files are far smaller; a "YAML bomb" is refused."""
 
     size: int = setting(2_000_000, "B", "of a file", "convention: a second of reading")
     nodes: int = setting(
@@ -76,7 +76,7 @@ def read(text: str) -> Read:
 
 
 class _Builder:
-    """From events to a tree. Aliases share their tree, so that nothing grows here."""
+    """From events to a tree. Aliases share their tree, so they take no memory here."""
 
     def __init__(self, limits: YamlLimits) -> None:
         self.limits = limits
@@ -116,7 +116,7 @@ class _Builder:
         self.open.append((tree, [None]))
 
     def _add(self, tree: Tree, anchor: str | None) -> None:
-        """Put a node where the text has it: as a key, a value, an item, or the whole."""
+        """Add a node at its place: as a key, a value, an item, or the whole document."""
         self.count += 1
         if self.count > self.limits.nodes:
             raise YamlError(f"has more than {self.limits.nodes} keys and values", tree.mark)
@@ -182,7 +182,7 @@ class _Builder:
 
 
 class _Walk:
-    """Places of all parts of a tree; what stands behind aliases counts every time."""
+    """Places of all parts of a tree; an aliased tree counts at every alias."""
 
     def __init__(self, found: Read, limits: YamlLimits) -> None:
         self.found, self.limits, self.count = found, limits, 0
@@ -215,7 +215,7 @@ def _parts(tree: Tree) -> Iterator[tuple[str | int, Mark, Tree]]:
 
 
 def _data(tree: Tree) -> Any:
-    """Plain data; aliases become copies, so that changing one leaves the other alone."""
+    """Plain data; aliases become copies, so that changing one does not change the other."""
     if tree.kind == "map":
         return {key: _data(inner) for key, _, inner in tree.value}
     if tree.kind == "seq":

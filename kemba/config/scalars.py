@@ -1,6 +1,6 @@
 """What a plain word means in YAML 1.2 (core schema): null, true, 42, 0o17, 1e3, .inf, or a text.
 
-`on`, `yes` and `1_000` are texts, other than in YAML 1.1.
+`on`, `yes` and `1_000` are texts, unlike in YAML 1.1.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Walking a pydantic schema along a location, to know which keys could have stood there."""
+"""Walking a pydantic schema along a location, to know which keys are allowed there."""
 
 from __future__ import annotations
 

@@ -38,7 +38,7 @@ class Broken(Exception):  # noqa: N818  a promise that is not kept, no fault of 
 
 
 def example(effect: type[Effect]) -> Effect:
-    """The effect as it matters in practice: `off` value plus size, all else at its default.
+    """The effect at a typical strength: `off` value plus size, other values at their defaults.
 
     Raises Broken when a field has no default.
     """
@@ -79,7 +79,7 @@ def model_of(*effects: Effect, rig: bool = False) -> Model:
 
 
 def without(model: Model, name: str) -> Model:
-    """The model less one effect."""
+    """The model without one effect."""
     rest = [e for e in model.effects if e.name != name]
     return Model(model.mechanism, rest, model.supply, model.name)
 
@@ -103,7 +103,7 @@ class Placed:
 
     @cached_property
     def model(self) -> Model:
-        """The model in which it stands."""
+        """The model that contains it."""
         return model_of(self.on, rig=self.rig)
 
     @cached_property
@@ -118,7 +118,7 @@ class Placed:
 
     @property
     def fits_rig(self) -> bool:
-        """Whether it can stand on the bench piston."""
+        """Whether it can act on the bench piston."""
         return set(self.on.ports) <= {"piston"} and self.on.kind != "end_stop"
 
 

@@ -11,7 +11,7 @@ from kemba.effects.series import Series
 
 SEEN = 1e-3  # of a channel of size 1: a fault that changes less is none
 UNDONE = 1e-3  # of a channel of size 1; a shift in time reads between rows 0.5 ms apart
-WIDEST = 0.1  # a figure that is known less well is a parameter to look for, no tolerance
+WIDEST = 0.1  # a figure less certain than this is a parameter to fit, not a tolerance
 NOTHING = 1e-9  # slope of the residual below which a figure has no influence
 
 
@@ -21,7 +21,7 @@ def measures(effect: type[Effect]) -> bool:
 
 
 def moves(effect: type[Effect]) -> bool:
-    """Whether the effect stands in the equations of motion."""
+    """Whether the effect enters the equations of motion."""
     return effect.moves
 
 

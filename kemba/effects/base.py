@@ -12,7 +12,7 @@ from typing_extensions import Self
 
 from kemba.quantity import Param, Quantity, Tolerance
 
-# 1 sigma as a share: a figure that an earlier discovery put on a model's list is known less well
+# 1 sigma as a share: an effect found by an earlier discovery is less certain
 REMEASURED = Tolerance(0.1, source="assumed: a discovery from a few logs is that sure of a size")
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ class Contribution:
 
 
 class At(Protocol):
-    """Where an effect stands: ports, own states, inputs and forces, signals, others' values.
+    """What an effect sees: ports, own states, inputs and forces, signals, others' values.
 
     `at.piston`, `at.hip`, `at.foot_x`, `at.foot_z`, `at.body_x`, `at.body_z`, `at.pitch` are
     ports; any other attribute is looked up by symbol, first at this leg, then at the robot.
@@ -89,7 +89,7 @@ class At(Protocol):
 
     @property
     def stroke(self) -> float:
-        """Way of the piston [m]."""
+        """Stroke of the piston [m]."""
 
     @property
     def legs(self) -> list[At]:
@@ -105,7 +105,7 @@ class At(Protocol):
 
 
 class Effect(BaseModel):
-    """One piece of physics that can stand on a model's list.
+    """One piece of physics that a model can list.
 
     Subclasses declare parameters as annotated fields, variables by symbol (as the equation
     writes them) and `evaluate`. They know no solver, step size, file or plot.
@@ -134,7 +134,7 @@ class Effect(BaseModel):
     dissipative: ClassVar[bool] = False
     moves: ClassVar[bool] = True  # False: in what is measured only; plans and simulations ignore it
     nominal: ClassVar[Mapping[str, Tolerance]] = {}  # figures that differ from machine to machine
-    on_rod: ClassVar[bool] = True  # False: its piston effort is not felt by a rod force sensor
+    on_rod: ClassVar[bool] = True  # False: a force sensor at the rod does not measure its effort
 
     @field_validator("on")
     @classmethod
@@ -192,11 +192,12 @@ class Effect(BaseModel):
         return self.declared()
 
     def tolerances(self) -> dict[str, float]:
-        """1 sigma, as a share, of the figures that a machine of the same make may have a little
-        different; the entries of a table as `fill[0]`.
+        """1 sigma, as a share of the value, of figures that differ a little between machines of
+        the same make; the entries of a table as `fill[0]`.
 
         These are the `nominal` ones. An effect that a plain machine lacks was found by an earlier
-        discovery: its switch is known less well. Delays are left out: they move instants.
+        discovery; its switch has a wider tolerance. Delays are left out: they shift events in
+        time.
         """
         found: dict[str, float] = {}
         for name, tolerance in self.nominal.items():
@@ -223,12 +224,12 @@ class Effect(BaseModel):
         return self.model_copy(update=dict(values))
 
     def of_cylinder(self, cylinder: Cylinder) -> Self:
-        """The same effect with the figures that it leaves open (None) taken from the cylinder."""
+        """The same effect; figures that are None are taken from the cylinder."""
         return self
 
     def remarks(self, supply: float) -> list[str]:
-        """What a user should know of the figures at this supply pressure [Pa]. Raises KembaError
-        where they cannot be."""
+        """Remarks on the figures at this supply pressure [Pa]. Raises KembaError where the
+        pressure is physically impossible."""
         return []
 
     def listed(self) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""The catalogue as data and as a page: what each effect is, read off its own definition."""
+"""The catalogue as data and as a page: what each effect is, from its own definition."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def _tables(effect: type[Effect]) -> Iterator[dict[str, Any]]:
 
 
 def _usual(effect: type[Effect], default: Any) -> Any:
-    """A default as people read it; figures that are left open come from the robot's file."""
+    """A default as text; figures that are None come from the robot's file."""
     if default is not None:
         return default
     own = effect.of_cylinder is not Effect.of_cylinder

@@ -23,7 +23,7 @@ PORTS: dict[str, tuple[str, str, str, tuple[str, ...]]] = {
     "body_z": ("m", "m.s-1", "N", ("z",)),
     "pitch": ("rad", "rad.s-1", "N.m", ("q", "w")),
 }
-# values at which a formula must be finite: limits of any such machine, generously, and zero
+# values at which a formula must be finite: generous limits of such machines, and zero
 TRIED: dict[str, dict[str, tuple[float, ...]]] = {
     "piston": {"x": (0.0, 0.05, 0.1), "v": (-5.0, -0.1, 0.0, 0.1, 5.0)},
     "hip": {"x": (-3.0, -0.5, 0.0, 0.5, 3.0), "v": (-60.0, -1.0, 0.0, 1.0, 60.0)},
@@ -60,7 +60,7 @@ Number = Annotated[
 
 
 class Expression(Effect):
-    """A force of the user's own, or on an angle a torque, as a formula.
+    """A force written by the user as a formula; on an angle a torque.
 
     `on` is a port: piston, hip, body_x, body_z or pitch, `front/piston` for one leg. The formula
     may read the port's x and v (q and w on angles, z on body_z), at a leg u_e, u_r, F_e, F_r and

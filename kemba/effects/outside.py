@@ -1,7 +1,7 @@
 """Finding effects outside the package: in installed packages, and in a file of the user's own.
 
 Such code is run with all rights of the user. It is only ever named by the user, as an installed
-package or by `--effects`; nothing that stands in a YAML or a log can name it.
+package or by `--effects`; nothing in a YAML or a log can name it.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class Registry(Mapping[str, type[Effect]]):
-    """Effects by kind. Packages with the entry point group `kemba.effects` join at the first look.
+    """Effects by kind. Those of installed packages are added at the first use.
 
     Looking anything up raises KembaError when such a package cannot be loaded.
     """
@@ -102,13 +102,13 @@ class Registry(Mapping[str, type[Effect]]):
 
 
 class Registered:
-    """Marks a field that holds an effect of any kind in a register, as it is when read."""
+    """Marks a field that holds an effect of any kind that is registered when it is read."""
 
     def __init__(self, registry: Registry) -> None:
         self.registry = registry
 
     def members(self) -> Iterable[type[Effect]]:
-        """The classes that may stand there (for the places of errors)."""
+        """The classes that are allowed there (to locate errors)."""
         return self.registry.values()
 
     def _read(self, value: Any) -> Effect:

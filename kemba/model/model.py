@@ -21,7 +21,8 @@ class Model:
     """A mechanism with effects; the order of the list does not matter.
 
     `supply` is the air pressure [Pa] at which the tables of the effects are read; `remarks` say
-    where that is outside of what was measured. What an effect leaves open is the cylinder's.
+    where that is outside of what was measured. Figures that an effect does not give come from the
+    cylinder.
     """
 
     def __init__(

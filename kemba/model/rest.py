@@ -61,7 +61,7 @@ class Rest:
 
     def __call__(self, *held: Any) -> Array:
         """The states (ns,) with `held` in the order of the symbols; they begin at their nominal
-        values. Raises KembaError where they explode."""
+        values. Raises KembaError where they grow without bound."""
         if not len(self._start):
             return np.empty(0)
         x, p = self._start / self._scale, ca.vertcat(*(ca.DM(h) for h in held))

@@ -26,7 +26,7 @@ from kemba.trajectory import Array
 class Band:
     """An estimate in time (n,) with the `low` and `high` ends of its interval.
 
-    `explained`: what an effect on trial makes of it; `stance`: spans [s] to shade.
+    `explained`: the part that a candidate effect explains; `stance`: spans [s] to shade.
     """
 
     label: str

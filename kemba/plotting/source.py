@@ -17,7 +17,7 @@ from kemba.trajectory import Array, Trajectory
 PLAN_FILE = "trajectory.csv"
 Mask = np.ndarray[Any, np.dtype[np.bool_]]
 
-HIDDEN = ("controller", "simulation")  # file names that say nothing without their folder
+HIDDEN = ("controller", "simulation")  # file names that need their folder to be clear
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class Source:
 
 
 def is_plan(trajectory: Trajectory, path: Path | None = None) -> bool:
-    """Whether the rows are nodes of a plan: its metadata decide, without them its file name."""
+    """Whether the rows are nodes of a plan: by its metadata, or without them by its file name."""
     kind = trajectory.meta.get("kind")
     return kind == "plan" if kind else path is not None and path.name == PLAN_FILE
 
@@ -90,7 +90,7 @@ def load_sources(paths: Iterable[str | Path], columns: ColumnMap | None = None) 
 
 
 def default_path(sources: Sequence[Source]) -> Path:
-    """Where a figure goes that nobody named: into the first one's run folder, or beside its CSV."""
+    """Where a figure without a name goes: into the first one's run folder, or beside its CSV."""
     file = sources[0].path or Path(PLAN_FILE)
     if len(sources) > 1:
         return file.with_name("overlay.png")

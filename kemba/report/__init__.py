@@ -1,4 +1,4 @@
-"""What verbs leave behind: run folders filled with results, certificates and figures."""
+"""What verbs write: run folders filled with results, certificates and figures."""
 
 from kemba.report.solving import Listener, solve_into
 

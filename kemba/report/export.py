@@ -44,7 +44,7 @@ def export(trajectory: Trajectory, path: str | Path, columns: ColumnMap | None =
 
 
 def plain_name(name: str) -> str:
-    """A name that every language takes: `front_hip_tau`."""
+    """A name that every language accepts: `front_hip_tau`."""
     return re.sub(r"\W", "_", name)
 
 

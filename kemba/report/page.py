@@ -18,9 +18,7 @@ Rows = Iterable[tuple[str, Any]]
 def report_run(run: str | Path, out: str | Path | None = None) -> Path:
     """Write the page of a run folder to `out`, by default `report.html` in it.
 
-    The page needs no other file.
-
-    Raises KembaError when the run has no certificate.
+    The page needs no other file. Raises KembaError when the run has no certificate.
     """
     found = load_run(run)
     answer = found.certificate
@@ -58,7 +56,7 @@ def _tables(answer: Mapping[str, Any]) -> Iterable[str]:
     yield _table("residuals", [(k, f"{v:.1e}") for k, v in answer["residuals"].items()])
     for key, title in WAYS:
         if answer.get(key):
-            yield _table(f"{title}: off the plan by", _executed(answer[key]))
+            yield _table(f"{title}: difference from the plan", _executed(answer[key]))
     yield _table("solving", [
         ("time", f"{answer['solve_s']:.2f} s"),
         ("CPU", f"{answer['solve_cpu_s']:.2f} s"),

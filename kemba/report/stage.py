@@ -23,7 +23,7 @@ SLOWER = 5.0  # times slower than life
 
 
 def write_view(source: Source, path: str | Path, model: str | None = None) -> Path:
-    """Write a page with the motion of a source in 3-D; it needs nothing else.
+    """Write a page with the motion of a source in 3-D; it needs no other file.
 
     Raises KembaError when columns are missing or the file cannot be written.
     """
@@ -90,12 +90,12 @@ def write_page(path: str | Path, title: str, body: str) -> Path:
 
 
 def fill(name: str, **values: str) -> str:
-    """A page of this room with its `$names` replaced."""
+    """A page of this package with its `$names` replaced."""
     return Template(page_text(name)).substitute(values)
 
 
 def page_text(name: str) -> str:
-    """The text of a file of this room's pages."""
+    """The text of a file in `pages`."""
     return (PAGES / name).read_text(encoding="utf-8")
 
 

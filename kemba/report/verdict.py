@@ -1,4 +1,4 @@
-"""The verdict on a plan: whether its executions keep what it promises."""
+"""The verdict on a plan: whether its executions match it."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Allowed:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Whether an execution is near enough to its plan, and how it went in words."""
+    """Whether an execution is near enough to its plan, with a sentence."""
 
     good: bool
     sentence: str

@@ -1,4 +1,4 @@
-"""A case: one piece of work of a sweep, known by the hash of its content."""
+"""A case: one piece of work of a sweep, identified by the hash of its content."""
 
 from __future__ import annotations
 
@@ -89,11 +89,11 @@ def _is_record(record: Any) -> bool:
 def perform(
     function: str, work: Work, path: str, effects: Mapping[str, str] | None = None
 ) -> Record:
-    """Do a case's work and keep its result at `path`, at once and whole. Runs in a worker.
+    """Do a case's work and keep its result at `path`, at once and completely. Runs in a worker.
 
-    What goes wrong in it is an outcome too. Where the folder of `path` is not to be seen, the
-    record is returned only. Work that is done already, by a worker that died since, is not
-    repeated. `effects`: files of effects from outside, by path, with the hash of their content.
+    An error in it is a result too. Where the folder of `path` is not visible, the record is
+    only returned. Work that another worker has already done is not repeated. `effects`: files of
+    effects from outside, by path, with the hash of their content.
     Raises KembaError when these cannot be loaded.
     """
     load_effects(effects or {})

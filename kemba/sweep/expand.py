@@ -25,7 +25,7 @@ def load_sweep(name: str | Path, overrides: list[str] | None = None) -> tuple[Sw
 
 
 class Expansion:
-    """A sweep's document and blocks, on the way to cases; paths are those beside the sweep."""
+    """A sweep's document and blocks, to be expanded to cases; paths are relative to the sweep."""
 
     def __init__(self, sweep: Sweep, document: Document) -> None:
         self.sweep, self.document = sweep, document
@@ -64,7 +64,7 @@ class Expansion:
         return ("blocks", name, kind)
 
     def varied(self, base: Document, name: str, values: Mapping[str, Any]) -> Document:
-        """`base` as one case has it."""
+        """`base` with the values of one case."""
         for key, value in values.items():
             base = self.changed(base, {key: value}, self.place(name, key))
         return base
@@ -78,7 +78,7 @@ def model_name(expansion: Expansion, name: str) -> str:
 
 
 def model_hash(name: str) -> str:
-    """What a model's YAML and its robot's hold, and the files of effects from outside."""
-    spec = load_spec(name).model_dump(mode="json", exclude={"robot"})  # its place does not matter
+    """The content of a model's YAML and its robot's, and the files of effects from outside."""
+    spec = load_spec(name).model_dump(mode="json", exclude={"robot"})  # its path does not matter
     files = [sha256(path) for path in model_files(name)]
     return content_hash([spec, *files, *BY_KIND.files.values()])

@@ -1,4 +1,4 @@
-"""Running cases on Dask: every result kept the moment it is there, nothing done twice."""
+"""Running cases on Dask: every result is kept at once, nothing is done twice."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ def run_cases(
 ) -> dict[str, Record]:
     """Run the cases without a result; `tell` is called after each. Returns records by key.
 
-    Missing from the answer: what `time_limit` [s] cut off. A case whose workers died again and
-    again is an error in the answer, but not in the folder, so that the next time tries it anew.
+    Cases that `time_limit` [s] cut off are missing from the answer. A case whose workers die
+    repeatedly is an error in the answer, but not in the folder, so the next run tries it again.
     Raises KembaError when the `scheduler` cannot be reached.
     """
     (folder / "cases").mkdir(parents=True, exist_ok=True)
@@ -73,7 +73,7 @@ def _gather(
         for task in ended:
             case = tasks[task]
             record = case.record(folder) or _record(task)
-            if record is None:  # its result died with the worker that held it
+            if record is None:  # its result was lost with its worker
                 ended.add(task)
                 continue
             if record["status"] != "lost" and case.record(folder) is None:
@@ -87,7 +87,7 @@ def _gather(
 
 
 def _record(task: Any) -> Record | None:
-    """What came of a task: `lost` when its workers died under it, None when it is run again."""
+    """The result of a task: `lost` when its workers died, None when it is run again."""
     from distributed import TimeoutError as TimeIsUp
 
     try:
@@ -108,7 +108,7 @@ ADDRESS = re.compile(r"(?:(?:tcp|tls)://)?(?P<host>\[[^\]]+\]|[^:/\[\]]+):(?P<po
 
 
 def check_scheduler(scheduler: str) -> None:
-    """Raise KembaError when nothing answers at the address: Dask itself tries for 40 s."""
+    """Raise KembaError when nothing answers at the address; Dask itself would try for 40 s."""
     match = ADDRESS.fullmatch(scheduler)
     if match is None:
         what = "is no address of a scheduler"
@@ -130,8 +130,8 @@ def _unreachable(scheduler: str, error: Exception) -> KembaError:
 def _client(scheduler: str | None, jobs: int | None, most: int) -> Iterator[Any]:
     """A client of the cluster asked for, or of a local one that ends with the block.
 
-    Our own workers are given one case at a time, so that a case that kills its worker is the
-    only one blamed for it.
+    Our own workers are given one case at a time, so that a case that kills its worker does
+    not affect others.
     """
     import dask
     from distributed import Client, LocalCluster

@@ -1,4 +1,4 @@
-"""Which of the varied conditions an executed plan suffers from: rank correlations."""
+"""Which of the varied conditions matter to an executed plan: rank correlations."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from kemba.units import read_si
 
 
 class InfluenceSettings(Settings):
-    """Which rank correlations are worth saying."""
+    """Which rank correlations are reported."""
 
     fewest: int = setting(
         5,
@@ -28,9 +28,9 @@ class InfluenceSettings(Settings):
 def influence(rows: list[tuple[Case, Record | None]]) -> dict[str, Any]:
     """Spearman's rank correlations of each varied number with apex and landing.
 
-    What varies about zero may cost as much on either side, which ranks cannot show: its size
-    stands beside it as `|start.body/pitch|`. `costs_most`: the condition with the strongest one,
-    landing first, apex where all or none landed; None when each may be chance.
+    A condition that varies about zero may matter equally on both sides, which ranks cannot show;
+    its size is added as `|start.body/pitch|`. `costs_most`: the condition with the strongest one,
+    landing first, apex where all or none landed; None when each may be due to chance.
     """
     done = [(case, record) for case, record in rows if record and "apex_m" in record]
     landed = np.array([float(record["good"]) for _, record in done])

@@ -20,7 +20,13 @@ from kemba.sweep.schema import Sweep
 from kemba.sweep.summary import best_known, cost_of, cost_ratio, summarise
 
 MANIFEST = "manifest.json"
-FORMULA = ("=", "+", "@", "\t", "\r")  # how spreadsheets know a formula ("-" begins numbers, too)
+FORMULA = (
+    "=",
+    "+",
+    "@",
+    "\t",
+    "\r",
+)  # begins of formulas in spreadsheets ("-" begins numbers too)
 FIGURES = (
     "status", "good", "sentence", "apex_m", "apex_error_m", "touchdown_error_s", "final_error_m",
     "fault", "pitch_rad", "duration_s", "solve_s", "solve_cpu_s", "build_s", "wall_s", "cpu_s",

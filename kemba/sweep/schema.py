@@ -68,10 +68,10 @@ class GainSet(Section):
 
 
 class Conditions(Section):
-    """What an executed plan meets.
+    """The conditions under which a plan is executed.
 
     `effects` by kind, with the parameters that differ from the plant's. `start`: how far the
-    robot stands from the plan's first pose, by coordinate; its lower foot stays on the ground.
+    robot starts from the plan's first pose, by coordinate; its lower foot stays on the ground.
     `jitter`: standard deviation of every switching's time, drawn by `seed`. `after`: how long the
     last commands are held.
     """
@@ -89,7 +89,7 @@ class Conditions(Section):
 class Block(Section):
     """Cases of one kind. `set` overrides keys of the task as `--set` does.
 
-    `grid`: every combination of these lists. `vary`: each combination is met with the same
+    `grid`: every combination of these lists. `vary`: each combination gets the same
     `cases` draws of these spreads. `expect`: the success rate below which the sweep has failed.
     """
 

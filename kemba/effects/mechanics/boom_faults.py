@@ -30,7 +30,7 @@ class BoomForce(Effect):
 
 
 class BoomInertia(Effect):
-    """Mass without weight: boom inertia that is larger than thought."""
+    """Mass without weight: the boom has more inertia than the model says."""
 
     kind: Literal["boom_inertia"] = "boom_inertia"
     m: Annotated[float, Param("kg", 0.2, lower=0.0, doc="mass without weight")] = 0.0

@@ -31,8 +31,8 @@ class Chamber(Effect):
 
     `F_extend`, `F_retract`: steady forces at the supply pressures `pressures` (Table II),
     interpolated. `fill`, `vent`: time constants at empty and full chamber (Table I); the
-    retract chamber's own extension is stroke - x. What is not given is that of the robot's
-    cylinder.
+    retract chamber's own extension is stroke - x. Other figures are those of the
+    robot's cylinder.
     """
 
     kind: Literal["chamber"] = "chamber"

@@ -22,7 +22,7 @@ MODES = ("c_extend", "c_retract", "c_both")
 class ModeDamping(Effect):
     """-c_d(u_e, u_r) v with c_d bilinear between the four valve modes of Table II.
 
-    What is not given is that of the robot's cylinder.
+    Other figures are those of the robot's cylinder.
     """
 
     kind: Literal["mode_damping"] = "mode_damping"

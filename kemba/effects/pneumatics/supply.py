@@ -1,4 +1,4 @@
-"""The air that reaches the chambers: its pressure, how it sags, how fast it flows."""
+"""The air that reaches the chambers: its pressure, its droop, its flow rate."""
 
 from __future__ import annotations
 

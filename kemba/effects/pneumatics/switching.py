@@ -19,7 +19,7 @@ ON = 0.5  # a command above this is on
 def pulses(time: Array, command: Array) -> list[Pulse]:
     """The pulses of a 0/1 column `command` (n,) that holds from each `time` (n,) [s] on.
 
-    A valve that is on in the first row has been on since ever (-inf), one that is on in the last
+    A valve that is on in the first row has always been on (-inf), one that is on in the last
     row stays on (inf).
     """
     on = np.asarray(command) > ON

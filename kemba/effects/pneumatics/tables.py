@@ -1,5 +1,5 @@
-"""Figures over the supply pressure: taken from the cylinder where an effect leaves them open, read
-between their pressures, extrapolated beyond them."""
+"""Figures over the supply pressure: the cylinder's where an effect does not give them, interpolated
+between the pressures measured, extrapolated beyond them."""
 
 from __future__ import annotations
 
@@ -49,9 +49,9 @@ def at_supply(effect: Effect, table: str, supply: float) -> Any:
 
 
 def beyond(effect: Effect, supply: float, tables: Sequence[str]) -> list[str]:
-    """What to say of a supply pressure [Pa] outside an effect's tables; nothing inside them.
+    """Remarks on a supply pressure [Pa] outside an effect's tables; nothing inside them.
 
-    Raises KembaError where what is extrapolated is not positive, which cannot be.
+    Raises KembaError where what is extrapolated is not positive, which is physically impossible.
     """
     low, high = min(effect.value("pressures")), max(effect.value("pressures"))
     if low <= supply <= high:

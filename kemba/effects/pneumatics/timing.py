@@ -28,7 +28,7 @@ class ValveDelay(Effect):
 
 
 class ValveCloseDelay(Effect):
-    """Switching off comes later than switching on: the return spring against a held armature."""
+    """Switching off comes later than switching on: the armature is held for a moment."""
 
     kind: Literal["valve_close_delay"] = "valve_close_delay"
     dt: Delay = 0.0

@@ -1,4 +1,4 @@
-"""Settings of what surrounds IPOPT: Newton steps, warm starts, compiled functions."""
+"""Settings for Newton steps, warm starts and compiled functions."""
 
 from __future__ import annotations
 

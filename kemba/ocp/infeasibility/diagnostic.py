@@ -1,4 +1,4 @@
-"""What stands in a task's way: a sentence, the requirement to relax, and how sure we are."""
+"""What prevents a plan: a sentence, the requirement to relax, and how certain it is."""
 
 from __future__ import annotations
 

@@ -16,8 +16,8 @@ from kemba.ocp.transcription.solution import to_trajectory
 
 @dataclass(frozen=True)
 class Explanation:
-    """A sentence and the requirements to relax. `proven`: it holds whatever the solver
-    said."""
+    """A sentence and the requirements to relax. `proven`: it does not depend on the
+    solver."""
 
     sentence: str
     relax: tuple[Relax, ...]

@@ -1,4 +1,4 @@
-"""Where every variable of a multi-phase program stands."""
+"""The position of every variable of a multi-phase program."""
 
 from __future__ import annotations
 

@@ -44,6 +44,6 @@ def warm(iterations: int) -> dict[str, Any]:
 
 
 def rough(iterations: int) -> dict[str, Any]:
-    """The same for the coarser scheme, which only finds the way."""
+    """The same for the coarser scheme, whose solution is only a start."""
     settings = Refining.current()
     return {**warm(iterations), "tol": settings.rough_tol, "constr_viol_tol": settings.rough_rows}

@@ -42,7 +42,7 @@ def find(schedule: Schedule, start: Iterate) -> Iterate:
     parameters = Parameters(relaxation.loose, forces=relaxation.forces)
     point = schedule.solve(RELAX, start, parameters, options=options)
     if point.ending in (Ending.INFEASIBLE, Ending.ITERATION_LIMIT):
-        return point  # tighter pairs allow even less
+        return point  # it would not converge with tighter pairs either
     return binary(schedule, point)
 
 

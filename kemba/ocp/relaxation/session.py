@@ -135,8 +135,8 @@ def _bounds(
 def _regularised(t: Transcription, parameters: Parameters) -> bool:
     """Whether Newton steps have a regularised Hessian: on a whole robot with relaxed pairs.
 
-    Half a robot is as quick without. The paper's penalty on pairs stays as it is, since it is
-    there to be compared with.
+    Half a robot is as quick without. The paper's penalty on pairs is not changed: it is
+    kept for comparison.
     """
     has_pairs = any(rows.kind == "pair" for rows in t.stage.rows)
     return has_pairs and not t.reduction.symmetric and not parameters.pairs

@@ -1,4 +1,4 @@
-"""What a plan is worth: its inputs and its table on the same model, its table on the plant."""
+"""How well a plan executes: its inputs and its table on the same model, its table on the plant."""
 
 from __future__ import annotations
 

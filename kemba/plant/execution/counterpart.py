@@ -21,9 +21,9 @@ def counterpart(
 ) -> Model:
     """The model YAML `plant` on the robot of the planning model `model`, with its own effects.
 
-    A plant whose own file names a robot keeps that one. Own effects are what `model` has and the
-    shipped planning model has not, unless it is air: chambers, and what the plant itself
-    describes, stay the plant's; `own_effects` False leaves them all out. `payload` [kg] and
+    A plant whose own file names a robot keeps that one. Own effects are those of `model` that the
+    shipped planning model lacks, except those of the air and those that the plant itself
+    describes; `own_effects` False leaves them all out. `payload` [kg] and
     `supply` [Pa] are the task's. Raises KembaError as `load_model` does.
     """
     spec, own = load_spec(plant), load_spec(model)

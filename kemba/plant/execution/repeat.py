@@ -77,7 +77,7 @@ def repeat_run(
 
 
 def _as_sent(log: Trajectory, table: Trajectory) -> Trajectory:
-    """The log with valves as the table sends them: how late each of them acts no log can show."""
+    """The log with valve commands as sent: a log cannot show how late each valve acts."""
     row = np.maximum(np.searchsorted(table.time, log.time + 1e-9, side="right") - 1, 0)
     valves = {
         header: table[name][row]

@@ -39,8 +39,8 @@ class Sensors:
                    steps=ENCODERS)  # fmt: skip
 
     def times(self, duration: float, rng: np.random.Generator) -> Array:
-        """Sample times (m,) [s] from 0 to `duration`, strictly increasing. None comes early: a row
-        is written after its tick's commands were sent, and shows them."""
+        """Sample times (m,) [s] from 0 to `duration`, strictly increasing. No sample is early: a
+        row is written after the commands of its tick were sent, and contains them."""
         period = 1.0 / self.rate
         times = np.arange(int(duration * self.rate + 1e-9) + 1) * period
         shift = np.clip(np.abs(rng.normal(0.0, self.jitter, len(times))), 0.0, 0.4 * period)

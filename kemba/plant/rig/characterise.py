@@ -38,7 +38,7 @@ class Characteristics:
     check: dict[str, tuple[float, float]]
 
     def effects(self) -> tuple[Chamber, ModeDamping, Valve]:
-        """The fitted effects; where the logs say nothing the figures of the file stay."""
+        """The fitted effects; where the logs give nothing the figures of the file are kept."""
         return fitted_effects(self.cylinder, self.rises, self.lines, self.plateaus)
 
     def write_model(self, path: str | Path, name: str = "characterised") -> None:

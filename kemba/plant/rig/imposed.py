@@ -1,4 +1,4 @@
-"""A bench piston whose motion is imposed: only the air answers."""
+"""A bench piston whose motion is imposed: only the force of the air is computed."""
 
 from __future__ import annotations
 

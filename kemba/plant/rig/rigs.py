@@ -76,7 +76,7 @@ class Rig(BaseModel):
 class LockedRig(Rig):
     """A locked rod on a force transducer; one chamber fills or vents (paper, Fig. 3 and 4).
 
-    `positions`: both ends of the stroke unless given.
+    `positions`: by default both ends of the stroke.
     """
 
     kind: Literal["locked"] = "locked"
@@ -109,8 +109,8 @@ class LockedRig(Rig):
 class DynamometerRig(Rig):
     """Constant `speeds` in each valve mode (paper, Fig. 5 and 6).
 
-    The opposing piston behind its flow-restricting valve is replaced by what it is for: a rod
-    speed that settles within `ramp`. The chambers have settled before the rod moves.
+    The opposing piston behind its flow-restricting valve is replaced by its purpose: a rod
+    speed that is constant after `ramp`. The chambers have settled before the rod moves.
     """
 
     kind: Literal["dynamometer"] = "dynamometer"

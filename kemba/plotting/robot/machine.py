@@ -17,7 +17,7 @@ from kemba.plotting.source import Mask
 from kemba.trajectory import Array, Trajectory
 
 OVERTRAVEL = 0.004  # m; a sensor may read this far beyond the stops
-ON_GROUND = 0.01  # m; a foot below this height is taken to stand, for want of its force
+ON_GROUND = 0.01  # m; a foot below this height counts as standing when its force is not known
 PRESSED = 0.02  # of the weight; more than this on a foot means it stands
 
 

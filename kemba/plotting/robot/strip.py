@@ -27,7 +27,7 @@ def film(source: Source, machine: Machine, frames: int = FRAMES) -> list[Pose]:
 
 
 def strip_height(shown: list[Pose], width: float) -> float:
-    """Height [in] of a strip of `width` [in] in which the figures just fit."""
+    """Height [in] of a strip of `width` [in] into which the figures fit exactly."""
     left, right, top = _extent(shown, _shifts(shown))
     return width * (top + HEAD) / (right - left) + FOOT
 

@@ -51,7 +51,7 @@ def theta_of(found: Discovery, hypothesis: Hypothesis) -> dict[str, float]:
 
 
 def plot_cells(found: Discovery) -> Figure:
-    """Error by noise, by channel and by motion and valve mode: of the model as it stood, and with
+    """Error by noise, by channel and by motion and valve mode: of the start model, and with
     what was found."""
     steps = {"before": NULL, "after": found.best} if found.best else {"": NULL}
     problem = found.search.problem
@@ -70,7 +70,7 @@ def plot_cells(found: Discovery) -> Figure:
 
 
 def plot_explained(found: Discovery) -> Figure:
-    """d(t) of the model as it stood, with its 95 % band, and what was found of it."""
+    """d(t) of the start model, with its 95 % band, and what was found of it."""
     problem = found.search.problem
     before = problem.missing_force(free_starts(problem))
     if not found.best:

@@ -19,7 +19,7 @@ def plot_robustness(
     planned: float | None = None,
     figure: Figure | None = None,
 ) -> Figure:
-    """How high executions went and which landed, and what they suffered from.
+    """How high executions went and which landed, and which conditions matter.
 
     `apex` (m,) [m] and `landed` (m,) of every execution; `ranks`: rank correlations by condition,
     each with `landing` and `apex`, None where there is none; `planned` [m] is marked.
