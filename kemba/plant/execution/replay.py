@@ -107,13 +107,11 @@ def peak(time: Array, z: Array) -> tuple[float, float]:
     return float(time[i] + shift), float(c + shift * (b + a * shift))
 
 
-def touchdown(
-    t: Trajectory, clock: Array, after: float, low: float, weight: float
-) -> float | None:
+def touchdown(t: Trajectory, clock: Array, after: float, low: float, weight: float) -> float | None:
     """When [s] a foot that was in the air first stands, after `after`; None if no foot does.
 
     A foot touches while it is below `low` [m]. A contact counts if it lasts 20 ms or to the end, or
-    if its force adds up to what the weight [N] does in 20 ms, which stops a fall of 0.2 m/s. A foot
+    if its force, without impacts, adds up to what the weight [N] does in 20 ms (0.2 m/s of fall). A foot
     that grazes the ground on its way does neither, and nobody would call it a landing.
     """
     times = []
