@@ -17,7 +17,8 @@ from kemba.trajectory import Trajectory
 from kemba_cli.main import app
 
 COARSE = ("--set", "nodes=24")
-PLAIN = (*COARSE, "--no-replay")  # plans as coarse as this solve, but do not come true
+# plans as coarse as this solve as implicit Euler, but are not refined and do not come true
+PLAIN = (*COARSE, "--no-replay", "--set", "refine=none")
 
 BAD_KEYS = """\
 name: mine
@@ -178,7 +179,7 @@ def test_json_is_one_object_with_the_promised_keys() -> None:
     found = answer(done)
     assert (done.exit_code, done.stderr) == (0, "")
     promised = "status sentence run task apex_m duration_s cost solve_s build_s iterations"
-    promised += " variables constraints residuals replay plant_replay worst good"
+    promised += " variables constraints residuals replay table_replay plant_replay worst good"
     assert set(promised.split()) <= set(found)
     assert set(found["residuals"]) == {"complementarity", "binary", "dynamics", "bounds"}
     assert found["cost"]["torque_squared_integral"] > 0
