@@ -10,7 +10,7 @@ from plant.scripts import drop, jump, planning
 from kemba.effects.mechanics.motor import Motor
 from kemba.plant import Gains, Profile, Simulated, execute, replay, replays, run
 from kemba.plant.execution.controller import hip_feedback, saturated
-from kemba.plant.execution.replay import judge
+from kemba.plant.execution.replay import judge, touchdown
 from kemba.plant.simulation.commands import Commands
 from kemba.trajectory import Trajectory
 
@@ -50,6 +50,7 @@ def test_the_certificate_holds_both_replays() -> None:
     found = replays(planning(), planned(), standing_table(), planning())
     assert found["replay"]["final_error_m"] < 1e-9
     assert found["plant_replay"]["apex_error_m"] < -0.1
+    assert found["table_replay"] == found["plant_replay"]  # here the plant is the same model
     assert replays(planning(), planned(), standing_table(), None)["plant_replay"] is None
     buried = planned().with_columns({"body/z [m]": planned()["body/z"] - 0.1})
     assert replays(planning(), buried, standing_table(), None)["replay"] is None
@@ -148,3 +149,41 @@ def test_the_motor_gives_less_the_faster_it_turns() -> None:
     assert saturated(motor, -30.0, 41.9) == -24.8
     assert saturated(motor, 30.0, 60.0) == 0.0
     assert saturated(None, 30.0, 60.0) == 30.0
+
+
+def test_a_robot_in_the_air_is_held_until_plan_time_zero() -> None:
+    """The lead is there for valves; a body that is dropped does not fall during it."""
+    high = {"body/z": 1.0}
+    done = execute(standing_table(0.006), planning(), start=high).trajectory
+    assert done.time[0] == pytest.approx(0.006)
+    assert done["body/z"][0] == pytest.approx(1.0)
+    fallen = 1.0 - np.interp(0.026, done.time, done["body/z"])
+    assert fallen == pytest.approx(0.5 * 9.81 * 0.02**2, rel=0.2)
+    assert execute(standing_table(0.006), planning()).trajectory.time[0] == 0.0
+
+
+def foot(force: float, *contacts: tuple[float, float]) -> Trajectory:
+    """A foot in the air but for `contacts`, in which it takes `force` [N]; 1 ms rows to 0.2 s."""
+    time = np.arange(201) * 1e-3
+    down = np.any([(time >= a) & (time < b) for a, b in contacts], axis=0)
+    columns = {"front/foot/z [m]": np.where(down, 0.0, 0.1), "front/foot/Fz [N]": force * down}
+    return Trajectory(time, columns)
+
+
+@pytest.mark.parametrize(
+    ("force", "contacts", "expected"),
+    [
+        (1.0, ((0.05, 0.054), (0.15, 1.0)), 0.15),  # a graze, then the landing
+        (400.0, ((0.05, 0.06), (0.15, 1.0)), 0.05),  # as short, but it stops the body
+        (1.0, ((0.05, 0.08), (0.15, 1.0)), 0.05),  # light, but it stays
+        (1.0, ((0.05, 0.054),), None),
+        (1.0, ((0.19, 1.0),), 0.19),  # lasts to the end
+        (1.0, ((0.0, 0.03), (0.15, 1.0)), 0.15),  # stood before
+    ],
+)
+def test_a_touchdown_carries_the_body(
+    force: float, contacts: tuple[tuple[float, float], ...], expected: float | None
+) -> None:
+    t = foot(force, *contacts)
+    found = touchdown(t, t.time, 0.01, 1e-4, 44.0)
+    assert found == (None if expected is None else pytest.approx(expected))

@@ -73,3 +73,17 @@ def test_the_best_of_several_starts_is_kept(tmp_path: Path) -> None:
     assert len(tried) == 2
     best = min(float(line.rsplit(" ", 1)[1]) for line in tried if "solved" in line)
     assert answer["cost"]["torque_squared_integral"] <= best * 1.05 + 1e-3
+
+
+def test_a_refined_plan_tells_the_impulses_on_its_feet(tmp_path: Path) -> None:
+    """A dropped robot loses its fall at touchdown: momentum that no force column holds."""
+    task, document = load_task("drop.yaml", ["nodes=40"])
+    folder = RunFolder.create(tmp_path / "run", task.name)
+    answer = solve_into(folder, task, document, Listener(), replay=False, figure=False)
+    assert "refined" in answer["sentence"]
+    plan = Trajectory.read(folder / "trajectory.csv")
+    impulse = plan["front/foot/impulse_z"]
+    hits = impulse.nonzero()[0]
+    touched = int((plan["front/foot/z"] <= 1e-6).argmax())
+    assert hits[0] == touched and impulse[touched] > 0.1
+    assert plan.unit("front/foot/impulse_x") == "N.s"
