@@ -27,7 +27,6 @@ AIR = {"touchdown_error_s": None, "landed": False, "fault": "ends in the air"}
 @pytest.mark.parametrize(
     ("key", "facts", "lands", "good", "told"),
     [
-<<<<<<< HEAD
         ("replay", {}, True, True,
          "re-simulation matches the plan (apex 0.0 mm higher, 2 mm allowed)"),
         ("replay", {"touchdown_error_s": 1e-3}, True, True,
@@ -44,38 +43,20 @@ AIR = {"touchdown_error_s": None, "landed": False, "fault": "ends in the air"}
         ("replay", {"final_error_m": 0.12, "apex_error_m": 0.003}, True, False,
          "the re-simulation reaches 3.0 mm above the planned apex (2 mm allowed) and ends 120.0 mm "
          "from the plan (30 mm allowed)"),
-        ("plant_replay", {"apex_error_m": 0.04, "touchdown_error_s": 0.03, "final_error_m": 0.1},
+        ("plant_replay", {"apex_error_m": 0.04, "touchdown_error_s": 0.003, "final_error_m": 0.01},
          True, True, "simulated robot matches the plan (apex 40.0 mm higher, 50 mm allowed)"),
+        ("plant_replay", {"touchdown_error_s": 0.074, "final_error_m": 0.194}, True, False,
+         "the simulated robot touches down 74.0 ms late (15 ms allowed) and ends 194.0 mm from the "
+         "plan (50 mm allowed)"),
+        ("table_replay", {"apex_error_m": -0.0029}, True, False,
+         "the re-simulation of controller.csv reaches 2.9 mm below the planned apex (2 mm "
+         "allowed)"),
+        ("table_replay", {"touchdown_error_s": -0.021, "final_error_m": 0.031}, True, False,
+         "the re-simulation of controller.csv touches down 21.0 ms early (3 ms allowed) and ends "
+         "31.0 mm from the plan (30 mm allowed)"),
         ("plant_replay", {"apex_error_m": -0.06}, True, False,
          "the simulated robot reaches 60.0 mm below the planned apex (50 mm allowed)"),
         ("plant_replay", FELL, True, False, "the simulated robot tips over"),
-=======
-        ("replay", {}, True, True, "replay reaches 0.0 mm above the plan, touches down 0.0 ms "
-         "early and lands"),
-        ("replay", AIR, False, True, "replay reaches 0.0 mm above the plan"),
-        ("replay", AIR, True, False, "but the replay reaches 0.0 mm above the plan and does not "
-         "land (the plan ends in the air)"),
-        ("replay", {"apex_error_m": -0.0262}, True, False, "but the replay reaches 26.2 mm below "
-         "the plan (2 mm allowed), touches down 0.0 ms early and lands"),
-        ("replay", {"touchdown_error_s": 0.0174}, True, False, "but the replay reaches 0.0 mm "
-         "above the plan, touches down 17.4 ms late (2 ms allowed) and lands"),
-        ("replay", {"final_error_m": 0.12}, True, False, "but the replay reaches 0.0 mm above the "
-         "plan, touches down 0.0 ms early, ends 120.0 mm from the plan (30 mm allowed) and lands"),
-        ("plant_replay", {"apex_error_m": 0.04, "touchdown_error_s": 0.014, "final_error_m": 0.04},
-         True, True, "plant reaches 40.0 mm above the plan, touches down 14.0 ms late and lands"),
-        ("plant_replay", {"touchdown_error_s": 0.074, "final_error_m": 0.194}, True, False,
-         "but the plant reaches 0.0 mm above the plan, touches down 74.0 ms late (15 ms allowed), "
-         "ends 194.0 mm from the plan (50 mm allowed) and lands"),
-        ("table_replay", {"apex_error_m": -0.0029}, True, False, "but the table reaches 2.9 mm "
-         "below the plan (2 mm allowed), touches down 0.0 ms early and lands"),
-        ("table_replay", {"touchdown_error_s": -0.021, "final_error_m": 0.031}, True, False,
-         "but the table reaches 0.0 mm above the plan, touches down 21.0 ms early (3 ms allowed), "
-         "ends 31.0 mm from the plan (30 mm allowed) and lands"),
-        ("plant_replay", {"apex_error_m": -0.06}, True, False, "but the plant reaches 60.0 mm "
-         "below the plan (50 mm allowed), touches down 0.0 ms early and lands"),
-        ("plant_replay", FELL, True, False, "but the plant reaches 0.0 mm above the plan, touches "
-         "down 0.0 ms early and does not land (tips over)"),
->>>>>>> wT
     ],
 )  # fmt: skip
 def test_a_verdict_says_what_matches_or_what_fails(

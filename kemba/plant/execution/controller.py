@@ -61,15 +61,10 @@ def execute(
 ) -> Execution:
     """Play a controller table (a run folder, `controller.csv`, or its trajectory) on `model`.
 
-        The robot starts at rest in the table's first pose, changed by `start`. A robot that starts in
-        the air is held until plan time 0, the end of the lead; its motion begins there. After the last
-    <<<<<<< HEAD
-        row the last commands stay for `extra` [s]. `valves` replace the table's. Raises KembaError when
-        the table lacks a column.
-    =======
-        row the last commands stay for `extra` [s]. `valves` replace the table's. Raises
-        KembaError when the table lacks a column.
-    >>>>>>> wT
+    The robot starts at rest in the table's first pose, changed by `start`. A robot that starts in
+    the air is held until plan time 0, the end of the lead; its motion begins there. After the last
+    row the last commands stay for `extra` [s]. `valves` replace the table's. Raises KembaError when
+    the table lacks a column.
     """
     table = read_controller(controller)
     gains = gains or Gains(*(table.meta.get(k, v) for k, v in vars(Gains()).items()))
