@@ -4,8 +4,8 @@ from kemba.plant.execution.certificate import replays
 from kemba.plant.execution.controller import Execution, Gains, execute
 from kemba.plant.execution.replay import Replay, replay
 from kemba.plant.simulation.commands import Commands, Profile
+from kemba.plant.simulation.record import Impact
 from kemba.plant.simulation.simulate import Simulated, run, simulate
-from kemba.plant.stepping.events import Impact
 
 __all__ = [
     "Commands",

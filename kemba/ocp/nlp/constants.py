@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import casadi as ca
 import numpy as np
 
-from kemba.ocp.nlp.rewriting import replay
+from kemba.instructions import replay
 
 SHAPING = (-1.0, 0.0, 0.5, 1.0, 2.0)  # numbers that decide what an expression simplifies to
 

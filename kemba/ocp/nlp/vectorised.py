@@ -11,7 +11,7 @@ from contextlib import contextmanager
 
 import casadi as ca
 
-from kemba.ocp.nlp.rewriting import replay
+from kemba.instructions import replay
 
 FEW = 8  # points at which one by one is as fast
 

@@ -12,7 +12,7 @@ from kemba.effects.mechanics.motor import Motor
 from kemba.errors import KembaError
 from kemba.model import Model
 from kemba.plant.execution.replay import Replay, first_row, judge
-from kemba.plant.simulation.commands import Commands, Feedback, Profile, Sense
+from kemba.plant.simulation.commands import Commands, JointControl, Profile
 from kemba.plant.simulation.simulate import STEP, Simulated, run
 from kemba.plant.stepping.arrays import Array
 from kemba.trajectory import Trajectory
@@ -71,7 +71,7 @@ def execute(
         for quantity in model.inputs.values()
         if quantity.binary
     }
-    commands = Commands({**profiles, **(valves or {})}, hip_feedback(model, table, gains), PERIOD)
+    commands = Commands({**profiles, **(valves or {})}, hip_control(model, table, gains), PERIOD)
     done = run(
         model,
         {**first_row(model, table), **(start or {})},
@@ -93,38 +93,30 @@ def read_controller(source: Trajectory | str | Path) -> Trajectory:
     return Trajectory(source.time - source.time[0], columns, source.meta)
 
 
-def hip_feedback(model: Model, table: Trajectory, gains: Gains) -> Feedback:
-    """tau = K_p (q_d - q) + K_d (w_d - w) + tau_ff within what the motors can give (eq. 10)."""
+def hip_control(model: Model, table: Trajectory, gains: Gains) -> JointControl:
+    """The hips follow a controller table within what the motors can give (eq. 10)."""
     legs = model.mechanism.legs
-    motors = {
-        leg: next((e for e in model.effects if isinstance(e, Motor) and e.on in (leg, None)), None)
+    motors = [
+        next((e for e in model.effects if isinstance(e, Motor) and e.on in (leg, None)), None)
         for leg in legs
-    }
-    reference = {
-        leg: [_column(table, f"{leg}/hip/{symbol}") for symbol in ("q", "w", "tau")] for leg in legs
-    }
-
-    def feedback(time: float, sense: Sense) -> dict[str, float]:
-        row = min(max(int(np.searchsorted(table.time, time + 1e-9)) - 1, 0), len(table) - 1)
-        torques = {}
-        for leg in legs:
-            q_d, w_d, tau = (column[row] for column in reference[leg])
-            q, w = sense[f"{leg}/hip/q"], sense[f"{leg}/hip/w"]
-            tau = gains.K_p * (q_d - q) + gains.K_d * (w_d - w) + tau
-            torques[f"{leg}/hip/tau"] = saturated(motors[leg], float(tau), w)
-        return torques
-
-    return feedback
+    ]
+    wanted = [[_column(table, f"{leg}/hip/{name}") for name in ("q", "w", "tau")] for leg in legs]
+    return JointControl(
+        joints=tuple(f"{leg}/hip" for leg in legs),
+        times=table.time,
+        wanted=np.ascontiguousarray(np.array(wanted).transpose(2, 0, 1)),
+        limits=np.array([motor_limits(motor) for motor in motors]).reshape(-1, 3),
+        K_p=gains.K_p,
+        K_d=gains.K_d,
+    )
 
 
-def saturated(motor: Motor | None, tau: float, w: float) -> float:
-    """The torque [N.m] that a motor at speed `w` [rad/s] gives when `tau` is asked."""
+def motor_limits(motor: Motor | None) -> tuple[float, float, float]:
+    """Peak torque [N.m], speed without load [rad/s], slope [N.m.s/rad] of a `JointControl`."""
     if motor is None:
-        return tau
+        return np.inf, np.inf, 1.0
     slope = motor.tau_rated / (motor.w_noload - motor.w_rated)
-    high = min(motor.tau_peak, max(0.0, slope * (motor.w_noload - w)))
-    low = -min(motor.tau_peak, max(0.0, slope * (motor.w_noload + w)))
-    return min(max(tau, low), high)
+    return motor.tau_peak, motor.w_noload, slope
 
 
 def _column(table: Trajectory, name: str) -> np.ndarray:

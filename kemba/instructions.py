@@ -1,4 +1,4 @@
-"""A function's instructions, gone through again with something else in place of numbers."""
+"""A CasADi function's instructions, gone through again with something else in place of numbers."""
 
 from __future__ import annotations
 
