@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from kemba.plant.kernel.jit import kernel
+from kemba.plant.kernel.jit import part
 from kemba.plant.kernel.machine import Memory, State
 from kemba.plant.stepping.arrays import Array
 
@@ -25,7 +25,7 @@ class Law(NamedTuple):
     wanted: Array
 
 
-@kernel
+@part
 def control(law: Law, k: Memory, now: State, mark: int) -> None:
     """Set the torques at a mark."""
     for i in range(len(law.torque)):
@@ -35,7 +35,7 @@ def control(law: Law, k: Memory, now: State, mark: int) -> None:
         k.x[law.torque[i]] = limited(tau, w, law.limits[i])
 
 
-@kernel
+@part
 def limited(tau: float, w: float, limits: Array) -> float:
     """The torque [N.m] that a motor at speed `w` [rad/s] gives when `tau` is asked.
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
+from math import ceil
 from typing import NamedTuple
-
-import numpy as np
 
 from kemba.plant.kernel.forces import touching
 from kemba.plant.kernel.impact import impact
-from kemba.plant.kernel.jit import kernel
+from kemba.plant.kernel.jit import kernel, part
 from kemba.plant.kernel.machine import Machine, Memory, State
 from kemba.plant.kernel.root import first_root
 from kemba.plant.kernel.step import step
@@ -31,7 +30,7 @@ class Impacts(NamedTuple):
     impulse: Array
 
 
-@kernel
+@part
 def advance(
     m: Machine, k: Memory, now: State, spare: State, until: float, longest: float, log: Impacts
 ) -> bool:
@@ -43,73 +42,81 @@ def advance(
         if log.count[0] + MOST > len(log.time):
             return False
         left = until - now.time[0]
-        steps = max(1, int(np.ceil(left / longest - 1e-6)))
-        _step(m, k, now, spare, left / steps, log)
+        steps = max(1.0, ceil(left / longest - 1e-6))
+        end = now.time[0] + left / steps
+        for event in range(MOST):
+            reach = CLOSED if event < MANY else REACH
+            if _until_touch(m, k, now, spare, end - now.time[0], reach):
+                collide(m, k, now, reach, log)
+            if end - now.time[0] <= NO_TIME:
+                break
     now.time[0] = until
     return True
 
 
 @kernel
 def collide(m: Machine, k: Memory, now: State, reach: float, log: Impacts) -> None:
-    """An impact at everything that touches."""
-    rows = touching(m, now.gap, reach)
-    rows = rows[m.hard[rows]]
-    if not len(rows):
+    """An impact at everything that touches: of instances with a rigid gap."""
+    count, at = 0, log.count[0]
+    for i in range(touching(m, k, now.gap, reach)):
+        if m.hard[k.rows[i]]:
+            k.rows[count] = k.rows[i]
+            count += 1
+    if count == 0:
         return
-    at = log.count[0]
-    lost = impact(m, k, now, rows, log.impulse[at])
-    for row in m.gaps:
-        if log.impulse[at, row] > NOTICED:
-            log.time[at], log.lost[at] = now.time[0], lost
+    log.time[at], log.lost[at] = now.time[0], impact(m, k, now, count)
+    for row in range(m.nl):
+        log.impulse[at, row] = 0.0
+    for i in range(count):
+        log.impulse[at, k.rows[i]] = k.lcp.z[i]
+    for i in range(len(m.gaps)):
+        if log.impulse[at, m.gaps[i]] > NOTICED:
             log.count[0] = at + 1
             return
 
 
-@kernel
-def _step(m: Machine, k: Memory, now: State, spare: State, h: float, log: Impacts) -> None:
-    """One step of `h` [s], interrupted where a gap closes."""
-    end = now.time[0] + h
-    for event in range(MOST):
-        reach = CLOSED if event < MANY else REACH
-        touched = _until_touch(m, k, now, spare, end - now.time[0], reach)
-        _copy(spare, now)
-        if touched:
-            collide(m, k, now, reach, log)
-        if end - now.time[0] <= NO_TIME:
-            return
-
-
-@kernel
+@part
 def _until_touch(m: Machine, k: Memory, now: State, new: State, h: float, reach: float) -> bool:
-    """`new` is the state after `h`, or at the first touch of a gap that is open now; whether
+    """`now` becomes the state after `h`, or at the first touch of a gap that is open; whether
     something touches."""
-    rows = touching(m, now.gap, reach)
-    step(m, k, now, h, rows, new)
-    may_hit = (now.gap > reach) & m.rigid
-    through = (new.gap < 0.0) & may_hit
-    if not through.any():
-        return ((new.gap <= reach) & (new.rate < 0.0) & may_hit).any()
+    count = touching(m, k, now.gap, reach)
+    step(m, k, now, h, count, new)
+    through, near = False, False
+    for i in range(len(m.gaps)):
+        may_hit = m.rigid[i] and now.gap[i] > reach
+        k.hits[i] = may_hit and new.gap[i] < 0.0
+        through |= k.hits[i]
+        near |= may_hit and new.gap[i] <= reach and new.rate[i] < 0.0
     for _ in range(4):
-        length, best, first = new.time[0] - now.time[0], np.inf, 0
-        for i in range(len(through)):
-            if through[i]:
-                slope = (new.gap[i] - now.gap[i]) / length
-                time = length * first_root(
-                    now.gap[i], now.rate[i] * length, new.rate[i] * length, slope * length
-                )
-                if time < best:
-                    best, first = time, i
-        step(m, k, now, max(best, 1e-9), rows, new)
-        through = (new.gap < -MISSED) & may_hit
-        through[first] = abs(new.gap[first]) > MISSED
-        if not through.any():
+        if not through:
             break
-    return True
+        near = True
+        first, time = _first_hit(m, k, now, new)
+        step(m, k, now, max(time, 1e-9), count, new)
+        through = False
+        for i in range(len(m.gaps)):
+            may_hit = m.rigid[i] and now.gap[i] > reach
+            k.hits[i] = may_hit and new.gap[i] < -MISSED
+            if i == first:
+                k.hits[i] = abs(new.gap[i]) > MISSED
+            through |= k.hits[i]
+    now.time[0] = new.time[0]
+    for i in range(len(now.y)):
+        now.y[i] = new.y[i]
+    for i in range(len(m.gaps)):
+        now.gap[i], now.rate[i] = new.gap[i], new.rate[i]
+    return near
 
 
-@kernel
-def _copy(source: State, target: State) -> None:
-    target.time[0] = source.time[0]
-    target.y[:] = source.y
-    target.gap[:] = source.gap
-    target.rate[:] = source.rate
+@part
+def _first_hit(m: Machine, k: Memory, now: State, new: State) -> tuple[int, float]:
+    """Which of the gaps `k.hits` closes first, and how long [s] after `now`."""
+    length, first, soonest = new.time[0] - now.time[0], -1, 1e300
+    for i in range(len(m.gaps)):
+        if k.hits[i]:
+            rise = new.gap[i] - now.gap[i]
+            rates = now.rate[i] * length, new.rate[i] * length
+            time = length * first_root(now.gap[i], rates[0], rates[1], rise)
+            if first < 0 or time < soonest:
+                first, soonest = i, time
+    return first, soonest

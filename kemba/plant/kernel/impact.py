@@ -2,114 +2,84 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from kemba.plant.kernel.calls import evaluate
-from kemba.plant.kernel.forces import (
-    add,
-    contact_forces,
-    evaluate_pairs,
-    keep_soft,
-    set_gaps,
-    use_soft,
-)
-from kemba.plant.kernel.jit import kernel
+from kemba.plant.kernel.forces import add_forces, evaluate_pairs, remember_push, set_gaps
+from kemba.plant.kernel.jit import kernel, part
 from kemba.plant.kernel.linear import factor, solve
 from kemba.plant.kernel.machine import Machine, Memory, State
-from kemba.plant.stepping.arrays import Array
 
 
 @kernel
-def place(m: Machine, k: Memory, now: State) -> None:
-    """Set the gaps of a state whose `y` is given."""
-    k.x[: len(now.y)] = now.y
-    evaluate_pairs(m, k)
-    set_gaps(m, k, now)
+def impact(m: Machine, k: Memory, now: State, count: int) -> float:
+    """An inelastic impact at the first `count` of the pairs `k.rows` changes the state `now`.
 
-
-@kernel
-def impact(m: Machine, k: Memory, now: State, rows: Array, impulse: Array) -> float:
-    """An inelastic impact at the pairs `rows` changes the state `now`.
-
-    Fills the impulses (nl,) [N.s] and gives the kinetic energy lost [J]. Energy cannot grow: the
+    Impulses are in `k.lcp.z` [N.s]; gives the kinetic energy lost [J]. Energy cannot grow: the
     impulses work against the velocity after them.
     """
-    n, v = m.n, now.y[m.n : 2 * m.n]
-    _accelerations(m, k, now, rows)
+    n, lost = m.n, 0.0
+    _accelerations(m, k, now, count)
     evaluate_pairs(m, k)
-    found = contact_forces(m, k, rows, k.X, 1.0, v, False)
-    old = v.copy()
-    add(v, k.X, 1.0, found)
-    impulse[:] = 0.0
-    for j in range(len(rows)):
-        impulse[rows[j]] = found[j]
-    lost = 0.0
     for i in range(n):
+        k.old[i] = k.v[i] = now.y[n + i]
+    add_forces(m, k, count, k.X, 1.0, k.v, False)
+    for i in range(n):
+        now.y[n + i] = k.v[i]
         for j in range(n):
-            lost += 0.5 * (old[i] - v[i]) * k.full[i, n + j] * (old[j] + v[j])
+            lost += 0.5 * (k.old[i] - k.v[i]) * k.smooth[i, n + j] * (k.old[j] + k.v[j])
     set_gaps(m, k, now)
     return lost
 
 
-@kernel
-def instant(m: Machine, k: Memory, now: State, rows: Array, h: float, a: Array, lam: Array) -> None:
-    """Fills accelerations (n,) and forces (nl,) [N] just after `now`.
+@part
+def instant(m: Machine, k: Memory, now: State, h: float, count: int, first: int) -> None:
+    """Accelerations (n,) and forces (nl,) [N] just after `now`, into `k.x` from `first` on.
 
-    The forces are those that hold the pairs over a short `h` [s].
+    The forces are those that hold the first `count` of the pairs `k.rows` over a short `h` [s];
+    slip speeds of open feet are the least that keep their pairs true.
     """
-    n = m.n
-    q, v = now.y[:n], now.y[n : 2 * n]
-    _accelerations(m, k, now, rows)
-    keep_soft(m, k)
-    lam[:] = 0.0
-    if len(rows):
-        for i in range(n):
-            k.x[i] = q[i] + h * v[i]
-        evaluate_pairs(m, k)
-        use_soft(m, k)
-        for i in range(len(m.gaps)):  # touching at rest, not hitting
-            k.pairs[m.gaps[i], n + m.nl] -= min(now.rate[i], 0.0)
-        ahead = np.empty(n)
-        for i in range(n):
-            ahead[i] = v[i] + h * k.X[i, 0]
-        found = contact_forces(m, k, rows, k.X, h, ahead, True)
-        add(k.X[:, 0], k.X, 1.0, found)
-        for j in range(len(rows)):
-            lam[rows[j]] = found[j]
-    a[:] = k.X[:, 0]
-
-
-@kernel
-def slip_speeds(m: Machine, k: Memory, now: State, rows: Array, lam: Array) -> None:
-    """Slip speeds of open feet: the least that keeps their pairs true."""
-    n, v = m.n, now.y[m.n : 2 * m.n]
-    taking_part = np.zeros(m.nl, dtype=np.bool_)
-    taking_part[rows] = True
-    k.x[: len(now.y)] = now.y
+    n, lam = m.n, first + m.n
+    for row in range(m.nl):
+        k.x[lam + row] = 0.0
+    _accelerations(m, k, now, count)
+    remember_push(m, k)
     evaluate_pairs(m, k)
     for speed in range(m.nl):
-        if m.slips[speed].any() and not taking_part[speed]:
-            lam[speed] = 0.0
-            for row in range(m.nl):
-                if m.slips[speed, row]:
-                    rate = 0.0
-                    for c in range(n):
-                        rate += k.pairs[row, c] * v[c]
-                    lam[speed] = max(lam[speed], abs(rate))
+        for row in range(m.nl):
+            if m.slips[speed, row]:
+                rate = 0.0
+                for c in range(n):
+                    rate += k.pairs[row, c] * now.y[n + c]
+                k.x[lam + speed] = max(k.x[lam + speed], abs(rate))
+    for i in range(n):
+        k.x[i] = now.y[i] + h * now.y[n + i]
+        k.v[i] = now.y[n + i] + h * k.X[i, 0]
+    if count > 0:
+        evaluate_pairs(m, k)
+        for i in range(len(m.gaps)):  # touching at rest, not hitting
+            k.pairs[m.gaps[i], n + m.nl] -= min(now.rate[i], 0.0)
+        add_forces(m, k, count, k.X, h, k.v, True)
+    for j in range(count):
+        k.x[lam + k.rows[j]] = k.lcp.z[j]
+    for i in range(n):
+        k.x[first + i] = k.X[i, 0]
+        for j in range(count):
+            k.x[first + i] += k.X[i, 1 + j] * k.lcp.z[j]
+    for i in range(n):
+        k.x[i] = now.y[i]
 
 
-@kernel
-def _accelerations(m: Machine, k: Memory, now: State, rows: Array) -> None:
-    """X (n, 1 + len(rows)): acceleration without forces, and per force of the pairs `rows`."""
+@part
+def _accelerations(m: Machine, k: Memory, now: State, count: int) -> None:
+    """X (n, 1 + nl): acceleration without forces, and per force of the pairs in `k.rows`."""
     n = m.n
-    k.x[: len(now.y)] = now.y
+    for i in range(len(now.y)):
+        k.x[i] = now.y[i]
     evaluate(m.smooth, k.x, k.smooth, k.later)
     for i in range(n):
         k.X[i, 0] = k.smooth[i, 2 * n]
         for j in range(n):
-            k.full[i, n + j] = k.smooth[i, n + j]
             k.inertia[i, j] = k.smooth[i, n + j]
-        for j in range(len(rows)):
-            k.X[i, 1 + j] = k.smooth[i, 2 * n + 1 + rows[j]]
+        for j in range(count):
+            k.X[i, 1 + j] = k.smooth[i, 2 * n + 1 + k.rows[j]]
     factor(k.inertia)
-    solve(k.inertia, k.X, 1 + len(rows))
+    solve(k.inertia, k.X, 1 + count)

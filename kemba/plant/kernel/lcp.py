@@ -7,98 +7,101 @@ where that fails.
 
 from __future__ import annotations
 
-import numpy as np
-
-from kemba.plant.kernel.jit import kernel
+from kemba.plant.kernel.jit import kernel, part
 from kemba.plant.kernel.lemke import lemke
 from kemba.plant.kernel.linear import solve_pivoted
-from kemba.plant.stepping.arrays import Array
+from kemba.plant.kernel.machine import Lcp
 
 ROUNDING = 1e-11  # of the terms of a row; a smaller violation is none
 SWAPS = 6  # changes of the active set before Lemke's method takes over
 
 
 @kernel
-def solve_lcp(A: Array, b: Array, guess: Array) -> tuple[Array, Array]:
-    """Solution z (n,) and its active set, starting from the active set `guess` (n,) of booleans.
+def solve_lcp(w: Lcp, n: int) -> None:
+    """Solution z and active set of the first n unknowns, starting from the active set `w.on`.
 
     Raises NoSolutionError.
     """
-    n = len(b)
-    z, on = np.zeros(n), guess.copy()
-    if _active_set(A, b, on, z):
-        return z, on
-    on[:] = False
-    if _active_set(A, b, on, z):
-        return z, on
-    row, column = _scales(A)
-    scaled = np.empty((n, n))
-    for i in range(n):
-        for j in range(n):
-            scaled[i, j] = row[i] * A[i, j] * column[j]
-    z = column * lemke(scaled, row * b)
-    for i in range(n):
-        on[i] = z[i] > 0.0
-    return z, on
-
-
-@kernel
-def _scales(A: Array) -> tuple[Array, Array]:
-    """Scales of rows and columns that let forces and slip speeds compare: a force has a diagonal,
-    a slip speed and its cone have none."""
-    n = len(A)
-    count, total = 0, 0.0
-    for i in range(n):
-        if A[i, i] > 0.0:
-            count, total = count + 1, total + A[i, i]
-    usual = total / count if count else 1.0
-    row, column = np.full(n, usual), np.ones(n)
-    for i in range(n):
-        if A[i, i] > 0.0:
-            row[i], column[i] = usual / A[i, i], 1.0 / usual
-    return row, column
-
-
-@kernel
-def _active_set(A: Array, b: Array, on: Array, z: Array) -> bool:
-    """Change the active set `on` until it gives a solution z; whether one was found."""
-    n = len(b)
-    inner, right = np.empty((n, n)), np.empty(n)
-    index = np.empty(n, dtype=np.int64)
-    for _ in range(SWAPS):
-        size = 0
-        for i in range(n):
-            if on[i]:
-                index[size] = i
-                size += 1
-        for k in range(size):
-            right[k] = -b[index[k]]
-            for j in range(size):
-                inner[k, j] = A[index[k], index[j]]
-        if not solve_pivoted(inner, right, size):
-            return False
-        z[:] = 0.0
-        largest = 0.0
-        for k in range(size):
-            z[index[k]] = right[k]
-            largest = max(largest, abs(right[k]))
-        if not _corrected(A, b, on, z, largest):
+    for attempt in range(2):
+        if attempt == 1:
             for i in range(n):
-                z[i] = max(z[i], 0.0)
-            return True
-    return False
+                w.on[i] = False
+        for _ in range(SWAPS):
+            if not _try_active_set(w, n):
+                break
+            if not _corrected(w, n):
+                for i in range(n):
+                    w.z[i] = max(w.z[i], 0.0)
+                return
+    by_lemke(w, n)
 
 
-@kernel
-def _corrected(A: Array, b: Array, on: Array, z: Array, largest: float) -> bool:
-    """Move every row that is on the wrong side to the other; whether there was one."""
-    changed = False
-    for i in range(len(b)):
-        w, terms = b[i], abs(b[i])
-        for j in range(len(b)):
-            w += A[i, j] * z[j]
-            terms += abs(A[i, j] * z[j])
-        if (z[i] < -ROUNDING * largest) if on[i] else (w < -ROUNDING * terms):
-            on[i] = not on[i]
+@part
+def _try_active_set(w: Lcp, n: int) -> bool:
+    """The z that the active set gives, or False where it gives none."""
+    size = 0
+    for i in range(n):
+        w.z[i] = 0.0
+        if w.on[i]:
+            w.index[size] = i
+            size += 1
+    for i in range(size):
+        w.right[i] = -w.b[w.index[i]]
+        for j in range(size):
+            w.inner[i, j] = w.A[w.index[i], w.index[j]]
+    if not solve_pivoted(w.inner, w.right, size):
+        return False
+    for i in range(size):
+        w.z[w.index[i]] = w.right[i]
+    return True
+
+
+@part
+def _corrected(w: Lcp, n: int) -> bool:
+    """Move every unknown that is on the wrong side to the other; whether there was one."""
+    changed, largest = False, 0.0
+    for i in range(n):
+        largest = max(largest, abs(w.z[i]))
+    for i in range(n):
+        slack, terms = w.b[i], abs(w.b[i])
+        for j in range(n):
+            term = w.A[i, j] * w.z[j]
+            slack += term
+            terms += abs(term)
+        if w.on[i]:
+            wrong = w.z[i] < -ROUNDING * largest
+        else:
+            wrong = slack < -ROUNDING * terms
+        if wrong:
+            w.on[i] = not w.on[i]
             changed = True
     return changed
+
+
+@part
+def by_lemke(w: Lcp, n: int) -> None:
+    """Lemke's method, with rows and columns scaled so that forces and slip speeds compare: a force
+    has a diagonal, a slip speed and its cone have none."""
+    count, usual = 0, 0.0
+    for i in range(n):
+        if w.A[i, i] > 0.0:
+            count, usual = count + 1, usual + w.A[i, i]
+    usual = usual / count if count > 0 else 1.0
+    for i in range(n):
+        row = usual / w.A[i, i] if w.A[i, i] > 0.0 else usual
+        for j in range(n):
+            column = 1.0 / usual if w.A[j, j] > 0.0 else 1.0
+            w.table[i, j] = 1.0 if i == j else 0.0
+            w.table[i, n + j] = -row * w.A[i, j] * column
+        w.table[i, 2 * n] = -1.0
+        w.table[i, 2 * n + 1] = row * w.b[i]
+    lemke(w, n)
+    for i in range(n):
+        w.z[i] = 0.0
+    for i in range(n):
+        j = w.basis[i] - n
+        if 0 <= j < n:
+            w.z[j] = max(w.table[i, 2 * n + 1], 0.0)
+            w.z[j] *= 1.0 / usual if w.A[j, j] > 0.0 else 1.0
+    for i in range(n):
+        w.on[i] = w.z[i] > 0.0

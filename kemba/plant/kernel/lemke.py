@@ -2,93 +2,85 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from kemba.plant.kernel.jit import kernel
+from kemba.plant.kernel.jit import kernel, part
+from kemba.plant.kernel.machine import Lcp
 from kemba.plant.stepping.arrays import Array
+
+NEGLIGIBLE = 1e-11  # of a column's largest entry; a smaller one is no pivot
+TIE = 1e-12  # ratios that differ by less are equal
 
 
 class NoSolutionError(ArithmeticError):
     """The complementarity problem has no solution that pivoting can reach."""
 
 
-@kernel
-def lemke(A: Array, b: Array) -> Array:
-    """The solution z (n,). Raises NoSolutionError when pivoting ends on a ray."""
-    n = len(b)
-    if (b >= 0.0).all():
-        return np.zeros(n)
-    # columns: w (n), z (n), the artificial variable, right-hand side
-    table = np.zeros((n, 2 * n + 2))
-    basis = np.arange(n)
+@part
+def lemke(w: Lcp, n: int) -> None:
+    """Pivot `w.table`, whose columns are w (n), z (n), the artificial variable, right-hand side.
+
+    Afterwards `w.basis` names the column that each row determines. Raises NoSolutionError when
+    pivoting ends on a ray.
+    """
     row = 0
     for i in range(n):
-        table[i, i], table[i, 2 * n], table[i, 2 * n + 1] = 1.0, -1.0, b[i]
-        for j in range(n):
-            table[i, n + j] = -A[i, j]
-        if b[i] < b[row]:
+        w.basis[i] = i
+        if w.table[i, 2 * n + 1] < w.table[row, 2 * n + 1]:
             row = i
+    if w.table[row, 2 * n + 1] >= 0.0:
+        return
     entering = 2 * n
     for _ in range(50 * n):
-        leaving = basis[row]
-        _pivot(table, row, entering)
-        basis[row] = entering
+        leaving = w.basis[row]
+        _pivot(w.table, n, row, entering)
+        w.basis[row] = entering
         if leaving == 2 * n:
-            return _solution(table, basis)
+            return
         entering = leaving + n if leaving < n else leaving - n
-        row = _leaving_row(table, entering, basis)
+        row = _leaving_row(w, n, entering)
+        if row < 0:
+            raise NoSolutionError("the contact forces have no solution")
     raise NoSolutionError("the contact forces do not settle")
 
 
 @kernel
-def _solution(table: Array, basis: Array) -> Array:
-    n = len(table)
-    z = np.zeros(n)
-    for i in range(n):
-        if n <= basis[i] < 2 * n:
-            z[basis[i] - n] = max(table[i, 2 * n + 1], 0.0)
-    return z
-
-
-@kernel
-def _pivot(table: Array, row: int, column: int) -> None:
+def _pivot(table: Array, n: int, row: int, column: int) -> None:
     pivot = table[row, column]
-    for j in range(table.shape[1]):
+    for j in range(2 * n + 2):
         table[row, j] /= pivot
-    for i in range(len(table)):
+    for i in range(n):
         ratio = table[i, column]
         if i != row and ratio != 0.0:
-            for j in range(table.shape[1]):
+            for j in range(2 * n + 2):
                 table[i, j] -= ratio * table[row, j]
 
 
-@kernel
-def _leaving_row(table: Array, entering: int, basis: Array) -> int:
-    """Row of the smallest ratio; ties go to the artificial variable, else lexicographically."""
-    n = len(table)
+@part
+def _leaving_row(w: Lcp, n: int, entering: int) -> int:
+    """Row of the smallest ratio, -1 where there is none; ties go to the artificial variable, else
+    lexicographically."""
     largest = 1.0
     for i in range(n):
-        largest = max(largest, abs(table[i, entering]))
-    left = np.empty(n, dtype=np.bool_)
+        largest = max(largest, abs(w.table[i, entering]))
     for i in range(n):
-        left[i] = table[i, entering] > 1e-11 * largest
-    if not left.any():
-        raise NoSolutionError("the contact forces have no solution")
+        w.left[i] = w.table[i, entering] > NEGLIGIBLE * largest
+    first = -1
     for key in range(-1, n):
         column = 2 * n + 1 if key < 0 else key
-        least = np.inf
+        least = 1e300
         for i in range(n):
-            if left[i]:
-                least = min(least, table[i, column] / table[i, entering])
-        count = 0
+            if w.left[i]:
+                least = min(least, w.table[i, column] / w.table[i, entering])
+        count, first = 0, -1
         for i in range(n):
-            if left[i]:
-                left[i] = table[i, column] / table[i, entering] <= least + 1e-12 * (
-                    1.0 + abs(least)
-                )
-                count += left[i]
-                if key < 0 and left[i] and basis[i] == 2 * n:
+            if w.left[i]:
+                ratio = w.table[i, column] / w.table[i, entering]
+                w.left[i] = ratio <= least + TIE * (1.0 + abs(least))
+            if w.left[i]:
+                if key < 0 and w.basis[i] == 2 * n:
                     return i
-        if count == 1:
+                count += 1
+                if first < 0:
+                    first = i
+        if count < 2:
             break
-    return int(np.argmax(left))
+    return first

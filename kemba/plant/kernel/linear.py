@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from kemba.plant.kernel.jit import kernel
+from kemba.plant.kernel.jit import kernel, part
 from kemba.plant.stepping.arrays import Array
 
 
@@ -42,7 +42,7 @@ def solve(factors: Array, X: Array, columns: int) -> None:
             X[k, j] /= factors[k, k]
 
 
-@kernel
+@part
 def solve_pivoted(A: Array, b: Array, n: int) -> bool:
     """The first n of b replaced by the solution of A y = b, or False where A is singular.
 

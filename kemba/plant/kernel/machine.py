@@ -35,10 +35,29 @@ class Machine(NamedTuple):
     slips: Array
 
 
+class Lcp(NamedTuple):
+    """A complementarity problem 0 <= z _|_ A z + b >= 0 of up to nl unknowns.
+
+    `on`: the active set, a guess before and the answer after. The rest is memory.
+    """
+
+    A: Array
+    b: Array
+    z: Array
+    on: Array
+    inner: Array
+    right: Array
+    index: Array
+    table: Array
+    basis: Array
+    left: Array
+
+
 class Memory(NamedTuple):
     """Where the kernel works. `full` and `smooth` (n, 2 n + 1 + nl) hold D | M | F | B of the
     motion, `air` and `later` (ns, ns + 1) hold A | f of the effect states, `pairs` and `before`
-    (nl, n + nl + 1) hold W | L | w0; `held` is the active set of the last step."""
+    (nl, n + nl + 1) hold W | L | w0. `rows` (nl,) begins with the pairs that take part, `held`
+    (nl,) is the active set of the last step, `v` and `old` (n,) are velocities."""
 
     x: Array
     full: Array
@@ -56,7 +75,12 @@ class Memory(NamedTuple):
     air_left: Array
     k1: Array
     k2: Array
+    v: Array
+    old: Array
+    rows: Array
     held: Array
+    hits: Array
+    lcp: Lcp
 
 
 class State(NamedTuple):
@@ -69,11 +93,29 @@ class State(NamedTuple):
     rate: Array
 
 
-def memory(m: Machine, nu: int, np_: int, ny: int) -> Memory:
-    """Memory for a model with `nu` inputs, `np_` free parameters and `ny` outputs."""
+def lcp_memory(n: int) -> Lcp:
+    """Memory for problems of up to `n` unknowns."""
+    square, vector = np.zeros((2, n, n)), np.zeros((3, n))
+    whole, truth = np.zeros((2, n), dtype=int), np.zeros((2, n), dtype=bool)
+    return Lcp(
+        A=square[0],
+        b=vector[0],
+        z=vector[1],
+        on=truth[0],
+        inner=square[1],
+        right=vector[2],
+        index=whole[0],
+        table=np.zeros((n, 2 * n + 2)),
+        basis=whole[1],
+        left=truth[1],
+    )
+
+
+def memory(m: Machine, inputs: int, parameters: int, outputs: int) -> Memory:
+    """Memory for a model with so many inputs, free parameters and outputs."""
     n, ns, nl, ng = m.n, m.ns, m.nl, len(m.gaps)
     shapes = {
-        "x": (3 * n + ns + nu + np_ + nl,),
+        "x": (3 * n + ns + inputs + parameters + nl,),
         "full": (n, 2 * n + 1 + nl),
         "smooth": (n, 2 * n + 1 + nl),
         "air": (ns, ns + 1),
@@ -81,7 +123,7 @@ def memory(m: Machine, nu: int, np_: int, ny: int) -> Memory:
         "pairs": (nl, n + nl + 1),
         "before": (nl, n + nl + 1),
         "gap": (ng,),
-        "y": (ny,),
+        "y": (outputs,),
         "left": (n, n),
         "inertia": (n, n),
         "X": (n, 1 + nl),
@@ -89,9 +131,15 @@ def memory(m: Machine, nu: int, np_: int, ny: int) -> Memory:
         "air_left": (ns, ns),
         "k1": (ns, 1),
         "k2": (ns, 1),
+        "v": (n,),
+        "old": (n,),
     }
     return Memory(
-        **{name: np.zeros(shape) for name, shape in shapes.items()}, held=np.zeros(nl, dtype=bool)
+        **{name: np.zeros(shape) for name, shape in shapes.items()},
+        rows=np.zeros(nl, dtype=int),
+        held=np.zeros(nl, dtype=bool),
+        hits=np.zeros(ng, dtype=bool),
+        lcp=lcp_memory(nl),
     )
 
 

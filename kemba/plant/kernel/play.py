@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
+from math import isfinite, isnan
 from typing import NamedTuple
-
-import numpy as np
 
 from kemba.plant.kernel.calls import evaluate
 from kemba.plant.kernel.control import Law, control
 from kemba.plant.kernel.events import CLOSED, Impacts, advance, collide
-from kemba.plant.kernel.forces import touching
-from kemba.plant.kernel.impact import instant, place, slip_speeds
-from kemba.plant.kernel.jit import kernel
+from kemba.plant.kernel.forces import evaluate_pairs, set_gaps, touching
+from kemba.plant.kernel.impact import instant
+from kemba.plant.kernel.jit import entry, part
 from kemba.plant.kernel.machine import Machine, Memory, State
 from kemba.plant.stepping.arrays import Array
 
@@ -42,7 +41,7 @@ class Progress(NamedTuple):
     answered: Array
 
 
-@kernel
+@entry
 def play(
     m: Machine,
     k: Memory,
@@ -65,43 +64,52 @@ def play(
         if mark > 0 and not advance(m, k, now, spare, plan.time[mark], longest, log):
             return FULL
         for i in range(m.n, 2 * m.n):
-            if not np.isfinite(now.y[i]):
+            if not isfinite(now.y[i]):
                 return EXPLODED
         if plan.tick[mark] and plan.asks and not progress.answered[0]:
             return ASK
         progress.answered[0] = False
-        _inputs(m, k, plan, mark)
+        for i in range(plan.u.shape[1]):
+            if not isnan(plan.u[mark, i]):
+                k.x[len(now.y) + i] = plan.u[mark, i]
         if plan.tick[mark] and not plan.asks:
             control(law, k, now, mark)
-        if mark == 0:
-            place(m, k, now)
-            if (now.gap < -DEEP).any():
-                return BURIED
-            collide(m, k, now, CLOSED, log)
+        if mark == 0 and not _start(m, k, now, log):
+            return BURIED
         if plan.row[mark] >= 0:
-            _record(m, k, now, longest, plan.sent[mark], table[plan.row[mark]])
+            _record(m, k, now, longest, plan, mark, table)
     return DONE
 
 
-@kernel
-def _inputs(m: Machine, k: Memory, plan: Schedule, mark: int) -> None:
-    for i in range(plan.u.shape[1]):
-        if not np.isnan(plan.u[mark, i]):
-            k.x[2 * m.n + m.ns + i] = plan.u[mark, i]
+@part
+def _start(m: Machine, k: Memory, now: State, log: Impacts) -> bool:
+    """Let what touches stop at the start; False where something starts deep in the ground."""
+    for i in range(len(now.y)):
+        k.x[i] = now.y[i]
+    evaluate_pairs(m, k)
+    set_gaps(m, k, now)
+    for i in range(len(m.gaps)):
+        if now.gap[i] < -DEEP:
+            return False
+    collide(m, k, now, CLOSED, log)
+    return True
 
 
-@kernel
-def _record(m: Machine, k: Memory, now: State, h: float, sent: Array, row: Array) -> None:
+@part
+def _record(
+    m: Machine, k: Memory, now: State, h: float, plan: Schedule, mark: int, table: Array
+) -> None:
     """A row of the record: state, inputs as sent, forces, outputs, all just after now."""
-    size, nu = len(now.y), len(sent)
-    a, lam = k.x[len(k.x) - m.n - m.nl : len(k.x) - m.nl], k.x[len(k.x) - m.nl :]
-    rows = touching(m, now.gap, CLOSED)
-    instant(m, k, now, rows, h, a, lam)
-    slip_speeds(m, k, now, rows, lam)
-    k.x[:size] = now.y
+    size, nu, row = len(now.y), plan.sent.shape[1], plan.row[mark]
+    first = len(k.x) - m.n - m.nl
+    instant(m, k, now, h, touching(m, k, now.gap, CLOSED), first)
     evaluate(m.outputs, k.x, k.y, k.gap)
-    row[:size] = now.y
+    for i in range(size):
+        table[row, i] = now.y[i]
     for i in range(nu):
-        row[size + i] = k.x[size + i] if np.isnan(sent[i]) else sent[i]
-    row[size + nu : size + nu + m.nl] = lam
-    row[size + nu + m.nl :] = k.y
+        sent = plan.sent[mark, i]
+        table[row, size + i] = k.x[size + i] if isnan(sent) else sent
+    for i in range(m.nl):
+        table[row, size + nu + i] = k.x[first + m.n + i]
+    for i in range(len(k.y)):
+        table[row, size + nu + m.nl + i] = k.y[i]
