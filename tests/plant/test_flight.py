@@ -25,7 +25,9 @@ def states(model: Model, t: Trajectory) -> tuple[np.ndarray, np.ndarray]:
 
 def inertia(model: Model, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     eq = equations_of(model)
-    return eq.now(q=q, v=v, s=np.zeros(eq.ns), u=np.zeros(eq.nu))["M"].copy()
+    return eq.now(q=q, v=v, s=np.zeros(eq.node.s.numel()), u=np.zeros(eq.node.u.numel()))[
+        "M"
+    ].copy()
 
 
 def energies(model: Model, t: Trajectory, lift: float = 0.0) -> np.ndarray:

@@ -8,7 +8,9 @@ from plant.scripts import jump, planning
 
 from kemba.effects.mechanics.motor import Motor
 from kemba.plant import Gains, Profile, execute, replay, replays, run
-from kemba.plant.execution.controller import saturated
+from kemba.plant.execution.controller import motor_limits
+from kemba.plant.kernel.control import limited
+from kemba.plant.kernel.jit import entry
 from kemba.plant.simulation.commands import Commands
 from kemba.trajectory import Trajectory
 
@@ -80,10 +82,18 @@ def test_the_controller_brings_a_hip_back() -> None:
     assert error[-1] == pytest.approx(-0.2, abs=0.1)
 
 
+@entry
+def limited_torque(tau: float, w: float, limits: np.ndarray) -> float:
+    return limited(tau, w, limits)
+
+
 def test_the_motor_gives_less_the_faster_it_turns() -> None:
+    def torque(motor: Motor | None, tau: float, w: float) -> float:
+        return limited_torque(tau, w, np.array(motor_limits(motor)))
+
     motor = Motor()
-    assert saturated(motor, 30.0, 0.0) == 24.8
-    assert saturated(motor, 30.0, 41.9) == pytest.approx(8.3)
-    assert saturated(motor, -30.0, 41.9) == -24.8
-    assert saturated(motor, 30.0, 60.0) == 0.0
-    assert saturated(None, 30.0, 60.0) == 30.0
+    assert torque(motor, 30.0, 0.0) == 24.8
+    assert torque(motor, 30.0, 41.9) == pytest.approx(8.3)
+    assert torque(motor, -30.0, 41.9) == -24.8
+    assert torque(motor, 30.0, 60.0) == 0.0
+    assert torque(None, 30.0, 60.0) == 30.0

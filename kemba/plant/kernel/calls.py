@@ -8,7 +8,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from kemba.plant.kernel.jit import part
+from kemba.plant.kernel.jit import kernel
 from kemba.plant.stepping.arrays import Array
 
 
@@ -26,7 +26,7 @@ def _call(typing: Any, address: Any, x: Any, first: Any, second: Any) -> Any:
     return types.void(types.intp, types.intp, types.intp, types.intp), build
 
 
-@part
+@kernel
 def evaluate(address: int, x: Array, first: Array, second: Array) -> None:
     """Evaluate a model's function of `x` into two arrays."""
     _call(address, x.ctypes.data, first.ctypes.data, second.ctypes.data)

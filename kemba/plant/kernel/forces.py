@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from kemba.plant.kernel.calls import evaluate
-from kemba.plant.kernel.jit import kernel, part
+from kemba.plant.kernel.jit import kernel
 from kemba.plant.kernel.lcp import solve_lcp
 from kemba.plant.kernel.machine import Machine, Memory, State
 from kemba.plant.stepping.arrays import Array
@@ -11,7 +11,7 @@ from kemba.plant.stepping.arrays import Array
 SOFT_REACH = 1e-3  # m; compliant gaps this close take part, whether they push or not
 
 
-@part
+@kernel
 def touching(m: Machine, k: Memory, gap: Array, reach: float) -> int:
     """How many pairs take part; their rows are the first of `k.rows`: gaps within `reach` [m]
     (compliant ones within `SOFT_REACH`) with the friction that belongs to them."""
@@ -30,7 +30,7 @@ def touching(m: Machine, k: Memory, gap: Array, reach: float) -> int:
     return count
 
 
-@part
+@kernel
 def evaluate_pairs(m: Machine, k: Memory) -> None:
     """The pairs at the state in `k.x`; compliant gaps push as remembered."""
     evaluate(m.pairs, k.x, k.pairs, k.gap)
@@ -42,7 +42,7 @@ def evaluate_pairs(m: Machine, k: Memory) -> None:
                 k.pairs[m.gaps[i], j] = k.before[m.gaps[i], j]
 
 
-@part
+@kernel
 def remember_push(m: Machine, k: Memory) -> None:
     """Remember how compliant gaps push at the state in `k.x`: their force is smooth, and acts as
     at the beginning of a stage."""
@@ -80,7 +80,7 @@ def add_forces(
             v[c] += share * T[c, 1 + i] * w.z[i]
 
 
-@part
+@kernel
 def set_gaps(m: Machine, k: Memory, at: State) -> None:
     """Gaps of a state and their rates, from the pairs just evaluated there."""
     for i in range(len(m.gaps)):

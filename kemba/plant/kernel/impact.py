@@ -9,7 +9,7 @@ from kemba.plant.kernel.linear import factor, solve
 from kemba.plant.kernel.machine import Machine, Memory, State
 
 
-@kernel
+@part
 def impact(m: Machine, k: Memory, now: State, count: int) -> float:
     """An inelastic impact at the first `count` of the pairs `k.rows` changes the state `now`.
 
@@ -68,7 +68,7 @@ def instant(m: Machine, k: Memory, now: State, h: float, count: int, first: int)
         k.x[i] = now.y[i]
 
 
-@part
+@kernel
 def _accelerations(m: Machine, k: Memory, now: State, count: int) -> None:
     """X (n, 1 + nl): acceleration without forces, and per force of the pairs in `k.rows`."""
     n = m.n

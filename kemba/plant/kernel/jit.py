@@ -45,7 +45,7 @@ def part(function: Function) -> Function:
     Numba compiles and optimises all that a function calls together with it, so a deep nest of
     functions is compiled many times over.
     """
-    return kernel(function)
+    return cast(Function, njit(error_model="numpy", inline="always", _nrt=False)(function))
 
 
 def entry(function: Function) -> Function:

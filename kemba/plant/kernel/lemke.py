@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from kemba.plant.kernel.jit import kernel, part
+from kemba.plant.kernel.jit import part
 from kemba.plant.kernel.machine import Lcp
 from kemba.plant.stepping.arrays import Array
 
@@ -42,7 +42,7 @@ def lemke(w: Lcp, n: int) -> None:
     raise NoSolutionError("the contact forces do not settle")
 
 
-@kernel
+@part
 def _pivot(table: Array, n: int, row: int, column: int) -> None:
     pivot = table[row, column]
     for j in range(2 * n + 2):
