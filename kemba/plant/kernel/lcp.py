@@ -36,7 +36,7 @@ def solve_lcp(w: Lcp, n: int) -> None:
     by_lemke(w, n)
 
 
-@part
+@kernel
 def _try_active_set(w: Lcp, n: int) -> bool:
     """The z that the active set gives, or False where it gives none."""
     size = 0
@@ -78,7 +78,7 @@ def _corrected(w: Lcp, n: int) -> bool:
     return changed
 
 
-@part
+@kernel
 def by_lemke(w: Lcp, n: int) -> None:
     """Lemke's method, with rows and columns scaled so that forces and slip speeds compare: a force
     has a diagonal, a slip speed and its cone have none."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from kemba.plant.kernel.jit import part
+from kemba.plant.kernel.jit import kernel, part
 from kemba.plant.kernel.machine import Lcp
 from kemba.plant.stepping.arrays import Array
 
@@ -42,7 +42,7 @@ def lemke(w: Lcp, n: int) -> None:
     raise NoSolutionError("the contact forces do not settle")
 
 
-@part
+@kernel
 def _pivot(table: Array, n: int, row: int, column: int) -> None:
     pivot = table[row, column]
     for j in range(2 * n + 2):
@@ -54,7 +54,7 @@ def _pivot(table: Array, n: int, row: int, column: int) -> None:
                 table[i, j] -= ratio * table[row, j]
 
 
-@part
+@kernel
 def _leaving_row(w: Lcp, n: int, entering: int) -> int:
     """Row of the smallest ratio, -1 where there is none; ties go to the artificial variable, else
     lexicographically."""
