@@ -24,7 +24,7 @@ from kemba.effects.catalogue import (
     Valve,
 )
 from kemba.effects.pneumatics.constants import ATMOSPHERE
-from kemba.mechanism import rig_mechanism
+from kemba.mechanism import load_cylinder, rig_mechanism
 from kemba.model import Model
 
 STROKE = 0.07
@@ -59,7 +59,9 @@ def rig(values: np.ndarray) -> Model:
         gauge=(p["gauge"],),
     )
     losses = [SealFriction(F_c=p["F_c"]), PistonDamping(c=p["c"]), SupplyLine(a=p["a_line"])]
-    return Model(rig_mechanism(), [Valve(), HoseLag(T=OPENING), chamber, *losses])
+    return Model(
+        rig_mechanism(load_cylinder("dsnu-25-70")), [Valve(), HoseLag(T=OPENING), chamber, *losses]
+    )
 
 
 def functions(model: Model) -> tuple[ca.Function, ca.Function]:

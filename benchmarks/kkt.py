@@ -22,9 +22,9 @@ from scipy.sparse.linalg import splu
 
 from kemba.model import load_model
 from kemba.ocp import load_task
-from kemba.ocp.nlp.ipopt import Parameters
 from kemba.ocp.planner import Planner
 from kemba.ocp.task.requirement import resolve
+from kemba.ocp.transcription.parameters import Parameters
 from kemba.ocp.transcription.symmetry import whole
 from kemba.ocp.transcription.transcribe import Transcription
 from kemba.sweep import machine
@@ -37,7 +37,7 @@ def program(name: str, nodes: int) -> tuple[Transcription, np.ndarray]:
     task, document = load_task(name)
     model = load_model(task.model)
     planner = Planner(task, model, resolve(task, model, document))
-    transcription = planner.search(nodes, whole(model.node)).transcription
+    transcription = planner.schedule(nodes, whole(model.node)).transcription
     return transcription, planner.guess(transcription).Y
 
 

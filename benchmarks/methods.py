@@ -35,7 +35,7 @@ def row(name: str, found: Plan) -> str:
     cost = found.cost["torque_squared_integral"]
     cells = [
         name,
-        found.status,
+        str(found.status),
         f"{found.solve_s:.1f}",
         f"{found.solve_cpu_s:.1f}",
         str(found.iterations),

@@ -24,7 +24,8 @@ RIGS = ("locked", "volumes", "dynamometer", "random")
 def main(model: str, figures: Path | None) -> None:
     data = {name: _logs(name, model) for name in RIGS}
     told = (name for name in RIGS if name != "volumes")  # the same tests as `locked`, in between
-    found = characterise({f"{n}/{test}": log for n in told for test, log in data[n].items()})
+    logs = {f"{n}/{test}": log for n in told for test, log in data[n].items()}
+    found = characterise(logs, bench_model(model, 0.7e6).mechanism.need_cylinder())
     for columns, rows in (
         (tables.RISE_COLUMNS, tables.rise_rows(found)),
         (tables.FORCE_COLUMNS, tables.force_rows(found)),

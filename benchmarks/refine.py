@@ -62,7 +62,7 @@ def _line(euler: Plan, found: Refined, busy: float) -> str:
     before = f"{_errors(replay(euler.model, euler.trajectory))} | {euler.solve_cpu_s:.1f} s | "
     before += f"{euler.cost['torque_squared_integral']:.3g}"
     if found.trajectory is None:
-        return f"{before} | {found.message} | {busy:.1f} s | | {found.iterations} |"
+        return f"{before} | {found.ending} | {busy:.1f} s | | {found.iterations} |"
     cost = costs(euler.model, found.trajectory)["torque_squared_integral"]
     after = f"{_errors(replay(euler.model, found.trajectory))} | {busy:.1f} s | {cost:.3g}"
     return f"{before} | {after} | {found.iterations} |"

@@ -13,6 +13,7 @@ import argparse
 import numpy as np
 
 from kemba.ocp import load_task, plan
+from kemba.ocp.certificate.status import Status
 from kemba.plotting import plot_growth, save_figure
 from kemba.sweep import machine
 
@@ -30,7 +31,7 @@ def seconds(name: str, nodes: int, repeats: int, limit: float) -> float:
         print(
             f"{name:20s} N = {nodes:4d}  {found.solve_cpu_s:7.2f} s  {found.sentence}", flush=True
         )
-        if found.status == "solved":
+        if found.status is Status.SOLVED:
             times.append(found.solve_cpu_s)
     return float(np.median(times)) if times else np.nan
 

@@ -14,6 +14,7 @@ import re
 import tempfile
 from collections.abc import Iterator
 from contextlib import ExitStack
+from dataclasses import dataclass, field
 from pathlib import Path
 from unittest.mock import patch
 
@@ -21,24 +22,36 @@ import numpy as np
 
 from kemba.config import parse
 from kemba.ocp import Task, plan
+from kemba.ocp.functions.settings import Newton
+from kemba.ocp.relaxation.settings import Starts
+from kemba.settings import Settings, changed
 from kemba.sweep import expand, load_sweep, machine
 
-Changes = tuple[dict[str, object], dict[str, object]]  # in kemba.ocp, in a task's solver
-SHIPPED: Changes = ({}, {})
-VARIANTS: dict[str, dict[str, Changes]] = {
+
+@dataclass(frozen=True)
+class Variant:
+    """What a variant changes: settings, the task's solver, whether whole robots grow from half."""
+
+    settings: dict[type[Settings], dict[str, object]] = field(default_factory=dict)
+    solver: dict[str, object] = field(default_factory=dict)
+    grown: bool = True
+
+
+SHIPPED = Variant()
+VARIANTS: dict[str, dict[str, Variant]] = {
     "general": {
         "as shipped": SHIPPED,
-        "from the guess": ({"planner.Planner.half": None}, {}),
-        "two rounds of moving switches": ({}, {"valve_search": 2}),
-        "undamped": ({"damped.DAMPING": 0.0}, {}),
-        "changed plans at their bounds": ({"schedule.CHANGED": 1e-6}, {}),
-        "memory by IPOPT's default": ({}, {"options": {"mumps_mem_percent": 1000}}),
+        "from the guess": Variant(grown=False),
+        "two rounds of moving switches": Variant(solver={"valve_search": 2}),
+        "plain Hessian": Variant({Newton: {"regularisation": 0.0}}),
+        "changed plans at their bounds": Variant({Starts: {"changed": 1e-6}}),
+        "memory by IPOPT's default": Variant(solver={"options": {"mumps_mem_percent": 1000}}),
     },
     "symmetric": {
         "as shipped": SHIPPED,
-        "two rounds of moving switches": ({}, {"valve_search": 2}),
-        "no round": ({}, {"valve_search": 0}),
-        "changed plans at their bounds": ({"schedule.CHANGED": 1e-6}, {}),
+        "two rounds of moving switches": Variant(solver={"valve_search": 2}),
+        "no round": Variant(solver={"valve_search": 0}),
+        "changed plans at their bounds": Variant({Starts: {"changed": 1e-6}}),
     },
 }
 ITERATION = re.compile(r"^ *\d+r?(?: +\S+){5} +(\S+)(?: +\S+){3}$", re.MULTILINE)  # lg(rg)
@@ -51,14 +64,15 @@ def jumps(block: str, count: int) -> Iterator[Task]:
     return (parse(case.work["task"], Task) for case in cases[:count])
 
 
-def figures(task: Task, changes: Changes) -> list[float]:
+def figures(task: Task, variant: Variant) -> list[float]:
     """Iterations, those shifted, logarithm of the cost and CPU seconds of one cold solve."""
-    replaced, set_in_solver = changes
-    solver = task.solver.model_copy(update=set_in_solver)
+    solver = task.solver.model_copy(update=variant.solver)
     with tempfile.TemporaryDirectory() as folder, ExitStack() as patches:
         log = Path(folder) / "solver.log"
-        for name, value in replaced.items():
-            patches.enter_context(patch(f"kemba.ocp.{name}", value))
+        for settings, values in variant.settings.items():
+            patches.enter_context(changed(settings, **values))
+        if not variant.grown:
+            patches.enter_context(patch("kemba.ocp.planner.Planner.half", None))
         found = plan(task.model_copy(update={"solver": solver}), log=log)
         shifts = ITERATION.findall(log.read_text(encoding="utf-8"))
     cost = found.cost["torque_squared_integral"]
@@ -73,7 +87,7 @@ def main() -> None:
     asked = parser.parse_args()
     variants = VARIANTS[asked.block]
     tasks = jumps(asked.block, asked.cases)
-    found = [[figures(task, changes) for changes in variants.values()] for task in tasks]
+    found = [[figures(task, variant) for variant in variants.values()] for task in tasks]
     iterations, shifted, cost, seconds = np.moveaxis(np.array(found), -1, 0)  # (cases, variants)
     print(f"{asked.cases} {asked.block} jumps, {machine()}\n")
     print("| variant | iterations | shifted | cost [N².m².s] | CPU time |\n|---|" + "---:|" * 4)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from functools import lru_cache
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -12,6 +13,31 @@ import typer
 if TYPE_CHECKING:
     from rich.console import Console
 
+
+def _load_effects(files: list[Path] | None) -> list[Path] | None:
+    """Add the effects of the user's files, before the verb reads any YAML."""
+    if files:
+        from kemba.effects import BY_KIND
+        from kemba.errors import KembaError
+
+        try:
+            for file in files:
+                BY_KIND.load_file(file)
+        except KembaError as error:
+            typer.echo(str(error), err=True)
+            raise typer.Exit(2) from None
+    return files
+
+
+OwnEffects = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--effects",
+        callback=_load_effects,
+        help="Python file with effects of your own (its code is run); may be repeated.",
+    ),
+]
+Force = Annotated[bool, typer.Option("--force", help="Replace results that are there already.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing but the result.")]
 

@@ -15,6 +15,9 @@ import typer
 
 from kemba.errors import KembaError
 
+OF_THE_DISK = (
+    *(errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO),
+)
 BAD_ANSWER = 1
 BAD_INPUT = 2
 INTERRUPTED = 130
@@ -31,17 +34,34 @@ def guarded(verb: Callable[..., None]) -> Callable[..., None]:
             raise
         except KembaError as error:
             typer.echo(str(error), err=True)
-            raise typer.Exit(BAD_INPUT) from None
+            raise typer.Exit(_code(error)) from None
         except KeyboardInterrupt:
             typer.echo("interrupted", err=True)
             raise typer.Exit(INTERRUPTED) from None
         except Exception as error:
             if isinstance(error, OSError) and error.errno == errno.EPIPE:
                 raise  # the reader of our output went away; click leaves quietly
+            if isinstance(error, OSError) and error.errno in OF_THE_DISK:
+                typer.echo(_disk(error), err=True)
+                raise typer.Exit(BAD_ANSWER) from None
             typer.echo(_crash(error), err=True)
             raise typer.Exit(BAD_ANSWER) from None
 
     return run
+
+
+def _code(error: KembaError) -> int:
+    """The command was right when only the disk is full."""
+    from kemba.files import DiskFull
+
+    return BAD_ANSWER if isinstance(error, DiskFull) else BAD_INPUT
+
+
+def _disk(error: OSError) -> str:
+    """A failed write in words; without a name it was our own output."""
+    from kemba.files import write_error
+
+    return str(write_error(error.filename or "the output", error))
 
 
 def _crash(error: Exception) -> str:
@@ -49,13 +69,17 @@ def _crash(error: Exception) -> str:
     whole = "".join(traceback.format_exception(error))
     if os.environ.get("KEMBA_DEBUG"):
         return whole
-    with tempfile.NamedTemporaryFile(
-        "w", prefix="kemba-crash-", suffix=".log", delete=False, encoding="utf-8"
-    ) as log:
-        log.write(whole)
+    try:
+        with tempfile.NamedTemporaryFile(
+            "w", prefix="kemba-crash-", suffix=".log", delete=False, encoding="utf-8"
+        ) as log:
+            log.write(whole)
+        attached = f"the file {log.name}"
+    except OSError:
+        attached = "what KEMBA_DEBUG=1 shows"
     last = traceback.extract_tb(error.__traceback__)[-1]
     place = f"{Path(last.filename).name}:{last.lineno}"
     return (
         f"kemba failed unexpectedly: {type(error).__name__} at {place}: {error}\n"
-        f"This is a fault of kemba; please report it with the file {log.name}"
+        f"This is a fault of kemba; please report it with {attached}"
     )

@@ -6,6 +6,8 @@ Verb modules import typer only; numpy, casadi and the like belong inside their f
 
 from __future__ import annotations
 
+import os
+import sys
 from typing import Annotated
 
 import typer
@@ -72,4 +74,17 @@ def options(
 
 def main() -> None:
     """Run `kemba-opt`. Exit code 0 good, 1 bad answer, 2 wrong usage or input, 130 interrupted."""
-    app(prog_name="kemba-opt")
+    try:
+        app(prog_name="kemba-opt")
+    finally:
+        _flush()
+
+
+def _flush() -> None:
+    """Write out what is left, so that a full disk is told and not only a strange exit code."""
+    try:
+        sys.stdout.flush()
+    except OSError as error:
+        typer.echo(f"the output cannot be written: {error.strerror}", err=True)
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nothing more to fail
+        sys.exit(1)

@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 SCHEMAS = {
     "tasks": "kemba.ocp.task.task:Task",
     "models": "kemba.model.spec:ModelSpec",
-    "robots": "kemba.mechanism.links:Robot",
+    "robots": "kemba.mechanism.links:RobotFile",
+    "cylinders": "kemba.mechanism.cylinder:CylinderTable",
     "sweeps": "kemba.sweep.schema:Sweep",
     "rigs": "kemba.plant.rig.bench:RigFile",
 }

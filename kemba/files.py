@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import math
 import os
@@ -14,20 +15,62 @@ from typing import Any, TextIO
 from kemba.errors import KembaError
 
 
+class WriteError(KembaError):
+    """A file or folder that cannot be written: another place must be given."""
+
+
+class DiskFull(WriteError):  # noqa: N818
+    """There is no space left: the command was right, and runs again when there is."""
+
+
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+
+
+def write_error(path: str | Path, error: OSError) -> WriteError:
+    """Why `path` cannot be written, and what to do about it."""
+    what = f"cannot be written: {error.strerror or error}"
+    if error.errno in FULL:
+        return DiskFull(str(path), what, hint="free some space on this disk, then run it again")
+    return WriteError(str(path), what, hint="give a place where you may write files")
+
+
+@contextmanager
+def atomic_path(path: str | Path) -> Iterator[Path]:
+    """A name to write to; the file appears under `path` only when the block ends without an error.
+
+    Raises WriteError when the disk is full or the folder cannot be written.
+    """
+    path = Path(path)
+    temporary: Path | None = None
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(
+            dir=path.parent, prefix=f".{path.name[:100]}.", suffix=path.suffix
+        )
+        os.close(handle)
+        temporary = Path(name)
+        yield temporary
+        temporary.chmod(_mode(path))
+        temporary.replace(path)
+    except BaseException as error:
+        if temporary is not None:
+            temporary.unlink(missing_ok=True)
+        if isinstance(error, OSError):
+            raise write_error(path, error) from None
+        raise
+
+
 @contextmanager
 def atomic_text(path: str | Path) -> Iterator[TextIO]:
-    """A UTF-8 text file that appears under `path` only when the block ends without an error."""
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with open(handle, "w", encoding="utf-8", newline="\n") as stream:
-            yield stream
-        Path(name).chmod(_mode(path))
-        Path(name).replace(path)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
+    """A UTF-8 text file that appears under `path` only when the block ends without an error.
+
+    Raises WriteError when the disk is full or the folder cannot be written.
+    """
+    with (
+        atomic_path(path) as temporary,
+        temporary.open("w", encoding="utf-8", newline="\n") as stream,
+    ):
+        yield stream
 
 
 def _mode(path: Path) -> int:

@@ -1,4 +1,4 @@
-"""A CasADi function's instructions, gone through again with something else in place of numbers."""
+"""The instructions of a CasADi function, applied to other things than numbers."""
 
 from __future__ import annotations
 

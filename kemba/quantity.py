@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
     from pydantic_core import CoreSchema
 
-__all__ = ["Param", "Quantity", "convert", "expectation", "is_si", "to_si"]
+__all__ = ["Param", "Quantity", "Tolerance", "convert", "expectation", "is_si", "to_si"]
 
 HEADER = re.compile(r"(?P<name>[^\s/,\[\]]+(?:/[^\s/,\[\]]+)*) \[(?P<unit>[^\[\]]+)\]")
 
@@ -107,3 +107,21 @@ class Param:
             "unit": self.unit,
             "description": text,
         }
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """How much a nominal figure may differ on a machine of the same make.
+
+    `sigma` (1 sigma) in `unit`: the figure's own, or "1" for a share of it. `each`: the entries of
+    a table differ one by one, not all by one factor. `source`: where `sigma` comes from.
+    """
+
+    sigma: float
+    unit: str = "1"
+    each: bool = False
+    source: str = ""
+
+    def share(self, value: float) -> float:
+        """1 sigma as a share of the figure's value."""
+        return self.sigma if self.unit == "1" else self.sigma / abs(value)

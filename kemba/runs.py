@@ -15,7 +15,8 @@ from typing import Any
 
 import kemba
 from kemba.errors import KembaError
-from kemba.files import read_json, write_json
+from kemba.files import read_json, write_error, write_json
+from kemba.folders import LOCK, lock_folder, try_writing, unlock
 from kemba.trajectory import Trajectory
 
 __all__ = ["Run", "RunFolder", "load_run", "write_json"]
@@ -26,10 +27,14 @@ LIBRARIES = ("casadi", "pin", "numpy")
 
 @dataclass
 class RunFolder:
-    """A folder being filled by a verb; its manifest says `running` until `finish`."""
+    """A folder being filled by a verb; its manifest says `running` until `finish`.
+
+    No other process can fill it meanwhile.
+    """
 
     path: Path
     manifest: dict[str, Any] = field(default_factory=dict)
+    lock: Any = field(default=None, repr=False)
 
     @classmethod
     def create(
@@ -43,10 +48,16 @@ class RunFolder:
 
         `inputs` are the task and model files, of which hashes are kept. A folder left by a run
         that never finished is used again. Raises KembaError when `out` holds a finished run or
-        other files, or cannot be made.
+        other files, cannot be made or written, or is being filled by another process.
         """
-        path = _next_free(task) if out is None else _usable(Path(out))
-        folder = cls(path)
+        if out is None:
+            path = _next_free(task)
+        else:
+            path = Path(out)
+            _check_usable(path)
+        try_writing(path)
+        folder = cls(path, lock=lock_folder(path))
+        _check_usable(path)  # another process may have finished since
         folder.manifest = {
             "status": "running",
             "task": task,
@@ -63,6 +74,8 @@ class RunFolder:
         """Replace the manifest by its final form; `facts` are further entries."""
         self.manifest.update(status=status, finished=_now(), **facts)
         write_json(self.path / MANIFEST, self.manifest)
+        unlock(self.lock, self.path)
+        self.lock = None
 
     def __truediv__(self, name: str) -> Path:
         return self.path / name
@@ -88,7 +101,11 @@ class Run:
     @cached_property
     def certificate(self) -> dict[str, Any]:
         """The outcome, residuals and replay of the plan."""
-        return dict(read_json(self._file("certificate.json")))
+        found = read_json(self._file("certificate.json"))
+        if not isinstance(found, dict):
+            expected = "a group of keys, as solve writes it, was expected"
+            raise KembaError(str(self.path / "certificate.json"), "is no certificate", expected)
+        return found
 
     @property
     def task(self) -> Path:
@@ -114,7 +131,7 @@ def load_run(path: str | Path) -> Run:
     if not (folder / MANIFEST).is_file():
         expected = f"a folder with a {MANIFEST}, as solve writes it, was expected"
         raise KembaError(str(folder), "is not a run folder", expected)
-    return Run(folder, dict(read_json(folder / MANIFEST)))
+    return Run(folder, read_manifest(folder))
 
 
 def versions() -> dict[str, str]:
@@ -141,20 +158,28 @@ def _next_free(task: str) -> Path:
             path.mkdir(parents=True)
         except FileExistsError:
             number += 1
+        except OSError as error:
+            raise write_error(path, error) from None
         else:
             return path
 
 
-def _usable(path: Path) -> Path:
-    """The folder asked for, made, or left over from an unfinished run."""
-    if path.is_dir() and any(path.iterdir()):
+def _check_usable(path: Path) -> None:
+    """Raise KembaError unless the folder is new, or left over from an unfinished run."""
+    if path.exists() and not path.is_dir():
+        raise KembaError(f"--out {path}", "is a file", "a new folder was expected")
+    if path.is_dir() and any(item.name != LOCK for item in path.iterdir()):
         if not (path / MANIFEST).is_file():
             raise KembaError(f"--out {path}", "holds other files", "a new folder was expected")
-        if read_json(path / MANIFEST).get("status") != "running":
+        if read_manifest(path).get("status") != "running":
             hint = "give another --out, or delete it first"
             raise KembaError(f"--out {path}", "holds a finished run already", hint=hint)
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise KembaError(f"--out {path}", error.strerror or str(error)) from None
-    return path
+
+
+def read_manifest(folder: Path) -> dict[str, Any]:
+    """The manifest of a run or sweep folder. Raises KembaError when it is no group of keys."""
+    found = read_json(folder / MANIFEST)
+    if not isinstance(found, dict):
+        expected = "a group of keys, as kemba writes it, was expected"
+        raise KembaError(str(folder / MANIFEST), "is no manifest", expected)
+    return found

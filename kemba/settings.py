@@ -23,6 +23,7 @@ from typing_extensions import dataclass_transform
 from kemba.errors import KembaError, suggest
 
 ORIGINS = ("derived", "literature", "tuned", "convention")
+BY_HAND = "tuned: by hand on the twin of tests/twin, no benchmark"
 
 S = TypeVar("S", bound="Settings")
 

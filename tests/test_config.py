@@ -143,12 +143,15 @@ def test_mistakes_without_a_line() -> None:
 @pytest.mark.parametrize(
     ("text", "start"),
     [
-        ("a: [1, 2\nb: 3\n", "jump.yaml:2:2: is not valid YAML: expected ',' or ']'"),
-        ("a:\n\tb: 1\n", "jump.yaml:2:1: is not valid YAML: found character '\\t'"),
-        ("a: *none\n", "jump.yaml:1:4: is not valid YAML: found undefined alias 'none'"),
-        ("a: !!python/name:os.system x\n", "jump.yaml:1:4: is not valid YAML: could not determine"),
-        ("a: 1\n---\nb: 1\n", "jump.yaml:2:1: is not valid YAML: but found another document"),
-        ("&a [*a]", "jump.yaml: an alias contains itself"),
+        ("a: [1, 2\nb: 3\n", "jump.yaml:2:2: is not valid YAML: did not find expected ','"),
+        ("a:\n\tb: 1\n", "jump.yaml:2:1: is not valid YAML: found character that"),
+        ("a: *none\n", "jump.yaml:1:4: the alias '*none' has no anchor"),
+        (
+            "a: !!python/name:os.system x\n",
+            "jump.yaml:1:4: the tag '!!python/name:os.system' is not",
+        ),
+        ("a: 1\n---\nb: 1\n", "jump.yaml:2:1: a second document begins here"),
+        ("&a [*a]", "jump.yaml:1:5: the alias '*a' contains itself"),
         ("a: \x01", "jump.yaml: is not valid YAML: unacceptable character"),
     ],
 )
@@ -200,11 +203,14 @@ def test_overrides_that_do_not_fit_the_schema() -> None:
 
 def test_overrides_that_lead_nowhere() -> None:
     with pytest.raises(ConfigErrors) as caught:
-        apply_overrides(document(), ["nodes", "nodes.x=1", "effects.7.T_c=3", "a..b=4"])
+        apply_overrides(
+            document(), ["nodes", "nodes.x=1", "effects.7.T_c=3", "effects[2].T_c=3", "a..b=4"]
+        )
     assert [str(error) for error in caught.value.errors] == [
         "--set nodes: is not key=value; such as --set 'goals.apex=0.5 m'",
         "--set nodes.x=1: nodes is a plain value and has no key 'x'",
         "--set effects.7.T_c=3: effects has no item '7'; 0 to 1 was expected",
+        "--set effects[2].T_c=3: effects has no item '2'; 0 to 1 was expected",
         "--set a..b=4: is not key=value; such as --set 'goals.apex=0.5 m'",
     ]
 

@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 import re
+import shlex
+import subprocess
+import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
+from typer.testing import CliRunner
 
 from kemba.config import shipped_configs
+from kemba.mechanism.cylinder import CylinderTable
+from kemba.mechanism.links import Leg, LegPlace, Link, Piston, RobotFile
+from kemba.model import load_model
 from kemba.ocp.task.costs import COSTS
 from kemba.ocp.task.task import Bound, Goal, Solver, Task, Tolerances
+from kemba_cli.main import app
 
 ROOT = Path(__file__).parent.parent
 PAGES = sorted([*ROOT.glob("docs/*.md"), ROOT / "README.md"])
@@ -20,6 +29,44 @@ def test_every_key_of_a_task_is_described(section: type[Task]) -> None:
     page = (ROOT / "docs" / "tasks.md").read_text(encoding="utf-8")
     named = set(re.findall(r"`(\w+)`", page))
     assert set(section.model_fields) <= named
+
+
+SECTIONS: dict[str, type[Any]] = {
+    "Robot": RobotFile,
+    "Place of a leg": LegPlace,
+    "Leg": Leg,
+    "Link": Link,
+    "Lengths of the piston": Piston,
+    "Cylinder": CylinderTable,
+}
+
+
+@pytest.mark.parametrize("title", SECTIONS)
+def test_every_key_of_a_robot_is_described_with_its_unit(title: str) -> None:
+    page = (ROOT / "docs" / "robots.md").read_text(encoding="utf-8")
+    section = page.split(f"### {title}\n")[1].split("\n##")[0]
+    told = dict(re.findall(r"^\| `(\w+)` \| ([^|]+) \|", section, re.MULTILINE))
+    fields = SECTIONS[title].model_fields
+    assert list(told) == list(fields)
+    for name, info in fields.items():
+        unit = re.search(r"Param\(unit='([^']+)'", f"{info.metadata}{info.annotation}")
+        assert unit is None or told[name] == unit.group(1), name
+
+
+def test_the_walk_of_the_robots_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its first three steps, by a shell; nothing is solved."""
+    page = (ROOT / "docs" / "robots.md").read_text(encoding="utf-8")
+    shell = re.findall(r"```sh\n(.*?)```", page, re.DOTALL)
+    model = re.findall(r"```yaml\n(.*?)```", page, re.DOTALL)[0]
+    first = shell[0].replace("python -c", f"{sys.executable} -c")
+    subprocess.run(["sh", "-ec", first], cwd=tmp_path, check=True)
+    (tmp_path / "mine" / "model.yaml").write_text(model, encoding="utf-8")
+    monkeypatch.chdir(tmp_path / "mine")
+    for line in shell[1].strip().splitlines():
+        verb = [*shlex.split(line)[1:], *(["--dry-run"] if " solve " in line else [])]
+        done = CliRunner().invoke(app, verb)
+        assert done.exit_code == 0, done.output
+    assert load_model("model.yaml").mechanism.legs == ("left", "right")
 
 
 def test_every_cost_and_shipped_task_is_described() -> None:

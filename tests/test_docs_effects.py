@@ -21,7 +21,7 @@ from kemba.effects.catalogue import (
 )
 from kemba.effects.describe import page
 from kemba.errors import KembaError
-from kemba.mechanism import rig_mechanism
+from kemba.mechanism import load_cylinder, rig_mechanism
 from kemba.model import Model, load_model
 from kemba.model.spec import ModelSpec
 
@@ -57,7 +57,7 @@ def test_the_class_of_extending_runs_and_dissipates(tmp_path: Path) -> None:
 
 
 def test_the_formula_of_extending_runs(tmp_path: Path) -> None:
-    (text,) = blocks("extending.md", "yaml")
+    text, _ = blocks("extending.md", "yaml")
     (tmp_path / "mine.yaml").write_text(text, encoding="utf-8")
     labels = [i.label for i in load_model(tmp_path / "mine.yaml").instances]
     assert "front/magnet" in labels and "front/contact" in labels
@@ -78,7 +78,8 @@ def test_the_message_of_extending_is_the_real_one() -> None:
 def test_fitted_chambers_meet_tables_1_and_2_as_documented() -> None:
     """Every entry within what docs/pneumatics.md admits."""
     losses = [SupplyLine(), HoseLag(T=1e-3), SealFriction(F_c=5.9), PistonDamping(c=20.0)]
-    rig = Model(rig_mechanism(), [Valve(), OrificeChamber(), *losses])
+    chamber = OrificeChamber(V_r=15.0e-6)
+    rig = Model(rig_mechanism(load_cylinder("dsnu-25-70")), [Valve(), chamber, *losses])
     allowed = {"[ms]": lambda paper: 0.07 * paper + 0.1, "[N]": lambda _: 13.5}
     script = runpy.run_path(str(DOCS.parent / "benchmarks" / "fit_chambers.py"))
     for entry, paper, found, _ in script["table"](rig):

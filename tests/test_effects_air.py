@@ -16,14 +16,16 @@ from kemba.effects.catalogue import (
     ValveCloseDelay,
     ValveDelay,
 )
-from kemba.effects.pneumatics.constants import AREA_E, AREA_R
 from kemba.errors import KembaError
-from kemba.model import Model, load_model
+from kemba.mechanism import load_cylinder
+from kemba.model import Model, build_model, load_model, load_spec
 
+CYLINDER = load_cylinder("dsnu-25-70")
+AREA_E, AREA_R = CYLINDER.area_extend, CYLINDER.area_retract
 X, V = 0.02, 0.3
 
 
-def rates(model: Model, u: tuple[float, float], **states: float) -> dict[str, float]:
+def rates(model: Model, u: tuple[float, float], v: float = V, **states: float) -> dict[str, float]:
     """Rates of a rig's effect states by column name, and the force `piston/F`."""
     node = model.node
     names = [q.name for q in model.states.values()]
@@ -33,7 +35,7 @@ def rates(model: Model, u: tuple[float, float], **states: float) -> dict[str, fl
             for n, q in zip(names, model.states.values(), strict=True)
         ]
     )
-    arguments = {"q": X, "v": V, "a": 0, "s": s, "sd": 0 * s, "lam": [], "u": list(u), "p": []}
+    arguments = {"q": X, "v": v, "a": 0, "s": s, "sd": 0 * s, "lam": [], "u": list(u), "p": []}
     result = dict(zip(names, -np.asarray(node.residual(**arguments)["rate"]).ravel(), strict=True))
     columns = [o.name for o in node.output_quantities]
     force = np.asarray(node.measure(**arguments)["y"]).ravel()[columns.index("piston/F")]
@@ -54,6 +56,23 @@ def test_supply_scale_multiplies_both_static_forces() -> None:
 def test_rise_time_scale_multiplies_tau() -> None:
     slow, usual = rates(rig(RiseTimeScale(k=1.25)), (1, 0)), rates(rig(), (1, 0))
     assert slow["chamber/extend/F"] == pytest.approx(usual["chamber/extend/F"] / 1.25)
+
+
+@pytest.mark.parametrize("valve", [1, 0], ids=["filling", "venting"])
+@pytest.mark.parametrize("chambers", ["first_order", "orifice"])
+def test_rise_time_scale_slows_filling_and_venting_alike(chambers: str, valve: int) -> None:
+    """A valve's answer takes 1.25 times as long, in the chambers of eq. 4 and of eq. 1 to 3."""
+    state = {"first_order": "chamber/extend/F", "orifice": "chamber/extend/P"}[chambers]
+    full = {"first_order": 150.0, "orifice": 4e5}[chambers]
+    spec = load_spec("planning").model_copy(update={"chambers": chambers})
+
+    def rate(*extra: Effect) -> float:
+        model = build_model(spec, extra, rig=True)
+        u = (valve, 0)
+        return rates(model, u, v=0.0, **{state.replace("/", "_"): full})[state]
+
+    assert rate() > 0 if valve else rate() < 0
+    assert rate(RiseTimeScale(k=1.25)) == pytest.approx(rate() / 1.25, rel=1e-9)
 
 
 def test_droop_is_drawn_by_filling_chambers_of_every_leg() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ast
+import time
 from typing import Any
 
 import numpy as np
@@ -110,6 +112,41 @@ def test_mistakes_are_explained(fields: dict[str, Any], sentence: str) -> None:
     with pytest.raises(KembaError) as caught:
         expression(**{"on": "piston", "parameters": {**F0}, **fields})
     assert sentence in str(caught.value).replace("\n", " ")
+
+
+@pytest.mark.parametrize(
+    "force, sentence",
+    [
+        ("F0*9**9**9**9", "'9 ** 9 ** 9' has no finite value"),
+        ("F0*log(9**9**9)", "'9 ** 9 ** 9' has no finite value"),
+        ("F0*10**400", "'10 ** 400' has no finite value"),
+        ("F0*1" + "0" * 400, "has no finite value"),
+        ("F0*(1/0)", "'1 / 0' has no finite value"),
+        ("F0*(-1)**0.5", "'(-1) ** 0.5' has no finite value"),
+        ("F0*0**-1", "'0 ** (-1)' has no finite value"),
+        ("F0*2**5000", "'2 ** 5000' has no finite value"),
+        ("F0*log(0)", "'log(0)' has no finite value"),
+        ("F0*sqrt(-1)", "'sqrt(-1)' has no finite value"),
+        ("-" * 490 + "F0", "is nested deeper than 40 operations"),
+        ("F0" + "+F0" * 150, "is nested deeper than 40 operations"),
+        ("F0*max(u_e, " * 35 + "0" + ")" * 35, "is nested deeper than 40 operations"),
+        ("F0/u_e", "'F0 / u_e' has no finite value at F0 = 8, u_e = 0"),
+        ("F0*log(u_e)", "has no finite value at F0 = 8, u_e = 0"),
+        ("F0*(u_e - 0.5)**0.5", "has no finite value at F0 = 8, u_e = 0"),
+        ("F0*exp(1e4*u_e)", "has no finite value at F0 = 8, u_e = 1"),
+        ("F0*u_e**1e9*1e300*1e300", "has no finite value"),
+    ],
+)
+def test_what_is_not_finite_is_refused_at_once(force: str, sentence: str) -> None:
+    began = time.process_time()
+    with pytest.raises(KembaError) as caught:
+        expression(on="piston", force=force, parameters=F0)
+    assert sentence in str(caught.value).replace("\n", " ")
+    assert time.process_time() - began < 1.0
+
+
+def test_constants_are_computed_once() -> None:
+    assert ast.unparse(parse_formula("-(2*9.81)*F + sqrt(16)**(1/2)")) == "-19.62 * F + 2.0"
 
 
 def test_every_function_can_be_called() -> None:

@@ -8,16 +8,19 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from kemba.effects.catalogue import CrossLeak, OrificeChamber, SupplyLine, Valve
-from kemba.effects.pneumatics.constants import AREA_E, ATMOSPHERE, GAS, KAPPA, TEMPERATURE
+from kemba.effects.pneumatics.constants import ATMOSPHERE, GAS, KAPPA, TEMPERATURE
 from kemba.effects.pneumatics.flow import CHOKED, SUBSONIC, mass_flow, phi, psi
-from kemba.mechanism import rig_mechanism
+from kemba.mechanism import load_cylinder, rig_mechanism
 from kemba.model import Model, load_spec
 from kemba.model.spec import build_model
+
+CYLINDER = load_cylinder("dsnu-25-70")
+AREA_E, AREA_R = CYLINDER.area_extend, CYLINDER.area_retract
 
 
 def rig(*extra: object, **values: object) -> Model:
     chamber = OrificeChamber().bind(values)
-    return Model(rig_mechanism(), [Valve(), chamber, *extra])  # type: ignore[list-item]
+    return Model(rig_mechanism(CYLINDER), [Valve(), chamber, *extra])  # type: ignore[list-item]
 
 
 def rate(model: Model) -> ca.Function:
@@ -86,7 +89,7 @@ def test_mass_is_conserved_between_hose_and_locked_chamber() -> None:
     change = dict(zip(names, answer.y[:, -1] - answer.y[:, 0], strict=True))
     volumes = {
         "chamber/extend/P": chamber.V_e + AREA_E * x,
-        "chamber/retract/P": chamber.V_r + AREA_E * (1 - 0.16) * (0.07 - x),
+        "chamber/retract/P": chamber.V_r + AREA_R * (CYLINDER.stroke - x),
         "supply/line/s": line.V * full,
         "supply/tank/s": line.V_tank * full,
     }

@@ -57,7 +57,7 @@ def test_other_folders_are_left_alone() -> None:
     Path("data/thesis.tex").write_text("")
     with pytest.raises(KembaError, match="--out data: holds other files; a new folder"):
         RunFolder.create("data", "jump")
-    with pytest.raises(KembaError, match=r"--out data/thesis.tex: File exists"):
+    with pytest.raises(KembaError, match=r"--out data/thesis.tex: is a file; a new folder"):
         RunFolder.create("data/thesis.tex", "jump")
 
 

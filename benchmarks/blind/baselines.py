@@ -7,15 +7,14 @@ from typing import Any
 import numpy as np
 from scipy.linalg import lstsq
 
-from kemba.identify.evidence.problem import Problem
+from kemba.identify.problem.problem import Problem
 
 NAMES = ("one_by_bic", "all_by_least_squares")
 
 
 def all_of(problem: Problem) -> dict[str, Any]:
     """Answers of every baseline: the effect named, or null for nothing."""
-    if hasattr(problem, "recolour"):
-        problem.recolour(None)  # neither whitens
+    problem = problem.recolour(None)  # neither whitens
     switches = {c.key: name for name, c in problem.candidates.items()}
     names = [*problem.nuisance, *switches]
     r, jacobian = problem.residual({}), problem.jacobian({}, names)

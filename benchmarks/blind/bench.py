@@ -28,7 +28,7 @@ from twin.catalogue import CATALOGUE
 from twin.measure import Sensors
 
 from blind import study
-from kemba.identify.bench import BenchProblem, bench_problem
+from kemba.identify.bench.problem import BenchProblem, bench_problem
 from kemba.identify.logs.gate import check_logs
 from kemba.identify.logs.reading import read_logs
 from kemba.model.spec import load_model
@@ -87,18 +87,23 @@ def _setting(effect: Any, turn: int, seed: int, rng: np.random.Generator) -> dic
     }
 
 
-def run(setting: dict[str, Any]) -> dict[str, Any]:
-    """One case: logs made, answered, and compared with the truth."""
+def logs_of(setting: dict[str, Any], folder: Path) -> tuple[list[Path], dict[str, Any]]:
+    """Logs of one case, written to `folder`, and the truth about them."""
     options = {k: v for k, v in setting.items() if k not in ("effect", "noise", "pressures")}
     sensors = Sensors(noise=setting["noise"], pressures=setting["pressures"])
+    return bench_case(folder, setting["effect"], sensors=sensors, **options)
+
+
+def run(setting: dict[str, Any]) -> dict[str, Any]:
+    """One case: logs made, answered, and compared with the truth."""
     with tempfile.TemporaryDirectory() as folder:
-        paths, truth = bench_case(Path(folder), setting["effect"], sensors=sensors, **options)
+        paths, truth = logs_of(setting, Path(folder))
         logs = read_logs(paths)
 
     def problem() -> BenchProblem:
         check_logs(logs)
         found = bench_problem(logs, load_model(MODELS[setting["chambers"]], rig=True))
-        found.plausible()
+        found.validate()
         return found
 
     return {"case": setting, "truth": truth["effects"], **study.answered(problem)}

@@ -29,7 +29,7 @@ from twin.measure import Sensors, fault_channels
 from blind import study
 from kemba.identify.logs.gate import check_logs
 from kemba.identify.logs.reading import read_logs
-from kemba.identify.robot import RobotProblem, robot_problem
+from kemba.identify.robot.problem import RobotProblem, robot_problem
 from kemba.model.spec import load_model
 
 EFFECTS = [name for name, entry in CATALOGUE.items() if entry.known]
@@ -74,18 +74,23 @@ def _setting(effect: Any, turn: int, seed: int, rng: np.random.Generator) -> dic
     }
 
 
-def run(setting: dict[str, Any]) -> dict[str, Any]:
-    """One case: logs made, answered, and compared with the truth."""
+def logs_of(setting: dict[str, Any], folder: Path) -> tuple[list[Path], dict[str, Any]]:
+    """Logs of one case, written to `folder`, and the truth about them."""
     options = {k: v for k, v in setting.items() if k not in ("effect", "noise")}
     sensors = Sensors(noise=setting["noise"])
+    return _standing(folder, setting["effect"], sensors=sensors, **options)
+
+
+def run(setting: dict[str, Any]) -> dict[str, Any]:
+    """One case: logs made, answered, and compared with the truth."""
     with tempfile.TemporaryDirectory() as folder:
-        paths, truth = _standing(Path(folder), setting["effect"], sensors=sensors, **options)
+        paths, truth = logs_of(setting, Path(folder))
         logs = read_logs(paths)
 
     def problem() -> RobotProblem:
         check_logs(logs)
         found = robot_problem(logs, load_model())
-        found.plausible()
+        found.validate()
         return found
 
     return {"case": setting, "truth": truth["effects"], **study.answered(problem)}

@@ -15,8 +15,8 @@ import numpy as np
 from blind import baselines, report
 from kemba.identify.answer import Answer
 from kemba.identify.discover import discover
-from kemba.identify.evidence.problem import Problem
 from kemba.identify.logs.gate import BadData
+from kemba.identify.problem.problem import Problem
 
 Setting = dict[str, Any]
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "discovery.md"

@@ -7,13 +7,15 @@ from typing import Annotated
 
 import typer
 
-from kemba_cli.common import Json, Quiet, print_json
+from kemba_cli.common import Force, Json, OwnEffects, Quiet, print_json
 
 
 def adopt(
     answer: Annotated[Path, typer.Argument(help="Folder written by discover.")],
     effect: Annotated[str, typer.Argument(help="Effect of its ranking, such as seal_friction.")],
     out: Annotated[Path | None, typer.Option(help="Model YAML to write.")] = None,
+    force: Force = False,
+    own_effects: OwnEffects = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -21,8 +23,10 @@ def adopt(
 
     Example: kemba-opt adopt answer pressure_friction --out model.yaml
     """
+    from kemba.folders import fresh
     from kemba.identify.adopt import adopt_effect
 
     path = out or answer / f"model_{effect.replace(':', '_').replace('/', '_')}.yaml"
+    fresh(path, force)
     adopt_effect(answer, effect, path)
     print_json({"model": str(path), "added": effect}) if json else typer.echo(path)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from kemba_cli.common import Json, Quiet, print_json, results, say
+from kemba_cli.common import Force, Json, OwnEffects, Quiet, print_json, results, say
 
 if TYPE_CHECKING:
     from kemba.plant.rig.characterise import Characteristics
@@ -22,9 +22,14 @@ def characterise(
     figures: Annotated[
         Path | None, typer.Option(help="Folder for the paper's figure of each rig.")
     ] = None,
+    model: Annotated[
+        str, typer.Option(help="Model YAML whose robot has the cylinder that was tested.")
+    ] = "planning",
     paper: Annotated[
         bool, typer.Option("--paper", help="No logs: what the paper's own tables imply.")
     ] = False,
+    force: Force = False,
+    own_effects: OwnEffects = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -37,16 +42,20 @@ def characterise(
         return
     if not logs:
         raise typer.BadParameter("logs are missing: give CSV files, or --paper", param_hint="LOGS")
+    from kemba.folders import fresh
+    from kemba.model import load_model
     from kemba.plant.rig.characterise import characterise as fit
     from kemba.plant.rig.tables import as_json
     from kemba.trajectory import Trajectory
 
+    if out:
+        fresh(out, force)
     files = [f for item in logs for f in (sorted(item.glob("*.csv")) if item.is_dir() else [item])]
     read = {str(file): Trajectory.read(file) for file in files}
-    found = fit(read)
+    found = fit(read, load_model(model, rig=True).mechanism.need_cylinder())
     if out:
         found.write_model(out, out.stem)
-    drawn = _draw(found, read, figures) if figures else []
+    drawn = _draw(found, read, figures, model) if figures else []
     answer: dict[str, Any] = {"logs": len(files), **as_json(found), "model": out and str(out)}
     answer["figures"] = drawn
     if json:
@@ -76,7 +85,9 @@ def _print_paper(json: bool, quiet: bool) -> None:
         results().print(table)
 
 
-def _draw(found: Characteristics, logs: dict[str, Trajectory], folder: Path) -> list[str]:
+def _draw(
+    found: Characteristics, logs: dict[str, Trajectory], folder: Path, model: str
+) -> list[str]:
     """The figure of each rig among the logs; what was fitted predicts random motion."""
     from kemba.plotting import plot_rig, save_figure
 
@@ -85,7 +96,7 @@ def _draw(found: Characteristics, logs: dict[str, Trajectory], folder: Path) -> 
         rig = str(log.meta.get("rig") or Path(name).resolve().parent.name)
         rigs.setdefault(rig, {})[Path(name).stem] = log
     return [
-        str(save_figure(plot_rig(own, effects=found.effects()), folder / f"{rig}.png"))
+        str(save_figure(plot_rig(own, model, found.effects()), folder / f"{rig}.png"))
         for rig, own in rigs.items()
     ]
 

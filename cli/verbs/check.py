@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from kemba_cli.common import Json, Quiet, print_json
+from kemba_cli.common import Json, OwnEffects, Quiet, print_json
 from kemba_cli.failures import BAD_INPUT
 
 
@@ -16,6 +16,7 @@ def check(
     column_map: Annotated[
         str | None, typer.Option("--map", help="Column map YAML for foreign logs.")
     ] = None,
+    own_effects: OwnEffects = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -63,14 +64,25 @@ def _yaml(file: Path) -> dict[str, Any]:
     document = load_yaml(locate(file, SCHEMAS))
     kind = kind_of(document)
     parsed = parse(document, schema_of(kind))
+    remarks = _whole(kind, parsed, document)
+    sentence = "; ".join([f"one of the {kind}", *remarks])
+    return {"kind": kind, "sentence": sentence, "remarks": remarks}
+
+
+def _whole(kind: str, parsed: Any, document: Any) -> list[str]:
+    """What a file names must exist too: robots, cylinders, legs, quantities, costs, options."""
+    from kemba.mechanism import load_cylinder, load_robot
+    from kemba.model import load_model
+    from kemba.ocp.planning import check_feasible
+    from kemba.ocp.task.task import parse_task
+
     if kind == "tasks":
-        _names(parsed, document)
-    return {"kind": kind, "sentence": f"one of the {kind}"}
-
-
-def _names(task: Any, document: Any) -> None:
-    """Quantities, costs and solver options that a task names."""
-    from kemba.ocp import task_model
-    from kemba.ocp.task.requirement import resolve
-
-    resolve(task, task_model(task), document)
+        model, _ = check_feasible(parse_task(document), document)
+        return model.remarks
+    if kind == "models":
+        return load_model(document.source).remarks
+    if kind == "robots":
+        load_robot(document.source)
+    if kind == "cylinders":
+        load_cylinder(document.source)
+    return []

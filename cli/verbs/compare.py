@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from kemba_cli.common import Json, Quiet, print_json, results, say
+from kemba_cli.common import Force, Json, OwnEffects, Quiet, print_json, results, say
 
 if TYPE_CHECKING:
     from kemba.identify.compare.compare import Comparison
@@ -23,6 +23,8 @@ def compare(
     column_map: Annotated[
         str | None, typer.Option("--map", help="Column map YAML for foreign logs.")
     ] = None,
+    force: Force = False,
+    own_effects: OwnEffects = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -34,8 +36,11 @@ def compare(
 
     # many small products: more BLAS threads only wait for each other
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    from kemba.identify.compare.from_logs import compare_logs
+    from kemba.folders import fresh
+    from kemba.identify.compare_logs import compare_logs
 
+    if figure is not None:
+        fresh(figure, force, "--figure")
     found, _ = compare_logs(logs, model, column_map, run)
     if figure is not None:
         from kemba.plotting.study.comparison import plot_comparison
@@ -59,9 +64,9 @@ def _print(found: Comparison) -> None:
         numbers = (f"{x:.3g}" for x in (c.rmse, c.max, c.noise_sigma, c.ratio))
         table.add_row(c.name.replace("[", r"\["), *numbers)
     results().print(table)
-    for cell in sorted((c for c in found.bins if c.significant), key=lambda c: c.q_value)[:SHOWN]:
-        where = f"{cell.channel} in {cell.phase}, valves {cell.mode}, piston {cell.region}"
-        typer.echo(f"  {where}: {cell.ratio:.2g} times the noise (q = {cell.q_value:.1g})")
+    for at in sorted((c for c in found.bins if c.significant), key=lambda c: c.q_value)[:SHOWN]:
+        where = f"{at.channel} in {at.phase}, valves {at.mode}, piston {at.region}"
+        typer.echo(f"  {where}: {at.ratio:.2g} times the noise (q = {at.q_value:.1g})")
     for hint in found.hints[:SHOWN]:
         typer.echo(f"  {hint.text}")
     for peak in found.peaks:

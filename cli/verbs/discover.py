@@ -7,11 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from kemba_cli.common import Json, Quiet, print_json, say
+from kemba_cli.common import Force, Json, OwnEffects, Quiet, print_json, say
 from kemba_cli.failures import BAD_ANSWER
 
 if TYPE_CHECKING:
     from kemba.identify.answer import Answer
+
+# what an answer consists of, also what adopt and experiment add
+WRITTEN = ("answer.json", "model.yaml", "model_*.yaml", "experiment.yaml", "*.png")
 
 
 def discover(
@@ -20,14 +23,17 @@ def discover(
         list[Path] | None, typer.Option(help="A log kept for judging only; may be repeated.")
     ] = None,
     model: Annotated[str, typer.Option(help="Model YAML whose gaps to find.")] = "planning",
-    out: Annotated[Path, typer.Option(help="Folder for answer.json, model.yaml, figures.")] = Path(
-        "answer"
-    ),
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder for answer.json, model.yaml, figures (answer, answer-2, ...)."),
+    ] = None,
     column_map: Annotated[
         str | None, typer.Option("--map", help="Column map YAML for foreign logs.")
     ] = None,
     time_limit: Annotated[float, typer.Option(min=5.0, help="Seconds at most.")] = 300.0,
     figures: Annotated[bool, typer.Option(help="Draw the figures.")] = True,
+    force: Force = False,
+    own_effects: OwnEffects = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -39,18 +45,25 @@ def discover(
 
     # a search is many small products: more BLAS threads only wait for each other
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    from kemba.identify.workflow import discover_logs
+    from kemba.folders import claimed
+    from kemba.identify.workflow import discover_logs, write_answer
     from kemba_cli.progress import Progress
 
-    with Progress(quiet or json) as progress:
-        answer, found = discover_logs(
-            logs, holdout or [], model, column_map, time_limit, progress.tell, out
-        )
-    if figures and found is not None:
-        from kemba.plotting.study.discovery import draw_discovery
+    with claimed(out, "answer", "answer.json", force) as folder:
+        with Progress(quiet or json) as progress:
+            answer, found = discover_logs(
+                logs, holdout or [], model, column_map, time_limit, progress.tell
+            )
+        try:
+            for old in (file for name in WRITTEN for file in folder.glob(name)):
+                old.unlink()
+            write_answer(answer, folder, model)
+            if figures and found is not None:
+                from kemba.plotting.study.discovery import draw_discovery
 
-        draw_discovery(found, out)
-    _tell(answer, out, json, quiet)
+                draw_discovery(found, folder)
+        finally:  # also when the disk is full: it took minutes
+            _tell(answer, folder, json, quiet)
     if answer.verdict == "bad-data":
         raise typer.Exit(BAD_ANSWER)
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from kemba_cli.common import Json, Quiet, print_json, results
+from kemba_cli.common import Json, OwnEffects, Quiet, print_json, results
+from kemba_cli.failures import BAD_ANSWER
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -14,6 +16,11 @@ if TYPE_CHECKING:
 
 def effects(
     name: Annotated[str, typer.Argument(help="One effect; the whole catalogue if omitted.")] = "",
+    test: Annotated[
+        Path | None,
+        typer.Option("--test", help="Python file: try every promise on each of its effects."),
+    ] = None,
+    own_effects: OwnEffects = None,
     json: Json = False,
     markdown: Annotated[
         bool, typer.Option("--markdown", help="The catalogue as a page of the documentation.")
@@ -22,9 +29,16 @@ def effects(
 ) -> None:
     """Show the catalogue: equation, parameters with unit and size, source.
 
+    With --test, run the checks that every effect must pass on a file of your own; exit code 1
+    when one fails.
+
     Example: kemba-opt effects seal_friction
     """
-    from kemba.effects.describe import CHAPTERS, describe, find_effect, page
+    from kemba.effects.describe import chapters, describe, find_effect, page
+
+    if test is not None:
+        _test(test, json, quiet)
+        return
 
     if name:
         found = describe(find_effect(name))
@@ -32,10 +46,35 @@ def effects(
     elif markdown:
         typer.echo(page(), nl=False)
     elif json:
-        print_json({"effects": [describe(e) for group in CHAPTERS.values() for e in group]})
+        print_json({"effects": [describe(e) for group in chapters().values() for e in group]})
     else:
-        for chapter, group in CHAPTERS.items():
+        for chapter, group in chapters().items():
             results().print(_table(chapter, [describe(effect) for effect in group]))
+
+
+def _test(file: Path, json: bool, quiet: bool) -> None:
+    """The checks of every effect in a file, one line each."""
+    from kemba.contract import examine
+    from kemba.effects import BY_KIND
+
+    results = []
+    for effect in BY_KIND.load_file(file):
+        for result in examine(effect):
+            results.append(result)
+            if not json and not (quiet and result.good):
+                told = "good" if result.good else f"FAILED: {result.sentence}"
+                typer.echo(f"{result.effect}: {result.check.name}: {told}")
+    failed = [result for result in results if not result.good]
+    if json:
+        rows = [
+            {"effect": r.effect, "check": r.check.name, "good": r.good, "sentence": r.sentence}
+            for r in results
+        ]
+        print_json({"good": not failed, "checks": rows})
+    elif not failed:
+        typer.echo(f"{file}: good: {len(results)} checks")
+    if failed:
+        raise typer.Exit(BAD_ANSWER)
 
 
 def _table(title: str, rows: list[dict[str, Any]]) -> Table:

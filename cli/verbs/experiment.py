@@ -7,12 +7,14 @@ from typing import Annotated
 
 import typer
 
-from kemba_cli.common import Json, Quiet, print_json, say
+from kemba_cli.common import Force, Json, OwnEffects, Quiet, print_json, say
 
 
 def experiment(
     answer: Annotated[Path, typer.Argument(help="Folder written by discover.")],
     out: Annotated[Path | None, typer.Option(help="Rig YAML to write.")] = None,
+    force: Force = False,
+    own_effects: OwnEffects = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -20,9 +22,10 @@ def experiment(
 
     Example: kemba-opt experiment answer --out next.yaml
     """
+    from kemba.folders import fresh
     from kemba.identify.experiment import propose
 
-    path = out or answer / "experiment.yaml"
+    path = fresh(out or answer / "experiment.yaml", force)
     found = propose(answer, path)
     if json:
         facts = {"nats": found.nats, "rivals": found.rivals, "sentence": found.sentence}

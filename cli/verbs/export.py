@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from kemba_cli.common import Json, Quiet, print_json
+from kemba_cli.common import Force, Json, OwnEffects, Quiet, print_json
 
 
 def export(
@@ -17,6 +17,8 @@ def export(
         str | None,
         typer.Option("--map", help="Column map YAML of the program that is to read the .csv."),
     ] = None,
+    force: Force = False,
+    own_effects: OwnEffects = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -24,9 +26,12 @@ def export(
 
     Example: kemba-opt export runs/jump-1 --out jump.mat
     """
+    from kemba.folders import fresh
     from kemba.identify.logs.reading import load_map
     from kemba.plotting import load_source
     from kemba.report.export import export as write
 
-    path = write(load_source(run).trajectory, out, load_map(column_map) if column_map else None)
+    source = load_source(run)
+    fresh(out, force)
+    path = write(source.trajectory, out, load_map(column_map) if column_map else None)
     print_json({"export": str(path)}) if json else typer.echo(path)

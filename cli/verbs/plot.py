@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from kemba_cli.common import Json, Quiet, print_json
+from kemba_cli.common import Force, Json, OwnEffects, Quiet, print_json
 
 
 def plot(
@@ -18,7 +18,8 @@ def plot(
         ),
     ],
     save: Annotated[
-        Path | None, typer.Option(help="PNG, PDF or SVG; beside the first run when omitted.")
+        Path | None,
+        typer.Option(help="PNG, PDF or SVG (a new one beside the first run)."),
     ] = None,
     animate: Annotated[
         Path | None, typer.Option(help="Also write a GIF, or an MP4, of the first run.")
@@ -30,6 +31,8 @@ def plot(
     column_map: Annotated[
         str | None, typer.Option("--map", help="Column map YAML for foreign logs.")
     ] = None,
+    force: Force = False,
+    own_effects: OwnEffects = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -40,11 +43,17 @@ def plot(
     Example: kemba-opt plot runs/jump-1
     """
     from kemba import plotting
+    from kemba.folders import fresh, next_free
     from kemba.identify.logs.reading import load_map
     from kemba.plotting.window import open_window, show_windows
 
+    for path, option in ((save, "--save"), (animate, "--animate")):
+        if path is not None:
+            fresh(path, force, option)
     window = open_window() if show else None
     logs = plotting.bench_logs(runs[0]) if len(runs) == 1 else {}
+    if logs and animate:
+        raise typer.BadParameter("a rig does not move about", param_hint="--animate")
     if logs:
         figure = plotting.plot_rig(logs, model or "planning", figure=window)
         names, beside = list(logs), runs[0] / "figure.png"
@@ -52,10 +61,9 @@ def plot(
         sources = plotting.load_sources(runs, load_map(column_map) if column_map else None)
         figure = plotting.draw(sources, model, window)
         names, beside = [source.name for source in sources], plotting.default_path(sources)
-    written = {"figure": plotting.save_figure(figure, save or beside)}
+    path = save or (beside if force else next_free(beside))
+    written = {"figure": plotting.save_figure(figure, path)}
     if animate:
-        if logs:
-            raise typer.BadParameter("a rig does not move about", param_hint="--animate")
         machine = plotting.machine_of(sources[0], model)
         written["animation"] = plotting.save_animation(sources[0], machine, animate)
     paths = {kind: str(path) for kind, path in written.items()}

@@ -7,12 +7,13 @@ from typing import Annotated
 
 import typer
 
-from kemba_cli.common import Json, Quiet, print_json
+from kemba_cli.common import Json, OwnEffects, Quiet, print_json
 
 
 def report(
     run: Annotated[Path, typer.Argument(help="Run folder, as solve writes it.")],
     out: Annotated[Path | None, typer.Option(help="HTML to write (report.html in RUN).")] = None,
+    own_effects: OwnEffects = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:

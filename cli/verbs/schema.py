@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from kemba_cli.common import Json, Quiet, print_json
+from kemba_cli.common import Json, OwnEffects, Quiet, print_json
 
 
 def schema(
@@ -15,6 +15,7 @@ def schema(
     out: Annotated[
         Path | None, typer.Option(help="Write KIND.schema.json files into this folder.")
     ] = None,
+    own_effects: OwnEffects = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:

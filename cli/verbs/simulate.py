@@ -3,22 +3,31 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from kemba_cli.common import Json, Quiet, print_json, say
+from kemba_cli.common import Force, Json, OwnEffects, Quiet, print_json, say
+
+if TYPE_CHECKING:
+    from kemba.plant.rig.rigs import Rig
 
 
 def simulate(
     source: Annotated[str, typer.Argument(help="Run folder, controller.csv, or rig YAML.")],
-    model: Annotated[str, typer.Option(help="Model YAML of the plant.")] = "plant",
+    model: Annotated[
+        str | None, typer.Option(help="Model YAML of the plant; else the task's own.")
+    ] = None,
     repeat: Annotated[int, typer.Option(min=1, help="How often to execute the run.")] = 1,
     noise: Annotated[
         bool, typer.Option("--noise", help="Noisy sensors, scattering valves.")
     ] = False,
     seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same logs.")] = 0,
-    out: Annotated[Path | None, typer.Option(help="Folder for the logs.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for the logs (a new one in the run).")
+    ] = None,
+    force: Force = False,
+    own_effects: OwnEffects = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -26,10 +35,18 @@ def simulate(
 
     Example: kemba-opt simulate runs/jump-1 --repeat 3 --noise
     """
+    from kemba.folders import claimed
+
     if Path(source).suffix in (".yaml", ".yml"):
-        answer = _rig(source, model, out, seed, noise)
+        from kemba.plant.rig.bench import load_rig
+
+        rig = load_rig(source)
+        with claimed(out, Path("bench") / rig.name, "*.csv", force) as folder:
+            answer = _rig(rig, model or "plant", folder, seed, noise)
     else:
-        answer = _run(source, model, out, seed, noise, repeat)
+        default = (Path(source) if Path(source).is_dir() else Path(source).parent) / "logs"
+        with claimed(out, default, "*.csv", force) as folder:
+            answer = _run(source, model, folder, seed, noise, repeat)
     if json:
         print_json(answer)
     else:
@@ -38,13 +55,12 @@ def simulate(
 
 
 def _run(
-    source: str, model: str, out: Path | None, seed: int, noise: bool, repeat: int
+    source: str, model: str | None, out: Path, seed: int, noise: bool, repeat: int
 ) -> dict[str, Any]:
     from kemba.plant.execution.repeat import plant_of, repeat_run
 
-    folder = Path(source) if Path(source).is_dir() else Path(source).parent
     plant = plant_of(source, model)
-    repeats = repeat_run(source, plant, out or folder / "logs", repeat, noise, seed)
+    repeats = repeat_run(source, plant, out, repeat, noise, seed)
     runs = [r.summary for r in repeats]
     apex = ", ".join(f"{r['apex_m']:.3f}" for r in runs)
     sentence = f"reached {apex} m on {plant.name}"
@@ -54,18 +70,16 @@ def _run(
         sentence += f", off the plan by at most {1e3 * worst:.0f} mm; {landed} of {repeat} landed"
     return {
         "model": plant.name,
-        "folder": str(out or folder / "logs"),
+        "folder": str(out),
         "logs": [r["log"] for r in runs],
         "runs": runs,
         "sentence": sentence,
     }
 
 
-def _rig(source: str, model: str, out: Path | None, seed: int, noise: bool) -> dict[str, Any]:
-    from kemba.plant.rig.bench import bench_model, load_rig, write_rig
+def _rig(rig: Rig, model: str, folder: Path, seed: int, noise: bool) -> dict[str, Any]:
+    from kemba.plant.rig.bench import bench_model, write_rig
 
-    rig = load_rig(source)
-    folder = out or Path("bench") / rig.name
     logs = write_rig(rig, lambda supply: bench_model(model, supply), folder, seed, noise)
     return {
         "model": model,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from kemba_cli.common import Json, Quiet, print_json, say
+from kemba_cli.common import Json, OwnEffects, Quiet, print_json, say
 
 if TYPE_CHECKING:
     from kemba.ocp import Task
@@ -36,6 +36,7 @@ def solve(
     jobs: Annotated[int | None, typer.Option(min=1, help="Starts at a time.")] = None,
     replay: Annotated[bool, typer.Option(help="Execute the plan in simulation.")] = True,
     figure: Annotated[bool, typer.Option(help="Draw the plan.")] = True,
+    own_effects: OwnEffects = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -46,7 +47,9 @@ def solve(
 
     Example: kemba-opt solve jump.yaml --set "height=0.6 m"
     """
-    from kemba.config import find_config
+    from kemba.config import beside, find_config
+    from kemba.effects import BY_KIND
+    from kemba.model.spec import model_files
     from kemba.ocp import load_task, task_model
     from kemba.ocp.nlp.interrupt import Interrupt
     from kemba.ocp.task.requirement import resolve
@@ -66,13 +69,15 @@ def solve(
     if dry_run:
         _dry_run(resolved, document, model, json)
         return
-    resolved = resolved.model_copy(update={"model": model or resolved.model})
+    resolved = resolved.model_copy(update={"model": beside(model or resolved.model, Path())})
     built = task_model(resolved)
     resolve(resolved, built, document)
     if built.ignored:
         say(f"no plan can use {', '.join(built.ignored)}: it changes what is measured only", quiet)
-    models = [find_config(name, "models") for name in (resolved.model, resolved.plant)]
-    inputs = [find_config(task, "tasks"), *models]
+    for remark in built.remarks:
+        say(remark, quiet)
+    models = [path for name in (resolved.model, resolved.plant) for path in model_files(name)]
+    inputs = [find_config(task, "tasks"), *dict.fromkeys(models), *BY_KIND.files]
     folder = RunFolder.create(out, resolved.name, inputs)
     with Progress(quiet or json) as progress, Interrupt(lambda text: say(text, quiet)) as stop:
         listener = Listener(progress.tell, progress.watch, stop)
@@ -83,7 +88,7 @@ def solve(
         print_json(answer)
     else:
         typer.echo(answer["run"])
-        say(answer["sentence"], quiet)
+        say(answer["sentence"], quiet and answer["good"])  # why it failed is always said
     if answer["status"] == "interrupted":
         raise typer.Exit(130)
     if not answer["good"]:

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from kemba_cli.common import Json, Quiet, print_json, say, talk
+from kemba_cli.common import Json, OwnEffects, Quiet, print_json, say, talk
 
 EVERY = 10.0  # s between lines where no one watches
 
@@ -31,6 +31,7 @@ def sweep(
     time_limit: Annotated[
         float | None, typer.Option(min=0.1, help="Seconds after which to stop.")
     ] = None,
+    own_effects: OwnEffects = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -41,12 +42,34 @@ def sweep(
     Example: kemba-opt sweep reliability.yaml --jobs 2
     """
     from kemba import sweep as room
+    from kemba.folders import held
 
+    if scheduler is not None:
+        room.check_scheduler(scheduler)
     asked, document = room.load_sweep(file, list(overrides or []))
-    folder = room.open_folder(out, asked, document)
+    with held(out or Path("sweeps") / asked.name) as folder:
+        room.open_folder(folder, asked, document)
+        good = _run(folder, asked, document, scheduler, jobs, time_limit, json, quiet)
+    if not good:
+        raise typer.Exit(1)
+
+
+def _run(
+    folder: Path,
+    asked: Any,
+    document: Any,
+    scheduler: str | None,
+    jobs: int | None,
+    time_limit: float | None,
+    json: bool,
+    quiet: bool,
+) -> bool:
+    """Do what is missing, write and print the results; whether all is as expected."""
+    from kemba import sweep as room
+
     say(f"results in {folder}", quiet or json)
     cases = room.expand(asked, document, folder)
-    missing = {case.key for case in cases if not case.path(folder).is_file()}
+    missing = {case.key for case in cases if case.record(folder) is None}
     status, records = "interrupted", {}
     try:
         with Bar(len(missing), len({case.key for case in cases}), quiet or json) as bar:
@@ -58,8 +81,7 @@ def sweep(
         summary = room.write_results(folder, asked, cases, known, status)
     _figures(folder, cases, known, summary)
     _answer(folder, status, summary, json)
-    if status != "finished" or not summary["good"]:
-        raise typer.Exit(1)
+    return status == "finished" and bool(summary["good"])
 
 
 def _answer(folder: Path, status: str, summary: dict[str, Any], json: bool) -> None:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from kemba_cli.common import Json, Quiet, print_json
+from kemba_cli.common import Json, OwnEffects, Quiet, print_json
 
 
 def view(
@@ -17,6 +17,7 @@ def view(
         str | None, typer.Option(help="Model YAML with the robot, not the run's own.")
     ] = None,
     show: Annotated[bool, typer.Option("--show", help="Open it in the browser.")] = False,
+    own_effects: OwnEffects = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:

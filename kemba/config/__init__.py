@@ -1,6 +1,7 @@
 """Configuration files: from YAML to checked data, every mistake at its line."""
 
 from kemba.config.document import Document, Location, dump_yaml, load_text, load_yaml, written
+from kemba.config.names import FileName
 from kemba.config.parsing import (
     apply_overrides,
     beside,
@@ -12,6 +13,7 @@ from kemba.config.parsing import (
 
 __all__ = [
     "Document",
+    "FileName",
     "Location",
     "apply_overrides",
     "beside",

@@ -32,6 +32,8 @@ EXPECTED = {
     "dataclass_type": "a group of keys",
     "none_required": "nothing",
 }
+MOST = 50  # mistakes of one file; more help nobody and take long to find
+SHOWN = 80  # characters of a value in a message
 UNKNOWN_KEY = ("extra_forbidden", "unexpected_keyword_argument")
 
 
@@ -49,9 +51,12 @@ class Complaint(NamedTuple):
 def complaints(
     error: ValidationError, document: Document, schema: type[BaseModel]
 ) -> list[KembaError]:
-    """One KembaError for each place in the document that is wrong, in the file's order."""
+    """One KembaError for each place in the document that is wrong, in the file's order.
+
+    Of more than MOST mistakes only the first are told.
+    """
     found: dict[Location, list[Complaint]] = {}
-    for item in error.errors(include_url=False):
+    for item in error.errors(include_url=False)[:MOST]:
         place = descend(schema, document.data, item["loc"])[1]
         holders = descend(schema, document.data, item["loc"][:-1])[0]
         context = dict(item.get("ctx", {}))
@@ -64,7 +69,9 @@ def complaints(
     ]
     last = (len(document.lines), 0)
     kept.sort(key=lambda pair: document.marks.get(document.nearest(pair[0]), last))
-    return [report for _, report in kept]
+    more = error.error_count() - MOST
+    rest = [KembaError(document.source, f"and {more} more mistakes")] if more > 0 else []
+    return [*(report for _, report in kept), *rest]
 
 
 def _all_types(entries: list[Complaint]) -> bool:
@@ -146,4 +153,5 @@ def _at(place: Location, what: str) -> str:
 def _shown(value: Any) -> str:
     """A value as an author recognises it, long ones by their kind only."""
     names = {dict: "a group of keys", list: "a list", type(None): "nothing"}
-    return names.get(type(value), f"'{value}'")
+    text = str(value)
+    return names.get(type(value), f"'{text if len(text) <= SHOWN else text[:SHOWN] + '...'}'")

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from kemba.config.reader import Location, Mark, YamlError, YamlLimits, read
+from kemba.config.writer import dump_text
 from kemba.errors import ConfigErrors, KembaError
 from kemba.files import atomic_text
 
-if TYPE_CHECKING:
-    from ruamel.yaml.nodes import Node
+__all__ = ["Document", "Location", "dump_text", "dump_yaml", "load_text", "load_yaml", "written"]
 
-Location = tuple[str | int, ...]
+WIDE = 160  # characters of a line that are shown
 
 
 @dataclass(frozen=True)
@@ -54,65 +54,47 @@ class Document:
         where = f"{self.source}:{line + 1}:{column + 1}"
         excerpt = ""
         if line < len(self.lines):
-            before = "".join("\t" if char == "\t" else " " for char in self.lines[line][:column])
-            excerpt = f"    {self.lines[line].rstrip()}\n    {before}^"
+            excerpt = _excerpt(self.lines[line].rstrip(), column)
         return KembaError(where, what, expected, hint, excerpt)
 
 
 def load_yaml(path: str | Path) -> Document:
     """The document in a YAML 1.2 file.
 
-    Raises KembaError when the file cannot be read or is not YAML, and ConfigErrors listing all
-    keys that occur twice.
+    Raises KembaError when the file cannot be read, is not YAML or is larger than `YamlLimits`, and
+    ConfigErrors listing all keys that occur twice.
     """
+    largest = YamlLimits.current().size
     try:
-        text = Path(path).read_text(encoding="utf-8-sig")
+        with Path(path).open("rb") as stream:
+            content = stream.read(largest + 1)
+        text = content.decode("utf-8-sig")
     except OSError as error:
         raise KembaError(str(path), error.strerror or str(error)) from None
     except UnicodeDecodeError:
-        raise KembaError(str(path), "is not a UTF-8 text", "a YAML file was expected") from None
+        if len(content) <= largest:
+            raise KembaError(str(path), "is not a UTF-8 text", "a YAML file was expected") from None
+    if len(content) > largest:
+        raise KembaError(str(path), f"is larger than {largest} bytes", "a YAML file was expected")
     return load_text(text, str(path))
 
 
 def load_text(text: str, source: str) -> Document:
     """The document in a YAML text; errors as for `load_yaml`."""
-    from ruamel.yaml import YAML
-    from ruamel.yaml.error import MarkedYAMLError, YAMLError
-
-    yaml = YAML(typ="safe", pure=True)
-    yaml.allow_duplicate_keys = True  # found below, all at once
     blank = Document(None, source, text.splitlines())
     try:
-        node = yaml.compose(text)
-        places = list(_places(node, ())) if node is not None else []
-        data = _unshared(yaml.load(text))
-    except MarkedYAMLError as error:
+        found = read(text)
+    except YamlError as error:
         raise _syntax_error(error, blank) from None
-    except RecursionError:
-        raise KembaError(source, "an alias contains itself, or the nesting is too deep") from None
-    except (YAMLError, ValueError) as error:
-        raise KembaError(source, f"is not valid YAML: {str(error).splitlines()[0]}") from None
-    marks: dict[Location, tuple[int, int]] = {}
-    twice = []
-    for location, line, column in places:
-        if location in marks:
-            twice.append(_twice(blank, location, marks[location][0], (line, column)))
-        marks.setdefault(location, (line, column))
-    if twice:
-        raise ConfigErrors(twice)
-    return Document(data, source, blank.lines, marks)
+    if found.twice:
+        raise ConfigErrors(_twice(blank, *each) for each in found.twice)
+    return Document(found.data, source, blank.lines, found.marks)
 
 
 def dump_yaml(data: Any, path: str | Path) -> None:
     """Write plain data as YAML, whole or not at all; keys keep their order."""
-    from ruamel.yaml import YAML
-
-    yaml = YAML(typ="rt")
-    yaml.indent(mapping=2, sequence=4, offset=2)
-    yaml.width = 100
-    yaml.representer.ignore_aliases = lambda _: True
     with atomic_text(path) as stream:
-        yaml.dump(data, stream)
+        stream.write(dump_text(data))
 
 
 def written(location: Location) -> str:
@@ -121,43 +103,25 @@ def written(location: Location) -> str:
     return text.lstrip(".")
 
 
-def _places(node: Node, location: Location) -> Iterator[tuple[Location, int, int]]:
-    """Location, line and column of every key and list item below `node`."""
-    from ruamel.yaml.nodes import MappingNode, SequenceNode
-
-    if isinstance(node, MappingNode):
-        for key, value in node.value:
-            inner = (*location, str(key.value))
-            yield inner, key.start_mark.line, key.start_mark.column
-            yield from _places(value, inner)
-    elif isinstance(node, SequenceNode):
-        for index, value in enumerate(node.value):
-            yield (*location, index), value.start_mark.line, value.start_mark.column
-            yield from _places(value, (*location, index))
+def _excerpt(line: str, column: int) -> str:
+    """A line with a caret below the column, of a long one the part around it."""
+    start = max(0, column - WIDE // 2) if len(line) > WIDE else 0
+    shown, column = line[start : start + WIDE], column - start
+    before = "".join("\t" if char == "\t" else " " for char in shown[:column])
+    return f"    {shown}\n    {before}^"
 
 
-def _twice(
-    document: Document, location: Location, first_line: int, place: tuple[int, int]
-) -> KembaError:
+def _twice(document: Document, location: Location, first: Mark, second: Mark) -> KembaError:
+    """A key that stands twice, at its second place; the first is named."""
     what = f"{written(location)}: this key stands twice"
-    return document.error_at(*place, what, hint=f"its first value is in line {first_line + 1}")
+    return document.error_at(*second, what, hint=f"its first value is in line {first[0] + 1}")
 
 
-def _syntax_error(error: Any, document: Document) -> KembaError:
-    """ruamel's syntax error in our form."""
-    mark = error.problem_mark or error.context_mark
-    what = f"is not valid YAML: {error.problem or error.context}"
-    if mark is None:
-        return KembaError(document.source, what)
-    if "\t" in "".join(document.lines[mark.line : mark.line + 1])[: mark.column + 1]:
-        return document.error_at(mark.line, mark.column, what, hint="indent with spaces, not tabs")
-    return document.error_at(mark.line, mark.column, what)
-
-
-def _unshared(data: Any) -> Any:
-    """A copy with text keys and separate aliases, so that setting one leaves the other alone."""
-    if isinstance(data, dict):
-        return {str(key): _unshared(value) for key, value in data.items()}
-    if isinstance(data, list):
-        return [_unshared(value) for value in data]
-    return data
+def _syntax_error(error: YamlError, document: Document) -> KembaError:
+    """A mistake in the YAML text, with its line."""
+    if error.mark is None:
+        return KembaError(document.source, error.what, hint=error.hint)
+    line, column = error.mark
+    before = "".join(document.lines[line : line + 1])[: column + 1]
+    hint = "indent with spaces, not tabs" if "\t" in before else error.hint
+    return document.error_at(line, column, error.what, hint=hint)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -28,6 +29,9 @@ __all__ = [
 ]
 
 
+RANGE = {"equals", "at_least", "at_most"}
+
+
 def parse(document: Document | Mapping[str, Any], schema: type[Schema]) -> Schema:
     """The document, or the same as a dict, as an instance of a pydantic model.
 
@@ -48,8 +52,11 @@ def parse(document: Document | Mapping[str, Any], schema: type[Schema]) -> Schem
 def apply_overrides(document: Document, options: Iterable[str]) -> Document:
     """A copy of the document with `--set` options such as `goals.apex=0.5 m` applied.
 
-    Values are YAML. Whether the keys exist is judged by `parse`. Raises ConfigErrors with all
-    options that are not `key=value` or lead through something that has no keys.
+    Values are YAML. A plain value for a group of `equals`, `at_least` or `at_most` means `equals`;
+    what else the group says stays. Whether the keys exist is judged by `parse`.
+
+    Raises ConfigErrors with all options that are not `key=value` or lead through something that has
+    no keys.
     """
     data, overrides = document.data, dict(document.overrides)
     errors = []
@@ -76,21 +83,25 @@ def find_config(name: str | Path, folder: str) -> Path:
 
 
 def beside(name: str, folder: Path) -> str:
-    """The whole path of the file `name` in `folder` where there is one, else `name` as given."""
-    near = folder / name
-    return str(near.resolve()) if near.is_file() else name
+    """The whole path of the file `name` in `folder` or else in the current folder; where there is
+    neither, `name` as given, which may be that of a shipped file."""
+    near = (path for path in (folder / name, Path(name)) if _is_file(path))
+    found = next(near, None)
+    return name if found is None else str(found.resolve())
 
 
 def locate(name: str | Path, folders: Collection[str]) -> Path:
     """As `find_config`, looking in several folders of configs/."""
-    if Path(name).is_file():
+    if _is_file(Path(name)):
+        if Path(name).suffix not in (".yaml", ".yml"):
+            raise KembaError(str(name), "is no YAML file", "a name ending in .yaml was expected")
         return Path(name)
     shipped = {key: path for folder in folders for key, path in shipped_configs(folder).items()}
     short = Path(name).name if str(Path(name).parent) in folders else str(name)
     for candidate in (short, f"{short}.yaml"):
         if candidate in shipped:
             return shipped[candidate]
-    what = "is a folder" if Path(name).is_dir() else "no such file"
+    what = "is a folder" if os.path.isdir(name) else "no such file"  # noqa: PTH112  never raises
     hint = suggest(str(name), shipped) if shipped else ""
     raise KembaError(str(name), what, "a YAML file, of your own or shipped, was expected", hint)
 
@@ -101,6 +112,14 @@ def shipped_configs(folder: str) -> dict[str, Path]:
     checkout = (above / "pyproject.toml").is_file()
     root = above / ("configs" if checkout else "kemba_configs")
     return {path.name: path for path in sorted((root / folder).glob("*.yaml"))}
+
+
+def _is_file(path: Path) -> bool:
+    """Whether there is such a file; not for names that no file can have."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):  # too long, or with a zero in it
+        return False
 
 
 def _option(option: str, data: Any) -> tuple[Location, Any]:
@@ -129,6 +148,9 @@ def _option(option: str, data: Any) -> tuple[Location, Any]:
 def _replaced(data: Any, location: Location, value: Any) -> Any:
     """A copy of `data` with `value` at `location`; missing groups on the way are made."""
     if not location:
+        plain = not isinstance(value, (dict, list)) and value is not None
+        if plain and isinstance(data, dict) and RANGE & data.keys():
+            return {**{k: v for k, v in data.items() if k not in RANGE}, "equals": value}
         return value
     part, rest = location[0], location[1:]
     if isinstance(data, list):

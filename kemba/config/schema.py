@@ -18,11 +18,15 @@ def fields_of(schema: Any) -> dict[str, Any]:
 
 
 def schemas_in(annotation: Any) -> Iterator[Any]:
-    """Every model or dataclass named within an annotation such as `list[A | B]`."""
+    """Every model or dataclass that is named within an annotation such as `list[A | B]`."""
     if hasattr(annotation, "__pydantic_fields__") or dataclasses.is_dataclass(annotation):
         if isinstance(annotation, type):
             yield annotation
         return
+    for marker in getattr(annotation, "__metadata__", ()):
+        if hasattr(marker, "members"):  # a union whose members are known only when it is read
+            yield from marker.members()
+            return
     for inner in get_args(annotation):
         yield from schemas_in(inner)
 

@@ -1,16 +1,13 @@
 """The catalogue of physics: one definition per effect for optimiser, simulator, identification."""
 
-from typing import Annotated, Union
-
-from pydantic import Field
+from typing import Annotated
 
 from kemba.effects.base import At, Contribution, Effect, Pair, PortAt, Signal
-from kemba.effects.catalogue import BY_KIND, EFFECTS
+from kemba.effects.catalogue import BY_KIND, EFFECTS, load_effects
+from kemba.effects.registry import Registered
 
-AnyEffect = Annotated[
-    Union[EFFECTS],  # type: ignore[valid-type]  # noqa: UP007
-    Field(discriminator="kind"),
-]
+# an effect of any kind that is known when it is read
+AnyEffect = Annotated[Effect, Registered(BY_KIND)]
 
 __all__ = [
     "BY_KIND",
@@ -22,4 +19,5 @@ __all__ = [
     "Pair",
     "PortAt",
     "Signal",
+    "load_effects",
 ]

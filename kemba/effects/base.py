@@ -4,12 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Literal, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol
 
 import casadi as ca
 from pydantic import BaseModel, ConfigDict, field_validator
+from typing_extensions import Self
 
-from kemba.quantity import Param, Quantity
+from kemba.quantity import Param, Quantity, Tolerance
+
+# 1 sigma as a share: a figure that an earlier discovery put on a model's list is known less well
+REMEASURED = Tolerance(0.1, source="assumed: a discovery from a few logs is that sure of a size")
+
+if TYPE_CHECKING:
+    from kemba.mechanism import Cylinder
 
 
 @dataclass(frozen=True)
@@ -67,7 +74,6 @@ class At(Protocol):
 
     supply: float  # Pa
     gravity: float  # m.s-2
-    stroke: float  # m
     body_mass: float  # kg, of the body link alone
     piston: PortAt
     hip: PortAt
@@ -76,6 +82,14 @@ class At(Protocol):
     body_x: PortAt
     body_z: PortAt
     pitch: PortAt
+
+    @property
+    def cylinder(self) -> Cylinder:
+        """The cylinder of every leg: bore, areas, tube volume."""
+
+    @property
+    def stroke(self) -> float:
+        """Way of the piston [m]."""
 
     @property
     def legs(self) -> list[At]:
@@ -104,7 +118,7 @@ class Effect(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     kind: str
-    on: Literal["front", "rear"] | None = None
+    on: str | None = None
 
     place: ClassVar[Literal["leg", "body"]] = "leg"
     family: ClassVar[str] = ""
@@ -119,6 +133,7 @@ class Effect(BaseModel):
     mirror: ClassVar[Mapping[str, str]] = {}  # symbols that change sign or name in the mirror
     dissipative: ClassVar[bool] = False
     moves: ClassVar[bool] = True  # False: in what is measured only; plans and simulations ignore it
+    nominal: ClassVar[Mapping[str, Tolerance]] = {}  # figures that differ from machine to machine
     on_rod: ClassVar[bool] = True  # False: its piston effort is not felt by a rod force sensor
 
     @field_validator("on")
@@ -168,13 +183,32 @@ class Effect(BaseModel):
         found = {}
         for name, info in cls.model_fields.items():
             params = [m for m in info.metadata if isinstance(m, Param)]
-            if params and info.annotation is float:
+            if params and info.annotation in (float, float | None):
                 found[name] = params[0]
         return found
 
     def parameters(self) -> dict[str, Param]:
         """Scalar parameters of this effect by name."""
         return self.declared()
+
+    def tolerances(self) -> dict[str, float]:
+        """1 sigma, as a share, of the figures that a machine of the same make may have a little
+        different; the entries of a table as `fill[0]`.
+
+        These are the `nominal` ones. An effect that a plain machine lacks was found by an earlier
+        discovery: its switch is known less well. Delays are left out: they move instants.
+        """
+        found: dict[str, float] = {}
+        for name, tolerance in self.nominal.items():
+            value = self.value(name)
+            if tolerance.each:
+                found |= {f"{name}[{i}]": tolerance.share(x) for i, x in enumerate(value)}
+            else:
+                middle = value[len(value) // 2] if isinstance(value, tuple) else value
+                found[name] = tolerance.share(middle)
+        if self.off and self.moves and all(p.unit != "s" for p in self.parameters().values()):
+            found |= {name: REMEASURED.share(1.0) for name in self.off}
+        return found
 
     def shapes(self) -> tuple[str, ...]:
         """Parameters that matter only when the effect is on."""
@@ -187,6 +221,15 @@ class Effect(BaseModel):
     def bind(self, values: Mapping[str, Any]) -> Effect:
         """The same effect with parameters replaced, by numbers or by symbols, unchecked."""
         return self.model_copy(update=dict(values))
+
+    def of_cylinder(self, cylinder: Cylinder) -> Self:
+        """The same effect with the figures that it leaves open (None) taken from the cylinder."""
+        return self
+
+    def remarks(self, supply: float) -> list[str]:
+        """What a user should know of the figures at this supply pressure [Pa]. Raises KembaError
+        where they cannot be."""
+        return []
 
     def listed(self) -> dict[str, Any]:
         """The effect as an item of a model's YAML list."""

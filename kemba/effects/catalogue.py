@@ -1,8 +1,8 @@
-"""Every effect there is, by name, and the families a model can be built from."""
+"""The effects that kemba ships, by family, and the register of all effects by kind."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from kemba.effects.base import Effect
 from kemba.effects.expression import Expression
@@ -38,7 +38,9 @@ from kemba.effects.pneumatics.supply import RiseTimeScale, SupplyDroop, SupplySc
 from kemba.effects.pneumatics.supply_line import SupplyLine
 from kemba.effects.pneumatics.timing import ValveCloseDelay, ValveDelay
 from kemba.effects.pneumatics.valve import Valve
+from kemba.effects.registry import Registry
 from kemba.effects.sensors import SensorBias, SensorDelay, SensorScale
+from kemba.errors import KembaError
 
 # the planning model's own physics
 PLANNING: tuple[type[Effect], ...] = (Valve, Chamber, ModeDamping, EndStop, Motor, Boom, Contact)
@@ -92,7 +94,20 @@ MISSING: tuple[type[Effect], ...] = (*AIR, *PISTON, *HIP, *BODY, *GROUND, *SENSO
 
 EFFECTS: tuple[type[Effect], ...] = (*PLANNING, *PHYSICAL, *MISSING, Expression)
 
-BY_KIND: dict[str, type[Effect]] = {e.model_fields["kind"].default: e for e in EFFECTS}
+# these and the effects from outside, by kind
+BY_KIND = Registry(EFFECTS)
+
+
+def load_effects(files: Mapping[str, str]) -> None:
+    """Load the files that another process has loaded (`BY_KIND.files`). For workers.
+
+    Raises KembaError where a file cannot be loaded, or has another content here.
+    """
+    for path, digest in files.items():
+        BY_KIND.load_file(path)
+        if BY_KIND.files.get(path) != digest:
+            raise KembaError(path, "has another content than where this work was asked for")
+
 
 CHAMBERS: dict[str, Callable[[], list[Effect]]] = {
     "first_order": lambda: [Chamber(), ModeDamping()],

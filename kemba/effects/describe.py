@@ -9,15 +9,9 @@ from typing import Any, get_args
 
 from kemba.effects.base import Effect
 from kemba.effects.catalogue import BY_KIND, EFFECTS, MISSING, PHYSICAL, PLANNING
+from kemba.effects.registry import kind_of
 from kemba.errors import KembaError, suggest
 from kemba.quantity import Param
-
-CHAPTERS: dict[str, tuple[type[Effect], ...]] = {
-    "The planning model": PLANNING,
-    "Physical chambers": PHYSICAL,
-    "What may be missing": MISSING,
-    "Your own": tuple(e for e in EFFECTS if e not in (*PLANNING, *PHYSICAL, *MISSING)),
-}
 
 INTRODUCTION = """# The catalogue of effects
 
@@ -27,6 +21,19 @@ q, w hip angle and rate; tau hip torque. Forces are added to the right-hand side
 "size" is what would matter in practice, a prior width rather than a limit; that of a scale k is the
 size of k - 1. "off" is the value at which an effect is absent; parameters without one are shapes.
 """
+
+
+def chapters() -> dict[str, tuple[type[Effect], ...]]:
+    """The effects known now by the chapters of the catalogue."""
+    own = tuple(e for e in EFFECTS if e not in (*PLANNING, *PHYSICAL, *MISSING))
+    found = {
+        "The planning model": PLANNING,
+        "Physical chambers": PHYSICAL,
+        "What may be missing": MISSING,
+        "Your own": own,
+    }
+    outside = BY_KIND.outside
+    return {**found, "From outside the package": outside} if outside else found
 
 
 def find_effect(name: str) -> type[Effect]:
@@ -42,7 +49,7 @@ def describe(effect: type[Effect]) -> dict[str, Any]:
     places = effect.place if isinstance(effect.place, str) else "the port it names"
     ports = effect.ports if isinstance(effect.ports, tuple) else ()
     return {
-        "name": _kind(effect),
+        "name": kind_of(effect),
         "family": effect.family,
         "equation": effect.equation,
         "place": places,
@@ -63,7 +70,7 @@ def _parameter(effect: type[Effect], name: str) -> dict[str, Any]:
         "name": name,
         "unit": "channel's" if name in getattr(effect, "in_channel_unit", ()) else param.unit,
         "size": param.size,
-        "default": effect.model_fields[name].default,
+        "default": _usual(effect, effect.model_fields[name].default),
         "off": "infinity" if off is not None and math.isinf(off) else off,
         "lower": param.lower if math.isfinite(param.lower) else None,
         "upper": param.upper if math.isfinite(param.upper) else None,
@@ -76,7 +83,20 @@ def _tables(effect: type[Effect]) -> Iterator[dict[str, Any]]:
     for name, info in effect.model_fields.items():
         param = _param_in(info.annotation)
         if param is not None and name not in effect.declared():
-            yield {"name": name, "unit": param.unit, "default": info.default, "doc": param.doc}
+            yield {
+                "name": name,
+                "unit": param.unit,
+                "default": _usual(effect, info.default),
+                "doc": param.doc,
+            }
+
+
+def _usual(effect: type[Effect], default: Any) -> Any:
+    """A default as people read it; figures that are left open come from the robot's file."""
+    if default is not None:
+        return default
+    own = effect.of_cylinder is not Effect.of_cylinder
+    return "that of the robot's cylinder" if own else "as the description says"
 
 
 def _param_in(annotation: Any) -> Param | None:
@@ -100,7 +120,7 @@ def in_words(parameter: dict[str, Any]) -> str:
 def page() -> str:
     """The catalogue in Markdown (docs/effects.md)."""
     lines = [INTRODUCTION]
-    for chapter, effects in CHAPTERS.items():
+    for chapter, effects in chapters().items():
         lines += [f"## {chapter}\n", "| name | equation | parameters (unit), size | source |"]
         lines += ["|---|---|---|---|", *(_row(describe(effect)) for effect in effects), ""]
     return "\n".join(lines)
@@ -110,7 +130,3 @@ def _row(found: dict[str, Any]) -> str:
     parameters = "; ".join(in_words(p) for p in found["parameters"])
     equation = found["equation"].replace("|", "\\|")
     return f"| `{found['name']}` | {equation} | {parameters} | {found['source']} |"
-
-
-def _kind(effect: type[Effect]) -> str:
-    return str(effect.model_fields["kind"].default)

@@ -9,7 +9,8 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 from pydantic import Field, PlainSerializer, PlainValidator, WithJsonSchema, model_validator
 
 from kemba.effects.base import At, Contribution, Effect
-from kemba.effects.formula import check_dimension, evaluate, names_of, parse_formula
+from kemba.effects.dimension import check_dimension
+from kemba.effects.formula import check_finite, evaluate, names_of, parse_formula
 from kemba.errors import suggest
 from kemba.quantity import Param
 from kemba.units import read_si
@@ -22,6 +23,16 @@ PORTS: dict[str, tuple[str, str, str, tuple[str, ...]]] = {
     "body_z": ("m", "m.s-1", "N", ("z",)),
     "pitch": ("rad", "rad.s-1", "N.m", ("q", "w")),
 }
+# values at which a formula must be finite: limits of any such machine, generously, and zero
+TRIED: dict[str, dict[str, tuple[float, ...]]] = {
+    "piston": {"x": (0.0, 0.05, 0.1), "v": (-5.0, -0.1, 0.0, 0.1, 5.0)},
+    "hip": {"x": (-3.0, -0.5, 0.0, 0.5, 3.0), "v": (-60.0, -1.0, 0.0, 1.0, 60.0)},
+    "body_x": {"x": (-10.0, 0.0, 10.0), "v": (-5.0, 0.0, 5.0)},
+    "body_z": {"x": (0.0, 0.2, 2.0), "v": (-8.0, 0.0, 8.0)},
+    "pitch": {"x": (-3.0, 0.0, 3.0), "v": (-20.0, 0.0, 20.0)},
+}
+TRIED_AT_LEG = {"u_e": (0.0, 1.0), "u_r": (0.0, 1.0), "F_e": (0.0, 500.0), "F_r": (0.0, 500.0),
+                "tau": (-30.0, 0.0, 30.0)}  # fmt: skip
 OF_LEG = {"u_e": "1", "u_r": "1", "F_e": "N", "F_r": "N", "tau": "N.m"}
 
 
@@ -59,7 +70,7 @@ class Expression(Effect):
 
     kind: Literal["expression"] = "expression"
     called: str = Field(alias="name", pattern=r"^[A-Za-z]\w*$")
-    on: str  # type: ignore[assignment]
+    on: str
     force: str
     constants: dict[str, Number] = Field(default_factory=dict, alias="parameters")
 
@@ -86,6 +97,7 @@ class Expression(Effect):
         for name in sorted(set(self.constants) - read):
             raise ValueError(f"the parameter '{name}' is not in '{self.force}'")
         check_dimension(tree, units, PORTS[self.port][2])
+        check_finite(tree, self.ranges())
         return self
 
     @property
@@ -114,6 +126,13 @@ class Expression(Effect):
         position, rate, _, own = PORTS[self.port]
         units = {"x": position, "v": rate, **dict(zip(own, (position, rate), strict=False))}
         return units | (OF_LEG if self.place == "leg" else {})
+
+    def ranges(self) -> dict[str, tuple[float, ...]]:
+        """Values to try of everything that the formula may read, in SI."""
+        motion = TRIED[self.port]
+        own = dict(zip(PORTS[self.port][3], (motion["x"], motion["v"]), strict=False))
+        constants = {name: (float(c.value),) for name, c in self.constants.items()}
+        return {**motion, **own, **TRIED_AT_LEG, **constants}
 
     def parameters(self) -> dict[str, Param]:
         return {

@@ -1,23 +1,24 @@
 """Formulas that users write: parsed by a whitelist, checked for their dimension, evaluated.
 
-Nothing is ever handed to Python's `eval`: the syntax tree is walked and every node that is not
-arithmetic on known names is refused.
+Nothing is ever handed to Python's `eval`. The syntax tree is walked, and every node that is not
+arithmetic on known names is refused. Constants such as `2*9.81` are computed once, as floats.
 """
 
 from __future__ import annotations
 
 import ast
+import itertools
+import math
 import operator
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import casadi as ca
 
 from kemba.errors import suggest
-from kemba.units import called_dimension, parse_unit
 
 LONGEST = 500  # characters
+DEEPEST = 40  # nested operations; Python's own stack ends at about 1000
 OPERATORS: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
@@ -30,21 +31,25 @@ PURE: dict[str, Callable[..., Any]] = {  # of one number without dimension
 }
 SAME: dict[str, Callable[..., Any]] = {"abs": ca.fabs, "min": ca.fmin, "max": ca.fmax}
 FUNCTIONS: dict[str, Callable[..., Any]] = {**PURE, **SAME, "sqrt": ca.sqrt}
+OF_NUMBERS: dict[str, Callable[..., float]] = {  # the same on floats, ValueError outside the domain
+    **{name: getattr(math, name) for name in (*PURE, "sqrt")}, "abs": abs, "min": min, "max": max,
+}  # fmt: skip
 
 
 def parse_formula(text: str) -> ast.expr:
-    """The syntax tree of a formula; ValueError in words for its author."""
+    """The syntax tree of a formula, its constant parts computed; ValueError for its author."""
     if len(text) > LONGEST:
         raise ValueError(f"is longer than {LONGEST} characters")
     try:
         tree = ast.parse(text.strip(), mode="eval").body
-    except (SyntaxError, RecursionError, MemoryError) as error:
+    except (SyntaxError, RecursionError, MemoryError, ValueError) as error:
         column = getattr(error, "offset", None)
         place = f" near column {column}" if column else ""
         raise ValueError(f"'{text}' is not a formula{place}; such as '-c*v*abs(v)'") from None
+    _check_depth(tree)
     for node in ast.walk(tree):
         _check(node)
-    return tree
+    return _folded(tree)
 
 
 def names_of(tree: ast.expr) -> set[str]:
@@ -69,15 +74,67 @@ def evaluate(node: ast.expr, values: Mapping[str, Any]) -> Any:
     return FUNCTIONS[node.func.id](*(evaluate(arg, values) for arg in node.args))
 
 
-def check_dimension(tree: ast.expr, units: Mapping[str, str], unit: str) -> None:
-    """ValueError, with the offending part, unless the formula's value has the dimension of
-    `unit` when its names have `units`."""
-    found = _Dimensions(units).of(tree)
-    if not found.fits(parse_unit(unit)):
-        raise ValueError(
-            f"'{ast.unparse(tree)}' is {called_dimension(found.unit)}; "
-            f"{called_dimension(parse_unit(unit))} ({unit}) was expected"
-        )
+def check_finite(tree: ast.expr, ranges: Mapping[str, Sequence[float]]) -> None:
+    """ValueError, with the place, unless the value is finite for every combination of `ranges`.
+
+    `ranges`: the values to try of every name that the formula reads.
+    """
+    names = sorted(names_of(tree))
+    symbols = [ca.SX.sym(name) for name in names]
+    value = ca.SX(evaluate(tree, dict(zip(names, symbols, strict=True))))
+    points = list(itertools.product(*(ranges[name] for name in names)))
+    table = ca.DM(points).T if names else ca.DM(0, 1)
+    found = ca.Function("f", [ca.vertcat(*symbols)], [value]).map(len(points))(table)
+    for point, number in zip(points, found.full().ravel(), strict=True):
+        if not math.isfinite(number):
+            at = ", ".join(f"{name} = {x:g}" for name, x in zip(names, point, strict=True))
+            raise ValueError(f"'{ast.unparse(tree)}' has no finite value at {at}")
+
+
+def _check_depth(tree: ast.expr) -> None:
+    """Without recursion, which a deep tree would break."""
+    layer: list[ast.AST] = [tree]
+    for _ in range(DEEPEST):
+        layer = [inner for node in layer for inner in ast.iter_child_nodes(node)]
+        if not layer:
+            return
+    raise ValueError(f"is nested deeper than {DEEPEST} operations")
+
+
+def _folded(node: ast.expr) -> ast.expr:
+    """The tree with every part that reads no name as one number, which must be finite."""
+    if isinstance(node, ast.Constant):
+        return _number(node, lambda: float(node.value))  # type: ignore[arg-type]
+    if isinstance(node, ast.UnaryOp):
+        operand = _folded(node.operand)
+        if isinstance(operand, ast.Constant):
+            sign = -1.0 if isinstance(node.op, ast.USub) else 1.0
+            return ast.Constant(sign * operand.value)  # type: ignore[operator]
+        return ast.UnaryOp(node.op, operand)
+    if isinstance(node, ast.BinOp):
+        left, right = _folded(node.left), _folded(node.right)
+        if isinstance(left, ast.Constant) and isinstance(right, ast.Constant):
+            compute = OPERATORS[type(node.op)]
+            return _number(node, lambda: compute(left.value, right.value))
+        return ast.BinOp(left, node.op, right)
+    if isinstance(node, ast.Call):
+        args = [_folded(arg) for arg in node.args]
+        if all(isinstance(arg, ast.Constant) for arg in args):
+            call = OF_NUMBERS[node.func.id]  # type: ignore[attr-defined]
+            return _number(node, lambda: call(*(arg.value for arg in args)))  # type: ignore[attr-defined]
+        return ast.Call(node.func, args, [])
+    return node
+
+
+def _number(node: ast.expr, compute: Callable[[], Any]) -> ast.Constant:
+    """The value of a constant part; ValueError when it is no finite real number."""
+    try:
+        value = compute()
+    except (ArithmeticError, ValueError):
+        value = math.nan
+    if isinstance(value, complex) or not math.isfinite(value):
+        raise ValueError(f"'{ast.unparse(node)[:60]}' has no finite value")
+    return ast.Constant(float(value))
 
 
 def _check(node: ast.AST) -> None:
@@ -100,85 +157,3 @@ def _check(node: ast.AST) -> None:
     ):
         written = ast.unparse(node) if isinstance(node, ast.expr) else type(node).__name__
         raise ValueError(f"'{written}' cannot stand in a formula; only + - * / ** and functions")
-
-
-@dataclass(frozen=True)
-class _Dimension:
-    unit: Any  # pint.Unit
-    number: float | None = None  # of a literal
-
-    def fits(self, unit: Any) -> bool:
-        """Whether it can stand where `unit` is expected; a literal 0 has every dimension."""
-        return self.number == 0 or bool(self.unit.dimensionality == unit.dimensionality)
-
-    @property
-    def pure(self) -> bool:
-        return self.number == 0 or not self.unit.dimensionality
-
-
-class _Dimensions:
-    """Dimension of every part of a formula."""
-
-    def __init__(self, units: Mapping[str, str]) -> None:
-        self.units = units
-
-    def of(self, node: ast.expr) -> _Dimension:
-        if isinstance(node, ast.Constant):
-            return _Dimension(parse_unit("1"), float(node.value))  # type: ignore[arg-type]
-        if isinstance(node, ast.Name):
-            return _Dimension(parse_unit(self.units[node.id]))
-        if isinstance(node, ast.UnaryOp):
-            inner = self.of(node.operand)
-            return _Dimension(inner.unit, None if inner.number is None else -inner.number)
-        if isinstance(node, ast.BinOp):
-            return self._binary(node)
-        assert isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
-        return self._call(node, node.func.id)
-
-    def _binary(self, node: ast.BinOp) -> _Dimension:
-        left, right = self.of(node.left), self.of(node.right)
-        if isinstance(node.op, ast.Pow):
-            return self._power(node, left, right)
-        if isinstance(node.op, (ast.Add, ast.Sub)):
-            return self._alike(node, left, right)
-        if isinstance(node.op, ast.Mult):
-            return _Dimension(left.unit * right.unit)
-        number = None
-        if left.number is not None and right.number:
-            number = left.number / right.number  # so that v**(3/2) has a dimension
-        return _Dimension(left.unit / right.unit, number)
-
-    def _power(self, node: ast.BinOp, base: _Dimension, exponent: _Dimension) -> _Dimension:
-        if not exponent.pure:
-            raise ValueError(f"the exponent of '{ast.unparse(node)}' has a dimension")
-        if base.pure:
-            return _Dimension(parse_unit("1"))
-        if exponent.number is None:
-            raise ValueError(
-                f"'{ast.unparse(node)}' raises {called_dimension(base.unit)} to a power that is "
-                "not a plain number; divide the base by a parameter of its unit"
-            )
-        return _Dimension(base.unit**exponent.number)
-
-    def _alike(self, node: ast.expr, left: _Dimension, right: _Dimension) -> _Dimension:
-        if right.fits(left.unit):
-            return left
-        if left.fits(right.unit):
-            return right
-        raise ValueError(
-            f"'{ast.unparse(node)}' mixes {called_dimension(left.unit)} with "
-            f"{called_dimension(right.unit)}"
-        )
-
-    def _call(self, node: ast.Call, name: str) -> _Dimension:
-        args = [self.of(arg) for arg in node.args]
-        if name == "sqrt":
-            return _Dimension(args[0].unit ** 0.5)
-        if name in SAME:
-            return self._alike(node, args[0], args[-1]) if len(args) > 1 else args[0]
-        if not args[0].pure:
-            raise ValueError(
-                f"the argument of '{ast.unparse(node)}' is {called_dimension(args[0].unit)}; "
-                "divide it by a parameter of that unit"
-            )
-        return _Dimension(parse_unit("1"))

@@ -1,15 +1,23 @@
-"""What sensors do to a channel on its way into a log; never part of the motion."""
+"""What sensors do to a channel on its way into a log; never part of the motion.
+
+Simulator, bench and robot identification all read the faults from here. A new fault is one class:
+it says what is measured of a true series, how to undo that, and at which stage of the sensor it
+acts (`stage`). Faults of one channel always act in the order of the stages: first the clock (the
+reading is late), then the gain, then the zero, in whatever order a model lists them.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from typing import Annotated, Any, ClassVar, Literal
 
-import numpy as np
 from pydantic import field_validator, model_validator
 
 from kemba.effects.base import Effect
+from kemba.effects.series import Series
 from kemba.quantity import Param, to_si
+
+STAGES = ("clock", "gain", "zero")  # of a sensor, in the order in which a signal passes them
 
 # unit and usual noise (1 sigma) of a channel by the last part of its name
 CHANNELS: dict[str, tuple[str, float]] = {
@@ -33,13 +41,19 @@ CHANNELS: dict[str, tuple[str, float]] = {
 
 
 class SensorEffect(Effect):
-    """A fault of one sensor. `channel` is a column without its unit: `body/pitch`."""
+    """A fault of one sensor. `channel` is a column without its unit: `body/pitch`.
+
+    `off` names the parameter that switches it. `straight`: what is measured is linear in that
+    parameter, so that a finite difference of any size is its derivative.
+    """
 
     channel: str
 
     place: ClassVar[Literal["leg", "body"]] = "body"
     family: ClassVar[str] = "sensors"
     moves: ClassVar[bool] = False
+    stage: ClassVar[Literal["clock", "gain", "zero"]]
+    straight: ClassVar[bool] = True
     in_channel_unit: ClassVar[tuple[str, ...]] = ()
 
     @field_validator("channel")
@@ -50,7 +64,7 @@ class SensorEffect(Effect):
             endings = ", ".join(CHANNELS)
             raise ValueError(
                 f"'{channel}' is not a measured channel; a column such as body/pitch or "
-                f"front/piston/x was expected (ending in one of: {endings})"
+                f"<leg>/piston/x was expected (ending in one of: {endings})"
             )
         return path
 
@@ -58,7 +72,7 @@ class SensorEffect(Effect):
     @classmethod
     def _one_leg(cls, on: str | None) -> str | None:
         if on is not None:
-            raise ValueError("a sensor is chosen by `channel`, such as front/piston/x, not by `on`")
+            raise ValueError("a sensor is chosen by `channel`, such as <leg>/piston/x, not by `on`")
         return on
 
     @property
@@ -75,13 +89,24 @@ class SensorEffect(Effect):
         """Usual noise of such a channel (1 sigma); what is learnt from a log is better."""
         return CHANNELS[self.channel.split("/")[-1]][1]
 
-    def measured(self, time: Any, true: Any) -> Any:
-        """The channel as the log shows it, from its true values (n,) at `time` (n,) [s]."""
+    def sized(self, sigma: float) -> dict[str, Param]:
+        """Parameters by name, with the sizes that matter at this noise of the channel (1 sigma)."""
+        return self.declared()
+
+    def parameters(self) -> dict[str, Param]:
+        return self.sized(self.sigma)
+
+    @property
+    def lateness(self) -> float:
+        """Seconds by which the sensor shows its channel late."""
+        return 0.0
+
+    def measured(self, true: Series) -> Series:
+        """The channel as the sensor shows it, from its true values."""
         raise NotImplementedError
 
-    def expanded(self, true: Any, rate: Any) -> Any:
-        """The measured value to first order in the parameters, from the true value and its time
-        derivative; parameters and arguments may be symbols."""
+    def undone(self, measured: Series) -> Series:
+        """The true channel, from what the sensor shows: the inverse of `measured`."""
         raise NotImplementedError
 
 
@@ -94,6 +119,7 @@ class SensorBias(SensorEffect):
     equation: ClassVar[str] = "measured = true + b"
     source: ClassVar[str] = "encoder and transducer zeros"
     off: ClassVar[dict[str, float]] = {"b": 0.0}
+    stage: ClassVar[Literal["clock", "gain", "zero"]] = "zero"
     in_channel_unit: ClassVar[tuple[str, ...]] = ("b",)
 
     @model_validator(mode="before")
@@ -104,15 +130,15 @@ class SensorBias(SensorEffect):
         unit, _ = CHANNELS.get(str(data.get("channel")).split(" [")[0].split("/")[-1], ("1", 1.0))
         return {**data, "b": to_si(data["b"], unit)}
 
-    def parameters(self) -> dict[str, Param]:
-        doc = self.declared()["b"].doc
-        return {"b": Param(self.unit, 5.0 * self.sigma, doc=doc)}
+    def sized(self, sigma: float) -> dict[str, Param]:
+        in_sigmas = self.declared()["b"]
+        return {"b": Param(self.unit, in_sigmas.size * sigma, doc=in_sigmas.doc)}
 
-    def measured(self, time: Any, true: Any) -> Any:
-        return true + self.b
+    def measured(self, true: Series) -> Series:
+        return true.plus(self.b)
 
-    def expanded(self, true: Any, rate: Any) -> Any:
-        return true + self.b
+    def undone(self, measured: Series) -> Series:
+        return measured.plus(-self.b)
 
 
 class SensorScale(SensorEffect):
@@ -124,12 +150,13 @@ class SensorScale(SensorEffect):
     equation: ClassVar[str] = "measured = (1 + k) true"
     source: ClassVar[str] = "calibration of encoders and transducers"
     off: ClassVar[dict[str, float]] = {"k": 0.0}
+    stage: ClassVar[Literal["clock", "gain", "zero"]] = "gain"
 
-    def measured(self, time: Any, true: Any) -> Any:
-        return (1 + self.k) * true
+    def measured(self, true: Series) -> Series:
+        return true.times(1 + self.k)
 
-    def expanded(self, true: Any, rate: Any) -> Any:
-        return (1 + self.k) * true
+    def undone(self, measured: Series) -> Series:
+        return measured.times(1 / (1 + self.k))
 
 
 class SensorDelay(SensorEffect):
@@ -141,18 +168,35 @@ class SensorDelay(SensorEffect):
     equation: ClassVar[str] = "measured(t) = true(t - dt)"
     source: ClassVar[str] = "filters and bus transport"
     off: ClassVar[dict[str, float]] = {"dt": 0.0}
+    stage: ClassVar[Literal["clock", "gain", "zero"]] = "clock"
+    straight: ClassVar[bool] = False
 
-    def measured(self, time: Any, true: Any) -> Any:
-        return np.interp(np.asarray(time) - self.dt, time, true)
+    @property
+    def lateness(self) -> float:
+        return self.dt
 
-    def expanded(self, true: Any, rate: Any) -> Any:
-        return true - self.dt * rate
+    def measured(self, true: Series) -> Series:
+        return true.late(self.lateness)
+
+    def undone(self, measured: Series) -> Series:
+        return measured.late(-self.lateness)
 
 
-def as_measured(effects: Iterable[Effect], channel: str, time: Any, true: Any) -> Any:
-    """A channel (a column without its unit) with all its faults: late, then scaled, then offset."""
-    order = (SensorDelay, SensorScale, SensorBias)
+def in_order(effects: Iterable[Effect], channel: str) -> list[SensorEffect]:
+    """The faults of a channel (a column without its unit) in the order in which they act."""
     faults = [e for e in effects if isinstance(e, SensorEffect) and e.channel == channel]
-    for fault in sorted(faults, key=lambda e: order.index(type(e))):
-        true = fault.measured(time, true)
+    return sorted(faults, key=lambda fault: (STAGES.index(fault.stage), fault.kind))
+
+
+def as_measured(effects: Iterable[Effect], channel: str, true: Series) -> Series:
+    """A channel as its sensor shows it, with all faults of that channel among `effects`."""
+    for fault in in_order(effects, channel):
+        true = fault.measured(true)
     return true
+
+
+def as_true(effects: Iterable[Effect], channel: str, measured: Series) -> Series:
+    """The true channel behind what its sensor shows: `as_measured` undone."""
+    for fault in reversed(in_order(effects, channel)):
+        measured = fault.undone(measured)
+    return measured

@@ -8,7 +8,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-SIGNIFICANT = 0.02  # p-value of nothing below which something differs
+from kemba.identify.settings import DiscoverSettings
+
 Verdict = Literal["missing", "nothing", "unknown", "bad-data"]
 
 
@@ -70,7 +71,7 @@ def phrase(answer: Answer) -> str:
     """The verdict in one plain sentence."""
     if answer.verdict == "nothing":
         what = "Nothing is missing as far as these data can tell"
-        if answer.p_value_nothing <= SIGNIFICANT:
+        if answer.p_value_nothing <= DiscoverSettings.current().significant:
             what = "What differs is too small to matter"
         return (
             f"{what} (p = {answer.p_value_nothing:.2g}); "

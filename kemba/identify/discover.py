@@ -1,32 +1,24 @@
-"""From a problem to an answer: search, doubt, confirm."""
+"""From a problem to an answer: search for effects, then doubt what was found."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from kemba.identify.answer import SIGNIFICANT, Answer, Ranked, Value, phrase
-from kemba.identify.doubt.cross_validation import heldout_error, left_out, predicted_error
+from kemba.identify.answer import Answer, Ranked, phrase
+from kemba.identify.doubt.cross_validation import left_out
 from kemba.identify.doubt.run_consistency import Drift, drifting
 from kemba.identify.doubt.unexplained import Formula, look, unfinished
 from kemba.identify.evidence.bootstrap import NullTest, bootstrap, smallest_detectable
-from kemba.identify.evidence.linear import is_shape, time_blocks
-from kemba.identify.evidence.problem import Array, Candidate, Problem
-from kemba.identify.evidence.search import Search, share_of
-from kemba.identify.evidence.spike_slab import NULL, SPIKE_WIDTH, Hypothesis
-
-CLASS = 3.0  # nats within which two explanations are the same to these data
-MATTERS = 0.2  # an effect below this share of its size is no finding,
-MATTERS_TOO = 0.3  # nor is one beside a stronger one
-DEFECT = (
-    SPIKE_WIDTH  # share of an effect that the model's own imperfection may add or hide, 1 sigma
-)
-FINE = 0.1  # s, blocks whose signs are redrawn
-UNEXPLAINED, LEFT = 1.3, 0.9  # noise units and share of the error that no answer may leave
-SHOWN = 8
+from kemba.identify.evidence.linear import time_blocks
+from kemba.identify.evidence.search import Search
+from kemba.identify.evidence.spike_slab import NULL, Hypothesis
+from kemba.identify.problem.problem import Problem
+from kemba.identify.ranking import error, ladder, ranked, strength
+from kemba.identify.settings import DiscoverSettings
 
 Talk = Callable[[str], None]
 
@@ -47,11 +39,21 @@ def discover(
     time_limit: float = np.inf,
     say: Talk = lambda text: None,
 ) -> Discovery:
-    """Which effect is missing from the model behind `problem`, if any."""
+    """Which effect is missing from the model behind `problem`, if any.
+
+    `holdout`: other logs, on which the answer is judged; `time_limit` [s]; `say`: told of progress.
+    """
     started = time.monotonic()
-    search = Search(problem, started + 0.8 * time_limit, say)
-    best = search.run()
-    say("asking whether nothing would look like this")
+    share = DiscoverSettings.current().searching
+    search = Search(problem, started + share * time_limit, say)
+    found = judged(search, search.run(), holdout)
+    found.answer.runtime_s = time.monotonic() - started
+    return found
+
+
+def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> Discovery:
+    """What the finished `search` with its `best` hypothesis allows to say."""
+    search.say("asking whether nothing would look like this")
     test = null_test(search)
     best, p_value, dismissed = _believed(search, best, test)
     formula = look(search, best)
@@ -61,14 +63,13 @@ def discover(
     doubts = [] if formula else doubts_about(search, best, drift, holdout)
     ranking = ranked(search, best, dismissed, holdout)
     answer = _answer(search, best, p_value, test, ranking, formula, holdout, doubts)
-    answer.runtime_s = time.monotonic() - started
     return Discovery(answer, search, best, holdout)
 
 
 def null_test(search: Search) -> NullTest:
     """The bootstrap of the search, with the noise these data have."""
     base = search.base
-    blocks = time_blocks(search.problem, shortest=FINE)
+    blocks = time_blocks(search.problem, shortest=DiscoverSettings.current().fine)
     left = base.residual + base.jacobian @ (base.flexible_fit() - base.point.linear.at)
     pieces = base.jacobian * left[:, None]
     order = np.argsort(blocks, kind="stable")
@@ -81,13 +82,13 @@ def null_test(search: Search) -> NullTest:
 def _believed(
     search: Search, best: Hypothesis, test: NullTest
 ) -> tuple[Hypothesis, float, set[Hypothesis]]:
-    """The best hypothesis cut down to what is significant and holds on left-out data, the p-value
-    of nothing, and what was dismissed on the way."""
+    """The best hypothesis without what is not significant, too small or refuted by left-out data;
+    the p-value of nothing; and the hypotheses that were dismissed."""
     null = search.points[NULL].log_evidence
     singles = [p.log_evidence - null for h, p in search.points.items() if h]
     p_value = test.p_value(max(singles, default=0.0))
     dismissed: set[Hypothesis] = set()
-    if not best or p_value > SIGNIFICANT:
+    if not best or p_value > DiscoverSettings.current().significant:
         return NULL, p_value, dismissed
     while best:
         grave = material(search, best)
@@ -107,28 +108,31 @@ def _believed(
 
 
 def material(search: Search, hypothesis: Hypothesis) -> Hypothesis:
-    """Those of its effects that are large enough to be more than an imperfection."""
+    """Those effects of a hypothesis that are larger than a model's usual imperfection."""
     score, linear = search.points[hypothesis].score, search.points[hypothesis].linear
-    least = MATTERS if len(hypothesis) == 1 else MATTERS_TOO
+    settings = DiscoverSettings.current()
+    least = settings.matters if len(hypothesis) == 1 else settings.matters_too
 
     def share(effect: str) -> float:
         c = search.problem.candidates[effect]
         return float(abs(score.z[linear.index(c.key)] - c.lead.off) / c.lead.size)
 
-    strongest = max(hypothesis, key=lambda e: _strength(search, e, hypothesis))
-    return tuple(e for e in hypothesis if share(e) >= (MATTERS if e == strongest else least))
+    strongest = max(hypothesis, key=lambda e: strength(search, e, hypothesis))
+    wanted = {e: settings.matters if e == strongest else least for e in hypothesis}
+    return tuple(e for e in hypothesis if share(e) >= wanted[e])
 
 
 def doubts_about(
     search: Search, best: Hypothesis, drift: Drift | None, holdout: Problem | None
 ) -> list[str]:
-    """Why the best answer cannot be the whole of it."""
+    """Why the best answer cannot be complete."""
+    settings = DiscoverSettings.current()
     if drift is not None:
         return [str(drift)]
     if unfinished(search, best):
         return ["the error that is left repeats itself with motion and valves"]
     before, after = (error(search, h, holdout) for h in (NULL, best))
-    if best and after > max(UNEXPLAINED, LEFT * before):
+    if best and after > max(settings.unexplained, settings.left * before):
         return [
             f"{' and '.join(best)} fits best, but leaves an error of {after:.3g} times the noise"
         ]
@@ -163,115 +167,8 @@ def _answer(
         },
         formula=str(formula) if formula else None,
         split_by="held-out logs" if holdout else "runs" if len(problem.runs) > 3 else "time blocks",
-        ladder=_ladder(search, best, holdout),
+        ladder=ladder(search, best, holdout),
     )
     answer.remarks = list(doubts)
     answer.sentence = phrase(answer)
     return answer
-
-
-def error(search: Search, hypothesis: Hypothesis, holdout: Problem | None) -> float:
-    """Whitened RMS on data the fit has not seen."""
-    point = search.points[hypothesis]
-    if holdout is None:
-        return predicted_error(search, point)
-    return heldout_error(holdout, point.fit.theta)
-
-
-def ranked(
-    search: Search, best: Hypothesis, dismissed: set[Hypothesis], holdout: Problem | None
-) -> list[Ranked]:
-    """The effects in order of probability; those of the best answer first."""
-    problem = search.problem
-    probability = search.probabilities(dismissed) if best else _doubted(search.probabilities())
-    shares = share_of(probability, problem.candidates)
-    order = sorted(shares, key=lambda e: (e not in best, -_strength(search, e, best), -shares[e]))
-    found = []
-    before = error(search, NULL, holdout)
-    for effect in order[:SHOWN]:
-        hypothesis = best if effect in best else (effect,)
-        point = search.points.get(hypothesis)
-        if point is None:
-            continue
-        found.append(
-            Ranked(
-                effect,
-                shares[effect],
-                values(search, hypothesis, effect),
-                equivalents(search, hypothesis, effect) if effect in best else (),
-                before,
-                error(search, hypothesis, holdout),
-                left_out(search, hypothesis).nats,
-            )
-        )
-    return found
-
-
-def _doubted(probability: Mapping[Hypothesis, float]) -> dict[Hypothesis, float]:
-    """Where nothing was found significant, nothing is the likeliest."""
-    rest = sum(p for h, p in probability.items() if h)
-    scale = min(1.0, 0.5 / rest) if rest > 0 else 1.0
-    return {h: p * scale if h else 1.0 - rest * scale for h, p in probability.items()}
-
-
-def _strength(search: Search, effect: str, best: Hypothesis) -> float:
-    """How much evidence goes when this effect is taken out of the answer."""
-    if effect not in best:
-        return 0.0
-    rest = tuple(h for h in best if h != effect)
-    points = search.points
-    return points[best].log_evidence - points[rest].log_evidence if rest in points else 0.0
-
-
-def equivalents(search: Search, hypothesis: Hypothesis, effect: str) -> tuple[str, ...]:
-    """Effects that could stand in this one's place and explain the data as well."""
-    own = search.points[hypothesis].log_evidence
-    rest = set(hypothesis) - {effect}
-    found = []
-    for other, point in search.points.items():
-        swapped = set(other) - rest
-        if len(other) == len(hypothesis) and rest < set(other) | {""} and len(swapped) == 1:
-            (name,) = swapped
-            if name != effect and rest <= set(other) and own - point.log_evidence < CLASS:
-                found.append(name)
-    return tuple(sorted(found))
-
-
-def values(search: Search, hypothesis: Hypothesis, effect: str) -> dict[str, Value]:
-    """Parameters of one effect with 95 % intervals."""
-    point, candidate = search.points[hypothesis], search.problem.candidates[effect]
-    found = {}
-    for key, parameter in candidate.keys().items():
-        i = point.linear.index(key)
-        centre, sd = point.score.z[i], float(np.sqrt(point.score.covariance[i, i]))
-        step = 1.0 if is_shape(search.problem, key) else abs(centre - parameter.off)
-        sd = float(np.hypot(sd, DEFECT * step))
-        low, high = centre - 1.96 * sd, centre + 1.96 * sd
-        triple = np.array([centre, low, high])
-        if is_shape(search.problem, key):
-            triple = np.exp(np.clip(triple, -50, 50))
-        triple = np.clip(triple, parameter.lower, parameter.upper)
-        name, unit, triple = reported(candidate, parameter.name, parameter.unit, triple)
-        value, low, high = (float(t) for t in triple)
-        found[name] = Value(value, low, high, unit)
-    return found
-
-
-def reported(candidate: Candidate, name: str, unit: str, triple: Array) -> tuple[str, str, Array]:
-    """A parameter as the catalogue names it, also where it was searched reciprocally."""
-    if name not in candidate.reciprocal:
-        return name, unit, triple
-    name, unit = candidate.reciprocal[name]
-    value, low, high = 1.0 / np.maximum(triple, 1e-12)
-    return name, unit, np.array([value, high, low])
-
-
-def _ladder(search: Search, best: Hypothesis, holdout: Problem | None) -> list[tuple[str, float]]:
-    """Held-out error as the effects join, the strongest first."""
-    steps = [("model as it is", error(search, NULL, holdout))]
-    order = sorted(best, key=lambda e: -_strength(search, e, best))
-    for i in range(len(order)):
-        part = tuple(sorted(order[: i + 1]))
-        if part in search.points:
-            steps.append((order[i], error(search, part, holdout)))
-    return steps

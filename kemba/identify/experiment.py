@@ -1,4 +1,4 @@
-"""The next test: which of a menu of rig tests would tell the remaining rivals apart."""
+"""The next test: which one of a menu of rig tests tells the remaining effects apart best."""
 
 from __future__ import annotations
 
@@ -15,15 +15,31 @@ from kemba.files import read_json
 from kemba.identify.bench.bench_log import prepare
 from kemba.identify.bench.problem import BenchProblem
 from kemba.identify.evidence.linear import linearise, time_blocks
-from kemba.identify.evidence.problem import Array
+from kemba.identify.problem.problem import Array
 from kemba.model.spec import load_model
 from kemba.plant.rig.rigs import DynamometerRig, LockedRig, RandomRig, Rig
+from kemba.settings import BY_HAND, Settings, setting
 from kemba.trajectory import Trajectory
 
-SLOW = (0.01, 0.02, 0.05)  # m.s-1
-NOISE = 1.0  # N, of a usual transducer
-LONGEST = 12  # tests of one rig that are simulated to judge it
-CLEAR = 5.0  # nats that settle a question
+
+class ExperimentSettings(Settings):
+    """How the tests of the menu are judged."""
+
+    force_noise: float = setting(
+        1.0, "N", "noise of the force sensor", "convention: a usual transducer of a rig"
+    )
+    position_noise: float = setting(
+        1e-5, "m", "noise of the position sensor", "convention: a usual one of a rig"
+    )
+    rows: float = setting(1000.0, "Hz", "rows per second of the simulated logs", BY_HAND)
+    tests: int = setting(12, "1", "most tests of one rig that are simulated to judge it", BY_HAND)
+    clear: float = setting(
+        5.0,
+        "nats",
+        "evidence that settles a question",
+        "literature: Kass and Raftery 1995, 'very strong' evidence begins at 5 nats",
+    )
+    rivals: int = setting(4, "1", "effects that are to be told apart", "convention: few")
 
 
 @dataclass(frozen=True)
@@ -37,7 +53,7 @@ class Proposal:
     @property
     def sentence(self) -> str:
         first, second = self.rivals
-        if self.nats < CLEAR:
+        if self.nats < ExperimentSettings.current().clear:
             return (
                 f"No test of the menu separates {first} from {second}; "
                 f"the best, {self.rig.name}, would gain {self.nats:.1f} nats."
@@ -45,16 +61,16 @@ class Proposal:
         return f"The test '{self.rig.name}' separates {first} from {second} ({self.nats:.0f} nats)."
 
 
-def menu() -> list[Rig]:
-    """Standard tests of one piston."""
+def menu(stroke: float) -> list[Rig]:
+    """Standard tests of one piston of this stroke [m]."""
     modes = ("extend", "retract", "both", "none")
     slow = DynamometerRig.model_validate(
-        {"name": "slow_stroke", "speeds": {m: list(SLOW) for m in modes}}
+        {"name": "slow_stroke", "speeds": {m: [0.01, 0.02, 0.05] for m in modes}}
     )
     fast = DynamometerRig.model_validate(
         {"name": "dynamometer", "speeds": {m: [0.1, 0.3, 0.6, 1.0] for m in modes}}
     )
-    both_ends = {"positions": [0.0, 0.035, 0.07]}
+    both_ends = {"positions": [0.0, stroke / 2, stroke]}
     return [
         LockedRig.model_validate({"name": "locked_extend", "chamber": "extend", **both_ends}),
         LockedRig.model_validate({"name": "locked_retract", "chamber": "retract", **both_ends}),
@@ -70,7 +86,9 @@ def propose(folder: str | Path, out: Path) -> Proposal:
     answer = read_json(Path(folder) / "answer.json")
     rivals = contenders(answer)
     model = load_model(str(answer.get("base") or "planning"), rig=True)
-    proposals = [p for rig in menu() if (p := _judge(rig, model, rivals)) is not None]
+    proposals = [
+        p for rig in menu(model.mechanism.stroke) if (p := _judge(rig, model, rivals)) is not None
+    ]
     if not proposals:
         names = ", ".join(rivals)
         raise KembaError(str(folder), f"no rig test shows a difference between {names}")
@@ -87,7 +105,8 @@ def contenders(answer: Mapping[str, Any]) -> dict[str, dict[str, float]]:
         raise KembaError("answer.json", "has no ranking", "nothing is left to be separated")
     first = next(iter(rows))
     others = [*rows[first]["equivalent_to"], *(e for e in rows if e != first)]
-    chosen = [first, *dict.fromkeys(e for e in others if e in rows)][:4]
+    chosen = [first, *dict.fromkeys(e for e in others if e in rows)]
+    chosen = chosen[: ExperimentSettings.current().rivals]
     return {
         name: {f"{name}.{p}": v["value"] for p, v in rows[name]["parameters"].items()}
         for name in chosen
@@ -96,7 +115,7 @@ def contenders(answer: Mapping[str, Any]) -> dict[str, dict[str, float]]:
 
 def _judge(rig: Rig, model: Any, rivals: Mapping[str, Mapping[str, float]]) -> Proposal | None:
     """How well a rig separates the first rival from the one most like it."""
-    runs = [prepare(t.meta["name"], t) for t in _logs(rig)]
+    runs = [prepare(t.meta["name"], t) for t in _logs(rig, model.mechanism.stroke)]
     problem = BenchProblem(runs, model)
     known = {n: t for n, t in rivals.items() if n in problem.candidates}
     if len(known) < 2:
@@ -119,17 +138,17 @@ def _distance(gap: Array, jacobian: Array, width: Array) -> float:
     return 0.5 * float(gap @ gap - (scaled.T @ gap) @ np.linalg.solve(h, scaled.T @ gap))
 
 
-def _logs(rig: Rig) -> Iterator[Trajectory]:
+def _logs(rig: Rig, stroke: float) -> Iterator[Trajectory]:
     """The rig's tests as logs with ideal sensors and no force yet."""
-    rng = np.random.default_rng(0)
-    for number, test in enumerate(rig.tests(rng)):
-        if number >= LONGEST:
+    settings, rng = ExperimentSettings.current(), np.random.default_rng(0)
+    for number, test in enumerate(rig.tests(rng, stroke)):
+        if number >= settings.tests:
             return
-        times = test.times[:: max(1, round(rig.rate / 1000.0))]
+        times = test.times[:: max(1, round(rig.rate / settings.rows))]
         x, _ = test.motion(times)
-        noise = NOISE * rng.standard_normal(len(times))
+        noise = settings.force_noise * rng.standard_normal(len(times))
         columns = {
-            "piston/x [m]": x + 1e-5 * rng.standard_normal(len(times)),
+            "piston/x [m]": x + settings.position_noise * rng.standard_normal(len(times)),
             "piston/F [N]": noise,
         }
         for valve in ("extend", "retract"):

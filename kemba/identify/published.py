@@ -12,13 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from kemba.effects.pneumatics.constants import AREA_E, AREA_R
-from kemba.identify.evidence.problem import Array
+from kemba.identify.problem.problem import Array
+from kemba.mechanism import Cylinder, load_cylinder
 from kemba.plant.rig.tables import PAPER_FORCE, PAPER_RISE
 
-STROKE = 0.070  # m
+MADE_ON = "dsnu-25-70"  # the cylinder on which the paper's tables were measured
 LOSS_COLUMNS = ("0.6 MPa", "0.7 MPa", "0.8 MPa")
-AREAS = {"extend": AREA_E, "retract": -AREA_R, "both": AREA_E - AREA_R}
 
 
 @dataclass(frozen=True)
@@ -30,6 +29,7 @@ class Published:
     seal_friction: tuple[float, float]  # N, smallest and largest
     shortfall: dict[str, Array]  # share of the supply that is missing while air flows
     dead_volume: dict[str, float]  # m3, by filling and venting
+    cylinder: Cylinder
 
     def json(self) -> dict[str, Any]:
         """Everything found, SI."""
@@ -53,26 +53,31 @@ class Published:
             f"Tables I and II imply seal friction of {low:.0f} to {high:.0f} N, a supply that "
             f"falls short as it is drawn from ({growing} from 0.6 to 0.8 MPa), and tubes of "
             f"{volumes[0]:.0f} to {volumes[-1]:.0f} cm3 beside the stroke of "
-            f"{1e6 * AREA_E * STROKE:.0f} cm3."
+            f"{1e6 * self.cylinder.area_extend * self.cylinder.stroke:.0f} cm3."
         )
 
 
 def published() -> Published:
     """The findings, computed from Tables I and II."""
+    cylinder = load_cylinder(MADE_ON)
+    A_e, A_r = cylinder.area_extend, cylinder.area_retract
+    areas = {"extend": A_e, "retract": -A_r, "both": A_e - A_r}
     pressures = np.array(sorted({p for mode, p in PAPER_FORCE if mode == "extend"}))
     losses = {
         mode: np.array([abs(p * area) - abs(PAPER_FORCE[mode, p][0]) for p in pressures])
-        for mode, area in AREAS.items()
+        for mode, area in areas.items()
     }
     # With both valves on the chambers' shortfalls cancel nearly; at 0.6 MPa nothing falls short.
     bare = np.array([*losses["both"], losses["extend"][0], losses["retract"][0]])
     friction = float(np.median(bare))
     shortfall = {
-        mode: np.maximum(losses[mode] - friction, 0.0) / (pressures * abs(AREAS[mode]))
+        mode: np.maximum(losses[mode] - friction, 0.0) / (pressures * abs(areas[mode]))
         for mode in ("extend", "retract")
     }
     volume = {
-        name: AREA_E * STROKE / (full / empty - 1.0) for name, (empty, full) in PAPER_RISE.items()
+        name: A_e * cylinder.stroke / (full / empty - 1.0)
+        for name, (empty, full) in PAPER_RISE.items()
     }
     spread = np.percentile(bare, [25, 75])
-    return Published(pressures, losses, (float(spread[0]), float(spread[1])), shortfall, volume)
+    friction_span = (float(spread[0]), float(spread[1]))
+    return Published(pressures, losses, friction_span, shortfall, volume, cylinder)

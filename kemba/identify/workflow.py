@@ -12,10 +12,11 @@ from kemba.files import write_json
 from kemba.identify.adopt import write_model
 from kemba.identify.answer import Answer
 from kemba.identify.discover import Discovery, discover
-from kemba.identify.evidence.problem import Problem
 from kemba.identify.logs.excerpt import excerpts
 from kemba.identify.logs.gate import BadData, check_logs, sentence
-from kemba.identify.logs.reading import load_map, read_logs
+from kemba.identify.logs.reading import load_map, read_logs, taken_on
+from kemba.identify.problem.problem import Problem
+from kemba.model import Model, load_model
 from kemba.trajectory import Trajectory
 
 Paths = Sequence[str | Path]
@@ -41,13 +42,15 @@ def discover_logs(
     found: Discovery | None = None
     try:
         _apart(fitted, kept)
-        remarks = check_logs([*fitted, *kept])
+        built = model_of(fitted, model)
+        taken_on([*fitted, *kept], built.mechanism)
+        remarks = [*built.remarks, *check_logs([*fitted, *kept])]
         say("preparing the logs")
         fitted, cut = excerpts(fitted)
         kept, _ = excerpts(kept)
-        problem = make_problem(fitted, model)
-        remarks = [*remarks, *cut, *plausible(problem)]
-        judge = make_problem(kept, model) if kept else None
+        problem = make_problem(fitted, built)
+        remarks = [*remarks, *cut, *problem.validate()]
+        judge = make_problem(kept, built) if kept else None
         left = time_limit - (time.monotonic() - started)
         found = discover(problem, judge, left, say)
         answer = found.answer
@@ -61,24 +64,20 @@ def discover_logs(
     return answer, found
 
 
-def make_problem(logs: Sequence[Trajectory], model: str) -> Problem:
+def model_of(logs: Sequence[Trajectory], name: str) -> Model:
+    """The model `name` of the robot, or for bench logs of one of its pistons."""
+    return load_model(name, rig=logs[0].meta["kind"] == "bench")
+
+
+def make_problem(logs: Sequence[Trajectory], model: Model) -> Problem:
     """The problem of explaining bench or robot logs with a model."""
-    from kemba.model.spec import load_model
-
     if logs[0].meta["kind"] == "bench":
-        from kemba.identify.bench import bench_problem
+        from kemba.identify.bench.problem import bench_problem
 
-        return bench_problem(logs, load_model(model, rig=True))
-    from kemba.identify.robot import robot_problem
+        return bench_problem(logs, model)
+    from kemba.identify.robot.problem import robot_problem
 
-    return robot_problem(logs, load_model(model))
-
-
-def plausible(problem: Problem) -> list[str]:
-    """Remarks of the problem's own gate. Raises BadData when the model and the data contradict
-    each other so grossly that a column must be wrong."""
-    gate = getattr(problem, "plausible", None)
-    return list(gate()) if gate else []
+    return robot_problem(logs, model)
 
 
 def write_answer(answer: Answer, out: Path, model: str) -> None:

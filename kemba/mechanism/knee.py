@@ -18,7 +18,7 @@ def pivot_to_pin(leg: Leg, flexion: ca.SX) -> tuple[ca.SX, ca.SX]:
 
 
 def extension(leg: Leg, flexion: ca.SX) -> ca.SX:
-    """Piston extension [m] for a knee flexion [rad]: 0 retracted, `stroke` extended."""
+    """Piston extension [m] for a knee flexion [rad]: 0 with the rod in."""
     along, aside = pivot_to_pin(leg, flexion)
     return ca.sqrt(along**2 + aside**2) - leg.piston.retracted
 

@@ -4,20 +4,13 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import Field, field_validator
 
-from kemba.config import find_config, load_yaml, parse
+from kemba.mechanism.cylinder import Cylinder, CylinderTable
+from kemba.mechanism.table import Inertia, Length, Mass, Table
 from kemba.quantity import Param
 
-Length = Annotated[float, Param("m", doc="length")]
-Mass = Annotated[float, Param("kg", lower=0.0, doc="mass")]
-Inertia = Annotated[float, Param("kg.m2", lower=0.0, doc="moment of inertia")]
-
-
-class Table(BaseModel):
-    """A frozen row of the link table; unknown keys are refused."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
+RESERVED = ("body", "supply", "piston")  # first parts of columns that belong to no leg
 
 
 class Link(Table):
@@ -30,12 +23,12 @@ class Link(Table):
 
 
 class Piston(Table):
-    """Where the cylinder sits: pivot beside the hip, pin on the tibia, lengths pivot to pin."""
+    """Where the cylinder sits: pivot beside the hip, pin on the tibia, length from pivot to pin
+    with the rod in."""
 
     mount: Length
     pin: Length
     retracted: Length
-    stroke: Length
 
 
 class Leg(Table):
@@ -57,15 +50,33 @@ class LegPlace(Table):
 
 
 class Robot(Table):
-    """A planar robot: one body, legs of one kind."""
+    """A planar robot: one body, one to three legs of one kind, one kind of cylinder."""
 
     name: str
     gravity: Annotated[float, Param("m.s-2", lower=0.0, doc="gravity")] = 9.81
     body: Link
-    legs: dict[str, LegPlace]
+    legs: Annotated[dict[str, LegPlace], Field(min_length=1, max_length=3)]
     leg: Leg
+    cylinder: Cylinder
+
+    @field_validator("legs")
+    @classmethod
+    def _named(cls, legs: dict[str, LegPlace]) -> dict[str, LegPlace]:
+        for name in legs:
+            if not name.isidentifier() or name in RESERVED:
+                raise ValueError(
+                    f"'{name}' cannot be the name of a leg; a word such as left, other than "
+                    f"{', '.join(RESERVED)}, was expected"
+                )
+        return legs
+
+    @property
+    def stroke(self) -> float:
+        """Way of every piston [m]."""
+        return self.cylinder.stroke
 
 
-def load_robot(name: str = "kemba") -> Robot:
-    """The link table `name`, a path or a shipped robot. Raises KembaError."""
-    return parse(load_yaml(find_config(name, "robots")), Robot)
+class RobotFile(Robot):
+    """A robot as its YAML writes it: figures of the cylinder may be left to another cylinder."""
+
+    cylinder: CylinderTable  # type: ignore[assignment]

@@ -8,6 +8,8 @@ from functools import cached_property
 import casadi as ca
 
 from kemba.errors import KembaError, suggest
+from kemba.mechanism.cylinder import Cylinder
+from kemba.mechanism.links import Robot
 from kemba.quantity import Quantity
 
 
@@ -30,7 +32,8 @@ class Mechanism:
 
     `q, v, a` are SX symbols (n,); `inverse_dynamics` (n,) is the generalised force that the
     motion (q, v, a) needs, gravity included, no effect included. `legs` are the prefixes under
-    which leg ports are found ("" for a rig). `imposed`: the motion is given, forces are answers.
+    which leg ports are found ("" for a rig). `cylinder`: the one of every leg. `robot`: the link
+    table, None for a rig. `imposed`: the motion is given, forces are answers.
     `mirror` maps a coordinate to its mirror image ("-" prefixed where the sign turns).
     `standing`: coordinates with retracted pistons and each foot on the ground under its hip.
     `points`: (x, z) of places that pictures need, such as `front/pin`; nothing pushes there.
@@ -45,11 +48,12 @@ class Mechanism:
     inverse_dynamics: ca.SX
     ports: dict[str, Port]
     legs: tuple[str, ...]
+    gravity: float
     weight: float = 1.0
     mass: float = 1.0
     body_mass: float = 0.0
-    gravity: float = 9.81
-    stroke: float = 0.07
+    robot: Robot | None = None
+    cylinder: Cylinder | None = None
     imposed: bool = False
     mirror: dict[str, str] = field(default_factory=dict)
     standing: dict[str, float] = field(default_factory=dict)
@@ -59,6 +63,23 @@ class Mechanism:
     def n(self) -> int:
         """Number of coordinates."""
         return len(self.coordinates)
+
+    @property
+    def stroke(self) -> float:
+        """Way of every piston [m]. Raises KembaError for a mechanism without pistons."""
+        return self.need_cylinder().stroke
+
+    def need_cylinder(self) -> Cylinder:
+        """The cylinder of every leg. Raises KembaError for a mechanism without pistons."""
+        if self.cylinder is None:
+            raise KembaError(self.name, "has no cylinder", "a robot or a rig was expected")
+        return self.cylinder
+
+    def need_robot(self) -> Robot:
+        """The link table. Raises KembaError for a mechanism that is no robot."""
+        if self.robot is None:
+            raise KembaError(self.name, "is not a robot", "a model of a whole robot was expected")
+        return self.robot
 
     def port(self, name: str) -> Port:
         """The port called `name`, e.g. `front/piston/x`. Raises KembaError."""

@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 
 from kemba.mechanism import knee
-from kemba.mechanism.links import Robot, load_robot
+from kemba.mechanism.links import Robot
 from kemba.mechanism.pin_model import build_pin_model
 from kemba.mechanism.planar import Mechanism, Port
 from kemba.mechanism.recursion import FrameMotion, forward, read_joints, rnea
@@ -15,9 +15,8 @@ from kemba.quantity import Quantity
 HIP_RANGE = 1.4  # rad; beyond it the knee would rise above the body
 
 
-def robot_mechanism(robot: Robot | str = "kemba") -> Mechanism:
+def robot_mechanism(robot: Robot) -> Mechanism:
     """The mechanism of a link table: q = (x, z, pitch, hips, knees), n = 3 + 2 legs."""
-    robot = load_robot(robot) if isinstance(robot, str) else robot
     coordinates, velocities = _coordinates(robot)
     n = len(coordinates)
     q, v, a = ca.SX.sym("q", n), ca.SX.sym("v", n), ca.SX.sym("a", n)
@@ -45,7 +44,8 @@ def robot_mechanism(robot: Robot | str = "kemba") -> Mechanism:
         mass=float(mass),
         body_mass=robot.body.mass,
         gravity=robot.gravity,
-        stroke=robot.leg.piston.stroke,
+        robot=robot,
+        cylinder=robot.cylinder,
         mirror=_mirror(robot),
         standing=standing_pose(robot),
         points=_points(robot, motions),
@@ -79,8 +79,7 @@ def tree_angles(robot: Robot, q: ca.SX) -> ca.SX:
 
 
 def _coordinates(robot: Robot) -> tuple[tuple[Quantity, ...], tuple[Quantity, ...]]:
-    stroke = robot.leg.piston.stroke
-    bends = sorted(knee.flexion(robot.leg, x) for x in (0.0, stroke))
+    bends = sorted(knee.flexion(robot.leg, x) for x in (0.0, robot.stroke))
     slack = 0.05  # the end stops hold the knee; these bounds only keep solvers out of trouble
     q = [
         Quantity("body/x", "m", -5.0, 5.0, 0.1, doc="body centre, forward"),

@@ -20,7 +20,8 @@ from kemba.quantity import Param, Quantity
 class Model:
     """A mechanism with effects; the order of the list does not matter.
 
-    `supply` is the air pressure [Pa] at which the tables of the effects are read.
+    `supply` is the air pressure [Pa] at which the tables of the effects are read; `remarks` say
+    where that is outside of what was measured. What an effect leaves open is the cylinder's.
     """
 
     def __init__(
@@ -30,8 +31,11 @@ class Model:
         supply: float = 0.7e6,
         name: str = "model",
     ) -> None:
-        self.mechanism, self.effects = mechanism, tuple(effects)
+        self.mechanism = mechanism
+        cylinder = mechanism.cylinder
+        self.effects = tuple(e.of_cylinder(cylinder) if cylinder else e for e in effects)
         self.supply, self.name = supply, name
+        self.remarks = [text for e in self.effects for text in e.remarks(supply)]
         self.instances = place_effects(mechanism, self.effects)
         self.states = self._variables("states")
         self.inputs = self._variables("inputs")
@@ -66,11 +70,23 @@ class Model:
         """Effects that are part of measuring, not of the motion, such as a sensor's bias."""
         return [e.name for e in self.effects if not e.moves]
 
-    def timing(self, leg: str | None) -> tuple[float, float]:
-        """Seconds by which a leg's valves switch on and off after the command."""
-        here = [i.effect.timing() for i in self.instances if i.leg in (leg, None)]
+    def timing(
+        self, leg: str | None, values: Mapping[str, float] | None = None
+    ) -> tuple[float, float]:
+        """Seconds by which a leg's valves switch on and off after the command.
+
+        `values`: parameters that differ from the model's, by their names in `parameters`.
+        """
+        effects = [i.effect for i in self.instances if i.leg in (leg, None)]
+        here = [_with(effect, values or {}).timing() for effect in effects]
         on = sum(t.get("on", 0.0) for t in here)
         return on, sum(t.get("off", 0.0) for t in here)
+
+    @cached_property
+    def delays(self) -> tuple[str, ...]:
+        """Parameters (names as in `parameters`) that say when valves switch."""
+        late = [effect for effect in self.effects if effect.timing()]
+        return tuple(f"{effect.name}.{field}" for effect in late for field in effect.parameters())
 
     @cached_property
     def parameters(self) -> dict[str, tuple[Param, float]]:
@@ -108,6 +124,13 @@ class Model:
             Instance(i.effect.bind(bound.get(i.effect.name, {})), i.leg) for i in self.instances
         ]
         return _assemble(self, instances, p)
+
+
+def _with(effect: Effect, values: Mapping[str, float]) -> Effect:
+    """The effect with those of `values` that are its own (`effect.field`)."""
+    own = {f: values[f"{effect.name}.{f}"] for f in effect.declared()
+           if f"{effect.name}.{f}" in values}  # fmt: skip
+    return effect.bind(own) if own else effect
 
 
 def _scale(model: Model, bound: dict[str, dict[str, Any]], name: str, factor: ca.SX) -> None:

@@ -11,7 +11,7 @@ import casadi as ca
 from kemba.effects import BY_KIND
 from kemba.effects.base import At, Contribution, Effect, PortAt, Signal
 from kemba.errors import KembaError, suggest
-from kemba.mechanism import Mechanism
+from kemba.mechanism import Cylinder, Mechanism
 from kemba.quantity import Quantity
 
 LEG_PORTS = {"piston": "piston/x", "hip": "hip/q", "foot_x": "foot/x", "foot_z": "foot/z"}
@@ -57,7 +57,9 @@ def place_effects(mechanism: Mechanism, effects: Iterable[Effect]) -> list[Insta
         if effect.leg is not None:
             if effect.leg not in mechanism.legs:
                 raise KembaError(
-                    f"effects.{effect.name}", f"{mechanism.name} has no leg '{effect.leg}'"
+                    f"effects.{effect.name}",
+                    f"{mechanism.name} has no leg '{effect.leg}'",
+                    hint=suggest(effect.leg, filter(None, mechanism.legs)),
                 )
             legs = (effect.leg,)
         for leg in legs:
@@ -200,8 +202,16 @@ class _Place:
     def __init__(self, scene: Scene, leg: str | None) -> None:
         self._scene, self._leg = scene, leg
         self.supply = scene.supply
-        self.gravity, self.stroke = scene.mechanism.gravity, scene.mechanism.stroke
+        self.gravity = scene.mechanism.gravity
         self.body_mass = scene.mechanism.body_mass
+
+    @property
+    def cylinder(self) -> Cylinder:
+        return self._scene.mechanism.need_cylinder()
+
+    @property
+    def stroke(self) -> float:
+        return self._scene.mechanism.stroke
 
     @property
     def legs(self) -> list[At]:

@@ -8,21 +8,26 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from kemba.config import find_config, load_yaml, parse
+from kemba.config import Document, find_config, load_yaml, parse, shipped_configs
 from kemba.effects import AnyEffect, Effect
 from kemba.effects.catalogue import CHAMBERS
-from kemba.mechanism import rig_mechanism, robot_mechanism
+from kemba.effects.pneumatics.constants import ATMOSPHERE
+from kemba.errors import KembaError
+from kemba.mechanism import load_robot, rig_mechanism, robot_mechanism
+from kemba.mechanism.robot_file import find_file, robot_files
 from kemba.model.model import Model
 from kemba.quantity import Param
 
-Supply = Annotated[float, Param("Pa", 0.1e6, lower=0.6e6, upper=0.8e6, doc="supply pressure")]
+Supply = Annotated[float, Param("Pa", 0.1e6, lower=ATMOSPHERE, doc="supply pressure")]
 
 
 class ModelSpec(BaseModel):
     """A model as its YAML writes it.
 
     `base` names another model whose effects come first; one of the same name replaces it.
-    `chambers: orifice` swaps the first-order chambers for eq. 1-3.
+    `robot` is a path relative to the file that says it, then to the current folder, then a
+    shipped name; once loaded, the whole path. `chambers: orifice` swaps the first-order chambers
+    for eq. 1-3.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -38,21 +43,58 @@ class ModelSpec(BaseModel):
 
 def load_spec(name: str | Path = "planning") -> ModelSpec:
     """The model YAML `name` (a path or a shipped model) with its bases merged in."""
-    path = find_config(str(name), "models")
-    spec = parse(load_yaml(path), ModelSpec)
-    if spec.base is None:
-        return spec
-    base = load_spec(_near(path, spec.base))
-    merged = {e.name: e for e in (*base.effects, *spec.effects)}
-    update: dict[str, Any] = {
-        key: getattr(spec, key) or getattr(base, key) for key in ("robot", "supply", "chambers")
-    }
-    return spec.model_copy(update={**update, "base": None, "effects": tuple(merged.values())})
+    (_, spec), *bases = model_chain(name)
+    for _, base in bases:
+        merged = {e.name: e for e in (*base.effects, *spec.effects)}
+        update: dict[str, Any] = {
+            key: getattr(spec, key) or getattr(base, key) for key in ("robot", "supply", "chambers")
+        }
+        spec = spec.model_copy(update={**update, "effects": tuple(merged.values())})
+    return spec.model_copy(update={"base": None})
+
+
+def model_chain(name: str | Path) -> list[tuple[Path, ModelSpec]]:
+    """Files and specs of the model YAML `name`, its base, the base of that, ...; every `robot` is
+    a whole path. Raises KembaError with every mistake of a file, and where bases form a circle."""
+    chain: list[tuple[Path, ModelSpec]] = []
+    near: str | Path = name
+    while True:
+        path = find_config(str(near), "models").resolve()
+        document = load_yaml(path)
+        spec = parse(document, ModelSpec)
+        if path in [file for file, _ in chain]:
+            raise document.error(("base",), "base: leads back to this file")
+        if spec.robot is not None:
+            spec = spec.model_copy(update={"robot": _robot(spec.robot, path, document)})
+        chain.append((path, spec))
+        if spec.base is None:
+            return chain
+        near = _near(path, spec.base)
+
+
+def model_files(name: str | Path) -> list[Path]:
+    """Every file that decides what the model `name` is: its own, its bases', its robot's."""
+    robot = load_spec(name).robot
+    return [*(path for path, _ in model_chain(name)), *(robot_files(robot) if robot else [])]
+
+
+def own_robot(name: str | Path) -> str | None:
+    """The robot that the user's own files name for a model; None where only shipped ones do."""
+    ours = {path.resolve() for path in shipped_configs("models").values()}
+    return next((s.robot for path, s in model_chain(name) if s.robot and path not in ours), None)
+
+
+def _robot(name: str, path: Path, document: Document) -> str:
+    try:
+        return str(find_file(name, "robots", path.parent))
+    except KembaError as error:
+        what = f"robot: {error.what}"
+        raise document.error(("robot",), what, error.expected, error.hint) from None
 
 
 def _near(path: Path, base: str) -> str | Path:
     beside = path.parent / (base if base.endswith(".yaml") else f"{base}.yaml")
-    return beside if beside.exists() and beside != path else base
+    return beside if beside.exists() and beside.resolve() != path else base
 
 
 def build_model(
@@ -65,7 +107,11 @@ def build_model(
 
     `rig`: the same effects on the bench piston; those whose ports it lacks stay away.
     """
-    mechanism = rig_mechanism() if rig else robot_mechanism(spec.robot or "kemba")
+    if spec.robot is None:
+        expected = "robot: a robot's file, or base: a model that names one, was expected"
+        raise KembaError(f"model {spec.name}", "robot: missing", expected)
+    robot = load_robot(spec.robot)
+    mechanism = rig_mechanism(robot.cylinder) if rig else robot_mechanism(robot)
     effects: list[Effect] = [*spec.effects, *CHAMBERS[spec.chambers or "first_order"]()]
     named = {e.name: e for e in (*effects, *spec.effects)}
     listed = [*named.values()]

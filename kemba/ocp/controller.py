@@ -1,4 +1,4 @@
-"""The plan as the robot's 1 kHz controller plays it (paper, IV-B)."""
+"""The plan as a table for the robot's 1 kHz controller (paper, IV-B)."""
 
 from __future__ import annotations
 

@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 from kemba.model import Model
 from kemba.ocp.certificate.certify import Certificate, certify, costs
-from kemba.ocp.certificate.status import verdict
+from kemba.ocp.certificate.status import Status, verdict
 from kemba.ocp.infeasibility.diagnostic import Relax
 from kemba.ocp.infeasibility.explain import Explanation
 from kemba.ocp.nlp.ipopt import Iterate
-from kemba.ocp.relaxation.schedule import Attempt
+from kemba.ocp.relaxation.session import Attempt, Session
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.solution import to_trajectory
 from kemba.ocp.transcription.transcribe import Transcription
 from kemba.trajectory import Trajectory
-
-if TYPE_CHECKING:
-    from kemba.ocp.planner import Planner
 
 
 @dataclass(frozen=True)
@@ -31,7 +28,7 @@ class Plan:
     requirements: tuple[Requirement, ...]
     trajectory: Trajectory
     certificate: Certificate
-    status: str
+    status: Status
     sentence: str
     cost: dict[str, float]
     attempts: tuple[Attempt, ...]
@@ -50,29 +47,31 @@ class Plan:
 
 
 def judge(
-    planner: Planner,
+    requirements: Sequence[Requirement],
     transcription: Transcription,
     point: Iterate,
+    session: Session,
     solve_s: float,
     solve_cpu_s: float,
 ) -> Plan:
-    """Certificate, status and sentence of what was found."""
+    """Certificate, status and sentence of what was found; `requirements` are all of the task's."""
+    task, model = transcription.task, transcription.model
     trajectory = to_trajectory(transcription, point.Y)
-    certificate = certify(planner.model, planner.task, planner.requirements, trajectory)
-    status, sentence = verdict(planner.task, certificate, trajectory, point.message)
+    certificate = certify(model, task, requirements, trajectory)
+    status, sentence = verdict(task, certificate, trajectory, point.ending)
     return Plan(
-        task=planner.task,
-        model=planner.model,
-        requirements=tuple(planner.requirements),
+        task=task,
+        model=model,
+        requirements=tuple(requirements),
         trajectory=trajectory,
         certificate=certificate,
         status=status,
         sentence=sentence,
-        cost=costs(planner.model, trajectory),
-        attempts=tuple(planner.attempts),
+        cost=costs(model, trajectory),
+        attempts=tuple(session.attempts),
         solve_s=solve_s,
         solve_cpu_s=solve_cpu_s,
-        build_s=planner.building.wall,
+        build_s=session.building.wall,
         variables=transcription.variables,
         constraints=transcription.constraints,
     )
@@ -82,4 +81,4 @@ def explained(found: Plan, why: Explanation) -> Plan:
     """The same with the reason: what is proven replaces the solver's status and words."""
     if not why.proven:
         return replace(found, sentence=f"{found.sentence}; {why.sentence}")
-    return replace(found, status="infeasible", sentence=why.sentence, relax=why.relax)
+    return replace(found, status=Status.INFEASIBLE, sentence=why.sentence, relax=why.relax)

@@ -5,28 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from pathlib import Path
-
-import numpy as np
 
 from kemba.model import Model
 from kemba.ocp.infeasibility.elastic import Outcome, elastic
-from kemba.ocp.nlp.ipopt import Ipopt, Iterate, Watch
+from kemba.ocp.nlp.ending import Ending
+from kemba.ocp.nlp.ipopt import Iterate
 from kemba.ocp.planned import Plan, judge
 from kemba.ocp.relaxation.guess import automatic_guess
 from kemba.ocp.relaxation.lifting import confirm, grow
-from kemba.ocp.relaxation.penalty import WEIGHTS, penalise
+from kemba.ocp.relaxation.penalty import METHODS, penalise
 from kemba.ocp.relaxation.resume import resumed
-from kemba.ocp.relaxation.schedule import (
-    RELAX,
-    Attempt,
-    Schedule,
-    Stopped,
-    binary,
-    find,
-    refine,
-    tighten,
-)
+from kemba.ocp.relaxation.schedule import RELAX, binary, find, refine_grid, tighten
+from kemba.ocp.relaxation.session import Schedule, Session, Stopped
+from kemba.ocp.relaxation.settings import ValveSearch
 from kemba.ocp.relaxation.valve_search import search_neighbourhood
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
@@ -35,13 +26,11 @@ from kemba.ocp.transcription.transcribe import Transcription
 from kemba.stopwatch import Stopwatch
 from kemba.trajectory import Trajectory
 
-COARSEST, FINE = 24, 80  # nodes: no grid is coarser, and valves are sought on none finer
-
 
 def grids(nodes: int) -> list[int]:
     """Numbers of nodes from coarse to fine, each about half of the next."""
     found = [nodes // 2, nodes]
-    while found[0] > FINE:
+    while found[0] > ValveSearch.current().finest:
         found.insert(0, found[0] // 2)
     return found
 
@@ -53,32 +42,19 @@ class Planner:
     task: Task
     model: Model
     requirements: list[Requirement]
-    log: Path | None = None
-    tell: Callable[[str], None] = lambda text: None
-    watch: Watch | None = None
-    attempts: list[Attempt] = field(default_factory=list)
-    building: Stopwatch = field(default_factory=Stopwatch)
-    deadline: float = np.inf
+    session: Session = field(default_factory=Session)
     start: Trajectory | None = None
-    stop: Callable[[], bool] | None = None
     outcome: Outcome | None = None  # of the elastic solve after a failure
 
-    def search(self, nodes: int, reduction: Reduction) -> Schedule:
+    def schedule(self, nodes: int, reduction: Reduction) -> Schedule:
         """A fresh program on a grid of `nodes`; of half a robot, for what is asked of both legs
         alike."""
         requirements = self.alike if reduction.symmetric else self.requirements
-        with self.building.running():
-            transcription = Transcription(self.model, self.task, requirements, reduction, nodes)
+        with self.session.building.running():
+            program = Transcription(self.model, self.task, requirements, reduction, nodes)
         options = {"max_iter": self.task.solver.max_iterations, **self.task.solver.options}
-        ipopt = Ipopt(
-            transcription, options, self.log, self.deadline, self.watch, self.stop, self.building
-        )
         name = "half" if reduction.symmetric else "whole"
-
-        def tell(text: str) -> None:
-            self.tell(f"{text} ({name} robot, {nodes} nodes)")
-
-        return Schedule(ipopt, self.task.solver.complementarity, tell, self.attempts)
+        return self.session.schedule(program, options, f" ({name} robot, {nodes} nodes)")
 
     def guess(self, transcription: Transcription) -> Iterate:
         """The automatic start guess on a program's grid."""
@@ -107,67 +83,67 @@ class Planner:
         for reduction in self.reductions() if self.start is not None else ():
             yield lambda r=reduction: self._continued(r)  # type: ignore[misc]
         for reduction in self.reductions():
-            if self.task.solver.coarse and nodes // 2 >= COARSEST:
+            if self.task.solver.coarse and nodes // 2 >= ValveSearch.current().coarsest:
                 yield lambda r=reduction: self._coarse_to_fine(r)  # type: ignore[misc]
             yield lambda r=reduction: self._direct(r)  # type: ignore[misc]
 
     def _coarse_to_fine(self, reduction: Reduction) -> tuple[Transcription, Iterate]:
         first, *finer = grids(self.task.nodes)
-        search = self.search(first, reduction)
-        point = self._sought(search)
+        schedule = self.schedule(first, reduction)
+        point = self._sought(schedule)
         for nodes in finer:
             if not point.solved:
-                return search.transcription, point
-            coarse, search = search, self.search(nodes, reduction)
-            point = refine(search, coarse.transcription, point)
-        return self._finish(search, point)
+                return schedule.transcription, point
+            coarse, schedule = schedule, self.schedule(nodes, reduction)
+            point = refine_grid(schedule, coarse.transcription, point)
+        return self._finish(schedule, point)
 
     def _direct(self, reduction: Reduction) -> tuple[Transcription, Iterate]:
-        search = self.search(self.task.nodes, reduction)
-        return self._finish(search, self._sought(search))
+        schedule = self.schedule(self.task.nodes, reduction)
+        return self._finish(schedule, self._sought(schedule))
 
     def _continued(self, reduction: Reduction) -> tuple[Transcription, Iterate]:
         assert self.start is not None
-        search = self.search(self.task.nodes, reduction)
-        point = binary(search, resumed(search.transcription, self.start))
-        return self._finish(search, self._searched_nearby(search, point))
+        schedule = self.schedule(self.task.nodes, reduction)
+        point = binary(schedule, resumed(schedule.transcription, self.start))
+        return self._finish(schedule, self._searched_nearby(schedule, point))
 
-    def _sought(self, search: Schedule) -> Iterate:
+    def _sought(self, schedule: Schedule) -> Iterate:
         """A plan with binary valves: grown from half a robot's where legs are equal and only the
         requirements differ, else from the guess."""
-        t, rounds = search.transcription, self.task.solver.valve_search
+        t, rounds = schedule.transcription, self.task.solver.valve_search
         if self.half is not None and self.alike != self.requirements:
-            half = self.search(t.nodes, self.half)
+            half = self.schedule(t.nodes, self.half)
             point = find(half, self.guess(half.transcription))
             if point.solved:
-                point = grow(search, half.transcription, point, self.guess(t))
+                point = grow(schedule, half.transcription, point, self.guess(t))
             if point.solved:
-                return search_neighbourhood(search, point, rounds - 1, best=point)
-        return self._searched_nearby(search, find(search, self.guess(t)))
+                return search_neighbourhood(schedule, point, rounds - 1, best=point)
+        return self._searched_nearby(schedule, find(schedule, self.guess(t)))
 
-    def _searched_nearby(self, search: Schedule, point: Iterate) -> Iterate:
+    def _searched_nearby(self, schedule: Schedule, point: Iterate) -> Iterate:
         if not point.solved:
             return point
-        return search_neighbourhood(search, point, self.task.solver.valve_search)
+        return search_neighbourhood(schedule, point, self.task.solver.valve_search)
 
-    def _finish(self, search: Schedule, point: Iterate) -> tuple[Transcription, Iterate]:
-        point = tighten(search, point) if point.solved else point
-        if not point.solved or not search.transcription.reduction.symmetric:
-            return search.transcription, point
-        full = self.search(self.task.nodes, whole(self.model.node))
-        return full.transcription, confirm(full, search.transcription, point)
+    def _finish(self, schedule: Schedule, point: Iterate) -> tuple[Transcription, Iterate]:
+        point = tighten(schedule, point) if point.solved else point
+        if not point.solved or not schedule.transcription.reduction.symmetric:
+            return schedule.transcription, point
+        full = self.schedule(self.task.nodes, whole(self.model.node))
+        return full.transcription, confirm(full, schedule.transcription, point)
 
     def penalty(self) -> tuple[Transcription, Iterate]:
         """The paper's way, on the whole robot."""
-        search = self.search(self.task.nodes, whole(self.model.node))
-        start = self.guess(search.transcription)
-        return search.transcription, penalise(search, start, self.task.method)
+        schedule = self.schedule(self.task.nodes, whole(self.model.node))
+        start = self.guess(schedule.transcription)
+        return schedule.transcription, penalise(schedule, start, self.task.method)
 
     def run(self) -> tuple[Transcription, Iterate]:
-        """The first strategy that solves, else where the first one ended; a stop keeps its
-        iterate."""
+        """The result of the first strategy that solves, else of the first one; the best iterate of
+        a solve that was stopped."""
         try:
-            if self.task.method in WEIGHTS:
+            if self.task.method in METHODS:
                 return self.penalty()
             first = None
             for strategy in self.strategies():
@@ -175,15 +151,20 @@ class Planner:
                 if found[1].solved:
                     return found
                 first = first or found
-                if self.attempts[-1].name == RELAX and self.outcome is None:
-                    self.outcome = elastic(self, next(self.reductions()))
+                if self.session.attempts[-1].name == RELAX and self.outcome is None:
+                    self.outcome = self.elastic()
                     if self.outcome is not None and self.outcome.short:
                         return first
             assert first is not None
-            self.outcome = self.outcome or elastic(self, next(self.reductions()))
+            self.outcome = self.outcome or self.elastic()
             return first
         except Stopped as stop:
             return stop.transcription, stop.point
+
+    def elastic(self) -> Outcome | None:
+        """What gives way when the requirements may."""
+        reduction = next(self.reductions())
+        return elastic(self.model, self.task, self.requirements, reduction, self.session)
 
     def refuse(self) -> tuple[Transcription, Iterate]:
         """Nothing solved: the start guess, for a task that a check refused."""
@@ -191,15 +172,20 @@ class Planner:
         program = Transcription(
             self.model, self.task, self.requirements, whole_robot, self.task.nodes
         )
-        return program, replace(self.guess(program), message="Infeasible_Problem_Detected")
+        return program, replace(self.guess(program), ending=Ending.REFUSED)
 
 
 def searched(planner: Planner, refused: bool) -> Plan:
     """What the strategies find, judged; the start guess for a task that a check refused."""
-    before = replace(planner.building)
-    searching = Stopwatch()
-    with searching.running():
+    building = planner.session.building
+    before, solving = replace(building), Stopwatch()
+    with solving.running():
         transcription, point = planner.refuse() if refused else planner.run()
-    wall = searching.wall - (planner.building.wall - before.wall)
-    cpu = searching.cpu - (planner.building.cpu - before.cpu)
-    return judge(planner, transcription, point, wall, cpu)
+    return judge(
+        planner.requirements,
+        transcription,
+        point,
+        planner.session,
+        solve_s=solving.wall - (building.wall - before.wall),
+        solve_cpu_s=solving.cpu - (building.cpu - before.cpu),
+    )

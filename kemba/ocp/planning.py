@@ -1,4 +1,4 @@
-"""From a task to a certified plan: checked, searched, refined; what stands in its way if not."""
+"""From a task to a certified plan: checked, solved, refined; or why there is none."""
 
 from __future__ import annotations
 
@@ -8,14 +8,18 @@ from pathlib import Path
 
 from kemba.config import Document
 from kemba.effects.mechanics.load import Payload
+from kemba.errors import KembaError
 from kemba.model import Model, load_model
+from kemba.ocp.certificate.status import Status
 from kemba.ocp.infeasibility.checks import check_task
 from kemba.ocp.infeasibility.explain import explanation, refusal
-from kemba.ocp.nlp.ipopt import Watch
+from kemba.ocp.nlp.ipopt import Control
+from kemba.ocp.nlp.watcher import Watch
 from kemba.ocp.planned import Plan, explained
 from kemba.ocp.planner import Planner, searched
 from kemba.ocp.refined import refined
-from kemba.ocp.task.requirement import resolve
+from kemba.ocp.relaxation.session import Session
+from kemba.ocp.task.requirement import Requirement, resolve
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.symmetry import whole
 from kemba.ocp.transcription.transcribe import Transcription
@@ -36,8 +40,8 @@ def plan(
     """Solve a task. Never raises for a task that cannot be met: the status says so.
 
     Raises ConfigErrors for wrong names, units and solver options. `log` collects IPOPT's text,
-    `tell` hears what is being done, `watch` every iteration; `start` is a trajectory to go on
-    from, `stop` is asked between iterations whether to end with the best one.
+    `tell` gets the name of every solve, `watch` is called after every iteration; `start` is a
+    trajectory to begin with; `stop` is asked after every iteration whether to end.
     """
     document = document or Document(task.model_dump())
     building = Stopwatch()
@@ -46,14 +50,13 @@ def plan(
         requirements = resolve(task, built, document)
         diagnostics = check_task(task, built, requirements, document)
         refused = refusal(diagnostics)
-    planner = Planner(
-        task, built, requirements, log, tell, watch, building=building, start=start, stop=stop
-    )
-    planner.deadline = time.monotonic() + task.solver.time_limit
+    deadline = time.monotonic() + task.solver.time_limit
+    session = Session(Control(deadline, log, watch, stop), tell, building=building)
+    planner = Planner(task, built, requirements, session, start)
     found = searched(planner, refused is not None)
-    if found.status == "solved" and task.refine == "radau":
+    if found.status is Status.SOLVED and task.refine == "radau":
         return refined(planner, found)
-    if found.status in ("solved", "acceptable", "interrupted"):
+    if found.status.plan or found.status is Status.INTERRUPTED:
         return found
     why = refused or explanation(task, built, planner.outcome, diagnostics, document)
     return found if why is None else explained(found, why)
@@ -65,9 +68,26 @@ def task_model(task: Task, name: str | Path | None = None) -> Model:
     return load_model(name or task.model, extra, task.supply)
 
 
-def program_size(task: Task, document: Document, model: str | Path | None = None) -> dict[str, int]:
-    """Variables and rows of the whole program of a task, everything checked, nothing solved."""
+def check_feasible(
+    task: Task, document: Document, model: str | Path | None = None
+) -> tuple[Model, list[Requirement]]:
+    """The model and the requirements of a task; nothing is solved.
+
+    Raises KembaError for wrong names and units, and for what certainly cannot be met.
+    """
     built = task_model(task, model)
     requirements = resolve(task, built, document)
+    refused = refusal(check_task(task, built, requirements, document))
+    if refused is not None:
+        raise KembaError(document.source or task.name, refused.sentence)
+    return built, requirements
+
+
+def program_size(task: Task, document: Document, model: str | Path | None = None) -> dict[str, int]:
+    """Variables and rows of the whole program of a task, everything checked, nothing solved.
+
+    Raises KembaError as `check_feasible` does.
+    """
+    built, requirements = check_feasible(task, document, model)
     transcription = Transcription(built, task, requirements, whole(built.node), task.nodes)
     return {"variables": transcription.variables, "constraints": transcription.constraints}

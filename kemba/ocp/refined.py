@@ -5,36 +5,39 @@ from __future__ import annotations
 from dataclasses import replace
 
 from kemba.ocp.certificate.certify import costs
-from kemba.ocp.certificate.status import verdict
+from kemba.ocp.certificate.status import Status, verdict
+from kemba.ocp.nlp.ending import Ending
+from kemba.ocp.phases.settings import Refining
 from kemba.ocp.planned import Plan
 from kemba.ocp.planner import Planner, searched
 from kemba.ocp.refinement import refine
-from kemba.ocp.relaxation.schedule import Attempt
+from kemba.ocp.relaxation.session import Attempt
 from kemba.stopwatch import Stopwatch
-
-NUDGE = 0.05  # guess noise of the second start where the first plan does not refine
 
 
 def refined(planner: Planner, found: Plan) -> Plan:
-    """The plan on its own phases; where that fails, another start's, which often differs little
-    and yet refines. Not on a whole robot, where one failure takes long enough."""
+    """The plan on its own phases; where that fails, one from another start.
+
+    A second start often gives a similar plan that can be refined. It is tried on half a robot
+    only: on a whole one, one failure takes long enough.
+    """
     first = on_phases(planner, found)
     half = next(planner.reductions()).symmetric and planner.start is None
-    if first.refined or first.status != "solved" or not half:
+    if first.refined or first.status is not Status.SOLVED or not half:
         return first
-    task = planner.task
-    nudged = {"guess_noise": max(task.guess_noise, NUDGE), "seed": task.seed + 1}
+    task, noise = planner.task, Refining.current().second_start
+    nudged = {"guess_noise": max(task.guess_noise, noise), "seed": task.seed + 1}
     planner.task = task.model_copy(update=nudged)
     second = searched(planner, False)
     planner.task = task
-    if second.status == "solved":
+    if second.status is Status.SOLVED:
         second = on_phases(planner, replace(second, task=task))
-    if second.status == "interrupted":
-        first = replace(first, status="interrupted")
+    if second.status is Status.INTERRUPTED:
+        first = replace(first, status=Status.INTERRUPTED)
     best = second if second.refined else first
     return replace(
         best,
-        attempts=tuple(planner.attempts),
+        attempts=tuple(planner.session.attempts),
         solve_s=first.solve_s + second.solve_s,
         solve_cpu_s=first.solve_cpu_s + second.solve_cpu_s,
     )
@@ -44,33 +47,25 @@ def on_phases(planner: Planner, found: Plan) -> Plan:
     """The plan solved again on its own phases; where that fails, the same with the reason."""
     refining = Stopwatch()
     task, model = found.task, found.model
-    planner.tell("phases")
+    planner.session.tell("phases")
     with refining.running():
-        answer = refine(
-            model,
-            task,
-            found.requirements,
-            found.trajectory,
-            deadline=planner.deadline,
-            log=planner.log,
-            watch=planner.watch,
-            stop=planner.stop,
-        )
-    planner.attempts.append(Attempt("phases", answer.message, answer.iterations))
+        control = planner.session.control
+        answer = refine(model, task, found.requirements, found.trajectory, control=control)
+    planner.session.attempts.append(Attempt("phases", answer.ending, answer.iterations))
     found = replace(
         found,
-        attempts=tuple(planner.attempts),
+        attempts=tuple(planner.session.attempts),
         solve_s=found.solve_s + refining.wall,
         solve_cpu_s=found.solve_cpu_s + refining.cpu,
     )
     new, certificate = answer.trajectory, answer.certificate
-    if answer.stopped:
+    if answer.ending is Ending.INTERRUPTED:
         kept = "interrupted while refining, the implicit Euler plan is kept"
-        return replace(found, status="interrupted", sentence=f"{found.sentence}; {kept}")
+        return replace(found, status=Status.INTERRUPTED, sentence=f"{found.sentence}; {kept}")
     if new is None or certificate is None or not certificate.within(task.tolerances):
-        kept = f"not refined ({answer.message}), the implicit Euler plan is kept"
+        kept = f"not refined ({answer.sentence}), the implicit Euler plan is kept"
         return replace(found, sentence=f"{found.sentence}; {kept}")
-    status, sentence = verdict(task, certificate, new, answer.message)
+    status, sentence = verdict(task, certificate, new, answer.ending)
     return replace(
         found,
         trajectory=new,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
+from kemba.ocp.certificate.status import Status
 from kemba.ocp.planned import Plan
 
 
@@ -35,8 +36,9 @@ def answer(plan: Plan, run: str) -> dict[str, Any]:
         },
         "replay": None,
         "plant_replay": None,
-        "good": plan.status == "solved",
+        "good": plan.status is Status.SOLVED,
         "ignored": plan.model.ignored,
+        "remarks": plan.model.remarks,
         "relax": [
             {
                 name: getattr(r, name)

@@ -10,11 +10,21 @@ from multiprocessing import get_context
 from pathlib import Path
 
 from kemba.config import Document
+from kemba.effects import BY_KIND, load_effects
+from kemba.ocp.certificate.status import Status
 from kemba.ocp.planned import Plan
 from kemba.ocp.planning import plan
 from kemba.ocp.task.task import Task
+from kemba.settings import Settings, setting
 
-NOISE = 0.25  # of the scaled guess; the first start has the task's own
+
+class SeveralStarts(Settings):
+    """Several starts of one task."""
+
+    noise: float = setting(
+        0.25, "1", "guess noise of all starts but the first, which has the task's own",
+        "convention: a quarter of every scale, so that starts end in other minima",
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -22,7 +32,7 @@ class Start:
     """How one start ended."""
 
     seed: int
-    status: str
+    status: Status
     cost: float
 
 
@@ -39,13 +49,14 @@ def plan_best(
     The best one is solved once more from its own guess in this process: a plan's functions do not
     travel between processes. Raises as `plan` does.
     """
+    noise = SeveralStarts.current().noise
     tasks = [
-        task.model_copy(update={"guess_noise": max(task.guess_noise, NOISE * (i > 0)), "seed": i})
+        task.model_copy(update={"guess_noise": max(task.guess_noise, noise * (i > 0)), "seed": i})
         for i in range(starts)
     ]
     found: list[Start] = []
     workers = min(jobs or os.cpu_count() or 1, starts)
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+    with ProcessPoolExecutor(workers, get_context("spawn"), load_effects, (BY_KIND.files,)) as pool:
         futures = [pool.submit(_start, one) for one in tasks]
         try:
             for future in as_completed(futures):
@@ -54,7 +65,7 @@ def plan_best(
                 tell(f"start {start.seed}: {start.status}, cost {start.cost:.4g}")
         except KeyboardInterrupt:
             pool.shutdown(wait=False, cancel_futures=True)
-    solved = [s for s in found if s.status == "solved"]
+    solved = [s for s in found if s.status is Status.SOLVED]
     if not solved:
         return plan(task, document, log=log, tell=tell)
     best = min(solved, key=lambda s: s.cost)

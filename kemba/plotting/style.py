@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from kemba.errors import KembaError
+from kemba.files import atomic_path
 
 WIDTH = 7.0  # in, both columns of a paper
 
@@ -80,12 +81,8 @@ def save_figure(figure: Figure, path: str | Path) -> Path:
     if path.suffix.lstrip(".").lower() not in FORMATS:
         what = f"no figure format '{path.suffix}'" if path.suffix else "has no ending"
         raise KembaError(str(path), what, "a name ending in .png, .pdf or .svg was expected")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    try:
-        with matplotlib.rc_context(RC):
-            figure.savefig(path, dpi=200, facecolor="white")
-    except OSError as error:
-        raise KembaError(str(path), error.strerror or str(error)) from None
+    with atomic_path(path) as temporary, matplotlib.rc_context(RC):
+        figure.savefig(temporary, dpi=200, facecolor="white")
     return path
 
 

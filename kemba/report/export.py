@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from kemba.errors import KembaError
-from kemba.files import atomic_text, write_json
+from kemba.files import atomic_path, atomic_text, write_json
 from kemba.identify.logs.reading import ColumnMap, Source
 from kemba.quantity import convert
 from kemba.trajectory import TIME, Array, Trajectory
@@ -36,14 +36,10 @@ def export(trajectory: Trajectory, path: str | Path, columns: ColumnMap | None =
         raise KembaError(str(path), what, f"one of .{', .'.join(FORMATS)} was expected")
     if columns is not None and ending != "csv":
         raise KembaError(str(path), "a column map goes with .csv only")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        if columns is not None:
-            _foreign(trajectory, path, columns)
-        else:
-            writers[ending](trajectory, path)
-    except OSError as error:
-        raise KembaError(str(path), error.strerror or str(error)) from None
+    if columns is not None:
+        _foreign(trajectory, path, columns)
+    else:
+        writers[ending](trajectory, path)
     return path
 
 
@@ -58,14 +54,16 @@ def _mat(trajectory: Trajectory, path: Path) -> None:
     values = {plain_name(name): trajectory[name] for name in trajectory.names}
     units = {plain_name(name): trajectory.unit(name) for name in trajectory.names}
     content = {"time": trajectory.time, **values, "units": {"time": "s", **units}}
-    savemat(path, content, oned_as="column", long_field_names=True)
+    with atomic_path(path) as temporary:
+        savemat(temporary, content, appendmat=False, oned_as="column", long_field_names=True)
 
 
 def _npz(trajectory: Trajectory, path: Path) -> None:
     values = {name: trajectory[name] for name in trajectory.names}
     units = np.array([trajectory.unit(name) for name in trajectory.names])
     content: dict[str, Any] = {"time": trajectory.time, "units": units, **values}
-    np.savez_compressed(path, **content)
+    with atomic_path(path) as temporary, temporary.open("wb") as stream:
+        np.savez_compressed(stream, **content)
 
 
 def _json(trajectory: Trajectory, path: Path) -> None:

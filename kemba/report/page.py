@@ -7,6 +7,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+from kemba.errors import KembaError
 from kemba.plotting import draw, load_source, svg_text
 from kemba.report.stage import stage, write_page
 from kemba.runs import Run, load_run
@@ -21,14 +22,18 @@ def report_run(run: str | Path, out: str | Path | None = None) -> Path:
     """
     found = load_run(run)
     answer = found.certificate
-    good = answer.get("good", answer["status"] == "solved")
-    parts = [
-        f'<p class="verdict{"" if good else " bad"}">{escape(answer["sentence"])}</p>',
-        f'<div class="facts">{"".join(_tables(answer))}</div>',
-        *_pictures(found),
-        *_sources(found),
-    ]
-    title = f"{answer['task']}: {found.path.resolve().name}"
+    try:
+        good = answer.get("good", answer["status"] == "solved")
+        facts = [
+            f'<p class="verdict{"" if good else " bad"}">{escape(answer["sentence"])}</p>',
+            f'<div class="facts">{"".join(_tables(answer))}</div>',
+        ]
+        title = f"{answer['task']}: {found.path.resolve().name}"
+        origin = list(_sources(found))
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        what = f"its certificate or manifest is not as solve writes it ({error!r})"
+        raise KembaError(str(found.path), what, hint="solve the task again") from None
+    parts = [*facts, *_pictures(found), *origin]
     return write_page(out or found.path / "report.html", title, "\n".join(parts))
 
 

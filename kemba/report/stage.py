@@ -41,6 +41,7 @@ def stage(source: Source, model: str | None = None) -> str:
     """The viewer with its scene as HTML. Raises KembaError when columns are missing."""
     shown = scene(source, model)
     text = json.dumps(plain(shown), separators=(",", ":"), allow_nan=False)
+    text = text.replace("<", "\\u003c")  # no name of a leg can end the script
     return fill("stage.html", slower=f"{SLOWER:g}", viewer=page_text("viewer.js"), scene=text)
 
 
@@ -77,11 +78,8 @@ def write_page(path: str | Path, title: str, body: str) -> Path:
         "page.html", title=escape(title), css=page_text("page.css"), body=body,
         version=kemba.__version__,
     )  # fmt: skip
-    try:
-        with atomic_text(path) as stream:
-            stream.write(text)
-    except OSError as error:
-        raise KembaError(str(path), error.strerror or str(error)) from None
+    with atomic_text(path) as stream:
+        stream.write(text)
     return path
 
 

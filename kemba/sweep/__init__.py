@@ -1,8 +1,9 @@
 """Sweeps: many tasks to plan, or many executions of one plan, on Dask."""
 
+from kemba.sweep.blocks import expand
 from kemba.sweep.case import Case
-from kemba.sweep.expand import expand, load_sweep
-from kemba.sweep.farm import run_cases
+from kemba.sweep.expand import load_sweep
+from kemba.sweep.farm import check_scheduler, run_cases
 from kemba.sweep.machine import machine
 from kemba.sweep.results import open_folder, write_results
 from kemba.sweep.schema import Sweep
@@ -10,6 +11,7 @@ from kemba.sweep.schema import Sweep
 __all__ = [
     "Case",
     "Sweep",
+    "check_scheduler",
     "expand",
     "load_sweep",
     "machine",

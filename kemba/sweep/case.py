@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -12,6 +13,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from kemba.effects import load_effects
+from kemba.errors import KembaError
 from kemba.files import plain, read_json, write_json
 from kemba.stopwatch import Stopwatch
 
@@ -49,20 +52,52 @@ class Case:
         return folder / "cases" / f"{self.key}.json"
 
     def record(self, folder: Path) -> Record | None:
-        """Its result, None while there is none."""
-        path = self.path(folder)
-        return dict(read_json(path)) if path.is_file() else None
+        """Its result, None while there is none, or none that can be used."""
+        return read_record(self.path(folder))
 
 
-def perform(function: str, work: Work, path: str) -> Record:
+NUMBERS = (
+    "apex_m", "apex_error_m", "touchdown_error_s", "final_error_m", "pitch_rad", "duration_s",
+    "solve_s", "solve_cpu_s", "build_s", "wall_s", "cpu_s", "iterations", "variables",
+)  # fmt: skip
+
+
+def read_record(path: Path) -> Record | None:
+    """The result in a case's file; None when there is none, or it is damaged and must be redone."""
+    try:
+        record = read_json(path) if path.is_file() else None
+    except KembaError:
+        return None
+    return record if _is_record(record) else None
+
+
+def _is_record(record: Any) -> bool:
+    """Whether it holds what the table and the summary read, each of its type."""
+    if not isinstance(record, dict) or not isinstance(record.get("good"), bool):
+        return False
+    cost = record.get("cost") or {}
+    numbers = [record.get(name) for name in NUMBERS]
+    numbers.append(cost.get("torque_squared_integral") if isinstance(cost, dict) else cost)
+    return (
+        all(isinstance(record.get(name), str) for name in ("status", "sentence"))
+        and all(n is None or (isinstance(n, (int, float)) and math.isfinite(n)) for n in numbers)
+        and not any(isinstance(n, bool) for n in numbers)
+    )
+
+
+def perform(
+    function: str, work: Work, path: str, effects: Mapping[str, str] | None = None
+) -> Record:
     """Do a case's work and keep its result at `path`, at once and whole. Runs in a worker.
 
     What goes wrong in it is an outcome too. Where the folder of `path` is not to be seen, the
     record is returned only. Work that is done already, by a worker that died since, is not
-    repeated.
+    repeated. `effects`: files of effects from outside, by path, with the hash of their content.
+    Raises KembaError when these cannot be loaded.
     """
-    if Path(path).is_file():
-        return dict(read_json(path))
+    load_effects(effects or {})
+    if (known := read_record(Path(path))) is not None:
+        return known
     working = Stopwatch()
     try:
         with working.running():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -13,33 +13,32 @@ from kemba.effects import Effect
 from kemba.effects.catalogue import BY_KIND
 from kemba.effects.mechanics.load import Payload
 from kemba.errors import KembaError, suggest
-from kemba.model import Model, load_model
+from kemba.model import Model
 from kemba.plant import Gains, Replay, execute
 from kemba.plant.execution.controller import read_controller
+from kemba.plant.execution.counterpart import PLAIN, counterpart
 from kemba.plant.execution.replay import first_row
 from kemba.plant.simulation.valves import scattered
 from kemba.quantity import to_si
 from kemba.runs import load_run, sha256
 from kemba.sweep.case import Case, Work, content_hash
+from kemba.sweep.expand import Expansion, model_hash, model_name
 from kemba.sweep.sampling import sample
 from kemba.sweep.schema import Conditions, ExecuteBlock
 from kemba.trajectory import Trajectory
 
-if TYPE_CHECKING:
-    from kemba.sweep.expand import Expansion
-
 
 def execute_cases(expansion: Expansion, name: str, block: ExecuteBlock, folder: Path) -> list[Case]:
     """The cases of a block; its plan is made first when it is not there yet."""
-    from kemba.sweep.expand import model_hash, model_name
-
-    plant = model_name(expansion, block.plant)
+    plant, planned = (
+        model_name(expansion, m) for m in (block.plant, _model(expansion, name, block))
+    )
     base = Document({**_planned(expansion, name, block), **_given(block.conditions)})
     works = []
     for values in sample(block, name, expansion.sweep.seed):
         conditions = parse(expansion.varied(base, name, values), Conditions)
         works.append((values, conditions))
-    model = load_model(plant)
+    model = counterpart(planned, plant=plant)
     try:
         for _, conditions in works:
             changed_effects(model, conditions)
@@ -53,6 +52,8 @@ def execute_cases(expansion: Expansion, name: str, block: ExecuteBlock, folder: 
         "plan_hash": [sha256(plan / f) for f in ("trajectory.csv", "controller.csv")],
         "plant": plant,
         "plant_hash": model_hash(plant),
+        "model": planned,
+        "model_hash": model_hash(planned),
     }
     return [
         Case(name, index, values, "kemba.sweep.work:execute_case",
@@ -75,6 +76,17 @@ def _planned(expansion: Expansion, name: str, block: ExecuteBlock) -> dict[str, 
     return {key: task[key] for key in ("supply", "payload") if task.get(key) is not None}
 
 
+def _model(expansion: Expansion, name: str, block: ExecuteBlock) -> str:
+    """The model that the plan was made with: its robot and own effects are the plant's too."""
+    from kemba.ocp.task.task import parse_task
+
+    if block.run is None:
+        return parse_task(expansion.task_document(name)).model
+    file = _run_folder(expansion, block.run) / "task.yaml"
+    task = load_yaml(file).data if file.is_file() else {}
+    return str(task.get("model", PLAIN))
+
+
 def _run_folder(expansion: Expansion, run: str) -> Path:
     near = expansion.beside / run
     return near if near.is_dir() else Path(run)
@@ -94,7 +106,7 @@ def _plan_folder(expansion: Expansion, name: str, block: ExecuteBlock, folder: P
     path = folder / "plans" / content_hash(task.model_dump(exclude_none=True))
     if not (path / "controller.csv").is_file():
         found = plan(task, document)
-        if found.status not in ("solved", "acceptable"):
+        if not found.status.plan:
             at = ("blocks", name, "task")
             raise expansion.document.error(at, f"{block.task}: {found.sentence}")
         found.trajectory.write(path / "trajectory.csv")
@@ -105,8 +117,8 @@ def _plan_folder(expansion: Expansion, name: str, block: ExecuteBlock, folder: P
 def run_on_plant(work: Work) -> Replay:
     """The execution that a case asks for, compared with its plan."""
     conditions = parse(work["conditions"], Conditions)
-    plain = load_model(work["plant"])
-    model = load_model(work["plant"], changed_effects(plain, conditions), conditions.supply)
+    plain = counterpart(work["model"], supply=conditions.supply, plant=work["plant"])
+    model = plain.with_effects(changed_effects(plain, conditions))
     table = read_controller(work["plan"])
     rng = np.random.default_rng(conditions.seed)
     done = execute(

@@ -1,4 +1,4 @@
-"""From a sweep's YAML to its cases, every mistake found before anything runs."""
+"""A sweep's YAML: its document, its blocks, and the files that they name."""
 
 from __future__ import annotations
 
@@ -10,16 +10,12 @@ from typing import Any
 
 from kemba.config import Document, apply_overrides, find_config, load_yaml, parse, shipped_configs
 from kemba.config.document import Location
-from kemba.errors import ConfigErrors, KembaError
-from kemba.model.spec import load_spec
-from kemba.ocp.task.task import parse_task
+from kemba.effects import BY_KIND
+from kemba.errors import KembaError
+from kemba.model.spec import load_spec, model_files
 from kemba.runs import sha256
-from kemba.sweep.case import Case, content_hash
-from kemba.sweep.sampling import sample
-from kemba.sweep.schema import ExecuteBlock, SolveBlock, Sweep
-
-# of a task: what tells how it is solved, not what is to be found
-HOW = {"name", "notes", "guess", "guess_noise", "seed", "method", "solver", "tolerances"}
+from kemba.sweep.case import content_hash
+from kemba.sweep.schema import Sweep
 
 
 def load_sweep(name: str | Path, overrides: list[str] | None = None) -> tuple[Sweep, Document]:
@@ -73,53 +69,6 @@ class Expansion:
         return base
 
 
-def expand(sweep: Sweep, document: Document, folder: Path) -> list[Case]:
-    """All cases of a sweep. Raises ConfigErrors with the mistakes of all blocks.
-
-    `folder` keeps the plans that are to be executed; they are made here when missing.
-    """
-    from kemba.sweep.execution import execute_cases
-
-    expansion = Expansion(sweep, document)
-    cases: list[Case] = []
-    errors: list[KembaError] = []
-    for name, block in sweep.blocks.items():
-        try:
-            if isinstance(block, ExecuteBlock):
-                cases += execute_cases(expansion, name, block, folder)
-            else:
-                cases += _solve_cases(expansion, name, block)
-        except ConfigErrors as error:
-            errors += error.errors
-        except KembaError as error:
-            errors.append(error)
-    if errors:
-        raise ConfigErrors({str(error): error for error in errors}.values())
-    return cases
-
-
-def _solve_cases(expansion: Expansion, name: str, block: SolveBlock) -> list[Case]:
-    from kemba.ocp import task_model
-    from kemba.ocp.task.requirement import resolve
-
-    base = expansion.task_document(name)
-    cases = []
-    for index, values in enumerate(sample(block, name, expansion.sweep.seed)):
-        document = expansion.varied(base, name, values)
-        task = parse_task(document)
-        task = task.model_copy(update={"model": model_name(expansion, block.model or task.model)})
-        if index == 0:  # names of quantities are the same in all
-            resolve(task, task_model(task), document)
-        work: dict[str, Any] = {
-            "task": task.model_dump(exclude_none=True),
-            "model": model_hash(task.model),
-        }
-        aim = {key: value for key, value in work["task"].items() if key not in HOW}
-        problem = content_hash([aim, work["model"]])
-        cases.append(Case(name, index, values, "kemba.sweep.work:solve_case", work, problem))
-    return cases
-
-
 def model_name(expansion: Expansion, name: str) -> str:
     """A model as every worker finds it: shipped ones by name, others by their whole path."""
     if name in shipped_configs("models") or f"{name}.yaml" in shipped_configs("models"):
@@ -128,7 +77,7 @@ def model_name(expansion: Expansion, name: str) -> str:
 
 
 def model_hash(name: str) -> str:
-    """What a model's YAML and its robot's hold."""
-    spec = load_spec(name)
-    robot = find_config(spec.robot or "kemba", "robots")
-    return content_hash([spec.model_dump(mode="json"), sha256(robot)])
+    """What a model's YAML and its robot's hold, and the files of effects from outside."""
+    spec = load_spec(name).model_dump(mode="json", exclude={"robot"})  # its place does not matter
+    files = [sha256(path) for path in model_files(name)]
+    return content_hash([spec, *files, *BY_KIND.files.values()])

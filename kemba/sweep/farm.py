@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import logging
 import os
+import re
+import socket
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from kemba.effects import BY_KIND
 from kemba.errors import KembaError
 from kemba.files import write_json
 from kemba.sweep.case import Case, Record, perform
 
+REACHING = 5.0  # s for a connection to a scheduler; the slowest networks take one
 PATIENCE = 30.0  # s; for a result that a worker holds
 # Instead of Dask's own, with which workers give memory back at once; a solver asks for it again at
 # once, which costs a fifth of the time.
@@ -60,7 +64,7 @@ def _gather(
     tasks = {
         client.submit(
             perform, case.function, dict(case.work), str(case.path(folder).absolute()),
-            key=f"kemba-{case.key}", pure=False,
+            BY_KIND.files, key=f"kemba-{case.key}", pure=False,
         ): case
         for case in waiting.values()
     }  # fmt: skip
@@ -72,7 +76,7 @@ def _gather(
             if record is None:  # its result died with the worker that held it
                 ended.add(task)
                 continue
-            if record["status"] != "lost" and not case.path(folder).is_file():
+            if record["status"] != "lost" and case.record(folder) is None:
                 write_json(case.path(folder), record)  # the worker does not see our files
             found[case.key] = record
             tell(case, record)
@@ -90,12 +94,36 @@ def _record(task: Any) -> Record | None:
         if task.status == "finished":
             return dict(task.result(timeout=PATIENCE))
         if task.status == "error":
-            name = type(task.exception(timeout=PATIENCE)).__name__
-            sentence = f"its worker died, again and again ({name})"
+            error = task.exception(timeout=PATIENCE)
+            sentence = f"its worker died, again and again ({type(error).__name__})"
+            if isinstance(error, KembaError):  # it could not begin
+                sentence = str(error)
             return {"status": "lost", "good": False, "sentence": sentence}
     except TimeIsUp:
         pass
     return None
+
+
+ADDRESS = re.compile(r"(?:(?:tcp|tls)://)?(?P<host>\[[^\]]+\]|[^:/\[\]]+):(?P<port>\d{1,5})")
+
+
+def check_scheduler(scheduler: str) -> None:
+    """Raise KembaError when nothing answers at the address: Dask itself tries for 40 s."""
+    match = ADDRESS.fullmatch(scheduler)
+    if match is None:
+        what = "is no address of a scheduler"
+        raise KembaError(f"--scheduler {scheduler}", what, "such as tcp://host:8786")
+    try:
+        place = (match["host"].strip("[]"), int(match["port"]))
+        socket.create_connection(place, timeout=REACHING).close()
+    except (OSError, OverflowError, UnicodeError) as error:
+        raise _unreachable(scheduler, error) from None
+
+
+def _unreachable(scheduler: str, error: Exception) -> KembaError:
+    what = f"cannot be reached: {error}".splitlines()[0]
+    hint = "start one with: dask scheduler"
+    return KembaError(f"--scheduler {scheduler}", what, "such as tcp://host:8786", hint)
 
 
 @contextmanager
@@ -109,11 +137,11 @@ def _client(scheduler: str | None, jobs: int | None, most: int) -> Iterator[Any]
     from distributed import Client, LocalCluster
 
     if scheduler is not None:
+        check_scheduler(scheduler)
         try:
             client = Client(scheduler, timeout=10, set_as_default=False)
         except (OSError, ValueError, TimeoutError) as error:
-            what = f"cannot be reached: {error}".splitlines()[0]
-            raise KembaError(f"--scheduler {scheduler}", what, "such as tcp://host:8786") from None
+            raise _unreachable(scheduler, error) from None
         with client:
             yield client
         return

@@ -11,14 +11,16 @@ from typing import Any
 
 from kemba.config import Document, dump_yaml
 from kemba.errors import KembaError
-from kemba.files import atomic_text, read_json, write_json
-from kemba.runs import versions
+from kemba.files import atomic_text, write_json
+from kemba.folders import LOCK
+from kemba.runs import read_manifest, versions
 from kemba.sweep.case import Case, Record
 from kemba.sweep.machine import machine
 from kemba.sweep.schema import Sweep
 from kemba.sweep.summary import best_known, cost_of, cost_ratio, summarise
 
 MANIFEST = "manifest.json"
+FORMULA = ("=", "+", "@", "\t", "\r")  # how spreadsheets know a formula ("-" begins numbers, too)
 FIGURES = (
     "status", "good", "sentence", "apex_m", "apex_error_m", "touchdown_error_s", "final_error_m",
     "fault", "pitch_rad", "duration_s", "solve_s", "solve_cpu_s", "build_s", "wall_s", "cpu_s",
@@ -35,8 +37,8 @@ def open_folder(out: str | Path | None, sweep: Sweep, document: Document) -> Pat
     manifest = path / MANIFEST
     if path.exists() and not path.is_dir():
         raise KembaError(f"--out {path}", "is a file", "a folder was expected")
-    if path.is_dir() and any(path.iterdir()):
-        known = read_json(manifest) if manifest.is_file() else {}
+    if path.is_dir() and any(item.name != LOCK for item in path.iterdir()):
+        known = read_manifest(path) if manifest.is_file() else {}
         if known.get("sweep") != sweep.name:
             what = (
                 f"holds the sweep '{known['sweep']}'" if "sweep" in known else "holds other files"
@@ -50,10 +52,7 @@ def open_folder(out: str | Path | None, sweep: Sweep, document: Document) -> Pat
         "machine": machine(),
         "versions": versions(),
     }
-    try:
-        write_json(manifest, facts)
-    except OSError as error:
-        raise KembaError(f"--out {path}", error.strerror or str(error)) from None
+    write_json(manifest, facts)
     dump_yaml(document.data, path / "sweep.yaml")
     return path
 
@@ -63,7 +62,7 @@ def write_results(
 ) -> dict[str, Any]:
     """Table and summary of a sweep, as far as it came; the summary is returned."""
     summary = summarise(sweep, cases, records)
-    manifest = read_json(path / MANIFEST)
+    manifest = read_manifest(path)
     manifest |= {"status": status, "finished": _now(), "sentence": summary["sentence"]}
     table = _table(cases, records)
     facts = {key: manifest[key] for key in ("machine", "versions", "started", "finished")}
@@ -98,10 +97,16 @@ def _write_csv(table: list[dict[str, Any]], path: Path) -> None:
     names = [name for name in table[0] if name != "values"]
     with atomic_text(path) as stream:
         writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow([*names[:3], *keys, *names[3:]])
+        writer.writerow([harmless(cell) for cell in (*names[:3], *keys, *names[3:])])
         for row in table:
             fixed = [row[name] for name in names]
-            writer.writerow([*fixed[:3], *(row["values"].get(key) for key in keys), *fixed[3:]])
+            cells = [*fixed[:3], *(row["values"].get(key) for key in keys), *fixed[3:]]
+            writer.writerow([harmless(cell) for cell in cells])
+
+
+def harmless(cell: Any) -> Any:
+    """A cell that no spreadsheet takes for a formula and runs."""
+    return f"'{cell}" if isinstance(cell, str) and cell.startswith(FORMULA) else cell
 
 
 def _now() -> str:

@@ -6,6 +6,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from kemba.config import FileName
+from kemba.model.spec import Supply
 from kemba.quantity import Param
 from kemba.units import read_si
 
@@ -74,7 +76,7 @@ class Conditions(Section):
     last commands are held.
     """
 
-    supply: Annotated[float, Param("Pa", lower=0.6e6, upper=0.8e6)] | None = None
+    supply: Supply | None = None
     payload: Annotated[float, Param("kg", lower=0.0)] = 0.0
     jitter: Annotated[float, Param("s", lower=0.0, upper=0.05)] = 0.0
     seed: Annotated[int, Field(ge=0)] = 0
@@ -145,7 +147,7 @@ AnyBlock = Annotated[SolveBlock | ExecuteBlock, Field(discriminator="kind")]
 class Sweep(Section):
     """Many cases: blocks by name, and the seed of all draws."""
 
-    name: Annotated[str, Field(pattern=r"^[\w.-]+$")] = "sweep"
+    name: FileName = "sweep"
     notes: str = ""
     seed: Annotated[int, Field(ge=0)] = 0
-    blocks: Annotated[dict[str, AnyBlock], Field(min_length=1)]
+    blocks: Annotated[dict[FileName, AnyBlock], Field(min_length=1)]

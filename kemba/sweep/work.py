@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from kemba.sweep.case import Record, Work
 
 
@@ -16,10 +14,9 @@ def solve_case(work: Work) -> Record:
     figures = answer(plan(parse(work["task"], Task)), "")
     kept = (
         "status", "sentence", "apex_m", "duration_s", "cost", "solve_s", "solve_cpu_s", "build_s",
-        "iterations", "variables", "constraints", "residuals", "attempts",
+        "iterations", "variables", "constraints", "residuals", "attempts", "good",
     )  # fmt: skip
-    record: dict[str, Any] = {key: figures[key] for key in kept}
-    return record | {"good": figures["status"] == "solved"}
+    return {key: figures[key] for key in kept}
 
 
 def execute_case(work: Work) -> Record:

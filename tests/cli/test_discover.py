@@ -92,3 +92,23 @@ def test_wrong_usage_is_told_apart(folder: Path, tmp_path: Path) -> None:
     assert both.exit_code == 2 and "also among the logs" in both.stderr
     model = run("discover", log, "--model", "planing", "--out", tmp_path)
     assert model.exit_code == 2 and "planning" in model.stderr
+
+
+def test_no_answer_is_replaced_without_force(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("bad.csv").write_text(  # valves that are neither open nor shut
+        "time [s],piston/x [m],valve/extend [1],valve/retract [1],piston/F [N]\n"
+        + "".join(f"{i / 1000},0.03,0.5,0,{i % 7}\n" for i in range(400))
+    )
+    for name in ("answer", "answer-2"):
+        assert run("discover", "bad.csv").exit_code == 1
+        assert (tmp_path / name / "answer.json").is_file()
+    Path("answer/fit.png").write_text("old")
+    before = Path("answer/answer.json").read_text()
+    done = run("discover", "bad.csv", "--out", "answer")
+    assert done.exit_code == 2 and "holds results already (answer.json)" in done.stderr
+    assert Path("answer/answer.json").read_text() == before and Path("answer/fit.png").exists()
+    assert run("discover", "bad.csv", "--out", "answer", "--force").exit_code == 1
+    assert sorted(p.name for p in Path("answer").iterdir()) == ["answer.json"]

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 import kemba
 from kemba_cli.main import VERBS, app
 
-HEAVY = "numpy scipy casadi pinocchio ruamel.yaml pint matplotlib kemba.trajectory".split()
+HEAVY = "numpy scipy casadi pinocchio yaml pint matplotlib kemba.trajectory".split()
 
 
 def test_nothing_heavy_is_imported_for_help() -> None:

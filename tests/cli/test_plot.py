@@ -35,6 +35,17 @@ def test_the_figure_goes_into_the_run() -> None:
     assert Path("runs/jump-1/figure.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_no_figure_is_replaced_without_force() -> None:
+    for name in ("figure", "figure-2", "figure-3"):
+        assert run("runs/jump-1").stdout == f"runs/jump-1/{name}.png\n"
+    Path("a.png").write_text("mine")
+    done = run("log.csv", "--save", "a.png")
+    assert done.exit_code == 2 and "--save a.png: exists already" in done.stderr
+    assert Path("a.png").read_text() == "mine"
+    assert run("log.csv", "--save", "a.png", "--force").exit_code == 0
+    assert Path("a.png").read_bytes().startswith(b"\x89PNG")
+
+
 def test_json_names_every_file() -> None:
     done = run("runs/jump-1", "log.csv", "--save", "a.pdf", "--animate", "b.gif", "--json")
     assert json.loads(done.stdout) == {

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
-from kemba.mechanism import robot_mechanism
+from kemba.mechanism import load_robot, robot_mechanism
 from kemba.plant.execution.controller import read_controller
 from kemba.trajectory import Trajectory
 from kemba_cli.main import app
@@ -31,7 +31,7 @@ def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def folder() -> Path:
     """A run whose plan is to stand still for 30 ms, and push a little."""
-    time, pose = np.arange(0, 0.03, 1e-3), robot_mechanism().standing
+    time, pose = np.arange(0, 0.03, 1e-3), robot_mechanism(load_robot("kemba")).standing
     same = np.ones(len(time))
     columns = {"body/x [m]": 0 * same, "body/z [m]": pose["body/z"] * same}
     for leg in ("front", "rear"):
@@ -56,6 +56,18 @@ def test_three_noisy_logs_of_a_run(folder: Path) -> None:
     assert {log.meta["repeat_of"] for log in logs} == {"still-1"}
     assert logs[0].meta["kind"] == "robot"
     assert not np.array_equal(logs[0]["body/z"], logs[1]["body/z"])
+
+
+def test_no_log_is_replaced_without_force(folder: Path) -> None:
+    words = ["simulate", str(folder), "--model", "planning"]
+    for name in ("logs", "logs-2"):
+        assert run(*words).stdout == f"runs/still-1/{name}/log-1.csv\n"
+    before = Path("runs/still-1/logs/log-1.csv").read_bytes()
+    done = run(*words, "--noise", "--out", "runs/still-1/logs")
+    assert done.exit_code == 2 and "holds results already (log-1.csv)" in done.stderr
+    assert Path("runs/still-1/logs/log-1.csv").read_bytes() == before
+    assert run(*words, "--noise", "--out", "runs/still-1/logs", "--force").exit_code == 0
+    assert Path("runs/still-1/logs/log-1.csv").read_bytes() != before
 
 
 def test_the_plant_meets_the_supply_and_payload_of_the_task(folder: Path) -> None:

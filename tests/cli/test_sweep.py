@@ -1,4 +1,4 @@
-"""`kemba-opt sweep`: exit codes and answers; the cases themselves are faked."""
+"""`kemba-opt sweep`: exit codes and answers. Cases are faked but in one real sweep."""
 
 import json
 from pathlib import Path
@@ -82,3 +82,30 @@ def test_bad_input(sweep: Any) -> None:
     assert sweep("--set", "blocks.a.vary.hight=[0.5 m]").exit_code == 2
     Path("notes.txt").touch()
     assert sweep("--out", "notes.txt").exit_code == 2
+
+
+@pytest.mark.filterwarnings("ignore:unclosed:ResourceWarning")  # dask's clean-up
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_a_real_sweep_is_solved_and_not_repeated(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two jumps on a local worker; the second time everything is there already."""
+    monkeypatch.chdir(tmp_path)
+    Path("s.yaml").write_text(
+        SWEEP.replace("jump.yaml", "max_jump.yaml\n    set: {nodes: 24, refine: none}")
+        .replace("cases: 4", "cases: 2")
+        .replace("0.4 m", "0.8 m")
+        .replace("0.5 m", "0.9 m")
+    )
+    done = CliRunner().invoke(app, ["sweep", "s.yaml", "--jobs", "1"])
+    assert done.exit_code == 0, done.output
+    assert done.stdout.splitlines()[1].startswith("a: 2 of 2 solved")
+    kept = {p.name: p.read_bytes() for p in Path("sweeps/test/cases").iterdir()}
+    cases = json.loads(Path("sweeps/test/results.json").read_text())["cases"]
+    assert len(kept) == 2 and [case["status"] for case in cases] == ["solved", "solved"]
+    for case in cases:
+        height = float(case["values"]["height"].removesuffix(" m"))
+        assert 0.8 <= height <= 0.9 and case["apex_m"] >= height - 1e-6
+    again = CliRunner().invoke(app, ["sweep", "s.yaml", "--jobs", "1", "--json"])
+    assert again.exit_code == 0 and json.loads(again.stdout)["good"]
+    assert {p.name: p.read_bytes() for p in Path("sweeps/test/cases").iterdir()} == kept

@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from contract.cases import example, points, slopes, values_of
 
+from kemba.contract.cases import example, points, slopes, values_of
 from kemba.effects.catalogue import MISSING, SENSORS, Expression
 from kemba.model import Model, load_spec
 from kemba.model.spec import build_model
 
-EVERY = [
-    example(effect.model_fields["kind"].default)
-    for effect in (*MISSING, Expression)
-    if effect not in SENSORS
-]
+EVERY = [example(effect) for effect in (*MISSING, Expression) if effect not in SENSORS]
 CHAMBERS = pytest.mark.parametrize("chambers", ["first_order", "orifice"])
 
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from kemba.effects.pneumatics.switching import pulses
 from kemba.identify.bench.motion import SmoothedMotion
 from kemba.identify.bench.rig_model import RigModel
-from kemba.identify.bench.switching import pulses
 from kemba.model.spec import load_model
 from kemba.trajectory import Trajectory
 

@@ -14,10 +14,9 @@ pytest.importorskip("numba")
 
 from twin import bench, cases, catalogue, figures, measure, rigs
 
-from kemba.identify.bench import bench_problem
 from kemba.identify.bench.missing import lagged
+from kemba.identify.bench.problem import bench_problem
 from kemba.identify.compare.compare import Comparison, compare
-from kemba.identify.compare.smoother import missing_force
 from kemba.model.spec import load_model
 from kemba.plotting.study.comparison import plot_comparison
 from kemba.trajectory import Trajectory
@@ -78,7 +77,7 @@ def test_each_rig_shows_what_it_can(test: str, effect: str, quantity: str) -> No
     found = compared(catalogue.hidden(effect, 1.0), tests=(test,))
     assert not found.good
     assert found.noise_ratio > 2.0
-    telling = max(found.force_profiles, key=lambda law: law.gain)
+    telling = max(found.force_profiles, key=lambda profile: profile.gain)
     assert telling.quantity == quantity
     assert f"goes with {quantity.split(' [')[0]}" in found.sentence
 
@@ -115,7 +114,7 @@ def test_the_band_of_the_missing_force_covers_the_truth() -> None:
     logs, pushes = bench_logs(push=4.0)
     problem = bench_problem(logs, load_model("planning", rig=True))
     inside = []
-    for found, log, push in zip(missing_force(problem), logs, pushes, strict=True):
+    for found, log, push in zip(problem.missing_force(), logs, pushes, strict=True):
         low, high = found.band()
         truth = np.interp(found.time, log.time, push)
         inside.append((low[:, 0] < truth) & (truth < high[:, 0]))

@@ -9,7 +9,7 @@ import pytest
 
 from kemba.errors import KembaError
 from kemba.identify.logs.gate import check_logs
-from kemba.identify.logs.reading import ColumnMap, Source, grouped, load_map, read_log, read_logs
+from kemba.identify.logs.reading import ColumnMap, Source, load_map, read_log, read_logs
 from kemba.trajectory import Trajectory
 
 DATA = Path(__file__).parent / "data"
@@ -83,11 +83,3 @@ def test_robot_and_bench_do_not_mix(log_file: Path, tmp_path: Path) -> None:
     Trajectory(np.arange(3) / 1e3, {"body/z [m]": np.zeros(3)}).write(robot)
     with pytest.raises(KembaError, match="cannot be fitted together"):
         read_logs([log_file, robot])
-
-
-def test_runs_are_grouped_by_their_command() -> None:
-    logs = [
-        Trajectory([0.0], {}, {"name": name, **meta})
-        for name, meta in (("a", {"repeat_of": "jump"}), ("b", {"repeat_of": "jump"}), ("c", {}))
-    ]
-    assert grouped(logs) == {"jump": ["a", "b"], "c": ["c"]}

@@ -8,8 +8,9 @@ import pytest
 
 from kemba.mechanism import knee, load_robot
 
-LEG = load_robot().leg
-STROKE = np.linspace(0.0, LEG.piston.stroke, 15)
+ROBOT = load_robot("kemba")
+LEG = ROBOT.leg
+STROKE = np.linspace(0.0, ROBOT.stroke, 15)
 
 
 @pytest.mark.parametrize("x", STROKE)

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from kemba.errors import KembaError
-from kemba.mechanism import Mechanism, rig_mechanism, robot_mechanism
+from kemba.mechanism import Mechanism, load_cylinder, load_robot, rig_mechanism, robot_mechanism
 
 
 @pytest.fixture(scope="module")
 def robot() -> Mechanism:
-    return robot_mechanism()
+    return robot_mechanism(load_robot("kemba"))
 
 
 def point(m: Mechanism) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -67,6 +67,6 @@ def test_an_unknown_port_is_explained(robot: Mechanism) -> None:
 
 
 def test_the_rig_is_one_piston() -> None:
-    rig = rig_mechanism()
+    rig = rig_mechanism(load_cylinder("dsnu-25-70"))
     assert (rig.n, list(rig.ports), rig.legs, rig.imposed) == (1, ["piston/x"], ("",), True)
     assert rig.stroke == 0.07

@@ -16,10 +16,11 @@ from kemba.effects.pneumatics.damping import ModeDamping
 from kemba.effects.pneumatics.supply import SupplyScale
 from kemba.effects.pneumatics.valve import Valve
 from kemba.errors import KembaError
-from kemba.mechanism import rig_mechanism
+from kemba.mechanism import load_cylinder, rig_mechanism
 from kemba.model import Model, load_model
 
 Values = dict[str, np.ndarray]
+CYLINDER = load_cylinder("dsnu-25-70")
 
 
 @pytest.fixture(scope="module")
@@ -84,7 +85,8 @@ def test_two_effects_of_one_variable_are_refused(planning: Model) -> None:
 
 def test_a_missing_port_is_explained() -> None:
     with pytest.raises(KembaError) as error:
-        Model(rig_mechanism(), [BY_KIND["motor"].model_validate({"kind": "motor"})])
+        motor = BY_KIND["motor"].model_validate({"kind": "motor"})
+        Model(rig_mechanism(CYLINDER), [motor])
     assert str(error.value) == (
         "effects.motor: needs the port 'hip/q', which rig does not have; ports: piston/x"
     )
@@ -92,13 +94,13 @@ def test_a_missing_port_is_explained() -> None:
 
 def test_a_leg_that_is_not_there() -> None:
     with pytest.raises(KembaError) as error:
-        Model(rig_mechanism(), [Valve(on="front")])
+        Model(rig_mechanism(CYLINDER), [Valve(on="front")])
     assert str(error.value) == "effects.valve:front: rig has no leg 'front'"
 
 
 def test_a_value_that_nobody_provides() -> None:
     with pytest.raises(KembaError) as error:
-        _ = Model(rig_mechanism(), [Chamber()]).node
+        _ = Model(rig_mechanism(CYLINDER), [Chamber()]).node
     assert str(error.value) == (
         "effects.chamber: needs 'u_e' at rig, which no effect of this model gives; add valve"
     )
@@ -106,7 +108,7 @@ def test_a_value_that_nobody_provides() -> None:
 
 def test_a_signal_that_nobody_reads() -> None:
     with pytest.raises(KembaError) as error:
-        _ = Model(rig_mechanism(), [Valve(), SupplyScale(k=1.1)]).node
+        _ = Model(rig_mechanism(CYLINDER), [Valve(), SupplyScale(k=1.1)]).node
     assert "changes the signal 'supply_gain', which no effect of this model reads" in str(
         error.value
     )
@@ -126,7 +128,7 @@ class Loose(Effect):
 
 def test_a_state_that_nobody_moves() -> None:
     with pytest.raises(KembaError, match="has no rate: its effect declares but never moves it"):
-        _ = Model(rig_mechanism(), [Loose()]).node
+        _ = Model(rig_mechanism(CYLINDER), [Loose()]).node
 
 
 def test_unknown_names_are_answered_with_the_nearest(planning: Model) -> None:
@@ -149,19 +151,21 @@ def test_tables_are_read_at_the_supply(
     supply: float, forces: tuple[float, ...], damping: tuple[float, ...]
 ) -> None:
     """Table II, and halfway between its rows; the steady force is where the rate vanishes."""
-    model = Model(rig_mechanism(), [Valve(), Chamber()], supply)
+    model = Model(rig_mechanism(CYLINDER), [Valve(), Chamber()], supply)
     s = np.array(forces)
     rest = model.node.residual([0.03], [0.0], [0.0], s, [0, 0], [], [1, 1], [])[1]
     assert np.array(rest).ravel() == pytest.approx(0.0, abs=1e-9)
     modes = [(1, 0), (0, 1), (1, 1), (0, 0)]
-    assert [ModeDamping().c_d(*u, supply) for u in modes] == pytest.approx(list(damping))
+    found = ModeDamping().of_cylinder(CYLINDER)
+    assert [found.c_d(*u, supply) for u in modes] == pytest.approx(list(damping))
 
 
 @pytest.mark.parametrize(
     ("u", "x", "ms"), [(1, 0.0, 8), (1, 0.07, 25), (0, 0.0, 13), (0, 0.07, 37)]
 )
 def test_rise_times_of_table_i(u: int, x: float, ms: float) -> None:
-    assert Chamber().rise_time(u, x, 0.07) == pytest.approx(ms / 1000)
+    chamber = Chamber().of_cylinder(CYLINDER)
+    assert chamber.rise_time(u, x, CYLINDER.stroke) == pytest.approx(ms / 1000)
 
 
 def test_payload_is_mass_at_the_body(planning: Model) -> None:
@@ -179,7 +183,7 @@ def test_payload_is_mass_at_the_body(planning: Model) -> None:
 
 
 def test_end_stops_are_not_felt_by_the_rod_sensor() -> None:
-    model = Model(rig_mechanism(), [Valve(), Chamber(), EndStop()])
+    model = Model(rig_mechanism(CYLINDER), [Valve(), Chamber(), EndStop()])
     assert "piston/F" in model.node.outputs
     stop = [str(model.node.lam[i]) for i in range(model.node.lam.numel())]
     assert not any(name in str(model.node.outputs["piston/F"]) for name in stop)

@@ -19,7 +19,7 @@ from kemba.trajectory import Trajectory
 from kemba_cli.main import app
 
 QUICK = ("jump", "max_jump")
-SLOW = ("drop", "hop", "jump_forward", "stand")
+SHIPPED = (*QUICK, "drop", "hop", "jump_forward", "stand")
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from ocp.runs import QUICK, Solved, solved
 
+from kemba.effects import Effect
+from kemba.effects.pneumatics.timing import ValveCloseDelay
 from kemba.model import load_model
 from kemba.ocp import controller_table
 from kemba.trajectory import Trajectory
@@ -62,10 +64,10 @@ def test_hips_follow_the_plan(run: Solved) -> None:
         assert float(np.sum(np.abs(torque)) * 0.001) == pytest.approx(planned, rel=0.1, abs=0.01)
 
 
-def made(model_valves: dict[str, float]) -> Trajectory:
+def made(model_valves: dict[str, float], *extra: Effect) -> Trajectory:
     """The table of a hand-made plan: one extend pulse from 20 to 40 ms on a 10 ms grid."""
     time = np.linspace(0.0, 0.1, 11)
-    model = load_model()
+    model = load_model(extra=extra)
     columns = {q.header: 0.0 * time for q in model.inputs.values()}
     for leg in ("front", "rear"):
         columns |= {
@@ -90,6 +92,16 @@ def test_a_pulse_by_hand(dead_time: float, lead: float) -> None:
     sent = [lead + t - dead_time for t in (0.020, 0.040)]
     assert [value for _, value in found] == [1.0, 0.0]
     assert [time for time, _ in found] == pytest.approx(sent, abs=0.0005 + 1e-9)
+
+
+def test_opening_and_closing_have_leads_of_their_own() -> None:
+    """A valve that closes 4 ms later than it opens is told to close 4 ms earlier."""
+    table = made({}, ValveCloseDelay(dt=0.004))
+    lead = table.meta["lead"]
+    assert lead == pytest.approx(0.010)
+    (opens, _), (closes, _) = switches(table.time, table["front/valve/extend"])
+    assert opens - lead == pytest.approx(0.020 - 0.006, abs=0.0005 + 1e-9)
+    assert closes - lead == pytest.approx(0.040 - 0.010, abs=0.0005 + 1e-9)
 
 
 def test_torques_stand_at_the_middle_of_their_step() -> None:

@@ -69,9 +69,9 @@ def test_a_lopsided_body_refuses_it(planning: Model) -> None:
     "rear", [{"hip": -0.2, "fold": -1}, {"hip": -0.261, "fold": 1}], ids=["hip", "fold"]
 )
 def test_an_asymmetric_robot_has_none(planning: Model, rear: dict[str, float]) -> None:
-    data = load_robot().model_dump()
+    data = load_robot("kemba").model_dump()
     data["legs"]["rear"] = rear
-    robot = type(load_robot()).model_validate(data)
+    robot = type(load_robot("kemba")).model_validate(data)
     assert find_symmetry(Model(robot_mechanism(robot), planning.effects)) is None
 
 
@@ -105,6 +105,6 @@ def test_wishes_of_both_legs_alike(planning: Model) -> None:
 
 
 def test_valves_alone_have_no_mirror_without_a_robot() -> None:
-    from kemba.mechanism import rig_mechanism
+    from kemba.mechanism import load_cylinder, rig_mechanism
 
-    assert find_symmetry(Model(rig_mechanism(), [Valve()])) is None
+    assert find_symmetry(Model(rig_mechanism(load_cylinder("dsnu-25-70")), [Valve()])) is None

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from kemba.ocp.refinement.modes import HELD, HOP, OPEN, SHUDDER, Phase, _fill_hops, _settling
+from kemba.ocp.phases.modes import HELD, OPEN, Phase, _fill_hops, _settling
+from kemba.ocp.phases.settings import Reading
 
 FALLS = Phase(84, 97, (HELD, OPEN), (1.0, 0.0))
 HITS = Phase(97, 98, (HELD, HELD), (1.0, 0.0))
@@ -32,8 +33,9 @@ def test_a_contact_that_opens_before_the_last_switch_keeps_its_order() -> None:
 
 def test_only_brief_and_small_hops_are_filled() -> None:
     touches = [OPEN, HELD, HELD, OPEN, OPEN, HELD, OPEN, OPEN, OPEN, HELD, OPEN]
-    gap = np.array([0.0, 0.0, 0.0, 1.0, 2.0, 0.0, 1.0, 1.0, 1.0, 0.0, 1.0]) * SHUDDER
-    for hop, filled in ((SHUDDER, []), (HOP, [3, 4])):
+    reading = Reading.current()
+    gap = np.array([0.0, 0.0, 0.0, 1.0, 2.0, 0.0, 1.0, 1.0, 1.0, 0.0, 1.0]) * reading.shudder
+    for hop, filled in ((reading.shudder, []), (reading.hop, [3, 4])):
         modes = np.array(touches)
         _fill_hops(modes, gap, hop)
         assert np.flatnonzero(modes != np.array(touches)).tolist() == filled

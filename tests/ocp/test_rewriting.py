@@ -8,11 +8,12 @@ import pytest
 
 from kemba.model import load_model
 from kemba.ocp import load_task
-from kemba.ocp.nlp.blocks import Block, BlockProblem
-from kemba.ocp.nlp.proximal import Proximal
-from kemba.ocp.nlp.regularised import DAMPING, regularised_hessian
-from kemba.ocp.nlp.signs import canonical_signs
-from kemba.ocp.nlp.vectorised import FEW, vectorised
+from kemba.ocp.functions.blocks import Block, BlockProblem
+from kemba.ocp.functions.proximal import Proximal
+from kemba.ocp.functions.regularised import regularised_hessian
+from kemba.ocp.functions.settings import Functions, Newton
+from kemba.ocp.functions.signs import canonical_signs
+from kemba.ocp.functions.vectorised import vectorised
 from kemba.ocp.task.requirement import resolve
 from kemba.ocp.transcription.symmetry import find_symmetry
 from kemba.ocp.transcription.transcribe import Transcription
@@ -30,7 +31,7 @@ def half() -> Transcription:
     return Transcription(model, task, resolve(task, model, document), reduction, 24)
 
 
-@pytest.mark.parametrize("points", [1, FEW, POINTS])
+@pytest.mark.parametrize("points", [1, Functions.current().few, POINTS])
 def test_abreast_is_the_same_to_the_last_bit(half: Transcription, points: int) -> None:
     block, p, rng = half.problem.blocks[0], half.problem.p, np.random.default_rng(0)
     at = [block.z, ca.vertcat(p, block.constants)]
@@ -105,4 +106,4 @@ def test_damping_adds_the_same_curvature_everywhere() -> None:
     plain = BlockProblem([block], 3, ca.SX(0, 1)).hess_lag
     at = (np.random.default_rng(0).normal(size=3), [], 1.5, [0.3, -2.0])
     added = np.array(regularised_hessian(plain)(*at) - plain(*at))
-    assert added == pytest.approx(DAMPING * np.eye(3), abs=1e-15)
+    assert added == pytest.approx(Newton.current().regularisation * np.eye(3), abs=1e-15)

@@ -9,12 +9,15 @@ import pytest
 
 from kemba.model import load_model
 from kemba.ocp import load_task, plan, planner
+from kemba.ocp.certificate.status import Status
+from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.nlp.ipopt import Iterate
-from kemba.ocp.nlp.stagnation import GAVE_UP, Stagnation
+from kemba.ocp.nlp.stagnation import Stagnation
 from kemba.ocp.planned import Plan
-from kemba.ocp.relaxation import schedule
 from kemba.ocp.relaxation.guess import body_course
+from kemba.ocp.relaxation.settings import Ends
 from kemba.ocp.task.requirement import resolve
+from kemba.settings import changed
 
 FORWARD = ("nodes=50", "refine=none")
 
@@ -28,7 +31,7 @@ def told(name: str, *overrides: str) -> tuple[Plan, list[str]]:
 
 def test_a_forward_jump_grows_from_half_a_robot() -> None:
     found, solves = told("jump_forward", *FORWARD)
-    assert found.status == "solved"
+    assert found.status is Status.SOLVED
     assert solves[:3] == [
         f"{step} (half robot, 25 nodes)" for step in ("relax", "binary valves", "round valves")
     ]
@@ -45,50 +48,55 @@ def test_without_symmetry_it_starts_from_the_guess() -> None:
 
 
 def test_what_does_not_grow_starts_from_the_guess(monkeypatch: pytest.MonkeyPatch) -> None:
-    def wither(search: object, half: object, point: Iterate, guess: Iterate) -> Iterate:
-        return replace(guess, message="Infeasible_Problem_Detected")
+    def wither(schedule: object, half: object, point: Iterate, guess: Iterate) -> Iterate:
+        return replace(guess, ending=Ending.INFEASIBLE)
 
     monkeypatch.setattr(planner, "grow", wither)
     found, solves = told("jump_forward", *FORWARD)
-    assert found.status == "solved"
+    assert found.status is Status.SOLVED
     assert solves[3] == "relax (whole robot, 25 nodes)"
 
 
 @pytest.mark.parametrize(("rounds", "least", "most"), [(0, 0, 0), (1, 1, 1), (3, 2, 3)])
 def test_switches_move_as_often_as_asked(rounds: int, least: int, most: int) -> None:
     found, solves = told("jump", "nodes=50", "refine=none", f"solver.valve_search={rounds}")
-    assert found.status == "solved"
+    assert found.status is Status.SOLVED
     assert least <= sum(solve.startswith("move switches") for solve in solves) <= most
 
 
 @pytest.mark.parametrize(
-    ("limit", "value", "message"),
-    [("MISFIT", 1, "Maximum_Iterations_Exceeded"), ("STUCK", 0, GAVE_UP)],
+    ("limit", "ending"),
+    [
+        ({"misfit_iterations": 1}, Ending.ITERATION_LIMIT),
+        ({"stagnation_iterations": 0}, Ending.GAVE_UP),
+    ],
 )
 def test_valves_that_do_not_fit_the_finer_grid_are_sought_again(
-    limit: str, value: int, message: str, monkeypatch: pytest.MonkeyPatch
+    limit: dict[str, int], ending: Ending
 ) -> None:
-    monkeypatch.setattr(schedule, limit, value)
-    found, solves = told("jump", "nodes=50", "refine=none")
-    assert found.status == "solved"
-    assert message in [attempt.message for attempt in found.attempts]
+    with changed(Ends, **limit):
+        found, solves = told("jump", "nodes=50", "refine=none")
+    assert found.status is Status.SOLVED
+    assert ending in [attempt.ending for attempt in found.attempts]
     assert solves.count("relax (half robot, 25 nodes)") == 1  # no other strategy was needed
     assert solves.count("binary valves (half robot, 50 nodes)") == 1
 
 
 @pytest.mark.parametrize(
-    ("violations", "lost"),
+    ("violations", "found"),
     [
         ([1.0, 0.9, 0.85, 0.82], True),
         ([1.0, 0.9, 0.75, 0.74, 0.73], False),
         ([1.0, 0.04, 3.0, 2.0, 2.0, 2.0], False),  # it was near before
     ],
 )
-def test_patience_is_lost_where_nothing_comes_nearer(violations: list[float], lost: bool) -> None:
-    patience = Stagnation(iterations=3, small=0.05)
+def test_stagnation_is_found_where_nothing_comes_nearer(
+    violations: list[float], found: bool
+) -> None:
+    stagnation = Stagnation(iterations=3, small=0.05)
     for iteration, violation in enumerate(violations):
-        patience.hear(iteration, violation)
-    assert patience.lost is lost
+        stagnation.hear(iteration, violation)
+    assert stagnation.found is found
 
 
 @pytest.mark.parametrize("lift", ["5 cm", "50 cm"])

@@ -5,16 +5,15 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 import pytest
-from ocp.runs import QUICK, SLOW, Solved, solved
+from ocp.runs import SHIPPED, Solved, solved
 
 from kemba.effects.mechanics.boom import Boom
 from kemba.ocp.transcription.solution import arrays
 
-TASKS = [*QUICK, *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW)]
 TOLERANCE = 1e-6
 
 
-@pytest.fixture(params=TASKS)
+@pytest.fixture(params=SHIPPED)
 def shipped(request: pytest.FixtureRequest) -> Solved:
     return solved(request.param)
 
@@ -136,14 +135,12 @@ def test_max_jump_reaches_a_metre() -> None:
     assert plan["front/foot/z"][-1] > 0.3 and plan["rear/foot/z"][-1] > 0.3
 
 
-@pytest.mark.slow
 def test_forward_jump_lands_ahead() -> None:
     plan = solved("jump_forward").plan
     assert plan["body/x"][-1] == pytest.approx(0.3, abs=1e-6)
     assert plan["front/foot/x"][-1] - plan["front/foot/x"][0] > 0.1
 
 
-@pytest.mark.slow
 def test_stand_keeps_its_feet_down() -> None:
     plan = solved("stand").plan
     assert max(plan["front/foot/z"].max(), plan["rear/foot/z"].max()) <= 1e-6

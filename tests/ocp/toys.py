@@ -13,9 +13,10 @@ from kemba.config import Document
 from kemba.effects.base import At, Contribution, Effect
 from kemba.mechanism import Mechanism, Port
 from kemba.model import Model
-from kemba.ocp.nlp.ipopt import Ipopt, Iterate, Parameters
+from kemba.ocp.nlp.ipopt import Ipopt, Iterate
 from kemba.ocp.task.requirement import resolve
 from kemba.ocp.task.task import Task
+from kemba.ocp.transcription.parameters import Parameters
 from kemba.ocp.transcription.symmetry import whole
 from kemba.ocp.transcription.transcribe import Transcription
 from kemba.quantity import Quantity
@@ -85,7 +86,7 @@ def bead(axes: str = "x", gravity: float = 0.0) -> Mechanism:
     weight = ca.SX([gravity if axis == "z" else 0.0 for axis in axes])
     named = zip(coordinates, velocities, strict=True)
     ports = {c.name: Port(c, w, q[i]) for i, (c, w) in enumerate(named)}
-    return Mechanism("bead", q, v, a, coordinates, velocities, a + weight, ports, ())
+    return Mechanism("bead", q, v, a, coordinates, velocities, a + weight, ports, (), gravity=9.81)
 
 
 def solve(
@@ -112,6 +113,6 @@ def solve(
         "h": np.full((len(q), 1), wanted.step),
     }
     guess = Iterate(np.clip(program.layout.pack(groups), program.lower, program.upper))
-    found = Ipopt(program, SHARP).solve(guess, Parameters(eps=0.0))
-    assert found.solved, found.message
+    found = Ipopt(program, SHARP).solve(guess, Parameters(eps=0.0).vector(program.nodes))
+    assert found.solved, found.ending
     return program, found

@@ -23,7 +23,8 @@ def stranger() -> Robot:
     leg["femur"] |= {"length": 0.3, "com": 0.12, "mass": 0.5}
     leg["tibia"] |= {"length": 0.27, "com": 0.14, "inertia": 0.003}
     leg["rod"] |= {"com": 0.05, "mass": 0.2}
-    leg["piston"] |= {"mount": 0.04, "pin": 0.06, "retracted": 0.26, "stroke": 0.08}
+    leg["piston"] |= {"mount": 0.04, "pin": 0.06, "retracted": 0.26}
+    data["cylinder"] |= {"stroke": 0.08}
     leg["rotor_inertia"] = 0.02
     data["legs"] = {
         "front": {"hip": 0.2, "fold": 1},

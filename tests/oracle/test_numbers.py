@@ -11,11 +11,11 @@ from kemba.mechanism.knee import flexion
 from kemba.mechanism.robot import standing_pose
 from kemba.model import load_model
 
-ROBOT = load_robot()
+ROBOT = load_robot("kemba")
 
 
 def test_masses() -> None:
-    mechanism = robot_mechanism()
+    mechanism = robot_mechanism(load_robot("kemba"))
     assert mechanism.mass == pytest.approx(4.476)
     assert mechanism.weight == pytest.approx(4.476 * 9.81)
     assert mechanism.body_mass == 2.886
@@ -23,7 +23,7 @@ def test_masses() -> None:
 
 def test_knee_range() -> None:
     assert flexion(ROBOT.leg, 0.0) == pytest.approx(2.42837, abs=1e-5)
-    assert flexion(ROBOT.leg, ROBOT.leg.piston.stroke) == pytest.approx(0.79302, abs=1e-5)
+    assert flexion(ROBOT.leg, ROBOT.stroke) == pytest.approx(0.79302, abs=1e-5)
 
 
 def test_leg_length_and_pose() -> None:

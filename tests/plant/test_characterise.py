@@ -7,14 +7,17 @@ import numpy as np
 import pytest
 
 from kemba.errors import KembaError
+from kemba.mechanism import load_cylinder
 from kemba.model import Model, load_model
 from kemba.plant.rig.bench import bench_model, load_rig, run_rig, write_rig
 from kemba.plant.rig.characterise import Characteristics, characterise
 from kemba.plant.rig.imposed import stroke
-from kemba.plant.rig.rigs import STROKE, DynamometerRig, LockedRig, RandomRig, Rig
+from kemba.plant.rig.rigs import DynamometerRig, LockedRig, RandomRig, Rig
 from kemba.plant.rig.tables import PAPER_FORCE, PAPER_RISE
 from kemba.trajectory import Trajectory
 
+CYLINDER = load_cylinder("dsnu-25-70")
+STROKE = CYLINDER.stroke
 SPEEDS = dict.fromkeys(("extend", "retract", "both", "none"), (0.2, 0.5, 0.8))
 
 
@@ -39,7 +42,7 @@ def first_order() -> Characteristics:
     logs = {}
     for rig in rigs:
         logs |= {f"{rig.name}/{k}": v for k, v in logs_of(rig, "planning", noise=True).items()}
-    return characterise(logs)
+    return characterise(logs, CYLINDER)
 
 
 def test_rise_times_and_dead_time_of_the_truth_come_back() -> None:
@@ -88,7 +91,7 @@ def test_the_written_model_is_the_truth(tmp_path: Path) -> None:
 
 
 def test_locked_tests_alone_still_give_the_plateaus() -> None:
-    found = characterise(logs_of(LockedRig(name="locked"), "planning"))
+    found = characterise(logs_of(LockedRig(name="locked"), "planning"), CYLINDER)
     assert found.lines == []
     assert found.effects()[0].F_extend == pytest.approx((324.0,), abs=0.5)
 
@@ -104,24 +107,24 @@ def test_logs_that_tell_nothing_are_refused() -> None:
         },
     )
     with pytest.raises(KembaError, match="no log holds a locked rod"):
-        characterise({"still.csv": still})
+        characterise({"still.csv": still}, CYLINDER)
     with pytest.raises(KembaError, match="no column 'piston/F'"):
-        characterise({"bad.csv": still.select(["piston/x"])})
+        characterise({"bad.csv": still.select(["piston/x"])}, CYLINDER)
 
 
 def test_the_shipped_rigs_have_the_papers_numbers() -> None:
     count = {
-        name: len(list(load_rig(name).tests(np.random.default_rng(0))))
+        name: len(list(load_rig(name).tests(np.random.default_rng(0), STROKE)))
         for name in ("locked", "volumes", "dynamometer", "random")
     }
     assert count["locked"] == 60
     assert count["volumes"] == 10
     assert count["random"] == 1
-    assert len({t.facts["mode"] for t in load_rig("dynamometer").tests(None)}) == 4  # type: ignore[arg-type]
+    assert len({t.facts["mode"] for t in load_rig("dynamometer").tests(None, STROKE)}) == 4  # type: ignore[arg-type]
 
 
 def test_random_motion_stays_within_the_stroke() -> None:
-    (test,) = RandomRig(name="random").tests(np.random.default_rng(7))
+    (test,) = RandomRig(name="random").tests(np.random.default_rng(7), STROKE)
     x, v = test.motion(test.times)
     assert x.min() >= -1e-9
     assert x.max() <= STROKE + 1e-9
@@ -153,7 +156,7 @@ def test_the_shipped_plant_shows_the_papers_tables_at_07_mpa() -> None:
     speeds |= {"both": (0.2, 0.4, 0.6, 0.8), "none": (0.25, 0.5, 0.75, 1.0)}
     logs = logs_of(LockedRig(name="locked"), "plant")
     logs |= logs_of(DynamometerRig(name="dynamometer", speeds=speeds), "plant")
-    found = characterise(logs)
+    found = characterise(logs, CYLINDER)
     assert found.rises is not None
     for name, paper in PAPER_RISE.items():
         measured = [e.value for e in getattr(found.rises, name)]

@@ -69,6 +69,25 @@ def test_no_step_of_a_landing_adds_energy() -> None:
     assert {label.split(":")[0] for i in done.impacts for label in i.labels} >= {"front/contact"}
 
 
+@pytest.mark.parametrize("mu", [0.0, 0.1, 1.0])
+def test_the_energy_an_impact_loses_is_what_the_motion_loses(mu: float) -> None:
+    """Kinetic energy before less after, from the mass matrix alone; feet slide on at mu < 1."""
+    model = planning().with_effects([GroundFriction(mu=mu)])
+    done = run(model, {"body/vx": 1.0, "body/vz": -2.0}, None, 0.0)
+    (impact,) = done.impacts
+    q, after = (
+        np.array([done.trajectory[c.name][0] for c in columns])
+        for columns in (model.mechanism.coordinates, model.mechanism.velocities)
+    )
+    v = np.zeros(len(q))
+    v[:2] = 1.0, -2.0  # forward and down
+    M = equations_of(model).now(q=q, v=v, s=0.0, u=0.0)["M"]
+    lost = 0.5 * float(v @ M @ v - after @ M @ after)
+    assert impact.lost == pytest.approx(lost, rel=1e-9) and lost > 1.0
+    slip = [done.trajectory[f"{leg}/foot/vx"][0] for leg in LEGS]
+    assert (np.abs(slip).max() > 0.1) == (mu < 1.0)
+
+
 def test_friction_stays_in_its_cone_and_against_the_slip() -> None:
     slippery = planning().with_effects([GroundFriction(mu=0.1)])
     start = {"body/vx": 1.0}

@@ -32,7 +32,7 @@ def inertia(model: Model, q: np.ndarray, v: np.ndarray) -> np.ndarray:
 
 def energies(model: Model, t: Trajectory, lift: float = 0.0) -> np.ndarray:
     """Kinetic and potential energy [J] at every row; `lift` [N] is a constant downward force."""
-    robot = load_robot()
+    robot = load_robot("kemba")
     tree = build_pin_model(robot)
     data = tree.createData()
     symbol = model.mechanism.q
@@ -48,7 +48,7 @@ def energies(model: Model, t: Trajectory, lift: float = 0.0) -> np.ndarray:
 @settings(max_examples=6, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_free_flight_conserves_energy_and_momentum(seed: int) -> None:
-    bare, rng = Model(robot_mechanism(), []), np.random.default_rng(seed)
+    bare, rng = Model(robot_mechanism(load_robot("kemba")), []), np.random.default_rng(seed)
     rates = {
         c.name: rng.normal(0.0, 1.0) for c in bare.mechanism.velocities if "knee" not in c.name
     }
@@ -61,7 +61,7 @@ def test_free_flight_conserves_energy_and_momentum(seed: int) -> None:
 
 def test_the_boom_carries_energy_too() -> None:
     boom = Boom()
-    model = Model(robot_mechanism(), [boom])
+    model = Model(robot_mechanism(load_robot("kemba")), [boom])
     t = simulate(model, AIRBORNE, duration=0.3, sample=0.01)
     weight = boom.mass * 9.81 * boom.com / boom.length_z
     assert np.ptp(energies(model, t, weight)) < 1e-6 * 40.0

@@ -72,6 +72,34 @@ def test_contact_with_friction_is_always_solved(seed: int, mu: float, pivoting: 
     check(A, b, solve(A, b, rng.random(8) < 0.5, pivoting).z[:8])
 
 
+@pytest.mark.parametrize("short", [1e-3, 1e-6, 1e-9])
+@pytest.mark.parametrize("first", [True, False])
+def test_a_row_that_is_short_by_little_is_solved_too(short: float, first: bool) -> None:
+    """With only the other force on, one row is short by `short` of its terms: its own force must
+    come on. Solved by hand: z = (1 - s, s) and w = 0."""
+    A = np.array([[1.0, 1.0], [1.0, 2.0]])
+    b = -np.array([1.0, 1.0 + short])
+    if not first:
+        A, b = A[::-1, ::-1], b[::-1]
+    guess = np.array([first, not first])
+    found = solve(A, b, guess)
+    z, active = found.z[:2], found.on[:2]
+    assert z == pytest.approx([1.0 - short, short][:: 1 if first else -1], rel=1e-6)
+    assert active.all()
+    assert np.abs(A @ z + b).max() <= 1e-14
+
+
+@pytest.mark.parametrize("short", [1e-3, 1e-6, 1e-9])
+def test_a_force_that_pulls_by_little_is_let_go(short: float) -> None:
+    """With both on, one force would pull by `short`: it must be off, and its row open."""
+    A = np.array([[1.0, 1.0], [1.0, 2.0]])
+    b = -np.array([1.0, 1.0 - short])
+    found = solve(A, b, np.array([True, True]))
+    z, active = found.z[:2], found.on[:2]
+    assert z == pytest.approx([1.0, 0.0]) and active.tolist() == [True, False]
+    assert A @ z + b == pytest.approx([0.0, short], abs=1e-15)
+
+
 def test_a_problem_without_solution_says_so() -> None:
     with pytest.raises(NoSolutionError, match="no solution"):
         solve(np.array([[-1.0]]), np.array([-1.0]), np.array([False]))

@@ -72,7 +72,7 @@ def mujoco_model(robot: Robot) -> mujoco.MjModel:
 
 def by_mujoco(model: Model, start: dict[str, float], times: np.ndarray) -> np.ndarray:
     """x, z, pitch and the hips at the times (m, 5)."""
-    robot = load_robot()
+    robot = load_robot("kemba")
     engine = mujoco_model(robot)
     data = mujoco.MjData(engine)
     q, v, _ = initial_values(model, start)
@@ -97,7 +97,7 @@ def difference(model: Model, start: dict[str, float], times: np.ndarray) -> np.n
 
 
 def test_free_fall_with_moving_legs() -> None:
-    model = Model(robot_mechanism(), [])
+    model = Model(robot_mechanism(load_robot("kemba")), [])
     start = {
         "body/z": 2.0,
         "body/vx": 0.5,
@@ -117,7 +117,7 @@ def test_free_fall_with_moving_legs() -> None:
 
 def test_drop_on_two_feet() -> None:
     """Up to 60 ms after touchdown, legs half folded: feet stick, knees and hips give way."""
-    model = Model(robot_mechanism(), [Contact()])
+    model = Model(robot_mechanism(load_robot("kemba")), [Contact()])
     start = {"front/piston/x": 0.05, "rear/piston/x": 0.05}
     start["body/z"] = initial_values(model, start)[0][1] + 0.05
     error = difference(model, start, np.arange(0.0, 0.161, 0.01))

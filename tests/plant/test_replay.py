@@ -1,14 +1,16 @@
 """Plans executed: replay of the same model, and the controller of eq. 10."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
-from plant.scripts import jump, planning
+from plant.scripts import drop, jump, planning
 
 from kemba.effects.mechanics.motor import Motor
-from kemba.plant import Gains, Profile, execute, replay, replays, run
-from kemba.plant.execution.controller import motor_limits
+from kemba.plant import Gains, Profile, Simulated, execute, replay, replays, run
+from kemba.plant.execution.controller import hip_control, motor_limits
+from kemba.plant.execution.replay import judge
 from kemba.plant.kernel.control import limited
 from kemba.plant.kernel.jit import entry
 from kemba.plant.simulation.commands import Commands
@@ -72,6 +74,63 @@ def test_the_controller_holds_a_standing_robot() -> None:
     done = execute(standing_table(), planning())
     assert done.lead == 0.006
     assert np.abs(done.trajectory["front/hip/tau"]).max() < 1e-6
+
+
+def marked_table(rows: int = 20) -> Trajectory:
+    """A standing table in which row k feeds forward k N.m at the front hip, -k at the rear."""
+    marks = np.arange(100.0)
+    torques = {"front/hip/tau [N.m]": marks, "rear/hip/tau [N.m]": -marks}
+    table = standing_table().with_columns(torques)
+    columns = {h: table[n][:rows] for h, n in zip(table.headers, table.names, strict=True)}
+    return Trajectory(table.time[:rows], columns, table.meta)
+
+
+@pytest.mark.parametrize(
+    ("time", "row"), [(0.0, 0), (0.0009, 0), (0.001, 1), (0.0074, 7), (0.019, 19), (1.0, 19)]
+)
+def test_the_controller_plays_the_row_whose_time_has_come(time: float, row: int) -> None:
+    """Each row holds for its millisecond, the last one for good."""
+    model, table = planning(), marked_table()
+    (wanted,) = hip_control(model, table, Gains()).at(np.array([time]))
+    assert wanted[:, 2] == pytest.approx([row, -row])
+    assert wanted[0, 0] == table["front/hip/q"][0]
+
+
+def test_a_played_table_shows_in_the_motion_when_its_row_is_due() -> None:
+    done = execute(marked_table(), planning(), Gains(0.0, 0.0)).trajectory
+    assert done["front/hip/tau"][:10] == pytest.approx(np.arange(10.0))
+
+
+@cache
+def landing() -> tuple[Trajectory, Simulated]:
+    """A plan that ends standing, and its execution to the letter."""
+    fall = drop(duration=0.3)
+    return fall.trajectory, fall
+
+
+def fault_of(**changes: float) -> str | None:
+    """What is wrong with a landing whose last row differs by `changes` (columns, / as __)."""
+    plan, fall = landing()
+    columns = {}
+    for name, change in changes.items():
+        column = name.replace("__", "/")
+        values = plan[column].copy()
+        values[-1] = change
+        columns[f"{column} [{plan.unit(column)}]"] = values
+    executed = replace(fall, trajectory=plan.with_columns(columns))
+    return judge(planning(), plan, plan.time, executed).fault
+
+
+def test_a_landing_is_judged_by_how_it_ends() -> None:
+    assert fault_of() is None
+    assert fault_of(body__pitch=0.3) is None
+    for pitch in (0.5, -0.5):  # forward and backward
+        assert fault_of(body__pitch=pitch) == "tips over"
+    for point in ("front/hip", "rear/hip", "front/knee", "rear/knee"):
+        name = f"{point.replace('/', '__')}__z"
+        assert fault_of(**{name: -1e-3}) == f"the {point.replace('/', ' ')} meets the ground"
+    for leg in ("front", "rear"):
+        assert fault_of(**{f"{leg}__foot__z": 0.02}) == f"the {leg} foot does not stand"
 
 
 def test_the_controller_brings_a_hip_back() -> None:

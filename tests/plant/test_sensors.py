@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from plant.scripts import jump
 
-from kemba.effects.sensors import SensorBias, SensorDelay
+from kemba.effects.sensors import SensorBias, SensorDelay, SensorScale
 from kemba.plant.execution.sensors import Sensors, take_log
 from kemba.trajectory import Trajectory
 
@@ -39,6 +39,14 @@ def test_faults_of_sensors_show_in_the_log_only() -> None:
     log = take_log(true, Sensors(), np.random.default_rng(0), faults)
     assert log["body/pitch"] == pytest.approx(true["body/pitch"] + 0.01)
     assert log["body/z"][10:] == pytest.approx(true["body/z"][8:-2])
+
+
+def test_an_offset_is_not_scaled_whatever_the_order_of_the_list() -> None:
+    true = truth()
+    faults = [SensorBias(channel="body/z", b=0.5), SensorScale(channel="body/z", k=0.1)]
+    for order in (faults, faults[::-1]):
+        log = take_log(true, Sensors(), np.random.default_rng(0), order)
+        assert log["body/z"] == pytest.approx(1.1 * true["body/z"] + 0.5)
 
 
 def test_an_accelerometer_averages_over_its_sample() -> None:

@@ -22,7 +22,7 @@ def made_up_jump(nodes: int = 101, sway: float = 0.0) -> Trajectory:
     time = np.linspace(0.0, END, nodes) + 0.001 * np.sin(np.arange(nodes))
     time[0] = 0.0
     x = 0.07 * np.clip(_ramp(time, 0.04, TAKEOFF) - _ramp(time, LANDING, END - 0.03), 0, 1)
-    robot = load_robot()
+    robot = load_robot("kemba")
     standing = [standing_pose(robot, float(value)) for value in x]
     flight = np.clip((time - TAKEOFF) * (LANDING - time) * GRAVITY / 2, 0, None)
     columns = {
@@ -97,6 +97,8 @@ def _lag(time: Array, target: Array) -> Array:
     """First-order answer to `target` by implicit Euler, as the planner has it."""
     force = np.zeros(len(time))
     for k in range(1, len(time)):
-        share = (time[k] - time[k - 1]) / Chamber().vent[1]
+        share = (time[k] - time[k - 1]) / Chamber().of_cylinder(load_robot("kemba").cylinder).vent[
+            1
+        ]
         force[k] = (force[k - 1] + share * target[k]) / (1 + share)
     return force

@@ -8,10 +8,14 @@ import pytest
 
 pytest.importorskip("numba")
 
+from robot_logs import hops
 from twin.cases import robot_case
 
 from kemba.identify.answer import Answer
+from kemba.identify.discover import discover
+from kemba.identify.robot.problem import robot_problem
 from kemba.identify.workflow import discover_logs
+from kemba.model.spec import load_model
 
 
 def answer(folder: Path, effect: str | None, seed: int, runs: int) -> tuple[Answer, dict]:
@@ -32,6 +36,16 @@ def check(found: Answer, truth: dict) -> None:
 
 def test_friction_is_named_on_two_jumps(tmp_path: Path) -> None:
     check(*answer(tmp_path, "seal_friction", 3, 3))
+
+
+def test_nothing_is_found_on_clean_hops() -> None:
+    """Two short hops of a machine as the model has it, but for figures off by 1 %; the whole
+    catalogue may be blamed."""
+    logs, _ = hops(runs=2, seed=3, figures_off=0.01)
+    found = discover(robot_problem(logs, load_model("planning"))).answer
+    assert found.verdict == "nothing" and not found.added, found.sentence
+    assert found.p_value_nothing > 0.05 and found.error_after < 1.3
+    assert len(found.smallest_detectable) > 20, "else there was nothing to blame"
 
 
 @pytest.mark.slow

@@ -133,3 +133,13 @@ def test_wrong_endings_are_told(run: Path, tmp_path: Path) -> None:
     assert "no format '.xls'; one of .mat, .npz, .json, .csv was expected" in done.stderr
     done = call("export", str(run), "--out", str(tmp_path / "a.mat"), "--map", "authors.yaml")
     assert done.exit_code == 2 and "goes with .csv only" in done.stderr
+
+
+def test_no_name_ends_the_script(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from kemba.report import stage as room
+
+    shown = scene(load_source(run))
+    monkeypatch.setattr(room, "scene", lambda *_: {**shown, "legs": ["a</script><script>alert(1)"]})
+    page = room.stage(load_source(run))
+    assert page.count("<script") == page.count("</script") == 1
+    assert "a\\u003c/script>\\u003cscript>alert(1)" in page

@@ -22,6 +22,14 @@ def crash(work: dict[str, Any]) -> dict[str, Any]:
     raise ZeroDivisionError(f"case {work['number']} divides by zero")
 
 
+def knows_effect(work: dict[str, Any]) -> dict[str, Any]:
+    """Whether this worker knows an effect from outside the package."""
+    from kemba.effects import BY_KIND
+
+    known = "sticky" in BY_KIND
+    return {"status": "solved" if known else "failed", "good": known, "sentence": ""}
+
+
 def kill_own_worker(work: dict[str, Any]) -> dict[str, Any]:
     os.kill(os.getpid(), signal.SIGKILL)
     return {}

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from sweep.fakes import cases
 
+from kemba.effects import BY_KIND
 from kemba.files import read_json
 from kemba.sweep import Case, run_cases
 
@@ -144,7 +145,6 @@ def test_killing_workers_loses_and_repeats_nothing(tmp_path: Path, seed: int) ->
     check_all_done(tmp_path, listed, finished(tmp_path))
 
 
-@pytest.mark.slow
 def test_a_case_that_kills_its_workers_does_not_end_the_sweep(tmp_path: Path) -> None:
     bad, good = cases(tmp_path, 1, 0.0, "kill_own_worker"), cases(tmp_path, 3, 0.0)
     records = run_cases([good[0], *bad, *good[1:]], tmp_path, jobs=1)
@@ -152,3 +152,23 @@ def test_a_case_that_kills_its_workers_does_not_end_the_sweep(tmp_path: Path) ->
     assert records[bad[0].key]["status"] == "lost"
     assert "worker died" in records[bad[0].key]["sentence"]
     assert finished(tmp_path) == {case.key for case in good}
+
+
+def test_workers_know_effects_from_outside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("_kinds", "_files"):
+        monkeypatch.setattr(BY_KIND, name, dict(getattr(BY_KIND, name)))
+    own = tmp_path / "own.py"
+    own.write_text(
+        "from typing import Literal\nfrom kemba.effects import Effect\n"
+        'class Sticky(Effect):\n    kind: Literal["sticky"] = "sticky"\n'
+    )
+    BY_KIND.load_file(own)
+    listed = cases(tmp_path, 2, 0.0, "knows_effect")
+    records = run_cases(listed, tmp_path / "a", jobs=1)
+    assert all(record["good"] for record in records.values())
+    own.write_text(own.read_text() + "# changed since\n")
+    records = run_cases(listed, tmp_path / "b", jobs=1)
+    assert {record["status"] for record in records.values()} == {"lost"}
+    told = {record["sentence"] for record in records.values()}
+    assert told == {f"{own}: has another content than where this work was asked for"}
+    assert not list((tmp_path / "b" / "cases").iterdir())

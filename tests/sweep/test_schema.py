@@ -77,7 +77,7 @@ def test_mistakes_of_the_cases(tmp_path: Path) -> None:
   c:
     kind: solve
     task: jump.yaml
-    grid: {supply: [0.7 MPa, 0.9 MPa]}
+    grid: {supply: [0.7 MPa, 0.09 MPa]}
   d:
     kind: solve
     task: jump.yaml
@@ -94,7 +94,7 @@ def test_mistakes_of_the_cases(tmp_path: Path) -> None:
     assert mistakes(tmp_path, text) == [
         "s.yaml:6:11: hieght: unknown key; did you mean 'height'?",
         "s.yaml:9:5: jumpp.yaml: no such file; did you mean 'jump.yaml'?",
-        "s.yaml:13:12: supply: '0.9 MPa' is out of range; 600000 to 800000 Pa was expected",
+        "s.yaml:13:12: supply: '0.09 MPa' is out of range; at least 101325 Pa was expected",
         "s.yaml:17:12: start.body/pich: unknown quantity 'body/pich'; did you mean 'body/pitch'?",
         "s.yaml:18:3: effects.seal_frction: no such effect; did you mean 'seal_friction'?",
         "s.yaml:22:3: start.front/hp/q: no such coordinate; did you mean 'front/hip/q'?",

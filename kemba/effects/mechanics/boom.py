@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, ClassVar, Literal
 
 from kemba.effects.base import At, Contribution, Effect
-from kemba.quantity import Param
+from kemba.quantity import Param, Tolerance
 
 
 class Boom(Effect):
@@ -26,6 +26,9 @@ class Boom(Effect):
     equation: ClassVar[str] = "-(I/l_x^2) ax on x; -(I/l_z^2) az - m g com/l_z on z"
     source: ClassVar[str] = "paper II-B (mass, inertia); authors' program (lengths, COM)"
     ports: ClassVar[tuple[str, ...]] = ("body_x", "body_z")
+    nominal: ClassVar[dict[str, Tolerance]] = dict.fromkeys(
+        ("inertia", "mass"), Tolerance(0.02, source="assumed: as its links, weighed or from CAD")
+    )
 
     def evaluate(self, at: At) -> Contribution:
         weight = self.mass * at.gravity * self.com / self.length_z

@@ -2,24 +2,28 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, Literal
+import math
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-import numpy as np
+from typing_extensions import Self
 
 from kemba.effects.base import At, Contribution, Effect
-from kemba.quantity import Param, Quantity
+from kemba.effects.pneumatics.tables import at_supply, beyond, filled
+from kemba.quantity import Param, Quantity, Tolerance
+
+if TYPE_CHECKING:
+    from kemba.mechanism import Cylinder
 
 Newton = Annotated[float, Param("N", 10.0, lower=0.0, doc="of Table II")]
 Pascal = Annotated[float, Param("Pa", 1e4, lower=0.0, doc="pressure")]
 Second = Annotated[float, Param("s", 2e-3, lower=0.0, doc="of Table I")]
 
-TABLE_PRESSURES = (0.6e6, 0.7e6, 0.8e6)
+OF_A_KIND = Tolerance(0.02, source="assumed: parts of one make differ by 1 to 3 %")
+ENTRY = Tolerance(0.02, each=True, source="assumed: parts of one make differ by 1 to 3 %")
 
 
-def at_supply(supply: float, pressures: tuple[float, ...], table: tuple[Any, ...]) -> Any:
-    """A table over supply pressures read at `supply`; its entries may be symbols."""
-    weights = [np.interp(supply, pressures, row) for row in np.eye(len(pressures))]
-    return sum(float(w) * value for w, value in zip(weights, table, strict=True))
+STEADY = ("F_extend", "F_retract")
+FIGURES = ("pressures", *STEADY, "fill", "vent")
 
 
 class Chamber(Effect):
@@ -27,15 +31,16 @@ class Chamber(Effect):
 
     `F_extend`, `F_retract`: steady forces at the supply pressures `pressures` (Table II),
     interpolated. `fill`, `vent`: time constants at empty and full chamber (Table I); the
-    retract chamber's own extension is stroke - x.
+    retract chamber's own extension is stroke - x. What is not given is that of the robot's
+    cylinder.
     """
 
     kind: Literal["chamber"] = "chamber"
-    pressures: tuple[Pascal, ...] = TABLE_PRESSURES
-    F_extend: tuple[Newton, ...] = (287.0, 324.0, 349.0)
-    F_retract: tuple[Newton, ...] = (239.0, 260.0, 291.0)
-    fill: tuple[Second, Second] = (0.008, 0.025)
-    vent: tuple[Second, Second] = (0.013, 0.037)
+    pressures: tuple[Pascal, ...] | None = None
+    F_extend: tuple[Newton, ...] | None = None
+    F_retract: tuple[Newton, ...] | None = None
+    fill: tuple[Second, Second] | None = None
+    vent: tuple[Second, Second] | None = None
 
     family: ClassVar[str] = "air"
     equation: ClassVar[str] = "F = F_static u - tau(u, x) dF/dt; effort F_e - F_r"
@@ -49,8 +54,21 @@ class Chamber(Effect):
         "tau_r",
     )
 
+    nominal: ClassVar[dict[str, Tolerance]] = {
+        "F_extend": OF_A_KIND,
+        "F_retract": OF_A_KIND,
+        "fill": ENTRY,
+        "vent": ENTRY,
+    }
+
+    def of_cylinder(self, cylinder: Cylinder) -> Self:
+        return filled(self, cylinder, FIGURES, STEADY)
+
+    def remarks(self, supply: float) -> list[str]:
+        return beyond(self, supply, STEADY)
+
     def states(self) -> dict[str, Quantity]:
-        top = max(self.F_extend) * 1.3
+        top = 1.3 * max(self.value("F_extend") or (math.inf,))
         return {
             "F_e": Quantity("chamber/extend/F", "N", 0.0, top, 100.0, doc="extend chamber"),
             "F_r": Quantity("chamber/retract/F", "N", 0.0, top, 100.0, doc="retract chamber"),
@@ -58,16 +76,16 @@ class Chamber(Effect):
 
     def rise_time(self, u: Any, x: Any, stroke: float) -> Any:
         """tau(u, x) [s], bilinear in the valve and in the chamber's own extension (eq. 5)."""
-        vent = self.vent[0] + (self.vent[1] - self.vent[0]) * x / stroke
-        fill = self.fill[0] + (self.fill[1] - self.fill[0]) * x / stroke
+        ends = self.value("vent"), self.value("fill")
+        vent, fill = (empty + (full - empty) * x / stroke for empty, full in ends)
         return vent + u * (fill - vent)
 
     def evaluate(self, at: At) -> Contribution:
         x = at.piston.x
         tau_e = at.rise_gain * self.rise_time(at.u_e, x, at.stroke)
         tau_r = at.rise_gain * self.rise_time(at.u_r, at.stroke - x, at.stroke)
-        F_static_e = at.supply_gain * at_supply(at.supply, self.pressures, self.F_extend)
-        F_static_r = at.supply_gain * at_supply(at.supply, self.pressures, self.F_retract)
+        F_static_e = at.supply_gain * at_supply(self, "F_extend", at.supply)
+        F_static_r = at.supply_gain * at_supply(self, "F_retract", at.supply)
         return Contribution(
             effort={"piston": at.F_e - at.F_r},
             rate={

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Annotated, ClassVar, Literal
 
 from kemba.effects.base import At, Contribution, Effect, Signal
-from kemba.effects.pneumatics.constants import AREA_E, AREA_R
 from kemba.quantity import Param, Quantity
 
 
@@ -53,13 +52,14 @@ class CrossLeak(Effect):
 
     family: ClassVar[str] = "air"
     equation: ClassVar[str] = "p = F_e/A_e - F_r/A_r; dF_e/dt -= k p A_e, dF_r/dt += k p A_r"
-    source: ClassVar[str] = "leak past a worn piston seal; bore 25 mm, rod 10 mm (data sheet)"
+    source: ClassVar[str] = "leak past a worn piston seal; areas from bore and rod"
     ports: ClassVar[tuple[str, ...]] = ("piston",)
     off: ClassVar[dict[str, float]] = {"k": 0.0}
 
     def evaluate(self, at: At) -> Contribution:
-        p = at.F_e / AREA_E - at.F_r / AREA_R
-        return Contribution(add_rate={"F_e": -self.k * p * AREA_E, "F_r": self.k * p * AREA_R})
+        A_e, A_r = at.cylinder.area_extend, at.cylinder.area_retract
+        p = at.F_e / A_e - at.F_r / A_r
+        return Contribution(add_rate={"F_e": -self.k * p * A_e, "F_r": self.k * p * A_r})
 
 
 class BothModeLoss(Effect):

@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+
+from typing_extensions import Self
 
 from kemba.effects.base import At, Contribution, Effect
-from kemba.effects.pneumatics.chamber import TABLE_PRESSURES, Pascal, at_supply
-from kemba.effects.pneumatics.constants import AREA_E, AREA_R, ATMOSPHERE, GAS, KAPPA, TEMPERATURE
+from kemba.effects.pneumatics.chamber import OF_A_KIND, Pascal
+from kemba.effects.pneumatics.constants import ATMOSPHERE, GAS, KAPPA, TEMPERATURE
 from kemba.effects.pneumatics.flow import CHOKED, mass_flow, phi
-from kemba.quantity import Param, Quantity
+from kemba.effects.pneumatics.tables import at_supply, beyond, filled
+from kemba.quantity import Param, Quantity, Tolerance
+
+if TYPE_CHECKING:
+    from kemba.mechanism import Cylinder
 
 Area = Annotated[float, Param("m2", 1e-6, lower=0.0, doc="effective orifice area")]
-Volume = Annotated[float, Param("m3", 3e-6, lower=1e-7, doc="tubing and ports")]
+Volume = Annotated[float | None, Param("m3", 3e-6, lower=1e-7, doc="tubing and ports")]
 
 
 class OrificeChamber(Effect):
@@ -20,16 +26,17 @@ class OrificeChamber(Effect):
 
     Eq. 1 is printed with a plus before dV/dt; compression raises the pressure, so it is a minus
     here. `gauge` is what reaches the valves at the supply pressures `pressures`, above the
-    atmosphere; dead volumes are at x = 0 and at full stroke. The flow is eq. 2 and 3.
+    atmosphere. Dead volumes `V_e`, `V_r` are at x = 0 and at full stroke, unless given that of the
+    cylinder's tubes; its areas are A_e and A_r. The flow is eq. 2 and 3.
     """
 
     kind: Literal["orifice_chamber"] = "orifice_chamber"
     a_fill: Area = 4.63e-6
     a_vent: Area = 3.99e-6
-    V_e: Volume = 14.3e-6
-    V_r: Volume = 15.0e-6
+    V_e: Volume = None
+    V_r: Volume = None
     n: Annotated[float, Param("1", 0.1, lower=1.0, upper=KAPPA, doc="polytropic exponent")] = 1.27
-    pressures: tuple[Pascal, ...] = TABLE_PRESSURES
+    pressures: tuple[Pascal, ...] = (0.6e6, 0.7e6, 0.8e6)
     gauge: tuple[Pascal, ...] = (0.572e6, 0.634e6, 0.696e6)
 
     family: ClassVar[str] = "air"
@@ -46,6 +53,16 @@ class OrificeChamber(Effect):
     )
     carried_by: ClassVar[dict[str, str]] = {"F_e": "P_e", "F_r": "P_r"}
     replaces: ClassVar[tuple[str, ...]] = ("chamber", "mode_damping")
+    nominal: ClassVar[dict[str, Tolerance]] = dict.fromkeys(
+        ("gauge", "a_fill", "a_vent", "V_e", "V_r"), OF_A_KIND
+    )
+
+    def of_cylinder(self, cylinder: Cylinder) -> Self:
+        open_ = {name: cylinder.tube for name in ("V_e", "V_r") if getattr(self, name) is None}
+        return filled(self.model_copy(update=open_), cylinder, (), ("gauge",))
+
+    def remarks(self, supply: float) -> list[str]:
+        return beyond(self, supply, ("gauge",))
 
     def states(self) -> dict[str, Quantity]:
         low, high, size = 1e4, 3e6, 2e5
@@ -69,26 +86,27 @@ class OrificeChamber(Effect):
 
     def evaluate(self, at: At) -> Contribution:
         x, v = at.piston.x, at.piston.v
-        V_e, V_r = self.V_e + AREA_E * x, self.V_r + AREA_R * (at.stroke - x)
-        full = at.supply_gain * at_supply(at.supply, self.pressures, self.gauge)
+        A_e, A_r = at.cylinder.area_extend, at.cylinder.area_retract
+        V_e, V_r = self.value("V_e") + A_e * x, self.value("V_r") + A_r * (at.stroke - x)
+        full = at.supply_gain * at_supply(self, "gauge", at.supply)
         P_s = ATMOSPHERE + at.droop * full
         a_fill, a_vent = self.a_fill / at.rise_gain, self.a_vent / at.rise_gain
         draw_e = at.u_e * mass_flow(a_fill, P_s, at.P_e)
         draw_r = at.u_r * mass_flow(a_fill, P_s, at.P_r)
         vent_e = (1 - at.u_e) * mass_flow(a_vent, at.P_e, ATMOSPHERE)
         vent_r = (1 - at.u_r) * mass_flow(a_vent, at.P_r, ATMOSPHERE)
-        F_e, F_r = AREA_E * (at.P_e - ATMOSPHERE), AREA_R * (at.P_r - ATMOSPHERE)
+        F_e, F_r = A_e * (at.P_e - ATMOSPHERE), A_r * (at.P_r - ATMOSPHERE)
         return Contribution(
             effort={"piston": F_e - F_r},
             rate={
-                "P_e": self.rate(at.P_e, V_e, AREA_E * v, draw_e - vent_e),
-                "P_r": self.rate(at.P_r, V_r, -AREA_R * v, draw_r - vent_r),
+                "P_e": self.rate(at.P_e, V_e, A_e * v, draw_e - vent_e),
+                "P_r": self.rate(at.P_r, V_r, -A_r * v, draw_r - vent_r),
             },
             publish={
                 "F_e": F_e,
                 "F_r": F_r,
-                "F_static_e": AREA_E * full,
-                "F_static_r": AREA_R * full,
+                "F_static_e": A_e * full,
+                "F_static_r": A_r * full,
                 "tau_e": self.filling_time(V_e, full, at.rise_gain),
                 "tau_r": self.filling_time(V_r, full, at.rise_gain),
                 "draw_e": draw_e,

@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import Annotated, Any, ClassVar, Literal
 
 from kemba.effects.base import At, Contribution, Effect, Signal
+from kemba.effects.pneumatics.chamber import OF_A_KIND
 from kemba.effects.pneumatics.constants import ATMOSPHERE, GAS, KAPPA, TEMPERATURE
 from kemba.effects.pneumatics.flow import mass_flow
-from kemba.quantity import Param, Quantity
+from kemba.quantity import Param, Quantity, Tolerance
 
 
 class SupplyLine(Effect):
@@ -29,6 +30,8 @@ class SupplyLine(Effect):
         "dP_tank/dt = -kappa R T a phi(P_tank, P)/V_tank; P_s = P"
     )
     source: ClassVar[str] = "paper II-A (100 L tank), eq. 1-3; hose of 3 m, 8 mm assumed"
+
+    nominal: ClassVar[dict[str, Tolerance]] = dict.fromkeys(("a", "V"), OF_A_KIND)
 
     def states(self) -> dict[str, Quantity]:
         return {

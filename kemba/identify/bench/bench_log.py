@@ -9,21 +9,55 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from kemba.effects.mechanics.friction import V_COULOMB
+from kemba.effects.pneumatics.switching import pulses
 from kemba.identify.bench.motion import SmoothedMotion, smooth_motion
 from kemba.identify.bench.rig_model import Pulses
-from kemba.identify.bench.switching import pulses
-from kemba.identify.evidence.noise import difference_sigma
-from kemba.identify.evidence.problem import Array, Flags
 from kemba.identify.logs.excerpt import held
+from kemba.identify.problem.noise import difference_sigma
+from kemba.identify.problem.problem import Array, Flags
+from kemba.settings import BY_HAND, Settings, setting
 from kemba.trajectory import Trajectory
 
 PRESSURES = ("chamber/extend/P", "chamber/retract/P")
-FINEST_FORCE, FINEST_PRESSURE = 0.2, 100.0  # N, Pa: noise that is never undercut
-GAP, FORGET = 0.012, 0.12  # s
-NEIGHBOURS = 9  # samples over which the worst error of the velocity counts
-# usual figures of a cylinder of this size: N.s.m-1, N; and what friction adds below CREEP m.s-1
-DAMPING, FRICTION = 60.0, 10.0
-CREEPING, CREEP = 200.0, 0.08
+
+
+class BenchLogSettings(Settings):
+    """How a bench log is prepared."""
+
+    finest_force: float = setting(0.2, "N", "smallest noise of the force sensor", BY_HAND)
+    finest_pressure: float = setting(100.0, "Pa", "smallest noise of a pressure sensor", BY_HAND)
+    finest_share: float = setting(
+        5e-4, "1", "noise that is added, as a share of a channel's range", BY_HAND
+    )
+    gap: float = setting(
+        0.012, "s", "longest gap of the position that is bridged", BY_HAND, decides=True
+    )
+    forget: float = setting(
+        0.12,
+        "s",
+        "time after which chambers do not depend on the moment of a switching",
+        "derived: three times the slowest rise time of Table I",
+    )
+    neighbours: int = setting(
+        9, "1", "samples over which the largest error of the velocity counts", BY_HAND
+    )
+    damping: float = setting(
+        60.0,
+        "N.s.m-1",
+        "usual damping, by which an error of the velocity makes one of the force",
+        BY_HAND,
+    )
+    friction: float = setting(
+        10.0,
+        "N",
+        "usual friction of a cylinder, in doubt where the direction of motion is in doubt",
+        "derived: the tables of the paper imply 6 to 8 N",
+        decides=True,
+    )
+    creeping: float = setting(
+        200.0, "N.s.m-1", "slope of friction over speed, in addition, at low speed", BY_HAND
+    )
+    creep: float = setting(0.08, "m.s-1", "speed up to which this slope holds", BY_HAND)
 
 
 @dataclass(frozen=True)
@@ -42,10 +76,11 @@ class BenchLog:
     def blunt(self) -> Array:
         """Force error (n,) [N] that the error of the velocity makes: damping, and a friction of
         usual size where the direction of motion is in doubt. Alike for every hypothesis."""
-        v, sigma = self.motion.v, maximum_filter1d(self.motion.v_sigma, NEIGHBOURS)
+        usual = BenchLogSettings.current()
+        v, sigma = self.motion.v, maximum_filter1d(self.motion.v_sigma, usual.neighbours)
         high, low = np.tanh((v + 2 * sigma) / V_COULOMB), np.tanh((v - 2 * sigma) / V_COULOMB)
-        slope = DAMPING + CREEPING * np.exp(-((v / CREEP) ** 2))
-        return np.asarray(slope * self.motion.v_sigma + 0.5 * FRICTION * (high - low))
+        slope = usual.damping + usual.creeping * np.exp(-((v / usual.creep) ** 2))
+        return np.asarray(slope * self.motion.v_sigma + 0.5 * usual.friction * (high - low))
 
 
 def prepare(name: str, log: Trajectory) -> BenchLog:
@@ -63,20 +98,25 @@ def prepare(name: str, log: Trajectory) -> BenchLog:
 
 
 def noise_of(channel: str, y: Array) -> float:
-    """White noise per sample; a simulation without any is still no better than its own steps."""
-    least = FINEST_FORCE if channel == "piston/F" else FINEST_PRESSURE
+    """White noise per sample; a small least noise is added, also for simulated logs without any."""
+    settings = BenchLogSettings.current()
+    least = settings.finest_force if channel == "piston/F" else settings.finest_pressure
     spread = float(np.ptp(y[np.isfinite(y)]))
-    return max(difference_sigma(y), least + 5e-4 * spread)
+    return max(difference_sigma(y), least + settings.finest_share * spread)
 
 
 def blind(time: Array, good: Flags, sent: Array) -> Flags:
-    """Rows (n,) in and just after gaps of the position, and of the time itself; when a valve has
-    switched meanwhile, until the chambers have forgotten when."""
+    """Rows (n,) that cannot be predicted: in and just after gaps of the position and of the time.
+
+    Where a valve switched within a gap, the moment is not known. The rows after such a gap count
+    again when the chambers no longer depend on that moment.
+    """
+    settings = BenchLogSettings.current()
     known = np.flatnonzero(good)
-    wide = np.flatnonzero(np.diff(time[known]) > GAP)
+    wide = np.flatnonzero(np.diff(time[known]) > settings.gap)
     hidden = np.zeros(len(time), dtype=bool)
     for begin, end in zip(known[wide], known[wide + 1], strict=True):
         switched = np.any(sent[:, begin] != sent[:, end])
-        after = time[end] + (FORGET if switched else GAP)
+        after = time[end] + (settings.forget if switched else settings.gap)
         hidden |= (time > time[begin]) & (time < after)
     return hidden

@@ -2,71 +2,74 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
 import numpy as np
 
-from kemba.identify.bench.bench_log import FRICTION
+from kemba.identify.bench.bench_log import BenchLogSettings
 from kemba.identify.bench.formulas import features, terms
-from kemba.identify.bench.prediction import true_motion
+from kemba.identify.bench.predicted import PredictedLogs
 from kemba.identify.evidence.linear import within
-from kemba.identify.evidence.problem import Array, Theta
-from kemba.identify.evidence.spike_slab import SPIKE_WIDTH
-
-if TYPE_CHECKING:
-    from kemba.identify.bench.problem import BenchProblem
-
-PEAK = 99.5  # per cent of the rows below which a force counts as its largest
+from kemba.identify.evidence.spike_slab import SpikeSlabSettings
+from kemba.identify.problem.types import Array, Candidate, Leftover, Theta
+from kemba.settings import BY_HAND, Settings, setting
 
 
-def formula_columns(problem: BenchProblem, theta: Theta) -> dict[str, Array]:
-    """Columns (n,) by formula, per unit of its coefficient."""
+class BenchFormulaSettings(Settings):
+    """What counts as the largest force of a formula."""
+
+    peak: float = setting(99.5, "%", "percentile of the rows that is taken as the largest", BY_HAND)
+
+
+def formula_columns(predicted: PredictedLogs, theta: Theta) -> tuple[tuple[str, ...], Array]:
+    """Formulas, and their columns (n, k) of the residual, not whitened, per unit of coefficient."""
     parts: dict[str, list[Array]] = {}
-    for i, run in enumerate(problem.logs):
-        predicted = problem.predict(theta, i)
-        found = _terms(problem, theta, i)
-        for channel, (_, variance) in predicted.items():
-            keep = run.keep[channel]
-            for formula, force in found.items():
+    for i, log in enumerate(predicted.logs):
+        forces = _forces(predicted, theta, i)
+        for channel, (_, variance) in predicted.readings(theta, i).items():
+            keep = log.keep[channel]
+            for formula, force in forces.items():
                 column = force if channel == "piston/F" else np.zeros(len(force))
                 parts.setdefault(formula, []).append((column / np.sqrt(variance))[keep])
-    columns = np.stack([np.concatenate(p) for p in parts.values()], axis=1)
-    return dict(zip(parts, problem.whiten(columns).T, strict=True))
+    return tuple(parts), np.stack([np.concatenate(p) for p in parts.values()], axis=1)
 
 
-def weight(problem: BenchProblem, theta: Theta, formula: str, coefficient: float) -> float:
+def weight(predicted: PredictedLogs, theta: Theta, formula: str, coefficient: float) -> float:
     """Largest force of a formula as a share of what matters in practice."""
-    forces = (_terms(problem, theta, i)[formula] for i in range(len(problem.logs)))
-    peak = max(float(np.percentile(np.abs(force), PEAK)) for force in forces)
-    return abs(coefficient) * peak / FRICTION
+    forces = (_forces(predicted, theta, i)[formula] for i in range(len(predicted.logs)))
+    percent = BenchFormulaSettings.current().peak
+    peak = max(float(np.percentile(np.abs(force), percent)) for force in forces)
+    return abs(coefficient) * peak / BenchLogSettings.current().friction
 
 
-def leftover(problem: BenchProblem, theta: Theta) -> tuple[Array, Array, Array]:
-    """Force residual over its noise and over what every model leaves (n,), what it may depend
-    on (n, m), and run (n,)."""
+def leftover(
+    predicted: PredictedLogs, theta: Theta, candidates: Mapping[str, Candidate]
+) -> Leftover:
+    """Force residual over its noise and over what every model leaves, and what it may depend on."""
     parts = []
-    for i, run in enumerate(problem.logs):
-        keep = run.keep["piston/F"]
-        r = problem.standardised(theta, i)["piston/F"] / _imperfection(problem, i)
-        u = problem.predictor.acting(run, theta)
-        seen = features(true_motion(run.motion, theta), u)[keep]
-        parts.append((r, seen, np.full(len(r), i)))
-    residual, columns, index = (np.concatenate(p) for p in zip(*parts, strict=True))
-    return residual, columns, index
+    for i, log in enumerate(predicted.logs):
+        spread = _imperfection(predicted, i, candidates)
+        r = predicted.standardised(theta, i)["piston/F"] / spread
+        seen = features(predicted.motion(theta, i), predicted.acting(theta, i), predicted.stroke)
+        parts.append((r, seen[log.keep["piston/F"]], np.full(len(r), i)))
+    residual, columns, run = (np.concatenate(p) for p in zip(*parts, strict=True))
+    return Leftover(residual, columns, run)
 
 
-def _terms(problem: BenchProblem, theta: Theta, index: int) -> dict[str, Array]:
-    run = problem.logs[index]
-    return dict(terms(true_motion(run.motion, theta), problem.predictor.acting(run, theta)))
+def _forces(predicted: PredictedLogs, theta: Theta, index: int) -> dict[str, Array]:
+    """Formula -> force (n,) per unit of its coefficient along one log."""
+    motion, acting = predicted.motion(theta, index), predicted.acting(theta, index)
+    return dict(terms(motion, acting, predicted.stroke))
 
 
-def _imperfection(problem: BenchProblem, index: int) -> Array:
+def _imperfection(
+    predicted: PredictedLogs, index: int, candidates: Mapping[str, Candidate]
+) -> Array:
     """Spread (n,) of the force residual, in noise units, when every effect of the catalogue may
-    be there at floor level."""
-    base = problem.standardised({}, index)["piston/F"]
-    power = np.ones(len(base))
-    for c in problem.candidates.values():
-        small = {c.key: c.lead.off + SPIKE_WIDTH * c.lead.size}
-        there = problem.standardised(within(problem, small), index)["piston/F"]
-        power += (there - base) ** 2
+    be there with a small share of its size."""
+    base = predicted.standardised({}, index)["piston/F"]
+    power, spike = np.ones(len(base)), SpikeSlabSettings.current().spike
+    for c in candidates.values():
+        small = within(candidates, {c.key: c.lead.off + spike * c.lead.size})
+        power += (predicted.standardised(small, index)["piston/F"] - base) ** 2
     return np.asarray(np.sqrt(power))

@@ -1,4 +1,4 @@
-"""Simple force laws beyond the catalogue, by the formula that a model's YAML would hold."""
+"""Simple force terms beyond the catalogue, each with the formula that a model's YAML would hold."""
 
 from __future__ import annotations
 
@@ -9,25 +9,34 @@ from scipy.signal import lfilter
 
 from kemba.effects.mechanics.friction import V_COULOMB
 from kemba.identify.bench.motion import SmoothedMotion
-from kemba.identify.evidence.problem import Array
-
-STROKE = 0.070  # m
-RANGES = (0.003, 0.005, 0.008, 0.013, 0.02)  # m, reach of a force at an end of the stroke
-MEMORIES = (0.001, 0.006, 0.02, 0.06, 0.2)  # s
-CREEPS = (0.002, 0.006, 0.015)  # m, travel over which a hysteresis turns round
+from kemba.identify.doubt.force_terms import dahl, end_terms
+from kemba.identify.problem.problem import Array
+from kemba.settings import BY_HAND, Settings, setting
 
 
-def terms(motion: SmoothedMotion, u: Array) -> Iterator[tuple[str, Array]]:
-    """(formula, force per unit coefficient (n,)); `u` (n, 2): share of each valve being on."""
+class FormulaSettings(Settings):
+    """Constants of the simple force terms that are tried."""
+
+    memories: tuple[float, ...] = setting(
+        (0.001, 0.006, 0.02, 0.06, 0.2), "s", "times for which a switching is remembered", BY_HAND
+    )
+    creeps: tuple[float, ...] = setting(
+        (0.002, 0.006, 0.015), "m", "travel over which a hysteresis turns round", BY_HAND
+    )
+    speed: float = setting(0.3, "m.s-1", "speed by which speeds are scaled", BY_HAND)
+
+
+def terms(motion: SmoothedMotion, u: Array, stroke: float) -> Iterator[tuple[str, Array]]:
+    """(formula, force per unit coefficient (n,)); `u` (n, 2): share of each valve being on;
+    `stroke` [m]."""
+    settings = FormulaSettings.current()
     x, v, (u_e, u_r) = motion.x, motion.v, u.T
     sign = np.tanh(v / V_COULOMB)
     out, back = np.maximum(v, 0.0), np.minimum(v, 0.0)
-    for d in RANGES:
-        yield f"exp(-(x/{d:g})**2)", np.exp(-((x / d) ** 2))
-        yield f"exp(-(({STROKE:g} - x)/{d:g})**2)", np.exp(-(((STROKE - x) / d) ** 2))
-    yield f"x - {STROKE / 2:g}", x - STROKE / 2
-    yield f"(x - {STROKE / 2:g})**2", (x - STROKE / 2) ** 2
-    yield f"(x - {STROKE / 2:g})**3", (x - STROKE / 2) ** 3
+    yield from end_terms(x, stroke)
+    yield f"x - {stroke / 2:g}", x - stroke / 2
+    yield f"(x - {stroke / 2:g})**2", (x - stroke / 2) ** 2
+    yield f"(x - {stroke / 2:g})**3", (x - stroke / 2) ** 3
     yield "x*u_e", x * u_e
     yield "x*u_r", x * u_r
     yield "max(v, 0)", out
@@ -44,30 +53,19 @@ def terms(motion: SmoothedMotion, u: Array) -> Iterator[tuple[str, Array]]:
     yield "a", motion.a
     yield "u_e", u_e
     yield "u_r", u_r
-    for travel in CREEPS:
+    for travel in settings.creeps:
         yield f"dahl(x, {travel:g})", dahl(x, travel)
 
 
-def features(motion: SmoothedMotion, u: Array) -> Array:
-    """Whatever a missing force could depend on (n, m): where, how fast, and since when which
-    valve is on, each with each."""
-    step = float(np.median(np.diff(motion.time)))
-    x, v = motion.x / STROKE - 0.5, motion.v / 0.3
+def features(motion: SmoothedMotion, u: Array, stroke: float) -> Array:
+    """Quantities (n, m) that a missing force could depend on: functions of position and speed,
+    times functions of how long ago each valve was on. `u` (n, 2): share of each valve being on."""
+    settings, step = FormulaSettings.current(), float(np.median(np.diff(motion.time)))
+    x, v = motion.x / stroke - 0.5, motion.v / settings.speed
     places = [np.ones(len(x)), x, x**2, v, np.abs(v), v * x, np.tanh(motion.v / V_COULOMB)]
     histories = [np.ones(len(x)), u[:, 0] * u[:, 1]]
     for valve in u.T:
-        for memory in MEMORIES:
+        for memory in settings.memories:
             keep = np.exp(-step / memory)
             histories.append(lfilter([1 - keep], [1, -keep], valve, zi=[keep * valve[0]])[0])
     return np.stack([p * h for p in places for h in histories], axis=1)
-
-
-def dahl(x: Array, travel: float) -> Array:
-    """Hysteresis: z' = (v - abs(v) z)/travel along the path x (n,), which remembers its turns."""
-    z, out = 0.0, np.empty(len(x))
-    out[0] = z
-    for i, step in enumerate(np.diff(x), start=1):
-        target = 1.0 if step > 0 else -1.0
-        z = target + (z - target) * np.exp(-abs(step) / travel)
-        out[i] = z
-    return out

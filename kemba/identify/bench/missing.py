@@ -1,7 +1,7 @@
-"""How much force a bench model lacks: the measured force less the predicted, freed of noise.
+"""How much force a bench model lacks: the measured force less the predicted one, smoothed.
 
-The missing force is a first-order lag driven by noise, as on the robot; how strong it is, is learnt
-from the log. Prior and noise make a tridiagonal system, so that long logs cost nothing.
+The missing force is a first-order lag of white noise, as on the robot; its strength is learnt from
+the log. Prior and noise make a tridiagonal system, which is fast for long logs.
 """
 
 from __future__ import annotations
@@ -9,28 +9,35 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import cholesky_banded, solveh_banded
 
-from kemba.identify.bench.problem import BenchProblem
-from kemba.identify.compare.missing_force import Missing
-from kemba.identify.evidence.problem import Array, Theta
+from kemba.identify.bench.predicted import PredictedLogs
+from kemba.identify.problem.types import Array, MissingForce, Theta
+from kemba.settings import BY_HAND, Settings, setting
 
-MEMORY = 0.025  # s, of the missing force
-ROUNDS = 20
-BEGIN, NEGLIGIBLE = 5.0, 0.05  # N, 1 sigma
 FORCE = "piston/F"
 
 
+class BenchMissingSettings(Settings):
+    """The missing force of a bench log."""
+
+    memory: float = setting(0.025, "s", "correlation time of the missing force", BY_HAND)
+    rounds: int = setting(20, "1", "rounds in which its strength is learnt", BY_HAND)
+    begin: float = setting(5.0, "N", "strength (1 sigma) with which learning begins", BY_HAND)
+    negligible: float = setting(0.05, "N", "strength that is as good as none", BY_HAND)
+
+
 def bench_missing(
-    problem: BenchProblem, theta: Theta | None = None, strength: Array | None = None
-) -> list[Missing]:
-    """d(t) per run: the force on the rod, with its band."""
+    predicted: PredictedLogs, theta: Theta, strength: Array | None = None
+) -> list[MissingForce]:
+    """d(t) [N] per run: the force on the rod, with its band; `strength` (1,) [N], learnt when not
+    given."""
     found = []
-    for i, run in enumerate(problem.logs):
-        predicted, variance = problem.predict(theta or {}, i)[FORCE]
-        keep = run.keep[FORCE]
-        time, gap = run.motion.time[keep], (run.measured[FORCE] - predicted)[keep]
+    for i, log in enumerate(predicted.logs):
+        expected, variance = predicted.readings(theta, i)[FORCE]
+        keep = log.keep[FORCE]
+        time, gap = log.motion.time[keep], (log.measured[FORCE] - expected)[keep]
         known = None if strength is None else float(strength[0])
         force, sigma, used = lagged(time, gap, variance[keep], known)
-        found.append(Missing(run.name, time, (FORCE,), ("N",), force[:, None], sigma[:, None],
+        found.append(MissingForce(log.name, time, (FORCE,), ("N",), force[:, None], sigma[:, None],
                              np.array([used])))  # fmt: skip
     return found
 
@@ -38,22 +45,29 @@ def bench_missing(
 def lagged(
     time: Array, gap: Array, variance: Array, known: float | None = None
 ) -> tuple[Array, Array, float]:
-    """(estimate, 1 sigma), both (n,), and strength of a lag seen as `gap` (n,) in white noise of
-    `variance` (n,); its strength is learnt unless it is `known`."""
-    keep = np.exp(-np.diff(time) / MEMORY)
-    strength = known or BEGIN
-    for _ in range(1 if known else ROUNDS):
+    """Estimate (n,) and 1 sigma (n,) of a first-order lag, and its strength.
+
+    `time` (n,) [s]; `gap` (n,): the lag plus white noise of `variance` (n,). The strength (1 sigma
+    of the lag) is learnt unless it is `known`.
+    """
+    settings = BenchMissingSettings.current()
+    keep = np.exp(-np.diff(time) / settings.memory)
+    strength = known or settings.begin
+    for _ in range(1 if known else settings.rounds):
         used = strength
         bands = _precision(keep, strength)
         bands[1] += 1.0 / variance
         mean = solveh_banded(bands, gap / variance)
         spread = _inverse_diagonal(bands)
-        strength = max(float(np.sqrt(np.mean(mean**2 + spread))), NEGLIGIBLE)
+        strength = max(float(np.sqrt(np.mean(mean**2 + spread))), settings.negligible)
     return np.asarray(mean), np.sqrt(spread), used
 
 
 def _precision(keep: Array, strength: float) -> Array:
-    """Inverse covariance of the lag: upper bands (2, n), the diagonal below."""
+    """Inverse covariance of the lag as bands (2, n): the upper one, then the diagonal.
+
+    `keep` (n - 1,): share of the lag that is left after each step.
+    """
     driven = strength**2 * np.maximum(1.0 - keep**2, 1e-12)
     bands = np.zeros((2, len(keep) + 1))
     bands[1, 0] = 1.0 / strength**2

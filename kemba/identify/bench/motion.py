@@ -7,11 +7,29 @@ from functools import lru_cache
 
 import numpy as np
 
-from kemba.identify.evidence.noise import difference_sigma
-from kemba.identify.evidence.problem import Array
+from kemba.identify.problem.noise import difference_sigma
+from kemba.identify.problem.problem import Array
+from kemba.settings import BY_HAND, Settings, setting
 
-FINEST = 2e-6  # m, noise that is never undercut
-HALF_WIDTHS = (5, 8, 11, 15, 20, 27, 40, 60, 90, 135)  # samples
+
+class MotionSettings(Settings):
+    """How the velocity of an imposed motion is found."""
+
+    finest: float = setting(2e-6, "m", "smallest noise of the position sensor", BY_HAND)
+    half_widths: tuple[int, ...] = setting(
+        (5, 8, 11, 15, 20, 27, 40, 60, 90, 135),
+        "1",
+        "half widths, in samples, of the windows that are tried",
+        "convention: each about 1.4 times the one before",
+    )
+    measured: float = setting(
+        0.5, "1", "share of valid readings that a measured velocity needs", BY_HAND
+    )
+    width: int = setting(6, "1", "half width, in samples, of its smoothing", BY_HAND)
+    finest_speed: float = setting(1e-6, "m.s-1", "smallest noise of a velocity sensor", BY_HAND)
+    contradicts: float = setting(
+        3.0, "1", "sigmas by which a measured velocity may differ", "convention: three sigmas"
+    )
 
 
 @dataclass(frozen=True)
@@ -32,15 +50,15 @@ def smooth_motion(time: Array, x: Array, v: Array | None = None) -> SmoothedMoti
     At rest the window is wide, so that noise does not look like creeping; in fast motion it is
     narrow, so that the velocity is not blunted. `v` [m.s-1], when measured, is weighed in.
     """
-    good = np.isfinite(x)
+    settings, good = MotionSettings.current(), np.isfinite(x)
     step = float(np.median(np.diff(time)))
     count = max(int(np.ceil((time[-1] - time[0]) / step)) + 1, 8)
     grid = np.linspace(time[0], time[-1], count)
     step = float(grid[1] - grid[0])
     values = np.interp(grid, time[good], x[good])
-    sigma = max(difference_sigma(x[good]), FINEST)
+    sigma = max(difference_sigma(x[good]), settings.finest)
     position, rate, spread, half = _adaptive(values, sigma, step)
-    if v is not None and np.isfinite(v).sum() > 0.5 * len(v):
+    if v is not None and np.isfinite(v).sum() > settings.measured * len(v):
         rate, spread = _weigh_in(grid, rate, spread, half, time, v)
     a = np.gradient(_mean(rate, 3), step)
     x, v, a, spread = (np.interp(time, grid, c) for c in (position, rate, a, spread))
@@ -56,7 +74,7 @@ def _adaptive(values: Array, sigma: float, step: float) -> tuple[Array, Array, A
     n = len(values)
     best = np.full(n, np.inf)
     position, rate, half = values.copy(), np.zeros(n), np.zeros(n)
-    for width in HALF_WIDTHS:
+    for width in MotionSettings.current().half_widths:
         if 2 * width + 1 > n:
             break
         x, v, gain = _local_fit(values, width, step, 3)
@@ -107,14 +125,14 @@ def _weigh_in(
     grid: Array, rate: Array, spread: Array, half: Array, time: Array, v: Array
 ) -> tuple[Array, Array]:
     """The measured velocity joined to the derived one, unless the two contradict each other."""
-    good = np.isfinite(v)
+    settings, good = MotionSettings.current(), np.isfinite(v)
     measured = np.interp(grid, time[good], v[good])
-    sigma = max(difference_sigma(v[good]), 1e-6)
-    width = 6
+    sigma = max(difference_sigma(v[good]), settings.finest_speed)
+    width = settings.width
     smoothed = _mean(measured, width)
     sd = np.full(len(grid), sigma / np.sqrt(2 * width + 1))
     gap = np.median(np.abs(smoothed - rate) / np.hypot(sd, spread))
-    if gap > 3.0:
+    if gap > settings.contradicts:
         return rate, spread
     weight = spread**2 / (spread**2 + sd**2)
     return rate + weight * (smoothed - rate), np.sqrt(weight) * sd

@@ -2,219 +2,233 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
-from dataclasses import replace
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from copy import copy
 from functools import cached_property
 
 import numpy as np
+from typing_extensions import Self
 
-from kemba.identify.bench.bench_log import BenchLog
+from kemba.identify.bench.bench_log import BenchLog, prepare
 from kemba.identify.bench.beyond import formula_columns, leftover, weight
+from kemba.identify.bench.missing import bench_missing
 from kemba.identify.bench.operating_point import (
-    Switchings,
+    bench_force_channel,
     bench_operating_point,
-    bench_port,
     switchings,
 )
+from kemba.identify.bench.predicted import PredictedLogs, settle_starts
 from kemba.identify.bench.prediction import Predictor
 from kemba.identify.bench.validate import contradictions
-from kemba.identify.compare.force_profiles import ForceChannel
-from kemba.identify.evidence.candidates import effect_candidates, sensor_candidates
-from kemba.identify.evidence.noise import Colour, learn, whiten
-from kemba.identify.evidence.operating_point import OperatingPoint
-from kemba.identify.evidence.problem import Array, Rows, Theta, secant_jacobian
 from kemba.identify.logs.gate import BadData
+from kemba.identify.problem.candidates import effect_candidates, sensor_candidates
+from kemba.identify.problem.noise import Colour, learn, whiten
+from kemba.identify.problem.problem import Problem
+from kemba.identify.problem.types import (
+    Array,
+    Changes,
+    ForceChannel,
+    Leftover,
+    MissingForce,
+    OperatingPoint,
+    Rows,
+    Theta,
+)
 from kemba.model.model import Model
-
-EARLY = 0.08  # s that tell whether a valve had just been switched when a log begins
-REMEASURED = 0.1  # what an earlier discovery put on the model's list is known less well
-JITTER = 0.02  # nominal figures are off by 1-3 %
+from kemba.settings import BY_HAND, Settings, setting
+from kemba.trajectory import Trajectory
 
 
-class BenchProblem:
-    """Residuals of bench runs; effects join the model's list when theta switches them on."""
+class BenchProblemSettings(Settings):
+    """How well pressure sensors are known, and what counts as a change and as rest."""
+
+    pressure_zero: float = setting(
+        2e5,
+        "Pa",
+        "prior sigma of the bias of a pressure sensor",
+        "convention: two atmospheres; its zero is the atmosphere's or that of a vacuum",
+    )
+    pressure_gain: float = setting(
+        0.02,
+        "1",
+        "prior sigma of the scale error of a pressure sensor",
+        "convention: nominal figures are off by 1 to 3 %",
+        decides=True,
+    )
+    step: float = setting(
+        0.1, "1", "step of finite differences of a start, as a share of the state's scale", BY_HAND
+    )
+    rest: float = setting(2e-3, "m.s-1", "speed below which the piston rests", BY_HAND)
+
+
+class BenchProblem(Problem):
+    """Residuals of bench runs; effects join the model's list when theta switches them on.
+
+    `colour`: noise colour by run and channel; without any, residuals are not whitened.
+    """
+
+    learns_colour = True
 
     def __init__(self, runs: Iterable[BenchLog], model: Model, sensors: bool = True) -> None:
-        self._runs = list(runs)
+        logs = tuple(runs)
         self.model = model
-        self.runs = tuple(run.name for run in self._runs)
+        self.runs = tuple(log.name for log in logs)
         self.candidates = effect_candidates(model)
         if sensors:
-            self.candidates |= sensor_candidates(self._sensor_sigmas())
-        self.predictor = Predictor(model, self.candidates)
-        self.nuisance = {
-            name: (1.0, REMEASURED if _found(model, name) else JITTER)
-            for name in self.predictor.figures
-        }
-        self._starts = {
-            f"start:{name}[{i}]": (i, name)
-            for i in range(len(self._runs))
-            for name in self.predictor.rig({}).state_names
-        }
-        for key, (_, name) in self._starts.items():
+            self.candidates |= sensor_candidates(_sensor_sigmas(logs), model)
+        predictor = Predictor(model, self.candidates)
+        states = predictor.rig({}).state_names
+        starts = {f"start:{name}[{i}]": (i, name) for i in range(len(logs)) for name in states}
+        self.predicted = PredictedLogs(settle_starts(logs, predictor), predictor, starts)
+        self.nuisance = predictor.figures | predictor.sensors.nuisance
+        self._state_scale = {q.name: q.scale for q in model.states.values()}
+        for key, (_, name) in starts.items():
             self.nuisance[key] = (0.0, self._state_scale[name])
+        known = BenchProblemSettings.current()
         for channel in self.channels[1:]:
-            self.nuisance[f"offset:{channel}"] = (0.0, 2e5)
-            self.nuisance[f"gain:{channel}"] = (1.0, JITTER)
-        self.colour: dict[tuple[int, int], Colour] = {}
-        self._settle_starts()
+            self.nuisance[f"sensor_bias:{channel}.b"] = (0.0, known.pressure_zero)
+            self.nuisance[f"sensor_scale:{channel}.k"] = (0.0, known.pressure_gain)
+        self.colour: Mapping[tuple[int, int], Colour] = {}
 
     @property
     def logs(self) -> tuple[BenchLog, ...]:
         """The prepared logs, in the order of `runs`."""
-        return tuple(self._runs)
+        return self.predicted.logs
 
     @cached_property
     def channels(self) -> tuple[str, ...]:
-        return tuple(dict.fromkeys(c for run in self._runs for c in run.measured))
-
-    @cached_property
-    def _state_scale(self) -> dict[str, float]:
-        return {q.name: q.scale for q in self.model.states.values()}
-
-    def _sensor_sigmas(self) -> dict[str, float]:
-        force = float(np.median([run.sigma["piston/F"] for run in self._runs]))
-        position = float(np.median([run.motion.x_sigma for run in self._runs]))
-        return {"piston/F": force, "piston/x": position}
-
-    def predict(self, theta: Theta, index: int) -> dict[str, tuple[Array, Array]]:
-        """Per channel of run `index`: what should have been measured, and its variance."""
-        start = {name: theta.get(key, 0.0) for key, (i, name) in self._starts.items() if i == index}
-        return self.predictor.readings(self._runs[index], theta, start)
+        return tuple(dict.fromkeys(c for log in self.logs for c in log.measured))
 
     def residual(self, theta: Theta, runs: Collection[int] | None = None) -> Array:
         parts = []
-        for i in range(len(self._runs)) if runs is None else runs:
-            for channel, r in self.standardised(theta, i).items():
+        for i in range(len(self.logs)) if runs is None else runs:
+            for channel, r in self.predicted.standardised(theta, i).items():
                 colour = self.colour.get((i, self.channels.index(channel)))
                 parts.append(r if colour is None else whiten(r, colour))
         return np.concatenate(parts)
 
-    def standardised(self, theta: Theta, index: int) -> dict[str, Array]:
-        """Per channel (predicted - measured) / sigma of run `index`, before whitening."""
-        run = self._runs[index]
-        return {
-            c: ((y - run.measured[c]) / np.sqrt(variance))[run.keep[c]]
-            for c, (y, variance) in self.predict(theta, index).items()
-        }
-
     def jacobian(
         self, theta: Theta, names: Iterable[str], runs: Collection[int] | None = None
     ) -> Array:
+        """Secants (n, k); the start of a log moves its own rows only."""
         names = list(names)
-        plain = [n for n in names if n not in self._starts]
-        columns = dict(zip(plain, secant_jacobian(self, theta, plain, runs).T, strict=True))
-        columns |= self._start_columns(theta, [n for n in names if n in self._starts], runs)
+        starts = self.predicted.starts
+        plain = [n for n in names if n not in starts]
+        columns = dict(zip(plain, super().jacobian(theta, plain, runs).T, strict=True))
+        columns |= self._start_columns(theta, [n for n in names if n in starts], runs)
         return np.stack([columns[n] for n in names], axis=1)
 
     def _start_columns(
         self, theta: Theta, names: list[str], runs: Collection[int] | None
     ) -> dict[str, Array]:
-        """Columns of the initial states: each moves its own run only."""
+        """Columns (n,) of the initial states: one evaluation moves the starts of all runs."""
         if not names:
             return {}
+        starts, share = self.predicted.starts, BenchProblemSettings.current().step
         at = self.rows(runs).run
         base = self.residual(theta, runs)
         columns: dict[str, Array] = {}
-        for state in {self._starts[n][1] for n in names}:
-            own = {n: self._starts[n][0] for n in names if self._starts[n][1] == state}
-            step = {n: theta.get(n, 0.0) + 0.1 * self._state_scale[state] for n in own}
+        for state in {starts[n][1] for n in names}:
+            own = {n: starts[n][0] for n in names if starts[n][1] == state}
+            step = {n: theta.get(n, 0.0) + share * self._state_scale[state] for n in own}
             change = self.residual({**theta, **step}, runs) - base
-            slope = change / (0.1 * self._state_scale[state])
+            slope = change / (share * self._state_scale[state])
             columns |= {n: np.where(at == i, slope, 0.0) for n, i in own.items()}
         return columns
 
     def rows(self, runs: Collection[int] | None = None) -> Rows:
+        rest = BenchProblemSettings.current().rest
         parts: list[tuple[np.ndarray, ...]] = []
-        for i in range(len(self._runs)) if runs is None else runs:
-            run = self._runs[i]
-            for c in run.measured:
-                keep = run.keep[c]
+        for i in range(len(self.logs)) if runs is None else runs:
+            log = self.logs[i]
+            for c in log.measured:
+                keep = log.keep[c]
                 n, k = int(keep.sum()), self.channels.index(c)
-                label = np.where(np.abs(run.motion.v[keep]) < 2e-3, "rest", "moving")
-                one = (np.full(n, i), np.full(n, k), run.motion.time[keep], label, run.mode[keep])
-                parts.append((*one, np.full(n, run.sigma[c])))
-        run_, channel, time, phase, mode, sigma = (
+                label = np.where(np.abs(log.motion.v[keep]) < rest, "rest", "moving")
+                one = (np.full(n, i), np.full(n, k), log.motion.time[keep], label, log.mode[keep])
+                parts.append((*one, np.full(n, log.sigma[c])))
+        run, channel, time, phase, mode, sigma = (
             np.concatenate(p) for p in zip(*parts, strict=True)
         )
-        return Rows(run_, channel, time, phase, mode, self.channels, sigma)
+        return Rows(run, channel, time, phase, mode, self.channels, sigma)
 
     def operating_point(self) -> OperatingPoint:
         """The piston at every row."""
-        return bench_operating_point(self)
+        return bench_operating_point(self.predicted, self.model.mechanism.stroke)
 
-    def commands(self) -> list[Switchings]:
+    def commands(self) -> Sequence[Changes]:
         """Per run: valve -> instants and signs of its switchings."""
-        return [switchings(run) for run in self._runs]
+        return [switchings(log) for log in self.logs]
 
-    def ports(self) -> list[ForceChannel]:
+    def force_channels(self) -> list[ForceChannel]:
         """Where a force may be missing: on the rod."""
-        return [bench_port(self)]
+        return [bench_force_channel(self.predicted, self.rows(), self.operating_point())]
+
+    def missing_force(
+        self, theta: Theta | None = None, strength: Array | None = None
+    ) -> list[MissingForce]:
+        """The force that is missing on the rod."""
+        return bench_missing(self.predicted, theta or {}, strength)
 
     def formulas(self, theta: Theta) -> Mapping[str, Array]:
-        """Columns per unit of the coefficient, of simple terms beyond the catalogue."""
-        return formula_columns(self, theta)
+        """Simple force terms of position, speed and valves."""
+        names, columns = formula_columns(self.predicted, theta)
+        return dict(zip(names, self.whiten(columns).T, strict=True))
 
     def weight(self, theta: Theta, formula: str, coefficient: float) -> float:
-        """Largest force of a formula as a share of what matters in practice."""
-        return weight(self, theta, formula, coefficient)
+        """Largest force of a formula as a share of a usual friction."""
+        return weight(self.predicted, theta, formula, coefficient)
 
-    def leftover(self, theta: Theta) -> tuple[Array, Array, Array]:
-        """What is left over, what it may depend on, and run; see `kemba.identify.bench.beyond`."""
-        return leftover(self, theta)
+    def leftover(self, theta: Theta) -> Leftover:
+        """Force residual, and what a force could depend on."""
+        return leftover(self.predicted, theta, self.candidates)
 
-    def recolour(self, residual: Array | None, careful: bool = False) -> None:
-        """Learn each series' colour from residuals (n,) that were not whitened, or forget it."""
-        self.colour = {}
-        if residual is None:
-            return
-        rows = self.rows()
-        for i in range(len(self._runs)):
+    def recolour(self, residual: Array | None, careful: bool = False) -> Self:
+        """The same problem, each run's and channel's colour learnt anew, or forgotten."""
+        found = copy(self)
+        found.colour = {} if residual is None else self._learnt(residual, careful)
+        return found
+
+    def _learnt(self, residual: Array, careful: bool) -> dict[tuple[int, int], Colour]:
+        rows, found = self.rows(), {}
+        for i in range(len(self.logs)):
             for k in np.unique(rows.channel[rows.run == i]):
                 own = (rows.run == i) & (rows.channel == k)
-                self.colour[i, int(k)] = learn(residual[own], careful=careful)
+                found[i, int(k)] = learn(residual[own], careful=careful)
+        return found
 
     def whiten(self, columns: Array) -> Array:
-        """Columns (n, k) of not whitened slopes as `jacobian` would now return them."""
+        """Columns (n, k) that were not whitened, as `jacobian` would return them."""
         rows, out = self.rows(), columns.copy()
         for (i, k), colour in self.colour.items():
             own = (rows.run == i) & (rows.channel == k)
             out[own] = whiten(columns[own], colour)
         return np.asarray(out)
 
-    def plausible(self) -> list[str]:
-        """Raise BadData when columns must be mixed up; returns remarks."""
+    def validate(self) -> list[str]:
+        """No remarks. Raises BadData where columns must be mixed up."""
+        predictor = self.predicted.predictor
         faults = [
             fault
-            for run in self._runs
-            for fault in contradictions(run, lambda r: self.predictor.predict(r, {}).force)
+            for log in self.logs
+            for fault in contradictions(
+                log, self.model.mechanism.stroke, lambda trial: predictor.predict(trial, {}).force
+            )
         ]
         if faults:
             raise BadData(faults)
         return []
 
-    def _settle_starts(self) -> None:
-        """A valve on in the first row: on for long, or just switched? The data say."""
-        for i, run in enumerate(self._runs):
-            options = [_begun(c, run.motion.time[0]) for c in run.commands]
-            trials = [(e, r) for e in options[0] for r in options[1]]
-            if len(trials) == 1:
-                continue
-            early = run.motion.time[run.keep["piston/F"]] < run.motion.time[0] + EARLY
-            costs = []
-            for trial in trials:
-                self._runs[i] = replace(run, commands=trial)
-                r = self.standardised({}, i)["piston/F"][early]
-                costs.append(float(np.mean(np.abs(r))))
-            self._runs[i] = replace(run, commands=trials[int(np.argmin(costs))])
+
+def bench_problem(logs: Sequence[Trajectory], model: Model) -> BenchProblem:
+    """The problem of explaining bench logs with `model` and what may be added to it."""
+    return BenchProblem(
+        [prepare(str(log.meta.get("name", i)), log) for i, log in enumerate(logs)], model
+    )
 
 
-def _begun(intervals: list[tuple[float, float]], start: float) -> list[list[tuple[float, float]]]:
-    if not intervals or np.isfinite(intervals[0][0]):
-        return [intervals]
-    return [intervals, [(start, intervals[0][1]), *intervals[1:]]]
-
-
-def _found(model: Model, name: str) -> bool:
-    """Whether a number belongs to an effect that the plain machine would not have."""
-    return bool(model.effect(name.rsplit(".", 1)[0]).off)
+def _sensor_sigmas(logs: Sequence[BenchLog]) -> dict[str, float]:
+    """Noise (1 sigma) of the force [N] and of the position [m], the median over the logs."""
+    force = float(np.median([log.sigma["piston/F"] for log in logs]))
+    position = float(np.median([log.motion.x_sigma for log in logs]))
+    return {"piston/F": force, "piston/x": position}

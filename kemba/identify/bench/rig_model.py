@@ -10,21 +10,35 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from kemba.effects.base import Effect
+from kemba.effects.pneumatics.switching import Pulse, delayed, instants, is_on
 from kemba.identify.bench.motion import SmoothedMotion
-from kemba.identify.bench.switching import delayed, edges, is_on
-from kemba.identify.evidence.problem import Array
+from kemba.identify.problem.problem import Array
+from kemba.model.exponential import midpoint_step
 from kemba.model.model import Model
+from kemba.model.node import Node
+from kemba.model.rest import Rest, rate_of
+from kemba.settings import BY_HAND, Settings, setting
 
-LONGEST_STEP = 1.5e-3  # s; the fastest chamber answers in 8 ms
-NEWTON, STILL = 12, 1e-9  # steps to equilibrium, and share of a state per second that is rest
-WAITING = 0.5e-3  # s, steps in which chambers are left to settle
-CHUNK = 512  # steps per call of a compiled map
 # The velocity is known within v_sigma: the force is its mean over three Gauss-Hermite nodes
 V_NODES, V_MIDDLE = ((-np.sqrt(3.0), 1 / 6), (np.sqrt(3.0), 1 / 6)), 2 / 3  # sigma, weight
-BLUR = 0.75e-3  # s; no log says on which side of a switching instant its sample was taken
 
-Pulses = tuple[list[tuple[float, float]], list[tuple[float, float]]]  # of both valves
+Pulses = tuple[list[Pulse], list[Pulse]]  # of the extend and the retract valve
+
+
+class RigModelSettings(Settings):
+    """Integration of the chambers along an imposed motion."""
+
+    step: float = setting(
+        1.5e-3, "s", "longest step", "derived: a fifth of the fastest rise time of Table I, 8 ms"
+    )
+    chunk: int = setting(512, "1", "steps per call of a compiled function", BY_HAND)
+    blur: float = setting(
+        0.75e-3,
+        "s",
+        "time around a switching in which its effect on a sample is uncertain",
+        "derived: over half a row of 1 ms; a log does not say on which side its sample was taken",
+        decides=True,
+    )
 
 
 @dataclass(frozen=True)
@@ -45,26 +59,22 @@ class RigModel:
         self.model, self.names = model, (*free, *scaled)
         node = model.build(free, scaled)
         self._state_names = [q.name for q in model.states.values()]
-        rate = ca.substitute(-node.rate, node.sd, ca.SX.zeros(node.sd.numel()))
+        rate = rate_of(node)
         inputs = [node.s, node.q, node.v, node.a, node.u, node.p]
-        self._rate = ca.Function("rate", inputs, [rate, ca.jacobian(rate, node.s)])
+        self._rest = Rest(node.s, inputs[1:], rate, list(model.states.values()))
         force = node.outputs["piston/F"]
         results = ca.vertcat(force, ca.jacobian(force, node.v), ca.jacobian(force, node.u).T)
         self._functions = {
-            "step": _runge_kutta(node, rate),
+            "step": _step(node, rate),
             "force": ca.Function("force", inputs, [ca.densify(force)]),
             "output": ca.Function("output", inputs, [ca.densify(results)]),
         }
         self._maps: dict[tuple[str, int], _Call] = {}
-        self._start = np.array([q.value for q in model.states.values()])
 
     def timing(self, values: Mapping[str, float]) -> tuple[float, float]:
         """Seconds by which the valves switch on and off late, with these parameters."""
-        on = off = 0.0
-        for effect in self.model.effects:
-            times = effect.bind(_own(effect, values)).timing()
-            on, off = on + times.get("on", 0.0), off + times.get("off", 0.0)
-        return on, off
+        (leg,) = self.model.mechanism.legs
+        return self.model.timing(leg, values)
 
     def predict(
         self,
@@ -73,14 +83,14 @@ class RigModel:
         values: Mapping[str, float],
         start: Mapping[str, float] | None = None,
     ) -> Prediction:
-        """Integrate from equilibrium (plus `start` by state name) with exact switching instants.
+        """Integrate from rest (plus `start` by state name) with exact switching instants.
 
         `values` holds every name this rig was compiled for.
         """
         on, off = self.timing(values)
         valves = [delayed(c, on, off) for c in commands]
         p = np.array([values[name] for name in self.names])
-        times, at_sample = _breakpoints(motion.time, np.concatenate([edges(v) for v in valves]))
+        times, at_sample = _breakpoints(motion.time, np.concatenate([instants(v) for v in valves]))
         u = np.stack([is_on(v, times) for v in valves])
         s = self._integrate(times, motion, u, p, start or {})[:, at_sample]
         blurred = np.stack([share(v, motion.time) for v in valves])
@@ -98,46 +108,18 @@ class RigModel:
         self, times: Array, motion: SmoothedMotion, u: Array, p: Array, start: Mapping[str, float]
     ) -> Array:
         middle = 0.5 * (times[:-1] + times[1:])
-        paths = [np.interp(t, motion.time, c) for t in (times, middle) for c in _columns(motion)]
-        x, v, a, xm, vm, am = paths
-        s0 = self._equilibrium(np.array([x[0], 0.0, 0.0]), u[:, 0], p)
+        s0 = self._rest(motion.x[0], 0.0, 0.0, u[:, 0], p)
         s0 += np.array([start.get(name, 0.0) for name in self._state_names])
         n = len(times) - 1
-        drive = np.stack(
-            [np.diff(times), x[:-1], v[:-1], a[:-1], xm, vm, am, x[1:], v[1:], a[1:], *u[:, :-1]]
-        )
-        drive = np.pad(drive, ((0, 0), (0, -n % CHUNK)))  # steps of no length at the end
-        fixed = np.repeat(p[:, None], CHUNK, axis=1)
-        step, states = self._mapped("step", CHUNK), [s0[:, None]]
-        for i in range(0, drive.shape[1], CHUNK):
-            states.append(step(states[-1][:, -1], drive[:, i : i + CHUNK], fixed))
+        moved = [np.interp(middle, motion.time, c) for c in (motion.x, motion.v, motion.a)]
+        drive = np.stack([np.diff(times), *moved, *u[:, :-1]])
+        chunk = RigModelSettings.current().chunk
+        drive = np.pad(drive, ((0, 0), (0, -n % chunk)))  # steps of no length at the end
+        fixed = np.repeat(p[:, None], chunk, axis=1)
+        step, states = self._mapped("step", chunk), [s0[:, None]]
+        for i in range(0, drive.shape[1], chunk):
+            states.append(step(states[-1][:, -1], drive[:, i : i + chunk], fixed))
         return np.concatenate(states, axis=1)[:, : n + 1]
-
-    def _equilibrium(self, motion: Array, u: Array, p: Array) -> Array:
-        """Where the states come to rest under constant commands."""
-        s, done = self._newton(self._start, motion, u, p)
-        if (
-            not done
-        ):  # the flow through an orifice is steep: wait until the chambers are nearly there
-            drive = np.concatenate([[WAITING], motion, motion, motion, u])
-            still = np.repeat(drive[:, None], CHUNK, axis=1)
-            waited = self._mapped("step", CHUNK)(
-                self._start, still, np.repeat(p[:, None], CHUNK, 1)
-            )
-            s, done = self._newton(waited[:, -1], motion, u, p)
-            s = s if done else waited[:, -1]
-        return s
-
-    def _newton(self, s: Array, motion: Array, u: Array, p: Array) -> tuple[Array, bool]:
-        """States at rest near s, and whether they were found."""
-        for _ in range(NEWTON):
-            rate, slope = (np.asarray(part) for part in self._rate(s, *motion, u, p))
-            if np.all(np.abs(rate.ravel()) <= STILL * (1.0 + np.abs(s))):
-                return s, True
-            if not (np.all(np.isfinite(rate)) and np.all(np.isfinite(slope))):
-                break
-            s = s - np.linalg.lstsq(slope, rate.ravel(), rcond=None)[0]
-        return s, False
 
     def _mapped(self, kind: str, n: int) -> _Call:
         if (kind, n) not in self._maps:
@@ -167,18 +149,13 @@ class _Call:
         return out.reshape(self._shape, order="F")
 
 
-def _runge_kutta(node: Any, rate: ca.SX) -> ca.Function:
-    """(s, drive, p) -> s after one classical step of fourth order."""
-    f = ca.Function("f", [node.s, node.q, node.v, node.a, node.u, node.p], [rate])
-    s, d, p = (
-        ca.SX.sym(n, k) for n, k in (("s", node.s.numel()), ("d", 12), ("p", node.p.numel()))
-    )
-    h, u = d[0], d[10:12]
-    k1 = f(s, d[1], d[2], d[3], u, p)
-    k2 = f(s + h / 2 * k1, d[4], d[5], d[6], u, p)
-    k3 = f(s + h / 2 * k2, d[4], d[5], d[6], u, p)
-    k4 = f(s + h * k3, d[7], d[8], d[9], u, p)
-    return ca.Function("step", [s, d, p], [ca.densify(s + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4))])
+def _step(node: Node, rate: ca.SX) -> ca.Function:
+    """(s, drive, p) -> s after one step; `drive`: its length, x, v, a in its middle, the valves."""
+    d = ca.SX.sym("d", 6)
+    inputs = [node.q, node.v, node.a, node.u, node.p]
+    given = [d[1], d[2], d[3], d[4:6], node.p]
+    after, _ = midpoint_step(rate, node.s, inputs, given, d[0])
+    return ca.Function("step", [node.s, d, node.p], [ca.densify(after)], {"cse": True})
 
 
 def _breakpoints(samples: Array, events: Array) -> tuple[Array, Any]:
@@ -187,7 +164,7 @@ def _breakpoints(samples: Array, events: Array) -> tuple[Array, Any]:
     Their number depends on the number of events only, so that compiled maps are reused.
     """
     inside = np.clip(events, samples[0], samples[-1])
-    pieces = np.ceil(np.diff(samples) / LONGEST_STEP - 1e-6).astype(int)
+    pieces = np.ceil(np.diff(samples) / RigModelSettings.current().step - 1e-6).astype(int)
     fill = [
         np.linspace(samples[i], samples[i + 1], pieces[i] + 1)[1:-1]
         for i in np.flatnonzero(pieces > 1)
@@ -200,23 +177,14 @@ def _breakpoints(samples: Array, events: Array) -> tuple[Array, Any]:
 
 
 def share(intervals: Array, times: Array) -> Array:
-    """Share of [t - BLUR, t + BLUR] in which the valve is on: continuous in any delay."""
+    """Share of [t - blur, t + blur] in which the valve is on: continuous in any delay."""
     flat = np.clip(intervals, times[0] - 1.0, times[-1] + 1.0).ravel()
     if not len(flat):
         return np.zeros(len(times))
     knots = np.concatenate([[times[0] - 1.5], flat, [times[-1] + 1.5]])
     slope = np.arange(len(knots) - 1) % 2
     on_time = np.concatenate([[0.0], np.cumsum(slope * np.diff(knots))])
-    later = np.interp(times + BLUR, knots, on_time)
-    earlier = np.interp(times - BLUR, knots, on_time)
-    return np.asarray(np.clip((later - earlier) / (2 * BLUR), 0.0, 1.0))
-
-
-def _columns(motion: SmoothedMotion) -> tuple[Array, Array, Array]:
-    return motion.x, motion.v, motion.a
-
-
-def _own(effect: Effect, values: Mapping[str, float]) -> dict[str, float]:
-    """The scalar parameters among `values` that belong to this effect."""
-    prefix = f"{effect.name}."
-    return {k[len(prefix) :]: v for k, v in values.items() if k.startswith(prefix) and "[" not in k}
+    blur = RigModelSettings.current().blur
+    later = np.interp(times + blur, knots, on_time)
+    earlier = np.interp(times - blur, knots, on_time)
+    return np.asarray(np.clip((later - earlier) / (2 * blur), 0.0, 1.0))

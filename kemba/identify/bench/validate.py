@@ -1,4 +1,4 @@
-"""Is it these columns at all? The nominal prediction against each way to mix them up."""
+"""Are columns of a bench log mixed up? The nominal prediction is tried on each usual mistake."""
 
 from __future__ import annotations
 
@@ -11,20 +11,42 @@ from scipy.signal import correlate
 from kemba.errors import KembaError
 from kemba.identify.bench.bench_log import BenchLog
 from kemba.identify.bench.motion import SmoothedMotion
-from kemba.identify.evidence.problem import Array
-
-STROKE = 0.070  # m
-BETTER = 4.0  # factor by which a mix-up must fit better to be believed
-SMALL = 4.0  # sigma of error that no mix-up would leave
-CLOSE = 0.25  # share of the force's spread that a believable fit leaves at most
-LATEST = 0.015  # s; a lag beyond this is no sensor's delay but another clock
-RESOLUTION = 1e-3  # s
+from kemba.identify.problem.problem import Array
+from kemba.settings import BY_HAND, Settings, setting
 
 Predict = Callable[[BenchLog], Array]  # the nominal force along a run
 
 
-def mix_ups(run: BenchLog) -> Iterator[tuple[str, BenchLog]]:
-    """The run as it would be, were a column's mistake undone."""
+class BenchValidateSettings(Settings):
+    """When the columns of a bench log are said to be mixed up."""
+
+    better: float = setting(
+        4.0, "1", "factor by which a mix-up must fit better", BY_HAND, decides=True
+    )
+    small: float = setting(
+        4.0, "1", "error, in sigmas, that no mix-up would leave", BY_HAND, decides=True
+    )
+    close: float = setting(
+        0.25, "1", "share of the force's spread that a mix-up may leave", BY_HAND, decides=True
+    )
+    nothing: float = setting(
+        1.2, "1", "share of the spread left by a model that explains nothing", BY_HAND, decides=True
+    )
+    latest: float = setting(
+        0.015, "s", "a longer lag is no sensor's delay but another clock", BY_HAND, decides=True
+    )
+    resolution: float = setting(1e-3, "s", "resolution of lags", "convention: a usual row")
+    shortest: int = setting(400, "1", "steps of resolution that a lag can be read from", BY_HAND)
+    farthest: float = setting(0.5, "s", "longest lag", BY_HAND)
+    alike: float = setting(0.3, "1", "correlation that a lag must reach", BY_HAND, decides=True)
+    more_alike: float = setting(
+        1.5, "1", "factor by which a lag must raise the correlation", BY_HAND, decides=True
+    )
+
+
+def mix_ups(run: BenchLog, stroke: float) -> Iterator[tuple[str, BenchLog]]:
+    """What may be wrong with a log, and the log with that put right; `stroke` [m] of the
+    cylinder."""
     extend, retract = run.commands
     force = run.measured["piston/F"]
     yield (
@@ -39,7 +61,7 @@ def mix_ups(run: BenchLog) -> Iterator[tuple[str, BenchLog]]:
         "valve/extend and valve/retract are inverted (1 is on)",
         replace(run, commands=(_inverted(extend), _inverted(retract))),
     )
-    flipped = _flipped(run.motion)
+    flipped = _flipped(run.motion, stroke)
     yield "piston/x counts from the extended end (0 is retracted)", replace(run, motion=flipped)
     for factor, unit in ((1e3, "kN"), (1e-3, "mN"), (4.4482, "lbf"), (9.81, "kgf")):
         yield (
@@ -52,20 +74,20 @@ def mix_ups(run: BenchLog) -> Iterator[tuple[str, BenchLog]]:
         yield f"piston/x seems to be in {unit}", replace(run, motion=scaled)
 
 
-def contradictions(run: BenchLog, predict: Predict) -> list[KembaError]:
+def contradictions(run: BenchLog, stroke: float, predict: Predict) -> list[KembaError]:
     """What must be wrong with a run's columns, if anything."""
-    path = run.name
+    path, limits = run.name, BenchValidateSettings.current()
     error, scale = _misfit(run, predict)
-    if error < SMALL * run.sigma["piston/F"]:
+    if error < limits.small * run.sigma["piston/F"]:
         return []
-    trials = [(text, _misfit(trial, predict)) for text, trial in mix_ups(run)]
+    trials = [(text, _misfit(trial, predict)) for text, trial in mix_ups(run, stroke)]
     text, (best, spread) = min(trials, key=lambda t: t[1][0] / t[1][1])
-    if best / spread < CLOSE and best / spread * BETTER < error / scale:
+    if best / spread < limits.close and best / spread * limits.better < error / scale:
         return [KembaError(path, text, "the force answers the valves so much better then")]
     lagging = _clock(run, predict)
     if lagging:
         return lagging
-    if error > 1.2 * scale and scale > 0:
+    if error > limits.nothing * scale and scale > 0:
         return [
             KembaError(
                 path,
@@ -89,22 +111,24 @@ def _misfit(run: BenchLog, predict: Predict) -> tuple[float, float]:
 
 def _clock(run: BenchLog, predict: Predict) -> list[KembaError]:
     """A force that comes much later or earlier than any sensor's delay has another clock."""
-    keep = run.keep["piston/F"]
-    grid = np.arange(run.motion.time[0], run.motion.time[-1], RESOLUTION)
-    if len(grid) < 400 or not any(run.commands):
+    keep, limits = run.keep["piston/F"], BenchValidateSettings.current()
+    grid = np.arange(run.motion.time[0], run.motion.time[-1], limits.resolution)
+    if len(grid) < limits.shortest or not any(run.commands):
         return []
     time = run.motion.time[keep]
     measured = np.gradient(np.interp(grid, time, run.measured["piston/F"][keep]))
     expected = np.gradient(np.interp(grid, time, predict(run)[keep]))
     if not measured.std() or not expected.std():
         return []
-    far = min(int(0.5 / RESOLUTION), len(grid) // 3)
+    far = min(int(limits.farthest / limits.resolution), len(grid) // 3)
     both = correlate(measured - measured.mean(), expected - expected.mean(), "same", "fft")
     both /= len(grid) * measured.std() * expected.std()
     middle = len(grid) // 2
     near = both[middle - far : middle + far + 1]
-    lag = (int(np.argmax(near)) - far) * RESOLUTION
-    if abs(lag) <= LATEST or near.max() < 0.3 or near.max() < 1.5 * both[middle]:
+    lag = (int(np.argmax(near)) - far) * limits.resolution
+    if abs(lag) <= limits.latest or near.max() < limits.alike:
+        return []
+    if near.max() < limits.more_alike * both[middle]:
         return []
     word = "late" if lag > 0 else "early"
     return [
@@ -123,5 +147,5 @@ def _inverted(intervals: list[tuple[float, float]]) -> list[tuple[float, float]]
     return [(a, b) for a, b in pairs if b > a]
 
 
-def _flipped(motion: SmoothedMotion) -> SmoothedMotion:
-    return replace(motion, x=STROKE - motion.x, v=-motion.v, a=-motion.a)
+def _flipped(motion: SmoothedMotion, stroke: float) -> SmoothedMotion:
+    return replace(motion, x=stroke - motion.x, v=-motion.v, a=-motion.a)

@@ -9,20 +9,38 @@ from typing import Any
 import numpy as np
 from scipy.stats import chi2, false_discovery_control
 
-from kemba.identify.evidence.problem import Array, Labels, Rows
 from kemba.identify.evidence.windows import codes, rms
+from kemba.identify.problem.problem import Array, Labels, Rows, Texts
+from kemba.settings import BY_HAND, Settings, setting
 
-FEWEST = 5  # grains that make a cell
-TOLERATED = 1.15  # error ratio that a good model may have: nobody's nominal figures are exact
-FALSE_DISCOVERIES = 0.01
 ASSUMED = ("/foot/x", "/foot/z", "/stop")  # channels that no sensor measures
 STEADY = ("rest", "stance2")  # phases in which they can be relied on
+
+
+class BinSettings(Settings):
+    """When the error under one condition is called significant."""
+
+    fewest: int = setting(5, "1", "windows that make a bin", BY_HAND, decides=True)
+    tolerated: float = setting(
+        1.15,
+        "1",
+        "error ratio that a good model may have: nominal figures are never exact",
+        BY_HAND,
+        decides=True,
+    )
+    false_discoveries: float = setting(
+        0.01,
+        "1",
+        "share of the bins called significant that may be so by chance",
+        "literature: Benjamini and Hochberg 1995 control it; one in a hundred by convention",
+        decides=True,
+    )
 
 
 @dataclass(frozen=True)
 class ConditionBin:
     """One channel in one phase of motion, valve mode and region of the stroke (`in`, `mid`,
-    `out`); `q_value` controls false discoveries over all cells of a comparison."""
+    `out`); `q_value` controls false discoveries over all bins of a comparison."""
 
     channel: str
     phase: str
@@ -33,21 +51,23 @@ class ConditionBin:
 
     @property
     def significant(self) -> bool:
-        return self.q_value < FALSE_DISCOVERIES
+        return self.q_value < BinSettings.current().false_discoveries
 
 
-def condition_bins(
-    rows: Rows, region: Labels, first: Labels, sums: Array
-) -> Iterable[ConditionBin]:
-    """Every condition with enough data, of grains that begin at row `first` (k,) and sum to `sums`
-    (k,) in units of noise; q values over all of them."""
+def condition_bins(rows: Rows, region: Texts, first: Labels, sums: Array) -> Iterable[ConditionBin]:
+    """Every condition with enough data.
+
+    The aggregation windows begin at row `first` (k,) and sum to `sums` (k,) in units of noise;
+    `region` (n,): region of the stroke of every row. The q values are over all bins returned.
+    """
     parts = (rows.phase, rows.mode, region)
     names = [np.unique(a.astype(str)) for a in parts]
     table = np.stack([rows.channel, *(codes(a) for a in parts)], axis=1)[first]
     sound = ~doubtful(rows)[first]
     kinds, own = np.unique(table[sound], axis=0, return_inverse=True)
     groups = [sums[sound][own.ravel() == i] for i in range(len(kinds))]
-    known = [i for i, z in enumerate(groups) if len(z) >= FEWEST]
+    fewest = BinSettings.current().fewest
+    known = [i for i, z in enumerate(groups) if len(z) >= fewest]
     q = false_discovery_control([excess(groups[i]) for i in known]) if known else ()
     for i, q_value in zip(known, q, strict=True):
         channel, *place = kinds[i]
@@ -59,19 +79,24 @@ def condition_bins(
 
 
 def doubtful(rows: Rows) -> np.ndarray[Any, np.dtype[np.bool_]]:
-    """Rows (n,) of places that stand still by assumption, where the assumption is doubtful: when
-    feet come and go, a contact read a moment early or late is no fault of the model."""
+    """Flags (n,) of rows that assume a foot or a stop to stand still when it may not.
+
+    When feet come and go, a contact may be read a moment early or late: no fault of the model.
+    """
     assumed = np.array([name.endswith(ASSUMED) for name in rows.channels])
     return np.asarray(assumed[rows.channel] & ~np.isin(rows.phase.astype(str), STEADY))
 
 
 def excess(z: Array) -> float:
-    """p value of errors (n,) larger than a good model's: correlated ones count for less, and the
-    largest not at all, for a foot that lifts a moment early convicts no model."""
+    """p value of errors z (n,), in units of noise, under a good model.
+
+    Correlated errors count for less. The largest error is left out: a foot that lifts a moment
+    early makes one large error, which is no evidence against the model.
+    """
     if len(z) > 1:
         z = np.delete(z, np.argmax(np.abs(z)))
     power = z**2 - np.mean(z**2)
     spread = float(power @ power)
     echo = max(float(power[1:] @ power[:-1]) / spread, 0.0) if spread > 0 else 0.0
     count = len(z) * (1.0 - echo) / (1.0 + echo)
-    return float(chi2.sf(np.mean(z**2) / TOLERATED**2 * count, count))
+    return float(chi2.sf(np.mean(z**2) / BinSettings.current().tolerated ** 2 * count, count))

@@ -9,17 +9,20 @@ from typing import Any
 
 import numpy as np
 
-from kemba.identify.compare.bins import ConditionBin, condition_bins
+from kemba.identify.compare.bins import BinSettings, ConditionBin, condition_bins
 from kemba.identify.compare.force_profiles import ForceProfile, force_profiles
 from kemba.identify.compare.hints import Hint, Response, conflicts, lacking, lagged
-from kemba.identify.compare.missing_force import Missing, Peak, peaks
-from kemba.identify.compare.smoother import missing_force
-from kemba.identify.compare.tolerance import free_starts, slopes, within_tolerance
-from kemba.identify.evidence.operating_point import region_labels
-from kemba.identify.evidence.problem import Array, Labels, Problem, Rows, Theta
-from kemba.identify.evidence.windows import Windows, aggregation_windows, expected, rms
+from kemba.identify.compare.missing_force import Peak, peaks
+from kemba.identify.compare.tolerance import slopes, within_tolerance
+from kemba.identify.evidence.windows import Windows, aggregation_windows, free_starts, rms
+from kemba.identify.problem.problem import Array, MissingForce, Problem, Rows, Texts, Theta
+from kemba.settings import BY_HAND, Settings, setting
 
-GOOD, FAIR = 1.15, 1.5
+
+class CompareSettings(Settings):
+    """How an error is spoken of that is too large for a good model."""
+
+    fair: float = setting(1.5, "1", "error ratio below which it nearly explains them", BY_HAND)
 
 
 @dataclass(frozen=True)
@@ -37,8 +40,9 @@ class ChannelError:
 class Comparison:
     """What `compare` says; `good` where the error is within the noise.
 
-    `tolerant_ratio`: what the error would be if the model's nominal figures were off by their
-    usual tolerance, in the best way; `tolerable`: that would be within the noise everywhere.
+    `noise_ratio`: error in units of the noise (see `error_ratio`). `tolerant_ratio`: the same if
+    the model's nominal figures took the best values within their usual tolerance; `tolerable`: that
+    would be within the noise everywhere.
     """
 
     logs: tuple[str, ...]
@@ -51,13 +55,14 @@ class Comparison:
     hints: tuple[Hint, ...] = ()
     responses: tuple[Response, ...] = ()
     force_profiles: tuple[ForceProfile, ...] = ()
-    missing: tuple[Missing, ...] = ()
+    missing: tuple[MissingForce, ...] = ()
     plan: Mapping[str, float] = field(default_factory=dict)
     sentence: str = ""
 
     @property
     def good(self) -> bool:
-        return self.noise_ratio <= GOOD and not any(c.significant for c in self.bins)
+        good = BinSettings.current().tolerated
+        return self.noise_ratio <= good and not any(c.significant for c in self.bins)
 
     @property
     def peaks(self) -> list[Peak]:
@@ -84,11 +89,11 @@ def compare(problem: Problem, model: str, logs: Sequence[str] = ()) -> Compariso
     fitted."""
     start = free_starts(problem)
     rows, r = problem.rows(), problem.residual(start)
-    _, region = region_labels(problem, rows)
+    region = problem.operating_point().regions()
     window = aggregation_windows(problem, rows, region)
     sums = window.sums(r)
     known = slopes(problem, start)
-    responses = tuple(lagged(problem, rows, r / np.sqrt(expected(problem, len(r)))))
+    responses = tuple(lagged(problem, rows, r / np.sqrt(problem.expected_power())))
     forces = tuple(force_profiles(problem, r))
     sent = [s.hint for s in responses if s.certain]
     left = within_tolerance(r, known)
@@ -100,35 +105,31 @@ def compare(problem: Problem, model: str, logs: Sequence[str] = ()) -> Compariso
         tuple(_channels(problem, rows, r, window, start)),
         tuple(condition_bins(rows, region, window.first, sums)),
         ratio,
-        clean and not any(law.matters for law in force_profiles(problem, left)),
+        clean and not any(profile.matters for profile in force_profiles(problem, left)),
         (*sent, *conflicts(problem, rows, r, known)),
         responses,
         forces,
-        tuple(missing_force(problem, start)),
+        tuple(problem.missing_force(start)),
     )
     if not found.good and not found.tolerable:
         found = replace(found, hints=(*lacking(forces), *found.hints))
     return replace(found, sentence=phrase(found))
 
 
-def conditions(
-    problem: Problem, theta: Theta | None = None, regions: bool = False
-) -> tuple[float, list[ConditionBin]]:
-    """Error ratio and cells of the model with `theta` added, told apart by region or not."""
+def conditions(problem: Problem, theta: Theta | None = None) -> list[ConditionBin]:
+    """Error by condition of the model with `theta` added; regions of the stroke are not told
+    apart."""
     rows, r = problem.rows(), problem.residual(free_starts(problem, theta))
     region = np.full(len(rows), "", dtype=object)
-    if regions:
-        _, region = region_labels(problem, rows)
     window = aggregation_windows(problem, rows, region)
-    sums = window.sums(r)
-    return rms(sums), list(condition_bins(rows, region, window.first, sums))
+    return list(condition_bins(rows, region, window.first, window.sums(r)))
 
 
-def _tolerant(rows: Rows, region: Labels, window: Windows, left: Array) -> tuple[float, bool]:
+def _tolerant(rows: Rows, region: Texts, window: Windows, left: Array) -> tuple[float, bool]:
     """Error ratio of what the figures' tolerance leaves, and whether it is within the noise."""
     sums = window.sums(left)
     clean = not any(c.significant for c in condition_bins(rows, region, window.first, sums))
-    return rms(sums), clean and rms(sums) <= GOOD
+    return rms(sums), clean and rms(sums) <= BinSettings.current().tolerated
 
 
 def measured_units(rows: Rows) -> dict[str, str]:
@@ -145,8 +146,7 @@ def measured_units(rows: Rows) -> dict[str, str]:
 def _channels(
     problem: Problem, rows: Rows, r: Array, window: Windows, start: Theta
 ) -> Iterable[ChannelError]:
-    windows = getattr(problem, "window_errors", None)
-    errors = windows(start) if windows else {}
+    errors = problem.window_errors(start)
     sums = window.sums(r)
     headers = measured_units(rows)
     for k, channel in enumerate(rows.channels):
@@ -181,14 +181,18 @@ def phrase(found: Comparison) -> str:
             f"As it stands the model errs by {ratio}; {worst}; but figures off by no more than "
             f"their usual tolerance would explain the logs ({found.tolerant_ratio:.2g} times)."
         )
-    grade = "nearly explains" if found.noise_ratio < FAIR else "does not explain"
+    grade = (
+        "nearly explains"
+        if found.noise_ratio < CompareSettings.current().fair
+        else "does not explain"
+    )
     hints = [h for kind in ("law", "command", "conflict") for h in _first(found.hints, kind)]
     parts = [f"The model {grade} the logs: its error is {ratio}", worst, *(h.text for h in hints)]
     return "; ".join(parts) + "."
 
 
-def _place(cell: ConditionBin) -> str:
+def _place(at: ConditionBin) -> str:
     valves = {"00": "valves off", "10": "extend valve on", "01": "retract valve on"}
     stroke = {"in": ", piston retracted", "mid": ", piston mid-stroke", "out": ", piston extended"}
-    mode = valves.get(cell.mode, "both valves on")
-    return f"{cell.channel} in {cell.phase} with {mode}{stroke.get(cell.region, '')}"
+    mode = valves.get(at.mode, "both valves on")
+    return f"{at.channel} in {at.phase} with {mode}{stroke.get(at.region, '')}"

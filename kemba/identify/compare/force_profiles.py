@@ -1,59 +1,68 @@
 """The missing force as a function of one quantity: speed, position, load, time since a command.
 
-The force is taken as constant within bins of the quantity. Its values follow by least squares in
-the same whitened residuals that all else is judged by, so that they carry honest intervals and
-are not shrunk as a smoothed force is.
+The force is taken as constant within bins of the quantity. Its values follow by least squares from
+the whitened residuals. So their intervals are those of the noise, and no smoothing shrinks them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Protocol, runtime_checkable
+from dataclasses import dataclass
 
 import numpy as np
 
-from kemba.identify.evidence.problem import Array, Flags, Problem
-
-BINS = 8
-FEWEST = 30  # samples in a bin
-NARROW = 0.02  # of the middle 90 % of a quantity: no bin is narrower
-WIDE = 20.0  # times a port's usual force: prior sigma of a bin's force
-LAGS = np.arange(0.0015, 0.042, 0.004)  # s between a command's change and the error: edges
-SAME = 0.1  # share of a force's power by which bins may differ and still be one force
-DOUBT, NEGLIGIBLE = 20.0, 0.1  # nats; share of a port's usual force
-PLAIN = 60.0  # nats that nominal figures at the edge of their tolerance do not reach
+from kemba.identify.problem.problem import Array, Flags, ForceChannel, Problem
+from kemba.settings import BY_HAND, Settings, setting
 
 
-@dataclass(frozen=True)
-class ForceChannel:
-    """Where a force may be missing: quantities by label, arrays (...) over samples, and the
-    columns (rows, b) of residual that unit forces in bins (..., b) make. `after`: by command how
-    much it changed within each of the LAGS before a sample, (..., b). `usual`: a force [unit] that
-    is neither small nor large."""
+class ForceProfileSettings(Settings):
+    """How a missing force is looked for, and when it is said to be there."""
 
-    name: str
-    unit: str
-    usual: float
-    quantities: Mapping[str, Array]
-    columns: Callable[[Array], Array]
-    after: Mapping[str, Array] = field(default_factory=dict)
-
-
-@runtime_checkable
-class ForceChannelled(Protocol):
-    """A problem with ports."""
-
-    def ports(self) -> Sequence[ForceChannel]:
-        """All of them."""
+    bins: int = setting(8, "1", "most bins of a quantity", BY_HAND)
+    fewest: int = setting(30, "1", "samples in a bin", BY_HAND)
+    narrow: float = setting(
+        0.02, "1", "smallest width of a bin over the middle 90 % of a quantity", BY_HAND
+    )
+    wide: float = setting(
+        20.0, "1", "prior sigma of a bin's force over a channel's usual force", BY_HAND
+    )
+    first_lag: float = setting(
+        0.0015, "s", "shortest time from a command's change to an error", "derived: over one row"
+    )
+    last_lag: float = setting(
+        0.042, "s", "longest time", "derived: beyond the slowest rise time of Table I, 37 ms"
+    )
+    lag_step: float = setting(0.004, "s", "step of these times", BY_HAND)
+    same: float = setting(
+        0.1,
+        "1",
+        "share of a force's power by which bins may differ and still be one force",
+        BY_HAND,
+        decides=True,
+    )
+    doubt: float = setting(
+        20.0, "nats", "gain beyond which a force is there without doubt", BY_HAND, decides=True
+    )
+    negligible: float = setting(
+        0.1, "1", "negligible force over a channel's usual force", BY_HAND, decides=True
+    )
+    sure: float = setting(
+        3.0, "1", "sigmas beyond which a bin's force is not nought", "convention: three sigmas"
+    )
+    plain: float = setting(
+        60.0,
+        "nats",
+        "gain that nominal figures at the edge of their tolerance do not reach",
+        BY_HAND,
+        decides=True,
+    )
 
 
 @dataclass(frozen=True)
 class ForceProfile:
     """Missing `force` [unit] and its 1 sigma per bin (b,) around `centre` of a quantity; `gain`:
-    what it explains beyond its number of bins [nats]; `usual` as of its port."""
+    what it explains beyond its number of bins [nats]; `usual` as of its channel."""
 
-    port: str
+    channel: str
     unit: str
     quantity: str
     centre: Array
@@ -64,13 +73,14 @@ class ForceProfile:
 
     @property
     def matters(self) -> bool:
-        """Whether a force is there beyond doubt, and is not negligible."""
-        return self.gain > DOUBT and self.largest > NEGLIGIBLE * self.usual
+        """Whether a force is certainly there, and is not negligible."""
+        settings = ForceProfileSettings.current()
+        return self.gain > settings.doubt and self.largest > settings.negligible * self.usual
 
     @property
     def largest(self) -> float:
-        """Of the forces that are plainly not nought, the largest."""
-        plain = np.abs(self.force) > 3.0 * self.sigma
+        """The largest force [unit] that differs from zero by more than its error."""
+        plain = np.abs(self.force) > ForceProfileSettings.current().sure * self.sigma
         return float(np.max(np.abs(self.force[plain]), initial=0.0))
 
     @property
@@ -79,57 +89,69 @@ class ForceProfile:
         weight = 1.0 / self.sigma**2
         mean = float(np.sum(weight * self.force) / np.sum(weight))
         varies = float(np.sum(weight * (self.force - mean) ** 2))
-        return mean if varies < SAME * float(np.sum(weight)) * mean**2 else None
+        same = ForceProfileSettings.current().same
+        return mean if varies < same * float(np.sum(weight)) * mean**2 else None
 
     def __str__(self) -> str:
         what = self.quantity.partition(" [")[0]
         if self.constant is not None:
-            return (
-                f"a constant force on the {self.port} is missing ({self.constant:+.2g} {self.unit})"
-            )
+            force = f"{self.constant:+.2g} {self.unit}"
+            return f"a constant force on the {self.channel} is missing ({force})"
         going = "comes" if what.startswith("after ") else "goes with"
         size = f"up to {self.largest:.2g} {self.unit}"
-        return f"a force on the {self.port} is missing that {going} {what} ({size})"
+        return f"a force on the {self.channel} is missing that {going} {what} ({size})"
 
 
 def force_profiles(problem: Problem, residual: Array) -> list[ForceProfile]:
-    """Every port against every quantity of its own, the most telling port first."""
-    if not isinstance(problem, ForceChannelled):
-        return []
-    found = [[p for p in _of(port, residual) if p is not None] for port in problem.ports()]
+    """Every force channel against each of its quantities, the channel that explains most first.
+
+    `residual` (n,): whitened.
+    """
+    found = [
+        [p for p in _of(channel, residual) if p is not None] for channel in problem.force_channels()
+    ]
     found = [group for group in found if group]
     found.sort(key=lambda group: -max(p.gain for p in group))
     return [p for group in found for p in group]
 
 
-def _of(port: ForceChannel, residual: Array) -> list[ForceProfile | None]:
-    by_value = [force_profile(port, label, residual) for label in port.quantities]
-    return by_value + [_solved(port, f"after {n} [ms]", 1e3 * middle(LAGS), rise, residual)
-                       for n, rise in port.after.items()]  # fmt: skip
+def _of(channel: ForceChannel, residual: Array) -> list[ForceProfile | None]:
+    by_value = [force_profile(channel, label, residual) for label in channel.quantities]
+    return by_value + [_solved(channel, f"after {n} [ms]", 1e3 * middle(lags()), rise, residual)
+                       for n, rise in channel.after.items()]  # fmt: skip
 
 
-def force_profile(port: ForceChannel, label: str, residual: Array) -> ForceProfile | None:
-    """The missing force of a port by bins of one of its quantities; None where it hardly varies."""
-    values = port.quantities[label]
+def force_profile(channel: ForceChannel, label: str, residual: Array) -> ForceProfile | None:
+    """The missing force of a channel by bins of one of its quantities; None where the quantity
+    hardly varies."""
+    values = channel.quantities[label]
     edges = bins(values)
     if edges is None:
         return None
     flags = _flags(values, edges)
     sides = flags.reshape(-1, flags.shape[-1])
     centre = np.array([float(np.median(values.ravel()[own])) for own in sides.T])
-    return _solved(port, label, centre, flags.astype(float), residual)
+    return _solved(channel, label, centre, flags.astype(float), residual)
 
 
 def _solved(
-    port: ForceChannel, label: str, centre: Array, shapes: Array, residual: Array
+    channel: ForceChannel, label: str, centre: Array, shapes: Array, residual: Array
 ) -> ForceProfile:
-    columns = port.columns(shapes)
-    prior = np.eye(shapes.shape[-1]) / (WIDE * port.usual) ** 2
+    columns, wide = channel.columns(shapes), ForceProfileSettings.current().wide
+    prior = np.eye(shapes.shape[-1]) / (wide * channel.usual) ** 2
     gram, slope = columns.T @ columns + prior, columns.T @ residual
     force = -np.linalg.solve(gram, slope)
     sigma = np.sqrt(np.diag(np.linalg.inv(gram)))
     gain = 0.5 * float(force @ gram @ force) - len(force)
-    return ForceProfile(port.name, port.unit, label, centre, force, sigma, gain, port.usual)
+    return ForceProfile(
+        channel.name, channel.unit, label, centre, force, sigma, gain, channel.usual
+    )
+
+
+def lags() -> Array:
+    """Edges (k,) [s] of the times between a command's change and an error."""
+    settings = ForceProfileSettings.current()
+    return np.arange(settings.first_lag, settings.last_lag, settings.lag_step)
 
 
 def middle(edges: Array) -> Array:
@@ -138,21 +160,24 @@ def middle(edges: Array) -> Array:
 
 
 def risen(times: Array, sizes: Array, at: Array) -> Array:
-    """How much a command with changes `sizes` at `times` rose within each of the LAGS before the
-    moments `at` (n,): (n, lags)."""
+    """How much a command rose within each of the `lags` before the moments `at` (n,) [s]: (n, l).
+
+    The command changes by `sizes` (c,) at `times` (c,) [s].
+    """
     total = np.concatenate([[0.0], np.cumsum(sizes)])
-    level = total[np.searchsorted(times, at[:, None] - LAGS, side="right")]
+    level = total[np.searchsorted(times, at[:, None] - lags(), side="right")]
     return np.asarray(level[:, :-1] - level[:, 1:])
 
 
 def bins(values: Array) -> Array | None:
-    """Edges of bins with the same number of samples each; None without enough of them."""
+    """Edges (b + 1,) of bins with the same number of samples each; None with too few samples."""
+    settings = ForceProfileSettings.current()
     seen = values[np.isfinite(values)]
-    if len(seen) < 2 * FEWEST:
+    if len(seen) < 2 * settings.fewest:
         return None
-    count = min(BINS, len(seen) // FEWEST)
+    count = min(settings.bins, len(seen) // settings.fewest)
     edges = np.quantile(seen, np.linspace(0.0, 1.0, count + 1))
-    narrowest = NARROW * float(np.diff(np.quantile(seen, (0.05, 0.95)))[0])
+    narrowest = settings.narrow * float(np.diff(np.quantile(seen, (0.05, 0.95)))[0])
     kept = [float(edges[0])]
     for edge in edges[1:-1]:
         if min(edge - kept[-1], edges[-1] - edge) > narrowest:

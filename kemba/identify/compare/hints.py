@@ -1,30 +1,55 @@
 """What the error goes with: a force by speed, position or load, commands sent before it, and
-parameters that wander between runs or between valve modes."""
+parameters that would have to differ between runs or between valve modes."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import chi2, norm
 
-from kemba.identify.compare.force_profiles import LAGS, PLAIN, ForceProfile, middle, risen
+from kemba.identify.compare.force_profiles import (
+    ForceProfile,
+    ForceProfileSettings,
+    lags,
+    middle,
+    risen,
+)
 from kemba.identify.compare.tolerance import Slopes
-from kemba.identify.evidence.problem import Array, Labels, Problem, Rows
 from kemba.identify.evidence.windows import codes
+from kemba.identify.problem.problem import Array, Changes, Labels, Problem, Rows
+from kemba.settings import BY_HAND, Settings, setting
 
-CERTAIN = 1e-4
-DEPENDENT = 1.5  # rows are not quite independent: z scores count for so much less
-LEAST_INFORMATION = 4.0  # in sizes to the -2: a run that tells less about a parameter is mute
-SLACK = 0.1  # sizes by which a parameter may differ between runs without anybody caring
 
-Changes = Mapping[str, tuple[Array, Array]]
+class HintSettings(Settings):
+    """When a hint is certain."""
+
+    certain: float = setting(
+        1e-4,
+        "1",
+        "p-value below which a hint is certain, over all that were tried",
+        BY_HAND,
+        decides=True,
+    )
+    dependent: float = setting(
+        1.5, "1", "z scores are divided by this: rows are not quite independent", BY_HAND
+    )
+    information: float = setting(
+        4.0, "1", "information on a parameter, per size squared, that a run must give", BY_HAND
+    )
+    slack: float = setting(
+        0.1, "1", "sizes by which a parameter may differ between runs", BY_HAND, decides=True
+    )
 
 
 @dataclass(frozen=True)
 class Hint:
-    """One finding in words; `kind`: law, command, conflict; the larger `weight`, the plainer."""
+    """One thing that the error goes with, in words.
+
+    `kind`: `law` (a missing force that goes with a quantity), `command` or `conflict`. The larger
+    `weight`, the clearer it is.
+    """
 
     kind: str
     text: str
@@ -33,8 +58,10 @@ class Hint:
 
 @dataclass(frozen=True)
 class Response:
-    """Cross-correlation of a channel's error with the changes of a command before it: z score
-    (k,) per `lag` (k,) [s]; `tests`: how many were tried for this one."""
+    """Cross-correlation of a channel's error with the changes of a command before it.
+
+    `z` (k,): z score per `lag` (k,) [s]. `tests`: how many were tried to find this one.
+    """
 
     channel: str
     command: str
@@ -48,7 +75,8 @@ class Response:
 
     @property
     def certain(self) -> bool:
-        return bool(np.abs(self.z[self.peak]) > norm.isf(CERTAIN / (2 * self.tests)))
+        certain = HintSettings.current().certain
+        return bool(np.abs(self.z[self.peak]) > norm.isf(certain / (2 * self.tests)))
 
     @property
     def hint(self) -> Hint:
@@ -58,20 +86,19 @@ class Response:
 
 
 def lacking(found: Sequence[ForceProfile]) -> list[Hint]:
-    """The missing force that explains most, if it is plain."""
-    best = max(found, key=lambda law: law.gain, default=None)
-    return [Hint("law", str(best), best.gain)] if best and best.gain > PLAIN else []
+    """The missing force that explains most, if it explains enough."""
+    plain = ForceProfileSettings.current().plain
+    best = max(found, key=lambda profile: profile.gain, default=None)
+    return [Hint("law", str(best), best.gain)] if best and best.gain > plain else []
 
 
 def lagged(problem: Problem, rows: Rows, white: Array) -> list[Response]:
-    """Of every command the channel whose error follows its changes most plainly; these first.
+    """For every command the channel whose error follows its changes most clearly, the clearest
+    command first.
 
-    `white` (n,) has unit variance where the model is right.
+    `white` (n,): residual with unit variance where the model is right.
     """
-    source = getattr(problem, "commands", None)
-    if source is None:
-        return []
-    runs: list[Changes] = source()
+    runs = problem.commands()
     names = sorted({n for run in runs for n in run})
     found = [_strongest(rows, white, runs, name, len(names)) for name in names]
     return sorted(found, key=lambda s: -abs(s.z[s.peak]))
@@ -81,18 +108,19 @@ def _strongest(
     rows: Rows, white: Array, runs: Sequence[Changes], name: str, commands: int
 ) -> Response:
     """A command's rise within each lag, as a regressor of every channel's error."""
-    rise = np.zeros((len(rows), len(LAGS) - 1))
+    rise = np.zeros((len(rows), len(lags()) - 1))
     for i, changes in enumerate(runs):
         if name in changes:
             own = rows.run == i
             rise[own] = risen(*changes[name], rows.time[own])
+    dependent = HintSettings.current().dependent
     best, tests = None, commands * len(rows.channels)
     for k, channel in enumerate(rows.channels):
         own = rows.channel == k
         power = np.sum(rise[own] ** 2, axis=0)
-        z = white[own] @ rise[own] / np.sqrt(np.maximum(power, 1e-12)) / DEPENDENT
+        z = white[own] @ rise[own] / np.sqrt(np.maximum(power, 1e-12)) / dependent
         z = np.where(power > 1e-9 * np.max(power, initial=1e-12), z, 0.0)
-        this = Response(channel, name, middle(LAGS), z, tests)
+        this = Response(channel, name, middle(lags()), z, tests)
         if best is None or np.max(np.abs(z)) > np.max(np.abs(best.z)):
             best = this
     assert best is not None
@@ -100,8 +128,8 @@ def _strongest(
 
 
 def conflicts(problem: Problem, rows: Rows, r: Array, known: Slopes) -> list[Hint]:
-    """Parameters whose best value wanders more than its error allows, the clearest first: from run
-    to run, or from one valve mode to another."""
+    """Parameters whose best values differ by more than their error allows, from run to run or from
+    one valve mode to another; the clearest first. `r` (n,): the residual."""
     groups = {"from run to run": rows.run, "between valve modes": codes(rows.mode)}
     found = [
         hint
@@ -112,8 +140,12 @@ def conflicts(problem: Problem, rows: Rows, r: Array, known: Slopes) -> list[Hin
 
 
 def _wandering(r: Array, known: Slopes, group: Labels, text: str) -> Iterable[Hint]:
-    """Each effect's switch with a value per group against one value for all; the nuisance
-    parameters, free within their priors, are the same in all groups."""
+    """Each effect's switch with one value per group against one value for all.
+
+    `group` (n,): group of each row. The nuisance parameters are free within their priors, and the
+    same in all groups.
+    """
+    settings = HintSettings.current()
     parts = [group == i for i in np.unique(group)]
     by_part = [(known.by_lead[own], known.by_nuisance[own], r[own]) for own in parts]
     power = np.stack([np.sum(j * j, axis=0) for j, _, _ in by_part])
@@ -122,23 +154,27 @@ def _wandering(r: Array, known: Slopes, group: Labels, text: str) -> Iterable[Hi
     n = known.by_nuisance
     solve = np.linalg.inv(n.T @ n + np.eye(n.shape[1]))
     for i, c in enumerate(known.leads):
-        told = np.flatnonzero(power[:, i] > LEAST_INFORMATION)
+        told = np.flatnonzero(power[:, i] > settings.information)
         own = cross[told, i]
         information = np.diag(power[told, i]) - own @ solve @ own.T
         p = _agreement(information, own @ solve @ (n.T @ r) - slope[told, i])
-        if p < CERTAIN / len(known.leads):
+        if p < settings.certain / len(known.leads):
             weight = float(-np.log10(max(p, 1e-300)))
             yield Hint("conflict", f"{c.key} would have to differ {text}", weight)
 
 
 def _agreement(information: Array, pull: Array) -> float:
-    """p value of one value for all groups, from the information (g, g) on a value for each and the
-    slope (g,) of the log likelihood at nought."""
+    """p value of one value for all groups.
+
+    `information` (g, g) on a value for each group; `pull` (g,): slope of the log likelihood where
+    all values are zero.
+    """
     if len(pull) < 2:
         return 1.0
+    slack = HintSettings.current().slack
     spread = np.linalg.pinv(information, rcond=1e-9, hermitian=True)
     a = spread @ pull
-    certainty = np.linalg.inv(spread + SLACK**2 * np.eye(len(a)))
+    certainty = np.linalg.inv(spread + slack**2 * np.eye(len(a)))
     ones = np.ones(len(a))
     apart = a - ones @ certainty @ a / (ones @ certainty @ ones)
     return float(chi2.sf(apart @ certainty @ apart, len(a) - 1))

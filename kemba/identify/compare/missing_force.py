@@ -1,4 +1,4 @@
-"""The force that a model lacks, in time, with its 95 % band."""
+"""The force that a model lacks, in time, with its 95 % band: where it stands out most."""
 
 from __future__ import annotations
 
@@ -6,33 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kemba.identify.evidence.problem import Array
-
-
-@dataclass(frozen=True)
-class Missing:
-    """Missing force in one run: `force` and its 1 sigma (n, k) at `time` (n,), per channel.
-
-    `strength`: 1 sigma (k,) that each channel is taken to have; `stance`: spans [s] in which a foot
-    is down, so that contact hides most of what is missing.
-    """
-
-    run: str
-    time: Array
-    channels: tuple[str, ...]
-    units: tuple[str, ...]
-    force: Array
-    sigma: Array
-    strength: Array
-    stance: tuple[tuple[float, float], ...] = ()
-
-    def band(self) -> tuple[Array, Array]:
-        """Low and high ends of the 95 % interval."""
-        return self.force - 1.96 * self.sigma, self.force + 1.96 * self.sigma
-
-    def evidence(self) -> Array:
-        """Mean square (k,) of the force in its own sigma: how plainly each channel lacks one."""
-        return np.asarray(np.mean((self.force / self.sigma) ** 2, axis=0))
+from kemba.identify.problem.problem import Array, MissingForce
 
 
 @dataclass(frozen=True)
@@ -49,7 +23,7 @@ class Peak:
     rms: float
 
 
-def peaks(found: list[Missing]) -> list[Peak]:
+def peaks(found: list[MissingForce]) -> list[Peak]:
     """Per channel the moment at which the missing force stands out most from its band."""
     chosen = []
     for k, channel in enumerate(found[0].channels):

@@ -7,16 +7,29 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from kemba.identify.evidence.problem import Array, Candidate, Problem, Theta
+from kemba.identify.problem.problem import Array, Candidate, Problem, Theta
+from kemba.settings import Settings, setting
 
-WIDEST = 2.0  # prior sigmas
-START = "start:"  # names of nuisance parameters that say how a log begins
+
+class ToleranceSettings(Settings):
+    """How far nominal figures may be off."""
+
+    widest: float = setting(
+        2.0,
+        "1",
+        "largest error of a figure, in prior sigmas",
+        "convention: 95 % of them",
+        decides=True,
+    )
 
 
 @dataclass(frozen=True)
 class Slopes:
-    """Slopes of a residual: along the switch of every effect (n, leads), per size, and along
-    every nuisance parameter (n, nuisance), per prior sigma."""
+    """Slopes of a residual.
+
+    `by_lead` (n, leads): along the switch of every effect, per size. `by_nuisance` (n, nuisance):
+    along every nuisance parameter, per prior sigma.
+    """
 
     leads: tuple[Candidate, ...]
     by_lead: Array
@@ -24,7 +37,7 @@ class Slopes:
 
 
 def slopes(problem: Problem, at: Theta) -> Slopes:
-    """Of the effects of the catalogue that are no sensor's."""
+    """Slopes at theta `at`, of all effects but sensor faults."""
     leads = tuple(c for c in problem.candidates.values() if not c.sensor)
     nuisance = list(problem.nuisance)
     jacobian = problem.jacobian(at, [*(c.key for c in leads), *nuisance])
@@ -35,19 +48,9 @@ def slopes(problem: Problem, at: Theta) -> Slopes:
 
 
 def within_tolerance(residual: Array, known: Slopes) -> Array:
-    """What is left of a residual (n,) when no nuisance parameter moves by more than WIDEST."""
+    """The part (n,) of a residual (n,) that is left when every nuisance parameter takes its best
+    value within `widest` prior sigmas."""
+    widest = ToleranceSettings.current().widest
     q, triangle = np.linalg.qr(known.by_nuisance)
-    step = lsq_linear(triangle, -q.T @ residual, (-WIDEST, WIDEST)).x
+    step = lsq_linear(triangle, -q.T @ residual, (-widest, widest)).x
     return np.asarray(residual + known.by_nuisance @ step)
-
-
-def free_starts(problem: Problem, at: Theta | None = None) -> dict[str, float]:
-    """Theta `at` with each log beginning as its data say, all else nominal."""
-    theta = dict(at or {})
-    names = [n for n in problem.nuisance if n.startswith(START)]
-    if not names:
-        return theta
-    sigma = np.array([problem.nuisance[n][1] for n in names])
-    j, r = problem.jacobian(theta, names) * sigma, problem.residual(theta)
-    step = np.linalg.solve(j.T @ j + np.eye(len(names)), -j.T @ r)
-    return theta | dict(zip(names, (sigma * step).tolist(), strict=True))

@@ -1,4 +1,4 @@
-"""Does it hold on data it was not fitted to? Prediction of left-out blocks, and held-out logs."""
+"""Does it hold on data it was not fitted to? Each block of time is predicted from the others."""
 
 from __future__ import annotations
 
@@ -7,21 +7,42 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from kemba.identify.evidence.linear import Linear, estimate, linearise, time_blocks
-from kemba.identify.evidence.null_model import best_fit
+from kemba.identify.evidence.linear import Linear
 from kemba.identify.evidence.point import LinearisationPoint
-from kemba.identify.evidence.problem import Array, Problem, Theta
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
-from kemba.identify.evidence.windows import rms, windows_of
+from kemba.identify.problem.problem import Array
+from kemba.settings import BY_HAND, Settings, setting
 
-NONE = 1e-6  # a floor that lets nothing through
-TOLERATED = 3.0  # sigma by which a nominal figure may be off
+
+class CrossValidationSettings(Settings):
+    """When left-out data refute an answer."""
+
+    refuted: float = setting(
+        2.0,
+        "nats",
+        "loss on left-out data, beyond its standard error, that refutes an answer",
+        BY_HAND,
+        decides=True,
+    )
+    tolerated: float = setting(
+        3.0,
+        "1",
+        "prior sigmas by which a nominal figure may be off",
+        "convention: three sigmas",
+        decides=True,
+    )
+    none: float = setting(
+        1e-6, "1", "width of the spike of absent effects", "convention: none, but not singular"
+    )
+    free: float = setting(
+        1e6, "1", "prior sigmas by which an effect may be off", "convention: no bound"
+    )
 
 
 @dataclass(frozen=True)
 class Gain:
-    """Log-likelihood gained on left-out data [nats], with its standard error over blocks."""
+    """Log likelihood gained on left-out data [nats], and its standard error over blocks."""
 
     nats: float
     error: float
@@ -29,7 +50,7 @@ class Gain:
     @property
     def refuted(self) -> bool:
         """Whether left-out data speak against it, by more than their scatter."""
-        return self.nats + self.error < -2.0
+        return self.nats + self.error < -CrossValidationSettings.current().refuted
 
 
 def left_out(search: Search, hypothesis: Hypothesis, against: Hypothesis = NULL) -> Gain:
@@ -43,14 +64,14 @@ def left_out(search: Search, hypothesis: Hypothesis, against: Hypothesis = NULL)
 
 def _predicted(search: Search, point: LinearisationPoint) -> Array:
     """Log likelihood (b,) of each block under the fit to all others."""
-    return -0.5 * _powers(search, point, point.linear) / search.heat
+    return -0.5 * _powers(search, point, point.linear)
 
 
 def _powers(search: Search, point: LinearisationPoint, judged: Linear) -> Array:
     """Sum of squares (b,) that `judged` has of each block under the fit to all others.
 
-    A left-out block judges the hypothesis itself: nothing else may help at floor level, and no
-    nominal figure may leave its tolerance to do an effect's work.
+    A left-out block judges the hypothesis alone: all other effects are absent, and no nominal
+    figure may leave its tolerance to imitate an effect.
     """
     linear, found = point.linear, []
     for block in range(len(linear.count)):
@@ -63,30 +84,22 @@ def _powers(search: Search, point: LinearisationPoint, judged: Linear) -> Array:
 
 def within_tolerance(search: Search, linear: Linear, hypothesis: Hypothesis) -> Array:
     """z (k,) of the best fit with the nominal figures within their tolerance."""
-    ranker = search.base.ranker(linear, floor=NONE)
+    settings = CrossValidationSettings.current()
+    ranker = search.base.ranker(linear, spike=settings.none)
     width = ranker.widths(hypothesis, 1.0)
     gram, slope, _ = linear.total
-    h = gram * np.outer(width, width) / search.heat + np.eye(len(width))
+    h = gram * np.outer(width, width) + np.eye(len(width))
     shift = (linear.mean - linear.at) / width
     lower = np.linalg.cholesky(h)
-    target = np.linalg.solve(lower, shift - width * slope / search.heat)
-    reach = np.where(ranker.nuisance, TOLERATED, 1e6)
+    target = np.linalg.solve(lower, shift - width * slope)
+    reach = np.where(ranker.nuisance, settings.tolerated, settings.free)
     found = lsq_linear(lower.T, target, bounds=(shift - reach, shift + reach), method="bvls")
     return np.asarray(linear.at + width * found.x)
 
 
-def predicted_error(search: Search, point: LinearisationPoint) -> float:
-    """RMS of whitened residuals summed over grains, each block predicted from all others."""
-    power = float(_powers(search, point, point.coarse).sum())
-    return float(np.sqrt(max(power, 0.0) / point.coarse.count.sum()))
-
-
-def heldout_error(problem: Problem, theta: Theta) -> float:
-    """RMS of whitened residuals summed over grains on other logs; only how their runs start is
-    fitted to them."""
-    names = tuple(n for n in problem.nuisance if n not in theta or n.startswith("start:"))
-    theta = {k: v for k, v in theta.items() if not k.startswith("start:")}
-    if names:
-        linear, _, _ = linearise(problem, theta, time_blocks(problem), names)
-        theta = theta | estimate(problem, linear, best_fit(linear))
-    return rms(windows_of(problem).sums(problem.residual(theta)))
+def left_out_error(search: Search, hypothesis: Hypothesis) -> float:
+    """RMS of whitened residuals summed over aggregation windows, as `error_ratio`, each block of
+    time predicted from all others."""
+    point = search.points[hypothesis]
+    power = float(_powers(search, point, point.windowed).sum())
+    return float(np.sqrt(max(power, 0.0) / point.windowed.count.sum()))

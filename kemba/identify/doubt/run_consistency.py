@@ -1,4 +1,4 @@
-"""Does a parameter wander from run to run? One that does points at the defect, not at its value."""
+"""Does a parameter differ from run to run? Then something is missing that changes with the run."""
 
 from __future__ import annotations
 
@@ -7,21 +7,53 @@ from dataclasses import dataclass
 import numpy as np
 
 from kemba.identify.doubt.cross_validation import within_tolerance
-from kemba.identify.evidence.problem import Array, Labels
 from kemba.identify.evidence.search import Search
-from kemba.identify.evidence.spike_slab import NULL, SPIKE_WIDTH, Hypothesis
+from kemba.identify.evidence.spike_slab import NULL, Hypothesis, SpikeSlabSettings
+from kemba.identify.problem.problem import Array, Labels
+from kemba.settings import BY_HAND, Settings, setting
 
-CLEAR = 100.0  # nats that separate values per run must bring over one value for all
-SHARE_OF_ROWS = 0.01  # per row
-SHARE = 0.1  # and as a share of what the answer itself brings
-SPREAD = 1.2  # sizes between the smallest and the largest value
-FORGIVEN = 0.15  # noise units of force that a run may be off by, whatever the reason
-INFORMED = 0.2  # sizes, one sigma of a value that a run must give to be asked
+
+class RunConsistencySettings(Settings):
+    """When a parameter differs from run to run."""
+
+    clear: float = setting(
+        100.0,
+        "nats",
+        "gain of a value per run over one value for all that is asked for",
+        BY_HAND,
+        decides=True,
+    )
+    share_of_rows: float = setting(
+        0.01, "nats", "the same per row of the logs", BY_HAND, decides=True
+    )
+    share: float = setting(
+        0.1, "1", "the same as a share of the gain of the answer itself", BY_HAND, decides=True
+    )
+    spread: float = setting(
+        1.2, "1", "sizes between the smallest and the largest value", BY_HAND, decides=True
+    )
+    forgiven: float = setting(
+        0.15,
+        "1",
+        "error of a run, in sigmas of one row, that all its rows may share",
+        BY_HAND,
+        decides=True,
+    )
+    informed: float = setting(
+        0.2,
+        "1",
+        "a run is asked where it gives the parameter with this sigma, in sizes",
+        BY_HAND,
+        decides=True,
+    )
 
 
 @dataclass(frozen=True)
 class Drift:
-    """A parameter whose values per run contradict each other."""
+    """A parameter whose values per run contradict each other.
+
+    `values`: one per run that tells the parameter [its unit]; `nats`: gain of these over one value.
+    """
 
     effect: str
     key: str
@@ -34,7 +66,8 @@ class Drift:
 
 
 def drifting(search: Search, best: Hypothesis) -> Drift | None:
-    """The clearest case of a parameter that wanders, in what the best answer leaves over."""
+    """The clearest case of a parameter that differs, in the error that the best answer leaves."""
+    settings, spike = RunConsistencySettings.current(), SpikeSlabSettings.current().spike
     problem, point = search.problem, search.points[best]
     if len(problem.runs) < 2:
         return None
@@ -46,20 +79,20 @@ def drifting(search: Search, best: Hypothesis) -> Drift | None:
     for effect, candidate in problem.candidates.items():
         column = search.base.jacobian[:, search.points[()].linear.index(candidate.key)]
         gram, slope = _sums(column * column, run), _sums(column * residual, run)
-        error = (1.0 + FORGIVEN**2 * count) / np.maximum(gram, 1e-12)
-        keep = error < (INFORMED * candidate.lead.size) ** 2
+        error = (1.0 + settings.forgiven**2 * count) / np.maximum(gram, 1e-12)
+        keep = error < (settings.informed * candidate.lead.size) ** 2
         if keep.sum() < 2:
             continue
         gram, slope = gram[keep], slope[keep]
-        narrow = error[keep] + (SPIKE_WIDTH * candidate.lead.size) ** 2
+        narrow = error[keep] + (spike * candidate.lead.size) ** 2
         own = -slope / gram
         shared = float(np.sum(own / narrow) / np.sum(1.0 / narrow))
         nats = 0.5 * float(np.sum((own - shared) ** 2 / narrow))
-        if np.ptp(own) > SPREAD * candidate.lead.size:
+        if np.ptp(own) > settings.spread * candidate.lead.size:
             values = tuple(float(candidate.lead.off + a) for a in own)
             found.append(Drift(effect, candidate.key, values, nats))
     clearest = max(found, key=lambda d: d.nats, default=None)
-    least = max(CLEAR, SHARE * gained, SHARE_OF_ROWS * len(residual))
+    least = max(settings.clear, settings.share * gained, settings.share_of_rows * len(residual))
     if clearest is None or clearest.nats < least:
         return None
     return clearest
@@ -73,4 +106,5 @@ def _tolerant(search: Search) -> Array:
 
 
 def _sums(values: Array, run: Labels) -> Array:
+    """Sum (runs,) of values (n,) over the rows of each run."""
     return np.asarray(np.bincount(run, weights=values), dtype=float)

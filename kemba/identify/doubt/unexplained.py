@@ -1,61 +1,84 @@
-"""What no effect of the catalogue explains: simple terms, judged by the same evidence."""
+"""Errors that no effect of the catalogue explains: simple terms, judged by the same evidence."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 
 from kemba.identify.evidence.linear import Linear, condense
-from kemba.identify.evidence.problem import Array, Candidate, Parameter, Theta
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis, Ranker
-
-WIDTH = 10.0  # prior of a term: so many sigma where it acts most
-AHEAD = 6.0  # nats by which a formula must beat the catalogue
-STRUCTURE = 1.0  # repeatable mean square, in noise units, that an imperfect model may leave,
-LEFT = 0.1  # and as a share of what the answer explains
-MATTERS = 0.2  # a formula whose force stays below this share of an effect's size is no finding
-CLIP, RIDGES, FOLDS = 30.0, (1e-4, 1e-2, 1.0), 5
+from kemba.identify.problem.problem import Array, Candidate, Labels, Parameter
+from kemba.identify.settings import DiscoverSettings
+from kemba.settings import BY_HAND, Settings, setting
 
 
-@runtime_checkable
-class Examinable(Protocol):
-    """A problem that can say what its residual may depend on."""
+class UnexplainedSettings(Settings):
+    """When something is missing that the catalogue does not have."""
 
-    def leftover(self, theta: Theta) -> tuple[Array, Array, Array]:
-        """Residual over its white noise (n,), regressors (n, m), and the run of each row (n,)."""
-
-
-@runtime_checkable
-class Weighing(Protocol):
-    """A problem that can say how much a term would matter."""
-
-    def weight(self, theta: Theta, formula: str, coefficient: float) -> float:
-        """Its largest force as a share of what matters in practice."""
+    width: float = setting(
+        10.0,
+        "1",
+        "prior of a term's force, in sigmas of the noise where it acts most",
+        BY_HAND,
+        decides=True,
+    )
+    terms: int = setting(2, "1", "most terms of a formula", "convention: a formula can be read")
+    structure: float = setting(
+        1.0,
+        "1",
+        "repeatable mean square, in noise units, that an imperfect model may leave",
+        BY_HAND,
+        decides=True,
+    )
+    left: float = setting(
+        0.1, "1", "the same as a share of what the answer explains", BY_HAND, decides=True
+    )
+    matters: float = setting(
+        0.2,
+        "1",
+        "smallest force of a formula, as a share of what matters in practice",
+        BY_HAND,
+        decides=True,
+    )
+    clip: float = setting(30.0, "1", "residuals are clipped at so many sigmas", BY_HAND)
+    ridges: tuple[float, ...] = setting(
+        (1e-4, 1e-2, 1.0), "1", "penalties of the regression that are tried", BY_HAND
+    )
+    folds: int = setting(5, "1", "blocks of time that are left out in turn", "convention: five")
+    no_force: float = setting(
+        1e-9, "1", "force, in sigmas, of a term that acts nowhere", "convention: nought"
+    )
 
 
 def structured(search: Search, hypothesis: Hypothesis) -> tuple[float, float]:
     """Mean square of the residual in noise units, and the part of it that repeats itself.
 
-    A regression on everything a force could depend on is learnt on some blocks and judged on the
-    others: what it predicts there is structure, and no noise, however coloured.
+    A regression on everything that a force could depend on is learnt on some blocks of time. What
+    it predicts in the other blocks is structure: noise cannot be predicted, however coloured.
     """
-    if not isinstance(search.problem, Examinable):
+    settings = UnexplainedSettings.current()
+    left_over = search.problem.leftover(search.points[hypothesis].fit.theta)
+    if left_over is None:
         return 1.0, 0.0
-    r, columns, run = search.problem.leftover(search.points[hypothesis].fit.theta)
-    r = np.clip(r, -CLIP, CLIP)
+    r = np.clip(left_over.residual, -settings.clip, settings.clip)
+    columns = left_over.features
     columns = columns / np.maximum(np.sqrt(np.mean(columns**2, axis=0)), 1e-9)
-    folds = _folds(run)
+    folds = _folds(left_over.run)
     power = float(np.mean(r**2))
-    left = min(float(np.mean((r - _foretold(r, columns, folds, k)) ** 2)) for k in RIDGES)
+    left = min(
+        float(np.mean((r - _predicted_folds(r, columns, folds, k)) ** 2)) for k in settings.ridges
+    )
     return power, max(power - left, 0.0)
 
 
-def _foretold(r: Array, columns: Array, folds: Array, ridge: float) -> Array:
-    """Each fold as the regression on the others foretells it."""
+def _predicted_folds(r: Array, columns: Array, folds: Labels, ridge: float) -> Array:
+    """Residual (n,) that a ridge regression on the other folds predicts for each fold.
+
+    `columns` (n, m): regressors; `folds` (n,): fold of each row.
+    """
     predicted = np.zeros(len(r))
     for fold in np.unique(folds):
         out = folds == fold
@@ -65,27 +88,32 @@ def _foretold(r: Array, columns: Array, folds: Array, ridge: float) -> Array:
     return predicted
 
 
-def _folds(run: Array) -> Array:
-    """Blocks of time, FOLDS of them per run, dealt out in turn."""
+def _folds(run: Labels) -> Labels:
+    """Which fold each row (n,) belongs to: runs are cut into blocks of time, dealt out in turn."""
+    folds = UnexplainedSettings.current().folds
     labels = np.zeros(len(run), dtype=int)
     for i in np.unique(run):
         own = np.flatnonzero(run == i)
-        labels[own] = np.arange(len(own)) * 2 * FOLDS // len(own) % FOLDS
+        labels[own] = np.arange(len(own)) * 2 * folds // len(own) % folds
     return labels
 
 
 def unfinished(search: Search, best: Hypothesis) -> bool:
-    """Whether so much structure is left that the answer cannot be the whole of it."""
+    """Whether so much structure is left that the answer cannot be complete."""
+    settings = UnexplainedSettings.current()
     power, structure = structured(search, best)
-    if not best:
-        return structure > STRUCTURE
+    if not best or structure <= settings.structure:
+        return structure > settings.structure
     before, _ = structured(search, NULL)
-    return structure > max(STRUCTURE, LEFT * max(before - power, 0.0))
+    return structure > settings.left * max(before - power, 0.0)
 
 
 @dataclass(frozen=True)
 class Formula:
-    """Terms found, coefficients (value, sigma), and how much evidence they add [nats]."""
+    """A force as a sum of simple terms.
+
+    `coefficients`: value and sigma of each term; `gain` [nats]: log evidence that they add.
+    """
 
     terms: tuple[str, ...]
     coefficients: tuple[tuple[float, float], ...]
@@ -101,12 +129,16 @@ class Formula:
 def extended(
     search: Search, linear: Linear, jacobian: Array, r: Array, formulas: Mapping[str, Array]
 ) -> tuple[Ranker, dict[str, str]]:
-    """A ranker that knows these terms as further candidates; their names by formula."""
+    """A ranker with these formulas as further candidates, and name of a candidate -> formula.
+
+    `jacobian` (n, k) and `r` (n,) as in `linear`; `formulas`: columns (n,).
+    """
+    settings = UnexplainedSettings.current()
     names = {f"term{i}": formula for i, formula in enumerate(formulas)}
     columns = np.stack([formulas[f] for f in names.values()], axis=1)
     reach = np.percentile(np.abs(columns), 99, axis=0)
-    widths = WIDTH / np.maximum(reach, 1e-9)
-    keep = [i for i in range(len(names)) if reach[i] > 1e-9]
+    widths = settings.width / np.maximum(reach, settings.no_force)
+    keep = [i for i in range(len(names)) if reach[i] > settings.no_force]
     names = {n: f for i, (n, f) in enumerate(names.items()) if i in keep}
     columns, widths = columns[:, keep], widths[keep]
     candidates = {
@@ -122,11 +154,19 @@ def extended(
         r,
         search.base.division.blocks,
     )
-    ranker = Ranker(
-        joined, {**search.problem.candidates, **candidates}, search.problem.nuisance, search.heat
-    )
-    ranker.silent = frozenset(candidates)
-    return ranker, names
+    problem = search.problem
+    known = {**problem.candidates, **candidates}
+    return Ranker(joined, known, problem.nuisance, silent=candidates), names
+
+
+def by_chance(count: int) -> float:
+    """Gain [nats] that the best of `count` terms reaches by chance at most as often as a p-value
+    may be significant.
+
+    A Bayes factor exceeds exp(g) with a probability of exp(-g) at most where its term is not there
+    (Markov's inequality); `count` of them do so with `count` times that probability at most.
+    """
+    return float(np.log(count / DiscoverSettings.current().significant))
 
 
 def look(search: Search, best: Hypothesis) -> Formula | None:
@@ -138,9 +178,9 @@ def look(search: Search, best: Hypothesis) -> Formula | None:
     ranker, names = extended(
         search, null.linear, search.base.jacobian, search.base.residual, formulas
     )
-    alone = _grow(ranker, names, ())
+    alone, ahead = _grow(ranker, names, ()), by_chance(len(names))
     catalogue = search.points[best].log_evidence - null.log_evidence
-    if alone is not None and alone.gain > catalogue + AHEAD and _matters(search, alone):
+    if alone is not None and alone.gain > catalogue + ahead and _matters(search, alone):
         return replace(alone, gain=alone.gain - catalogue)
     return None
 
@@ -148,22 +188,22 @@ def look(search: Search, best: Hypothesis) -> Formula | None:
 def _matters(search: Search, formula: Formula) -> bool:
     """Whether a formula is more than the imperfection that every model has."""
     problem, theta = search.problem, search.points[NULL].fit.theta
-    if not isinstance(problem, Weighing):
-        return True
     parts = zip(formula.terms, formula.coefficients, strict=True)
-    return any(problem.weight(theta, term, c) > MATTERS for term, (c, _) in parts)
+    least = UnexplainedSettings.current().matters
+    return any(problem.weight(theta, term, c) > least for term, (c, _) in parts)
 
 
 def _grow(ranker: Ranker, names: Mapping[str, str], start: Hypothesis) -> Formula | None:
-    """Greedy choice of at most two terms; each must bring its share."""
+    """Terms chosen one after the other; each must add enough evidence."""
+    least, most = by_chance(len(names)), UnexplainedSettings.current().terms
     base = ranker.score(start).log_evidence
     chosen, reached = start, base
-    for _ in range(2):
+    for _ in range(most):
         table = {n: ranker.score((*chosen, n)).log_evidence for n in names if n not in chosen}
         if not table:
             break
         name = max(table, key=table.__getitem__)
-        if table[name] < reached + AHEAD + 2.0:
+        if table[name] < reached + least:
             break
         chosen, reached = (*chosen, name), table[name]
     terms = tuple(n for n in chosen if n not in start)

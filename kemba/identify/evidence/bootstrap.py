@@ -1,4 +1,4 @@
-"""Is nothing missing? The whole linear search, repeated on data in which nothing is."""
+"""Is nothing missing? The linear search, repeated on simulated logs in which nothing is."""
 
 from __future__ import annotations
 
@@ -10,22 +10,32 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.special import logsumexp
 from scipy.stats import norm
 
-from kemba.identify.evidence.problem import Array
-from kemba.identify.evidence.spike_slab import (
-    SLAB_WIDTH,
-    SPIKE_WIDTH,
-    TOLERANCES,
-    Hypothesis,
-    Ranker,
-)
+from kemba.identify.evidence.spike_slab import Hypothesis, Ranker, SpikeSlabSettings
+from kemba.identify.problem.problem import Array
+from kemba.identify.settings import DiscoverSettings
+from kemba.settings import Settings, setting
 
-DRAWS = 400
-QUANTILE = 0.98
+
+class BootstrapSettings(Settings):
+    """The test whether anything is missing."""
+
+    draws: int = setting(
+        400,
+        "1",
+        "number of simulated logs",
+        "derived: eight of them lie beyond the p-value asked for, so that it is known to a third",
+    )
+    least: float = setting(
+        1.0, "nats", "smallest threshold of the log evidence", "convention: evidence of one nat"
+    )
 
 
 @dataclass(frozen=True)
 class NullTest:
-    """`scores` (draws,): best log evidence over nothing, in logs in which nothing is missing."""
+    """The best score that a single effect reaches in logs in which nothing is missing.
+
+    `scores` (draws,): its log evidence less that of nothing [nats]. `names` of the parameters.
+    """
 
     scores: Array
     names: tuple[str, ...]
@@ -36,7 +46,10 @@ class NullTest:
 
     @property
     def threshold(self) -> float:
-        return float(max(np.quantile(self.scores, QUANTILE), 1.0))
+        """Log evidence that only as many of such logs reach as a significant p-value allows."""
+        significant = DiscoverSettings.current().significant
+        least = BootstrapSettings.current().least
+        return float(max(np.quantile(self.scores, 1.0 - significant), least))
 
 
 def bootstrap(
@@ -44,13 +57,16 @@ def bootstrap(
     noise: Array,
     hypotheses: Sequence[Hypothesis],
     seed: int = 0,
-    draws: int = DRAWS,
+    draws: int | None = None,
 ) -> NullTest:
-    """Nominal figures off within their tolerance, every effect at floor level, noise redrawn.
+    """Scores of simulated logs in which nothing is missing.
 
-    `noise` (blocks, k): J'e of short blocks of what a flexible model leaves; blocks keep the
-    colour, their random signs make new noise.
+    In each of them the nominal figures are off within their tolerance, every effect is there with
+    the small share of its size that the spike allows, and the noise is another. `noise` (blocks,
+    k): J'e of short blocks of the error that a flexible model leaves. A block keeps the colour of
+    the noise; a random sign of each block makes new noise.
     """
+    draws = BootstrapSettings.current().draws if draws is None else draws
     rng = np.random.default_rng(seed)
     slopes = _slopes(ranker, noise, rng, draws)
     base = _evidence(ranker, (), slopes)
@@ -62,15 +78,15 @@ def bootstrap(
 
 def _slopes(ranker: Ranker, noise: Array, rng: np.random.Generator, draws: int) -> Array:
     """J'r (k, draws) of logs in which nothing is missing, at the prior mean."""
-    linear = ranker.linear
+    linear, prior = ranker.linear, SpikeSlabSettings.current()
     gram = linear.gram.sum(axis=0)
     signs = rng.choice([-1.0, 1.0], size=(draws, len(noise)))
     width = linear.width.copy()
-    tolerance = rng.choice(TOLERANCES, size=draws)
+    tolerance = rng.choice(prior.tolerances, size=draws)
     truth = rng.standard_normal((draws, len(width))) * width
     truth[:, ranker.nuisance] *= tolerance[:, None]
     for effect, i in ranker.lead.items():
-        truth[:, i] *= SPIKE_WIDTH
+        truth[:, i] *= prior.spike
         if not ranker.candidates[effect].lead.signed:
             truth[:, i] = np.abs(truth[:, i])
     return np.asarray((-(truth @ gram) + signs @ noise).T)
@@ -78,21 +94,22 @@ def _slopes(ranker: Ranker, noise: Array, rng: np.random.Generator, draws: int) 
 
 def _evidence(ranker: Ranker, hypothesis: Hypothesis, slopes: Array) -> Array:
     """Log evidence (draws,), up to a term that all hypotheses share."""
-    gram = ranker.linear.gram.sum(axis=0) / ranker.heat
-    parts = []
-    for tolerance in TOLERANCES:
+    gram = ranker.linear.gram.sum(axis=0)
+    parts, tolerances = [], SpikeSlabSettings.current().tolerances
+    for tolerance in tolerances:
         width = ranker.widths(hypothesis, tolerance)
         factor = cho_factor(gram * np.outer(width, width) + np.eye(len(width)), lower=True)
-        eta = -width[:, None] * slopes / ranker.heat
+        eta = -width[:, None] * slopes
         step = cho_solve(factor, eta)
         value = 0.5 * np.sum(eta * step, axis=0) - float(np.sum(np.log(np.diag(factor[0]))))
-        parts.append(value + _sides(ranker, hypothesis, width, factor, step))
-    return np.asarray(logsumexp(parts, axis=0) - np.log(len(TOLERANCES)))
+        parts.append(value + _sign_terms(ranker, hypothesis, width, factor, step))
+    return np.asarray(logsumexp(parts, axis=0) - np.log(len(tolerances)))
 
 
-def _sides(
+def _sign_terms(
     ranker: Ranker, hypothesis: Hypothesis, width: Array, factor: tuple[Array, bool], step: Array
 ) -> Array:
+    """What the sign of switches that cannot be negative adds to the evidence (draws,)."""
     total = np.zeros(step.shape[1])
     for effect in hypothesis:
         if not ranker.candidates[effect].lead.signed:
@@ -105,14 +122,15 @@ def _sides(
 
 
 def smallest_detectable(ranker: Ranker, threshold: float) -> dict[str, float]:
-    """Per effect, the size that these data would show above the threshold nine times in ten."""
-    found = {}
+    """Effect -> size [its switch's unit] that these data would show above the threshold [nats] nine
+    times in ten."""
+    found, prior = {}, SpikeSlabSettings.current()
     for effect, i in ranker.lead.items():
         size = ranker.candidates[effect].lead.size
-        wide = SLAB_WIDTH * size
+        wide = prior.slab * size
         covariance = ranker.score((effect,)).covariance
         variance = 1.0 / max(1.0 / covariance[i, i] - 1.0 / wide**2, 1e-12 / wide**2)
-        narrow = variance + (SPIKE_WIDTH * size) ** 2
+        narrow = variance + (prior.spike * size) ** 2
         gain = 0.5 * (1.0 / narrow - 1.0 / (variance + wide**2))
         occam = 0.5 * np.log((variance + wide**2) / narrow)
         found[effect] = float(np.sqrt(max(threshold + occam, 0.5) / gain) + 1.28 * np.sqrt(narrow))

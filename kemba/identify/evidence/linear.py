@@ -7,18 +7,36 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kemba.identify.evidence.problem import Array, Flags, Labels, Parameter, Problem, Theta
+from kemba.identify.problem.problem import (
+    Array,
+    Candidate,
+    Flags,
+    Labels,
+    Parameter,
+    Problem,
+    Theta,
+)
+from kemba.settings import BY_HAND, Settings, setting
 
-FARTHEST = 4.0  # sizes
+
+class LinearSettings(Settings):
+    """Where the linearised problem may lead."""
+
+    farthest: float = setting(
+        4.0, "1", "largest distance of a switch from off, in sizes, where it is tried", BY_HAND
+    )
+    blocks: int = setting(
+        4, "1", "fewest blocks: fewer runs are cut in time", "convention: for leaving out a quarter"
+    )
 
 
 @dataclass(frozen=True)
 class Linear:
-    """r(z) = r0 + J (z - at) summed over blocks of rows.
+    """r(z) = r0 + J (z - at), as sums over b blocks of rows.
 
-    `gram` (b, k, k) = J'J, `slope` (b, k) = J'r0, `power` (b,) = r0'r0, `count` (b,) rows per
-    block. Shape parameters stand as their logarithms. `width` and `mean` (k,) are the prior of
-    each z when it is free; `bend` tells which names are switches of absent effects.
+    `names` of the k parameters; `at` (k,): where it is linearised; shapes stand as logarithms.
+    `mean` and `width` (k,): the prior of each parameter when it is free. `gram` (b, k, k) = J'J,
+    `slope` (b, k) = J'r0, `power` (b,) = r0'r0, `count` (b,): rows per block.
     """
 
     names: tuple[str, ...]
@@ -32,6 +50,7 @@ class Linear:
 
     @property
     def total(self) -> tuple[Array, Array, float]:
+        """J'J (k, k), J'r0 (k,) and r0'r0 over all blocks."""
         return self.gram.sum(axis=0), self.slope.sum(axis=0), float(self.power.sum())
 
     def without(self, blocks: Flags) -> Linear:
@@ -39,6 +58,7 @@ class Linear:
         return self.only(~blocks)
 
     def only(self, keep: Flags) -> Linear:
+        """The same with the blocks where `keep` (b,) is true."""
         return replace(
             self,
             gram=self.gram[keep],
@@ -48,6 +68,7 @@ class Linear:
         )
 
     def index(self, name: str) -> int:
+        """Place of a name. Raises ValueError where it is none of `names`."""
         return self.names.index(name)
 
 
@@ -64,6 +85,7 @@ def names_of(problem: Problem, theta: Theta) -> tuple[str, ...]:
 
 
 def is_on(theta: Theta, key: str, lead: Parameter) -> bool:
+    """Whether theta switches the effect on whose switch is `lead`, named `key`."""
     return theta.get(key, lead.off) != lead.off
 
 
@@ -90,7 +112,8 @@ def condense(
     r: Array,
     blocks: Labels,
 ) -> Linear:
-    """Sums over each block."""
+    """Sums over each block: `jacobian` (n, k), `r` (n,), `blocks` (n,) labels of the rows; `at`,
+    `mean` and `width` (k,) as in `Linear`."""
     labels = np.unique(blocks)
     gram, slope, power, count = [], [], [], []
     for label in labels:
@@ -112,13 +135,13 @@ def moved(linear: Linear, at: Array, jacobian: Array, r: Array, blocks: Labels) 
     return replace(linear, at=at, slope=slope, power=power)
 
 
-def within(problem: Problem, theta: Mapping[str, float]) -> dict[str, float]:
+def within(candidates: Mapping[str, Candidate], theta: Theta) -> dict[str, float]:
     """Theta with every effect's parameters inside their bounds."""
-    bounds = {k: p for c in problem.candidates.values() for k, p in c.keys().items()}
+    bounds = {k: p for c in candidates.values() for k, p in c.keys().items()}
     clipped = {k: _sane(v, bounds[k]) if k in bounds else v for k, v in theta.items()}
     typical = {
         key: p.typical
-        for c in problem.candidates.values()
+        for c in candidates.values()
         if is_on(clipped, c.key, c.lead)
         for key, p in c.keys().items()
         if key not in clipped
@@ -129,19 +152,20 @@ def within(problem: Problem, theta: Mapping[str, float]) -> dict[str, float]:
 def _sane(value: float, parameter: Parameter) -> float:
     """Within the bounds, and within a few sizes of off where it is a switch."""
     if np.isnan(parameter.typical):
-        reach = FARTHEST * parameter.size
+        reach = LinearSettings.current().farthest * parameter.size
         value = float(np.clip(value, parameter.off - reach, parameter.off + reach))
     return float(np.clip(value, parameter.lower, parameter.upper))
 
 
 def is_shape(problem: Problem, name: str) -> bool:
+    """Whether a name in theta is a shape parameter of an effect."""
     effect = name.rsplit(".", 1)[0]
     candidate = problem.candidates.get(effect)
     return candidate is not None and name != candidate.key
 
 
 def priors(problem: Problem, theta: Theta, names: Iterable[str]) -> tuple[Array, Array, Array]:
-    """Where the linearisation stands, and mean and width of the prior, per name."""
+    """Value at theta, prior mean and prior width (k,) of each name; shapes as logarithms."""
     rows = []
     for name in names:
         if name in problem.nuisance:
@@ -157,8 +181,10 @@ def priors(problem: Problem, theta: Theta, names: Iterable[str]) -> tuple[Array,
     return at, mean, width
 
 
-def time_blocks(problem: Problem, wanted: int = 4, shortest: float = 0.0) -> Labels:
-    """A label per row: every run, cut in time where there are fewer runs than `wanted`."""
+def time_blocks(problem: Problem, wanted: int | None = None, shortest: float = 0.0) -> Labels:
+    """A label (n,) per row: every run is a block, cut in time where there are fewer runs than
+    `wanted` (None: the setting), or cut into pieces of at least `shortest` [s]."""
+    wanted = LinearSettings.current().blocks if wanted is None else wanted
     rows = problem.rows()
     pieces = max(1, int(np.ceil(wanted / max(len(problem.runs), 1))))
     labels = np.zeros(len(rows), dtype=int)
@@ -172,7 +198,7 @@ def time_blocks(problem: Problem, wanted: int = 4, shortest: float = 0.0) -> Lab
 
 
 def estimate(problem: Problem, linear: Linear, z: Array) -> dict[str, float]:
-    """Theta of a vector z; switches that are at their off value are left out."""
+    """Theta of a vector z (k,); effects whose switch is off are left out."""
     theta: dict[str, float] = {}
     for name, value in zip(linear.names, z, strict=True):
         theta[name] = float(np.exp(value)) if is_shape(problem, name) else float(value)

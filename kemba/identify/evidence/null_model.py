@@ -1,4 +1,4 @@
-"""The model as it is: fitted, its noise learnt, and what every effect promises from there."""
+"""The model as it is: its fit, the colour of the noise, and the linear evidence of every effect."""
 
 from __future__ import annotations
 
@@ -16,73 +16,81 @@ from kemba.identify.evidence.linear import (
     priors,
     within,
 )
-from kemba.identify.evidence.point import Colourable, Division, LinearisationPoint, Movable
-from kemba.identify.evidence.problem import Array, Problem
+from kemba.identify.evidence.point import Division, LinearisationPoint
 from kemba.identify.evidence.refit import Fit, Frozen
-from kemba.identify.evidence.spike_slab import NULL, SPIKE_WIDTH, Hypothesis, Ranker
-
-GLANCES = 1  # evaluations of each single effect before the leaders are refitted
-ABSURD = 1e5  # noise units
+from kemba.identify.evidence.spike_slab import NULL, Hypothesis, Ranker
+from kemba.identify.problem.problem import Array, Problem
+from kemba.settings import BY_HAND, Settings, setting
 
 Names = tuple[str, ...]
+
+
+class NullModelSettings(Settings):
+    """How single effects are looked at before the leaders are refitted."""
+
+    glances: int = setting(1, "1", "evaluations of each single effect", BY_HAND)
+    rounds: int = setting(2, "1", "refits of the model as it is", BY_HAND)
+    absurd: float = setting(
+        1e5, "1", "residual in sigmas at which nothing can be predicted", "convention: beyond data"
+    )
 
 
 class Baseline:
     """The null hypothesis refitted, with slopes to every effect of the catalogue.
 
-    `point`: the null; `table`: log evidence by hypothesis as the slopes promise it; `jacobian`
-    (n, k) and `residual` (n,) at the null. `among`: single effects worth more than a linear look.
+    `problem`: the problem under the noise colour learnt. `point`: the null. `table`: log evidence
+    by hypothesis, linear. `jacobian` (n, k) and `residual` (n,) at the null. `among`: single
+    effects whose evidence is improved by a few evaluations (None: all).
     """
 
     point: LinearisationPoint
     jacobian: Array
     residual: Array
 
-    def __init__(
-        self, problem: Problem, heat: float = 1.0, among: frozenset[Hypothesis] | None = None
-    ) -> None:
-        self.problem, self.heat, self.among = problem, heat, among
+    def __init__(self, problem: Problem, among: frozenset[Hypothesis] | None = None) -> None:
+        self.problem, self.among = problem, among
         self.division = Division(problem)
         self.table: dict[Hypothesis, float] = {}
         self._start()
 
     @property
     def frozen(self) -> Frozen:
-        """Slopes to the nominal figures, for refits."""
+        """Slopes along the nuisance parameters, for refits."""
         names = tuple(self.problem.nuisance)
         at = [self.point.linear.index(n) for n in names]
         return Frozen(names, self.jacobian[:, at])
 
-    def ranker(self, linear: Linear, floor: float = SPIKE_WIDTH) -> Ranker:
-        """Evidence of hypotheses on `linear`."""
-        return Ranker(linear, self.problem.candidates, self.problem.nuisance, self.heat, floor)
+    def ranker(self, linear: Linear, spike: float | None = None) -> Ranker:
+        """Scores hypotheses on `linear`; `spike`: width of absent effects in sizes (None: the
+        setting)."""
+        return Ranker(linear, self.problem.candidates, self.problem.nuisance, spike)
 
     def flexible_fit(self) -> Array:
-        """z (k,) at the null with every effect free at its full size."""
+        """z (k,) of the best fit at the null with every effect free within its full size."""
         return best_fit(self.point.linear)
 
     def seen_from(self, theta: Mapping[str, float]) -> None:
-        """Whiten anew by what is left over at another point, and look again."""
+        """Learn the noise colour from the residual at theta, and rank all hypotheses again."""
         self._learn_noise(theta, keep=False)
-        self._look(self.point.fit.theta)
+        self._rank(self.point.fit.theta)
 
     def _start(self) -> None:
         """Null fit, noise colour, and the linear table at the null."""
         problem, blocks = self.problem, self.division.blocks
         free = tuple(problem.nuisance)
-        moving = isinstance(problem, Movable)  # its slopes hold as far as tolerances reach
+        moving = problem.moves  # then slopes hold within the nuisance parameters' tolerances
         names = names_of(problem, {}) if moving else free
         known = problem.jacobian({}, names)
         slopes = known[:, [names.index(n) for n in free]]
         theta: dict[str, float] = {}
-        for _ in range(2):
+        for _ in range(NullModelSettings.current().rounds):
             r = problem.residual(theta)
             linear = condense(free, *priors(problem, theta, free), slopes, r, blocks)
             theta = estimate(problem, linear, best_fit(linear))
-        self._look(theta, known if moving else self._learn_noise(theta, keep=True))
+        self._rank(theta, known if moving else self._learn_noise(theta, keep=True))
 
-    def _look(self, theta: Mapping[str, float], jacobian: Array | None = None) -> None:
-        """Linearise at theta, and say what every hypothesis promises."""
+    def _rank(self, theta: Mapping[str, float], jacobian: Array | None = None) -> None:
+        """Linearise at theta, and score every hypothesis there."""
         names = names_of(self.problem, theta)
         self.jacobian = self.problem.jacobian(theta, names) if jacobian is None else jacobian
         self.residual = self.problem.residual(theta)
@@ -91,66 +99,73 @@ class Baseline:
         self.table = ranker.table((0, 1, 2) if self.among is None else (0, 1))
         for hypothesis in [h for h in self.table if len(h) == 1]:
             if self.among is None or hypothesis in self.among:
-                self.table[hypothesis] = self._glance(hypothesis)
+                self.table[hypothesis] = self._improved(hypothesis)
 
     def rescore(self, theta: Mapping[str, float] | None = None, names: Names = ()) -> None:
-        """The null with the slopes as they are now, at theta or where it was."""
+        """Score the null with the slopes as they are now, at theta or where it was."""
         theta = self.point.fit.theta if theta is None else theta
         names = names or self.point.linear.names
-        linear, coarse = self.division.linear(theta, names, self.jacobian, self.residual)
+        linear, windowed = self.division.linear(theta, names, self.jacobian, self.residual)
         fit = Fit(dict(theta), 0.5 * float(self.residual @ self.residual))
-        self.point = LinearisationPoint(NULL, fit, linear, coarse, self.ranker(linear).score(NULL))
+        self.point = LinearisationPoint(
+            NULL, fit, linear, windowed, self.ranker(linear).score(NULL)
+        )
 
-    def _glance(self, hypothesis: Hypothesis) -> float:
-        """Log evidence where the linear estimate points to, with the true residual there.
+    def _improved(self, hypothesis: Hypothesis) -> float:
+        """Log evidence of a single effect with the true residual at its linear estimate.
 
-        Times are far from linear, so they are looked at from both sides of their size as well.
+        Residuals are far from linear in delays and time constants: these start from their size, on
+        both sides, as well.
         """
         (effect,) = hypothesis
         candidate, theta = self.problem.candidates[effect], self.point.fit.theta
-        if isinstance(self.problem, Movable) and self.problem.is_straight(candidate.key):
+        if self.problem.is_straight(candidate.key):
             return self.table[hypothesis]
         starts: list[dict[str, float]] = [dict(theta)]
         if candidate.lead.unit == "s":
             signs = (1.0, -1.0) if candidate.lead.signed else (1.0,)
-            starts += [{**theta, **within(self.problem, candidate.typical(s))} for s in signs]
+            sizes = [within(self.problem.candidates, candidate.typical(sign)) for sign in signs]
+            starts += [{**theta, **size} for size in sizes]
         return max(self._descend(hypothesis, start) for start in starts)
 
     def _descend(self, hypothesis: Hypothesis, theta: dict[str, float]) -> float:
-        """The best log evidence on a few Newton steps from theta with the slopes of the null."""
+        """The best log evidence within a few Newton steps from theta, with the slopes of the
+        null."""
+        settings = NullModelSettings.current()
         free = {*self.problem.nuisance, *(self.problem.candidates[e].key for e in hypothesis)}
         linear, best = self.point.linear, -np.inf
         own = np.array([name in free for name in linear.names])
-        for step in range(GLANCES + 1):
+        for step in range(settings.glances + 1):
             if step or theta != self.point.fit.theta:
                 r = self.problem.residual(theta)
-                if not np.all(np.abs(r) < ABSURD):
+                if not np.all(np.abs(r) < settings.absurd):
                     break  # a linear estimate may point to where nothing can be predicted
                 at, _, _ = priors(self.problem, theta, linear.names)
                 linear = moved(linear, at, self.jacobian, r, self.division.blocks)
             score = self.ranker(linear).score(hypothesis)
             best = max(best, score.log_evidence)
             at = np.where(own, score.z, linear.at)
-            theta = within(self.problem, estimate(self.problem, linear, at))
+            theta = within(self.problem.candidates, estimate(self.problem, linear, at))
         return best
 
     def _learn_noise(self, theta: Mapping[str, float], keep: bool) -> Array | None:
-        """Colour of what remains when every effect of the catalogue may help to explain.
+        """Learn the noise colour from the residual that is left when every effect may help to
+        explain.
 
-        Returns the Jacobian at theta under the new colour when it is wanted (`keep`).
+        A residual of the null would not do: a missing effect would pass for coloured noise. Returns
+        the Jacobian at theta under the new colour when it is wanted (`keep`).
         """
-        problem = self.problem
-        if not isinstance(problem, Colourable):
+        if not self.problem.learns_colour:
             return None
-        problem.recolour(None)
-        linear, jacobian, r = linearise(problem, theta, self.division.blocks)
+        plain = self.problem.recolour(None)
+        linear, jacobian, r = linearise(plain, theta, self.division.blocks)
         left = r + jacobian @ (best_fit(linear) - linear.at)
-        problem.recolour(left, careful=not keep)
-        return problem.whiten(jacobian) if keep else None
+        self.problem = plain.recolour(left, careful=not keep)
+        return self.problem.whiten(jacobian) if keep else None
 
 
 def best_fit(linear: Linear) -> Array:
-    """z (k,) with every name free within its prior."""
+    """z (k,) of the best fit, every parameter free within its prior."""
     gram, slope, _ = linear.total
     precision = 1.0 / linear.width**2
     shift = linear.mean - linear.at

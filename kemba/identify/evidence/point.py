@@ -4,72 +4,57 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 
 from kemba.identify.evidence.linear import Linear, condense, priors, time_blocks
-from kemba.identify.evidence.problem import Array, Labels, Problem
 from kemba.identify.evidence.refit import Fit
 from kemba.identify.evidence.spike_slab import Hypothesis, Score
 from kemba.identify.evidence.windows import Windows, windows_of
+from kemba.identify.problem.problem import Array, Labels, Problem
 
 
 @dataclass(frozen=True)
 class LinearisationPoint:
-    """A fit, what the problem looks like there, row by row (`linear`) and summed over grains
-    (`coarse`), and how the hypothesis scores."""
+    """A hypothesis refitted, with the problem linearised there.
+
+    `linear`: by rows; `windowed`: by sums over aggregation windows. `score`: evidence of the
+    hypothesis.
+    """
 
     hypothesis: Hypothesis
     fit: Fit
     linear: Linear
-    coarse: Linear
+    windowed: Linear
     score: Score
 
     @property
     def log_evidence(self) -> float:
+        """Log evidence [nats] of the hypothesis."""
         return self.score.log_evidence
 
-
-@runtime_checkable
-class Colourable(Protocol):
-    """A problem whose noise colour can be learnt from the residuals of a flexible model."""
-
-    def recolour(self, residual: Array | None, careful: bool = False) -> None:
-        """Learn from residuals (n,) that were not whitened; None: forget. `careful`: the model
-        behind them is good, so that spikes are no physics and may be silenced."""
-
-    def whiten(self, columns: Array) -> Array:
-        """Columns (n, k) computed before any colour as they are under the present one."""
-
-
-@runtime_checkable
-class Movable(Protocol):
-    """A problem that is linearised along a motion, which depends on the model."""
-
-    def relinearise(self, base: Mapping[str, float]) -> None:
-        """Find the motion again with the model at `base`; rows may be others than before."""
-
-    def is_straight(self, name: str) -> bool:
-        """Whether residuals are linear in this parameter, so that slopes tell all."""
+    @property
+    def fitted_error(self) -> float:
+        """Error in units of the noise on the fitted logs: RMS over aggregation windows."""
+        return float(np.sqrt(self.windowed.power.sum() / self.windowed.count.sum()))
 
 
 class Division:
-    """The rows of a problem divided into time blocks (n,) and into grains."""
+    """The rows of a problem divided into time blocks (n,) and into aggregation windows."""
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
         self.blocks: Labels = time_blocks(problem)
-        self.grains: Windows = windows_of(problem)
+        self.windows: Windows = windows_of(problem)
 
     def linear(
         self, theta: Mapping[str, float], names: tuple[str, ...], jacobian: Array, r: Array
     ) -> tuple[Linear, Linear]:
-        """The problem about theta with these slopes (n, k), row by row and by grains."""
+        """The problem about theta with these slopes (n, k), row by row and by windows."""
         at = priors(self.problem, theta, names)
         fine = condense(names, *at, jacobian, r, self.blocks)
-        if len(self.grains.first) == len(r):
+        if len(self.windows.first) == len(r):
             return fine, fine
-        sums = self.grains.sums(np.column_stack([jacobian, r]))
-        coarse = condense(names, *at, sums[:, :-1], sums[:, -1], self.blocks[self.grains.first])
-        return fine, coarse
+        sums = self.windows.sums(np.column_stack([jacobian, r]))
+        windowed = condense(names, *at, sums[:, :-1], sums[:, -1], self.blocks[self.windows.first])
+        return fine, windowed

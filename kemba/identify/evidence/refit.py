@@ -1,4 +1,5 @@
-"""Nonlinear refit of one hypothesis: least squares with priors, nuisance columns kept frozen."""
+"""Nonlinear refit of one hypothesis: least squares with priors; slopes along nuisance parameters
+are those of the null."""
 
 from __future__ import annotations
 
@@ -9,26 +10,45 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from kemba.identify.evidence.linear import is_shape
-from kemba.identify.evidence.problem import Array, Parameter, Problem
-from kemba.identify.evidence.spike_slab import SLAB_WIDTH, Hypothesis
+from kemba.identify.evidence.spike_slab import Hypothesis, SpikeSlabSettings
+from kemba.identify.problem.problem import Array, Parameter, Problem
+from kemba.settings import BY_HAND, Settings, setting
 
-EVALUATIONS = 10
-ABSURD = 1e6  # noise units
+
+class RefitSettings(Settings):
+    """The nonlinear refit of one hypothesis."""
+
+    evaluations: int = setting(10, "1", "largest number of evaluations", BY_HAND)
+    cost: float = setting(3e-6, "1", "relative change of the cost at which a fit ends", BY_HAND)
+    change: float = setting(1e-4, "1", "relative change of x at which a fit ends", BY_HAND)
+    step: float = setting(0.03, "1", "step of finite differences, in prior widths", BY_HAND)
+    bound: float = setting(8.0, "1", "largest distance from the prior mean, in widths", BY_HAND)
+    farthest: float = setting(3.0, "1", "largest start of a switch, in sizes", BY_HAND)
+    nearest: float = setting(0.1, "1", "smallest start of a switch, in sizes", BY_HAND)
+    factor: float = setting(
+        3.0, "1", "a shape also starts at its default times and over this", BY_HAND
+    )
+    absurd: float = setting(
+        1e6, "1", "residuals are clipped at so many sigmas", "convention: finite, beyond all data"
+    )
 
 
 @dataclass(frozen=True)
 class Fit:
-    """Theta of a hypothesis at its best, half the sum of squares (priors included), and the
-    slopes of the residual along its own parameters there."""
+    """The best theta of a hypothesis.
+
+    `cost`: half the sum of squares, priors included. `columns`: name -> slope (n,) of the residual
+    along a parameter of the hypothesis, there; of shapes along their logarithm.
+    """
 
     theta: dict[str, float]
     cost: float
-    columns: dict[str, Array] = field(default_factory=dict)  # (n,) by name; shapes by ln
+    columns: dict[str, Array] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class Frozen:
-    """Columns of the nuisance parameters (n, k), good enough at every point of a search."""
+    """Slopes (n, k) along the nuisance parameters, which hold at every point of a search."""
 
     names: tuple[str, ...]
     jacobian: Array
@@ -39,12 +59,11 @@ def refit(
     hypothesis: Hypothesis,
     start: Mapping[str, float],
     frozen: Frozen,
-    heat: float = 1.0,
 ) -> Fit:
     """The best theta with these effects on, from `start` (and, where shapes exist, others)."""
     best: Fit | None = None
     for trial in _starts(problem, hypothesis, start):
-        fit = _LeastSquares(problem, hypothesis, trial, frozen, heat).run()
+        fit = _LeastSquares(problem, hypothesis, trial, frozen).run()
         if best is None or fit.cost < best.cost - 1e-6:
             best = fit
     assert best is not None
@@ -54,7 +73,8 @@ def refit(
 def _starts(
     problem: Problem, hypothesis: Hypothesis, start: Mapping[str, float]
 ) -> Iterable[dict[str, float]]:
-    """Effects not switched on in `start` begin at half their size, shapes at several values."""
+    """Effects start where `start` has them, but not at off; shapes also at other values."""
+    settings = RefitSettings.current()
     theta = {k: v for k, v in start.items() if k in problem.nuisance}
     shapes: list[tuple[str, Parameter]] = []
     for effect in hypothesis:
@@ -68,15 +88,17 @@ def _starts(
                     shapes.append((key, parameter))
     yield theta
     for key, parameter in shapes:
-        for factor in (1 / 3, 3.0):
+        for factor in (1 / settings.factor, settings.factor):
             value = np.clip(parameter.typical * factor, parameter.lower, parameter.upper)
             yield {**theta, key: float(value)}
 
 
 def _inside(value: float, parameter: Parameter) -> float:
     """A start that is on, not too far out, and on the possible side."""
-    step = np.clip(value - parameter.off, -3.0 * parameter.size, 3.0 * parameter.size)
-    least = 0.1 * parameter.size
+    settings = RefitSettings.current()
+    farthest = settings.farthest * parameter.size
+    step = np.clip(value - parameter.off, -farthest, farthest)
+    least = settings.nearest * parameter.size
     if abs(step) < least:
         step = least if step >= 0 or not parameter.signed else -least
     if not parameter.signed:
@@ -93,13 +115,13 @@ class _LeastSquares:
         hypothesis: Hypothesis,
         start: Mapping[str, float],
         frozen: Frozen,
-        heat: float,
     ) -> None:
-        self.problem, self.frozen, self.scale = problem, frozen, 1.0 / np.sqrt(heat)
+        self.problem, self.frozen = problem, frozen
         self.own = {key: p for e in hypothesis for key, p in problem.candidates[e].keys().items()}
         self.switches = {problem.candidates[e].key for e in hypothesis}
         self.nuisance = list(frozen.names)
         self.start = dict(start)
+        self.settings, self.slab = RefitSettings.current(), SpikeSlabSettings.current().slab
 
     def run(self) -> Fit:
         x0 = np.array([*self._nuisance_start(), *(self._in(k, self.start[k]) for k in self.own)])
@@ -112,18 +134,19 @@ class _LeastSquares:
             bounds=(lower, upper),
             method="trf",
             x_scale=1.0,
-            max_nfev=EVALUATIONS,
-            ftol=3e-6,
-            xtol=1e-4,
+            max_nfev=self.settings.evaluations,
+            ftol=self.settings.cost,
+            xtol=self.settings.change,
         )
         return Fit(self._theta(found.x), float(found.cost), self._columns(found.jac))
 
     def _columns(self, jacobian: Array) -> dict[str, Array]:
+        """Slopes of the residual per unit of each own parameter, from those per prior width."""
         rows, n = len(self.frozen.jacobian), len(self.nuisance)
         columns = {}
         for i, (key, p) in enumerate(self.own.items(), start=n):
-            unit = p.size if is_shape(self.problem, key) else SLAB_WIDTH * p.size
-            columns[key] = jacobian[:rows, i] / (self.scale * unit)
+            unit = p.size if is_shape(self.problem, key) else self.slab * p.size
+            columns[key] = jacobian[:rows, i] / unit
         return columns
 
     def _nuisance_start(self) -> Iterable[float]:
@@ -132,26 +155,27 @@ class _LeastSquares:
             yield (self.start.get(name, nominal) - nominal) / sigma
 
     def _in(self, key: str, value: float) -> float:
-        """A parameter in prior widths: shapes by their logarithm."""
+        """A parameter in prior widths, shapes by their logarithm."""
         p = self.own[key]
         if is_shape(self.problem, key):
             return float(np.log(value / p.typical)) / p.size
-        return (value - p.off) / (SLAB_WIDTH * p.size)
+        return (value - p.off) / (self.slab * p.size)
 
     def _out(self, key: str, x: float) -> float:
+        """The parameter of a value in prior widths, within its bounds."""
         p = self.own[key]
         if is_shape(self.problem, key):
             return float(np.clip(p.typical * np.exp(p.size * x), p.lower, p.upper))
-        return float(np.clip(p.off + SLAB_WIDTH * p.size * x, p.lower, p.upper))
+        return float(np.clip(p.off + self.slab * p.size * x, p.lower, p.upper))
 
     def _bounds(self) -> tuple[Array, Array]:
-        n = len(self.nuisance)
-        lower, upper = np.full(n + len(self.own), -8.0), np.full(n + len(self.own), 8.0)
+        n, bound = len(self.nuisance), self.settings.bound
+        lower, upper = np.full(n + len(self.own), -bound), np.full(n + len(self.own), bound)
         for i, (key, p) in enumerate(self.own.items(), start=n):
             if np.isfinite(p.lower):
                 lower[i] = max(
                     lower[i],
-                    self._in(key, p.lower) if p.lower > 0 or key in self.switches else -8.0,
+                    self._in(key, p.lower) if p.lower > 0 or key in self.switches else -bound,
                 )
             if np.isfinite(p.upper):
                 upper[i] = min(upper[i], self._in(key, p.upper))
@@ -167,8 +191,10 @@ class _LeastSquares:
         return theta
 
     def _residual(self, x: Array) -> Array:
-        r = self.problem.residual(self._theta(x)) * self.scale
-        return np.concatenate([np.nan_to_num(np.clip(r, -ABSURD, ABSURD), nan=ABSURD), x])
+        """Residuals (n,), then the distances (k,) from the prior means in widths."""
+        r = self.problem.residual(self._theta(x))
+        absurd = self.settings.absurd
+        return np.concatenate([np.nan_to_num(np.clip(r, -absurd, absurd), nan=absurd), x])
 
     def _jacobian(self, x: Array) -> Array:
         base = self._residual(x)
@@ -176,10 +202,10 @@ class _LeastSquares:
         sigmas = np.array([self.problem.nuisance[name][1] for name in self.nuisance])
         jacobian = np.zeros((len(base), len(x)))
         rows = len(base) - len(x)
-        jacobian[:rows, :n] = self.frozen.jacobian * sigmas * self.scale
+        jacobian[:rows, :n] = self.frozen.jacobian * sigmas
         jacobian[rows:] = np.eye(len(x))
         for i in range(n, len(x)):
-            h = 0.03
+            h = self.settings.step
             moved = x.copy()
             moved[i] += h
             jacobian[:rows, i] = (self._residual(moved) - base)[:rows] / h

@@ -1,4 +1,4 @@
-"""The search: null fit, ranking, refits of the leaders, growth, and what each step believed."""
+"""The search: fit of the null, ranking, refits of the leaders, further effects one by one."""
 
 from __future__ import annotations
 
@@ -10,105 +10,157 @@ import numpy as np
 
 from kemba.identify.evidence.linear import Linear, estimate, names_of
 from kemba.identify.evidence.null_model import Baseline
-from kemba.identify.evidence.point import LinearisationPoint, Movable
-from kemba.identify.evidence.problem import Problem
+from kemba.identify.evidence.point import LinearisationPoint
 from kemba.identify.evidence.refit import Fit, refit
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis, log_prior, probabilities
+from kemba.identify.problem.problem import Problem
+from kemba.settings import BY_HAND, Settings, setting
 
-LEADERS = 6
-SURE = 3  # so many leaders are refitted however far behind they are,
-FAR, FAR_SHARE = 40.0, 0.7  # others when no more nats, or share of the gain, behind
-FOLLOWED = 2  # times that the motion is found again with the best guess
-LARGEST = 3  # effects in one answer; more need another experiment
-GAIN = 3.0  # nats beyond prior odds that a further effect must bring
-LEAST = 0.1  # sizes, from which on a secant tells more than a slope
+
+class SearchSettings(Settings):
+    """Which hypotheses are refitted."""
+
+    leaders: int = setting(6, "1", "effects that are refitted in a round", BY_HAND, decides=True)
+    sure: int = setting(
+        3, "1", "leaders that are refitted however far behind they are", BY_HAND, decides=True
+    )
+    far: float = setting(
+        40.0, "nats", "other leaders are refitted when not farther behind", BY_HAND, decides=True
+    )
+    far_share: float = setting(
+        0.7, "1", "or no farther behind than this share of the gain", BY_HAND, decides=True
+    )
+    promising: float = setting(
+        0.5,
+        "1",
+        "share of the best gain with which an effect is tried again",
+        BY_HAND,
+        decides=True,
+    )
+    followed: int = setting(
+        2, "1", "times that the motion is found again with the best guess", BY_HAND, decides=True
+    )
+    largest: int = setting(
+        3, "1", "effects in one answer", "convention: more need another experiment", decides=True
+    )
+    leaders_grown: int = setting(
+        3, "1", "effects that are refitted beside the best answer", BY_HAND, decides=True
+    )
+    leaders_swapped: int = setting(
+        2, "1", "effects that are refitted in place of one of the answer", BY_HAND, decides=True
+    )
+    gain: float = setting(
+        3.0, "nats", "gain from which a pair recommends its members", BY_HAND, decides=True
+    )
+    least: float = setting(
+        0.1,
+        "1",
+        "size of an effect from which its secant replaces its slope",
+        BY_HAND,
+        decides=True,
+    )
 
 
 @dataclass
 class Search:
-    """State of one search on one problem; `run` fills it."""
+    """State of one search; `run` fills it.
+
+    `problem`: the problem as it is now; it is replaced when its noise colour is learnt or its
+    motion found again. `deadline`: when to stop refitting, by `time.monotonic` [s]. `say`: told of
+    progress. `points`: every hypothesis that was refitted. `base`: the null model.
+    """
 
     problem: Problem
     deadline: float = np.inf
     say: Callable[[str], None] = lambda text: None
-    heat: float = 1.0
     points: dict[Hypothesis, LinearisationPoint] = field(default_factory=dict)
     base: Baseline = field(init=False)
     _thetas: dict[Hypothesis, dict[str, float]] = field(default_factory=dict)
     _stale: bool = False
 
     def run(self) -> Hypothesis:
-        """The hypothesis the evidence favours; everything seen stays in `points`."""
+        """The likeliest hypothesis; everything that was refitted stays in `points`."""
+        leaders = SearchSettings.current().leaders
         self.say("fitting the model as it is")
         self.start()
-        best = self._round(NULL, LEADERS)
+        best = self._round(NULL, leaders)
         self.say(f"first guess: {' + '.join(best) or 'nothing'}")
-        if isinstance(self.problem, Movable):
-            return self._follow(self.problem, best)
+        if self.problem.moves:
+            return self._follow(best)
         if best != NULL:
             promising = self._promising()
             self.base.seen_from(self.points[best].fit.theta)
+            self.problem = self.base.problem
             self.points = {NULL: self.base.point}
             for hypothesis in promising:
                 self.visit(hypothesis)
-            best = self._round(NULL, LEADERS)
+            best = self._round(NULL, leaders)
             best = self._grow(best)
         return best
 
-    def _follow(self, problem: Movable, best: Hypothesis) -> Hypothesis:
-        """Look again along the motion that the best guess makes of the data, until it stays.
+    def _follow(self, best: Hypothesis) -> Hypothesis:
+        """Repeat the search along the motion that the best hypothesis makes of the data, until the
+        best hypothesis stays the same.
 
-        A guess far from the first motion looks bad only for being far: what the slopes promise
-        counts as well as what the refit found.
+        An effect that changes the motion much is underrated along the first motion. So where no
+        refit is better than nothing, the linear evidence may choose the hypothesis to follow.
         """
-        for _ in range(FOLLOWED):
-            guess = best or self._promised()
+        settings = SearchSettings.current()
+        for _ in range(settings.followed):
+            guess = best or self._first_of_table()
             if guess == NULL or time.monotonic() > self.deadline:
                 return best
             point = self.points[guess]
             self.say(f"looking again as if {' + '.join(guess)} were there")
             among = self._contenders()
-            problem.relinearise(point.fit.theta)
+            self.problem = self.problem.relinearise(point.fit.theta)
             self.start(among)
             self.visit(guess)
-            best = self._round(NULL, LEADERS)
+            best = self._round(NULL, settings.leaders)
             if best in (guess, NULL):
                 break
         return self._grow(best) if best else best
 
     def _contenders(self) -> frozenset[Hypothesis]:
-        """Single effects that were refitted, or promise half of what the best one does."""
+        """Single effects that were refitted, or whose linear evidence gains a good share of the
+        best."""
         null = self.points[NULL].log_evidence
         gains = {h: e - null for h, e in self.base.table.items() if len(h) == 1}
-        least = 0.5 * max(gains.values())
+        least = SearchSettings.current().promising * max(gains.values())
         return frozenset(h for h, gain in gains.items() if gain > least or h in self.points)
 
-    def _promised(self) -> Hypothesis:
-        """The refitted single effect that the table puts first, if it pays there."""
+    def _first_of_table(self) -> Hypothesis:
+        """Of the refitted single effects the one with the largest linear evidence, if that beats
+        nothing."""
         count = len(self.problem.candidates)
         null = self.points[NULL].log_evidence + log_prior(NULL, count)
         tables: dict[Hypothesis, float] = {
             h: e for h, e in self.base.table.items() if h in self.points and len(h) == 1
         }
         first = max(tables, key=tables.__getitem__, default=NULL)
-        pays = first and tables[first] + log_prior(first, count) > null
-        return first if pays else NULL
+        better = first and tables[first] + log_prior(first, count) > null
+        return first if better else NULL
 
     def start(self, among: frozenset[Hypothesis] | None = None) -> None:
         """Null fit, noise colour, and the linear table at the null."""
-        self.base = Baseline(self.problem, self.heat, among)
+        self.base = Baseline(self.problem, among)
+        self.problem = self.base.problem
         self.points = {NULL: self.base.point}
 
     def _round(self, given: Hypothesis, leaders: int) -> Hypothesis:
-        """Refit the most promising extensions of `given` by one; the best of all points so far."""
+        """Refit `given` with one more effect, the likeliest ones; the best of all points so far."""
+        settings = SearchSettings.current()
         table = self._extensions(given)
         order = sorted(table, key=lambda h: -table[h])[:leaders]
-        promise = table[order[0]] - self.points[given].log_evidence
-        reach = max(FAR, FAR_SHARE * promise)
+        gain = table[order[0]] - self.points[given].log_evidence
+        reach = max(settings.far, settings.far_share * gain)
         for hypothesis in order:
             if given and table[hypothesis] < self.points[given].log_evidence:
-                break  # not even the slopes promise anything
-            if table[hypothesis] < table[order[0]] - reach and hypothesis not in order[:SURE]:
+                break  # even the linear evidence gains nothing
+            if (
+                table[hypothesis] < table[order[0]] - reach
+                and hypothesis not in order[: settings.sure]
+            ):
                 break
             if time.monotonic() > self.deadline:
                 break
@@ -116,7 +168,8 @@ class Search:
         return self.best()
 
     def _extensions(self, given: Hypothesis) -> dict[Hypothesis, float]:
-        """Linear evidence of `given` plus one effect, pairs lending theirs to their members."""
+        """Linear evidence of `given` plus one effect. The members of a pair that is much better
+        than any single effect count as much as the best single effect."""
         if given != NULL:
             ranker = self.base.ranker(self.points[given].linear)
             return ranker.table((len(given) + 1,), given=given)
@@ -124,35 +177,34 @@ class Search:
         base = max(single.values())
         pairs = [h for h in self.base.table if len(h) == 2]
         best_pair = max(pairs, key=self.base.table.__getitem__, default=NULL)
-        if best_pair and self.base.table[best_pair] > base + GAIN:
+        if best_pair and self.base.table[best_pair] > base + SearchSettings.current().gain:
             for name in best_pair:
                 single[(name,)] = max(single[(name,)], base)
         return single
 
     def visit(self, hypothesis: Hypothesis) -> LinearisationPoint:
-        """Refit a hypothesis (once) and score it there."""
+        """Refit a hypothesis, once, and score it there."""
         if hypothesis not in self.points:
             self.say(f"refitting {' + '.join(hypothesis)}")
-            fit = refit(
-                self.problem, hypothesis, self._guess(hypothesis), self.base.frozen, self.heat
-            )
+            fit = refit(self.problem, hypothesis, self._guess(hypothesis), self.base.frozen)
             self._learn_secant(hypothesis, fit)
             self.points[hypothesis] = self._point(hypothesis, fit)
             self._thetas[hypothesis] = fit.theta
         return self.points[hypothesis]
 
     def _learn_secant(self, hypothesis: Hypothesis, fit: Fit) -> None:
-        """From here on, a refitted effect is known by its secant.
+        """From here on a refitted effect counts by its secant, no longer by its slope at nothing.
 
-        Everything absent may help at floor level, and slopes at nothing promise too much far from
-        where they hold: a rival would look good for what it leaves to them.
+        Under every hypothesis each absent effect may be there with a small share of its size. Far
+        from nothing its slope may promise more than the effect can do. A wrong hypothesis would
+        then look good because of an effect that it does not name.
         """
         problem, (effect, *others) = self.problem, hypothesis
         candidate = problem.candidates[effect]
-        if others or not isinstance(problem, Movable) or problem.is_straight(candidate.key):
+        if others or not problem.moves or problem.is_straight(candidate.key):
             return
         size = fit.theta[candidate.key] - candidate.lead.off
-        if abs(size) > LEAST * candidate.lead.size:
+        if abs(size) > SearchSettings.current().least * candidate.lead.size:
             own = set(candidate.keys())
             absent = {k: v for k, v in fit.theta.items() if k not in own}
             change = problem.residual(fit.theta) - problem.residual(absent)
@@ -160,7 +212,7 @@ class Search:
             self._stale = True
 
     def _refresh(self) -> None:
-        """Score everything again by the secants learnt."""
+        """Score everything again with the secants learnt."""
         if self._stale:
             self.base.rescore()
             self.points = {h: self._point(h, p.fit) for h, p in self.points.items() if h}
@@ -168,13 +220,13 @@ class Search:
             self._stale = False
 
     def _point(self, hypothesis: Hypothesis, fit: Fit) -> LinearisationPoint:
-        linear, coarse = self._near(fit)
-        return LinearisationPoint(
-            hypothesis, fit, linear, coarse, self.base.ranker(linear).score(hypothesis)
-        )
+        linear, windowed = self._near(fit)
+        score = self.base.ranker(linear).score(hypothesis)
+        return LinearisationPoint(hypothesis, fit, linear, windowed, score)
 
     def _near(self, fit: Fit) -> tuple[Linear, Linear]:
-        """Linear at a refitted point: its own slopes are fresh, the others are the null's."""
+        """The problem about a refitted point, by rows and by windows: slopes of its own parameters
+        are those of the fit, all others are the null's."""
         names, base = names_of(self.problem, fit.theta), self.base
         known = base.point.linear
         columns = [
@@ -184,8 +236,8 @@ class Search:
         return base.division.linear(fit.theta, names, np.stack(columns, axis=1), r)
 
     def _guess(self, hypothesis: Hypothesis) -> dict[str, float]:
-        """Where it was before, or the largest part that was refitted, moved by the linear
-        estimate there."""
+        """Where a refit starts: at its last result, or at the linear estimate from the largest part
+        of the hypothesis that was refitted."""
         if hypothesis in self._thetas:
             return self._thetas[hypothesis]
         parts = [h for h in self.points if set(h) < set(hypothesis)]
@@ -196,33 +248,35 @@ class Search:
         return {**guess, **{k: v for k, v in point.fit.theta.items() if k not in guess}}
 
     def best(self) -> Hypothesis:
-        """The likeliest of everything refitted."""
+        """The likeliest of all refitted hypotheses."""
         self._refresh()
         count = len(self.problem.candidates)
         return max(self.points, key=lambda h: self.points[h].log_evidence + log_prior(h, count))
 
     def _grow(self, best: Hypothesis) -> Hypothesis:
-        """Add while it pays; then try to swap each member for another."""
-        while len(best) < LARGEST and time.monotonic() < self.deadline:
-            grown = self._round(best, 3)
+        """Add effects while the evidence grows; then try to swap each for another."""
+        settings = SearchSettings.current()
+        while len(best) < settings.largest and time.monotonic() < self.deadline:
+            grown = self._round(best, settings.leaders_grown)
             if grown == best or len(grown) <= len(best):
                 break
             best = grown
         for member in best if len(best) > 1 else ():
             rest = tuple(h for h in best if h != member)
             self.visit(rest)
-            self._round(rest, 2)
+            self._round(rest, settings.leaders_swapped)
         return self.best()
 
     def _promising(self) -> list[Hypothesis]:
-        """What was refitted and gained at least half of what the best gained."""
+        """Refitted hypotheses that gained a good share of what the best one gained."""
         null = self.points[NULL].log_evidence
         gains = {h: p.log_evidence - null for h, p in self.points.items() if h}
-        return [h for h, gain in gains.items() if gain > 0.5 * max(gains.values())]
+        least = SearchSettings.current().promising * max(gains.values())
+        return [h for h, gain in gains.items() if gain > least]
 
     def probabilities(self, dismissed: Collection[Hypothesis] = ()) -> dict[Hypothesis, float]:
-        """Over everything refitted, and the rest of the singles by their linear evidence; without
-        what was `dismissed`, as too small or refuted by left-out data."""
+        """Of all refitted hypotheses, and of the other single effects by their linear evidence;
+        without the hypotheses `dismissed` as too small or as refuted by left-out data."""
         evidence: dict[Hypothesis, float] = {
             h: e for h, e in self.base.table.items() if len(h) == 1
         }

@@ -12,11 +12,47 @@ from scipy.special import logsumexp
 from scipy.stats import norm
 
 from kemba.identify.evidence.linear import Linear
-from kemba.identify.evidence.problem import Array, Candidate
+from kemba.identify.problem.problem import Array, Candidate
+from kemba.settings import BY_HAND, Settings, setting
 
-SPIKE_WIDTH = 0.05  # every effect of the catalogue may be there with this share of its size
-SLAB_WIDTH = 0.7  # width of a large effect, in sizes
-TOLERANCES = (0.5, 1.0, 1.5)  # how far nominal figures are off, in units of their prior sigma
+
+class SpikeSlabSettings(Settings):
+    """The prior: of every effect the width of its spike and of its slab, and of hypotheses."""
+
+    spike: float = setting(
+        0.05,
+        "1",
+        "width of the spike: every effect of the catalogue may be there with this share of its "
+        "size",
+        f"{BY_HAND}; that intervals count it as 5 % and not as 2 % came of benchmarks/blind",
+        decides=True,
+    )
+    slab: float = setting(
+        0.7, "1", "width of the slab: of a large effect, in sizes", BY_HAND, decides=True
+    )
+    silent: float = setting(
+        1e-6, "1", "width of the spike of a formula", "convention: none, but not singular"
+    )
+    tolerances: tuple[float, ...] = setting(
+        (0.5, 1.0, 1.5),
+        "1",
+        "how far nominal figures are off, in prior sigmas; evidence is averaged over these",
+        "convention: three nodes around one prior sigma, which is itself uncertain",
+        decides=True,
+    )
+    nothing: float = setting(
+        0.5, "1", "prior probability that nothing is missing", "convention: even odds", decides=True
+    )
+    single: float = setting(
+        0.4, "1", "prior probability of one effect, shared by all", BY_HAND, decides=True
+    )
+    pair: float = setting(
+        0.01, "1", "prior probability of two effects, shared by all pairs", BY_HAND, decides=True
+    )
+    triple: float = setting(
+        0.001, "1", "prior probability of three, shared by all triples", BY_HAND, decides=True
+    )
+
 
 Hypothesis = tuple[str, ...]  # names of the effects that are large, sorted
 NULL: Hypothesis = ()
@@ -32,33 +68,33 @@ class Score:
 
 
 class Ranker:
-    """Scores hypotheses on one linearisation; `heat` > 1 tempers too sure a likelihood."""
+    """Scores hypotheses on one linearisation.
+
+    Every effect of the catalogue may be there with a small share of its size: the `spike` width of
+    its prior, in sizes (None: the setting). The effects of a hypothesis have the slab width
+    instead. `silent`: effects that are absent where the hypothesis does not name them.
+    """
 
     def __init__(
         self,
         linear: Linear,
         candidates: Mapping[str, Candidate],
         nuisance: Iterable[str],
-        heat: float = 1.0,
-        floor: float = SPIKE_WIDTH,
+        spike: float | None = None,
+        silent: Iterable[str] = (),
     ) -> None:
-        self.linear, self.candidates, self.heat, self.floor = linear, candidates, heat, floor
-        self.silent: frozenset[str] = frozenset()  # effects with no floor of their own
+        self._prior = SpikeSlabSettings.current()
+        spike = self._prior.spike if spike is None else spike
+        self.linear, self.candidates, self.spike = linear, candidates, spike
+        self.silent = frozenset(silent)
         free = set(nuisance)
         self.nuisance = np.array([name in free for name in linear.names])
         self.lead = {c.effect: linear.index(c.key) for c in candidates.values()}
-        self._shape = {
-            effect: [
-                linear.index(key) for key in tuple(c.keys()) if key != c.key and key in linear.names
-            ]
-            for effect, c in candidates.items()
-        }
-        gram, slope, power = linear.total
-        self._gram, self._slope, self._power = gram / heat, slope / heat, power / heat
+        self._gram, self._slope, self._power = linear.total
 
     def score(self, hypothesis: Hypothesis) -> Score:
-        """Averaged over how far the nominal figures may be off."""
-        parts = [self._score(hypothesis, t) for t in TOLERANCES]
+        """Evidence, averaged over how far the nominal figures may be off."""
+        parts = [self._score(hypothesis, t) for t in self._prior.tolerances]
         best = max(parts, key=lambda s: s.log_evidence)
         total = float(logsumexp([s.log_evidence for s in parts]) - np.log(len(parts)))
         return Score(total, best.z, best.covariance)
@@ -77,20 +113,23 @@ class Ranker:
         quadratic = self._power + float(precision @ shift**2) - float(eta @ step)
         covariance = np.outer(width, width) * cho_solve(factor, np.eye(len(width)))
         z = self.linear.at + step
-        log_evidence = -0.5 * quadratic - 0.5 * log_det + self._sides(hypothesis, z, covariance)
+        log_evidence = -0.5 * quadratic - 0.5 * log_det + self._sign_term(hypothesis, z, covariance)
         return Score(log_evidence, z, covariance)
 
     def widths(self, hypothesis: Hypothesis, tolerance: float) -> Array:
+        """Prior widths (k,) under a hypothesis; nominal figures are off by `tolerance` prior
+        sigmas."""
         width = self.linear.width.copy()
         width[self.nuisance] *= tolerance
         for effect, i in self.lead.items():
-            floor = 1e-6 if effect in self.silent else self.floor
-            share = np.hypot(SLAB_WIDTH, floor) if effect in hypothesis else floor
+            spike = self._prior.silent if effect in self.silent else self.spike
+            share = np.hypot(self._prior.slab, spike) if effect in hypothesis else spike
             width[i] *= share
         return np.asarray(np.maximum(width, 1e-12))
 
-    def _sides(self, hypothesis: Hypothesis, z: Array, covariance: Array) -> float:
-        """A switch that cannot be negative halves its prior, and may rule out its posterior."""
+    def _sign_term(self, hypothesis: Hypothesis, z: Array, covariance: Array) -> float:
+        """What the sign of switches that cannot be negative adds to the log evidence: the prior has
+        one side only, and so has the posterior."""
         total = 0.0
         for effect in hypothesis:
             lead, i = self.candidates[effect].lead, self.lead[effect]
@@ -117,8 +156,10 @@ class Ranker:
 
 
 def log_prior(hypothesis: Hypothesis, count: int) -> float:
-    """Nothing is missing half of the time; each further effect is rarer, and all are alike."""
-    share = {0: 0.5, 1: 0.4, 2: 0.01, 3: 0.001}[min(len(hypothesis), 3)]
+    """Log prior probability of a hypothesis among `count` effects: all effects are equally likely,
+    and each further one makes a hypothesis less likely."""
+    prior = SpikeSlabSettings.current()
+    share = (prior.nothing, prior.single, prior.pair, prior.triple)[min(len(hypothesis), 3)]
     ways = {0: 1.0, 1: count, 2: count * (count - 1) / 2}.get(
         len(hypothesis), count * (count - 1) * (count - 2) / 6
     )
@@ -126,7 +167,7 @@ def log_prior(hypothesis: Hypothesis, count: int) -> float:
 
 
 def probabilities(evidence: Mapping[Hypothesis, float], count: int) -> dict[Hypothesis, float]:
-    """Posterior over the hypotheses listed."""
+    """Posterior probability of each hypothesis, from log evidence [nats], among `count` effects."""
     logs = np.array([e + log_prior(h, count) for h, e in evidence.items()])
     weights = np.exp(logs - logsumexp(logs))
     return dict(zip(evidence, weights.tolist(), strict=True))

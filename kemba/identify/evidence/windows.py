@@ -1,51 +1,81 @@
-"""Residuals summed over moments: a model that is wrong errs for longer than a sample, noise not."""
+"""Aggregation windows: residuals are summed over some rows before they are judged.
+
+The error of a wrong model lasts longer than one row; noise changes from row to row.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from kemba.identify.evidence.operating_point import region_labels
-from kemba.identify.evidence.problem import Array, Labels, Problem, Rows
+from kemba.identify.problem.problem import Array, Labels, Problem, Rows, Texts, Theta
+
+START = "start:"  # names of nuisance parameters that say how a log begins
 
 
 @dataclass(frozen=True)
 class Windows:
-    """Stretches of successive rows of one run, channel and condition: the first row (k,) of each,
-    and the size (k,) that noise would give to the sum over it."""
+    """Groups of successive rows of one run, channel and condition.
+
+    `first` (k,): first row of each window. `noise` (k,): 1 sigma of the sum over it, if there is
+    nothing but noise.
+    """
 
     first: Labels
     noise: Array
 
     def sums(self, columns: Array) -> Array:
-        """Columns (n, ...) summed over every grain, (k, ...), in units of noise."""
+        """Columns (n, ...) summed over every window, (k, ...), in units of noise."""
         scale = self.noise.reshape(-1, *[1] * (columns.ndim - 1))
         return np.asarray(np.add.reduceat(columns, self.first, axis=0) / scale)
 
 
-def aggregation_windows(problem: Problem, rows: Rows, region: Labels) -> Windows:
-    """Grains of as many rows as the problem says (`window`, else one), each under one condition."""
+def aggregation_windows(problem: Problem, rows: Rows, region: Texts) -> Windows:
+    """Windows of `problem.window` rows, each under one condition."""
     begin = np.flatnonzero(changes(rows, region))
     place = np.arange(len(rows)) - np.repeat(begin, np.diff(np.append(begin, len(rows))))
-    first = np.flatnonzero(place % getattr(problem, "window", 1) == 0)
-    return Windows(first, np.sqrt(np.add.reduceat(expected(problem, len(rows)), first)))
+    first = np.flatnonzero(place % problem.window == 0)
+    return Windows(first, np.sqrt(np.add.reduceat(problem.expected_power(), first)))
 
 
 def windows_of(problem: Problem) -> Windows:
-    """Grains of a problem by all its conditions."""
-    rows = problem.rows()
-    return aggregation_windows(problem, rows, region_labels(problem, rows)[1])
+    """Aggregation windows of a problem under all its conditions."""
+    return aggregation_windows(problem, problem.rows(), problem.operating_point().regions())
 
 
-def expected(problem: Problem, count: int) -> Array:
-    """Mean square (n,) of each row if the model were right: one, or what the problem knows."""
-    known = getattr(problem, "expected_power", None)
-    return np.asarray(known() if known else np.ones(count))
+def free_starts(
+    problem: Problem, theta: Theta | None = None, also: Iterable[str] = ()
+) -> dict[str, float]:
+    """Theta with each log beginning as its own data say, found by one linear step.
+
+    `also`: further nuisance parameters to find. All other values stay.
+    """
+    free = {n for n in problem.nuisance if n.startswith(START)} | set(also)
+    found = {k: v for k, v in (theta or {}).items() if k not in free and not k.startswith(START)}
+    names = [n for n in problem.nuisance if n in free]
+    if not names:
+        return found
+    nominal, sigma = np.array([problem.nuisance[n] for n in names]).T
+    j, r = problem.jacobian(found, names) * sigma, problem.residual(found)
+    step = np.linalg.solve(j.T @ j + np.eye(len(names)), -j.T @ r)
+    return found | dict(zip(names, (nominal + sigma * step).tolist(), strict=True))
 
 
-def changes(rows: Rows, region: Labels) -> np.ndarray[Any, np.dtype[np.bool_]]:
+def error_ratio(problem: Problem, theta: Theta | None = None, also: Iterable[str] = ()) -> float:
+    """Error in units of the noise: the RMS of whitened residuals summed over aggregation windows.
+
+    It is about 1 where the model at theta is right. Nothing is fitted to these logs but how each of
+    them begins (and the nuisance parameters `also`): so it is the error of logs that a fit has not
+    seen.
+    """
+    found = free_starts(problem, theta, also)
+    return rms(windows_of(problem).sums(problem.residual(found)))
+
+
+def changes(rows: Rows, region: Texts) -> np.ndarray[Any, np.dtype[np.bool_]]:
     """Rows (n,) whose run, channel or condition differs from that of the row before."""
     fresh = np.ones(len(rows), dtype=bool)
     labels = (rows.run, rows.channel, *(codes(x) for x in (rows.phase, rows.mode, region)))

@@ -1,4 +1,4 @@
-"""Long logs cut down to what a search needs: about 1 kHz, and a minute of pieces spread evenly."""
+"""Long logs are shortened: rows about 1 ms apart, and one minute of pieces spread over the log."""
 
 from __future__ import annotations
 
@@ -6,15 +6,45 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from kemba.settings import BY_HAND, Settings, setting
 from kemba.trajectory import Array, Trajectory
 
-ROWS = 60_000  # of all logs together
-PIECE = 2.0  # s
-FINEST = 7e-4  # s; of faster logs some rows are enough
+
+class ExcerptSettings(Settings):
+    """How much of long logs is used."""
+
+    rows: int = setting(
+        60_000,
+        "1",
+        "largest number of rows of all logs together",
+        f"{BY_HAND}; one minute at 1 kHz",
+    )
+    piece: float = setting(
+        2.0,
+        "s",
+        "length of the pieces that are kept of a long log",
+        BY_HAND,
+    )
+    finest: float = setting(
+        7e-4, "s", "rows closer than this are thinned", "derived: below it, two rows fit into 1 ms"
+    )
+    step: float = setting(
+        1e-3,
+        "s",
+        "distance of rows after thinning",
+        "derived: an eighth of the fastest rise time of a chamber (8 ms, Table I)",
+    )
 
 
-def excerpts(logs: Sequence[Trajectory], rows: int = ROWS) -> tuple[list[Trajectory], list[str]]:
-    """The logs, thinned and cut into pieces where they are too long, and remarks on it."""
+def excerpts(
+    logs: Sequence[Trajectory], rows: int | None = None
+) -> tuple[list[Trajectory], list[str]]:
+    """The logs, thinned and cut into pieces where they are too long, and remarks about it.
+
+    `rows`: largest number of rows of all logs together; the setting where it is not given.
+    """
+    settings = ExcerptSettings.current()
+    rows = settings.rows if rows is None else rows
     found, remarks = [], []
     for log in logs:
         thin = thinned(log)
@@ -27,15 +57,17 @@ def excerpts(logs: Sequence[Trajectory], rows: int = ROWS) -> tuple[list[Traject
     share = rows / total
     pieces = [piece for log in found for piece in cut(log, share)]
     remarks.append(
-        f"{total} rows are more than a search needs: {len(pieces)} pieces of {PIECE:g} s are used"
+        f"{total} rows are more than a search needs: "
+        f"{len(pieces)} pieces of {settings.piece:g} s are used"
     )
     return pieces, remarks
 
 
 def thinned(log: Trajectory) -> Trajectory:
-    """Every so many rows, so that steps are about 1 ms, and every row in which a valve switches."""
+    """One row per millisecond, and every row in which a valve switches."""
+    settings = ExcerptSettings.current()
     step = float(np.median(np.diff(log.time)))
-    group = round(1e-3 / step) if step < FINEST else 1
+    group = round(settings.step / step) if step < settings.finest else 1
     if group < 2:
         return log
     chosen = np.arange(len(log)) % group == 0
@@ -49,11 +81,12 @@ def thinned(log: Trajectory) -> Trajectory:
 def cut(log: Trajectory, share: float) -> list[Trajectory]:
     """Pieces spread evenly over the log that make up `share` of it."""
     span = float(log.time[-1] - log.time[0])
-    wanted = max(1, int(span * share / PIECE))
-    if span <= 2 * PIECE:
+    piece = ExcerptSettings.current().piece
+    wanted = max(1, int(span * share / piece))
+    if span <= 2 * piece:
         return [log]
-    starts = log.time[0] + (span - PIECE) * (np.arange(wanted) + 0.5) / wanted
-    return [part(log, start, start + PIECE) for start in starts]
+    starts = log.time[0] + (span - piece) * (np.arange(wanted) + 0.5) / wanted
+    return [part(log, start, start + piece) for start in starts]
 
 
 def part(log: Trajectory, start: float, end: float) -> Trajectory:
@@ -65,7 +98,7 @@ def part(log: Trajectory, start: float, end: float) -> Trajectory:
 
 
 def held(values: Array) -> Array:
-    """Commands with missing readings filled by the last one sent."""
+    """Commands (n,); a missing one is replaced by the last one that was sent."""
     good = np.isfinite(values)
     if good.all():
         return values

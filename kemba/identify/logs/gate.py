@@ -1,4 +1,4 @@
-"""The gate: a log that cannot be right is refused with row and column, and nothing is fitted."""
+"""Checks before a fit: a log that cannot be right is refused, with row and column."""
 
 from __future__ import annotations
 
@@ -7,21 +7,16 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
+from kemba.effects.sensors import CHANNELS
 from kemba.errors import ConfigErrors, KembaError, suggest
-from kemba.identify.evidence.noise import difference_sigma
-from kemba.identify.logs.reading import NEEDED
+from kemba.identify.logs.reading import legs_of, needed
+from kemba.identify.logs.settings import GateSettings
+from kemba.identify.problem.noise import difference_sigma
 from kemba.trajectory import TIME, Array, Trajectory
 
-SHORTEST = 0.15  # s
-FEWEST = 60  # rows
-LONGEST_BURST = 0.1  # s without a value that interpolation may bridge
-MISSING_SHARE = 0.3
-QUIET = 1e-4  # noise as a share of the range, below which a channel counts as noiseless
-FASTEST, LEAP = 8.0, 0.004  # m.s-1, m: no piston goes farther between two rows
-FROZEN = 40  # equal readings in a row where noise is seen elsewhere
-# by the last part of the name: smallest and largest value that can be, and what a mistake would be
+# Physical limits by the last part of the name: smallest, largest, and the likely mistake.
 RANGES = {
-    "piston/x": (-0.01, 0.085, "metres from 0 (retracted) to 0.070; is it in millimetres?"),
+    "piston/x": (-0.01, 1.0, "metres from 0 (retracted) to the stroke; is it in millimetres?"),
     "piston/v": (-8.0, 8.0, "metres per second; is it in mm/s?"),
     "piston/F": (-3000.0, 3000.0, "newtons, pushing positive"),
     "hip/q": (-2 * math.pi, 2 * math.pi, "radians; is it in degrees?"),
@@ -35,8 +30,6 @@ RANGES = {
     "body/az": (-2000.0, 2000.0, "metres per second squared"),
     "P": (2e4, 2e6, "pascals, absolute; is it in bar or kPa, or gauge?"),
 }
-# what most of a channel's motion would be, were its unit right: smallest plausible 98 % spread
-ANGLES = ("hip/q", "body/pitch")
 
 
 class BadData(ConfigErrors):
@@ -52,7 +45,7 @@ def check_logs(logs: Sequence[Trajectory]) -> list[str]:
 
 
 def _faults(log: Trajectory) -> list[KembaError]:
-    """Faults of one log; the deeper checks only where the plain ones pass."""
+    """Faults of one log; a later check runs only where the earlier ones found nothing."""
     for stage in (_columns, _time, _cells, _values):
         found = list(stage(log))
         if found:
@@ -61,16 +54,30 @@ def _faults(log: Trajectory) -> list[KembaError]:
 
 
 def _columns(log: Trajectory) -> Iterator[KembaError]:
-    for name in NEEDED[log.meta["kind"]]:
+    for name in needed(log):
         if name not in log:
             hint = f"{suggest(name, log.names)} Map foreign columns with --map".strip()
             yield _fault(log, f"needs the column '{name}', which is missing", hint=hint)
+    for name in log.names:
+        unit = _unit_of(name)
+        if unit is not None and log.unit(name) != unit:
+            what = f"the column's unit is [{log.unit(name)}]"
+            expected, hint = f"'{name} [{unit}]' was expected", "convert it with --map"
+            yield _fault(log, what, expected, hint, column=name)
+
+
+def _unit_of(name: str) -> str | None:
+    """The unit that a column must have; None where the gate does not know the column."""
+    if "valve/" in name:
+        return "1"
+    known = any(name == k or name.endswith(f"/{k}") for k in RANGES)
+    return CHANNELS[name.split("/")[-1]][0] if known else None
 
 
 def _time(log: Trajectory) -> Iterator[KembaError]:
-    t = log.time
-    if len(t) < FEWEST:
-        yield _fault(log, f"has {len(t)} rows", f"at least {FEWEST} were expected")
+    t, limits = log.time, GateSettings.current()
+    if len(t) < limits.fewest:
+        yield _fault(log, f"has {len(t)} rows", f"at least {limits.fewest} were expected")
         return
     wrong = ~np.isfinite(t)
     wrong[1:] |= ~(np.diff(t) > 0)
@@ -83,21 +90,25 @@ def _time(log: Trajectory) -> Iterator[KembaError]:
         count = f"{int(wrong.sum())} such rows; are rows duplicated, or clocks mixed?"
         yield _fault(log, what, "times must increase from row to row", count, row=i, column=TIME)
         return
-    if t[-1] - t[0] < SHORTEST:
-        yield _fault(log, f"lasts {t[-1] - t[0]:.3f} s", f"at least {SHORTEST} s were expected")
+    span = t[-1] - t[0]
+    if span < limits.shortest:
+        expected = f"at least {limits.shortest} s were expected"
+        yield _fault(log, f"lasts {span:.3f} s", expected)
     step = float(np.median(np.diff(t)))
-    if step > 0.02:
-        hint = "is the time in milliseconds?" if step > 0.5 else "a valve's answer takes 8 ms"
-        yield _fault(log, f"has a row every {step:.3g} s", "at least 50 rows a second", hint)
-    elif t[-1] - t[0] > 0.5 * len(t):
+    if step > limits.slowest:
+        in_ms = step > limits.milliseconds
+        hint = "is the time in milliseconds?" if in_ms else "a chamber fills within 8 ms"
+        expected = f"at least {1.0 / limits.slowest:.0f} rows a second"
+        yield _fault(log, f"has a row every {step:.3g} s", expected, hint)
+    elif span > limits.gaps * len(t):
         yield _fault(log, "has gaps longer than all of its rows", column=TIME)
 
 
 def _cells(log: Trajectory) -> Iterator[KembaError]:
-    for name in NEEDED[log.meta["kind"]]:
+    for name in needed(log):
         y = log[name]
         missing = ~np.isfinite(y)
-        if missing.mean() > MISSING_SHARE:
+        if missing.mean() > GateSettings.current().missing:
             what = f"{100 * missing.mean():.0f} % of its readings are missing"
             yield _fault(log, what, column=name, row=int(np.argmax(missing)))
         elif "valve/" in name:
@@ -105,22 +116,24 @@ def _cells(log: Trajectory) -> Iterator[KembaError]:
 
 
 def _valve(log: Trajectory, name: str, y: Array) -> Iterator[KembaError]:
-    wrong = np.isfinite(y) & (np.abs(y - np.round(y)) > 1e-6) | (y < 0) | (y > 1)
+    far, state = GateSettings.current().valve, np.clip(np.round(y), 0.0, 1.0)
+    wrong = np.isfinite(y) & (np.abs(y - state) > far)
     if wrong.any():
         i = int(np.argmax(wrong))
         what = f"the valve command is {y[i]:g}"
         hint = "map a voltage or per cent with a scale" if y[i] > 1 else ""
-        yield _fault(log, what, "0 or 1 was expected", hint, row=i, column=name)
+        expected = f"0 or 1 within {far:g} was expected"
+        yield _fault(log, what, expected, hint, row=i, column=name)
 
 
 def _values(log: Trajectory) -> Iterator[KembaError]:
-    needed = NEEDED[log.meta["kind"]]
+    wanted = needed(log)
     for name in log.names:
         y = log[name]
         if "valve/" in name or not np.isfinite(y).any():
             continue
         yield from _range(log, name, y)
-        if name in needed:
+        if name in wanted:
             yield from _frozen(log, name, y)
         if name.endswith("piston/x"):
             yield from _leap(log, name, y)
@@ -132,8 +145,12 @@ def _range(log: Trajectory, name: str, y: Array) -> Iterator[KembaError]:
     if not known:
         return
     low, high, expected = known[0]
+    limits = GateSettings.current()
+    if name.endswith("piston/x") and "stroke" in log.meta:
+        high = log.meta["stroke"] + limits.beyond
     outside = np.isfinite(y) & ((y < low) | (y > high))
-    few = 0.002 if name in NEEDED[log.meta["kind"]] else 0.05
+    wanted = name in needed(log)
+    few = limits.impossible if wanted else limits.impossible_elsewhere
     if outside.mean() > few:
         i = int(np.argmax(outside))
         what = f"the reading {y[i]:.6g} {log.unit(name)} cannot be ({int(outside.sum())} rows)"
@@ -151,15 +168,16 @@ def _frozen(log: Trajectory, name: str, y: Array) -> Iterator[KembaError]:
     """A sensor that repeats one reading while it is noisy elsewhere: dead, stuck or saturated."""
     if name.endswith("hip/tau"):
         return
+    limits = GateSettings.current()
     good = np.flatnonzero(np.isfinite(y))
     values = y[good]
     equal = np.diff(values) == 0
     start, length = _longest(equal)
     elsewhere = np.delete(equal, np.s_[start : start + length])
-    if length < FROZEN or not len(elsewhere) or elsewhere.mean() > 0.2:
+    if length < limits.frozen or not len(elsewhere) or elsewhere.mean() > limits.repeats:
         return
-    if difference_sigma(values) < QUIET * np.ptp(values):
-        return  # a simulation without noise may well stand still
+    if difference_sigma(values) < limits.quiet * np.ptp(values):
+        return  # a simulation without noise may stand still
     value, row = values[start], int(good[start])
     at_end = value in (values.max(), values.min())
     what = f"{length + 1} readings in a row are exactly {value:.6g} {log.unit(name)}"
@@ -168,12 +186,13 @@ def _frozen(log: Trajectory, name: str, y: Array) -> Iterator[KembaError]:
 
 
 def _leap(log: Trajectory, name: str, y: Array) -> Iterator[KembaError]:
-    """A position that is elsewhere from one row to the next, and stays there."""
+    """A position that jumps from one row to the next, and stays there."""
+    limits = GateSettings.current()
     good = np.flatnonzero(np.isfinite(y))
     step, passed = np.diff(y[good]), np.diff(log.time[good])
-    far = np.abs(step) > FASTEST * passed + LEAP
-    calm = np.abs(step) < 0.3 * np.max(np.abs(step), initial=0.0)
-    far[1:-1] &= calm[:-2] & calm[2:]  # a spike returns at once: a bad reading, which is borne
+    far = np.abs(step) > limits.fastest * passed + limits.leap
+    calm = np.abs(step) < limits.calm * np.max(np.abs(step), initial=0.0)
+    far[1:-1] &= calm[:-2] & calm[2:]  # a spike returns at once: one bad reading is tolerated
     if far.any():
         i = int(np.argmax(far))
         what = f"leaps by {1e3 * step[i]:.1f} mm within {1e3 * passed[i]:.1f} ms"
@@ -193,11 +212,12 @@ def _longest(flags: np.ndarray) -> tuple[int, int]:
 
 
 def _excitation(log: Trajectory) -> Iterator[KembaError]:
-    """Something must be commanded or move, and the answer must not be dead."""
+    """Something must be commanded or move, and no sensor may be dead."""
+    limits = GateSettings.current()
     valves = [n for n in log.names if "valve/" in n]
     switched = any(np.ptp(log[n][np.isfinite(log[n])]) > 0 for n in valves)
-    moving = [n for n in NEEDED[log.meta["kind"]] if n.endswith("/x") or n == "body/z"]
-    moved = any(_travel(log[n]) > 2e-3 for n in moving)
+    moving = [n for n in needed(log) if n.endswith("/x") or n == "body/z"]
+    moved = any(_travel(log[n]) > limits.moves for n in moving)
     if not switched and not moved:
         yield _fault(
             log, "no valve switches and nothing moves", "a log with excitation was expected"
@@ -205,9 +225,9 @@ def _excitation(log: Trajectory) -> Iterator[KembaError]:
         return
     if log.meta["kind"] == "bench" and _travel(log["piston/F"]) == 0.0:
         yield _fault(log, "never changes", "is the sensor dead?", column="piston/F", row=0)
-    for leg in ("front", "rear") if log.meta["kind"] == "robot" else ():
+    for leg in legs_of(log) if log.meta["kind"] == "robot" else ():
         for name in (f"{leg}/hip/q", f"{leg}/piston/x", "body/z"):
-            if np.ptp(log[name][np.isfinite(log[name])]) == 0.0 and len(log) > 200:
+            if np.ptp(log[name][np.isfinite(log[name])]) == 0.0 and len(log) > limits.dead:
                 yield _fault(log, "never changes", "is the sensor dead?", column=name, row=0)
 
 
@@ -221,7 +241,7 @@ def _remarks(log: Trajectory) -> Iterator[str]:
     gaps = np.diff(log.time) > 5 * np.median(np.diff(log.time))
     if gaps.any():
         yield f"{name}: {int(gaps.sum())} gaps in time, the longest {np.diff(log.time).max():.3f} s"
-    for column in NEEDED[log.meta["kind"]]:
+    for column in needed(log):
         missing = int((~np.isfinite(log[column])).sum())
         if missing:
             yield f"{name}: {column}: {missing} readings missing"

@@ -4,30 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from kemba.config import find_config, load_yaml, parse
 from kemba.errors import KembaError, suggest
+from kemba.identify.logs.settings import GateSettings
+from kemba.identify.logs.sidecar import check_kind, check_noise
+from kemba.mechanism import Mechanism
 from kemba.quantity import Quantity, convert
 from kemba.table import read_table
 from kemba.trajectory import Array, Trajectory, sidecar
 
 Kind = Literal["robot", "bench"]
-ROBOT = (
-    "body/x",
-    "body/z",
-    "body/pitch",
-    *(
-        f"{leg}/{name}"
-        for leg in ("front", "rear")
-        for name in ("hip/q", "hip/tau", "piston/x", "valve/extend", "valve/retract")
-    ),
-)
+BODY = ("body/x", "body/z", "body/pitch")
+LEG = ("hip/q", "hip/tau", "piston/x", "valve/extend", "valve/retract")
 BENCH = ("piston/x", "valve/extend", "valve/retract", "piston/F")
-NEEDED: dict[str, tuple[str, ...]] = {"robot": ROBOT, "bench": BENCH}
+KINDS = ("robot", "bench")
 
 
 class Source(BaseModel):
@@ -77,11 +72,21 @@ def read_log(path: str | Path, columns: ColumnMap | None = None) -> Trajectory:
     log.meta.setdefault("kind", (columns and columns.kind) or kind_of(log, path))
     log.meta["name"] = path.stem
     log.meta["path"] = str(path)
-    if log.meta["kind"] not in NEEDED:
-        raise KembaError(
-            str(sidecar(path)), f"kind: '{log.meta['kind']}'", hint=suggest("robot", NEEDED)
-        )
-    return log
+    beside = str(sidecar(path))
+    log.meta["kind"] = check_kind(log.meta["kind"], KINDS, beside)
+    if "noise" in log.meta:
+        units = {name: log.unit(name) for name in log.names}
+        log.meta["noise"] = check_noise(log.meta["noise"], units, beside)
+    return _without_absurd(log)
+
+
+def _without_absurd(log: Trajectory) -> Trajectory:
+    """The log with readings that no channel can have as missing ones: their squares overflow."""
+    limit = GateSettings.current().absurd
+    columns = {h: log[name] for h, name in zip(log.headers, log.names, strict=True)}
+    wild = {h: np.abs(values) > limit for h, values in columns.items()}
+    broken = {h: np.where(wild[h], np.nan, columns[h]) for h in columns if wild[h].any()}
+    return log.with_columns(broken) if broken else log
 
 
 def read_logs(paths: Sequence[str | Path], columns: ColumnMap | None = None) -> list[Trajectory]:
@@ -107,9 +112,34 @@ def _tell_apart(logs: Sequence[Trajectory]) -> None:
             log.meta["name"] = f"{path.parent.name}/{path.stem}"
 
 
+def legs_of(log: Trajectory) -> tuple[str, ...]:
+    """The legs of a robot's log: those of the machine that is known, else all whose columns the
+    log has, whatever their names."""
+    if "legs" in log.meta:
+        return tuple(log.meta["legs"])
+    parts = [name.split("/", 1) for name in log.names if "/" in name]
+    return tuple(dict.fromkeys(leg for leg, rest in parts if leg != "body" and rest in LEG))
+
+
+def needed(log: Trajectory) -> tuple[str, ...]:
+    """The columns without which a log says nothing: they follow from its kind and its legs."""
+    if log.meta["kind"] == "bench":
+        return BENCH
+    legs = legs_of(log) or ("<leg>",)
+    return (*BODY, *(f"{leg}/{name}" for leg in legs for name in LEG))
+
+
+def taken_on(logs: Iterable[Trajectory], mechanism: Mechanism) -> None:
+    """Note in the logs on which machine they were taken: its legs and its stroke [m]."""
+    for log in logs:
+        log.meta["stroke"] = mechanism.stroke
+        if log.meta["kind"] == "robot":
+            log.meta["legs"] = list(mechanism.legs)
+
+
 def kind_of(log: Trajectory, where: str | Path = "") -> Kind:
     """Robot or bench, by the columns."""
-    if any(name.startswith(("body/", "front/", "rear/")) for name in log.names):
+    if any(name.startswith("body/") or "/hip/" in name for name in log.names):
         return "robot"
     if any(name in BENCH for name in log.names):
         return "bench"
@@ -163,18 +193,3 @@ def _earlier(time: Array, values: Array, delay: float, hold: bool) -> Array:
         at = np.clip(np.searchsorted(time, time + delay, side="right") - 1, 0, len(time) - 1)
         return np.asarray(values[at])
     return np.interp(time + delay, time, values)
-
-
-def grouped(logs: Iterable[Trajectory]) -> dict[str, list[str]]:
-    """Runs with the same command, by group: `repeat_of` of the sidecar, else each its own."""
-    groups: dict[str, list[str]] = {}
-    for log in logs:
-        groups.setdefault(str(log.meta.get("repeat_of", log.meta["name"])), []).append(
-            log.meta["name"]
-        )
-    return groups
-
-
-def metadata(log: Trajectory) -> dict[str, Any]:
-    """What the sidecar said."""
-    return {k: v for k, v in log.meta.items() if k not in ("name", "path")}

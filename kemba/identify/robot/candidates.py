@@ -3,25 +3,32 @@
 from __future__ import annotations
 
 from kemba.effects import BY_KIND
-from kemba.identify.evidence.candidates import effect_candidates
-from kemba.identify.evidence.problem import Candidate, Parameter
+from kemba.identify.problem.candidates import CandidateSettings, effect_candidates
+from kemba.identify.problem.problem import Candidate, Parameter
 from kemba.model.model import Model
+from kemba.settings import BY_HAND, Settings, setting
 
 GROUND = ("ground_compliance", "ground_friction", "contact")
-DELAYS = ("valve_delay.dt", "valve_close_delay.dt")
 SOFTNESS = "ground_compliance.softness"
 GRIP = "ground_friction.mu"
-LAGS = {"hose_lag.T": 6e-4, "motor_lag.T": 6e-4}  # s; shorter is as good as none
-SHORTEST = 1e-6  # s
+LAGS = ("hose_lag.T", "motor_lag.T")
+
+
+class RobotCandidateSettings(Settings):
+    """Ground and lags, as robot logs can show them."""
+
+    none: float = setting(1e-6, "s", "a lag that is none", "convention: far below a row")
+    softness: float = setting(5e-5, "m.N-1", "size of a ground's softness", BY_HAND)
+    softest: float = setting(1e-3, "m.N-1", "largest softness of a ground", BY_HAND)
 
 
 def robot_candidates(model: Model) -> dict[str, Candidate]:
     """The effects that `model` lacks; a soft ground is searched by its softness 1/k."""
-    found = effect_candidates(model)
+    found, settings = effect_candidates(model), RobotCandidateSettings.current()
     if "ground_compliance" in found:
         found["ground_compliance"] = Candidate(
             "ground_compliance",
-            Parameter("softness", "m.N-1", 0.0, 5e-5, 0.0, 1e-3),
+            Parameter("softness", "m.N-1", 0.0, settings.softness, 0.0, settings.softest),
             (Parameter("d", "s.m-1", 1.0, 0.7, 0.1, 10.0, 1.0),),
             reciprocal={"softness": ("k", "N.m-1")},
         )
@@ -55,4 +62,5 @@ def ground_of(model: Model) -> tuple[float, dict[str, float]]:
 
 def without_delay(name: str, value: float) -> float:
     """A lag too short to matter as the model should have it: none."""
-    return SHORTEST if name in LAGS and value < LAGS[name] else value
+    short = name in LAGS and value < CandidateSettings.current().fastest
+    return RobotCandidateSettings.current().none if short else value

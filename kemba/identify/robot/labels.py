@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
-from kemba.identify.evidence.problem import Rows
+from kemba.identify.problem.types import Array, Flags, Rows, Texts
 from kemba.identify.robot.dynamics.physics import Physics
-from kemba.identify.robot.dynamics.reference import GROUND_SIGMA
+from kemba.identify.robot.dynamics.settings import PlaceSettings
 from kemba.identify.robot.motion.batch import Batch
 from kemba.identify.robot.motion.contact import Schedule
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
-Texts = np.ndarray[Any, Any]
 MODES = np.array(["00", "01", "10", "11"], dtype=object)  # extend, retract
 
 
@@ -27,22 +24,22 @@ def row_channels(physics: Physics) -> tuple[str, ...]:
 def describe(
     physics: Physics,
     batch: Batch,
-    plan: Sequence[Schedule],
+    schedules: Sequence[Schedule],
     inputs: Array,
-    mask: np.ndarray[Any, np.dtype[np.bool_]],
+    mask: Flags,
     runs: Sequence[int],
 ) -> Rows:
     """Rows where `mask` (n, L, m) holds, run by run, channel by channel."""
     channels = row_channels(physics)
     m = len(channels)
-    found: dict[str, list[Any]] = {}
+    found: dict[str, list[Texts]] = {}
     for i in runs:
-        track, own = batch.resampled[i], mask[:, i].T
+        log, own = batch.resampled[i], mask[:, i].T
         time = np.zeros(batch.n)
-        time[: len(track.time)] = track.time
+        time[: len(log.time)] = log.time
         phase = np.full(batch.n, "", dtype=object)
-        phase[: len(track.time)] = plan[i].phase
-        sigma = np.append(track.sigma, [GROUND_SIGMA] * (m - len(track.sigma)))
+        phase[: len(log.time)] = schedules[i].phase
+        sigma = np.append(log.sigma, [PlaceSettings.current().ground] * (m - len(log.sigma)))
         whole = {
             "run": np.full(own.shape, i),
             "channel": np.broadcast_to(np.arange(m)[:, None], own.shape),
@@ -58,7 +55,7 @@ def describe(
 
 
 def valve_modes(physics: Physics, inputs: Array, channels: Sequence[str]) -> Texts:
-    """Mode (n, m) of the channel's own leg; of the body: the front leg's."""
+    """Mode (n, m) of the channel's own leg; of the body: the first leg's."""
     texts = {}
     for leg in physics.legs:
         on = [

@@ -1,51 +1,65 @@
 """How much force a robot model lacks: d(t) per physical channel with its 95 % band.
 
-Every channel's unknown force is a first-order lag driven by noise, as part of the filter's state.
-How strong each is, is learnt from the data; a channel that does not need one is left with almost
-none. In stance the contact forces are unknown too, so only what they cannot explain is told.
+Every channel's unknown force is a first-order lag of white noise, and a state of the filter. Its
+strength is learnt from the data; a channel that needs no force ends with almost none. In stance
+the contact forces are unknown too, so only the force that they cannot explain is found.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from kemba.identify.compare.missing_force import Missing, spans
-from kemba.identify.evidence.problem import Array, Theta
-from kemba.identify.robot.dynamics.reference import Floor, densities
+from kemba.identify.compare.missing_force import spans
+from kemba.identify.problem.problem import Array, MissingForce, Theta
+from kemba.identify.robot.dynamics.reference import densities
+from kemba.identify.robot.dynamics.settings import QuietForceDensity
 from kemba.identify.robot.motion.filter import System, gains, smooth_with_band
-from kemba.identify.robot.problem import RobotProblem
+from kemba.identify.robot.state import LinearisedState
+from kemba.settings import BY_HAND, Settings, setting
 
-MEMORY = 0.025  # s, of the missing force
-ROUNDS = 6
-# N and N.m (1 sigma): where the search for a channel's strength begins, and what is as good as none
-BEGIN = {"body": 5.0, "pitch": 0.5, "hip": 0.5, "piston": 10.0}
-NEGLIGIBLE = {"body": 0.1, "pitch": 0.01, "hip": 0.01, "piston": 0.1}
-QUIET = Floor(body=1e-5, pitch=1e-6, hip=1e-6, rod=1e-5)
+
+class RobotMissingSettings(Settings):
+    """The missing force of robot logs. Its strength (1 sigma) is learnt per channel."""
+
+    memory: float = setting(0.025, "s", "correlation time of the missing force", BY_HAND)
+    rounds: int = setting(6, "1", "rounds in which its strength is learnt", BY_HAND)
+    body: float = setting(5.0, "N", "strength with which learning begins", BY_HAND)
+    pitch: float = setting(0.5, "N.m", "the same of the moment on the body", BY_HAND)
+    hip: float = setting(0.5, "N.m", "the same of the torque at a hip", BY_HAND)
+    piston: float = setting(10.0, "N", "the same of the force on a rod", BY_HAND)
+    negligible: float = setting(0.1, "N", "strength of a force that is as good as none", BY_HAND)
+    negligible_moment: float = setting(0.01, "N.m", "the same of a moment", BY_HAND)
 
 
 def robot_missing(
-    problem: RobotProblem, theta: Theta | None = None, strength: Array | None = None
-) -> list[Missing]:
-    """d(t) per run: force on the body, moments at pitch and hips, force on the rods."""
-    names = problem.physics.channels
+    state: LinearisedState, theta: Theta, strength: Array | None = None
+) -> list[MissingForce]:
+    """d(t) per run: force on the body [N], moments at pitch and hips [N.m], force on the rods [N].
+
+    `strength` (k,): 1 sigma of each channel's force; learnt when not given.
+    """
+    names = state.physics.channels
     kinds = [_kind(name) for name in names]
-    sigma = np.array([BEGIN[kind] for kind in kinds]) if strength is None else strength
-    least = np.array([NEGLIGIBLE[kind] for kind in kinds])
-    quiet = densities(problem.physics, problem.batch, problem.plan, QUIET)
-    y, g = problem.defects(theta or {})
-    valid, k = problem.batch.valid, len(names)
-    for _ in range(ROUNDS if strength is None else 1):
-        system = with_forces(problem, quiet, sigma)
+    settings = RobotMissingSettings.current()
+    begin = np.array([getattr(settings, kind) for kind in kinds])
+    sigma = begin if strength is None else strength
+    moment = np.isin(kinds, ("pitch", "hip"))
+    least = np.where(moment, settings.negligible_moment, settings.negligible)
+    quiet = densities(state.physics, state.batch, state.schedules, QuietForceDensity.current())
+    y, g = state.measurement(theta), state.acceleration(theta)
+    valid, k = state.batch.valid, len(names)
+    for _ in range(settings.rounds if strength is None else 1):
+        system = with_forces(state, quiet, sigma)
         x, variance = smooth_with_band(system, gains(system), y, g)
         power = (x[..., -k:] ** 2 + variance[..., -k:])[valid].mean(axis=0)
         used, sigma = sigma, np.maximum(np.sqrt(power), least)
     units = tuple("N.m" if kind in ("pitch", "hip") else "N" for kind in kinds)
     found = []
-    for i, track in enumerate(problem.batch.resampled):
-        n = len(track.time)
+    for i, log in enumerate(state.batch.resampled):
+        n = len(log.time)
         force, spread = x[:n, i, -k:], np.sqrt(variance[:n, i, -k:])
-        down = spans(track.time, problem.plan[i].phase != "flight")
-        found.append(Missing(track.name, track.time, names, units, force, spread, used, down))
+        down = spans(log.time, state.schedules[i].phase != "flight")
+        found.append(MissingForce(log.name, log.time, names, units, force, spread, used, down))
     return found
 
 
@@ -54,19 +68,22 @@ def _kind(channel: str) -> str:
     return {"body/pitch": "pitch", "hip": "hip", "piston": "piston"}.get(last, "body")
 
 
-def with_forces(problem: RobotProblem, density: Array, sigma: Array) -> System:
-    """The filter's system with a lagged force of strength `sigma` (k,) per channel as states."""
-    base = problem.point.system_with(density, problem.batch.h)
-    h, k = problem.batch.h, len(sigma)
+def with_forces(state: LinearisedState, density: Array, sigma: Array) -> System:
+    """The filter's system with a lagged force per channel, 1 sigma `sigma` (k,), as more states.
+
+    `density` (n, L, c): of the other unknown forces.
+    """
+    base = state.motion.system_with(density, state.batch.h)
+    h, k = state.batch.h, len(sigma)
     n, runs, m, d = base.H.shape
-    pushes = problem.point.channels[..., :k]  # generalised force per channel force
+    pushes = state.motion.channels[..., :k]  # generalised force per channel force
     F = np.zeros((n, runs, d + k, d + k))
     F[..., :d, :d] = base.F
-    accelerations = base.G[..., : pushes.shape[2]] @ problem.point.inverse @ pushes
+    accelerations = base.G[..., : pushes.shape[2]] @ state.motion.inverse @ pushes
     F[..., :d, d:] = accelerations
-    keep = np.exp(-h / MEMORY)
+    keep = np.exp(-h / RobotMissingSettings.current().memory)
     i = np.arange(k)
-    F[..., d + i, d + i] = np.where(problem.batch.valid, keep, 1.0)[..., None]
+    F[..., d + i, d + i] = np.where(state.batch.valid, keep, 1.0)[..., None]
     j = base.G.shape[3]
     G = np.zeros((n, runs, d + k, j + k))
     G[..., :d, :j] = base.G

@@ -2,80 +2,101 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from scipy.optimize import lsq_linear
 
 from kemba.errors import KembaError
-from kemba.identify.evidence.problem import Array, Flags, Rows
-
-if TYPE_CHECKING:
-    from kemba.identify.robot.problem import RobotProblem
-
-DEEP, OFTEN = (
-    -0.04,
-    0.03,
-)  # m below the ground, in this share of the rows: no sensor fault is so large
-ABSURD = 15.0  # one-step errors in units of noise, rms, that no missing effect makes
-FAULTY = 4.0  # sizes that a sensor's fault may have and still be one
+from kemba.identify.problem.types import Array, Flags, Rows
+from kemba.identify.robot.state import LinearisedState
+from kemba.settings import BY_HAND, Settings, setting
 
 
-def contradictions(problem: RobotProblem) -> Iterator[KembaError]:
-    """What cannot be, run by run."""
-    legs = problem.physics.legs
-    rows, r = problem.rows(), problem.residual({})
+class RobotValidateSettings(Settings):
+    """When robot logs contradict themselves or any model."""
+
+    deep: float = setting(
+        0.04,
+        "m",
+        "depth of a foot below the ground that no sensor's fault makes",
+        BY_HAND,
+        decides=True,
+    )
+    often: float = setting(
+        0.03, "1", "share of the rows in which it must be so deep", BY_HAND, decides=True
+    )
+    absurd: float = setting(
+        15.0,
+        "1",
+        "rms one-step error, in sigmas, that no missing effect makes",
+        BY_HAND,
+        decides=True,
+    )
+    faulty: float = setting(4.0, "1", "largest fault of a sensor, in sizes", BY_HAND, decides=True)
+
+
+def contradictions(
+    state: LinearisedState, rows: Rows, r: Array, sensor_columns: Callable[[], Array]
+) -> Iterator[KembaError]:
+    """What cannot be, run by run.
+
+    `rows` and `r` (n,): the residual of the model as it is. `sensor_columns`: gives the columns
+    (n, k) of all sensor faults per size; it is called only where a residual is too large.
+    """
+    absurd = RobotValidateSettings.current().absurd
     forgiven: Array | None = None
-    for i, track in enumerate(problem.batch.resampled):
-        n = len(track.time)
-        sunk = False
-        for leg, height in zip(
-            legs, problem.point.places[:n, i, 1 : 2 * len(legs) : 2].T, strict=True
-        ):
-            deep = height < DEEP
-            if deep.mean() > OFTEN:
-                sunk = True
-                at = int(np.argmin(height))
-                yield KembaError(
-                    track.name,
-                    f"the {leg} foot would be {-1e3 * height[at]:.0f} mm below the ground "
-                    f"at {track.time[at]:.3f} s",
-                    "a foot on or above it was expected",
-                    f"is a sign of body/pitch or {leg}/hip/q turned, or are columns swapped?",
-                )
+    for i, log in enumerate(state.batch.resampled):
+        sunk = list(_sunk(state, i))
+        yield from sunk
         own = rows.run == i
-        power = _power(problem, r, rows, own)
-        if max(power.values(), default=0.0) > ABSURD:
-            forgiven = _forgiven(problem, r) if forgiven is None else forgiven
-            power = _power(problem, forgiven, rows, own)
+        power = _power(state.physics.channels, r, rows, own)
+        if max(power.values(), default=0.0) > absurd:
+            forgiven = _forgiven(r, sensor_columns()) if forgiven is None else forgiven
+            power = _power(state.physics.channels, forgiven, rows, own)
         worst = max(power, key=power.__getitem__, default="")
-        if worst and power[worst] > ABSURD and not sunk:
+        if worst and power[worst] > absurd and not sunk:
             yield KembaError(
-                track.name,
+                log.name,
                 f"{worst} moves as no robot would: {power[worst]:.0f} times its noise off per row",
                 "motion that follows from the commands was expected",
                 "are columns swapped, a sign turned, or clocks apart?",
             )
 
 
-def _power(problem: RobotProblem, r: Array, rows: Rows, own: Flags) -> dict[str, float]:
-    """Root mean square of the residual by channel."""
+def _sunk(state: LinearisedState, run: int) -> Iterator[KembaError]:
+    """Feet that would be far below the ground for long."""
+    limits = RobotValidateSettings.current()
+    legs, log = state.physics.legs, state.batch.resampled[run]
+    heights = state.motion.places[: len(log.time), run, 1 : 2 * len(legs) : 2]
+    for leg, height in zip(legs, heights.T, strict=True):
+        if np.mean(height < -limits.deep) > limits.often:
+            at = int(np.argmin(height))
+            yield KembaError(
+                log.name,
+                f"the {leg} foot would be {-1e3 * height[at]:.0f} mm below the ground "
+                f"at {log.time[at]:.3f} s",
+                "a foot on or above it was expected",
+                f"is a sign of body/pitch or {leg}/hip/q turned, or are columns swapped?",
+            )
+
+
+def _power(channels: Sequence[str], r: Array, rows: Rows, own: Flags) -> dict[str, float]:
+    """Root mean square of the residual by channel, over the rows `own` (n,)."""
     found = {}
-    for k, channel in enumerate(problem.physics.channels):
+    for k, channel in enumerate(channels):
         at = own & (rows.channel == k)
         if at.any():
             found[channel] = float(np.sqrt(np.mean(r[at] ** 2)))
     return found
 
 
-def _forgiven(problem: RobotProblem, r: Array) -> Array:
-    """The residual less what faults of sensors can explain: these are to be found, not refused."""
-    faults = [c for c in problem.candidates.values() if c.sensor]
-    jacobian = problem.jacobian({}, [c.key for c in faults])
-    jacobian *= [c.lead.size for c in faults]
-    gram = jacobian.T @ jacobian + 1e-9 * np.eye(len(faults))
+def _forgiven(r: Array, columns: Array) -> Array:
+    """The residual (n,) less what faults of sensors can explain: these are to be found, not
+    refused. `columns` (n, k) per size of each fault."""
+    gram = columns.T @ columns + 1e-9 * np.eye(columns.shape[1])
+    faulty = RobotValidateSettings.current().faulty
     lower = np.linalg.cholesky(gram)
-    wanted = np.linalg.solve(lower, -jacobian.T @ r)
-    found = lsq_linear(lower.T, wanted, bounds=(-FAULTY, FAULTY))
-    return np.asarray(r + jacobian @ found.x)
+    wanted = np.linalg.solve(lower, -columns.T @ r)
+    found = lsq_linear(lower.T, wanted, bounds=(-faulty, faulty))
+    return np.asarray(r + columns @ found.x)

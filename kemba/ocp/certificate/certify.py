@@ -12,16 +12,16 @@ from kemba.model import Model
 from kemba.ocp.task.costs import COSTS
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task, Tolerances
-from kemba.ocp.transcription.solution import arrays
+from kemba.ocp.transcription.first_node import state_rows
+from kemba.ocp.transcription.solution import arrays, groups
 from kemba.ocp.transcription.stage import ANGLE_ARM
-from kemba.quantity import Quantity
 from kemba.trajectory import Trajectory
 
 
 @dataclass(frozen=True)
 class Violation:
-    """One violated piece of physics or requirement: `size` is relative to its scale, `violation` in
-    `unit`."""
+    """A physical law or a requirement that is violated at a node: by `violation` in `unit`, which
+    is `size` times its scale."""
 
     what: str
     node: int
@@ -58,112 +58,163 @@ def certify(
     trajectory: Trajectory,
     most: int = 8,
 ) -> Certificate:
-    """Residuals of a trajectory under implicit Euler on its own grid.
+    """Residuals of a trajectory under implicit Euler on its own grid, with the `most` worst.
 
-    complementarity: max of force (by body weight) times gap [m] or slip [m.s-1]; dynamics: max
-    scaled defect; bounds: max scaled violation of bounds, limits, signs and requirements.
+    complementarity: largest force (by body weight) times gap [m] or slip [m.s-1]; binary: largest
+    u(1 - u); dynamics: largest scaled defect; bounds: largest scaled violation of bounds, limits,
+    signs and requirements, the first node included. Raises KembaError for missing columns.
     """
-    x, t = arrays(model, trajectory), trajectory.time
-    h = np.diff(t)
-    node = model.node
-    a, sd = np.diff(x["v"], axis=0) / h[:, None], np.diff(x["s"], axis=0) / h[:, None]
-    now = {k: values[1:] for k, values in x.items()}
-    evaluated = node.residual.map(len(h))(
-        *(m.T for m in (now["q"], now["v"], a, now["s"], sd, now["lam"], now["u"])), []
-    )
-    dynamics, rate, pair_a, pair_b, limits = (np.array(part).T for part in evaluated)
-    weight = model.mechanism.weight
+    measured = Measurement(model, trajectory)
+    bounds = [measured.signs(), measured.first_node(), measured.boxes()]
+    bounds.append(measured.requirements(requirements))
+    defects = max(measured.dynamics(), measured.kinematics(), measured.rates())
+    pairs, binary = measured.products(), measured.binary()
+    return Certificate(pairs, binary, defects, max(bounds), measured.worst(most))
 
-    found: list[Violation] = []
 
-    def note(values: np.ndarray, labels: Iterable[tuple[str, str, float]], first: int = 1) -> float:
-        """Record scaled violations (nodes, rows); `labels` give what, unit and physical scale."""
+Label = tuple[str, str, float]  # what a column says, the unit of its violation, one unit's size
+
+
+class Measurement:
+    """The residuals of a trajectory, measured part by part; each part notes its violations.
+
+    Arrays are (nodes, rows) over the nodes from 1 on, where a step ends, unless said otherwise.
+    """
+
+    def __init__(self, model: Model, trajectory: Trajectory) -> None:
+        self.model, self.trajectory, self.time = model, trajectory, trajectory.time
+        self.x = x = arrays(model, trajectory)
+        self.h = h = np.diff(trajectory.time)[:, None]
+        self.found: list[Violation] = []
+        rates = np.diff(x["v"], axis=0) / h, np.diff(x["s"], axis=0) / h
+        now = {name: values[1:] for name, values in x.items()}
+        at = (now["q"], now["v"], rates[0], now["s"], rates[1], now["lam"], now["u"])
+        parts = model.node.residual.map(len(h))(*(m.T for m in at), [])
+        self.residual = dict(
+            zip(
+                ("dynamics", "rate", "pair_a", "pair_b", "limits"),
+                (np.array(part).T for part in parts),
+                strict=True,
+            )
+        )
+
+    def note(self, values: np.ndarray, labels: Iterable[Label], first: int = 1) -> float:
+        """Keep the worst of every column of scaled violations (nodes, rows), whose nodes begin at
+        `first`; the largest of all, at least 0."""
         if values.size == 0:
             return 0.0
         for j, (what, unit, scale) in enumerate(labels):
             k = int(np.argmax(values[:, j]))
-            size = float(values[k, j])
-            found.append(Violation(what, k + first, float(t[k + first]), size * scale, unit, size))
+            size, node = float(values[k, j]), k + first
+            time = float(self.time[node])
+            self.found.append(Violation(what, node, time, size * scale, unit, size))
         return float(max(values.max(), 0.0))
 
-    arm = np.array([1.0 if r.unit == "N" else ANGLE_ARM for r in node.dynamics_rows])
-    kinematic = np.diff(x["q"], axis=0) - h[:, None] * now["v"]
-    q_scale = np.array([c.scale for c in model.mechanism.coordinates])
-    s_scale = np.array([r.scale for r in node.rate_rows])
-    defect = max(
-        note(
-            np.abs(dynamics) / (weight * arm),
-            [(r.label, r.unit, weight * s) for r, s in zip(node.dynamics_rows, arm, strict=True)],
-        ),
-        note(
-            np.abs(kinematic) / q_scale,
-            [(f"kinematics:{c.name}", c.unit, c.scale) for c in model.mechanism.coordinates],
-        ),
-        note(
-            np.abs(rate) * h[:, None] / s_scale if rate.size else rate,
-            [(r.label, r.unit.removesuffix(".s-1"), r.scale) for r in node.rate_rows],
-        ),
-    )
-    scale_b = np.array([b.scale for _, b in node.pair_rows])
-    product = np.abs(pair_a * pair_b / scale_b)
-    pairs = note(product, [(a.label, f"{a.unit} of body weight", 1.0) for a, _ in node.pair_rows])
-    signs = max(
-        note(-pair_a, [(a.label, a.unit, 1.0) for a, _ in node.pair_rows]),
-        note(-pair_b / scale_b, [(b.label, b.unit, b.scale) for _, b in node.pair_rows]),
-        note(-limits, [(r.label, "of the limit", 1.0) for r in node.limit_rows]),
-    )
-    acting = {q.name for q in (*model.inputs.values(), *model.forces.values())}
-    boxes = [signs, *_boxes(model, x, note), _requirements(requirements, trajectory, found, acting)]
-    binary = [i for i, q in enumerate(model.inputs.values()) if q.binary]
-    u = now["u"][:, binary]
-    worst = sorted((v for v in found if v.size > 1e-9), key=lambda v: -v.size)[:most]
-    return Certificate(
-        pairs, float(np.max(np.abs(u * (1 - u)), initial=0.0)), defect, max(boxes), tuple(worst)
-    )
+    def worst(self, most: int) -> tuple[Violation, ...]:
+        """The worst violations noted so far, each law once, worst first; not rounding errors."""
+        kept: dict[tuple[str, str], Violation] = {}
+        for violation in sorted(self.found, key=lambda v: -v.size):
+            if violation.size > 1e-9:
+                kept.setdefault((violation.what, violation.unit), violation)
+        return tuple(kept.values())[:most]
 
+    def dynamics(self) -> float:
+        """Equations of motion, forces by body weight and moments by that at an arm."""
+        rows, weight = self.model.node.dynamics_rows, self.model.mechanism.weight
+        scale = weight * np.array([1.0 if r.unit == "N" else ANGLE_ARM for r in rows])
+        labels = [(r.label, r.unit, float(s)) for r, s in zip(rows, scale, strict=True)]
+        return self.note(np.abs(self.residual["dynamics"]) / scale, labels)
 
-def _boxes(model: Model, x: dict[str, np.ndarray], note) -> list[float]:  # type: ignore[no-untyped-def]
-    groups: dict[str, Iterable[Quantity]] = {
-        "q": model.mechanism.coordinates,
-        "v": model.mechanism.velocities,
-        "s": model.states.values(),
-        "u": model.inputs.values(),
-        "lam": model.forces.values(),
-    }
-    sizes = []
-    for name, group in groups.items():
-        quantities = list(group)
-        lower = np.array([q.lower for q in quantities])
-        upper = np.array([q.upper for q in quantities])
-        scale = np.array([q.scale for q in quantities])
-        over = np.maximum(lower - x[name][1:], x[name][1:] - upper) / scale
-        sizes.append(note(over, [(f"bound:{q.name}", q.unit, q.scale) for q in quantities]))
-    return sizes
+    def kinematics(self) -> float:
+        """Coordinates against velocities times steps."""
+        coordinates = self.model.mechanism.coordinates
+        defect = np.diff(self.x["q"], axis=0) - self.h * self.x["v"][1:]
+        labels = [(f"kinematics:{c.name}", c.unit, c.scale) for c in coordinates]
+        return self.note(np.abs(defect) / np.array([c.scale for c in coordinates]), labels)
 
+    def rates(self) -> float:
+        """Effect states against their rates times steps."""
+        rows = self.model.node.rate_rows
+        if not rows:
+            return 0.0
+        defect = np.abs(self.residual["rate"]) * self.h / np.array([r.scale for r in rows])
+        return self.note(defect, [(r.label, r.unit.removesuffix(".s-1"), r.scale) for r in rows])
 
-def _requirements(
-    requirements: Sequence[Requirement],
-    trajectory: Trajectory,
-    found: list[Violation],
-    acting: set[str],
-) -> float:
-    worst = 0.0
-    nodes = len(trajectory) - 1
-    for requirement in requirements:
-        values = trajectory[requirement.quantity.name]
-        over = np.maximum(requirement.lower - values, values - requirement.upper)
-        if requirement.at is None and requirement.quantity.name in acting:
-            over[0] = 0.0  # inputs and forces act on the interval before a node
-        k = int(np.argmax(over)) if requirement.at is None else requirement.node(nodes)
-        size = float(over[k]) / requirement.quantity.scale
-        what = f"{requirement.text}:{requirement.quantity.name}"
-        found.append(
-            Violation(
-                what, k, float(trajectory.time[k]), float(over[k]), requirement.quantity.unit, size
-            )
+    def products(self) -> float:
+        """Products of the complementarity pairs, forces by body weight."""
+        rows = self.model.node.pair_rows
+        product = np.abs(self.residual["pair_a"] * self._scaled_b())
+        return self.note(product, [(a.label, f"{a.unit} of body weight", 1.0) for a, _ in rows])
+
+    def signs(self) -> float:
+        """Pairs and limits that are negative."""
+        node = self.model.node
+        first = [(a.label, a.unit, 1.0) for a, _ in node.pair_rows]
+        second = [(b.label, b.unit, b.scale) for _, b in node.pair_rows]
+        limits = [(r.label, "of the limit", 1.0) for r in node.limit_rows]
+        return max(
+            self.note(-self.residual["pair_a"], first),
+            self.note(-self._scaled_b(), second),
+            self.note(-self.residual["limits"], limits),
         )
-        worst = max(worst, size)
-    return worst
+
+    def _scaled_b(self) -> np.ndarray:
+        scale = np.array([b.scale for _, b in self.model.node.pair_rows])
+        return np.asarray(self.residual["pair_b"] / scale)
+
+    def first_node(self) -> float:
+        """What holds in every state, at the first node."""
+        rows = state_rows(self.model.node)
+        if not rows:
+            return 0.0
+        values = first_state(self.model, *(self.x[name][0] for name in ("q", "v", "s")))
+        return self.note(-values[None, :], [(r.label, r.unit, r.scale) for r in rows], 0)
+
+    def boxes(self) -> float:
+        """Bounds of every quantity; the first node has no inputs and forces."""
+        worst = 0.0
+        for name, quantities in groups(self.model).items():
+            first = 0 if name in ("q", "v", "s") else 1
+            values = self.x[name][first:]
+            lower, upper, scale = (
+                np.array([getattr(q, end) for q in quantities])
+                for end in ("lower", "upper", "scale")
+            )
+            over = np.maximum(lower - values, values - upper) / scale
+            labels = [(f"bound:{q.name}", q.unit, q.scale) for q in quantities]
+            worst = max(worst, self.note(over, labels, first))
+        return worst
+
+    def requirements(self, requirements: Sequence[Requirement]) -> float:
+        """What the task asks; inputs and forces act on the interval before a node."""
+        acting = {q.name for name in ("u", "lam") for q in groups(self.model)[name]}
+        worst, nodes = 0.0, len(self.trajectory) - 1
+        for requirement in requirements:
+            name, unit = requirement.quantity.name, requirement.quantity.unit
+            first = int(name in acting)
+            at = slice(first, None)
+            if requirement.at is not None:
+                first = requirement.node(nodes)
+                at = slice(first, first + 1)
+            values = self.trajectory[name][at, None]
+            over = np.maximum(requirement.lower - values, values - requirement.upper)
+            label = (f"{requirement.text}:{name}", unit, requirement.scale)
+            worst = max(worst, self.note(over / requirement.scale, [label], first))
+        return worst
+
+    def binary(self) -> float:
+        """Largest u(1 - u) of the valves."""
+        valves = [i for i, q in enumerate(self.model.inputs.values()) if q.binary]
+        u = self.x["u"][1:, valves]
+        return float(np.max(np.abs(u * (1 - u)), initial=0.0))
+
+
+def first_state(model: Model, q: np.ndarray, v: np.ndarray, s: np.ndarray) -> np.ndarray:
+    """What holds in every state (rows,), scaled, at q, v, s (n,); negative where it does not."""
+    node, rows = model.node, state_rows(model.node)
+    scaled = ca.vertcat(*(row.expression / row.scale for row in rows))
+    evaluate = ca.Function("state", [node.q, node.v, node.s], [ca.densify(scaled)])
+    return np.array(evaluate(q, v, s)).ravel()
 
 
 def costs(model: Model, trajectory: Trajectory) -> dict[str, float]:

@@ -2,40 +2,65 @@
 
 from __future__ import annotations
 
+from enum import Enum
+
 from kemba.ocp.certificate.certify import Certificate
+from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.task.task import Task
+from kemba.settings import Settings, setting
 from kemba.trajectory import Trajectory
 
-LIMITS = (
-    "Maximum_Iterations_Exceeded",
-    "Maximum_CpuTime_Exceeded",
-    "Maximum_WallTime_Exceeded",
-)
-ACCEPTABLE = 100.0  # times the tolerance: usable, but not what was asked
+
+class Judging(Settings):
+    """How a plan is judged that misses its tolerances."""
+
+    acceptable: float = setting(
+        100.0, "1", "times the tolerances within which a plan is usable, but not what was asked",
+        "convention: two digits short of what was asked",
+    )  # fmt: skip
+
+
+class Status(str, Enum):
+    """What solving gave; the values are the words of the command line's contract."""
+
+    SOLVED = "solved"  # every residual within the task's tolerances
+    ACCEPTABLE = "acceptable"  # a plan, but not all that was asked
+    INFEASIBLE = "infeasible"
+    STALLED = "stalled"
+    LIMIT = "limit"
+    INTERRUPTED = "interrupted"
+
+    def __str__(self) -> str:
+        return str(self.value)
+
+    @property
+    def plan(self) -> bool:
+        """Whether there is a plan that is worth executing."""
+        return self in (Status.SOLVED, Status.ACCEPTABLE)
 
 
 def verdict(
-    task: Task, certificate: Certificate, trajectory: Trajectory, message: str
-) -> tuple[str, str]:
-    """(status, sentence): solved, acceptable, infeasible, stalled, limit or interrupted."""
+    task: Task, certificate: Certificate, trajectory: Trajectory, ending: Ending | None
+) -> tuple[Status, str]:
+    """Status and sentence of a trajectory; `ending` is that of its last solve."""
     facts = f"apex {max(trajectory['body/z']):.3f} m, {trajectory.time[-1]:.3f} s"
-    if message == "User_Requested_Stop":
-        return "interrupted", f"interrupted: best iterate kept, {facts}; {_worst(certificate)}"
+    if ending is Ending.INTERRUPTED:
+        what = f"interrupted: best iterate kept, {facts}; {_worst(certificate)}"
+        return Status.INTERRUPTED, what
     if certificate.within(task.tolerances):
-        return "solved", f"solved: {facts}"
-    loose = task.tolerances.model_copy(
-        update={
-            name: ACCEPTABLE * getattr(task.tolerances, name)
-            for name in ("complementarity", "dynamics", "bounds")
-        }
-    )
-    if certificate.within(loose):
-        return "acceptable", f"acceptable, short of tolerance: {facts}; {_worst(certificate)}"
-    if message in LIMITS:
-        return "limit", f"stopped by a limit before a plan was found: {_worst(certificate)}"
-    if message == "Infeasible_Problem_Detected":
-        return "infeasible", f"infeasible as far as the solver sees: {_worst(certificate)}"
-    return "stalled", f"stalled ({message}): {_worst(certificate)}"
+        return Status.SOLVED, f"solved: {facts}"
+    factor, names = Judging.current().acceptable, ("complementarity", "dynamics", "bounds")
+    loose = {name: factor * getattr(task.tolerances, name) for name in names}
+    worst = _worst(certificate)
+    if certificate.within(task.tolerances.model_copy(update=loose)):
+        return Status.ACCEPTABLE, f"acceptable, short of tolerance: {facts}; {worst}"
+    if ending is None:
+        return Status.STALLED, f"not solved: {worst}"
+    if ending.limit:
+        return Status.LIMIT, f"stopped by a limit before a plan was found: {worst}"
+    if ending in (Ending.INFEASIBLE, Ending.REFUSED):
+        return Status.INFEASIBLE, f"infeasible as far as the solver sees: {worst}"
+    return Status.STALLED, f"stalled, {ending.sentence}: {worst}"
 
 
 def _worst(certificate: Certificate) -> str:

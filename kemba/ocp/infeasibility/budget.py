@@ -8,11 +8,9 @@ from kemba.config import Document
 from kemba.model import Model
 from kemba.ocp.infeasibility.diagnostic import Diagnostic, key, number, place, relax
 from kemba.ocp.infeasibility.flight import Flight, air_work, hip_power, leg_swing
+from kemba.ocp.infeasibility.settings import Checks
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
-
-HEAVY = 0.2  # of all that is lifted, from which the payload is told
-STROKES = 3  # more pushes than this fit into no planned motion
 
 
 def budget_diagnostics(
@@ -66,13 +64,13 @@ def _energy(task: Task, model: Model, flight: Flight, document: Document) -> Ite
         return
     longest = task.duration * (1 + task.step_variation) * (flight.requirement.at or 1.0)
     causes = [f"{off} keeps the pistons without air"] if off else []
-    if task.payload > HEAVY * flight.mass:
+    if task.payload > Checks.current().heavy * flight.mass:
         causes.append(f"{key('payload', document)} adds {number(task.payload, 'kg')}")
     lifted = f"{asked}: lifting {flight.mass:.1f} kg to {number(flight.height, 'm')}"
     most = flight.z0 + air / (flight.mass * flight.fall)
     yield Diagnostic(
         "; ".join([*causes, f"{lifted} takes {lift:.0f} J, one stroke of the pistons {air:.0f} J"]),
-        lift > STROKES * air + hip_power(model) * longest,
+        lift > Checks.current().strokes * air + hip_power(model) * longest,
         (relax(document, flight.requirement, flight.height, most),),
         cause=bool(causes),
     )
@@ -100,7 +98,7 @@ def _grip(
     floors = [e for e in model.effects if e.family == "ground" and "mu" in e.parameters()]
     if not floors or all(float(e.value("mu")) > 0 for e in floors):
         return
-    if way < 0.01:
+    if way < Checks.current().forward:
         return
     where = place(document, last[0].location)
     yield Diagnostic(

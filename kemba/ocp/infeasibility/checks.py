@@ -1,6 +1,6 @@
 """Before solving: what can be said in milliseconds about a task that cannot be met.
 
-A certain finding refuses the task; the others are kept as hints for when solving fails.
+A certain diagnostic refuses the task; the others become hints if solving fails.
 """
 
 from __future__ import annotations
@@ -23,17 +23,16 @@ from kemba.ocp.infeasibility.diagnostic import (
 )
 from kemba.ocp.infeasibility.flight import Flight, flight_of
 from kemba.ocp.infeasibility.pose import Gap, Poses
+from kemba.ocp.infeasibility.settings import Checks
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
 from kemba.quantity import Quantity
-
-LONGEST_STEP = 0.05  # s; with longer ones a valve cannot be timed within a push
 
 
 def check_task(
     task: Task, model: Model, requirements: Sequence[Requirement], document: Document
 ) -> list[Diagnostic]:
-    """Findings, certain ones first; after the first certain kind nothing more is looked for."""
+    """Diagnostics, certain ones first; after a certain kind no other kind is looked for."""
     found = list(contradictions(task, requirements, document))
     if found:
         return found
@@ -49,7 +48,7 @@ def check_task(
 def moments(
     task: Task, requirements: Sequence[Requirement]
 ) -> Iterator[tuple[str, list[Requirement]]]:
-    """The requirements that hold at each moment (those that hold throughout included), and its name."""
+    """Every moment by name, with the requirements that hold at it or throughout."""
     always = [w for w in requirements if w.at is None]
     timed = sorted((w for w in requirements if w.at is not None), key=lambda w: w.node(task.nodes))
     for node, group in groupby(timed, key=lambda w: w.node(task.nodes)):
@@ -62,8 +61,7 @@ def moments(
 def contradictions(
     task: Task, requirements: Sequence[Requirement], document: Document
 ) -> Iterator[Diagnostic]:
-    """Two requirements on one quantity, or a requirement and the quantity's own range, that exclude each
-    other."""
+    """Two requirements on one quantity that exclude each other, or one outside its range."""
     told: set[tuple[Location, Location]] = set()
     for when, here in moments(task, requirements):
         for name in dict.fromkeys(w.quantity.name for w in here):
@@ -108,7 +106,7 @@ def _against_range(requirement: Requirement, q: Quantity, document: Document) ->
 def impossible_poses(
     task: Task, poses: Poses, requirements: Sequence[Requirement], document: Document
 ) -> Iterator[Diagnostic]:
-    """Moments at which no pose and no rates meet all requirements: reach, ground, stops, geometry."""
+    """Moments at which no pose and no rates of the robot meet all requirements."""
     for when, here in moments(task, requirements):
         together = poses.gaps(here, here)
         if together == []:
@@ -126,7 +124,7 @@ def impossible_poses(
 
 
 def _smallest(poses: Poses, here: Sequence[Requirement]) -> list[Gap]:
-    """The one line of the task that helps if it gives way alone, by the least; [] if none does."""
+    """How the one line of the task gives way that must give way least; [] if none helps."""
     best: list[Gap] = []
     for location in dict.fromkeys(w.location for w in here if w.at is not None):
         gaps = poses.gaps(here, [w for w in here if w.location == location])
@@ -140,7 +138,7 @@ def _size(gaps: Sequence[Gap]) -> float:
 
 
 def _reason(gaps: Sequence[Gap]) -> str:
-    """What stands in the way, where one requirement tells it."""
+    """What prevents it, as far as the requirement shows."""
     if any(g.requirement.quantity.name.endswith("foot/z") and g.asked < -1e-6 for g in gaps):
         return "; the ground is at 0 m"
     return " with the other requirements kept"
@@ -148,12 +146,13 @@ def _reason(gaps: Sequence[Gap]) -> str:
 
 def coarse_grid(task: Task, flight: Flight | None, document: Document) -> Iterator[Diagnostic]:
     """Steps too long to time a push."""
-    if flight is None or task.step <= LONGEST_STEP:
+    longest = Checks.current().longest_step
+    if flight is None or task.step <= longest:
         return
-    enough = int(-(-task.duration // LONGEST_STEP))
+    enough = int(-(-task.duration // longest))
     sentence = (
         f"{key('nodes', document)}: {task.nodes} over {task.duration:g} s make steps of "
         f"{1e3 * task.step:.0f} ms; a push by air needs steps of at most "
-        f"{1e3 * LONGEST_STEP:.0f} ms, so at least {enough} nodes"
+        f"{1e3 * longest:.0f} ms, so at least {enough} nodes"
     )
     yield Diagnostic(sentence, True)

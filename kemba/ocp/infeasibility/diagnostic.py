@@ -38,8 +38,11 @@ class Relax:
 
 @dataclass(frozen=True)
 class Diagnostic:
-    """What a check found. `certain`: no plan can exist, nothing need be solved. `cause`: it names
-    something else than the requirement that fails."""
+    """What a check found.
+
+    `certain`: no plan can exist, so that nothing is solved. `cause`: it names the cause, which is
+    not the requirement that fails.
+    """
 
     sentence: str
     certain: bool

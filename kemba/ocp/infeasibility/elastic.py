@@ -1,54 +1,39 @@
-"""The same program with requirements that may give way at an l1 cost; the physics stays hard."""
+"""The same program with requirements that may give way at an l1 cost; the physics must hold."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
 
 from kemba.model import Model
-from kemba.ocp.infeasibility.pose import SCALE
-from kemba.ocp.nlp.blocks import Block
-from kemba.ocp.nlp.ipopt import Ipopt, Iterate, Parameters
+from kemba.ocp.functions.blocks import Block
+from kemba.ocp.infeasibility.settings import ElasticSolve
+from kemba.ocp.nlp.ending import Ending
+from kemba.ocp.nlp.ipopt import Iterate, warm
 from kemba.ocp.relaxation.guess import automatic_guess
-from kemba.ocp.relaxation.schedule import (
-    LOOSE,
-    SWITCHING,
-    VALVE,
-    Schedule,
-    Stopped,
-    fix,
-    tighten,
-    warm,
-)
+from kemba.ocp.relaxation.schedule import fix, interior, tighten
+from kemba.ocp.relaxation.session import Schedule, Session, Stopped
+from kemba.ocp.relaxation.settings import Ends, Relaxation, Starts
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
+from kemba.ocp.transcription.parameters import Parameters
 from kemba.ocp.transcription.stage import Rows
 from kemba.ocp.transcription.symmetry import Reduction
 from kemba.ocp.transcription.transcribe import RequirementBlock, Transcription
 
-if TYPE_CHECKING:
-    from kemba.ocp.planner import Planner
-
-BUDGET = 30.0  # s
-NODES = 40  # a coarser grid is enough to say what is too much
-ITERATIONS = 500
-PRICE = 100.0  # of one unit of scaled slack, against a cost of 0.01 to 10
-SHORT = 0.05  # scaled slack (5 mm, 0.6 deg) from which a requirement counts as out of reach
-
-# Who gives way: goals first, as people would; then everything but the start, whose pose is judged
-# before solving.
+# What may give way: goals first; then everything but the start, which is checked before solving.
 TIERS = (("goals",), ("goals", "bounds", "end"))
 
 
 class Elastic(Transcription):
-    """Requirements of the sections `soft` have a pair of slack variables, shared by their nodes: how far
-    below and above what is asked the plan stays. They stand at the first node, in columns of Y
-    behind the layout's.
+    """A transcription whose requirements of the sections `soft` may give way.
+
+    Each of them has two slack variables, shared by all its nodes: how far the plan stays below and
+    above what is asked. They stand in row 0 of Y, in columns behind the layout's.
     """
 
     def __init__(
@@ -62,7 +47,8 @@ class Elastic(Transcription):
     ) -> None:
         self.soft = soft
         self.slack: list[tuple[Requirement, int, float]] = []  # requirement, first column, scale
-        cheap = {name: 0.01 * weight for name, weight in task.cost.items()}
+        factor = ElasticSolve.current().cheap
+        cheap = {name: factor * weight for name, weight in task.cost.items()}
         super().__init__(
             model, task.model_copy(update={"cost": cheap}), requirements, reduction, nodes
         )
@@ -83,7 +69,7 @@ class Elastic(Transcription):
         self, requirement: Requirement, g: ca.SX, where: list[int], index: np.ndarray
     ) -> RequirementBlock:
         """The rows of a requirement that may give way, at a price per unit of scaled slack."""
-        column, scale = self.layout.size + 2 * len(self.slack), requirement_scale(requirement)
+        column, scale = self.layout.size + 2 * len(self.slack), requirement.scale
         self.slack.append((requirement, column, scale))
         self.upper[0, column : column + 2] = np.inf
         below, above = ca.SX.sym("below"), ca.SX.sym("above")
@@ -98,28 +84,24 @@ class Elastic(Transcription):
         )
         shared = np.tile(index[0, column : column + 2], (len(where), 1))
         at = np.hstack([index[where, : self.layout.size], shared])
-        price = PRICE * (below + above) / len(where)
+        price = ElasticSolve.current().price * (below + above) / len(where)
         return Block(ca.vertcat(self.stage.y, below, above), rows.g, price, at), rows, where
 
     def start(self, Y: np.ndarray) -> np.ndarray:
         """A start guess with room for every requirement to give way."""
         wide = np.zeros(self.shape)
         wide[:, : self.layout.size] = Y
-        wide[0, self.layout.size :] = 0.1
+        wide[0, self.layout.size :] = ElasticSolve.current().room
         return wide
 
     def given(self, Y: np.ndarray) -> list[tuple[Requirement, float, float]]:
-        """Requirements that gave way: the requirement, by how much in its unit (above: positive), and scaled."""
+        """Every soft requirement: by how much it gave way, in its unit (above is positive) and
+        scaled."""
         found = []
         for requirement, column, scale in self.slack:
             by = float(Y[0, column + 1] - Y[0, column])
             found.append((requirement, by * scale, abs(by)))
         return found
-
-
-def requirement_scale(requirement: Requirement) -> float:
-    """What counts as one unit of slack."""
-    return SCALE.get(requirement.quantity.unit, requirement.quantity.scale)
 
 
 @dataclass(frozen=True)
@@ -136,57 +118,72 @@ class Outcome:
         return bool(self.given)
 
 
-def elastic(planner: Planner, reduction: Reduction) -> Outcome | None:
+def elastic(
+    model: Model,
+    task: Task,
+    requirements: Sequence[Requirement],
+    reduction: Reduction,
+    session: Session,
+) -> Outcome | None:
     """Solve the task with soft requirements on a coarse grid; None when even that failed.
 
     Raises Stopped when the user stopped it.
     """
-    deadline = min(planner.deadline, time.monotonic() + BUDGET)
-    sections = {str(w.location[0]) for w in planner.requirements}
+    deadline = min(session.control.deadline, time.monotonic() + ElasticSolve.current().budget)
+    limited = replace(session, control=replace(session.control, deadline=deadline))
+    sections = {str(w.location[0]) for w in requirements}
+    nodes = min(task.nodes, ElasticSolve.current().nodes)
     for soft in TIERS:
         if sections & set(soft):
-            outcome = _solve(planner, reduction, soft, deadline)
+            with session.building.running():
+                program = Elastic(model, task, requirements, reduction, nodes, soft)
+            outcome = _solve(program, limited)
             if outcome is not None:
                 return outcome
     return None
 
 
-def _solve(
-    planner: Planner, reduction: Reduction, soft: Sequence[str], deadline: float
-) -> Outcome | None:
+def _solve(program: Elastic, session: Session) -> Outcome | None:
     """The usual schedule; the last step that converged counts."""
-    task = planner.task
-    nodes = min(task.nodes, NODES)
-    with planner.building.running():
-        program = Elastic(planner.model, task, planner.requirements, reduction, nodes, soft)
-    options = {**task.solver.options, "max_iter": ITERATIONS}
-    ipopt = Ipopt(
-        program, options, planner.log, deadline, planner.watch, planner.stop, planner.building
-    )
-    search = Schedule(ipopt, task.solver.complementarity, planner.tell, planner.attempts)
-    quiet = [w for w in planner.requirements if w.location[0] not in soft]
+    options = {**program.task.solver.options, "max_iter": ElasticSolve.current().iterations}
+    schedule = session.schedule(program, options)
     converged: list[Iterate] = []
     try:
-        name = f"soft {' and '.join(soft)}: relax"
-        # the second guess keeps still, which is nearly feasible: far off the bounds it is not
-        for requirements, push in ((planner.requirements, 0.3), (quiet, 1e-3)):
-            interior = {"bound_push": push, "bound_frac": push, "mu_init": 0.1, "tol": 1e-3}
-            Y = automatic_guess(planner.model, task, requirements, program.layout, nodes)
-            start = Iterate(program.start(Y))
-            point = search.solve(name, start, Parameters(LOOSE), options=interior)
-            if point.solved:
-                converged.append(point)
-                break
-        else:
+        first = _first(schedule, program)
+        if first is None:
             return None
-        binary, name = Parameters(LOOSE, VALVE, SWITCHING), "its valves"
-        point = search.solve(name, converged[0], binary, options=warm(1e-3, tol=1e-3))
+        converged.append(first)
+        relaxation = Relaxation.current()
+        parameters = Parameters(relaxation.loose, relaxation.valve, relaxation.switching)
+        how = warm(Starts.current().changed_mu, tol=Ends.current().tol)
+        point = schedule.solve("its valves", first, parameters, options=how)
         converged.append(point)
-        converged.append(tighten(search, fix(search, point)))
+        converged.append(tighten(schedule, fix(schedule, point)))
     except Stopped as stop:
-        if stop.point.message == "User_Requested_Stop":
+        if stop.point.ending is Ending.INTERRUPTED:
             raise
     best = next((p for p in reversed(converged) if p.solved), None)
     if best is None:
         return None
-    return Outcome(program, best, tuple(g for g in program.given(best.Y) if g[2] > SHORT))
+    short = ElasticSolve.current().short
+    return Outcome(program, best, tuple(g for g in program.given(best.Y) if g[2] > short))
+
+
+def _first(schedule: Schedule, program: Elastic) -> Iterate | None:
+    """The program with relaxed pairs, from two guesses; None where neither converges.
+
+    The second guess keeps still, which is nearly feasible: far off the bounds it is not.
+    """
+    name = f"soft {' and '.join(program.soft)}: relax"
+    still = [w for w in program.requirements if w.location[0] not in program.soft]
+    starts = Starts.current()
+    guesses = ((program.requirements, starts.interior_push), (still, starts.changed))
+    for requirements, push in guesses:
+        Y = automatic_guess(
+            program.model, program.task, requirements, program.layout, program.nodes
+        )
+        start, loose = Iterate(program.start(Y)), Parameters(Relaxation.current().loose)
+        point = schedule.solve(name, start, loose, options=interior(push))
+        if point.solved:
+            return point
+    return None

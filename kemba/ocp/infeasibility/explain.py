@@ -1,4 +1,4 @@
-"""Why a task has no plan: what gave way, by how much, and the limits it ran into."""
+"""Why a task has no plan: what gave way, by how much, and which limits of the robot it reached."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ from kemba.ocp.transcription.solution import to_trajectory
 
 @dataclass(frozen=True)
 class Explanation:
-    """A sentence and the requirements to relax. `proven`: it stands whatever the solver said."""
+    """A sentence and the requirements to relax. `proven`: it holds whatever the solver
+    said."""
 
     sentence: str
     relax: tuple[Relax, ...]

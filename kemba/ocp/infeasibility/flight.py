@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import casadi as ca
 import numpy as np
 
-from kemba.mechanism import load_robot
 from kemba.model import Model
+from kemba.model.rest import at_rest
 from kemba.ocp.infeasibility.pose import Poses
 from kemba.ocp.task.requirement import Requirement
 
@@ -35,21 +34,21 @@ class Flight:
     def least_time(self, other: float, generous: bool) -> float:
         """Seconds between the apex and the height `other` [m], at least.
 
-        The ground only pushes, so the centre of mass never falls, nor slows while it rises, faster
-        than by `fall`. Generous: the legs' motion lends the body their swing, in height and time.
+        The ground only pushes: the centre of mass accelerates downwards by `fall` at most.
+        `generous`: the motion of the legs may add their swing to the body's height.
         """
         lent = self.swing if generous else 0.0
         way = max(self.height - other - lent, 0.0)
         return float(np.sqrt(2 * way / self.fall) - np.sqrt(2 * lent / self.fall))
 
     def most(self, other: float, span: float) -> float:
-        """The height [m] that `span` seconds from or to `other` allow, generously."""
+        """The greatest height [m] that `span` seconds from or to the height `other` allow."""
         lent = float(np.sqrt(2 * self.swing / self.fall))
         return other + self.swing + self.fall * (span + lent) ** 2 / 2
 
 
 def flight_of(model: Model, requirements: Sequence[Requirement], poses: Poses) -> Flight | None:
-    """The flight that the highest requirement on the body's height asks for, from a start at rest."""
+    """The flight to the greatest height that is required of the body, from a start at rest."""
     highest = [
         w for w in requirements if w.quantity.name == "body/z" and w.at and np.isfinite(w.lower)
     ]
@@ -59,7 +58,7 @@ def flight_of(model: Model, requirements: Sequence[Requirement], poses: Poses) -
     if not highest or not resting or not grounded:
         return None
     requirement = max(highest, key=lambda w: w.lower)
-    robot = load_robot(model.mechanism.name)
+    robot = model.mechanism.need_robot()
     leg = robot.leg.femur.length + robot.leg.tibia.length
     if requirement.lower <= leg:
         return None
@@ -80,14 +79,14 @@ def flight_of(model: Model, requirements: Sequence[Requirement], poses: Poses) -
 
 
 def leg_swing(model: Model) -> float:
-    """How much the legs can move the centre of mass, from one side of the hips to the other,
-    times the mass [kg.m]; at most."""
-    leg = load_robot(model.mechanism.name).leg
+    """How far moving legs can shift the centre of mass at most, times the mass [kg.m]."""
+    robot = model.mechanism.need_robot()
+    leg = robot.leg
     shank = leg.femur.length + leg.tibia.com
-    rod = leg.piston.mount + leg.piston.retracted + leg.piston.stroke
+    rod = leg.piston.mount + leg.piston.retracted + robot.stroke
     arms = leg.femur.mass * leg.femur.com + leg.tibia.mass * shank
     arms += leg.cylinder.mass * (leg.piston.mount + leg.cylinder.com) + leg.rod.mass * rod
-    return 2 * len(model.mechanism.legs) * arms
+    return 2 * len(robot.legs) * arms
 
 
 def inertia_and_weight(model: Model) -> tuple[float, float]:
@@ -95,12 +94,12 @@ def inertia_and_weight(model: Model) -> tuple[float, float]:
     node = model.node
     row = [c.name for c in model.mechanism.coordinates].index("body/z")
     q = np.array([model.mechanism.standing[c.name] for c in model.mechanism.coordinates])
-    still, zeros = np.zeros(len(q)), [0.0 * np.ones(x.numel()) for x in (node.s, node.lam, node.u)]
+    still, s = np.zeros(len(q)), np.array([x.value for x in model.states.values()])
+    sd, lam, u, p = (np.zeros(x.numel()) for x in (node.sd, node.lam, node.u, node.p))
 
     def force(a: float) -> float:
         up = a * (np.arange(len(q)) == row)
-        s, lam, u = zeros
-        found = node.residual(q, still, up, s, s, lam, u, np.zeros(node.p.numel()))
+        found = node.residual(q, still, up, s, sd, lam, u, p)
         return float(found[0][row])
 
     return abs(force(1.0) - force(0.0)), abs(force(0.0))
@@ -112,12 +111,8 @@ def air_work(model: Model) -> float:
     q = np.array([model.mechanism.standing[c.name] for c in model.mechanism.coordinates])
     v, lam = np.zeros(len(q)), np.zeros(node.lam.numel())
     u = np.array([float(symbol == "u_e") for _, symbol in model.inputs])
-    s = np.array([s.value for s in model.states.values()])
+    s = at_rest(model, q, u)
     p = np.zeros(node.p.numel())
-    if len(s):
-        rate = -node.residual(q, v, v, node.s, 0 * node.s, lam, u, p)[1]
-        settle = ca.integrator("settle", "cvodes", {"x": node.s, "ode": rate}, 0.0, 0.5)
-        s = np.array(settle(x0=s)["xf"]).ravel()
     measured = np.array(node.measure(q, v, v, s, 0 * s, lam, u, p)).ravel()
     forces = [
         value

@@ -1,4 +1,4 @@
-"""Which limits of the robot a plan leans on, in words."""
+"""Which limits of the robot a plan reaches, in words."""
 
 from __future__ import annotations
 
@@ -7,12 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from kemba.model import Model
+from kemba.ocp.infeasibility.settings import Leaning
 from kemba.ocp.task.task import Task
 from kemba.trajectory import Trajectory
-
-NEAR = 0.99  # of a limit counts as at it
-OFTEN = 0.3  # of the steps that a limit must hold to be told
-GRIP = 0.02  # of body weight; less normal force is no stance
 
 
 def active_limits(task: Task, model: Model, trajectory: Trajectory) -> list[str]:
@@ -30,7 +27,9 @@ def _stance(model: Model, trajectory: Trajectory) -> np.ndarray:
     """Steps (n,) in which some foot bears load, up to the highest point."""
     names = [f"{leg}/foot/Fz" for leg in model.mechanism.legs]
     load = np.array([trajectory[name] for name in names if name in trajectory]).sum(axis=0)
-    bears = np.broadcast_to(load > GRIP * model.mechanism.weight, len(trajectory)).copy()
+    bears = np.broadcast_to(
+        load > Leaning.current().grip * model.mechanism.weight, len(trajectory)
+    ).copy()
     bears[0] = False
     bears[int(np.argmax(trajectory["body/z"])) + 1 :] = False
     return np.asarray(bears)
@@ -41,7 +40,7 @@ def _legs(model: Model, holds: dict[str, bool]) -> str:
 
 
 def _valves(model: Model, trajectory: Trajectory) -> Iterator[str]:
-    stance = _stance(model, trajectory)
+    stance, leaning = _stance(model, trajectory), Leaning.current()
     if not stance.any():
         return
     for chamber in ("extend", "retract"):
@@ -51,8 +50,10 @@ def _valves(model: Model, trajectory: Trajectory) -> Iterator[str]:
             if f"{leg}/valve/{chamber}" in trajectory
         }
         word = "extension" if chamber == "extend" else "retraction"
-        open_ = _legs(model, {leg: x > 0.95 for leg, x in share.items()})
-        most = _legs(model, {leg: 0.6 < x <= 0.95 for leg, x in share.items()})
+        open_ = _legs(model, {leg: x > leaning.throughout for leg, x in share.items()})
+        most = _legs(
+            model, {leg: leaning.mostly < x <= leaning.throughout for leg, x in share.items()}
+        )
         if open_:
             yield f"{open_} {word} valves are open throughout the push"
         elif most and chamber == "extend":
@@ -60,14 +61,14 @@ def _valves(model: Model, trajectory: Trajectory) -> Iterator[str]:
 
 
 def _torques(model: Model, trajectory: Trajectory) -> Iterator[str]:
-    share: dict[str, float] = {}
+    leaning, share = Leaning.current(), dict[str, float]()
     peak = 0.0
     for (leg, _), quantity in model.inputs.items():
         if quantity.unit == "N.m" and leg is not None:
             peak = max(peak, quantity.upper)
-            at_peak = np.abs(trajectory[quantity.name][1:]) > 0.95 * quantity.upper
+            at_peak = np.abs(trajectory[quantity.name][1:]) > leaning.peak * quantity.upper
             share[leg] = float(np.mean(at_peak))
-    legs = _legs(model, {leg: x >= OFTEN for leg, x in share.items()})
+    legs = _legs(model, {leg: x >= leaning.often for leg, x in share.items()})
     if legs:
         most = f"{max(share.values()):.0%} of the steps"
         yield f"{legs} hip torque is at its peak of {peak:g} N.m (tau_peak) in {most}"
@@ -79,7 +80,8 @@ def _strokes(model: Model, trajectory: Trajectory) -> Iterator[str]:
         return
     full = {
         leg: bool(
-            trajectory[f"{leg}/piston/x"][: stance[-1] + 2].max() > NEAR * model.mechanism.stroke
+            trajectory[f"{leg}/piston/x"][: stance[-1] + 2].max()
+            > Leaning.current().near * model.mechanism.stroke
         )
         for leg in model.mechanism.legs
     }
@@ -88,22 +90,22 @@ def _strokes(model: Model, trajectory: Trajectory) -> Iterator[str]:
 
 
 def _grip(model: Model, trajectory: Trajectory) -> Iterator[str]:
-    slides = {}
+    slides, leaning = {}, Leaning.current()
     for leg in model.mechanism.legs:
         names = [f"{leg}/foot/{part}" for part in ("Fz", "slip")]
         if not all(name in trajectory for name in names):
             continue
         normal, slip = (trajectory[name][1:] for name in names)
-        bears = normal > GRIP * model.mechanism.weight
-        slides[leg] = bool(bears.any() and np.mean(slip[bears] > 0.02) > OFTEN)
+        bears = normal > leaning.grip * model.mechanism.weight
+        slides[leg] = bool(bears.any() and np.mean(slip[bears] > leaning.slides) > leaning.often)
     if any(slides.values()):
         yield f"{_legs(model, slides)} feet slip at the edge of the friction cone"
 
 
 def _steps(task: Task, trajectory: Trajectory) -> Iterator[str]:
-    h = np.diff(trajectory.time)
+    h, leaning = np.diff(trajectory.time), Leaning.current()
     nominal = task.duration / len(h)
     for side, word in ((1 + task.step_variation, "longest"), (1 - task.step_variation, "shortest")):
-        at = np.abs(h / nominal - side) < 0.02 * side
-        if task.step_variation > 0 and np.mean(at) > 0.8:
+        at = np.abs(h / nominal - side) < leaning.step * side
+        if task.step_variation > 0 and np.mean(at) > leaning.steps:
             yield f"the steps are at their {word} (`duration`, `step_variation`)"

@@ -11,25 +11,27 @@ import casadi as ca
 import numpy as np
 
 from kemba.model import Model
+from kemba.ocp.infeasibility.settings import PoseSearch
 from kemba.ocp.task.requirement import Requirement, quantity_expression
 
-TRIES = 4
-MET = 1e-5  # slack in SI units below which a requirement counts as met
-SCALE = {"m": 0.1, "rad": 0.2, "m.s-1": 1.0, "rad.s-1": 5.0}
-SILENT: dict[str, Any] = {
-    "print_time": False,
-    "error_on_fail": False,
-    "ipopt.print_level": 0,
-    "ipopt.sb": "yes",
-    "ipopt.tol": 1e-8,
-    "ipopt.max_iter": 150,
-    "ipopt.bound_relax_factor": 0.0,
-}
+
+def silent() -> dict[str, Any]:
+    """Options of IPOPT for a pose."""
+    settings = PoseSearch.current()
+    return {
+        "print_time": False,
+        "error_on_fail": False,
+        "ipopt.print_level": 0,
+        "ipopt.sb": "yes",
+        "ipopt.tol": settings.tol,
+        "ipopt.max_iter": settings.iterations,
+        "ipopt.bound_relax_factor": 0.0,
+    }
 
 
 @dataclass(frozen=True)
 class Gap:
-    """A requirement and the value nearest to it that a pose can have while the other requirements hold."""
+    """A requirement, and the nearest value that a pose reaches while the others hold."""
 
     requirement: Requirement
     asked: float
@@ -46,8 +48,8 @@ class Poses:
         node = model.node
         others = ca.vertcat(node.a, node.s, node.sd, node.lam, node.u)
         self.expressions: dict[str, ca.SX] = {}
-        self.units = {w.quantity.name: w.quantity.unit for w in requirements}
-        for name in self.units:
+        self.scales = {w.quantity.name: w.scale for w in requirements}
+        for name in self.scales:
             expression = quantity_expression(model, name)
             if not ca.depends_on(expression, others):
                 self.expressions[name] = expression
@@ -55,7 +57,7 @@ class Poses:
 
     @cached_property
     def walls(self) -> ca.SX:
-        """What is never negative in any pose: gaps of the feet, way left to the end stops."""
+        """Expressions that no pose makes negative: gaps of feet, distances to the end stops."""
         node = self.model.node
         others = ca.vertcat(node.v, node.a, node.s, node.sd, node.lam, node.u)
         rows = ca.vertsplit(ca.vertcat(node.pair_a, node.pair_b))
@@ -66,14 +68,15 @@ class Poses:
         node, n = self.model.node, len(self.names)
         below, above, weight = ca.SX.sym("below", n), ca.SX.sym("above", n), ca.SX.sym("w", n + 1)
         height = quantity_expression(self.model, "body/z")
+        still = PoseSearch.current().still
         aims = ca.vertcat(*self.expressions.values())
         nlp = {
             "x": ca.vertcat(node.q, node.v, below, above),
             "p": weight,
-            "f": ca.dot(weight[:n], below + above) - weight[n] * height + 1e-6 * ca.sumsqr(node.v),
+            "f": ca.dot(weight[:n], below + above) - weight[n] * height + still * ca.sumsqr(node.v),
             "g": ca.vertcat(aims + below - above, self.walls),
         }
-        return ca.nlpsol("pose", "ipopt", nlp, SILENT)
+        return ca.nlpsol("pose", "ipopt", nlp, silent())
 
     def gaps(
         self, requirements: Sequence[Requirement], free: Iterable[Requirement]
@@ -84,19 +87,21 @@ class Poses:
         """
         may = {w.quantity.name for w in free}
         best: tuple[np.ndarray, np.ndarray] | None = None
-        for attempt in range(TRIES):
+        for attempt in range(PoseSearch.current().tries):
             found = self._solve(requirements, may, attempt)
             if found is not None:
                 slack = found[1]
                 if best is None or np.abs(slack).sum() < np.abs(best[1]).sum():
                     best = found
-                if np.abs(slack).max(initial=0.0) < MET:
+                if np.abs(slack).max(initial=0.0) < PoseSearch.current().met:
                     return []
         return None if best is None else self._told(best[1], requirements)
 
     def highest(self, requirements: Sequence[Requirement]) -> float | None:
         """The largest height of the body [m] in any pose in which `requirements` hold."""
-        found = [self._solve(requirements, set(), k, lift=1.0) for k in range(TRIES)]
+        found = [
+            self._solve(requirements, set(), k, lift=1.0) for k in range(PoseSearch.current().tries)
+        ]
         names = [c.name for c in self.model.mechanism.coordinates]
         heights = [float(f[0][names.index("body/z")]) for f in found if f is not None]
         return max(heights) if heights else None
@@ -118,7 +123,7 @@ class Poses:
         boxes = [*mechanism.coordinates, *mechanism.velocities]
         low, high = np.array([q.lower for q in boxes]), np.array([q.upper for q in boxes])
         room = np.array([10.0 * (name in may) for name in self.names])
-        weight = [1.0 / SCALE.get(self.units[name], 1.0) for name in self.names]
+        weight = [1.0 / self.scales[name] for name in self.names]
         found = self._solver(
             x0=np.concatenate([np.clip(self._start(attempt), low, high), np.full(2 * n, 0.01)]),
             p=[*weight, lift],
@@ -137,13 +142,14 @@ class Poses:
         """The standing pose at rest, then others around it."""
         mechanism, rng = self.model.mechanism, np.random.default_rng(attempt)
         q = np.array([mechanism.standing[c.name] for c in mechanism.coordinates])
-        away = rng.normal(size=len(q)) * [3 * c.scale for c in mechanism.coordinates]
+        spread = PoseSearch.current().spread
+        away = rng.normal(size=len(q)) * [spread * c.scale for c in mechanism.coordinates]
         return np.concatenate([q + away * (attempt > 0), np.zeros(len(q))])
 
     def _told(self, slack: np.ndarray, requirements: Sequence[Requirement]) -> list[Gap]:
         gaps = []
         for i, name in enumerate(self.names):
-            if abs(slack[i]) < MET:
+            if abs(slack[i]) < PoseSearch.current().met:
                 continue
             same = [w for w in requirements if w.quantity.name == name]
             if slack[i] > 0:

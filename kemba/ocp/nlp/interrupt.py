@@ -1,4 +1,4 @@
-"""Ctrl-C as a request to stop: the first ends the work in order, the second at once."""
+"""Ctrl-C as a request to stop: the first ends the work and keeps its result, the second quits."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ SHOW_CURSOR = "\x1b[?25h"
 
 
 class Interrupt:
-    """While it stands, SIGINT only sets a flag that solvers look at between iterations.
+    """A context in which SIGINT only sets a flag, which solvers read after every iteration.
 
-    Call it to ask whether to stop. `tell` hears of the first Ctrl-C; the second ends the process
-    as if nobody had listened, since an exception would be lost inside a solver's callback.
-    Outside the main thread it changes nothing.
+    Calling it tells whether to stop. `tell` gets a message at the first Ctrl-C. The second one
+    ends the process by the default handler: an exception would be lost in a solver's callback.
+    Outside the main thread the context changes nothing.
     """
 
     def __init__(self, tell: Callable[[str], None] = lambda text: None) -> None:

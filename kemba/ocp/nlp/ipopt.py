@@ -1,4 +1,4 @@
-"""IPOPT on a transcription: options checked, its text in a log file, warm starts, a time limit."""
+"""The one wrapper of IPOPT: start, bounds, options, limits, its text in a log file."""
 
 from __future__ import annotations
 
@@ -7,251 +7,189 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import casadi as ca
 import numpy as np
 
-from kemba.ocp.nlp.blocks import BlockProblem
-from kemba.ocp.nlp.proximal import Proximal
-from kemba.ocp.nlp.regularised import regularised_hessian
-from kemba.ocp.nlp.stagnation import GAVE_UP, Stagnation
-from kemba.ocp.transcription.transcribe import Transcription
+from kemba.ocp.functions.blocks import BlockProblem
+from kemba.ocp.functions.proximal import Proximal
+from kemba.ocp.functions.regularised import regularised_hessian
+from kemba.ocp.functions.settings import Newton
+from kemba.ocp.nlp.ending import Ending
+from kemba.ocp.nlp.program import Program
+from kemba.ocp.nlp.stagnation import Stagnation
+from kemba.ocp.nlp.watcher import Watch, Watcher
 from kemba.stopwatch import Stopwatch
 
-SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
+Bounds = tuple[np.ndarray, np.ndarray]  # lower and upper, in the shape of the program's
 
 
 @dataclass(frozen=True)
 class Iterate:
-    """A primal-dual iterate: Y (nodes + 1, n), multipliers of bounds and rows, and how it ended."""
+    """A primal-dual iterate and how its solve ended.
+
+    `Y`: variables in the shape of the program's bounds; `lam_x`, `lam_g`: multipliers of bounds
+    and rows; `ending`: None for a start that was not solved yet.
+    """
 
     Y: np.ndarray
     lam_x: np.ndarray | None = None
     lam_g: np.ndarray | None = None
     objective: float = np.nan
-    message: str = ""
+    ending: Ending | None = None
     iterations: int = 0
 
     @property
     def solved(self) -> bool:
-        """Whether IPOPT says it converged."""
-        return self.message in SOLVED
+        """Whether the solver converged."""
+        return self.ending is not None and self.ending.good
 
 
 @dataclass(frozen=True)
-class Parameters:
-    """What a step of a schedule sets: pair relaxation, the weights of valve penalty and switching
-    (per node of the grid's mean), of the pair penalty (per pair), of squared scaled forces, and of
-    the way from the start (half its square in scaled variables)."""
+class Control:
+    """What ends a solve early and who hears of it.
 
-    eps: float
-    valve: float = 0.0
-    switching: float = 0.0
-    pairs: float = 0.0
-    forces: float = 0.0
-    anchor: float = 0.0
+    `deadline` in time.monotonic(); `stop` is asked and `watch` told after every iteration; `log`
+    collects IPOPT's text.
+    """
 
-    def vector(self, nodes: int) -> list[float]:
-        """The program's parameters on a grid of `nodes`."""
-        return [self.eps, self.valve / nodes, self.switching / nodes, self.pairs, self.forces]
+    deadline: float = np.inf
+    log: Path | None = None
+    watch: Watch | None = None
+    stop: Callable[[], bool] | None = None
 
+    def ended(self) -> Ending | None:
+        """How a solve ends that would begin now; None where it may begin."""
+        if self.stop is not None and self.stop():
+            return Ending.INTERRUPTED
+        return Ending.TIME_LIMIT if self.deadline <= time.monotonic() else None
 
-Watch = Callable[[int, float, float], None]  # iteration, objective, worst scaled violation
-
-
-class Watched(Protocol):
-    """A program whose rows and their bounds a watcher may ask for."""
-
-    @property
-    def problem(self) -> BlockProblem: ...
-    @property
-    def g_lower(self) -> np.ndarray: ...
-    @property
-    def g_upper(self) -> np.ndarray: ...
+    def options(self) -> dict[str, Any]:
+        """The limits as options of IPOPT."""
+        options: dict[str, Any] = {}
+        remaining = self.deadline - time.monotonic()
+        if np.isfinite(remaining):
+            options["max_wall_time"] = max(remaining, 1e-3)
+        if self.log is not None:
+            options |= {"output_file": str(self.log), "file_print_level": 5, "file_append": "yes"}
+        return options
 
 
-class Watcher(ca.Callback):
-    """Tells `watch` about every iteration, and asks `stop` and `patience` whether to go on."""
-
-    def __init__(
-        self,
-        program: Watched,
-        watch: Watch | None,
-        stop: Callable[[], bool] | None,
-        patience: Stagnation | None,
-        parameters: int | None = None,
-    ) -> None:
-        super().__init__()
-        self.t, self.watch, self.stop, self.patience = program, watch, stop, patience
-        self.count = 0
-        self.parameters = program.problem.p.numel() if parameters is None else parameters
-        self.construct("watcher", {})
-
-    def get_n_in(self) -> int:
-        return int(ca.nlpsol_n_out())
-
-    def get_n_out(self) -> int:
-        return 1
-
-    def get_name_in(self, i: int) -> str:
-        return str(ca.nlpsol_out(i))
-
-    def get_sparsity_in(self, i: int) -> ca.Sparsity:
-        rows = {"x": self.t.problem.size, "lam_x": self.t.problem.size, "f": 1}
-        rows |= {"g": self.t.problem.rows, "lam_g": self.t.problem.rows}
-        return ca.Sparsity.dense(rows.get(ca.nlpsol_out(i), self.parameters))
-
-    def eval(self, arguments: Sequence[ca.DM]) -> list[int]:
-        if self.watch is not None or self.patience is not None:
-            g = np.asarray(arguments[2]).ravel()
-            over = np.maximum(self.t.g_lower - g, g - self.t.g_upper)
-            violation = float(over.max(initial=0.0))
-            if self.watch is not None:
-                self.watch(self.count, float(arguments[1]), violation)
-            if self.patience is not None:
-                self.patience.hear(self.count, violation)
-        self.count += 1
-        lost = self.patience is not None and self.patience.lost
-        return [int(lost or (self.stop is not None and self.stop()))]
+def common() -> dict[str, Any]:
+    """IPOPT options of every solve."""
+    return {
+        "print_level": 0,
+        "sb": "yes",
+        "nlp_scaling_method": "none",
+        "mu_strategy": "monotone",
+        "mumps_mem_percent": Newton.current().memory,
+    }
 
 
-COMMON: dict[str, Any] = {
-    "print_level": 0,
-    "sb": "yes",
-    "nlp_scaling_method": "none",
-    "mu_strategy": "monotone",
-    # By default MUMPS asks for eleven times what it expects to need, and the system hands out and
-    # takes back pages at every factorisation. Where twice as much is too little it asks again.
-    "mumps_mem_percent": 100,
-}
-
-WARM: dict[str, Any] = {
-    "warm_start_init_point": "yes",
-    "warm_start_bound_push": 1e-6,
-    "warm_start_bound_frac": 1e-6,
-    "warm_start_slack_bound_push": 1e-6,
-    "warm_start_slack_bound_frac": 1e-6,
-    "warm_start_mult_bound_push": 1e-6,
-}
+def warm(mu: float, push: float | None = None, **more: Any) -> dict[str, Any]:
+    """IPOPT options of a warm start at barrier parameter `mu`, `push` off the bounds."""
+    push = Newton.current().warm_push if push is None else push
+    names = ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac", "mult_bound_push")
+    pushed = {f"warm_start_{name}": push for name in names}
+    return {"warm_start_init_point": "yes", **pushed, "mu_init": mu, **more}
 
 
 class Ipopt:
-    """Solves a transcription, again and again with other parameters, bounds and options.
+    """Solves a program, again and again with other parameters, bounds and options.
 
-    `options` go to IPOPT every time; `log` collects its text; `deadline` is in time.monotonic();
-    `building` counts the making of what IPOPT evaluates.
+    `options` go to IPOPT every time; `building` counts the making of what IPOPT evaluates.
     """
 
     def __init__(
         self,
-        transcription: Transcription,
+        program: Program,
         options: Mapping[str, Any] | None = None,
-        log: Path | None = None,
-        deadline: float = np.inf,
-        watch: Watch | None = None,
-        stop: Callable[[], bool] | None = None,
+        control: Control | None = None,
         building: Stopwatch | None = None,
     ) -> None:
-        self.transcription, self.options = transcription, dict(options or {})
-        self.log, self.deadline, self.watch, self.stop = log, deadline, watch, stop
-        self.building, self.iterations = building or Stopwatch(), 0
-        self._damped: dict[BlockProblem | Proximal, ca.Function] = {}
+        self.program, self.options = program, dict(options or {})
+        self.control, self.building = control or Control(), building or Stopwatch()
+        self._regularised: dict[BlockProblem | Proximal, ca.Function] = {}
 
     def solve(
         self,
         start: Iterate,
-        parameters: Parameters,
+        p: Sequence[float] = (),
         options: Mapping[str, Any] | None = None,
-        fixed: Mapping[int, np.ndarray] | None = None,
-        free: Mapping[int, tuple[np.ndarray, np.ndarray]] | None = None,
-        patience: Stagnation | None = None,
+        bounds: Bounds | None = None,
+        proximal: float = 0.0,
+        stagnation: Stagnation | None = None,
+        regularised: bool = False,
     ) -> Iterate:
-        """One solve from `start`; `fixed` maps columns of Y to values (nodes + 1,) they keep,
-        `free` to bounds that hold as well. Where `patience` is lost its message is GAVE_UP."""
-        t = self.transcription
-        remaining = self.deadline - time.monotonic()
-        if self.stop is not None and self.stop():
-            return replace(start, message="User_Requested_Stop", iterations=0)
-        if remaining <= 0:
-            return replace(start, message="Maximum_CpuTime_Exceeded", iterations=0)
-        lower, upper = t.lower.copy(), t.upper.copy()
-        for column, values in (fixed or {}).items():
-            lower[1:, column] = upper[1:, column] = values[1:]
-        for column, (low, high) in (free or {}).items():
-            lower[1:, column] = np.maximum(lower[1:, column], low[1:])
-            upper[1:, column] = np.minimum(upper[1:, column], high[1:])
-        own = {**COMMON, **self.options, **(options or {})}
-        if np.isfinite(remaining):
-            own["max_wall_time"] = remaining
-        if self.log is not None:
-            own |= {"output_file": str(self.log), "file_print_level": 5, "file_append": "yes"}
+        """One solve from `start` with the program's parameters `p`.
+
+        `bounds` replace the program's own on the variables; `proximal` is the weight of half the
+        squared distance from the start, in the cost; where `stagnation` is found the ending is
+        GAVE_UP; `regularised` Newton steps have a multiple of the identity in the Hessian.
+        """
+        ended = self.control.ended()
+        if ended is not None:
+            return replace(start, ending=ended, iterations=0)
+        program = self.program
+        lower, upper = bounds or (program.lower, program.upper)
+        own = {**common(), **self.options, **(options or {}), **self.control.options()}
         with self.building.running():
-            problem, p = self._posed(parameters, start)
-            plugin = self._plugin(problem, self._newton(problem, parameters), own)
-            if any(listener is not None for listener in (self.watch, self.stop, patience)):
-                watcher = Watcher(t, self.watch, self.stop, patience, len(p))
+            problem: BlockProblem | Proximal = self._proximal if proximal else program.problem
+            parameters = [*p, proximal, *start.Y.ravel()] if proximal else list(p)
+            hessian = self._regularised_hessian(problem) if regularised else problem.hess_lag
+            plugin = _plugin(problem, hessian, own)
+            if watcher := self._watcher(stagnation, len(parameters)):
                 plugin["iteration_callback"] = watcher
             solver = ca.nlpsol("solver", "ipopt", problem.nlp, plugin)
         arguments: dict[str, Any] = {
             "x0": np.clip(start.Y, lower, upper).ravel(),
-            "p": p,
+            "p": parameters,
             "lbx": lower.ravel(),
             "ubx": upper.ravel(),
-            "lbg": t.g_lower,
-            "ubg": t.g_upper,
+            "lbg": program.g_lower,
+            "ubg": program.g_upper,
         }
         if start.lam_g is not None and own.get("warm_start_init_point") == "yes":
             arguments |= {"lam_x0": start.lam_x, "lam_g0": start.lam_g}
-        found = solver(**arguments)
-        stats = solver.stats()
-        self.iterations += int(stats["iter_count"])
+        found, stats = solver(**arguments), solver.stats()
+        gave_up = stagnation is not None and stagnation.found
         return Iterate(
-            Y=np.array(found["x"]).reshape(t.shape),
+            Y=np.array(found["x"]).reshape(lower.shape),
             lam_x=np.array(found["lam_x"]).ravel(),
             lam_g=np.array(found["lam_g"]).ravel(),
             objective=float(found["f"]),
-            message=GAVE_UP if patience and patience.lost else str(stats["return_status"]),
+            ending=Ending.GAVE_UP if gave_up else Ending.of_ipopt(str(stats["return_status"])),
             iterations=int(stats["iter_count"]),
         )
 
-    def _posed(
-        self, parameters: Parameters, start: Iterate
-    ) -> tuple[BlockProblem | Proximal, list[float]]:
-        """The problem, anchored where asked, and its parameters."""
-        problem, p = self.transcription.problem, parameters.vector(self.transcription.nodes)
-        if not parameters.anchor:
-            return problem, p
-        return self._anchored, [*p, parameters.anchor, *start.Y.ravel()]
-
     @cached_property
-    def _anchored(self) -> Proximal:
-        return Proximal(self.transcription.problem)
+    def _proximal(self) -> Proximal:
+        return Proximal(self.program.problem)
 
-    def _newton(self, problem: BlockProblem | Proximal, parameters: Parameters) -> ca.Function:
-        """The Hessian that Newton steps are made with: damped on a whole robot with relaxed pairs.
+    def _regularised_hessian(self, problem: BlockProblem | Proximal) -> ca.Function:
+        if problem not in self._regularised:
+            self._regularised[problem] = regularised_hessian(problem.hess_lag)
+        return self._regularised[problem]
 
-        Half a robot is as quick without. The paper's penalty on pairs stays as it is, for it is
-        there to be compared with.
-        """
-        stage, half = self.transcription.stage, self.transcription.reduction.symmetric
-        if half or parameters.pairs or not any(r.kind == "pair" for r in stage.rows):
-            return problem.hess_lag
-        if problem not in self._damped:
-            self._damped[problem] = regularised_hessian(problem.hess_lag)
-        return self._damped[problem]
+    def _watcher(self, stagnation: Stagnation | None, parameters: int) -> Watcher | None:
+        """The callback, where anybody wants to hear of iterations."""
+        watch, stop = self.control.watch, self.control.stop
+        if watch is None and stop is None and stagnation is None:
+            return None
+        return Watcher(self.program, watch, stop, stagnation, parameters)
 
-    @staticmethod
-    def _plugin(
-        problem: BlockProblem | Proximal, hessian: ca.Function, options: Mapping[str, Any]
-    ) -> dict[str, Any]:
-        return {
-            "print_time": False,
-            "error_on_fail": False,
-            "grad_f": problem.grad_f,
-            "jac_g": problem.jac_g,
-            "hess_lag": hessian,
-            "calc_lam_p": False,
-            "no_nlp_grad": True,
-            **{f"ipopt.{name}": value for name, value in options.items()},
-        }
+
+def _plugin(
+    problem: BlockProblem | Proximal, hessian: ca.Function, options: Mapping[str, Any]
+) -> dict[str, Any]:
+    return {
+        "print_time": False,
+        "error_on_fail": False,
+        "grad_f": problem.grad_f,
+        "jac_g": problem.jac_g,
+        "hess_lag": hessian,
+        "calc_lam_p": False,
+        "no_nlp_grad": True,
+        **{f"ipopt.{name}": value for name, value in options.items()},
+    }

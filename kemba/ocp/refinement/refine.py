@@ -2,28 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from kemba.model import Model
 from kemba.ocp.certificate.certify import Certificate
-from kemba.ocp.nlp.ipopt import SOLVED, Watch
-from kemba.ocp.nlp.stagnation import GAVE_UP
-from kemba.ocp.refinement.independent import Independent
-from kemba.ocp.refinement.mode_constraints import add_mode_constraints
-from kemba.ocp.refinement.modes import Phase, read_phases
-from kemba.ocp.refinement.program import Program
-from kemba.ocp.refinement.radau import RADAU3, RADAU5, STATE, Scheme
-from kemba.ocp.refinement.repair import FITS, misfit, repaired, simplified
-from kemba.ocp.refinement.requirements import add_requirements
+from kemba.ocp.nlp.ending import Ending
+from kemba.ocp.nlp.ipopt import Control, Iterate
+from kemba.ocp.phases.independent import Independent
+from kemba.ocp.phases.mode_constraints import add_mode_constraints
+from kemba.ocp.phases.modes import Phase, read_phases
+from kemba.ocp.phases.program import PhaseProgram
+from kemba.ocp.phases.radau import RADAU3, RADAU5, STATE, Scheme
+from kemba.ocp.phases.requirements import add_requirements
+from kemba.ocp.phases.settings import Elements, Refining, Repair
+from kemba.ocp.phases.unilateral import read_constraints
+from kemba.ocp.refinement.repair import misfit, repaired, simplified
 from kemba.ocp.refinement.sample import certificate, to_trajectory
-from kemba.ocp.refinement.solve import STOPPED, Control, PhaseSolution, solve
+from kemba.ocp.refinement.solve import rough, solve, warm
 from kemba.ocp.refinement.start import carried, start_vector
-from kemba.ocp.refinement.unilateral import read_constraints
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.solution import arrays
@@ -35,34 +35,21 @@ from kemba.ocp.transcription.symmetry import (
 )
 from kemba.trajectory import Trajectory
 
-STOPS = (STOPPED, "Maximum_WallTime_Exceeded")
-MIRRORED = 1e-6  # scaled; a plan that differs less from its mirror image is solved by half
-PRICE = 1000.0  # of a rule giving way by its scale; cheaper, rules that could hold give way too
-# weights of staying near the start: without, short steps of free duration wander off
-NEAR, NEAR_ELASTIC, NEAR_FINE = 10.0, 1.0, 1.0
-FAIR = 2.0  # times the nominal step; on longer elements two stages err, for lower costs
-ROUNDS = 6  # elastic solves of one reading
-ITERATIONS = {True: 300, False: 450}  # of all solves together, of half a robot and of a whole one
-WARM: dict[str, Any] = {"mu_init": 1e-4, "bound_push": 1e-6, "bound_frac": 1e-6}
-# the coarser scheme finds the way and which modes fit, the finer one makes it exact
-ROUGH = {**WARM, "max_iter": 60, "tol": 1e-3, "constr_viol_tol": 1e-6}
-NEAREST = {True: {**ROUGH, "max_iter": 50}, False: ROUGH}  # of half and whole robot
-ELASTIC = {**ROUGH, "max_iter": 100, "mu_init": 0.1}
-FINE = {**WARM, "max_iter": 60}
-
 
 @dataclass(frozen=True)
 class Refined:
-    """A plan on phases: its trajectory, what it violates, how IPOPT ended and how long it took.
+    """A plan on phases: its trajectory, what it violates, how the last solve ended, iterations.
 
-    `trajectory` and `certificate` are None where no program could be built or solved.
+    `trajectory` and `certificate` are None where no program could be built or solved; `reason`
+    says why a program could not be built.
     """
 
     trajectory: Trajectory | None
     certificate: Certificate | None
-    message: str
+    ending: Ending
     iterations: int
     phases: tuple[Phase, ...] = ()
+    reason: str = ""
 
     @property
     def solved(self) -> bool:
@@ -70,9 +57,14 @@ class Refined:
         return self.trajectory is not None
 
     @property
-    def stopped(self) -> bool:
-        """Whether the user ended it."""
-        return self.message == STOPPED
+    def done(self) -> bool:
+        """Whether nothing else is to be tried: it is solved or was cut short."""
+        return self.solved or self.ending.cut_short
+
+    @property
+    def sentence(self) -> str:
+        """How it ended, in words."""
+        return self.reason or self.ending.sentence
 
 
 def refine(
@@ -81,30 +73,23 @@ def refine(
     requirements: Sequence[Requirement],
     plan: Trajectory,
     reduction: Reduction | None = None,
-    deadline: float = np.inf,
-    log: Path | None = None,
-    watch: Watch | None = None,
-    stop: Callable[[], bool] | None = None,
+    control: Control | None = None,
 ) -> Refined:
-    """The plan with its modes kept, phase durations free, and events where they happen.
+    """The plan solved again with its modes kept and the durations of its phases free.
 
-    `reduction`: half or whole robot; by default the half where plan and task allow it. `deadline`
-    is in time.monotonic(). `log` collects IPOPT's text. `watch` hears every iteration, `stop` is
-    asked whether to end: the message then is IPOPT's for a user's stop.
+    `reduction`: half or whole robot; by default the half where plan and task allow it.
     """
     reduction = reduction or reduction_of(model, task, requirements, plan)
-    refiner = Refiner(
-        model, task, requirements, plan, reduction, Control(deadline, log, watch, stop)
-    )
+    refiner = Refiner(model, task, requirements, plan, reduction, control or Control())
     try:
         return refiner.run()
     except ValueError as error:
-        return Refined(None, None, f"the model {error}", 0)
+        return Refined(None, None, Ending.UNSUITABLE, 0, reason=f"the model {error}")
 
 
 @dataclass
 class Refiner:
-    """Readings of a plan's modes, each repaired where it does not fit, until one solves."""
+    """Reads the modes of a plan, solves, and repairs modes that do not fit, until one solves."""
 
     model: Model
     task: Task
@@ -113,7 +98,7 @@ class Refiner:
     reduction: Reduction
     control: Control
     iterations: int = 0
-    seen: list[list[Phase]] = field(default_factory=list)  # whose modes were put to the test
+    seen: list[list[Phase]] = field(default_factory=list)  # phases that were tried
 
     @property
     def marks(self) -> list[int]:
@@ -123,101 +108,110 @@ class Refiner:
     @property
     def left(self) -> int:
         """Iterations that may still be spent."""
-        return ITERATIONS[self.reduction.symmetric] - self.iterations
+        settings, half = Refining.current(), self.reduction.symmetric
+        most = settings.iterations_half if half else settings.iterations_whole
+        return most - self.iterations
 
     def run(self) -> Refined:
         """The first reading that solves, else how the last one ended."""
         constraints = read_constraints(self.model, self.reduction)
         inputs = self.reduction.restrict("u", arrays(self.model, self.plan)["u"])
         valves = np.round(inputs[:, _binary(self.model, self.reduction)])
-        found = Refined(None, None, GAVE_UP, 0)
+        found = Refined(None, None, Ending.GAVE_UP, 0)
         for trim in (False, True):
             phases = read_phases(self.model, constraints, self.plan, valves, self.marks, trim)
             if phases in self.seen:
                 break
             found = self.exact(phases, self.plan)
-            if not found.solved and found.message not in STOPS:
+            if not found.done:
                 found = self.repair(phases, found)
-            if found.solved or found.message in STOPS:
+            if found.done:
                 break
         return replace(found, iterations=self.iterations)
 
     def repair(self, phases: list[Phase], found: Refined) -> Refined:
         """The solution on phases repaired until their modes fit, else how the last try ended."""
         start = self.plan
-        for _ in range(ROUNDS):
+        for _ in range(Refining.current().rounds):
             if phases in self.seen or self.left <= 0:
                 break
             self.seen.append(phases)
-            program, rough = self.rough(phases, start)
-            if rough.message in STOPS:
-                return self._ended(program, rough.message)
-            if misfit(program, rough.x).max(initial=0.0) <= FITS:
-                found = self.finish(program, rough.x)
-                if found.solved or found.message in STOPS:
+            program, near = self.rough(phases, start)
+            ended = self._ended(program, near)
+            if ended.done:
+                return ended
+            if misfit(program, near.Y).max(initial=0.0) <= Repair.current().fits:
+                found = self.finish(program, near.Y)
+                if found.done:
                     break
-            better = repaired(program, rough.x, self.marks)
+            better = repaired(program, near.Y, self.marks)
             if better is None:
                 break
-            phases, start = better, to_trajectory(program, rough.x)
+            phases, start = better, to_trajectory(program, near.Y)
         return found
 
     def exact(self, phases: Sequence[Phase], start: Trajectory) -> Refined:
-        """The nearest solution on some phases by the coarser scheme, then the best by both."""
+        """The solution nearest to the plan by the coarser scheme, then the best one by both."""
         program, x = self.build(phases, start, RADAU3)
-        found = self._solve(program, program.anchor(x, NEAR), NEAREST[self.reduction.symmetric])
-        if found.message not in SOLVED:
-            return self._ended(program, found.message)
-        return self.simpler(program, found.x) or self.finish(program, found.x)
+        settings = Refining.current()
+        half = self.reduction.symmetric
+        iterations = settings.nearest_half if half else settings.rough_iterations
+        found = self._solve(program, program.proximal(x, settings.near), rough(iterations))
+        if not found.solved:
+            return self._ended(program, found)
+        return self.simpler(program, found.Y) or self.finish(program, found.Y)
 
-    def simpler(self, program: Program, x: np.ndarray) -> Refined | None:
+    def simpler(self, program: PhaseProgram, x: np.ndarray) -> Refined | None:
         """The solution without the phases that collapsed in x; None where it has none."""
         phases = simplified(program, x, self.marks)
         if phases is None or self.left <= 0:
             return None
         found = self.exact(phases, to_trajectory(program, x))
-        return found if found.solved or found.message in STOPS else None
+        return found if found.done else None
 
-    def finish(self, near: Program, x: np.ndarray) -> Refined:
+    def finish(self, near: PhaseProgram, x: np.ndarray) -> Refined:
         """From the nearest solution x by the coarser scheme to a good one, to an exact one."""
         program, start = self.build(near.phases, self.plan, RADAU3)
-        program.keep_short(x, FAIR)
-        best = self._solve(program, x[: len(start)], ROUGH)
-        found = self._ended(program, best.message)
-        if best.message in SOLVED:
-            simpler = self.simpler(program, best.x)
+        program.keep_short(x, Elements.current().fair)
+        best = self._solve(program, x[: len(start)], rough(Refining.current().rough_iterations))
+        found = self._ended(program, best)
+        if best.solved:
+            simpler = self.simpler(program, best.Y)
             if simpler is not None:
                 return simpler
-        for way in [best.x] * (best.message in SOLVED) + [x] * (best.message not in STOPS):
+        for way in [best.Y] * best.solved + [x] * (not found.done):
             found = self.fine(program, way)
-            if found.solved or found.message in STOPS:
+            if found.done:
                 break
         return found
 
-    def rough(self, phases: Sequence[Phase], start: Trajectory) -> tuple[Program, PhaseSolution]:
+    def rough(self, phases: Sequence[Phase], start: Trajectory) -> tuple[PhaseProgram, Iterate]:
         """The elastic program of the coarser scheme, solved."""
-        program, x = self.build(phases, start, RADAU3, PRICE)
-        x = program.loosened(program.anchor(x, NEAR_ELASTIC))
-        return program, self._solve(program, x, ELASTIC)
+        settings = Refining.current()
+        program, x = self.build(phases, start, RADAU3, settings.price)
+        x = program.loosened(program.proximal(x, settings.near_elastic))
+        options = {**rough(settings.elastic_iterations), "mu_init": settings.elastic_mu}
+        return program, self._solve(program, x, options)
 
-    def fine(self, rough: Program, x: np.ndarray) -> Refined:
+    def fine(self, coarser: PhaseProgram, x: np.ndarray) -> Refined:
         """The exact program of the finer scheme, from a solution x of the coarser one."""
-        program, _ = self.build(rough.phases, self.plan, RADAU5)
-        start = program.anchor(carried(program, rough, x), NEAR_FINE)
-        found = self._solve(program, start, FINE)
-        if found.message not in SOLVED:
-            return self._ended(program, found.message)
-        trajectory = to_trajectory(program, found.x)
-        measured = certificate(program, found.x, trajectory)
-        phases = tuple(program.phases)
-        return Refined(trajectory, measured, found.message, self.iterations, phases)
+        settings = Refining.current()
+        program, _ = self.build(coarser.phases, self.plan, RADAU5)
+        start = program.proximal(carried(program, coarser, x), settings.near_fine)
+        found = self._solve(program, start, warm(settings.rough_iterations))
+        ended = self._ended(program, found)
+        if not found.solved:
+            return ended
+        trajectory = to_trajectory(program, found.Y)
+        measured = certificate(program, found.Y, trajectory)
+        return replace(ended, trajectory=trajectory, certificate=measured)
 
     def build(
         self, phases: Sequence[Phase], start: Trajectory, scheme: Scheme, elastic: float = 0.0
-    ) -> tuple[Program, np.ndarray]:
+    ) -> tuple[PhaseProgram, np.ndarray]:
         """The program of some phases and its start. Raises ValueError for other models."""
         constraints = read_constraints(self.model, self.reduction)
-        program = Program(
+        program = PhaseProgram(
             self.model, self.task, self.reduction, phases, constraints, scheme, elastic
         )
         x = start_vector(program, start)
@@ -230,14 +224,15 @@ class Refiner:
         x = np.concatenate([x, np.zeros(program.columns.size - len(x))])
         return program, np.clip(x, program.lower, program.upper)
 
-    def _solve(self, program: Program, start: np.ndarray, options: dict[str, Any]) -> PhaseSolution:
+    def _solve(self, program: PhaseProgram, start: np.ndarray, options: dict[str, Any]) -> Iterate:
         options = {**options, "max_iter": max(0, min(options["max_iter"], self.left))}
         found = solve(program, start, options, self.control)
         self.iterations += found.iterations
         return found
 
-    def _ended(self, program: Program, message: str) -> Refined:
-        return Refined(None, None, message, self.iterations, tuple(program.phases))
+    def _ended(self, program: PhaseProgram, last: Iterate) -> Refined:
+        assert last.ending is not None
+        return Refined(None, None, last.ending, self.iterations, tuple(program.phases))
 
 
 def reduction_of(
@@ -247,10 +242,10 @@ def reduction_of(
     half = find_symmetry(model) if task.solver.symmetry else None
     if half is None or not requirements_are_symmetric(model, requirements):
         return whole(model.node)
-    x = arrays(model, plan)
+    x, mirrored = arrays(model, plan), Refining.current().mirrored
     for name, matrix in half.B.items():
         mean = half.expand(name, half.restrict(name, x[name]))
-        if matrix.size and np.abs(mean - x[name]).max() > MIRRORED * max(1.0, np.abs(mean).max()):
+        if matrix.size and np.abs(mean - x[name]).max() > mirrored * max(1.0, np.abs(mean).max()):
             return whole(model.node)
     return half
 

@@ -1,4 +1,4 @@
-"""Modes that do not fit, changed where an elastic program had to give way."""
+"""Modes that do not fit: they are changed where an elastic program had to give way."""
 
 from __future__ import annotations
 
@@ -7,16 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from kemba.ocp.refinement.modes import AHEAD, BACK, HELD, OPEN, Phase
-from kemba.ocp.refinement.program import SHORT, Program
-
-FITS = 3e-4  # scaled; modes that give way less fit
-MATTERS = 0.1  # of the worst
-SLIVER = 3  # elements; phases up to this long give way before longer ones
-COLLAPSED = 3.0  # times the shortest duration
+from kemba.ocp.phases.modes import AHEAD, BACK, HELD, OPEN, Phase
+from kemba.ocp.phases.program import PhaseProgram
+from kemba.ocp.phases.settings import Elements, Repair
 
 
-def misfit(program: Program, x: np.ndarray) -> np.ndarray:
+def misfit(program: PhaseProgram, x: np.ndarray) -> np.ndarray:
     """How far every constraint's mode gives way in every phase (phases, constraints), by the
     worst of its scaled rows."""
     found = np.zeros((len(program.phases), len(program.constraints)))
@@ -27,18 +23,19 @@ def misfit(program: Program, x: np.ndarray) -> np.ndarray:
     return found
 
 
-def repaired(program: Program, x: np.ndarray, marks: Sequence[int]) -> list[Phase] | None:
+def repaired(program: PhaseProgram, x: np.ndarray, marks: Sequence[int]) -> list[Phase] | None:
     """Phases with the modes changed where they fit worst; None where nothing is left to change.
 
     A phase that is short or has collapsed takes the modes of a neighbour; elsewhere the constraint
     that gives way most changes its mode.
     """
+    repair = Repair.current()
     blame = misfit(program, x)
     phases = list(program.phases)
     worst = blame.max(axis=1)
     touched: set[int] = set()
     for p in np.argsort(-worst):
-        if worst[p] <= max(FITS, MATTERS * worst.max()):
+        if worst[p] <= max(repair.fits, repair.matters * worst.max()):
             break
         short = _shortest_near(program, x, int(p))
         if touched & {int(p), short}:
@@ -55,10 +52,10 @@ def repaired(program: Program, x: np.ndarray, marks: Sequence[int]) -> list[Phas
     return None if found == merged(program.phases, marks) else found
 
 
-def simplified(program: Program, x: np.ndarray, marks: Sequence[int]) -> list[Phase] | None:
+def simplified(program: PhaseProgram, x: np.ndarray, marks: Sequence[int]) -> list[Phase] | None:
     """Phases without those that collapsed between two others; None where none did."""
     h = x[program.columns.h[:, 0]] * program.layout.scale[program.layout.slices["h"]][0]
-    least = COLLAPSED * SHORT * program.task.duration / program.nodes
+    least = _collapsed(program)
     phases = list(program.phases)
     for p in range(1, len(phases) - 1):
         around = (phases[p - 1].modes, phases[p + 1].modes)
@@ -81,17 +78,25 @@ def merged(phases: Sequence[Phase], marks: Sequence[int]) -> list[Phase]:
     return found
 
 
-def _shortest_near(program: Program, x: np.ndarray, p: int) -> int | None:
-    """The shortest of phase p and its neighbours that may give way: by the plan, then by x, where
-    the elastic program may have bent durations."""
+def _collapsed(program: PhaseProgram) -> float:
+    """Element duration [s] below which a phase has collapsed."""
+    shortest = Elements.current().shortest * program.task.duration / program.nodes
+    return Repair.current().collapsed * shortest
+
+
+def _shortest_near(program: PhaseProgram, x: np.ndarray, p: int) -> int | None:
+    """The shortest of phase p and its neighbours whose modes may be replaced, or None.
+
+    Shortest by its elements, then by its duration in x, which the elastic program may distort.
+    """
     h = x[program.columns.h[:, 0]] * program.layout.scale[program.layout.slices["h"]][0]
-    least = COLLAPSED * SHORT * program.task.duration / program.nodes
+    least = _collapsed(program)
     last = len(program.phases) - 1
     near = [
         k
         for k in (p - 1, p, p + 1)
         if 0 < k < last
-        and (program.phases[k].elements <= SLIVER or h[k] <= least)
+        and (program.phases[k].elements <= Repair.current().sliver or h[k] <= least)
         and _nearest_modes(program.phases, k) != program.phases[k].modes
     ]
     return min(near, key=lambda k: (program.phases[k].elements, h[k]), default=None)
@@ -108,8 +113,8 @@ def _nearest_modes(phases: Sequence[Phase], p: int) -> tuple[int, ...]:
     return min(sides, key=distance).modes
 
 
-def _changed(program: Program, x: np.ndarray, p: int, i: int) -> tuple[int, ...]:
-    """The modes of phase p with that of constraint i as its worst rule suggests."""
+def _changed(program: PhaseProgram, x: np.ndarray, p: int, i: int) -> tuple[int, ...]:
+    """The modes of phase p; constraint i gets the mode that its worst violation suggests."""
     worst, kind, sign = 0.0, "", 0
     for soft in program.soft:
         here = soft.phases == p

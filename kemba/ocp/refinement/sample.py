@@ -5,8 +5,9 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
-from kemba.ocp.certificate.certify import Certificate, Violation
-from kemba.ocp.refinement.program import Program
+from kemba.ocp.certificate.certify import Certificate, Violation, first_state
+from kemba.ocp.phases.program import PhaseProgram
+from kemba.ocp.phases.radau import STATE
 from kemba.ocp.transcription.layout import STEP
 from kemba.ocp.transcription.solution import arrays, written
 from kemba.trajectory import Trajectory
@@ -15,7 +16,7 @@ PHYSICS = ("kinematics", "dynamics", "rate", "impact")  # first words of their r
 WORST = 8
 
 
-def to_trajectory(program: Program, x: np.ndarray) -> Trajectory:
+def to_trajectory(program: PhaseProgram, x: np.ndarray) -> Trajectory:
     """Every quantity of the model at element ends, just before an impact there. Inputs and
     forces of a row act on the interval before it; at the first node they are zero."""
     layout, c = program.layout, program.columns
@@ -43,7 +44,7 @@ def to_trajectory(program: Program, x: np.ndarray) -> Trajectory:
     return written(program.model, program.task.name, times, values, a, sd)
 
 
-def _split_friction(program: Program, Y: np.ndarray) -> None:
+def _split_friction(program: PhaseProgram, Y: np.ndarray) -> None:
     """One signed friction force as its forward and backward part."""
     offset = program.layout.slices["lam"].start
     for constraint in program.constraints:
@@ -54,7 +55,9 @@ def _split_friction(program: Program, Y: np.ndarray) -> None:
             Y[:, forward], Y[:, backward] = np.maximum(force, 0.0), np.maximum(-force, 0.0)
 
 
-def _slip_speeds(program: Program, q: np.ndarray, v: np.ndarray, lam: np.ndarray) -> np.ndarray:
+def _slip_speeds(
+    program: PhaseProgram, q: np.ndarray, v: np.ndarray, lam: np.ndarray
+) -> np.ndarray:
     """Forces with every slip speed that the pairs ask for: its size."""
     node, B = program.model.node, program.reduction.B["lam"]
     lam = lam.copy()
@@ -69,9 +72,12 @@ def _slip_speeds(program: Program, q: np.ndarray, v: np.ndarray, lam: np.ndarray
     return lam
 
 
-def certificate(program: Program, x: np.ndarray, trajectory: Trajectory) -> Certificate:
-    """What the solution violates: collocation and impacts (dynamics), modes, bounds and requirements
-    (bounds), forces times gaps at the element ends (complementarity)."""
+def certificate(program: PhaseProgram, x: np.ndarray, trajectory: Trajectory) -> Certificate:
+    """What the solution x (size,) violates.
+
+    dynamics: collocation and impacts; bounds: modes, bounds, requirements and the first state;
+    complementarity: forces times gaps at the ends of elements.
+    """
     g = np.array(program.problem.g(x, [])).ravel()
     over = np.maximum(np.maximum(program.g_lower - g, g - program.g_upper), 0.0)
     rows = program.rows
@@ -83,16 +89,18 @@ def certificate(program: Program, x: np.ndarray, trajectory: Trajectory) -> Cert
             found.append(Violation(rows[i].label, node, time, size, "of its scale", size))
     physics = np.array([row.label.split(":")[0] in PHYSICS for row in rows])
     boxes = np.maximum(program.lower - x, x - program.upper)
+    start = arrays(program.model, trajectory)
+    first = first_state(program.model, *(start[name][0] for name in STATE))
     return Certificate(
         complementarity=_complementarity(program, trajectory),
         binary=0.0,  # valves are rounded constants of their phase
         dynamics=float(np.max(over[physics], initial=0.0)),
-        bounds=float(max(np.max(boxes, initial=0.0), np.max(over[~physics], initial=0.0))),
+        bounds=max(float(np.max(part, initial=0.0)) for part in (boxes, over[~physics], -first)),
         worst=tuple(found),
     )
 
 
-def _complementarity(program: Program, trajectory: Trajectory) -> float:
+def _complementarity(program: PhaseProgram, trajectory: Trajectory) -> float:
     model, node = program.model, program.model.node
     x = arrays(model, trajectory)
     q, v, s, lam, u = (x[name][1:].T for name in ("q", "v", "s", "lam", "u"))

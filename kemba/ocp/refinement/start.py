@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from kemba.ocp.refinement.program import Program
-from kemba.ocp.refinement.radau import STATE
+from kemba.ocp.phases.program import PhaseProgram
+from kemba.ocp.phases.radau import STATE
 from kemba.ocp.transcription.layout import STEP
 from kemba.ocp.transcription.solution import arrays
 from kemba.trajectory import Trajectory
 
 
-def node_rows(program: Program, plan: Trajectory) -> np.ndarray:
+def node_rows(program: PhaseProgram, plan: Trajectory) -> np.ndarray:
     """Scaled half values (nodes + 1, n) of a plan; friction as one signed force."""
     groups = arrays(program.model, plan)
     groups["h"] = np.diff(plan.time, prepend=plan.time[0])[:, None]
@@ -25,7 +25,7 @@ def node_rows(program: Program, plan: Trajectory) -> np.ndarray:
     return Y
 
 
-def start_vector(program: Program, plan: Trajectory) -> np.ndarray:
+def start_vector(program: PhaseProgram, plan: Trajectory) -> np.ndarray:
     """The program's variables from a plan, phase by phase on even grids."""
     c, layout, t = program.columns, program.layout, plan.time
     Y = node_rows(program, plan)
@@ -55,7 +55,7 @@ def _between(times: np.ndarray, rows: np.ndarray, now: float) -> np.ndarray:
     return np.array([np.interp(now, times, column) for column in rows.T])
 
 
-def carried(program: Program, coarse: Program, x: np.ndarray) -> np.ndarray:
+def carried(program: PhaseProgram, coarse: PhaseProgram, x: np.ndarray) -> np.ndarray:
     """The variables of `program` from a solution of the same phases by another scheme."""
     c, old = program.columns, coarse.columns
     y = np.zeros(c.size)

@@ -1,4 +1,4 @@
-"""Rounded valves that stay long enough to be worth switching."""
+"""Rounded valves without short pulses."""
 
 from __future__ import annotations
 

@@ -1,5 +1,8 @@
-"""Automatic start guess: the body's height as one-dimensional rest, push, flight, landing; legs by
-inverse kinematics with the feet under the hips; forces and valves by virtual work."""
+"""Automatic start guess.
+
+The body's height rests, is pushed, flies and lands, in one dimension. Legs follow by inverse
+kinematics with the feet under the hips, forces and valves by virtual work.
+"""
 
 from __future__ import annotations
 
@@ -9,14 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial.polynomial import polyder, polyval
 
-from kemba.mechanism import Robot, load_robot
+from kemba.mechanism import Robot
 from kemba.mechanism.knee import extension, flexion
 from kemba.model import Model
+from kemba.ocp.relaxation.settings import Guess
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.layout import Layout
-
-STRETCH = 0.92  # of the full leg length at take-off
 
 
 @dataclass(frozen=True)
@@ -44,7 +46,7 @@ class Course:
 
 
 def asked(requirements: Sequence[Requirement], name: str, at: float) -> float | None:
-    """The value wished for a quantity at a moment, if any (the nearer end of a range)."""
+    """The value required of a quantity at a moment, or None; of a range its lower end, if any."""
     for requirement in requirements:
         if requirement.quantity.name == name and requirement.at == at:
             return requirement.lower if np.isfinite(requirement.lower) else requirement.upper
@@ -56,7 +58,7 @@ def body_course(
 ) -> Course:
     """Height of the body over the motion; `reach` = leg length retracted and stretched [m]."""
     low, high = reach
-    top = low + STRETCH * (high - low)
+    top = low + Guess.current().stretch * (high - low)
     z0 = asked(requirements, "body/z", 0.0) or low
     z1 = asked(requirements, "body/z", 1.0)
     peaks = [
@@ -67,7 +69,7 @@ def body_course(
     if z0 > top:
         fall = float(np.sqrt(2 * (z0 - top) / g))
         course = Course([0.0, fall], [z0, top], [0.0, -g * fall], (0.0, fall))
-        return _landed(course, duration, z1 or low + 0.3 * (top - low))
+        return _landed(course, duration, z1 or low + Guess.current().landing * (top - low))
     if peak is None or peak.at is None:
         return Course([0.0, duration], [z0, z1 or z0], [0.0, 0.0], (duration, duration))
     apex, t_apex = peak.lower, peak.at * duration
@@ -78,7 +80,7 @@ def body_course(
     if apex <= top:
         course = Course([0.0, t_apex], [z0, apex], [0.0, 0.0], (t_apex, t_apex))
     else:
-        rise = min(float(np.sqrt(2 * (apex - top) / g)), 0.7 * t_apex)
+        rise = min(float(np.sqrt(2 * (apex - top) / g)), Guess.current().rise * t_apex)
         speed = g * rise
         push = min(2 * (top - z0) / speed, t_apex - rise)
         start = t_apex - rise - push
@@ -91,7 +93,7 @@ def body_course(
         if lands and end < duration:
             course = Course([*knots, end], [*z, top], [*vz, -speed], course.flight)
     if t_apex < duration and (lands or z1 is not None):
-        return _landed(course, duration, z1 or low + 0.3 * (top - low))
+        return _landed(course, duration, z1 or low + Guess.current().landing * (top - low))
     return course
 
 
@@ -104,7 +106,7 @@ def _landed(course: Course, duration: float, z: float) -> Course:
 def leg_pose(robot: Robot, fold: int, dx: np.ndarray, dz: np.ndarray) -> tuple[np.ndarray, ...]:
     """Hip angle and flexion [rad] (n,) that put the foot at (dx, dz) from the hip [m]."""
     f, t = robot.leg.femur.length, robot.leg.tibia.length
-    bends = sorted(flexion(robot.leg, x) for x in (0.0, robot.leg.piston.stroke))
+    bends = sorted(flexion(robot.leg, x) for x in (0.0, robot.stroke))
     length = np.hypot(dx, dz)
     cosine = np.clip((length**2 - f**2 - t**2) / (2 * f * t), -1, 1)
     bend = np.clip(np.arccos(cosine), bends[0], bends[1])
@@ -116,12 +118,12 @@ def automatic_guess(
     model: Model, task: Task, requirements: Sequence[Requirement], layout: Layout, nodes: int
 ) -> np.ndarray:
     """Start guess Y (nodes + 1, n) in the layout's scaled coordinates."""
-    robot = load_robot(model.mechanism.name)
+    robot = model.mechanism.need_robot()
     t = np.linspace(0.0, task.duration, nodes + 1)
     lengths = [
         np.hypot(f + b * np.cos(k), b * np.sin(k))
         for f, b in [(robot.leg.femur.length, robot.leg.tibia.length)]
-        for k in (flexion(robot.leg, x) for x in (0.0, robot.leg.piston.stroke))
+        for k in (flexion(robot.leg, x) for x in (0.0, robot.stroke))
     ]
     gravity = model.mechanism.gravity
     if task.guess == "standing":
@@ -132,7 +134,7 @@ def automatic_guess(
     z, az = course(t), course(t, 2)
     airborne = (t > course.flight[0]) & (t < course.flight[1])
     x0, x1 = (asked(requirements, "body/x", at) or 0.0 for at in (0.0, 1.0))
-    span = max(course.flight[1] - course.flight[0], 0.05)
+    span = max(course.flight[1] - course.flight[0], Guess.current().least_flight)
     x = x0 + (x1 - x0) * np.clip((t - course.flight[0]) / span, 0.0, 1.0)
 
     names = [c.name for c in model.mechanism.coordinates]
@@ -142,7 +144,7 @@ def automatic_guess(
     share = load / len(robot.legs)
     forces: dict[str, np.ndarray] = {}
     for leg, place in robot.legs.items():
-        reach = np.minimum(z, lengths[0] + STRETCH * (lengths[1] - lengths[0]))
+        reach = np.minimum(z, lengths[0] + Guess.current().stretch * (lengths[1] - lengths[0]))
         hip, bend = leg_pose(robot, place.fold, np.zeros_like(z), -reach)
         q[:, names.index(f"{leg}/hip/q")] = hip
         q[:, names.index(f"{leg}/knee/q")] = place.fold * bend
@@ -168,7 +170,7 @@ def _lever(robot: Robot, bend: np.ndarray) -> np.ndarray:
     def length(k: np.ndarray) -> np.ndarray:
         return np.asarray(np.hypot(f + b * np.cos(k), b * np.sin(k)))
 
-    step = 1e-4
+    step = Guess.current().difference
     ahead, behind = ([extension(robot.leg, k + d) for k in bend] for d in (step, -step))
     dx = np.array(ahead, float) - np.array(behind, float)
     return np.asarray((length(bend + step) - length(bend - step)) / dx)
@@ -177,15 +179,19 @@ def _lever(robot: Robot, bend: np.ndarray) -> np.ndarray:
 def _efforts(
     model: Model, t: np.ndarray, piston: dict[str, np.ndarray], share: np.ndarray
 ) -> dict[str, np.ndarray]:
-    s = np.zeros((len(t), len(model.states)))
+    s = np.tile([q.value for q in model.states.values()], (len(t), 1))
     u = np.zeros((len(t), len(model.inputs)))
     lam = np.zeros((len(t), len(model.forces)))
+    cylinder = model.mechanism.need_cylinder()
+    settings = Guess.current()
+    full = settings.filled * float(np.interp(model.supply, cylinder.pressures, cylinder.F_extend))
+    rise = settings.filling * max(cylinder.fill)
     for i, (leg, symbol) in enumerate(model.states):
         if symbol == "F_e" and leg in piston:
-            s[:, i] = np.clip(piston[leg], 0.0, 300.0)
+            s[:, i] = np.clip(piston[leg], 0.0, full)
     for i, (leg, symbol) in enumerate(model.inputs):
-        if symbol == "u_e" and leg in piston:
-            u[:, i] = np.clip((piston[leg] + 0.015 * np.gradient(piston[leg], t)) / 300.0, 0.0, 1.0)
+        if symbol == "u_e" and leg in piston:  # eq. 4 solved for the valve
+            u[:, i] = np.clip((piston[leg] + rise * np.gradient(piston[leg], t)) / full, 0.0, 1.0)
     for i, (_, symbol) in enumerate(model.forces):
         if symbol == "lam_n":
             lam[:, i] = share

@@ -1,4 +1,4 @@
-"""From half the robot to the whole one: a plan confirmed there, or grown where legs differ."""
+"""Symmetry lifting: from a plan of half the robot to one of the whole robot."""
 
 from __future__ import annotations
 
@@ -6,59 +6,52 @@ from dataclasses import replace
 
 import numpy as np
 
-from kemba.ocp.nlp.ipopt import Iterate, Parameters
-from kemba.ocp.relaxation.schedule import (
-    EXACT,
-    LONGEST,
-    LOOSE,
-    MARGIN,
-    ROUNDED,
-    Attempt,
-    Schedule,
-    fix,
-    move,
-    warm,
-)
+from kemba.ocp.nlp.ipopt import Iterate, warm
+from kemba.ocp.nlp.program import violation
+from kemba.ocp.relaxation.schedule import exact, fix, move
+from kemba.ocp.relaxation.session import Attempt, Schedule
+from kemba.ocp.relaxation.settings import Ends, Relaxation, Starts
+from kemba.ocp.transcription.parameters import Parameters
 from kemba.ocp.transcription.transcribe import Transcription
-
-CONFIRMED = 1e-7  # scaled violation
 
 
 def widen(half: Transcription, whole: Transcription, Y: np.ndarray) -> np.ndarray:
-    """Y of the half robot as Y of the whole one."""
+    """Y (nodes + 1, n) of the half robot as Y of the whole one."""
     groups = {g: half.layout.full(Y, g) for g in ("q", "v", "s", "u", "lam")}
     groups["h"] = half.layout.half(Y, "h")
     return whole.layout.pack(groups)
 
 
-def confirm(search: Schedule, half: Transcription, point: Iterate) -> Iterate:
-    """A plan of the half robot on the whole one: checked there, and solved on where it falls
-    short (its forces and moments vanish by symmetry, so that it rarely does)."""
-    whole = search.transcription
+def confirm(schedule: Schedule, half: Transcription, point: Iterate) -> Iterate:
+    """A solved plan of the half robot on the whole one, solved again where a row is not met.
+
+    That is rare: what the half robot leaves out is zero by symmetry.
+    """
+    whole = schedule.transcription
     start = replace(point, Y=widen(half, whole, point.Y), lam_x=None, lam_g=None)
-    parameters = Parameters(MARGIN * search.final_eps)
+    parameters = Parameters(Relaxation.current().margin * schedule.final_eps)
     g = np.array(whole.problem.g(start.Y.ravel(), parameters.vector(whole.nodes))).ravel()
-    if np.max(np.maximum(whole.g_lower - g, g - whole.g_upper)) <= CONFIRMED:
-        search.attempts.append(Attempt("confirmed on the whole robot", point.message, 0))
+    if violation(whole, g) <= Ends.current().confirmed and point.ending is not None:
+        schedule.attempts.append(Attempt("confirmed on the whole robot", point.ending, 0))
         return start
-    options = warm(1e-7, **EXACT)
-    fixed = search.valves(start)
-    return search.solve("whole robot", start, parameters, options=options, fixed=fixed)
+    options, fixed = exact(Starts.current().confirm_mu), schedule.valves(start)
+    return schedule.solve("whole robot", start, parameters, options=options, fixed=fixed)
 
 
-def grow(search: Schedule, half: Transcription, point: Iterate, guess: Iterate) -> Iterate:
+def grow(schedule: Schedule, half: Transcription, point: Iterate, guess: Iterate) -> Iterate:
     """A plan of the whole robot, its pairs still a little loose, from one of the half robot for
     what the task asks of both legs alike.
 
-    All switches are released by a few nodes, and rounded again. What the mirror keeps at zero, as
-    the way ahead, starts from `guess`.
+    All switches are released by a few nodes, and rounded again. Coordinates that are zero by
+    symmetry, such as the way forward, start from `guess`.
     """
-    whole = search.transcription
+    whole, starts, ends = schedule.transcription, Starts.current(), Ends.current()
     Y = widen(half, whole, point.Y)
     lost = np.flatnonzero(~half.layout.reduction.B["q"].any(axis=1))
     for group in ("q", "v"):
         columns = whole.layout.slices[group].start + lost
         Y[:, columns] = guess.Y[:, columns]
-    options = warm(1e-2, ROUNDED, max_iter=search.at_most(LONGEST))
-    moved = move(search, Iterate(Y), LOOSE, **options)
-    return fix(search, moved) if moved.solved else moved
+    longest = schedule.at_most(ends.relax_iterations)
+    options = warm(starts.rounded_mu, starts.rounded, max_iter=longest)
+    moved = move(schedule, Iterate(Y), Relaxation.current().loose, **options)
+    return fix(schedule, moved) if moved.solved else moved

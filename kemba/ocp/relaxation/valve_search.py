@@ -1,4 +1,4 @@
-"""Valve sequences: moving switches while it pays, and counting them."""
+"""Valve neighbourhood search: switches are moved while the cost falls; switches are counted."""
 
 from __future__ import annotations
 
@@ -6,24 +6,25 @@ import numpy as np
 
 from kemba.model import Model
 from kemba.ocp.nlp.ipopt import Iterate
-from kemba.ocp.relaxation.schedule import Schedule, fix, move
+from kemba.ocp.relaxation.schedule import fix, move
+from kemba.ocp.relaxation.session import Schedule
+from kemba.ocp.relaxation.settings import Ends, ValveSearch
 from kemba.trajectory import Trajectory
-
-ENOUGH = 80  # iterations; where moved switches take more, the plan is seldom better
-PAYS = 0.02  # relative fall of the cost that makes another round worth while
 
 
 def search_neighbourhood(
-    search: Schedule, point: Iterate, rounds: int, best: Iterate | None = None
+    schedule: Schedule, point: Iterate, rounds: int, best: Iterate | None = None
 ) -> Iterate:
     """Release every valve switch by a few nodes and round again, at most `rounds` times and as
     long as the cost falls; `best` is a plan that has been through this."""
+    longest = schedule.at_most(Ends.current().moved_iterations)
+    pays = ValveSearch.current().pays
     for _ in range(rounds):
-        better = fix(search, Iterate(move(search, point).Y), max_iter=search.at_most(ENOUGH))
-        if not better.solved or (best and better.objective >= (1 - PAYS) * best.objective):
+        better = fix(schedule, Iterate(move(schedule, point).Y), max_iter=longest)
+        if not better.solved or (best and better.objective >= (1 - pays) * best.objective):
             break
         point = best = better
-    return best or fix(search, point)
+    return best or fix(schedule, point)
 
 
 def switching(model: Model, plan: Trajectory) -> dict[str, float | int]:

@@ -1,4 +1,4 @@
-"""Costs by name: one step of each one's time integral."""
+"""Costs by name: what one step adds to the time integral of each."""
 
 from __future__ import annotations
 

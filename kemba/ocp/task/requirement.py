@@ -19,6 +19,8 @@ from kemba.quantity import Quantity, to_si
 
 # `rest`: every rate is zero; `settled`: every state of an effect is where it comes to rest
 SPECIAL = ("rest", "settled")
+# How much of each unit matters in a requirement; other units have the scale of the quantity.
+SCALES = {"m": 0.1, "rad": 0.2, "m.s-1": 1.0, "rad.s-1": 5.0}
 MOMENTS = {"start": 0.0, "middle": 0.5, "end": 1.0}
 
 
@@ -31,6 +33,12 @@ class Requirement:
     at: float | None
     lower: float
     upper: float
+
+    @property
+    def scale(self) -> float:
+        """One unit of its violation, in the quantity's unit: the same in every program, in the
+        elastic solve's prices and in the certificate."""
+        return SCALES.get(self.quantity.unit, self.quantity.scale)
 
     @property
     def text(self) -> str:

@@ -7,7 +7,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from kemba.config import Document, apply_overrides, beside, find_config, load_yaml, parse
+from kemba.config import Document, FileName, apply_overrides, beside, find_config, load_yaml, parse
+from kemba.model.spec import Supply
 from kemba.quantity import Param
 
 Value = float | str
@@ -81,13 +82,13 @@ class Task(Section):
     `settled: true` that every state of an effect is at its value at rest.
     """
 
-    name: str = "task"
+    name: FileName = "task"
     notes: str = ""
     model: str = "planning"
     plant: str = "plant"
     height: Annotated[float, Param("m", lower=0.0, doc="of the body's centre")] | None = None
     distance: Annotated[float, Param("m", doc="forward")] | None = None
-    supply: Annotated[float, Param("Pa", lower=0.6e6, upper=0.8e6, doc="supply")] | None = None
+    supply: Supply | None = None
     payload: Annotated[float, Param("kg", lower=0.0, doc="at the body's centre")] = 0.0
     duration: Annotated[float, Param("s", lower=0.01, upper=20.0, doc="nominal")] = 0.5
     nodes: Annotated[int, Field(ge=4, le=2000)] = 100

@@ -79,39 +79,36 @@ def build_stage(
         ]
     )
     eps, weights = ca.SX.sym("eps"), ca.SX.sym("weights", 4)
-    labels = [node.pair_rows[i][0].label for i in reduction.pairs]
     a_rows = [node.pair_rows[i][0] for i in reduction.pairs]
     b_rows = [node.pair_rows[i][1] for i in reduction.pairs]
     a = pair_a[reduction.pairs]
     b = pair_b[reduction.pairs] / ca.DM([r.scale for r in b_rows])
-    product = a * b
+    limit_rows = [node.limit_rows[i] for i in reduction.limits]
     rows = (
         _kinematics(layout, y0, y, h),
         _momentum(model, layout, reduction, dynamics, h),
         _rates(model, reduction, rate, h),
-        _rows("pair", product - eps, labels, [r.unit for r in a_rows], -INF, 0.0),
+        _rows("pair", a * b - eps, [r.label for r in a_rows], [r.unit for r in a_rows], -INF, 0.0),
         _signs(a, y, layout, a_rows, [1.0] * len(a_rows)),
         _signs(b, y, layout, b_rows, [r.scale for r in b_rows]),
-        _rows(
-            "limit",
-            limits[reduction.limits],
-            [node.limit_rows[i].label for i in reduction.limits],
-            ["1"] * len(reduction.limits),
-            0.0,
-            INF,
-        ),
-    )
-    objective = sum(w * COSTS[name](model, now["u"], h) for name, w in cost.items())
-    u, u0 = y[layout.binary], y0[layout.binary]
-    objective = (
-        objective / COST_SCALE
-        + weights[0] * ca.sum1(u * (1 - u))
+        _rows("limit", limits[reduction.limits], [r.label for r in limit_rows],
+              ["1"] * len(limit_rows), 0.0, INF),
+    )  # fmt: skip
+    own = sum(w * COSTS[name](model, now["u"], h) for name, w in cost.items()) / COST_SCALE
+    objective = own + _penalties(layout, y0, y, a * b, weights)
+    kept = tuple(r for r in rows if r.g.numel())
+    return Stage(layout, y0, y, eps, weights, kept, ca.densify(ca.SX(objective)))
+
+
+def _penalties(layout: Layout, y0: ca.SX, y: ca.SX, product: ca.SX, weights: ca.SX) -> ca.SX:
+    """What a schedule adds to the task's cost, see `Parameters`."""
+    u, u0, h = y[layout.binary], y0[layout.binary], layout.half(y, "h")
+    return ca.SX(
+        weights[0] * ca.sum1(u * (1 - u))
         + weights[1] * ca.sumsqr(u - u0)
         + weights[2] * ca.sum1(product)
         + weights[3] * ca.sumsqr(y[layout.slices["lam"]]) * h / STEP
     )
-    kept = tuple(r for r in rows if r.g.numel())
-    return Stage(layout, y0, y, eps, weights, kept, ca.densify(ca.SX(objective)))
 
 
 def _rows(
@@ -161,7 +158,7 @@ def _signs(
     g: ca.SX, y: ca.SX, layout: Layout, rows: Sequence[Row], scales: Sequence[float]
 ) -> Rows:
     """Rows g >= 0, except where g is a variable whose own bound says so."""
-    kept = [i for i in range(g.numel()) if not _bounded_below(g[i], y, layout)]
+    kept = [i for i in range(g.numel()) if not bounded_below(g[i], y, layout)]
     return _rows(
         "sign",
         g[kept],
@@ -184,7 +181,8 @@ def as_variable(g: ca.SX, y: ca.SX) -> tuple[int, float, float] | None:
     return index, factor, offset
 
 
-def _bounded_below(g: ca.SX, y: ca.SX, layout: Layout) -> bool:
+def bounded_below(g: ca.SX, y: ca.SX, layout: Layout) -> bool:
+    """Whether g is a variable whose own bound says g >= 0."""
     variable = as_variable(g, y)
     if variable is None:
         return False

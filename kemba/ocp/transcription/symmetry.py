@@ -16,7 +16,11 @@ Matrix = np.ndarray
 
 @dataclass(frozen=True)
 class Reduction:
-    """full = B half for q (and v, a), s, lam, u, and the rows that the half problem keeps."""
+    """How a half problem stands for the whole one.
+
+    `B`: matrices (n, nh) with full = B half, for q (and v, a), s, lam and u. `rate`, `pairs`,
+    `limits`: indices of the node's rows that the half problem keeps.
+    """
 
     B: dict[str, Matrix]
     rate: list[int]
@@ -49,7 +53,7 @@ def whole(node: Node) -> Reduction:
 def mirror_names(model: Model) -> dict[str, str]:
     """Mirror image of every variable by column name, "-" prefixed where the sign turns.
 
-    Empty for a mechanism without a mirror, or with an effect on one leg only.
+    Empty for a mechanism without a mirror, and where an effect acts on one leg only.
     """
     legs = model.mechanism.legs
     names = dict(model.mechanism.mirror)
@@ -78,8 +82,10 @@ def _rate_image(model: Model, index: int, names: Mapping[str, str]) -> str:
 
 
 def find_symmetry(model: Model) -> Reduction | None:
-    """The half problem of a mirror-symmetric model, or None. Never assumed: the declared mirror
-    is tried on the residual at random points."""
+    """The half problem of a mirror-symmetric model, or None.
+
+    The mirror that the model declares is checked on its residual at random points.
+    """
     names = mirror_names(model)
     if not names:
         return None
@@ -166,7 +172,7 @@ def requirements_are_symmetric(model: Model, requirements: Sequence[Requirement]
 
 
 def mirrored_requirements(model: Model, requirements: Sequence[Requirement]) -> list[Requirement]:
-    """The requirements that have their mirror image among the requirements, tried at a random point."""
+    """The requirements whose mirror image is required too, tried at a random point."""
     images = image_matrices(model)
     names = list(dict.fromkeys(w.quantity.name for w in requirements))
     node = model.node

@@ -1,4 +1,20 @@
-"""A task on a model becomes a nonlinear program: grid, bounds, rows, and what each one means."""
+"""A task on a model becomes a nonlinear program.
+
+Legend:
+
+N   number of steps ("nodes" of a task); node k = 0 ... N ends step k, node 0 is the start
+n   size of a node's vector y = [q, v, s, u, lam, h]:
+    q, v   coordinates and velocities, of half a robot where a mirror symmetry is used
+    s      states of effects, u inputs (torques, valves), lam forces and slip speeds
+    h      the step that ends at this node
+    Every entry is divided by the scale of its quantity. u, lam and h of node 0 are fixed dummies.
+Y   (N + 1, n): all variables, row by row; the program's x is Y.ravel()
+m   rows of one step, in this order: defects of kinematics, of motion, of rates; products of the
+    pairs; signs of both sides of a pair; limits (see `stage`)
+g   all rows: m rows of step 1, ..., m rows of step N; then the requirements that are no bounds,
+    one block each over its nodes; then what holds in every state, at node 0
+p   (5,): relaxation of the pairs and four weights (see `parameters`)
+"""
 
 from __future__ import annotations
 
@@ -9,11 +25,12 @@ import casadi as ca
 import numpy as np
 
 from kemba.model import Model
-from kemba.ocp.nlp.blocks import Block, BlockProblem
+from kemba.ocp.functions.blocks import Block, BlockProblem
 from kemba.ocp.task.requirement import Requirement, quantity_expression
 from kemba.ocp.task.task import Task
+from kemba.ocp.transcription.first_node import Held, granted, state_rows
 from kemba.ocp.transcription.layout import GROUPS, STEP, Layout
-from kemba.ocp.transcription.stage import INF, Rows, Stage, as_variable, build_stage
+from kemba.ocp.transcription.stage import INF, Rows, Stage, as_variable, bounded_below, build_stage
 from kemba.ocp.transcription.symmetry import Reduction
 
 RequirementBlock = tuple[Block, Rows, list[int]]  # with the nodes at which its rows hold
@@ -31,10 +48,10 @@ class Meaning:
 
 
 class Transcription:
-    """The program of one task on one grid.
+    """The program of one task on one grid, see the legend above.
 
-    Variables: Y (nodes + 1, n) row by row, `layout` tells what is where; node 0 has no inputs.
-    `lower`, `upper` bound the variables, `g_lower`, `g_upper` the rows; `meanings` names them.
+    `layout` tells what is where in y; `lower`, `upper` (N + 1, n) bound Y, `g_lower`, `g_upper`
+    (rows,) bound g; `meanings` says what each row of g is; `problem` has the functions.
     """
 
     def __init__(
@@ -56,7 +73,8 @@ class Transcription:
         self._rest_before_start()
         stage = self.stage
         index = np.arange((nodes + 1) * self.shape[1]).reshape(self.shape)
-        moments = self.requirement_blocks(index)
+        self.held: list[Held] = []  # requirements that hold exactly at the first node
+        moments = self.requirement_blocks(index) + self._first_node_blocks(index)
         pairs = np.hstack([index[:-1, :n], index[1:, :n]])
         both, p = ca.vertcat(stage.y0, stage.y), ca.vertcat(stage.eps, stage.weights)
         blocks = [Block(both, stage.g, stage.cost, pairs)]
@@ -71,7 +89,7 @@ class Transcription:
         self.problem = BlockProblem(blocks, index.size, p, worth_compiling=True)
 
     def _rest_before_start(self) -> None:
-        """Node 0 has no interval before it: its inputs and forces are dummies at zero."""
+        """Inputs and forces of node 0 are fixed at zero and its step at the nominal one."""
         for group in ("u", "lam"):
             part = self.layout.slices[group]
             self.lower[0, part] = self.upper[0, part] = 0.0
@@ -79,7 +97,7 @@ class Transcription:
         self.lower[0, part] = self.upper[0, part] = self.task.duration / self.nodes / STEP
 
     def extra_columns(self) -> int:
-        """Columns of Y behind the layout's own, kept at zero unless `requirement_blocks` frees them."""
+        """Columns of Y behind the layout's own; zero unless `requirement_blocks` frees them."""
         return 0
 
     def requirement_blocks(self, index: np.ndarray) -> list[RequirementBlock]:
@@ -94,6 +112,8 @@ class Transcription:
         self, requirement: Requirement, g: ca.SX, where: list[int], index: np.ndarray
     ) -> RequirementBlock | None:
         """The rows of a requirement that holds exactly; None where tighter bounds do it."""
+        if 0 in where:
+            self.held.append(Held(g, requirement.lower, requirement.upper))
         variable = as_variable(g, self.stage.y)
         if variable is not None:
             self._tighten(where, variable, requirement)
@@ -102,18 +122,37 @@ class Transcription:
         at = index[where, : self.layout.size]
         return Block(self.stage.y, rows.g, ca.SX(0), at), rows, where
 
-    def requirement_expressions(self) -> Iterator[tuple[Requirement, ca.SX, list[int]]]:
-        """Every requirement as an expression of the stage's y and the nodes at which it holds; those that
-        symmetry grants or repeats are left out."""
-        full = {g: ca.densify(self.layout.full(self.stage.y, g)) for g in GROUPS if g != "h"}
+    def _first_node_blocks(self, index: np.ndarray) -> list[RequirementBlock]:
+        """What holds in every state, at the first node; without what requirements there imply."""
+        stage, node, blocks = self.stage, self.model.node, []
+        for row in state_rows(node, self.reduction.pairs, self.reduction.limits):
+            g = self.of_state(row.expression) / row.scale
+            if bounded_below(g, stage.y, self.layout) or granted(
+                g, stage.y, self.layout, self.held
+            ):
+                continue
+            rows = Rows(row.kind, g, 0.0, INF, (row.label,), (row.unit,), (row.scale,))
+            at = index[[0], : self.layout.size]
+            blocks.append((Block(stage.y, rows.g, ca.SX(0), at), rows, [0]))
+        return blocks
+
+    def of_state(self, expression: ca.SX) -> ca.SX:
+        """An expression of the node's q, v, s, u, lam in the stage's y."""
+        full = [ca.densify(self.layout.full(self.stage.y, g)) for g in GROUPS if g != "h"]
         node = self.model.node
-        symbols = {"q": node.q, "v": node.v, "s": node.s, "u": node.u, "lam": node.lam}
-        values = [full[name] for name in symbols]
+        symbols = [node.q, node.v, node.s, node.u, node.lam]
+        return ca.SX(ca.cse(ca.densify(ca.substitute([ca.SX(expression)], symbols, full)[0])))
+
+    def requirement_expressions(self) -> Iterator[tuple[Requirement, ca.SX, list[int]]]:
+        """Every requirement with its expression in the stage's y and the nodes where it holds.
+
+        Those that the symmetry grants or repeats are left out.
+        """
+        node = self.model.node
         seen: set[tuple[object, ...]] = set()
         for requirement in self.requirements:
             expression = quantity_expression(self.model, requirement.quantity.name)
-            g = ca.substitute([expression], list(symbols.values()), values)[0]
-            g = ca.SX(ca.cse(ca.densify(g)))
+            g = self.of_state(expression)
             key = (
                 requirement.location,
                 requirement.at,
@@ -163,7 +202,7 @@ class Transcription:
 
 
 def _requirement_row(g: ca.SX, requirement: Requirement) -> Rows:
-    scale = {"m": 0.1, "m.s-1": 1.0, "rad": 0.2}.get(requirement.quantity.unit, 1.0)
+    scale = requirement.scale
     label = f"{requirement.text}:{requirement.quantity.name}"
     return Rows(
         "requirement",

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from kemba.config import load_yaml
-from kemba.effects.mechanics.load import Payload
 from kemba.errors import KembaError
 from kemba.model import Model, load_model
+from kemba.plant.execution.certificate import PLANT
 from kemba.plant.execution.controller import Execution, Gains, execute, read_controller
+from kemba.plant.execution.counterpart import PLAIN, counterpart
 from kemba.plant.execution.replay import Replay
 from kemba.plant.execution.sensors import Sensors, take_log
 from kemba.plant.simulation.valves import scattered
@@ -86,11 +87,22 @@ def _as_sent(log: Trajectory, table: Trajectory) -> Trajectory:
     return log.with_columns(valves)
 
 
-def plant_of(run: str | Path, name: str) -> Model:
-    """The model `name` under the supply and the payload of the task that a run was made for."""
+def plant_of(run: str | Path, name: str | None = None) -> Model:
+    """The plant of the task that a run was made for: its robot, supply, payload, own effects.
+
+    Another plant `name` is taken as it stands, but on the task's robot, unless its own file names
+    one, and with the task's supply and payload.
+    """
     file = (Path(run) if Path(run).is_dir() else Path(run).parent) / "task.yaml"
-    task = load_yaml(file).data if file.is_file() else {}
-    payload = to_si(task.get("payload") or 0.0, "kg")
-    supply = task.get("supply")
-    extra = [Payload(m=payload)] if payload else []
-    return load_model(name, extra, None if supply is None else to_si(supply, "Pa"))
+    task = load_yaml(file).data if file.is_file() else None
+    if not task:
+        return load_model(name or PLANT)
+    payload, supply = to_si(task.get("payload") or 0.0, "kg"), task.get("supply")
+    own = str(task.get("plant", PLANT))
+    return counterpart(
+        str(task.get("model", PLAIN)),
+        payload,
+        None if supply is None else to_si(supply, "Pa"),
+        name or own,
+        own_effects=name in (None, own),
+    )

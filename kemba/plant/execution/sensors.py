@@ -9,7 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from kemba.effects import Effect
-from kemba.effects.sensors import CHANNELS, SensorEffect
+from kemba.effects.sensors import CHANNELS, as_measured
+from kemba.effects.series import Series
 from kemba.plant.stepping.arrays import Array
 from kemba.trajectory import Trajectory
 
@@ -53,17 +54,16 @@ def take_log(
     rng: np.random.Generator,
     effects: Iterable[Effect] = (),
 ) -> Trajectory:
-    """The log of a simulated motion: its measured channels with sensor faults among `effects`,
-    noise and quantisation. Commands are logged as they are."""
-    faults = [effect for effect in effects if isinstance(effect, SensorEffect)]
+    """The log of a simulated motion: its measured channels with the sensor faults among `effects`,
+    then noise, then quantisation. Commands are logged as they are."""
+    effects = list(effects)
     columns, sigmas = {}, {}
     for header, name in zip(truth.headers, truth.names, strict=True):
         if not CHANNEL.fullmatch(name):
             continue
         values = _averaged(truth, name)
         if not COMMANDS.fullmatch(name):
-            for fault in (f for f in faults if f.channel == name):
-                values = np.asarray(fault.measured(truth.time, values))
+            values = as_measured(effects, name, Series(truth.time, values)).value
             ending = name.split("/")[-1]
             sigma, step = sensors.noise.get(ending, 0.0), sensors.steps.get(ending, 0.0)
             values = values + rng.normal(0.0, sigma, len(values)) if sigma else values

@@ -12,7 +12,7 @@ from kemba.plant.kernel.jit import kernel
 from kemba.plant.stepping.arrays import Array
 
 
-@intrinsic
+@intrinsic  # type: ignore[untyped-decorator, unused-ignore]
 def _call(typing: Any, address: Any, x: Any, first: Any, second: Any) -> Any:
     """`f(x*, y0*, y1*)` at an address; pointers are integers here."""
 

@@ -42,7 +42,7 @@ def limited(tau: float, w: float, limits: Array) -> float:
     `limits`: peak torque [N.m], speed without load [rad/s], and the slope [N.m.s] at which torque
     falls with speed.
     """
-    peak, noload, slope = limits[0], limits[1], limits[2]
+    peak, noload, slope = float(limits[0]), float(limits[1]), float(limits[2])
     high = min(peak, max(0.0, slope * (noload - w)))
     low = -min(peak, max(0.0, slope * (noload + w)))
     return min(max(tau, low), high)

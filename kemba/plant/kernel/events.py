@@ -24,7 +24,7 @@ NOTICED = 1e-9  # N.s; a smaller impulse is no impact
 class Impacts(NamedTuple):
     """The impacts so far: how many, and by row time [s], energy lost [J] and impulses (nl,)."""
 
-    count: Array
+    number: Array
     time: Array
     lost: Array
     impulse: Array
@@ -39,7 +39,7 @@ def advance(
     False when it stops earlier because `log` is nearly full.
     """
     while until - now.time[0] > NO_TIME:
-        if log.count[0] + MOST > len(log.time):
+        if log.number[0] + MOST > len(log.time):
             return False
         left = until - now.time[0]
         steps = max(1.0, ceil(left / longest - 1e-6))
@@ -57,7 +57,7 @@ def advance(
 @kernel
 def collide(m: Machine, k: Memory, now: State, reach: float, log: Impacts) -> None:
     """An impact at everything that touches: of instances with a rigid gap."""
-    count, at = 0, log.count[0]
+    count, at = 0, log.number[0]
     for i in range(touching(m, k, now.gap, reach)):
         if m.hard[k.rows[i]]:
             k.rows[count] = k.rows[i]
@@ -71,7 +71,7 @@ def collide(m: Machine, k: Memory, now: State, reach: float, log: Impacts) -> No
         log.impulse[at, k.rows[i]] = k.lcp.z[i]
     for i in range(len(m.gaps)):
         if log.impulse[at, m.gaps[i]] > NOTICED:
-            log.count[0] = at + 1
+            log.number[0] = at + 1
             return
 
 

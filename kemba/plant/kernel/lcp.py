@@ -43,16 +43,16 @@ def _try_active_set(w: Lcp, n: int) -> bool:
     for i in range(n):
         w.z[i] = 0.0
         if w.on[i]:
-            w.index[size] = i
+            w.places[size] = i
             size += 1
     for i in range(size):
-        w.right[i] = -w.b[w.index[i]]
+        w.right[i] = -w.b[w.places[i]]
         for j in range(size):
-            w.inner[i, j] = w.A[w.index[i], w.index[j]]
+            w.inner[i, j] = w.A[w.places[i], w.places[j]]
     if not solve_pivoted(w.inner, w.right, size):
         return False
     for i in range(size):
-        w.z[w.index[i]] = w.right[i]
+        w.z[w.places[i]] = w.right[i]
     return True
 
 
@@ -68,10 +68,7 @@ def _corrected(w: Lcp, n: int) -> bool:
             term = w.A[i, j] * w.z[j]
             slack += term
             terms += abs(term)
-        if w.on[i]:
-            wrong = w.z[i] < -ROUNDING * largest
-        else:
-            wrong = slack < -ROUNDING * terms
+        wrong = w.z[i] < -ROUNDING * largest if w.on[i] else slack < -ROUNDING * terms
         if wrong:
             w.on[i] = not w.on[i]
             changed = True

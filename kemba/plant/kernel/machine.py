@@ -47,7 +47,7 @@ class Lcp(NamedTuple):
     on: Array
     inner: Array
     right: Array
-    index: Array
+    places: Array
     table: Array
     basis: Array
     left: Array
@@ -104,7 +104,7 @@ def lcp_memory(n: int) -> Lcp:
         on=truth[0],
         inner=square[1],
         right=vector[2],
-        index=whole[0],
+        places=whole[0],
         table=np.zeros((n, 2 * n + 2)),
         basis=whole[1],
         left=truth[1],

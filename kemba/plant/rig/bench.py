@@ -4,20 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
-from kemba.config import find_config, load_yaml, parse
+from kemba.config import Document, find_config, load_yaml, parse
 from kemba.model import Model, load_model
 from kemba.plant.execution.sensors import Sensors, take_log
 from kemba.plant.rig.imposed import drive
 from kemba.plant.rig.rigs import AnyRig, Rig
 from kemba.trajectory import Trajectory
-
-if TYPE_CHECKING:
-    from kemba.config.document import Document
 
 FORCE_NOISE = 0.3  # N, 1 sigma of a bench force transducer
 
@@ -55,7 +51,8 @@ def run_rig(
     rng = np.random.default_rng(seed)
     models: dict[float, Model] = {}
     sensors = Sensors(noise={"F": FORCE_NOISE, "x": 1e-5, "P": 1e3} if noise else {})
-    for test in rig.tests(rng):
+    first = models[rig.supplies[0]] = model(rig.supplies[0])
+    for test in rig.tests(rng, first.mechanism.stroke):
         if test.supply not in models:
             models[test.supply] = model(test.supply)
         piston = models[test.supply]

@@ -10,11 +10,13 @@ from typing import Any
 import numpy as np
 
 from kemba.config import dump_yaml
+from kemba.effects import Effect
 from kemba.effects.pneumatics.chamber import Chamber
 from kemba.effects.pneumatics.damping import ModeDamping
+from kemba.effects.pneumatics.tables import at_supply
 from kemba.effects.pneumatics.valve import Valve
 from kemba.errors import KembaError
-from kemba.mechanism import rig_mechanism
+from kemba.mechanism import Cylinder, rig_mechanism
 from kemba.model import Model
 from kemba.plant.rig.estimate import Estimate, mean
 from kemba.plant.rig.imposed import drive, followed
@@ -26,17 +28,18 @@ from kemba.trajectory import Trajectory
 
 @dataclass(frozen=True)
 class Characteristics:
-    """What bench logs say about a cylinder; `check` holds R2 and RMS [N] of the fitted model's
+    """What bench logs say about a `cylinder`; `check` holds R2 and RMS [N] of the fitted model's
     force by log, for logs in which the rod and the valves both move."""
 
+    cylinder: Cylinder
     rises: RiseTable | None
     lines: list[Line]
     plateaus: dict[tuple[str, float], Estimate]
     check: dict[str, tuple[float, float]]
 
     def effects(self) -> tuple[Chamber, ModeDamping, Valve]:
-        """The fitted effects; where the logs say nothing the paper's values stay."""
-        return fitted_effects(self.rises, self.lines, self.plateaus)
+        """The fitted effects; where the logs say nothing the figures of the file stay."""
+        return fitted_effects(self.cylinder, self.rises, self.lines, self.plateaus)
 
     def write_model(self, path: str | Path, name: str = "characterised") -> None:
         """Write a model YAML: the planning model with the fitted chambers, damping and valves."""
@@ -45,11 +48,12 @@ class Characteristics:
         dump_yaml({"name": name, "base": "planning", "effects": effects, "notes": notes}, path)
 
 
-def characterise(logs: dict[str, Trajectory]) -> Characteristics:
-    """Fit eq. 4 to 7 to bench logs by name. Raises KembaError when they hold nothing to fit."""
+def characterise(logs: dict[str, Trajectory], cylinder: Cylinder) -> Characteristics:
+    """Fit eq. 4 to 7 to bench logs by name, of a cylinder of these dimensions. Raises KembaError
+    when they hold nothing to fit."""
     for name, log in logs.items():
         _check_columns(name, log)
-    rises = [rise for log in logs.values() for rise in find_rises(log)]
+    rises = [rise for log in logs.values() for rise in find_rises(log, cylinder.stroke)]
     strokes = [s for s in map(find_stroke, logs.values()) if s is not None]
     if not rises and not strokes:
         raise KembaError(
@@ -59,30 +63,34 @@ def characterise(logs: dict[str, Trajectory]) -> Characteristics:
         )
     table = rise_table(rises) if rises else None
     lines, plateaus = stroke_table(strokes), _plateaus(rises)
-    effects = fitted_effects(table, lines, plateaus)
+    effects = fitted_effects(cylinder, table, lines, plateaus)
     check = {}
     for name, log in logs.items():
         if np.ptp(log["piston/x"]) > 1e-3 and _switches(log):
-            check[name] = _compare(effects, log)
-    return Characteristics(table, lines, plateaus, check)
+            check[name] = _compare(cylinder, effects, log)
+    return Characteristics(cylinder, table, lines, plateaus, check)
 
 
 def fitted_effects(
-    rises: RiseTable | None, lines: list[Line], plateaus: dict[tuple[str, float], Estimate]
+    cylinder: Cylinder,
+    rises: RiseTable | None,
+    lines: list[Line],
+    plateaus: dict[tuple[str, float], Estimate],
 ) -> tuple[Chamber, ModeDamping, Valve]:
     """Chamber, damping and valve with the values of the tables."""
-    chamber, damping, valve = Chamber(), ModeDamping(), Valve()
+    chamber, damping = Chamber().of_cylinder(cylinder), ModeDamping().of_cylinder(cylinder)
+    valve = Valve()
     force = {key: abs(e.value) for key, e in plateaus.items()}
     force |= {(line.mode, line.supply): abs(line.F_static.value) for line in lines}
     drag = {(line.mode, line.supply): max(line.c_d.value, 0.0) for line in lines}
     supplies = sorted({p for mode, p in force if mode in ("extend", "retract") and p > 0.0})
     if supplies:
-        at = {f"F_{m}": _over(force, m, supplies, getattr(chamber, f"F_{m}"), chamber.pressures)
+        at = {f"F_{m}": _over(force, m, supplies, chamber, f"F_{m}")
               for m in ("extend", "retract")}  # fmt: skip
         chamber = chamber.model_copy(update={"pressures": tuple(supplies), **at})
     if drag:
-        known = sorted({p for _, p in drag if p > 0.0}) or list(damping.pressures)
-        at = {f"c_{m}": _over(drag, m, known, getattr(damping, f"c_{m}"), damping.pressures)
+        known = sorted({p for _, p in drag if p > 0.0}) or list(damping.value("pressures"))
+        at = {f"c_{m}": _over(drag, m, known, damping, f"c_{m}")
               for m in ("extend", "retract", "both")}  # fmt: skip
         rest = drag.get(("none", 0.0), damping.c_none)
         damping = damping.model_copy(update={"pressures": tuple(known), **at, "c_none": rest})
@@ -98,11 +106,11 @@ def _over(
     found: dict[tuple[str, float], float],
     mode: str,
     supplies: list[float],
-    usual: tuple[float, ...],
-    pressures: tuple[float, ...],
+    usual: Effect,
+    table: str,
 ) -> tuple[float, ...]:
-    """Values of a mode at the supplies, the paper's where a test is missing."""
-    return tuple(found.get((mode, p), float(np.interp(p, pressures, usual))) for p in supplies)
+    """Values of a mode at the supplies, those of `table` of an effect where a test is missing."""
+    return tuple(found.get((mode, p), float(at_supply(usual, table, p))) for p in supplies)
 
 
 def _plateaus(rises: Iterable[Rise]) -> dict[tuple[str, float], Estimate]:
@@ -113,8 +121,8 @@ def _plateaus(rises: Iterable[Rise]) -> dict[tuple[str, float], Estimate]:
     return {key: mean(np.array(values)) for key, values in groups.items()}
 
 
-def _compare(effects: tuple[Any, ...], log: Trajectory) -> tuple[float, float]:
-    return agreement(predict(effects, log), log)
+def _compare(cylinder: Cylinder, effects: tuple[Any, ...], log: Trajectory) -> tuple[float, float]:
+    return agreement(predict(cylinder, effects, log), log)
 
 
 def agreement(predicted: Trajectory, log: Trajectory) -> tuple[float, float]:
@@ -124,9 +132,10 @@ def agreement(predicted: Trajectory, log: Trajectory) -> tuple[float, float]:
     return 1.0 - float(np.mean(error**2)) / spread, float(np.sqrt(np.mean(error**2)))
 
 
-def predict(effects: tuple[Any, ...], log: Trajectory) -> Trajectory:
-    """What a piston with `effects` answers to the motion and the valves of a bench log."""
-    model = Model(rig_mechanism(), effects, float(log.meta.get("supply", 0.7e6)), "bench")
+def predict(cylinder: Cylinder, effects: tuple[Any, ...], log: Trajectory) -> Trajectory:
+    """What a `cylinder` with `effects` answers to the motion and the valves of a bench log."""
+    supply = float(log.meta.get("supply", 0.7e6))
+    model = Model(rig_mechanism(cylinder), effects, supply, "bench")
     valves = {name: Profile.of(log.time, log[name]) for name in ("valve/extend", "valve/retract")}
     return drive(model, followed(log), valves, log.time)
 

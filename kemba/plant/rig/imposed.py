@@ -8,6 +8,7 @@ import numpy as np
 
 from kemba.errors import KembaError
 from kemba.model import Model
+from kemba.model.rest import at_rest
 from kemba.plant.simulation.commands import Profile
 from kemba.plant.simulation.inputs import among, breaks, input_table, merged
 from kemba.plant.simulation.valves import delayed
@@ -31,7 +32,7 @@ def drive(
     """The force of a bench piston moved as `motion` says, sampled at `times` (m,) [s].
 
     `valves` are commands as sent, by column name; effect states begin at `start` or at what they
-    settle to with the first commands. Raises KembaError when the model's motion is free.
+    come to at rest with the first commands. Raises KembaError when the model's motion is free.
     """
     if not model.mechanism.imposed:
         raise KembaError(
@@ -43,7 +44,7 @@ def drive(
     marks = merged(np.asarray(times, dtype=float), edges)
     wanted = among(marks, times)
     u, sent = (np.nan_to_num(input_table(model, p, marks)) for p in (acting, valves))
-    s = _settled(model, eq, motion, first, u[0]) if start is None else _given(model, start)
+    s = at_rest(model, motion(times[:1])[0], u[0]) if start is None else _given(model, start)
     rows = []
     for i, time in enumerate(marks):
         if i:
@@ -63,15 +64,6 @@ def _advance(
         s = eq.driven(q=x[i], v=v[i], s=s, u=u, q1=x[i + 1], v1=v[i + 1], h=(end - begin) / count)[
             "s"
         ].copy()
-    return s
-
-
-def _settled(model: Model, eq: Equations, motion: ImposedMotion, time: float, u: Array) -> Array:
-    """Effect states after long rest at the first position and commands."""
-    x, _ = motion(np.array([time]))
-    s = np.array([q.value for q in model.states.values()], dtype=float)
-    for _ in range(800):
-        s = eq.driven(q=x[0], v=0.0, s=s, u=u, q1=x[0], v1=0.0, h=1e-3)["s"].copy()
     return s
 
 

@@ -9,13 +9,15 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from kemba.plant.rig.imposed import ImposedMotion, hermite, locked, stroke
+from kemba.config import FileName
+from kemba.errors import KembaError
+from kemba.plant.rig.imposed import ImposedMotion, hermite, locked
+from kemba.plant.rig.imposed import stroke as steady_stroke
 from kemba.plant.simulation.commands import Profile
 from kemba.plant.stepping.arrays import Array
 from kemba.quantity import Param
 
-STROKE = 0.07  # m
-Length = Annotated[float, Param("m", lower=0.0, upper=STROKE, doc="rod extension")]
+Length = Annotated[float, Param("m", lower=0.0, doc="rod extension")]
 Speed = Annotated[float, Param("m.s-1", lower=0.0, doc="rod speed")]
 Second = Annotated[float, Param("s", lower=0.0, doc="time")]
 Hertz = Annotated[float, Param("Hz", lower=0.0, doc="rate")]
@@ -53,14 +55,17 @@ class Rig(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    name: str
+    name: FileName
     notes: str = ""
     supplies: tuple[Pressure, ...] = (0.7e6,)
     repeats: int = Field(default=1, ge=1, le=100)
     rate: Hertz = 2000.0
 
-    def tests(self, rng: np.random.Generator) -> Iterator[Test]:
-        """The tests in order; random ones are drawn from `rng`."""
+    def tests(self, rng: np.random.Generator, stroke: float) -> Iterator[Test]:
+        """The tests in order, of a cylinder of `stroke` [m]; random ones are drawn from `rng`.
+
+        Raises KembaError where a position lies beyond the stroke.
+        """
         raise NotImplementedError
 
     def clock(self, duration: float) -> Array:
@@ -69,18 +74,26 @@ class Rig(BaseModel):
 
 
 class LockedRig(Rig):
-    """A locked rod on a force transducer; one chamber fills or vents (paper, Fig. 3 and 4)."""
+    """A locked rod on a force transducer; one chamber fills or vents (paper, Fig. 3 and 4).
+
+    `positions`: both ends of the stroke unless given.
+    """
 
     kind: Literal["locked"] = "locked"
     chamber: Literal["extend", "retract"] = "extend"
-    positions: tuple[Length, ...] = (0.0, STROKE)
+    positions: tuple[Length, ...] | None = None
     switch: tuple[Literal["fill", "vent"], ...] = ("fill", "vent")
     command: Second = 0.02
     duration: Second = 0.35
 
-    def tests(self, rng: np.random.Generator) -> Iterator[Test]:
+    def tests(self, rng: np.random.Generator, stroke: float) -> Iterator[Test]:
+        positions = (0.0, stroke) if self.positions is None else self.positions
+        for x in positions:
+            if x > stroke:
+                what = f"{1e3 * x:g} mm is beyond the stroke"
+                raise KembaError("rig.positions", what, f"0 to {1e3 * stroke:g} mm was expected")
         for supply in self.supplies:
-            for x in self.positions:
+            for x in positions:
                 for switch in self.switch:
                     steps = [0.0, 1.0] if switch == "fill" else [1.0, 0.0]
                     valve = Profile(np.array([-1.0, self.command]), np.array(steps))
@@ -104,19 +117,19 @@ class DynamometerRig(Rig):
     ramp: Second = 0.005
     settle: Second = 0.05
 
-    def tests(self, rng: np.random.Generator) -> Iterator[Test]:
+    def tests(self, rng: np.random.Generator, stroke: float) -> Iterator[Test]:
         for supply in self.supplies:
             for mode, speeds in self.speeds.items():
                 for speed in speeds:
                     for number in range(1, self.repeats + 1):
-                        yield self._test(supply, mode, speed, number)
+                        yield self._test(supply, mode, speed, number, stroke)
 
-    def _test(self, supply: float, mode: str, speed: float, number: int) -> Test:
+    def _test(self, supply: float, mode: str, speed: float, number: int, way: float) -> Test:
         u_e, u_r = VALVES[mode]
         valves = {"valve/extend": Profile.constant(u_e), "valve/retract": Profile.constant(u_r)}
-        begin, end, way = (STROKE, 0.0, -1.0) if mode == "retract" else (0.0, STROKE, 1.0)
-        motion = stroke(begin, way * speed, self.settle, self.ramp, end)
-        times = self.clock(self.settle + self.ramp + STROKE / speed)
+        begin, end, sign = (way, 0.0, -1.0) if mode == "retract" else (0.0, way, 1.0)
+        motion = steady_stroke(begin, sign * speed, self.settle, self.ramp, end)
+        times = self.clock(self.settle + self.ramp + way / speed)
         name = f"{mode}-{1e3 * speed:.0f}mms-{supply / 1e6:.1f}MPa-{number}"
         return Test(name, supply, motion, valves, times, {"test": "dynamometer", "mode": mode})
 
@@ -133,11 +146,11 @@ class RandomRig(Rig):
     speed: Speed = 0.6
     duration: Second = 10.0
 
-    def tests(self, rng: np.random.Generator) -> Iterator[Test]:
+    def tests(self, rng: np.random.Generator, stroke: float) -> Iterator[Test]:
         for supply in self.supplies:
             for number in range(1, self.repeats + 1):
                 knots = np.arange(int(self.duration * self.frequency) + 2) / self.frequency
-                motion = hermite(knots, *self._states(len(knots), rng))
+                motion = hermite(knots, *self._states(len(knots), rng, stroke))
                 valves = {
                     f"valve/{chamber}": Profile.of(knots, rng.integers(0, 2, len(knots)))
                     for chamber in ("extend", "retract")
@@ -147,16 +160,16 @@ class RandomRig(Rig):
                     name, supply, motion, valves, self.clock(self.duration), {"test": "random"}
                 )
 
-    def _states(self, count: int, rng: np.random.Generator) -> tuple[Array, Array]:
+    def _states(self, count: int, rng: np.random.Generator, stroke: float) -> tuple[Array, Array]:
         """Positions and speeds whose cubic pieces stay within the stroke."""
-        x, v = [STROKE / 2], [0.0]
+        x, v = [stroke / 2], [0.0]
         inside = np.linspace(0.0, 1.0, 21)
         while len(x) < count:
-            place, speed = rng.uniform(0.0, STROKE), rng.uniform(-self.speed, self.speed)
+            place, speed = rng.uniform(0.0, stroke), rng.uniform(-self.speed, self.speed)
             knots = np.array([0.0, 1.0 / self.frequency])
             piece = hermite(knots, np.array([x[-1], place]), np.array([v[-1], speed]))
             path = piece(inside / self.frequency)[0]
-            if path.min() >= 0.0 and path.max() <= STROKE:
+            if path.min() >= 0.0 and path.max() <= stroke:
                 x.append(place)
                 v.append(speed)
             elif rng.random() < 0.02:  # a corner without a way out: go back one

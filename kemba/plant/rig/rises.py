@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -12,7 +13,6 @@ from kemba.plant.rig.estimate import Estimate, linear, mean
 from kemba.plant.stepping.arrays import Array
 from kemba.trajectory import Trajectory
 
-STROKE = 0.07  # m
 STILL = 2e-4  # m; a rod that moves less is locked
 STEP_SIZE = 20.0  # N; smaller steps of the force tell nothing
 ONSET = (0.02, 0.10)  # shares of the step through which its beginning is extrapolated
@@ -22,13 +22,14 @@ ONSET = (0.02, 0.10)  # shares of the step through which its beginning is extrap
 class Rise:
     """One switching of one chamber of a locked rod.
 
-    `u`: the valve's new value; `x` [m]: the chamber's own extension; `time` [s] from the command
-    and `level` (n,) from 0 to 1 along the step; `dead` [s]; `plateau` [N] the steady force of the
-    chamber when full.
+    `u`: the valve's new value; `x` [m]: the chamber's own extension, of `stroke` [m] at most;
+    `time` [s] from the command and `level` (n,) from 0 to 1 along the step; `dead` [s]; `plateau`
+    [N] the steady force of the chamber when full.
     """
 
     u: float
     x: float
+    stroke: float
     supply: float
     chamber: str
     time: Array
@@ -60,8 +61,9 @@ class RiseTable:
     r2_linear: float
 
 
-def find_rises(log: Trajectory) -> Iterator[Rise]:
-    """Every switching of a chamber in a bench log while the rod is locked."""
+def find_rises(log: Trajectory, stroke: float) -> Iterator[Rise]:
+    """Every switching of a chamber in a bench log of a cylinder of `stroke` [m], while the rod is
+    locked."""
     x = log["piston/x"]
     if np.ptp(x) > STILL:
         return
@@ -69,19 +71,20 @@ def find_rises(log: Trajectory) -> Iterator[Rise]:
     edges = {name: np.flatnonzero(np.diff(v.astype(int))) + 1 for name, v in valves.items()}
     every = np.sort(np.concatenate([*edges.values()]))
     for chamber, indices in edges.items():
-        sign, own = (1.0, x) if chamber == "extend" else (-1.0, STROKE - x)
+        sign, own = (1.0, x) if chamber == "extend" else (-1.0, stroke - x)
         for edge in indices:
             later = every[every > edge]
             stop = int(later[0]) if len(later) else len(log)
             u = float(valves[chamber][edge])
-            rise = _rise(log, int(edge), stop, sign, chamber, u, float(own.mean()))
+            rise = _rise(log, int(edge), stop, sign, chamber)
             if rise is not None:
-                yield rise
+                yield Rise(u=u, x=float(own.mean()), stroke=stroke, **rise)
 
 
 def _rise(
-    log: Trajectory, edge: int, stop: int, sign: float, chamber: str, u: float, x: float
-) -> Rise | None:
+    log: Trajectory, edge: int, stop: int, sign: float, chamber: str
+) -> dict[str, Any] | None:
+    """The answer to the switching at row `edge`, until row `stop`; None where it tells nothing."""
     force, time = sign * log["piston/F"], log.time[edge - 1 : stop] - log.time[edge]
     before = float(force[max(edge - 20, 0) : edge].mean())
     after = float(force[stop - max((stop - edge) // 10, 3) : stop].mean())
@@ -91,7 +94,14 @@ def _rise(
     low, high = (_crossing(time, level, share) for share in ONSET)
     dead = low - (high - low) * ONSET[0] / (ONSET[1] - ONSET[0])
     supply = float(log.meta.get("supply", 0.7e6))
-    return Rise(u, x, supply, chamber, time, level, dead, max(before, after))
+    return {
+        "supply": supply,
+        "chamber": chamber,
+        "time": time,
+        "level": level,
+        "dead": dead,
+        "plateau": max(before, after),
+    }
 
 
 def _crossing(time: Array, level: Array, share: float) -> float:
@@ -123,7 +133,7 @@ def rise_table(rises: Iterable[Rise]) -> RiseTable:
     level = np.concatenate([r.level for r in rises])
     error = np.concatenate([fitted for _, fitted in fits]) - level
     r2 = 1.0 - float(error @ error) / float(((level - level.mean()) ** 2).sum())
-    u, x = np.array([r.u for r in rises]), np.array([r.x for r in rises]) / STROKE
+    u, x = np.array([r.u for r in rises]), np.array([r.x / r.stroke for r in rises])
     corners = np.array([[1, a, b, a * b] for a in (1.0, 0.0) for b in (0.0, 1.0)])
     table, r2_linear = linear(np.column_stack([np.ones_like(u), u, x, u * x]), taus, corners)
     return RiseTable((table[0], table[1]), (table[2], table[3]), dead, r2, r2_linear)

@@ -6,7 +6,6 @@ from typing import Any
 
 from kemba.plant.rig.characterise import Characteristics
 from kemba.plant.rig.estimate import Estimate
-from kemba.plant.rig.rises import STROKE
 
 # Table I, s, at x = 0 and 70 mm
 PAPER_RISE = {"fill": (0.008, 0.025), "vent": (0.013, 0.037)}
@@ -96,7 +95,7 @@ def _rises(found: Characteristics) -> list[tuple[str, float, Estimate, float]]:
         (name, x, estimate, paper)
         for name in ("fill", "vent")
         for x, estimate, paper in zip(
-            (0.0, STROKE), getattr(found.rises, name), PAPER_RISE[name], strict=True
+            (0.0, found.cylinder.stroke), getattr(found.rises, name), PAPER_RISE[name], strict=True
         )
     ]
 

@@ -97,12 +97,12 @@ class Player:
 
     def _fetch_impacts(self) -> None:
         log, gaps = self._log, self.pairs.gaps
-        for i in range(log.count[0]):
+        for i in range(log.number[0]):
             impulses = log.impulse[i][gaps]
             labels = tuple(self.pairs.labels[row] for row in gaps[impulses > NOTICED])
             found = Impact(float(log.time[i]), labels, float(impulses.max()), float(log.lost[i]))
             self.impacts.append(found)
-        log.count[0] = 0
+        log.number[0] = 0
 
     def _answer(self) -> None:
         """Ask the controller outside the kernel."""

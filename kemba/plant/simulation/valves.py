@@ -1,4 +1,4 @@
-"""From valve commands as sent to what the valves do: dead time, late closing, merged pulses."""
+"""Valve commands as they reach a simulated model: dead time, late closing, scatter."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from kemba.effects.pneumatics import switching
 from kemba.model import Model
 from kemba.plant.simulation.commands import Profile
 from kemba.trajectory import Trajectory
@@ -17,16 +18,8 @@ def acting(sent: Profile, on: float, off: float) -> Profile:
     Pulses that overlap after the shift merge; those that vanish are dropped. A valve that is on
     before the first command stays on until its first closing.
     """
-    merged: list[list[float]] = []
-    for start, end in _pulses(sent):
-        start, end = start + on, end + off
-        if end <= start:
-            continue
-        if merged and start <= merged[-1][1]:
-            merged[-1][1] = max(merged[-1][1], end)
-        else:
-            merged.append([start, end])
-    return Profile.pulses(*((a, b) for a, b in merged))
+    late = switching.delayed(switching.pulses(sent.times, sent.values), on, off)
+    return Profile.pulses(*((a, b) for a, b in late.tolist()))
 
 
 def delayed(model: Model, profiles: dict[str, Profile]) -> dict[str, Profile]:
@@ -50,11 +43,3 @@ def scattered(
             times[1:] += rng.normal(0.0, sigma, len(times) - 1)
             moved[quantity.name] = replace(profile, times=np.maximum.accumulate(times))
     return moved
-
-
-def _pulses(sent: Profile) -> list[tuple[float, float]]:
-    on = sent.values > 0.5
-    edges = np.flatnonzero(np.diff(on.astype(int))) + 1
-    starts = [-np.inf] * bool(on[0]) + [float(sent.times[i]) for i in edges if on[i]]
-    ends = [float(sent.times[i]) for i in edges if not on[i]]
-    return list(zip(starts, ends + [np.inf] * (len(starts) - len(ends)), strict=True))

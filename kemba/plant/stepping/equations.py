@@ -44,8 +44,13 @@ class Equations:
         for speed, rows in pairs.free_speeds:
             slips[speed, rows] = True
         return Machine(
-            *(address[name] for name in ("full", "smooth", "pairs", "outputs")),
-            *(self.node.q.numel(), self.node.s.numel(), nl),
+            full=address["full"],
+            smooth=address["smooth"],
+            pairs=address["pairs"],
+            outputs=address["outputs"],
+            n=self.node.q.numel(),
+            ns=self.node.s.numel(),
+            nl=nl,
             gaps=pairs.gaps,
             rigid=pairs.rigid,
             group=pairs.group,

@@ -9,7 +9,7 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from kemba.plant.rig.rises import STROKE, Rise, dead_times
+from kemba.plant.rig.rises import Rise, dead_times
 from kemba.plotting.style import BLUE, GREY, INK, VERMILLION, key_above, paper_figure, paper_style
 
 SHOWN = 0.2  # s after the command
@@ -46,7 +46,7 @@ def plot_volumes(rises: Sequence[Rise], figure: Figure | None = None) -> Figure:
     for axes, (u, state, hue) in zip((left, middle), STATES, strict=True):
         own = [rise for rise in rises if rise.u == u]
         for rise in own:
-            shown = colormaps["viridis"](0.9 * _place(rise) / STROKE)
+            shown = colormaps["viridis"](0.9 * _place(rise) / rise.stroke)
             axes.plot(1e3 * rise.time, _force(rise), color=shown, lw=1.0)
         _label(axes, state)
         x = np.array([_place(rise) for rise in own])
@@ -57,8 +57,8 @@ def plot_volumes(rises: Sequence[Rise], figure: Figure | None = None) -> Figure:
         ends = np.array([places[0], places[-1]])
         right.plot(1e3 * ends, line(ends), color=hue, label=f"{state}, R² {1 - error:.3f}")
     for place in places:
-        shown = colormaps["viridis"](0.9 * place / STROKE)
-        left.plot([], [], color=shown, label=f"{place / STROKE:.0%}")
+        shown = colormaps["viridis"](0.9 * place / rises[0].stroke)
+        left.plot([], [], color=shown, label=f"{place / rises[0].stroke:.0%}")
     left.legend(title="volume", loc="lower right")
     right.set_xlabel("extension [mm]")
     right.set_ylabel("rise time [ms]")

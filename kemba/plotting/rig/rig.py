@@ -44,7 +44,8 @@ def plot_rig(
 
     Raises KembaError when the logs are none of these.
     """
-    rises = [rise for log in logs.values() for rise in find_rises(log)]
+    cylinder = bench_model(model, NOMINAL).mechanism.need_cylinder()
+    rises = [rise for log in logs.values() for rise in find_rises(log, cylinder.stroke)]
     strokes = [s for s in map(find_stroke, logs.values()) if s is not None]
     if rises and strokes:
         hint = "plot the folder of each rig by itself"
@@ -57,7 +58,7 @@ def plot_rig(
     name, log = _nominal(logs)
     supply = float(log.meta.get("supply", NOMINAL))
     listed = bench_model(model, supply).effects if effects is None else tuple(effects)
-    return plot_prediction(log, predict(listed, log), name, figure)
+    return plot_prediction(log, predict(cylinder, listed, log), name, figure)
 
 
 def plot_strokes(strokes: Sequence[Stroke], figure: Figure | None = None) -> Figure:

@@ -9,8 +9,9 @@ from functools import lru_cache
 import casadi as ca
 import numpy as np
 
-from kemba.effects.pneumatics.chamber import Chamber
-from kemba.mechanism import Mechanism, Robot, knee, load_robot
+from kemba.effects.pneumatics.chamber import STEADY, Chamber
+from kemba.effects.pneumatics.tables import at_supply
+from kemba.mechanism import Mechanism, Robot, knee
 from kemba.model import Model, build_model, load_spec
 from kemba.plotting.source import Mask
 from kemba.trajectory import Array, Trajectory
@@ -79,10 +80,10 @@ def load_machine(model: str = "planning", supply: float | None = None) -> Machin
     """The robot of a model YAML (a path or a shipped model), fed with `supply` [Pa] instead of
     the model's own pressure. Raises KembaError."""
     spec = load_spec(model)
-    built, robot = build_model(spec, supply=supply), load_robot(spec.robot or "kemba")
+    built = build_model(spec, supply=supply)
     mechanism = built.mechanism
     places = ca.Function("places", [mechanism.q], [ca.vertcat(*mechanism.points.values())])
-    return Machine(robot, mechanism, _limits(built), places)
+    return Machine(mechanism.need_robot(), mechanism, _limits(built), places)
 
 
 def _limits(model: Model) -> dict[str, tuple[float, ...]]:
@@ -93,7 +94,6 @@ def _limits(model: Model) -> dict[str, tuple[float, ...]]:
             known["hip/tau"] = (quantity.lower, quantity.upper)
     for effect in model.effects:
         if isinstance(effect, Chamber):
-            tables = (effect.F_extend, effect.F_retract)
-            steady = [float(np.interp(model.supply, effect.pressures, t)) for t in tables]
+            steady = (float(at_supply(effect, name, model.supply)) for name in STEADY)
             known["chamber/F"] = tuple(steady)
     return known

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure, SubFigure
 from kemba.identify.compare.bins import ConditionBin
 from kemba.identify.compare.compare import Comparison
 from kemba.identify.compare.force_profiles import ForceProfile
-from kemba.identify.compare.missing_force import Missing
+from kemba.identify.problem.types import MissingForce
 from kemba.plotting.bands import Band, draw_band
 from kemba.plotting.heat import LEVEL, ROW, add_bar, draw_heat, name_conditions
 from kemba.plotting.style import BLUE, GREY, key_above, paper_figure, paper_style
@@ -27,7 +27,7 @@ Column = tuple[str, str, str]  # phase, mode, region
 
 @paper_style
 def plot_comparison(found: Comparison, figure: Figure | None = None) -> Figure:
-    """Heat map by condition (significant cells bold); d(t) with its 95 % band in the run that
+    """Heat map by condition (significant bins bold); d(t) with its 95 % band in the run that
     lacks most; the missing force against what it goes with."""
     tables = columns_of(found.bins)
     bands = bands_of(found.missing)
@@ -40,13 +40,13 @@ def plot_comparison(found: Comparison, figure: Figure | None = None) -> Figure:
     heat, time, force = rooms[:, 0]
     _heat(heat, found.bins, channels, tables)
     _bands(time, bands)
-    _laws(force, panels)
+    _profiles(force, panels)
     return figure
 
 
-def columns_of(cells: Sequence[ConditionBin]) -> list[list[Column]]:
+def columns_of(listed: Sequence[ConditionBin]) -> list[list[Column]]:
     """The conditions that were visited, in one table or, when there are many, in two."""
-    order = sorted({(c.phase, c.mode, c.region) for c in cells}, key=place_of)
+    order = sorted({(c.phase, c.mode, c.region) for c in listed}, key=place_of)
     if len(order) <= WIDEST:
         return [order]
     half = len(order) / 2
@@ -62,19 +62,19 @@ def place_of(column: Column) -> tuple[int, str, int]:
 
 def _heat(
     room: SubFigure,
-    cells: Sequence[ConditionBin],
+    listed: Sequence[ConditionBin],
     channels: Sequence[str],
     tables: list[list[Column]],
 ) -> None:
-    known = {(c.channel, (c.phase, c.mode, c.region)): c for c in cells}
+    known = {(c.channel, (c.phase, c.mode, c.region)): c for c in listed}
     grid = room.subplots(len(tables), 1, squeeze=False)[:, 0]
     for axes, columns in zip(grid, tables, strict=True):
         ratios = np.full((len(channels), len(columns)), np.nan)
         bold = np.zeros(ratios.shape, bool)
         for at in np.ndindex(ratios.shape):
-            cell = known.get((channels[at[0]], columns[at[1]]))
-            if cell is not None:
-                ratios[at], bold[at] = cell.ratio, cell.significant
+            one = known.get((channels[at[0]], columns[at[1]]))
+            if one is not None:
+                ratios[at], bold[at] = one.ratio, one.significant
         image = draw_heat(axes, ratios, bold)
         axes.set_yticks(range(len(channels)), channels)
         name_conditions(axes, [c if c[2] else c[:2] for c in columns])
@@ -83,7 +83,7 @@ def _heat(
         add_bar(room, image, list(grid), "")
 
 
-def bands_of(missing: Sequence[Missing], after: Sequence[Missing] = ()) -> list[Band]:
+def bands_of(missing: Sequence[MissingForce], after: Sequence[MissingForce] = ()) -> list[Band]:
     """d(t) of the channels that lack most, in the run that lacks most; with `after`, the part of
     it that is gone there counts as explained."""
     if not missing:
@@ -120,32 +120,32 @@ def _bands(room: SubFigure, bands: Sequence[Band]) -> None:
 
 
 def panels_of(found: Sequence[ForceProfile]) -> list[ForceProfile]:
-    """Of the port that lacks most: its quantities, and the command that tells most."""
-    own = [law for law in found if law.port == found[0].port]
-    sent = [law for law in own if law.quantity.startswith("after ")]
-    best = max(sent, key=lambda law: law.gain, default=None)
-    return [law for law in own if law not in sent or law is best]
+    """Of the force channel that lacks most: its quantities, and the command that tells most."""
+    own = [profile for profile in found if profile.channel == found[0].channel]
+    sent = [profile for profile in own if profile.quantity.startswith("after ")]
+    best = max(sent, key=lambda profile: profile.gain, default=None)
+    return [profile for profile in own if profile not in sent or profile is best]
 
 
-def _laws(room: SubFigure, panels: Sequence[ForceProfile]) -> None:
+def _profiles(room: SubFigure, panels: Sequence[ForceProfile]) -> None:
     if not panels:
         return
     grid = room.subplots(1, len(panels), squeeze=False)[0]
-    for axes, law in zip(grid, panels, strict=True):
-        _law(axes, law)
+    for axes, profile in zip(grid, panels, strict=True):
+        _profile(axes, profile)
     first = panels[0]
-    grid[0].set_ylabel(f"missing on the {first.port} [{first.unit}]")
+    grid[0].set_ylabel(f"missing on the {first.channel} [{first.unit}]")
 
 
-def _law(axes: Axes, law: ForceProfile) -> None:
+def _profile(axes: Axes, profile: ForceProfile) -> None:
     """Force per bin with 95 % intervals; unsure bins do not stretch the axis."""
     axes.axhline(0.0, color=GREY, lw=0.6, zorder=1)
-    spread: Array = 1.96 * law.sigma
+    spread: Array = 1.96 * profile.sigma
     axes.errorbar(
-        law.centre, law.force, spread, fmt="o-", ms=3, lw=0.8, elinewidth=0.8, capsize=1.5,
+        profile.centre, profile.force, spread, fmt="o-", ms=3, lw=0.8, elinewidth=0.8, capsize=1.5,
         color=BLUE, zorder=3,
     )  # fmt: skip
     sure = spread <= 4.0 * np.median(spread)
-    reach = 1.15 * float(np.max(np.abs(law.force[sure]) + spread[sure]))
+    reach = 1.15 * float(np.max(np.abs(profile.force[sure]) + spread[sure]))
     axes.set_ylim(-reach, reach)
-    axes.set_xlabel(law.quantity)
+    axes.set_xlabel(profile.quantity)

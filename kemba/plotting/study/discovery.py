@@ -10,11 +10,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from kemba.identify.compare.compare import conditions
-from kemba.identify.compare.smoother import missing_force
-from kemba.identify.compare.tolerance import free_starts
 from kemba.identify.discover import Discovery
-from kemba.identify.evidence.problem import Array, Rows
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
+from kemba.identify.evidence.windows import free_starts
+from kemba.identify.problem.problem import Array, Rows
+from kemba.identify.ranking import rungs
 from kemba.plotting.bands import plot_bands, plot_ladder
 from kemba.plotting.heat import plot_heat_map
 from kemba.plotting.study.comparison import bands_of, place_of
@@ -55,7 +55,7 @@ def plot_cells(found: Discovery) -> Figure:
     what was found."""
     steps = {"before": NULL, "after": found.best} if found.best else {"": NULL}
     problem = found.search.problem
-    listed = {t: conditions(problem, theta_of(found, h))[1] for t, h in steps.items()}
+    listed = {t: conditions(problem, theta_of(found, h)) for t, h in steps.items()}
     first = next(iter(listed.values()))
     channels = list(dict.fromkeys(c.channel for c in first))
     columns = sorted({(c.phase, c.mode, c.region) for c in first}, key=place_of)
@@ -72,23 +72,19 @@ def plot_cells(found: Discovery) -> Figure:
 def plot_explained(found: Discovery) -> Figure:
     """d(t) of the model as it stood, with its 95 % band, and what was found of it."""
     problem = found.search.problem
-    before = missing_force(problem, free_starts(problem))
+    before = problem.missing_force(free_starts(problem))
     if not found.best:
         return plot_bands(bands_of(before))
     theta = free_starts(problem, theta_of(found, found.best))
-    after = missing_force(problem, theta, before[0].strength)
+    after = problem.missing_force(theta, before[0].strength)
     return plot_bands(bands_of(before, after), " + ".join(found.best))
 
 
 def plot_steps(found: Discovery) -> Figure:
-    """Errors of fitted and held-out runs as effects are added, all other figures nominal."""
+    """Errors of fitted and held-out data as effects are added: the numbers of the answer."""
     names = [name for name, _ in found.answer.ladder]
-    thetas = [theta_of(found, tuple(sorted(names[1 : i + 1]))) for i in range(len(names))]
-    fitted = [conditions(found.search.problem, theta)[0] for theta in thetas]
-    held_out = None
-    if found.holdout is not None:
-        held_out = [conditions(found.holdout, theta)[0] for theta in thetas]
-    return plot_ladder(names, fitted, held_out)
+    fitted = [found.search.points[step].fitted_error for step in rungs(found.search, found.best)]
+    return plot_ladder(names, fitted, [error for _, error in found.answer.ladder])
 
 
 def _residuals(found: Discovery) -> tuple[Rows, dict[str, Array]]:

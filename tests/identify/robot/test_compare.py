@@ -15,8 +15,7 @@ from twin import catalogue
 from kemba.identify.compare.bins import excess
 from kemba.identify.compare.compare import Comparison, compare
 from kemba.identify.compare.force_profiles import ForceProfile
-from kemba.identify.compare.smoother import missing_force
-from kemba.identify.robot import robot_problem
+from kemba.identify.robot.problem import robot_problem
 from kemba.model.spec import load_model
 from kemba.plotting.study.comparison import plot_comparison
 
@@ -72,10 +71,10 @@ def test_its_figure_has_every_channel_and_region(wrong: Comparison) -> None:
 
 def test_friction_shows_as_a_force_against_speed() -> None:
     found = compared(catalogue.hidden("seal_friction", 1.0))
-    law = law_of(found, "rods", "speed [m/s]")
-    fast = np.abs(law.centre) > 0.05
-    assert np.all(law.force[fast] * law.centre[fast] < 0)
-    usual = np.average(np.abs(law.force[fast]), weights=1.0 / law.sigma[fast] ** 2)
+    profile = profile_of(found, "rods", "speed [m/s]")
+    fast = np.abs(profile.centre) > 0.05
+    assert np.all(profile.force[fast] * profile.centre[fast] < 0)
+    usual = np.average(np.abs(profile.force[fast]), weights=1.0 / profile.sigma[fast] ** 2)
     assert usual == pytest.approx(10.0, abs=2.0)
     assert next(h for h in found.hints if h.kind == "law").text.startswith("a force on the rods")
     assert "goes with speed" in found.sentence
@@ -84,8 +83,8 @@ def test_friction_shows_as_a_force_against_speed() -> None:
 @pytest.mark.slow
 def test_a_weak_motor_shows_against_its_torque() -> None:
     found = compared(catalogue.hidden("torque_scale", 1.0))
-    law = law_of(found, "hips", "torque [N.m]")
-    assert law.gain == max(law.gain for law in found.force_profiles)
+    profile = profile_of(found, "hips", "torque [N.m]")
+    assert profile.gain == max(p.gain for p in found.force_profiles)
     sent = {hint.text.partition(" ms after ")[2] for hint in found.hints if hint.kind == "command"}
     assert {"front/hip/tau changes", "rear/hip/tau changes"} & sent
 
@@ -93,13 +92,14 @@ def test_a_weak_motor_shows_against_its_torque() -> None:
 @pytest.mark.slow
 def test_a_late_valve_shows_after_it_switches() -> None:
     found = compared(catalogue.hidden("valve_delay", 1.0))
-    after = law_of(found, "rods", "after retract [ms]")
-    usual = law_of(compared(), "rods", "after retract [ms]")
+    after = profile_of(found, "rods", "after retract [ms]")
+    usual = profile_of(compared(), "rods", "after retract [ms]")
     assert after.gain > 100 > 20 > usual.gain
 
 
-def law_of(found: Comparison, port: str, quantity: str) -> ForceProfile:
-    return next(law for law in found.force_profiles if (law.port, law.quantity) == (port, quantity))
+def profile_of(found: Comparison, channel: str, quantity: str) -> ForceProfile:
+    listed = found.force_profiles
+    return next(p for p in listed if (p.channel, p.quantity) == (channel, quantity))
 
 
 @pytest.mark.slow
@@ -127,7 +127,7 @@ def test_the_band_of_the_missing_force_covers_the_truth() -> None:
     logs, forces = hops(runs=4, pushes=sigma)
     problem = robot_problem(logs, load_model("planning"))
     inside, strength = [], []
-    for found, force, log in zip(missing_force(problem), forces, logs, strict=True):
+    for found, force, log in zip(problem.missing_force(), forces, logs, strict=True):
         truth = np.stack([np.interp(found.time, log.time, f) for f in force.T], axis=1)
         low, high = found.band()
         inside.append((low < truth) & (truth < high))
@@ -138,5 +138,5 @@ def test_the_band_of_the_missing_force_covers_the_truth() -> None:
 
 def test_where_nothing_is_missing_the_force_is_small() -> None:
     logs, _ = hops(runs=2)
-    for found in missing_force(robot_problem(logs, load_model("planning"))):
+    for found in robot_problem(logs, load_model("planning")).missing_force():
         assert np.abs(found.force[:, 5:]).mean() < 2.0

@@ -9,7 +9,7 @@ pytest.importorskip("numba")
 from robot_logs import hops
 
 from kemba.identify.logs.gate import BadData
-from kemba.identify.robot import robot_problem
+from kemba.identify.robot.problem import robot_problem
 from kemba.model.spec import load_model
 from kemba.trajectory import Trajectory
 
@@ -20,7 +20,7 @@ def log() -> Trajectory:
 
 
 def test_a_good_log_passes(log: Trajectory) -> None:
-    assert robot_problem([log], load_model("planning")).plausible() == []
+    assert robot_problem([log], load_model("planning")).validate() == []
 
 
 @pytest.mark.parametrize(
@@ -35,4 +35,4 @@ def test_a_good_log_passes(log: Trajectory) -> None:
 def test_mixed_up_columns_are_refused(log: Trajectory, change: object) -> None:
     spoilt = log.with_columns(change(log))  # type: ignore[operator]
     with pytest.raises(BadData, match=r"foot|moves as no robot"):
-        robot_problem([spoilt], load_model("planning")).plausible()
+        robot_problem([spoilt], load_model("planning")).validate()

@@ -10,8 +10,8 @@ pytest.importorskip("numba")
 from robot_logs import hops
 from twin import catalogue, measure
 
-from kemba.identify.evidence.problem import Problem
-from kemba.identify.robot import RobotProblem, robot_problem
+from kemba.identify.problem.problem import Problem
+from kemba.identify.robot.problem import RobotProblem, robot_problem
 from kemba.model.spec import load_model
 from kemba.trajectory import Trajectory
 
@@ -68,7 +68,7 @@ def test_a_right_model_leaves_white_noise(clean: RobotProblem) -> None:
 
 
 def test_the_reference_follows_the_motion(clean: RobotProblem) -> None:
-    y, seen = clean.point.y, clean.batch.y
+    y, seen = clean.state.motion.y, clean.batch.y
     error = np.sqrt(np.nanmean((y - seen) ** 2, axis=(0, 1)))
     assert np.all(error < 1.3 * clean.batch.sigma.max(axis=0))
 
@@ -97,10 +97,22 @@ def test_slopes_agree_with_differences(clean: RobotProblem) -> None:
     names = ["payload.m", "ground_friction.mu", "boom.mass", "tolerance.front/hip.mass"]
     slopes = clean.jacobian({}, names)
     base = clean.residual({})
-    nominal = {"ground_friction.mu": 1.0, "boom.mass": 2.699}
+    nominal = {"ground_friction.mu": 1.0, "boom.mass": 1.0}
     for name, slope in zip(names, slopes.T, strict=True):
         moved = clean.residual({name: nominal.get(name, 0.0) + 0.1})
         np.testing.assert_allclose((moved - base) / 0.1, slope, atol=1e-6 + 1e-6 * abs(slope).max())
+
+
+def test_every_model_of_the_air_has_its_nominal_figures_free() -> None:
+    (log, *_), _ = hops(runs=1)
+    first, physical = (robot_problem([log], load_model(name)) for name in ("planning", "plant"))
+    assert {f"chamber:{g}.F_extend" for g in ("front", "rear")} <= set(first.nuisance)
+    assert "mode_damping:rear.c_none" in first.nuisance
+    figures = ("gauge", "a_fill", "a_vent", "V_e", "V_r")
+    for name in (f"orifice_chamber:{leg}.{f}" for leg in ("front", "rear") for f in figures):
+        assert physical.nuisance[name] == (1.0, 0.02)
+        assert np.linalg.norm(physical.jacobian({}, [name])) > 1.0
+    assert physical.nuisance["seal_friction.F_c"] == (1.0, 0.1)  # as a discovery found it
 
 
 def test_gaps_and_a_log_that_begins_in_the_air_are_borne() -> None:

@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 
+from kemba.effects.sensors import SensorDelay
 from kemba.identify.robot.motion.resampled import ResampledLog
 from kemba.identify.robot.motion.sensing import ahead, sensed, travelled
 
 TIME = np.arange(0.0, 0.6, 1e-3)
 STEP = np.full((len(TIME), 1), 1e-3)
 LATE = 2.4e-3  # s
-THETA = {"sensor_delay:body/z.dt": LATE}
+FAULTS = {"body/z": [SensorDelay(channel="body/z", dt=LATE)]}
 
 
 @pytest.fixture
@@ -33,7 +34,7 @@ def column(values: np.ndarray) -> np.ndarray:
 
 def test_a_late_sensor_reads_the_past(track: ResampledLog) -> None:
     way = travelled(column(rate(TIME)), STEP)
-    seen = sensed(["body/z"], [track], column(swing(TIME)), way, THETA)[20:-20, 0, 0]
+    seen = sensed(FAULTS, [track], column(swing(TIME)), way)[20:-20, 0, 0]
     assert seen == pytest.approx(swing(TIME - LATE)[20:-20], abs=2e-5)
 
 
@@ -44,7 +45,7 @@ def test_noise_in_the_rate_hardly_shortens_a_delay(track: ResampledLog) -> None:
     noisy = rate(TIME) + noise
     target = swing(TIME - LATE) - swing(TIME)
     way = travelled(column(noisy), STEP)
-    change = sensed(["body/z"], [track], column(swing(TIME)), way, THETA)[:, 0, 0] - swing(TIME)
+    change = sensed(FAULTS, [track], column(swing(TIME)), way)[:, 0, 0] - swing(TIME)
     calm = change / LATE
     assert target @ calm / (calm @ calm) == pytest.approx(LATE, rel=0.08)
     assert -target @ noisy / (noisy @ noisy) < 0.8 * LATE

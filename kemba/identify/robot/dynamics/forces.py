@@ -1,4 +1,4 @@
-"""Forces of the model along a reference as its parameters change; only what changes is redone."""
+"""Forces of the model along a reference at any parameters; results that recur are kept."""
 
 from __future__ import annotations
 
@@ -9,18 +9,23 @@ import casadi as ca
 import numpy as np
 
 from kemba.identify.robot.dynamics.inputs import Inputs, air_states, read_inputs
-from kemba.identify.robot.dynamics.linear import Linearised
+from kemba.identify.robot.dynamics.linear import LinearisedMotion
 from kemba.identify.robot.dynamics.physics import Physics, prepared
 from kemba.identify.robot.motion.batch import Batch
+from kemba.settings import BY_HAND, Settings, setting
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
-KEPT = 4
+
+class ForcesSettings(Settings):
+    """What is kept of computed forces."""
+
+    kept: int = setting(4, "1", "results that are kept beside the first one", BY_HAND)
 
 
 @dataclass
 class Line:
-    """Force (N, k) at p, and its slopes along parameters in which it is straight."""
+    """Force (N, k) at p, and its slopes (N, k) along parameters in which it is linear."""
 
     p: Array
     force: Array
@@ -28,18 +33,19 @@ class Line:
 
 
 class Forces:
-    """What `point` needs beyond the model at any parameters p (k,) and delays (valves, 2)."""
+    """Force that a motion needs beyond the model, at any parameters p (k,) and delays (valves, 2)
+    [s]."""
 
-    def __init__(self, physics: Physics, batch: Batch, point: Linearised) -> None:
-        self.physics, self.batch, self.point = physics, batch, point
-        self._drives: dict[bytes, list[Inputs]] = {}
+    def __init__(self, physics: Physics, batch: Batch, motion: LinearisedMotion) -> None:
+        self.physics, self.batch, self.motion = physics, batch, motion
+        self._inputs: dict[bytes, list[Inputs]] = {}
         self._states: dict[bytes, tuple[ca.DM, ca.DM]] = {}
         self._lines: dict[bytes, Line] = {}
-        self._middle = tuple(prepared(a) for a in point.middle)
+        self._middle = tuple(prepared(a) for a in motion.middle)
 
     def at(self, p: Array, delays: Array) -> Array:
         """Force (n, L, k) that the motion needs beyond model and contact."""
-        return self.batch.deep(self._force(p, delays)) - self.point.contact
+        return self.batch.deep(self._force(p, delays)) - self.motion.contact
 
     def slopes(self, p: Array, delays: Array) -> Array:
         """d force / dp (N, k, len(p)) at the samples."""
@@ -50,11 +56,11 @@ class Forces:
         """Effect states and inputs at the samples."""
         key = delays.tobytes() + p[self.physics.moves].tobytes()
         if key not in self._states:
-            path = self._drives.get(delays.tobytes())
-            if path is None:
-                path = read_inputs(self.physics, self.batch, self.point.ref, delays)
-                _keep(self._drives, delays.tobytes(), path)
-            states = air_states(self.physics, self.batch, path, p)
+            given = self._inputs.get(delays.tobytes())
+            if given is None:
+                given = read_inputs(self.physics, self.batch, self.motion.ref, delays)
+                _keep(self._inputs, delays.tobytes(), given)
+            states = air_states(self.physics, self.batch, given, p)
             ready = tuple(prepared(self.batch.flat(a)) for a in states)
             _keep(self._states, key, ready)
         return self._states[key]
@@ -85,6 +91,6 @@ class Forces:
 
 def _keep(store: dict[bytes, Any], key: bytes, value: Any) -> None:
     """Add to a store that holds the first one and the last few."""
-    if len(store) > KEPT:
+    if len(store) > ForcesSettings.current().kept:
         del store[list(store)[1]]
     store[key] = value

@@ -9,7 +9,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from kemba.identify.robot.dynamics.air import SETTLING, Index, substeps
+from kemba.identify.robot.dynamics.air import Index, substeps
 from kemba.identify.robot.dynamics.physics import Physics
 from kemba.identify.robot.dynamics.reference import Reference
 from kemba.identify.robot.motion.batch import Batch
@@ -19,50 +19,54 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 @dataclass(frozen=True)
 class Inputs:
-    """One run cut at every switching: `given` are steps, q, v and inputs of the integration;
-    `h` (N,) the steps from the log's start on, `index` of each node among them."""
+    """One run cut at every switching.
+
+    `given`: steps (1, N) [s], q, v and inputs (., N) of the integration. `h` (N,) [s]: the same
+    steps; `index` (n,) of each node among them; `width` (n,) [s] of each node's step. `inputs`
+    (n, nu): mean over each node's step.
+    """
 
     given: tuple[ca.DM, ca.DM, ca.DM, ca.DM]
     h: Array
     index: Index
-    width: Array  # (n,) of each node's step
-    inputs: Array  # (n, nu), the mean over each step
+    width: Array
+    inputs: Array
 
     def means(self, values: Array) -> Array:
         """(n, k): values (k, N) averaged over the step from each node."""
-        padded = np.append(values * self.h, 0 * values[:, :1], axis=1)
-        sums = np.add.reduceat(padded, self.index, axis=1)
-        return np.vstack([(sums / self.width).T[:-1], values[:, -1:].T])
+        return _means(values, self.h, self.index, self.width)
+
+
+def _means(values: Array, h: Array, index: Index, width: Array) -> Array:
+    padded = np.append(values * h, 0 * values[:, :1], axis=1)
+    sums = np.add.reduceat(padded, index, axis=1)
+    return np.vstack([(sums / width).T[:-1], values[:, -1:].T])
 
 
 def read_inputs(physics: Physics, batch: Batch, ref: Reference, delays: Array) -> list[Inputs]:
     """Per run; `delays` (valves, 2) in seconds to switching on and off."""
     found = []
-    for i, track in enumerate(batch.resampled):
-        n = len(track.time)
-        times, valves, index = substeps(track, delays)
+    for i, log in enumerate(batch.resampled):
+        n = len(log.time)
+        times, valves, index = substeps(log, delays)
         h = np.diff(times)
         middle = 0.5 * (times[1:] + times[:-1])
-        q, v = (_at(track.time, a[:n, i], middle) for a in (ref.q, ref.v))
-        held = np.clip(np.searchsorted(track.time, middle, side="right") - 1, 0, n - 1)
-        u = physics.arrange(track.torque[held].T, valves)
-        lead = [np.repeat(a[:, :1], len(SETTLING), axis=1) for a in (q, 0 * v, u)]
-        whole = (np.hstack(pair) for pair in zip(lead, (q, v, u), strict=True))
-        steps = np.append(SETTLING, h)[None, :]
-        given = tuple(ca.DM(a) for a in (steps, *whole))
-        width = np.append(np.diff(track.time), 1.0)
-        drive = Inputs(given, h, index, width, np.empty(0))  # type: ignore[arg-type]
-        found.append(Inputs(drive.given, h, index, width, drive.means(u)))
+        q, v = (_at(log.time, a[:n, i], middle) for a in (ref.q, ref.v))
+        held = np.clip(np.searchsorted(log.time, middle, side="right") - 1, 0, n - 1)
+        u = physics.arrange(log.torque[held].T, valves)
+        given = (ca.DM(h[None, :]), ca.DM(q), ca.DM(v), ca.DM(u))
+        width = np.append(np.diff(log.time), 1.0)
+        found.append(Inputs(given, h, index, width, _means(u, h, index, width)))
     return found
 
 
 def air_states(
-    physics: Physics, batch: Batch, driven: Sequence[Inputs], p: Array
+    physics: Physics, batch: Batch, inputs: Sequence[Inputs], p: Array
 ) -> tuple[Array, Array]:
     """Effect states (n, L, ns) and inputs (n, L, nu), both the mean over each step."""
     moving = p[physics.moves]
-    states = [d.means(physics.states.run(*d.given, moving)[:, len(SETTLING) :]) for d in driven]
-    return batch.pad(states, 0.0), batch.pad([d.inputs for d in driven], 0.0)
+    states = [d.means(physics.states.run(*d.given, moving)) for d in inputs]
+    return batch.pad(states, 0.0), batch.pad([d.inputs for d in inputs], 0.0)
 
 
 def _at(time: Array, values: Array, times: Array) -> Array:

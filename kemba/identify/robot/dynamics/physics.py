@@ -8,9 +8,11 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from kemba.identify.problem.nominal import leg_by_leg, nominal_figures
 from kemba.identify.robot.dynamics.air import StateRunner
-from kemba.identify.robot.dynamics.tolerance import mass_regressors, with_tolerances
+from kemba.identify.robot.dynamics.tolerance import mass_regressors
 from kemba.model.model import Model
+from kemba.model.rest import rate_of
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Flags = np.ndarray[Any, np.dtype[np.bool_]]
@@ -25,22 +27,22 @@ class Physics:
 
     def __init__(self, model: Model, free: tuple[str, ...], grip: float = 1.0) -> None:
         self.base = model
-        self.model, further, self.nuisance = with_tolerances(model)
-        early = [n for n in self.nuisance if n in self.model.parameters]
-        self.names = (*free, *early, *(n for n in self.nuisance if n not in early))
+        self.model = leg_by_leg(model)
+        self.nuisance = nominal_figures(self.model, free)
+        self.names = (*free, *self.nuisance)
         self.nominal = np.array(
             [model.parameters[n][1] for n in free] + [v for v, _ in self.nuisance.values()]
         )
-        self.node = node = self.model.build((*free, *early))
-        self.p = ca.vertcat(node.p, further)
+        self.node = node = self.model.build(free, self.nuisance)
+        self.p = node.p
         self.mechanism, self.legs = model.mechanism, model.mechanism.legs
         self.inputs = tuple(q.name for q in self.model.inputs.values())
-        rate = -ca.substitute(node.rate, node.sd, ca.SX.zeros(node.sd.numel()))
-        start = np.array([q.value for q in self.model.states.values()])
+        rate = rate_of(node)
         self.moves = np.array(ca.which_depends(rate, self.p, 1), dtype=bool)
         self.moving = [n for n, moves in zip(self.names, self.moves, strict=True) if moves]
         p = ca.vertcat(*(self.p[int(i)] for i in np.flatnonzero(self.moves)))
-        self.states = StateRunner([node.q, node.v, node.s, node.u, p], rate, start)
+        states = list(self.model.states.values())
+        self.states = StateRunner([node.q, node.v, node.s, node.u, p], rate, states)
         self.grip = grip
         self._maps: dict[tuple[str, int], ca.Function] = {}
 

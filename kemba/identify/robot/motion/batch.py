@@ -44,6 +44,11 @@ class Batch:
         return self.pad([t.y for t in self.resampled], np.nan)
 
     @cached_property
+    def torque(self) -> Array:
+        """(n, L, legs): hip torques [N.m], zero past a run's end."""
+        return self.pad([t.torque for t in self.resampled], 0.0)
+
+    @cached_property
     def sigma(self) -> Array:
         """(L, m): noise of one node's value."""
         return np.stack([t.sigma for t in self.resampled])

@@ -1,4 +1,4 @@
-"""Who touches what, and when: read from measured kinematics, never from a plan."""
+"""Contacts of feet and end stops, read from the measured motion and never from a plan."""
 
 from __future__ import annotations
 
@@ -15,32 +15,64 @@ from scipy.ndimage import (
 )
 from scipy.signal import savgol_filter
 
+from kemba.settings import BY_HAND, Settings, setting
+
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Flags = np.ndarray[Any, np.dtype[np.bool_]]
 
-# A piston that reads half a millimetre wrong lifts the foot by three, a late encoder by nine: a
-# foot this near may touch, which costs a few milliseconds of known flight.
-MAY_TOUCH = 9.0e-3  # m
-LEVEL_SEARCH = 20e-3  # m from nought in which a foot at rest may mean the ground
-STANDS = 2.5e-3  # m above the level on which feet rest: may be standing
-TOUCHES = 1.5e-3  # m above the level on which feet rest: for naming the phase only
-NEAR_STOP = 0.6e-3  # m from the furthest reading near an end of the stroke
-STOP_SEARCH = 2.5e-3  # m from an end of the stroke in which a reading may mean the stop
-BLUR, STRIKE, IMPACT = 0.003, 0.025, 0.005  # s: around contact; in which it strikes; of an impact
-SETTLED = 0.010  # s within contact before a foot's height is trusted
-SLOW_FOOT, SLIDING, SLOW_BODY, SLOW_PISTON = 0.15, 0.1, 0.05, 0.02  # m.s-1
-STICKING = 0.04  # m.s-1
-FIRM_LOAD = 15.0  # N: of a foot whose sliding friction means something
-LEAST_LOAD = 6.0  # N: a foot that carries less is not known to stand
-RATE_WINDOW = 0.02  # s
-STEADY = 0.008  # s: the push of a leg changes no faster
+
+class ContactSettings(Settings):
+    """When a foot touches the ground, and when a piston rests at a stop."""
+
+    may_touch: float = setting(
+        9.0e-3,
+        "m",
+        "height below which a foot may touch",
+        "derived: a piston 0.5 mm wrong lifts the foot by 3 mm, a late encoder by 9 mm",
+    )
+    level_search: float = setting(
+        20e-3, "m", "height of a resting foot that may mean the ground", BY_HAND
+    )
+    level_rate: float = setting(0.03, "m.s-1", "vertical speed of a resting foot", BY_HAND)
+    level_rows: int = setting(20, "1", "rows at rest that give the ground's height", BY_HAND)
+    stands: float = setting(2.5e-3, "m", "height above the ground of a standing foot", BY_HAND)
+    touches: float = setting(1.5e-3, "m", "the same for naming the phase only", BY_HAND)
+    near_stop: float = setting(
+        0.6e-3, "m", "distance from a stop at which a piston may rest on it", BY_HAND
+    )
+    stop_search: float = setting(
+        2.5e-3, "m", "distance from an end of the stroke at which the stop may be", BY_HAND
+    )
+    stop_rows: int = setting(4, "1", "extreme readings that are left out", BY_HAND)
+    blur: float = setting(0.003, "s", "time around a contact in which it may be", BY_HAND)
+    strike: float = setting(0.025, "s", "time in which a foot strikes the ground", BY_HAND)
+    impact: float = setting(0.005, "s", "time that is called an impact", BY_HAND)
+    settled: float = setting(
+        0.010, "s", "time in contact before a foot's height is trusted", BY_HAND
+    )
+    slow_foot: float = setting(0.15, "m.s-1", "vertical speed of a standing foot", BY_HAND)
+    sliding: float = setting(0.1, "m.s-1", "speed of a foot that slides", BY_HAND)
+    sticking: float = setting(0.04, "m.s-1", "speed of a foot that sticks", BY_HAND)
+    slow_body: float = setting(0.05, "m.s-1", "speed of a body at rest", BY_HAND)
+    slow_piston: float = setting(0.02, "m.s-1", "speed of a piston at rest", BY_HAND)
+    firm_load: float = setting(
+        15.0, "N", "load of a foot whose sliding friction is judged", BY_HAND
+    )
+    least_load: float = setting(6.0, "N", "load of a foot that is known to stand", BY_HAND)
+    rate_window: float = setting(0.02, "s", "time over which rates are taken", BY_HAND)
+    steady: float = setting(0.008, "s", "time in which the push of a leg may change", BY_HAND)
 
 
 @dataclass(frozen=True)
 class Schedule:
-    """Of one run, per node: `foot` may touch (n, legs), `settled` on the ground (n, legs),
-    `struck` touched down within a moment (n, legs), `slides` (n, legs; sign of the slip),
-    `low`, `high` at an end stop (n, legs), `phase` (n,) as the contract names it."""
+    """Contacts of one run at its n nodes.
+
+    Per leg, (n, legs): `foot`: it may touch the ground; `settled`: it rests on the ground;
+    `struck`: it touched down a moment ago; `slides`: sign of its slip, 0 where it does not slide;
+    `low`, `high`: the piston is at an end stop; `rests`: the piston has settled on a stop;
+    `sticks`: the foot does not move along the ground. `phase` (n,): `rest`, `stance2`, `stance1`,
+    `impact` or `flight`.
+    """
 
     foot: Flags
     settled: Flags
@@ -49,8 +81,8 @@ class Schedule:
     low: Flags
     high: Flags
     phase: np.ndarray[Any, Any]
-    rests: Flags  # (n, legs): piston settled on a stop
-    sticks: Flags  # (n, legs): foot that does not move along the ground
+    rests: Flags
+    sticks: Flags
 
     @property
     def held(self) -> Flags:
@@ -60,24 +92,33 @@ class Schedule:
 
 
 def read_schedule(time: Array, feet: Array, pistons: Array, stroke: float, body: Array) -> Schedule:
-    """The schedule of one run from feet (n, legs, [x, z]), pistons (n, legs) and body (n, k)."""
-    dt = max(float(np.median(np.diff(time))), 1e-4)
+    """The schedule of one run at `time` (n,) [s].
+
+    `feet` (n, legs, [x, z]) [m], `pistons` (n, legs) [m], `stroke` [m], `body` (n, 3): x, z [m] and
+    pitch [rad].
+    """
+    limits, dt = ContactSettings.current(), max(float(np.median(np.diff(time))), 1e-4)
     feet_rate, piston_rate = slope(feet, dt), slope(pistons, dt)
     speed = np.abs(slope(body, dt)).max(axis=1)
-    blur, settle = max(1, round(BLUR / dt)), max(1, round(SETTLED / dt))
+    blur, settle = max(1, round(limits.blur / dt)), max(1, round(limits.settled / dt))
     legs: list[tuple[Any, ...]] = []
     for i in range(feet.shape[1]):
         z, vx, vz = feet[:, i, 1], feet_rate[:, i, 0], feet_rate[:, i, 1]
         level = ground_level(z, vz)
-        near, touches = z < level + MAY_TOUCH, z < level + TOUCHES
+        near, touches = z < level + limits.may_touch, z < level + limits.touches
         may = _dilate(near, blur)
-        inner = _erode(z < level + STANDS, settle) & (np.abs(vz) < SLOW_FOOT)
-        struck = _after(may, STRIKE / dt)
-        slips = inner & touches & ~struck & (np.abs(vx) > SLIDING)
+        inner = _erode(z < level + limits.stands, settle) & (np.abs(vz) < limits.slow_foot)
+        struck = _after(may, limits.strike / dt)
+        slips = inner & touches & ~struck & (np.abs(vx) > limits.sliding)
         slides = np.where(slips, np.sign(vx), 0.0)
         bottom, top = stop_levels(pistons[:, i], stroke)
-        at_low, at_high = pistons[:, i] < bottom + NEAR_STOP, pistons[:, i] > top - NEAR_STOP
-        rests = _erode(at_low | at_high, 3 * blur) & (np.abs(piston_rate[:, i]) < SLOW_PISTON)
+        at_low, at_high = (
+            pistons[:, i] < bottom + limits.near_stop,
+            pistons[:, i] > top - limits.near_stop,
+        )
+        rests = _erode(at_low | at_high, 3 * blur) & (
+            np.abs(piston_rate[:, i]) < limits.slow_piston
+        )
         legs.append(
             (
                 may,
@@ -87,63 +128,68 @@ def read_schedule(time: Array, feet: Array, pistons: Array, stroke: float, body:
                 _dilate(at_low, 2),
                 _dilate(at_high, 2),
                 rests,
-                _erode(np.abs(vx) < STICKING, settle // 2),
+                _erode(np.abs(vx) < limits.sticking, settle // 2),
                 touches,
-                _dilate(_after(touches, 1), round(IMPACT / dt)),
+                _dilate(_after(touches, 1), round(limits.impact / dt)),
             )
         )
     *parts, touches, impact = (np.stack(part, axis=1) for part in zip(*legs, strict=True))
     may, settled, struck, slides, low, high, rests, sticks = parts
     count = touches.sum(axis=1)
     phase = np.array(["flight", "stance1", "stance2"], dtype=object)[np.minimum(count, 2)]
-    phase[(count == feet.shape[1]) & (speed < SLOW_BODY)] = "rest"
+    phase[(count == feet.shape[1]) & (speed < limits.slow_body)] = "rest"
     phase[impact.any(axis=1)] = "impact"
     return Schedule(may, settled, struck, slides, low, high, phase, rests, sticks)
 
 
 def _after(flags: Flags, steps: float) -> Flags:
-    """So many steps from where each stretch of `flags` begins."""
+    """Flags (n,) of the first `steps` nodes of each stretch in which `flags` (n,) hold."""
     begin = flags & ~np.append(True, flags[:-1])
     return np.asarray(np.convolve(begin, np.ones(max(1, round(steps))))[: len(flags)] > 0)
 
 
 def loaded(schedule: Schedule, normal: Array, dt: float) -> Schedule:
     """The same with only those feet settled that carry a load: `normal` (n, legs) in N, steady."""
-    width = max(3, round(RATE_WINDOW / dt))
-    firm = minimum_filter1d(normal, width, axis=0) > FIRM_LOAD
+    settings = ContactSettings.current()
+    width = max(3, round(settings.rate_window / dt))
+    firm = minimum_filter1d(normal, width, axis=0) > settings.firm_load
     slides = schedule.slides * firm
-    for leg in slides.T:  # a slip that lasts: a foot that just lifts off drags along for a moment
+    for leg in slides.T:  # short slips do not count: a foot that lifts off drags for a moment
         leg *= binary_opening(leg != 0.0, np.ones(width, bool))
-    return replace(schedule, settled=schedule.settled & (normal > LEAST_LOAD), slides=slides)
+    return replace(
+        schedule, settled=schedule.settled & (normal > settings.least_load), slides=slides
+    )
 
 
 def steady(values: Array, dt: float) -> Array:
-    """Forces or rates (n, ...) without what changes from sample to sample, which is noise."""
-    return np.asarray(gaussian_filter1d(values, STEADY / dt, axis=0))
+    """Forces or rates (n, ...), smoothed: changes from sample to sample are noise."""
+    return np.asarray(gaussian_filter1d(values, ContactSettings.current().steady / dt, axis=0))
 
 
 def slope(values: Array, dt: float) -> Array:
     """Rate of a noisy signal (n, ...) over a few hundredths of a second."""
-    window = min(2 * max(2, round(RATE_WINDOW / dt / 2)) + 1, (len(values) - 1) // 2 * 2 + 1)
+    width = ContactSettings.current().rate_window
+    window = min(2 * max(2, round(width / dt / 2)) + 1, (len(values) - 1) // 2 * 2 + 1)
     return np.asarray(savgol_filter(values, window, 2, deriv=1, delta=dt, axis=0))
 
 
 def ground_level(z: Array, rate: Array) -> float:
     """Height at which a foot rests: sensors may be off by more than a centimetre."""
-    resting = z[(np.abs(z) < LEVEL_SEARCH) & (np.abs(rate) < 0.03)]
-    if len(resting) <= 20:
+    limits = ContactSettings.current()
+    resting = z[(np.abs(z) < limits.level_search) & (np.abs(rate) < limits.level_rate)]
+    if len(resting) <= limits.level_rows:
         return 0.0
     low = float(np.quantile(resting, 0.1))
-    return float(np.median(resting[resting < low + STANDS]))
+    return float(np.median(resting[resting < low + limits.stands]))
 
 
 def stop_levels(x: Array, stroke: float) -> tuple[float, float]:
-    """Readings at the two stops: the furthest ones, where these are near an end at all."""
-    ordered = np.sort(x)
-    few = min(4, len(x) - 1)
+    """Readings at the two stops: the extreme ones, if they are near the ends of the stroke."""
+    search, ordered = ContactSettings.current().stop_search, np.sort(x)
+    few = min(ContactSettings.current().stop_rows, len(x) - 1)
     low, high = float(ordered[few]), float(ordered[-1 - few])
-    low = low if abs(low) < STOP_SEARCH else 0.0
-    return low, high if abs(high - stroke) < STOP_SEARCH else stroke
+    low = low if abs(low) < search else 0.0
+    return low, high if abs(high - stroke) < search else stroke
 
 
 def _dilate(flags: Flags, steps: int) -> Flags:

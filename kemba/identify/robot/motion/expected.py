@@ -1,4 +1,4 @@
-"""What the residuals of a right model would be: pure sensor noise through the same filter."""
+"""The residuals that a right model would leave: sensor noise alone, through the same filter."""
 
 from __future__ import annotations
 
@@ -7,29 +7,37 @@ from typing import Any
 import numpy as np
 
 from kemba.identify.robot.motion.filter import Gains, System, innovations
+from kemba.settings import BY_HAND, Settings, setting
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
-DRAWS = 6
+
+class ExpectedSettings(Settings):
+    """Expected power of the residuals, by simulation."""
+
+    draws: int = setting(6, "1", "simulated logs", BY_HAND)
+    width: int = setting(21, "1", "nodes over which the power is averaged; odd", BY_HAND)
+    least: float = setting(0.02, "1", "smallest power", BY_HAND)
 
 
 def expected_power(system: System, gain: Gains, seed: int = 0) -> Array:
     """Mean square (n, L, m) of the whitened innovations that sensor noise alone makes.
 
-    Below 1 where the filter allows for contact forces that a steady stance does not use up.
-    Averaged over a fiftieth of a second, for the draws are few.
+    It is below 1 where the filter allows for contact forces that a steady stance does not need.
+    The draws are few, so that their power is averaged over some nodes.
     """
+    settings = ExpectedSettings.current()
     rng = np.random.default_rng(seed)
     sigma = np.sqrt(np.where(np.isfinite(system.R), system.R, 0.0))
-    y = sigma[..., None] * rng.standard_normal((*sigma.shape, DRAWS))
-    g = np.zeros((*sigma.shape[:2], system.G.shape[-1], DRAWS))
+    y = sigma[..., None] * rng.standard_normal((*sigma.shape, settings.draws))
+    g = np.zeros((*sigma.shape[:2], system.G.shape[-1], settings.draws))
     _, errors = innovations(system, gain, y, g)
     power = np.mean((gain.whitener @ errors) ** 2, axis=-1)
-    width = 21
+    width = settings.width
     padded = np.pad(power, ((width // 2, width // 2), (0, 0), (0, 0)), mode="edge")
     total = np.cumsum(padded, axis=0)
     total = np.concatenate([np.zeros((1, *total.shape[1:])), total])
-    return np.asarray(np.maximum((total[width:] - total[:-width]) / width, 0.02))
+    return np.asarray(np.maximum((total[width:] - total[:-width]) / width, settings.least))
 
 
 def predicted_error(system: System, y: Array, g: Array, steps: int) -> Array:

@@ -7,9 +7,20 @@ from typing import Any
 
 import numpy as np
 
+from kemba.settings import Settings, setting
+
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
-MISSING = 1e12  # times the variance: a row that was not measured tells nothing
+
+class FilterSettings(Settings):
+    """Numbers of the filter."""
+
+    missing: float = setting(
+        1e12,
+        "1",
+        "variance of a row that was not measured, over the largest variance",
+        "convention: such a row tells nothing",
+    )
 
 
 @dataclass(frozen=True)
@@ -44,7 +55,9 @@ def gains(system: System) -> Gains:
     s = system
     n, runs, m, d = s.H.shape
     known = np.isfinite(s.R)
-    R = np.where(known, s.R, MISSING * np.nanmax(np.where(known, s.R, 0.0)))
+    R = np.where(
+        known, s.R, FilterSettings.current().missing * np.nanmax(np.where(known, s.R, 0.0))
+    )
     noise = s.G @ s.W @ s.G.swapaxes(-1, -2)
     Ft, Ht = s.F.swapaxes(-1, -2), s.H.swapaxes(-1, -2)
     eye, diagonal = np.eye(d), np.arange(m)

@@ -8,25 +8,39 @@ from typing import Any
 
 import numpy as np
 
+from kemba.effects.pneumatics.switching import Pulse, pulses
+from kemba.effects.sensors import CHANNELS
+from kemba.identify.problem.noise import WhiteNoiseSettings, difference_sigma
+from kemba.settings import BY_HAND, Settings, setting
 from kemba.trajectory import Trajectory
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
-SHORTEST, LONGEST = 0.7e-3, 1.6e-3  # s between nodes; denser rows are averaged, gaps filled
-TRIMMED = 0.97  # share of third differences that count for the noise: impacts are no noise
+
+class ResamplingSettings(Settings):
+    """Nodes of robot logs."""
+
+    shortest: float = setting(0.7e-3, "s", "denser rows are averaged", BY_HAND)
+    longest: float = setting(1.6e-3, "s", "nodes farther apart are filled", BY_HAND)
+    finest: float = setting(
+        1e-6,
+        "1",
+        "smallest noise of a channel, in m or rad",
+        "convention: far below what position sensors resolve",
+    )
 
 
 @dataclass(frozen=True)
 class ResampledLog:
     """One run: `time` (n,) of the nodes, `y` (n, m) with NaN where nothing was measured,
-    `torque` (n, legs) held from each node, `switches` per valve as (times, +-1, at the start),
-    `sigma` (m,) of one value of `y`."""
+    `torque` (n, legs) held from each node, the pulses `sent` to each valve, `sigma` (m,) of one
+    value of `y`."""
 
     name: str
     time: Array
     y: Array
     torque: Array
-    switches: tuple[tuple[Array, Array, float], ...]
+    sent: tuple[list[Pulse], ...]
     sigma: Array
 
 
@@ -39,11 +53,11 @@ def resample(
     raw = np.stack([log[c][keep] for c in channels], axis=1)
     torque = np.stack([_held(log[f"{leg}/hip/tau"][keep]) for leg in legs], axis=1)
     valves = [f"{leg}/valve/{side}" for leg in legs for side in ("extend", "retract")]
-    switches = tuple(_switches(time, _held(log[v][keep])) for v in valves)
+    sent = tuple(pulses(time, _held(log[v][keep])) for v in valves)
     sigma = np.array([_sigma(log, c, raw[:, i]) for i, c in enumerate(channels)])
     time, raw, torque, count = _thin(time, raw, torque)
     time, raw, torque = _fill(time, raw, torque)
-    return ResampledLog(name, time, raw, torque, switches, sigma / np.sqrt(count))
+    return ResampledLog(name, time, raw, torque, sent, sigma / np.sqrt(count))
 
 
 def _held(values: Array) -> Array:
@@ -52,37 +66,21 @@ def _held(values: Array) -> Array:
     return np.nan_to_num(values[np.maximum.accumulate(index)])
 
 
-def _switches(time: Array, command: Array) -> tuple[Array, Array, float]:
-    on = (command > 0.5).astype(int)
-    edges = np.flatnonzero(np.diff(on)) + 1
-    return time[edges], np.diff(on)[edges - 1].astype(float), float(on[0])
-
-
 def _sigma(log: Trajectory, channel: str, values: Array) -> float:
-    """Noise of one sample: as the sidecar says, else from third differences."""
+    """Noise of one sample: as the sidecar says, else as its values tell, else the usual one."""
     noise = log.meta.get("noise") or {}
     for key in (channel, f"{channel} [{log.unit(channel)}]"):
         if key in noise:
             return float(noise[key])
-    return learnt_sigma(values)
-
-
-def learnt_sigma(values: Array) -> float:
-    """White noise (1 sigma) of a smooth signal, from its third differences."""
-    values = values[np.isfinite(values)]
-    rough = np.abs(np.diff(values, 3)) / np.sqrt(20.0)
-    if not len(rough):
-        return 1e-3
-    inner = rough[rough <= np.quantile(rough, TRIMMED)]
-    steps = np.diff(np.unique(values))
-    quantum = float(np.min(steps)) / np.sqrt(12.0) if len(steps) else 1e-6
-    return max(float(np.sqrt(np.mean(inner**2))) * 1.075, min(quantum, 5e-4), 1e-6)
+    if np.isfinite(values).sum() < WhiteNoiseSettings.current().fewest:
+        return CHANNELS[channel.split("/")[-1]][1]
+    return max(difference_sigma(values), ResamplingSettings.current().finest)
 
 
 def _thin(time: Array, raw: Array, torque: Array) -> tuple[Array, Array, Array, int]:
-    """Averages of so many rows that nodes are at least SHORTEST apart."""
+    """Averages of so many rows that nodes are at least `shortest` apart."""
     count = max(1, int(np.floor(1e-3 / max(np.median(np.diff(time)), 1e-9) + 0.3)))
-    if np.median(np.diff(time)) >= SHORTEST or count == 1:
+    if np.median(np.diff(time)) >= ResamplingSettings.current().shortest or count == 1:
         return time, raw, torque, 1
     n = len(time) // count * count
     with np.errstate(invalid="ignore"):
@@ -94,7 +92,9 @@ def _thin(time: Array, raw: Array, torque: Array) -> tuple[Array, Array, Array, 
 
 def _fill(time: Array, raw: Array, torque: Array) -> tuple[Array, Array, Array]:
     """Nodes without measurement where rows are far apart."""
-    pieces = np.maximum(1, np.ceil(np.diff(time) / LONGEST)).astype(int)
+    pieces = np.maximum(1, np.ceil(np.diff(time) / ResamplingSettings.current().longest)).astype(
+        int
+    )
     if (pieces == 1).all():
         return time, raw, torque
     start = np.repeat(np.arange(len(pieces)), pieces)

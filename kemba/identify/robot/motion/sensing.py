@@ -1,54 +1,69 @@
-"""What sensors make of the motion: bias, scale and delay per channel."""
+"""What sensors make of the motion along a robot log, channel by channel."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from kemba.identify.evidence.problem import Theta
+from kemba.effects.sensors import SensorEffect, as_measured
+from kemba.effects.series import Series
 from kemba.identify.robot.motion.resampled import ResampledLog
+from kemba.settings import BY_HAND, Settings, setting
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
-CALM = 2.0  # nodes, of about 1 ms, over which rates are smoothed before a delay reads them
+
+class SensingSettings(Settings):
+    """How late sensors read a motion."""
+
+    calm: float = setting(
+        2.0,
+        "1",
+        "nodes over which rates are smoothed before a delay reads them",
+        f"{BY_HAND}; noise in the rate makes delays look shorter, by as much as a half",
+    )
 
 
 def travelled(rate: Array, h: Array) -> Array:
     """Way (n, L, m) of each coordinate since the start, by its rate and the steps h (n, L).
 
-    Smoothed: noise in the rate that a delay is multiplied with makes delays look shorter than they
-    are, by as much as a half.
+    The rates are smoothed first. A delay multiplies them, and noise in a regressor makes its
+    coefficient too small: delays would look shorter than they are, by as much as a half.
     """
-    calm: Array = gaussian_filter1d(rate, CALM, axis=0, mode="nearest")
+    calm: Array = gaussian_filter1d(rate, SensingSettings.current().calm, axis=0, mode="nearest")
     steps = 0.5 * (calm[1:] + calm[:-1]) * h[:-1, :, None]
     return np.concatenate([np.zeros_like(rate[:1]), np.cumsum(steps, axis=0)])
 
 
 def sensed(
-    channels: Sequence[str], resampled: Sequence[ResampledLog], y: Array, way: Array, theta: Theta
+    faults: Mapping[str, Sequence[SensorEffect]],
+    resampled: Sequence[ResampledLog],
+    y: Array,
+    way: Array,
 ) -> Array:
-    """Readings (n, L, m) of the true coordinates `y`, at theta; `way` (n, L, m) as `travelled`."""
+    """What sensors with these faults, by channel, show (n, L, m) of the true coordinates `y`.
+
+    `way` (n, L, m) as `travelled` gives it: late sensors read the past from it.
+    """
     seen = y.copy()
-    for i, channel in enumerate(channels):
-        delay = theta.get(f"sensor_delay:{channel}.dt", 0.0)
-        for j, track in enumerate(resampled if delay else ()):
-            t, own = track.time, way[: len(track.time), j, i]
-            seen[: len(t), j, i] += np.interp(t - delay, t, own) - own
-        seen[..., i] *= 1.0 + theta.get(f"sensor_scale:{channel}.k", 0.0)
-        seen[..., i] += theta.get(f"sensor_bias:{channel}.b", 0.0)
+    for i, (channel, own) in enumerate(faults.items()):
+        for j, log in enumerate(resampled if own else ()):
+            n = len(log.time)
+            true = Series(log.time, y[:n, j, i], path=way[:n, j, i])
+            seen[:n, j, i] = as_measured(own, channel, true).value
     return np.asarray(seen)
 
 
 def ahead(values: Array, rates: Array, resampled: Sequence[ResampledLog], late: Array) -> Array:
     """Columns (n, L, k) as they are `late` (k,) seconds later: what late sensors will have seen;
-    by their `rates` beyond the end of a run."""
+    by their `rates` beyond the ends of a run."""
     shifted = values.copy()
     for i in np.flatnonzero(late):
-        for j, track in enumerate(resampled):
-            t, n = track.time + late[i], len(track.time)
-            beyond = np.maximum(t - track.time[-1], 0.0) * rates[n - 1, j, i]
-            shifted[:n, j, i] = np.interp(t, track.time, values[:n, j, i]) + beyond
+        for j, log in enumerate(resampled):
+            n = len(log.time)
+            now = Series(log.time, values[:n, j, i], (rates[:n, j, i],))
+            shifted[:n, j, i] = now.late(-late[i]).value
     return np.asarray(shifted)

@@ -1,0 +1,159 @@
+"""The page of the sensitivity study: one line per threshold, made from its records."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from kemba.settings import Settings
+
+PAGE = Path(__file__).resolve().parents[1] / "docs" / "sensitivity.md"
+LIMIT = 0.05  # share of verdicts that may change when a threshold is doubled
+VERBS = {
+    "discover": "Verdicts of `discover`: the verdict, or which effects it names",
+    "compare": "Verdicts of `compare`: good, tolerable or bad, and the kinds of its hints",
+    "schedule": "Plans: good or not",
+}
+HEAD = """# What hangs on the thresholds
+
+A threshold on which a verdict hangs is a setting (`kemba/settings.py`) that is marked `decides`.
+`benchmarks/sensitivity.py` halves and doubles each of them, one at a time, and counts the verdicts
+that change. A verdict should follow from the data, so none of these numbers should matter much. A
+threshold whose doubling changes more than 5 % of the verdicts is **bold**: it needs a reason better
+than the one in its column *origin*, or has to be replaced by something derived.
+
+*cases*: how many cases were run and read the setting; where none reads it, nothing can change.
+Columns *half* and *double* count the cases that changed. Whole numbers are rounded; those that
+halving leaves as they are show no change. This page is written by
+`python benchmarks/sensitivity.py --report`.
+"""
+
+Record = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Change:
+    """One setting, times a factor."""
+
+    cls: type[Settings]
+    field: str
+    factor: float
+
+    @property
+    def name(self) -> str:
+        return f"{self.cls.__name__}.{self.field}"
+
+    @property
+    def about(self) -> dataclasses.Field[Any]:
+        """The field with its metadata."""
+        (found,) = (f for f in dataclasses.fields(self.cls) if f.name == self.field)  # type: ignore[arg-type]
+        return found
+
+    @property
+    def value(self) -> Any:
+        """What the setting becomes; whole numbers stay whole and at least one."""
+        old = self.about.default
+        if isinstance(old, tuple):
+            return tuple(v * self.factor for v in old)
+        return max(1, round(old * self.factor)) if isinstance(old, int) else old * self.factor
+
+
+def read(path: Path) -> list[Record]:
+    """The records so far."""
+    if not path.is_file():
+        return []
+    return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines() if line]
+
+
+def write(changes: Sequence[Change], records: Sequence[Record]) -> None:
+    """The whole page."""
+    parts = [HEAD]
+    for verb, title in VERBS.items():
+        own = [r for r in records if r["case"].partition(":")[0] == verb]
+        if own:
+            parts.append(section(verb, title, changes, own))
+    PAGE.write_text("\n".join(parts), encoding="utf-8")
+    print(f"{PAGE.name}: {len(records)} records")
+
+
+def section(verb: str, title: str, changes: Sequence[Change], records: Sequence[Record]) -> str:
+    """The table of one verb, and what changed."""
+    base = {r["case"]: r["answer"] for r in records if not r["setting"]}
+    found: dict[str, dict[float, dict[str, Any]]] = defaultdict(lambda: defaultdict(dict))
+    for r in records:
+        if r["setting"]:
+            found[r["setting"]][r["factor"]][r["case"]] = r["answer"]
+    kinds = sorted({":".join(case.split(":")[1:-1]) for case in base} - {""})
+    sample = " and ".join(f"{sum(f':{k}:' in c for c in base)} {k}" for k in kinds) or len(base)
+    lines = [f"## {title}", "", f"Sample: {sample} cases. One case is {100 / len(base):.0f} %.", ""]
+    more = " | cost, iterations at half; double" if verb == "schedule" else ""
+    lines += [
+        f"| setting | value | unit | cases | half | double{more} | origin |",
+        "|---|---|---|---|---|---" + ("|---" if more else "") + "|---|",
+    ]
+    told, untouched = [], []
+    for name, by_factor in found.items():
+        about = next((c.about for c in changes if c.name == name), None)
+        if about is None:
+            continue  # a setting of the past
+        cases = {c for answers in by_factor.values() for c, a in answers.items() if a is not None}
+        if not cases:
+            untouched.append(f"`{name}`")
+            continue
+        flips = {f: flipped(base, by_factor[f]) for f in (0.5, 2.0)}
+        large = len(flips[2.0]) > LIMIT * len(base)
+        shown = f"**`{name}`**" if large else f"`{name}`"
+        counts = f"{len(flips[0.5])} | {len(flips[2.0])}"
+        extra = f" | {costs(base, by_factor)}" if more else ""
+        origin = about.metadata["origin"].replace("|", "/")
+        row = f"| {shown} | {about.default} | {about.metadata['unit']} | {len(cases)} | {counts}"
+        lines.append(f"{row}{extra} | {origin} |")
+        told += [
+            f"- `{name}` times {f:g}, {case}: {words(base[case])}, then {words(by_factor[f][case])}"
+            for f, which in flips.items()
+            for case in which
+        ]
+    if untouched:
+        lines += ["", f"Read in none of these cases: {', '.join(untouched)}."]
+    if told:
+        lines += ["", "What changed:", "", *told]
+    return "\n".join([*lines, ""])
+
+
+def flipped(base: dict[str, Any], answers: dict[str, Any]) -> list[str]:
+    """The cases whose verdict is another."""
+    return [c for c, a in answers.items() if a is not None and key(a) != key(base[c])]
+
+
+def key(answer: dict[str, Any]) -> tuple[Any, ...]:
+    """What counts as a verdict."""
+    return (answer["verdict"], *answer.get("added", ()), *answer.get("hints", ()))
+
+
+def words(answer: dict[str, Any]) -> str:
+    """A verdict in short."""
+    parts = [*answer.get("added", ()), *answer.get("hints", ())]
+    return f"{answer['verdict']} ({', '.join(parts)})" if parts else str(answer["verdict"])
+
+
+def costs(base: dict[str, Any], by_factor: dict[float, dict[str, Any]]) -> str:
+    """Mean ratio of cost and iterations to the plan with all settings as they are."""
+    return "; ".join(
+        f"{mean(base, by_factor[f], 'cost')}, {mean(base, by_factor[f], 'iterations')}"
+        for f in (0.5, 2.0)
+    )
+
+
+def mean(base: dict[str, Any], answers: dict[str, Any], what: str) -> str:
+    """Mean ratio over the good plans."""
+    ratios: Iterable[float] = [
+        a[what] / base[c][what]
+        for c, a in answers.items()
+        if a is not None and a["verdict"] == base[c]["verdict"] == "good" and base[c][what]
+    ]
+    return f"{sum(ratios) / len(list(ratios)):.2f}" if ratios else "-"

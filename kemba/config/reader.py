@@ -1,0 +1,235 @@
+"""Reading YAML text: plain data and where each part stands, within limits, running no code.
+
+The parser is PyYAML's (libyaml where it is installed). Only its events are used; tags never
+choose a Python class.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from kemba.config.scalars import resolve
+from kemba.settings import Settings, setting
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+Location = tuple[str | int, ...]
+Mark = tuple[int, int]
+
+CORE = "tag:yaml.org,2002:"
+
+
+class YamlLimits(Settings):
+    """How large a YAML file may be. Files of people are far below; a bomb is refused at once."""
+
+    size: int = setting(2_000_000, "B", "of a file", "convention: a second of reading")
+    nodes: int = setting(
+        20_000, "1", "keys, items and values, those behind aliases included",
+        "convention: ten times the largest shipped file, read within a second",
+    )  # fmt: skip
+    depth: int = setting(30, "1", "nested groups", "convention: no schema is deeper than 8")
+    aliases: int = setting(200, "1", "uses of `*name`", "convention: far above any use")
+    key: int = setting(200, "1", "characters of a key", "convention: no column name is longer")
+    text: int = setting(20_000, "1", "characters of a value", "convention: five pages of notes")
+
+
+class YamlError(Exception):
+    """A mistake in YAML text, at a line and column counted from 0 (None: nowhere)."""
+
+    def __init__(self, what: str, mark: Mark | None = None, hint: str = "") -> None:
+        super().__init__(what)
+        self.what, self.mark, self.hint = what, mark, hint
+
+
+@dataclass
+class Tree:
+    """A node of the text: `value` is a scalar, a list of trees, or a list of (key, tree)."""
+
+    mark: Mark
+    value: Any = None
+    kind: str = "scalar"
+    closed: bool = True
+
+
+@dataclass
+class Read:
+    """Data with the places of its parts, and keys that occur twice: location and both marks."""
+
+    data: Any = None
+    marks: dict[Location, Mark] = field(default_factory=dict)
+    twice: list[tuple[Location, Mark, Mark]] = field(default_factory=list)
+
+
+def read(text: str) -> Read:
+    """The data of a YAML text with one document. Raises YamlError."""
+    limits = YamlLimits.current()
+    if len(text) > limits.size:
+        raise YamlError(f"is longer than {limits.size} characters")
+    found = Read()
+    tree = _Builder(limits).tree(text)
+    if tree is not None:
+        _Walk(found, limits).into(tree, ())
+        found.data = _data(tree)
+    return found
+
+
+class _Builder:
+    """From events to a tree. Aliases share their tree, so that nothing grows here."""
+
+    def __init__(self, limits: YamlLimits) -> None:
+        self.limits = limits
+        self.anchors: dict[str, Tree] = {}
+        self.open: list[tuple[Tree, list[tuple[str, Mark] | None]]] = []
+        self.root: Tree | None = None
+        self.count = self.aliases = 0
+
+    def tree(self, text: str) -> Tree | None:
+        """The tree of the one document, None when the text is empty."""
+        for event in _events(text):
+            mark = (event.start_mark.line, event.start_mark.column)
+            name = type(event).__name__
+            if name == "DocumentStartEvent" and self.root is not None:
+                raise YamlError("a second document begins here", mark, "one file is one document")
+            if name == "ScalarEvent":
+                self._add(self._scalar(event, mark), event.anchor)
+            elif name == "AliasEvent":
+                self._add(self._alias(event.anchor, mark), None)
+            elif name in ("MappingStartEvent", "SequenceStartEvent"):
+                kind = "map" if name.startswith("M") else "seq"
+                self._begin(Tree(mark, [], kind, closed=False), event, kind)
+            elif name in ("MappingEndEvent", "SequenceEndEvent"):
+                self.open.pop()[0].closed = True
+        return self.root
+
+    def _begin(self, tree: Tree, event: Any, kind: str) -> None:
+        if event.tag not in (None, "!", CORE + kind):
+            raise YamlError(_tag(event.tag), tree.mark, "leave the tag out")
+        if len(self.open) >= self.limits.depth:
+            raise YamlError(f"is nested deeper than {self.limits.depth} levels", tree.mark)
+        self._add(tree, event.anchor)
+        self.open.append((tree, [None]))
+
+    def _add(self, tree: Tree, anchor: str | None) -> None:
+        """Put a node where the text has it: as a key, a value, an item, or the whole."""
+        self.count += 1
+        if self.count > self.limits.nodes:
+            raise YamlError(f"has more than {self.limits.nodes} keys and values", tree.mark)
+        if anchor is not None:
+            self.anchors[anchor] = tree
+        if not self.open:
+            self.root = tree
+            return
+        holder, key = self.open[-1]
+        if holder.kind == "seq":
+            holder.value.append(tree)
+        elif key[0] is None:
+            key[0] = (self._key(tree), tree.mark)
+        else:
+            holder.value.append((*key[0], tree))
+            key[0] = None
+
+    def _key(self, tree: Tree) -> str:
+        if tree.kind != "scalar":
+            raise YamlError("a group or list cannot be a key", tree.mark, "a text was expected")
+        text = str(tree.value[1])
+        if text == "<<" and not tree.value[0]:
+            what = "'<<' (merging of groups) is not part of YAML 1.2"
+            raise YamlError(what, tree.mark, "write the keys out, or use 'base' in a model")
+        if len(text) > self.limits.key:
+            what = f"this key has {len(text)} characters; {self.limits.key} are allowed"
+            raise YamlError(what, tree.mark)
+        return text
+
+    def _alias(self, name: str, mark: Mark) -> Tree:
+        self.aliases += 1
+        if self.aliases > self.limits.aliases:
+            raise YamlError(f"has more than {self.limits.aliases} aliases", mark)
+        if name not in self.anchors:
+            raise YamlError(f"the alias '*{name}' has no anchor '&{name}' before it", mark)
+        if not self.anchors[name].closed:
+            raise YamlError(f"the alias '*{name}' contains itself", mark)
+        return self.anchors[name]
+
+    def _scalar(self, event: Any, mark: Mark) -> Tree:
+        """`value`: whether it is quoted, its text, and what it stands for."""
+        text: str = event.value
+        if len(text) > self.limits.text:
+            what = f"this text has {len(text)} characters; {self.limits.text} are allowed"
+            raise YamlError(what, mark)
+        plain, tag = event.implicit[0], event.tag
+        try:
+            if tag in (None, "!"):
+                return Tree(mark, (not plain, text, resolve(text)[1] if plain else text))
+            wanted = tag.removeprefix(CORE)
+            if wanted == "str":
+                return Tree(mark, (True, text, text))
+            kind, value = resolve(text)
+        except ValueError as error:
+            raise YamlError(str(error), mark) from None
+        if wanted not in ("null", "bool", "int", "float"):
+            raise YamlError(_tag(tag), mark, "leave the tag out")
+        if (kind, wanted) == ("int", "float"):
+            kind, value = "float", float(value)
+        if kind != wanted:
+            raise YamlError(f"'{text[:40]}' is no {wanted}, as its tag says", mark)
+        return Tree(mark, (False, text, value))
+
+
+class _Walk:
+    """Places of all parts of a tree; what stands behind aliases counts every time."""
+
+    def __init__(self, found: Read, limits: YamlLimits) -> None:
+        self.found, self.limits, self.count = found, limits, 0
+
+    def into(self, tree: Tree, location: Location) -> None:
+        self.count += 1
+        if self.count > self.limits.nodes or len(location) > self.limits.depth:
+            what = f"its aliases stand for more than {self.limits.nodes} keys and values"
+            if len(location) > self.limits.depth:
+                what = f"its aliases are nested deeper than {self.limits.depth} levels"
+            raise YamlError(what, tree.mark)
+        for part, mark, inner in _parts(tree):
+            place = (*location, part)
+            if place in self.found.marks:
+                self.found.twice.append((place, self.found.marks[place], mark))
+            else:
+                self.found.marks[place] = mark
+            self.into(inner, place)
+
+
+def _parts(tree: Tree) -> Iterator[tuple[str | int, Mark, Tree]]:
+    if tree.kind == "map":
+        yield from tree.value
+    elif tree.kind == "seq":
+        yield from ((i, item.mark, item) for i, item in enumerate(tree.value))
+
+
+def _data(tree: Tree) -> Any:
+    """Plain data; aliases become copies, so that changing one leaves the other alone."""
+    if tree.kind == "map":
+        return {key: _data(inner) for key, _, inner in tree.value}
+    if tree.kind == "seq":
+        return [_data(item) for item in tree.value]
+    return tree.value[2]
+
+
+def _events(text: str) -> Iterator[Any]:
+    """PyYAML's events. Raises YamlError at syntax errors."""
+    import yaml
+
+    loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+    try:
+        yield from yaml.parse(text, Loader=loader)
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        what = f"is not valid YAML: {error.problem or error.context}"
+        raise YamlError(what, (mark.line, mark.column) if mark else None) from None
+    except (yaml.YAMLError, ValueError) as error:
+        raise YamlError(f"is not valid YAML: {str(error).splitlines()[0]}") from None
+
+
+def _tag(tag: str) -> str:
+    short = tag.replace(CORE, "!!")
+    return f"the tag '{short[:60]}' is not allowed; YAML never runs code or makes objects here"

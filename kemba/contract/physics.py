@@ -1,0 +1,146 @@
+"""Promises about an effect's numbers: finite, off is absent, friction takes energy away."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kemba.contract.cases import (
+    Broken,
+    Placed,
+    Point,
+    example,
+    model_of,
+    points,
+    values_of,
+    without,
+)
+from kemba.effects.sensors import SensorEffect
+from kemba.model import Model
+
+NOTHING = 1e-9  # slope of the residual below which a parameter has no influence
+TINY = 1e-6  # W; rounding of a dissipated power
+
+
+def finite(placed: Placed) -> None:
+    """Residual and slopes are finite at random states and at the borders, on robot and rig."""
+    for case in (placed, Placed(placed.effect, rig=True)) if placed.fits_rig else (placed,):
+        for point in points(case.model):
+            for name, value in case.slopes(**point, p=case.values).items():
+                if not np.isfinite(np.asarray(value)).all():
+                    part = {"F": "residual", "dy": "slope", "dp": "slope by the parameters"}[name]
+                    where = "rig" if case.rig else "robot"
+                    raise Broken(f"its {part} is not finite on the {where} at v = {point['v']}")
+
+
+def every_parameter_matters(placed: Placed) -> None:
+    """Each parameter changes what the effect does."""
+    effect = placed.on
+    if isinstance(effect, SensorEffect):
+        return  # see `measuring`
+    if effect.timing():
+        for name in effect.parameters():
+            if effect.bind({name: effect.value(name) + 0.001}).timing() == effect.timing():
+                raise Broken(f"{name} changes no time")
+        return
+    effect = placed.resolved
+    slope = sum(
+        np.abs(np.asarray(placed.slopes(**point, p=placed.values)["dp"]))
+        for point in points(placed.model, 12)
+    )
+    for i, name in enumerate(effect.parameters()):
+        moves_bounds = effect.bind({name: 1.1 * effect.value(name)}).inputs() != effect.inputs()
+        if not moves_bounds and slope[:, i].max() <= NOTHING:
+            raise Broken(f"{name} changes nothing")
+
+
+def off_is_absent(placed: Placed) -> None:
+    """At its off value the model is the same as without the effect."""
+    off = placed.on.bind(placed.effect.off)
+    model = model_of(off)
+    base = model_of() if off.replaces else without(model, off.name)
+    kept = [i for i, key in enumerate(model.states) if key in base.states]
+    for point in points(model):
+        point["s"] = settled(model, point, kept)
+        named = dict(zip(model.forces, point["lam"], strict=True))
+        forces = np.array([named[key] for key in base.forces])
+        there = {**point, "s": point["s"][kept], "sd": point["sd"][kept], "lam": forces}
+        found, wanted = values_of(model, point), values_of(base, there)
+        found["rate"] = found["rate"][kept]
+        if off.replaces:  # same pairs under another name, hence in another order
+            for part in ("pair_a", "pair_b"):
+                found[part], wanted[part] = np.sort(found[part]), np.sort(wanted[part])
+        for part, value in wanted.items():
+            if not same(found[part], value, 1e-6, 1e-6):
+                raise Broken(f"switched off it still changes the {part}")
+
+
+def settled(model: Model, point: Point, kept: list[int]) -> np.ndarray:
+    """Effect states with those that are not `kept` at rest: their rates are linear in them."""
+    own = [i for i in range(len(model.states)) if i not in kept]
+    s = np.array(point["s"], dtype=float)
+    if not own:
+        return s
+    for i in own:
+        s[i] = list(model.states.values())[i].value
+    start = values_of(model, {**point, "s": s})["rate"][own]
+    slope = np.zeros((len(own), len(own)))
+    for column, i in enumerate(own):
+        moved = s.copy()
+        moved[i] += 1e-3
+        slope[:, column] = (values_of(model, {**point, "s": moved})["rate"][own] - start) / 1e-3
+    s[own] -= np.linalg.lstsq(slope, start, rcond=None)[0]  # what has no rate stays where it is
+    return s
+
+
+def dissipates(placed: Placed) -> None:
+    """An effect that calls itself dissipative never gives energy, and takes some."""
+    base = without(placed.model, placed.on.name)
+    lost = []
+    for point in points(placed.model, 12):
+        change = values_of(placed.model, point)["dynamics"] - values_of(base, point)["dynamics"]
+        lost.append(float(point["v"] @ change))
+    if min(lost) < -NOTHING:
+        raise Broken(f"it gives {-min(lost):.3g} W; `dissipative` says that it only takes")
+    if max(lost) <= TINY:
+        raise Broken("it takes no energy at all")
+
+
+def order_does_not_matter(placed: Placed) -> None:
+    """The order of a model's list changes nothing."""
+    model = placed.model
+    turned = Model(model.mechanism, model.effects[::-1], model.supply)
+    for point in points(model, 2):
+        for part, value in values_of(model, point).items():
+            if not same(values_of(turned, point)[part], value, 1e-12, 0.0):
+                raise Broken(f"the {part} depends on the order of the list")
+
+
+def keeps_the_mirror(placed: Placed) -> None:
+    """With an effect on every leg the model keeps the mirror symmetry of its robot."""
+    from kemba.ocp.transcription.symmetry import find_symmetry
+
+    if find_symmetry(placed.model) is None:
+        raise Broken("the model loses its mirror; see `mirror` in docs/extending.md")
+
+
+def one_leg_only(placed: Placed) -> None:
+    """With `on` it acts at that leg and leaves the others alone."""
+    legs = placed.model.mechanism.legs
+    here, other, kind = legs[-1], legs[0], placed.on.kind
+    one = example(placed.effect).model_copy(update={"on": here})
+    model = model_of(one)
+    labels = [instance.label for instance in model.instances]
+    if one.name != f"{kind}:{here}" or f"{here}/{one.name}" not in labels:
+        raise Broken(f"'on: {here}' does not place it there")
+    if len(legs) > 1 and f"{other}/{one.name}" in labels:
+        raise Broken(f"'on: {here}' places it at {other} too")
+    for replaced in one.replaces:
+        if len(legs) > 1 and f"{other}/{replaced}" not in labels:
+            raise Broken(f"at {other} the effect '{replaced}' is gone")
+    if not np.isfinite(values_of(model, next(iter(points(model))))["dynamics"]).all():
+        raise Broken("its residual is not finite")
+
+
+def same(found: np.ndarray, wanted: np.ndarray, rtol: float, atol: float) -> bool:
+    """Whether two arrays agree within the tolerances of numpy."""
+    return found.shape == wanted.shape and bool(np.allclose(found, wanted, rtol=rtol, atol=atol))

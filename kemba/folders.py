@@ -1,0 +1,131 @@
+"""Places for results: numbered when nobody named one, never overwritten, one writer at a time."""
+
+from __future__ import annotations
+
+import errno
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from kemba.errors import KembaError
+from kemba.files import write_error
+
+if TYPE_CHECKING:
+    from filelock import BaseFileLock
+
+LOCK = ".lock"
+PROBE = 1_000_000  # bytes: about what a run folder takes, its solver's log included
+
+
+def fresh(path: str | Path, force: bool = False, option: str = "--out") -> Path:
+    """`path` for a new file, which can be written. Raises KembaError.
+
+    A file that is there already is kept, unless `force`.
+    """
+    path = Path(path)
+    if path.is_dir():
+        raise KembaError(f"{option} {path}", "is a folder", "the name of a file was expected")
+    if path.exists() and not force:
+        hint = "give another name, or --force to replace it"
+        raise KembaError(f"{option} {path}", "exists already", hint=hint)
+    try_writing(path.parent)
+    return path
+
+
+def next_free(path: Path) -> Path:
+    """`path`, or `path-2`, `path-3`, ... (`figure-2.png`): the first that holds nothing yet."""
+    number, found = 1, path
+    while found.exists() and not _is_empty(found):
+        number += 1
+        found = path.with_name(f"{path.stem}-{number}{path.suffix}")
+    return found
+
+
+@contextmanager
+def claimed(
+    out: str | Path | None, default: str | Path, results: str, force: bool = False
+) -> Iterator[Path]:
+    """A folder to write results to, which no other process writes to meanwhile.
+
+    `out`, or the first free one of `default`, `default-2`, ... Raises KembaError when `out` holds
+    a finished answer (a file that matches `results`) and not `force`, when it cannot be written,
+    or when another process writes to it. A folder that stays empty is removed at the end.
+    """
+    path = next_free(Path(default)) if out is None else Path(out)
+    made = not path.exists()
+    try_writing(path)
+    lock = lock_folder(path)
+    try:
+        old = sorted(path.glob(results))
+        if old and not force:
+            hint = "give another --out, or --force to replace it"
+            raise KembaError(f"--out {path}", f"holds results already ({old[0].name})", hint=hint)
+        yield path
+    finally:
+        unlock(lock, path)
+        if made and _is_empty(path):
+            with suppress(OSError):
+                path.rmdir()
+
+
+@contextmanager
+def held(folder: Path) -> Iterator[Path]:
+    """A folder that no other process writes to meanwhile. Raises KembaError as `claimed` does."""
+    try_writing(folder)
+    lock = lock_folder(folder)
+    try:
+        yield folder
+    finally:
+        unlock(lock, folder)
+
+
+def lock_folder(folder: Path) -> BaseFileLock | None:
+    """Hold a folder against other processes, until `unlock` or the end of this process.
+
+    None on a file system without locks. Raises KembaError when another process holds it.
+    """
+    from filelock import FileLock, Timeout
+
+    lock = FileLock(folder / LOCK)
+    try:
+        lock.acquire(timeout=0)
+    except Timeout:
+        what = "another kemba-opt is writing to this folder"
+        hint = "wait until it has ended, or give another --out"
+        raise KembaError(str(folder), what, hint=hint) from None
+    except NotImplementedError:
+        return None
+    except OSError as error:
+        if error.errno in (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP):
+            return None
+        raise write_error(folder, error) from None
+    return lock
+
+
+def unlock(lock: BaseFileLock | None, folder: Path) -> None:
+    """Let a folder go."""
+    if lock is not None:
+        with suppress(OSError):
+            (folder / LOCK).unlink(missing_ok=True)
+            lock.release()
+
+
+def try_writing(folder: str | Path) -> None:
+    """Make a folder and see that files can be written there, before long work begins.
+
+    Raises KembaError when they cannot, or when the disk is full.
+    """
+    folder = Path(folder)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder) as probe:
+            probe.write(bytes(PROBE))
+            probe.flush()
+    except OSError as error:
+        raise write_error(folder, error) from None
+
+
+def _is_empty(path: Path) -> bool:
+    return path.is_dir() and all(item.name == LOCK for item in path.iterdir())

@@ -1,0 +1,100 @@
+"""A set of bench logs and what a model predicts for each of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kemba.identify.bench.bench_log import BenchLog
+from kemba.identify.bench.motion import SmoothedMotion
+from kemba.identify.bench.prediction import Predictor
+from kemba.identify.problem.types import Array, Theta
+from kemba.settings import Settings, setting
+
+
+class StartSettings(Settings):
+    """How a log begins."""
+
+    early: float = setting(
+        0.08,
+        "s",
+        "beginning of a log that tells whether a valve had just been switched",
+        "derived: twice the slowest rise time of Table I",
+    )
+
+
+@dataclass(frozen=True)
+class PredictedLogs:
+    """Bench logs with the predictor of one model.
+
+    `starts`: name in theta -> (index of the log, name of the state), for every state whose value at
+    the start of a log is free.
+    """
+
+    logs: tuple[BenchLog, ...]
+    predictor: Predictor
+    starts: Mapping[str, tuple[int, str]]
+
+    @property
+    def stroke(self) -> float:
+        """Stroke of the cylinder [m]."""
+        return self.predictor.model.mechanism.stroke
+
+    def readings(self, theta: Theta, index: int) -> dict[str, tuple[Array, Array]]:
+        """Channel of log `index` -> what should have been measured (n,) and its variance (n,), in
+        the channel's unit."""
+        start = {name: theta.get(key, 0.0) for key, (i, name) in self.starts.items() if i == index}
+        return self.predictor.readings(self.logs[index], theta, start)
+
+    def standardised(self, theta: Theta, index: int) -> dict[str, Array]:
+        """Channel of log `index` -> (predicted - measured) / sigma of its rows, not whitened."""
+        return standardised(self.logs[index], self.readings(theta, index))
+
+    def motion(self, theta: Theta, index: int) -> SmoothedMotion:
+        """The motion of log `index` without the position sensor's faults."""
+        return self.predictor.true_motion(self.logs[index], theta)
+
+    def acting(self, theta: Theta, index: int) -> Array:
+        """Share of each sample's neighbourhood in which the two valves act (n, 2)."""
+        return self.predictor.acting(self.logs[index], theta)
+
+
+def standardised(log: BenchLog, readings: Mapping[str, tuple[Array, Array]]) -> dict[str, Array]:
+    """Channel -> (predicted - measured) / sigma of the rows that count."""
+    return {
+        c: ((y - log.measured[c]) / np.sqrt(variance))[log.keep[c]]
+        for c, (y, variance) in readings.items()
+    }
+
+
+def settle_starts(logs: Iterable[BenchLog], predictor: Predictor) -> tuple[BenchLog, ...]:
+    """The logs with the first valve pulse as the data have it.
+
+    A valve that is on in the first row may have been on for long, or may just have been switched.
+    The force in the first moments decides.
+    """
+    return tuple(_settled(log, predictor) for log in logs)
+
+
+def _settled(log: BenchLog, predictor: Predictor) -> BenchLog:
+    options = [_begun(c, log.motion.time[0]) for c in log.commands]
+    trials = [replace(log, commands=(e, r)) for e in options[0] for r in options[1]]
+    if len(trials) == 1:
+        return log
+    end = log.motion.time[0] + StartSettings.current().early
+    early = log.motion.time[log.keep["piston/F"]] < end
+
+    def cost(trial: BenchLog) -> float:
+        r = standardised(trial, predictor.readings(trial, {}, {}))["piston/F"]
+        return float(np.mean(np.abs(r[early])))
+
+    return min(trials, key=cost)
+
+
+def _begun(intervals: list[tuple[float, float]], start: float) -> list[list[tuple[float, float]]]:
+    """The pulses as they are, and with the first one switched on when the log starts."""
+    if not intervals or np.isfinite(intervals[0][0]):
+        return [intervals]
+    return [intervals, [(start, intervals[0][1]), *intervals[1:]]]

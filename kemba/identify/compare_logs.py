@@ -1,0 +1,55 @@
+"""From files to a comparison: read, check, predict."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from kemba.identify.compare.compare import Comparison, compare
+from kemba.identify.logs.gate import check_logs
+from kemba.identify.logs.reading import load_map, read_logs, taken_on
+from kemba.identify.problem.problem import Problem
+from kemba.identify.workflow import make_problem, model_of
+from kemba.trajectory import Trajectory
+
+PLANNED = ("body/x", "body/z", "body/pitch", "hip/q", "piston/x")
+
+
+def compare_logs(
+    logs: Sequence[str | Path],
+    model: str = "planning",
+    column_map: str | Path | None = None,
+    run: str | Path | None = None,
+) -> tuple[Comparison, Problem]:
+    """Where `model` fails on these logs, and how far a planned `run` (a folder or a trajectory
+    CSV) was missed. Raises KembaError; BadData where the logs cannot be right."""
+    columns = load_map(column_map) if column_map else None
+    read = read_logs(logs, columns)
+    built = model_of(read, model)
+    taken_on(read, built.mechanism)
+    check_logs(read)
+    problem = make_problem(read, built)
+    problem.validate()
+    found = compare(problem, model, [str(log.meta["path"]) for log in read])
+    if run is not None:
+        plan = Trajectory.read(Path(run) / "trajectory.csv" if Path(run).is_dir() else run)
+        found = replace(found, plan=missed(plan, read))
+    return found, problem
+
+
+def missed(plan: Trajectory, logs: Sequence[Trajectory]) -> Mapping[str, float]:
+    """Largest distance of the logs from the plan, by header, while the plan lasts."""
+    found: dict[str, float] = {}
+    for log in logs:
+        time = log.time - log.time[0] + plan.time[0]
+        during = time <= plan.time[-1]
+        wanted = plan.interpolate(time[during])
+        for name in wanted.names:
+            if name in log and name.endswith(PLANNED):
+                error = np.abs(log[name][during] - wanted[name])
+                header = f"{name} [{log.unit(name)}]"
+                found[header] = max(found.get(header, 0.0), float(np.nanmax(error)))
+    return found

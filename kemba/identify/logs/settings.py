@@ -1,0 +1,80 @@
+"""Limits of the checks that a log has to pass before anything is fitted."""
+
+from __future__ import annotations
+
+from kemba.settings import BY_HAND, Settings, setting
+
+
+class GateSettings(Settings):
+    """When a log is refused."""
+
+    shortest: float = setting(0.15, "s", "a log must last at least so long", BY_HAND, decides=True)
+    fewest: int = setting(60, "1", "a log must have at least so many rows", BY_HAND, decides=True)
+    slowest: float = setting(
+        0.02,
+        "s",
+        "largest median distance of rows",
+        "convention: 50 rows a second; chambers of Table I need 8 to 37 ms to fill",
+        decides=True,
+    )
+    milliseconds: float = setting(
+        0.5,
+        "s",
+        "median distance of rows that suggests a time in ms",
+        "convention: nobody logs at 2 Hz, 1 kHz is usual",
+    )
+    gaps: float = setting(
+        0.5, "s", "mean distance of rows that means long gaps", BY_HAND, decides=True
+    )
+    missing: float = setting(
+        0.3, "1", "share of readings of a needed column that may be missing", BY_HAND, decides=True
+    )
+    impossible: float = setting(
+        0.002,
+        "1",
+        "share of impossible readings that a needed column may have",
+        BY_HAND,
+        decides=True,
+    )
+    impossible_elsewhere: float = setting(
+        0.05, "1", "the same for columns that are not needed", BY_HAND, decides=True
+    )
+    valve: float = setting(
+        0.02,
+        "1",
+        "a valve column may be off 0 or 1 by this",
+        "convention: a scaled voltage is off by a few per mille to a few per cent",
+    )
+    absurd: float = setting(
+        1e12,
+        "1",
+        "readings beyond this, in the channel's SI unit, count as missing",
+        "convention: a broken record, not a measured value; its square would overflow",
+    )
+    quiet: float = setting(
+        1e-4,
+        "1",
+        "noise over range below which a channel counts as noiseless",
+        BY_HAND,
+        decides=True,
+    )
+    frozen: int = setting(
+        40, "1", "equal readings in a row that mean a dead sensor", BY_HAND, decides=True
+    )
+    repeats: float = setting(
+        0.2, "1", "share of equal neighbours elsewhere that means a coarse sensor", BY_HAND
+    )
+    fastest: float = setting(8.0, "m.s-1", "no piston moves faster", BY_HAND, decides=True)
+    leap: float = setting(
+        0.004, "m", "a position may be off by this between two rows", BY_HAND, decides=True
+    )
+    calm: float = setting(
+        0.3, "1", "a leap stands beside steps of less than this share of the largest", BY_HAND
+    )
+    moves: float = setting(
+        2e-3, "m", "a position with less travel does not move", BY_HAND, decides=True
+    )
+    beyond: float = setting(
+        0.015, "m", "a position may read so far past the stroke", BY_HAND, decides=True
+    )
+    dead: int = setting(200, "1", "rows without any change that mean a dead sensor", BY_HAND)

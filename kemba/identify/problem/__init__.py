@@ -1,0 +1,1 @@
+"""What bench and robot logs have in common for identification: residuals, candidates, noise."""

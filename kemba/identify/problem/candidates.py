@@ -1,0 +1,89 @@
+"""What may be missing: effects of the catalogue that a model could have, and sensor faults."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from kemba.effects import BY_KIND
+from kemba.effects.base import Effect
+from kemba.effects.sensors import SensorEffect
+from kemba.identify.problem.problem import Candidate, Parameter
+from kemba.identify.problem.sensor_faults import possible_faults
+from kemba.model.model import Model
+from kemba.model.scene import port_name
+from kemba.quantity import Param
+from kemba.settings import BY_HAND, Settings, setting
+
+
+class CandidateSettings(Settings):
+    """Where the parameters of a missing effect are looked for."""
+
+    fastest: float = setting(
+        6e-4,
+        "s",
+        "smallest time constant that is looked for",
+        "derived: about half a sampling interval of 1 ms; a shorter one shows in no log",
+    )
+    reach: float = setting(
+        10.0, "1", "a shape parameter is looked for within this factor of its default", BY_HAND
+    )
+    shape: float = setting(
+        0.7, "1", "prior width of the logarithm of a shape parameter", "convention: a factor of two"
+    )
+
+
+def effect_candidates(model: Model) -> dict[str, Candidate]:
+    """Every effect of the catalogue whose ports this model has and whose list lacks it."""
+    present = {e.kind for e in model.effects}
+    found = {}
+    for kind, effect in BY_KIND.items():
+        missing = effect.off and kind not in present
+        if missing and not issubclass(effect, SensorEffect) and _fits(model, effect):
+            found[kind] = candidate(effect)
+    return found
+
+
+def by_default(kind: str) -> Effect:
+    """The effect of a kind as its defaults have it: absent."""
+    return BY_KIND[kind](kind=kind)
+
+
+def candidate(effect: type[Effect]) -> Candidate:
+    """What `effect` declares: the parameter in `off` switches it, the others are shapes."""
+    return _candidate(effect.model_fields["kind"].default, effect, effect.declared())
+
+
+def sensor_candidates(sigmas: Mapping[str, float], model: Model) -> dict[str, Candidate]:
+    """Every sensor fault that the model's list lacks; `sigmas`: noise per sample by channel."""
+    present = {e.name for e in model.effects}
+    found = {}
+    for channel, sigma in sigmas.items():
+        for name, fault in possible_faults(channel).items():
+            if name not in present:
+                found[name] = _candidate(name, type(fault), fault.sized(sigma), sensor=True)
+    return found
+
+
+def _candidate(
+    name: str, effect: type[Effect], declared: Mapping[str, Param], sensor: bool = False
+) -> Candidate:
+    settings = CandidateSettings.current()
+    (lead, off), *_ = effect.off.items()
+    param = declared[lead]
+    # a time constant far below the sampling interval is the same as none
+    lower = (
+        max(param.lower, settings.fastest) if param.unit == "s" and param.lower > 0 else param.lower
+    )
+    switch = Parameter(lead, param.unit, off, param.size, lower, param.upper)
+    shapes = []
+    for other in (n for n in declared if n != lead):
+        p, typical = declared[other], float(effect.model_fields[other].default)
+        bounds = (max(p.lower, typical / settings.reach), min(p.upper, typical * settings.reach))
+        shapes.append(Parameter(other, p.unit, typical, settings.shape, *bounds, typical))
+    return Candidate(name, switch, tuple(shapes), sensor)
+
+
+def _fits(model: Model, effect: type[Effect]) -> bool:
+    legs = (None,) if effect.place == "body" else model.mechanism.legs
+    ports = {port_name(leg, alias) for leg in legs for alias in effect.ports}
+    return ports <= set(model.mechanism.ports)

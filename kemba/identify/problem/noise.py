@@ -1,0 +1,148 @@
+"""Coloured noise: a short autoregression, learnt on what a flexible model leaves over."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from statistics import NormalDist
+
+import numpy as np
+from scipy.linalg import solve_toeplitz
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
+from scipy.signal import lfilter
+
+from kemba.identify.problem.problem import Array
+from kemba.settings import BY_HAND, Settings, setting
+
+
+class NoiseSettings(Settings):
+    """How the colour of the noise is learnt."""
+
+    order: int = setting(
+        4, "1", "largest order of the autoregression", "literature: BIC chooses among 0 to this"
+    )
+    fewest: int = setting(50, "1", "rows below which no colour is learnt", BY_HAND)
+    least: float = setting(
+        0.6,
+        "1",
+        "smallest noise that is believed, as a share of the sensor's white noise; a flexible model "
+        "fits some of the noise",
+        BY_HAND,
+    )
+    trim: float = setting(
+        5.0, "1", "residuals beyond so many sigma are clipped: they are switching instants", BY_HAND
+    )
+    softest: float = setting(0.2, "1", "smallest sigma that the clipping assumes", BY_HAND)
+    spike: int = setting(7, "1", "rows that a spike lasts", BY_HAND)
+    around: int = setting(151, "1", "rows around a spike that it is compared with", BY_HAND)
+    spiky: float = setting(5.0, "1", "ratio of mean squares that makes a spike", BY_HAND)
+
+
+class WhiteNoiseSettings(Settings):
+    """How the white noise of a channel is told from its motion."""
+
+    fewest: int = setting(11, "1", "values that are needed to tell noise", BY_HAND)
+    kept: float = setting(
+        0.9,
+        "1",
+        "share of the third differences that count as noise, the smallest ones",
+        "tuned: by hand; impacts and switching valves take less than a tenth of a log",
+    )
+
+
+def difference_sigma(values: Array) -> float:
+    """White noise (1 sigma) per sample of a channel (n,); 0 where there are too few values.
+
+    From third differences, in which smooth motion cancels. The largest ones are left out: impacts
+    and switching valves are no noise. A quantised channel is never better than its own steps.
+    """
+    settings = WhiteNoiseSettings.current()
+    known = values[np.isfinite(values)]
+    if len(known) < settings.fewest:
+        return 0.0
+    rough = np.sort(np.abs(np.diff(known, n=3)))[: int(settings.kept * (len(known) - 3))]
+    noise = float(np.sqrt(np.mean(rough**2) / 20.0))  # 20 = 1 + 9 + 9 + 1
+    noise /= _spread_of_smallest(settings.kept)
+    steps = np.diff(np.unique(known))
+    return max(noise, float(steps.min() / np.sqrt(12.0)) if len(steps) else 0.0)
+
+
+def _spread_of_smallest(share: float) -> float:
+    """Root mean square of the `share` of a normal's values that are smallest in size, by its own
+    sigma."""
+    normal = NormalDist()
+    end = normal.inv_cdf(0.5 * (1.0 + share))
+    return float(np.sqrt(1.0 - 2.0 * end * normal.pdf(end) / share))
+
+
+@dataclass(frozen=True)
+class Colour:
+    """AR model r_t = sum phi_k r_{t-k} + sigma e_t of a standardised residual."""
+
+    phi: Array
+    sigma: float
+    weight: Array | None = None  # (n,) below 1 where the residual has a spike
+
+    @property
+    def spread(self) -> float:
+        """Standard deviation of the coloured series itself."""
+        impulse = np.zeros(2000)
+        impulse[0] = 1.0
+        response = lfilter([1.0], np.concatenate([[1.0], -self.phi]), impulse)
+        return float(self.sigma * np.sqrt(np.sum(response**2)))
+
+
+def learn(residual: Array, order: int | None = None, careful: bool = False) -> Colour:
+    """Yule-Walker fit to a residual (n,), its order by BIC up to `order` (None: the setting).
+
+    `careful`: spikes get less weight from now on.
+    """
+    order = NoiseSettings.current().order if order is None else order
+    weight = caution(residual) if careful else None
+    found = _yule_walker(residual if weight is None else residual * weight, order)
+    return replace(found, weight=weight)
+
+
+def _yule_walker(residual: Array, order: int) -> Colour:
+    settings = NoiseSettings.current()
+    scale = max(1.4826 * float(np.median(np.abs(residual))), settings.softest)
+    r = np.clip(residual, -settings.trim * scale, settings.trim * scale)
+    n = len(r)
+    if n < settings.fewest:
+        return Colour(np.zeros(0), max(float(np.sqrt(np.mean(r**2))), settings.least))
+    c = np.array([np.dot(r[: n - k], r[k:]) / n for k in range(order + 1)])
+    best, chosen = np.inf, (np.zeros(0), float(c[0]))
+    for p in range(order + 1):
+        phi = solve_toeplitz(c[:p], c[1 : p + 1]) if p else np.zeros(0)
+        power = max(float(c[0] - phi @ c[1 : p + 1]), 1e-6)
+        bic = n * np.log(power) + p * np.log(n)
+        if bic < best - 1e-9:
+            best, chosen = bic, (phi, power)
+    return Colour(chosen[0], max(float(np.sqrt(chosen[1])), settings.least))
+
+
+def caution(residual: Array) -> Array:
+    """Weights (n,) that silence spikes: a few rows with a large error among rows with a small one.
+
+    At switching instants and reversals the imposed motion is known worst. An error that lasts is
+    left alone: it may be physics.
+    """
+    settings, power = NoiseSettings.current(), residual**2
+    near, around = (uniform_filter1d(power, rows) for rows in (settings.spike, settings.around))
+    spike = near > settings.spiky * np.maximum(around, 1.0)
+    spike = maximum_filter1d(spike, settings.spike)
+    return np.where(spike, 1.0 / np.sqrt(np.maximum(near, 1.0)), 1.0)
+
+
+def whiten(residual: Array, colour: Colour) -> Array:
+    """e_t = (r_t - sum phi_k r_{t-k}) / sigma along the first axis of (n,) or (n, k).
+
+    The first rows are scaled by the series' spread instead.
+    """
+    if colour.weight is not None:
+        residual = (residual.T * colour.weight).T
+    taps = np.concatenate([[1.0], -colour.phi])
+    white = lfilter(taps, [1.0], residual, axis=0) / colour.sigma
+    p = len(colour.phi)
+    if p:
+        white[:p] = residual[:p] / max(colour.spread, colour.sigma)
+    return np.asarray(white)

@@ -1,0 +1,224 @@
+"""The contract between logs and search: a set of logs under one model, as whitened residuals.
+
+A bench log and a robot log differ in everything but this contract. A subclass of `Problem` owns
+the prediction and the noise. Ranking, search, doubts and the answer work on any `Problem`.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Collection, Iterable, Mapping, Sequence
+
+import numpy as np
+from typing_extensions import Self
+
+from kemba.identify.problem.types import (
+    Array,
+    Candidate,
+    Changes,
+    Flags,
+    ForceChannel,
+    Labels,
+    Leftover,
+    MissingForce,
+    OperatingPoint,
+    Parameter,
+    Rows,
+    Texts,
+    Theta,
+)
+from kemba.settings import BY_HAND, Settings, setting
+
+__all__ = [
+    "Array",
+    "Candidate",
+    "Changes",
+    "Flags",
+    "ForceChannel",
+    "Labels",
+    "Leftover",
+    "MissingForce",
+    "OperatingPoint",
+    "Parameter",
+    "Problem",
+    "Rows",
+    "Texts",
+    "Theta",
+]
+
+
+class StepSettings(Settings):
+    """Steps of finite differences."""
+
+    nuisance: float = setting(0.5, "1", "step of a nominal figure, in prior sigmas", BY_HAND)
+    switch: float = setting(
+        0.6, "1", "step of a switch that is off, in sizes: its secant", BY_HAND, decides=True
+    )
+    parameter: float = setting(
+        0.05, "1", "step of a parameter that is on, as a share of its size or value", BY_HAND
+    )
+
+
+class Problem(ABC):
+    """One set of logs under one model.
+
+    The prediction. `residual(theta)` is (predicted - measured) / noise, one number per row,
+    whitened: about N(0, 1) and independent from row to row if the model at `theta` is right. Rows
+    stand run by run in the order of `runs`, then channel by channel, then in time; `rows()`
+    describes them in the same order. Physical values are in SI units, as `Parameter.unit` says.
+    The rows do not depend on theta.
+
+    A problem does not change. What learns something (`recolour`, `relinearise`) returns a new
+    problem; the old one stays as it was.
+
+    `runs`: names of the runs. `candidates`: effects that may be missing, by name. `nuisance`:
+    nominal value and prior sigma of every figure that is never exactly known, by name; it is always
+    free within its prior. `window`: number of successive rows over which errors are summed before
+    they are judged: 1 where each row is a prediction over a long time, more where rows are one-step
+    errors.
+
+    Everything below `rows` is a capability with a default: a problem that lacks it inherits "none".
+    """
+
+    runs: tuple[str, ...]
+    candidates: dict[str, Candidate]
+    nuisance: dict[str, tuple[float, float]]
+    window: int = 1
+
+    @abstractmethod
+    def residual(self, theta: Theta, runs: Collection[int] | None = None) -> Array:
+        """Whitened residuals (n,) of the runs with these indices, in their order (None: all)."""
+
+    @abstractmethod
+    def rows(self, runs: Collection[int] | None = None) -> Rows:
+        """What each row (n,) of `residual` is."""
+
+    # Slopes
+
+    def jacobian(
+        self, theta: Theta, names: Iterable[str], runs: Collection[int] | None = None
+    ) -> Array:
+        """d residual / d names (n, k), per unit of each parameter.
+
+        A switch that is off has no useful derivative; it is linearised at its size (a secant). The
+        default takes finite differences with steps of physical size for all parameters.
+        """
+        base = self.residual(theta, runs)
+        columns = []
+        for name in names:
+            steps = list(self.steps(theta, name))
+            slopes = [(self.residual({**theta, **step}, runs) - base) / h for step, h in steps]
+            columns.append(np.mean(slopes, axis=0))
+        return np.stack(columns, axis=1) if columns else np.empty((len(base), 0))
+
+    def steps(self, theta: Theta, name: str) -> Iterable[tuple[dict[str, float], float]]:
+        """Steps for a finite difference along `name`: changed entries of theta, and how far they
+        go [the parameter's unit]. Two of them where both signs are possible."""
+        settings = StepSettings.current()
+        if name in self.nuisance:
+            nominal, sigma = self.nuisance[name]
+            h = settings.nuisance * sigma
+            yield {name: theta.get(name, nominal) + h}, h
+            return
+        candidate = self.candidates[name.rsplit(".", 1)[0]]
+        parameter = candidate.keys()[name]
+        if name == candidate.key and theta.get(name, parameter.off) == parameter.off:
+            shapes = {k: theta.get(k, p.typical) for k, p in candidate.keys().items() if k != name}
+            h = settings.switch * parameter.size
+            for sign in (1.0, -1.0) if parameter.signed else (1.0,):
+                yield {**shapes, name: parameter.off + sign * h}, sign * h
+            return
+        value = theta[name]
+        h = settings.parameter * (parameter.size if name == candidate.key else abs(value))
+        h = -h if value + h > parameter.upper else h
+        yield {name: value + h}, h
+
+    def parameters(self) -> dict[str, Parameter]:
+        """Every parameter of every candidate, by its name in theta."""
+        return {key: p for c in self.candidates.values() for key, p in c.keys().items()}
+
+    # What a right model would leave
+
+    def expected_power(self) -> Array:
+        """Mean square (n,) that each row would have if the model were right. Default: one."""
+        return np.ones(len(self.rows()))
+
+    def window_errors(self, theta: Theta) -> Mapping[str, Array]:
+        """Channel -> measured minus predicted (k,), in the channel's unit, each predicted over a
+        short time from the measured motion. Channels that are missing here have none."""
+        return {}
+
+    # Noise colour
+
+    learns_colour: bool = False  # whether the colour of the noise is learnt from residuals
+
+    def recolour(self, residual: Array | None, careful: bool = False) -> Self:
+        """This problem with the noise colour learnt from residuals (n,) of a problem without
+        colour; None: without colour. `careful`: the model behind these residuals is good, so that
+        spikes are no physics and get less weight."""
+        return self
+
+    def whiten(self, columns: Array) -> Array:
+        """Columns (n, k) of a problem without colour as they are under this one's colour."""
+        return columns
+
+    # Motion along which the model is linearised
+
+    moves: bool = False  # whether residuals are linearised along a motion that depends on the model
+
+    def relinearise(self, base: Theta) -> Self:
+        """This problem, linearised along the motion that the model at `base` makes of the data.
+        Its rows may differ from those of the old one."""
+        return self
+
+    def is_straight(self, name: str) -> bool:
+        """Whether the residual is linear in this parameter, so that its slope tells everything."""
+        return False
+
+    # Where each row was taken, and which forces may be missing
+
+    def operating_point(self) -> OperatingPoint:
+        """Piston position, speed and force of every row. Default: no row has a piston."""
+        return OperatingPoint.nowhere(len(self.rows()))
+
+    def commands(self) -> Sequence[Changes]:
+        """Per run: command -> times [s] and sizes of its changes. Empty: commands are unknown."""
+        return []
+
+    def force_channels(self) -> Sequence[ForceChannel]:
+        """Places where a force may be missing."""
+        return []
+
+    def missing_force(
+        self, theta: Theta | None = None, strength: Array | None = None
+    ) -> list[MissingForce]:
+        """Estimate of the missing force of every run with its 95 % band.
+
+        `strength` (k,): 1 sigma of each channel's force, learnt when not given. With the same
+        strength, estimates at two thetas differ by what the change of theta explains.
+        """
+        return []
+
+    # Physics that the catalogue lacks
+
+    def formulas(self, theta: Theta) -> Mapping[str, Array]:
+        """Simple terms beyond the catalogue: formula -> whitened column (n,) per unit of its
+        coefficient."""
+        return {}
+
+    def weight(self, theta: Theta, formula: str, coefficient: float) -> float:
+        """Largest force of a formula as a share of what matters in practice. Default: infinite,
+        so that every formula counts."""
+        return math.inf
+
+    def leftover(self, theta: Theta) -> Leftover | None:
+        """What the model at theta leaves over, with what it may depend on; None: not known."""
+        return None
+
+    # Gate
+
+    def validate(self) -> list[str]:
+        """Remarks on the logs. Raises BadData where the logs and the model contradict each other so
+        grossly that a column must be wrong."""
+        return []

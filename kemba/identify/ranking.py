@@ -1,0 +1,135 @@
+"""The effects in order of probability, with their parameters and their equivalents."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import pairwise
+
+import numpy as np
+
+from kemba.identify.answer import Ranked, Value
+from kemba.identify.doubt.cross_validation import left_out, left_out_error
+from kemba.identify.evidence.linear import is_shape
+from kemba.identify.evidence.search import Search, share_of
+from kemba.identify.evidence.spike_slab import NULL, Hypothesis, SpikeSlabSettings
+from kemba.identify.evidence.windows import error_ratio
+from kemba.identify.problem.problem import Array, Candidate, Problem
+from kemba.identify.settings import RankingSettings
+
+
+def error(search: Search, hypothesis: Hypothesis, holdout: Problem | None) -> float:
+    """Error in units of the noise on data that the fit has not seen: the one number that sentence,
+    ranking, ladder and figures show. Of the held-out logs; without any, of left-out blocks."""
+    if holdout is None:
+        return left_out_error(search, hypothesis)
+    unknown = set(holdout.nuisance) - set(search.problem.nuisance)  # of sensors not seen before
+    return error_ratio(holdout, search.points[hypothesis].fit.theta, unknown)
+
+
+def ranked(
+    search: Search, best: Hypothesis, dismissed: set[Hypothesis], holdout: Problem | None
+) -> list[Ranked]:
+    """The effects in order of probability; those of the best answer first."""
+    problem = search.problem
+    probability = search.probabilities(dismissed) if best else _doubted(search.probabilities())
+    shares = share_of(probability, problem.candidates)
+    order = sorted(shares, key=lambda e: (e not in best, -strength(search, e, best), -shares[e]))
+    found = []
+    before = error(search, NULL, holdout)
+    for effect in order[: RankingSettings.current().shown]:
+        hypothesis = best if effect in best else (effect,)
+        point = search.points.get(hypothesis)
+        if point is None:
+            continue
+        found.append(
+            Ranked(
+                effect,
+                shares[effect],
+                values(search, hypothesis, effect),
+                equivalents(search, hypothesis, effect) if effect in best else (),
+                before,
+                error(search, hypothesis, holdout),
+                left_out(search, hypothesis).nats,
+            )
+        )
+    return found
+
+
+def _doubted(probability: Mapping[Hypothesis, float]) -> dict[Hypothesis, float]:
+    """Where nothing was found significant, nothing is the likeliest."""
+    most = RankingSettings.current().doubted
+    rest = sum(p for h, p in probability.items() if h)
+    scale = min(1.0, most / rest) if rest > 0 else 1.0
+    return {h: p * scale if h else 1.0 - rest * scale for h, p in probability.items()}
+
+
+def strength(search: Search, effect: str, best: Hypothesis) -> float:
+    """How much evidence goes when this effect is taken out of the answer."""
+    if effect not in best:
+        return 0.0
+    rest = tuple(h for h in best if h != effect)
+    points = search.points
+    return points[best].log_evidence - points[rest].log_evidence if rest in points else 0.0
+
+
+def equivalents(search: Search, hypothesis: Hypothesis, effect: str) -> tuple[str, ...]:
+    """Effects that could stand in this one's place and explain the data as well."""
+    own, same = search.points[hypothesis].log_evidence, RankingSettings.current().same
+    rest = set(hypothesis) - {effect}
+    found = []
+    for other, point in search.points.items():
+        swapped = set(other) - rest
+        if len(other) == len(hypothesis) and rest < set(other) | {""} and len(swapped) == 1:
+            (name,) = swapped
+            if name != effect and rest <= set(other) and own - point.log_evidence < same:
+                found.append(name)
+    return tuple(sorted(found))
+
+
+def values(search: Search, hypothesis: Hypothesis, effect: str) -> dict[str, Value]:
+    """Parameters of one effect with 95 % intervals.
+
+    The model's own imperfection may add to an effect or hide some of it: as much, in one sigma, as
+    the spike of the prior allows.
+    """
+    point, candidate = search.points[hypothesis], search.problem.candidates[effect]
+    found, imperfection = {}, SpikeSlabSettings.current().spike
+    for key, parameter in candidate.keys().items():
+        i = point.linear.index(key)
+        centre, sd = point.score.z[i], float(np.sqrt(point.score.covariance[i, i]))
+        step = 1.0 if is_shape(search.problem, key) else abs(centre - parameter.off)
+        sd = float(np.hypot(sd, imperfection * step))
+        low, high = centre - 1.96 * sd, centre + 1.96 * sd
+        triple = np.array([centre, low, high])
+        if is_shape(search.problem, key):
+            triple = np.exp(np.clip(triple, -50, 50))
+        triple = np.clip(triple, parameter.lower, parameter.upper)
+        name, unit, triple = reported(candidate, parameter.name, parameter.unit, triple)
+        value, low, high = (float(t) for t in triple)
+        found[name] = Value(value, low, high, unit)
+    return found
+
+
+def reported(candidate: Candidate, name: str, unit: str, triple: Array) -> tuple[str, str, Array]:
+    """A parameter as the catalogue names it, also where it was searched reciprocally."""
+    if name not in candidate.reciprocal:
+        return name, unit, triple
+    name, unit = candidate.reciprocal[name]
+    value, low, high = 1.0 / np.maximum(triple, 1e-12)
+    return name, unit, np.array([value, high, low])
+
+
+def rungs(search: Search, best: Hypothesis) -> list[Hypothesis]:
+    """Nothing, then the effects of the best answer as they join, the strongest first; parts that
+    were not refitted are passed over."""
+    order = sorted(best, key=lambda e: -strength(search, e, best))
+    parts = [tuple(sorted(order[: i + 1])) for i in range(len(order))]
+    return [NULL, *(part for part in parts if part in search.points)]
+
+
+def ladder(search: Search, best: Hypothesis, holdout: Problem | None) -> list[tuple[str, float]]:
+    """Error on unseen data at every rung, by what joins there."""
+    steps, names = rungs(search, best), ["model as it is"]
+    for before, after in pairwise(steps):
+        names.append(" + ".join(e for e in after if e not in before))
+    return [(n, error(search, step, holdout)) for n, step in zip(names, steps, strict=True)]

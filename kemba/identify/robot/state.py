@@ -1,0 +1,191 @@
+"""Robot logs with a model linearised along the measured motion: everything a prediction needs.
+
+The measured motion is smoothed into a reference along which the model is linearised. A model that
+is right explains the way from node to node; what it gets wrong is a force defect, which a Kalman
+filter turns into innovations, white and of unit variance where model and noise are right. Initial
+states are free; contact and stop forces are unknown where the data show contact, impacts included.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from kemba.identify.problem.sensor_faults import SensorFaults, is_fault
+from kemba.identify.problem.types import Array, Flags, Theta
+from kemba.identify.robot.candidates import GRIP, SOFTNESS, without_delay
+from kemba.identify.robot.dynamics.forces import Forces
+from kemba.identify.robot.dynamics.inputs import air_states, read_inputs
+from kemba.identify.robot.dynamics.linear import LinearisedMotion, linearise_along, smoothed
+from kemba.identify.robot.dynamics.physics import Physics
+from kemba.identify.robot.dynamics.reference import (
+    Reference,
+    densities,
+    first_reference,
+    read_schedules,
+)
+from kemba.identify.robot.dynamics.settings import ForceDensity, LooseForceDensity
+from kemba.identify.robot.motion.batch import Batch
+from kemba.identify.robot.motion.contact import Schedule, loaded
+from kemba.identify.robot.motion.filter import Gains, gains, innovations
+from kemba.identify.robot.motion.sensing import ahead, sensed
+from kemba.settings import BY_HAND, Settings, setting
+
+
+class StateSettings(Settings):
+    """How the motion of robot logs is found."""
+
+    rounds: int = setting(2, "1", "times that the motion is smoothed with the model", BY_HAND)
+    lead_in: int = setting(4, "1", "nodes at the start that only tell where a run begins", BY_HAND)
+
+
+@dataclass(frozen=True)
+class LinearisedState:
+    """Robot logs and a model linearised at `base`.
+
+    Arrays have n nodes, L runs, k coordinates and m measured values per node: one per channel, then
+    the places of feet and stops.
+
+    `sensors`: what sensors make of the motion. `schedules`: contacts of each run. `motion`: the
+    reference, and the model linearised along it. `gain`: gains of the filter. `mask` (n, L, m):
+    rows that are data. `forces`: the model's force along the motion at any parameters. `linear`:
+    name -> generalised force (n, L, k) per unit of a parameter that stands beside the model, and
+    its nominal value. `ground`: parameters of the model's soft ground, empty where it is rigid.
+    """
+
+    physics: Physics
+    batch: Batch
+    sensors: SensorFaults
+    base: Theta
+    ground: Mapping[str, float]
+    schedules: tuple[Schedule, ...]
+    motion: LinearisedMotion
+    gain: Gains
+    mask: Flags
+    forces: Forces
+    linear: Mapping[str, tuple[Array, float]] = field(default_factory=dict)
+
+    def measurement(self, theta: Theta) -> Array:
+        """Measured minus reference (n, L, m) in the channel's unit, the reference as the sensors at
+        theta see it; NaN where nothing was measured."""
+        motion, batch = self.motion, self.batch
+        faults = {c: self.sensors.at(theta, c) for c in self.physics.channels}
+        seen = sensed(faults, batch.resampled, motion.y, motion.way)
+        soft = {**self.ground, **theta}
+        depth = motion.penetration(soft.get(SOFTNESS, 0.0), soft.get("ground_compliance.d", 1.0))
+        return np.concatenate([batch.y - seen, -motion.places - depth], axis=2)
+
+    def acceleration(self, theta: Theta) -> Array:
+        """Acceleration (n, L, k) that the model at theta adds to the reference's."""
+        force = self.forces.at(*values_at(self.physics, theta))
+        for name, (column, nominal) in self.linear.items():
+            if name in theta:
+                force = force + (theta[name] - nominal) * column
+        return self.motion.defect(force)
+
+    def slopes(self, theta: Theta, names: Sequence[str]) -> dict[str, Array]:
+        """Whitened columns (n, L, m) of parameters in which the force is linear."""
+        slopes = self.forces.slopes(*values_at(self.physics, theta))
+        place = {n: i for i, n in enumerate(self.physics.names)}
+        forces = [
+            self.linear[n][0] if n in self.linear else self.batch.deep(slopes[:, :, place[n]])
+            for n in names
+        ]
+        g = np.stack([self.motion.response(f) for f in forces], axis=-1)
+        return dict(zip(names, np.moveaxis(self.pushed(g), -1, 0), strict=True))
+
+    def pushed(self, g: Array) -> Array:
+        """Whitened residuals (n, L, m, c) that accelerations g (n, L, k, c) make."""
+        return self.whitened(np.zeros((*self.motion.system.R.shape, g.shape[-1])), g)
+
+    def whitened(self, y: Array, g: Array) -> Array:
+        """Predicted minus measured (n, L, m, c), whitened, of columns y (n, L, m, c) and
+        accelerations g (n, L, k, c)."""
+        _, errors = innovations(self.motion.system, self.gain, y, self.motion.extend(g))
+        return -(self.gain.whitener @ errors)
+
+    def residuals(self, thetas: Sequence[Theta]) -> Array:
+        """Whitened residuals (n, L, m, c) at each theta, rows that are no data included."""
+        y = np.stack([self.measurement(t) for t in thetas], axis=-1)
+        g = np.stack([self.acceleration(t) for t in thetas], axis=-1)
+        return self.whitened(y, g)
+
+    def pick(self, columns: Array, runs: Collection[int] | None = None) -> Array:
+        """(n, L, m, ...) -> rows (rows, ...): run by run, channel by channel, in time."""
+        chosen = range(len(self.batch.resampled)) if runs is None else runs
+        return np.concatenate([columns[:, i].swapaxes(0, 1)[self.mask[:, i].T] for i in chosen])
+
+
+def linearise_at(
+    physics: Physics,
+    batch: Batch,
+    sensors: SensorFaults,
+    base: Theta,
+    ground: Mapping[str, float],
+    unknown: ForceDensity,
+) -> LinearisedState:
+    """The logs smoothed with the model at `base`, and the model linearised along that motion.
+
+    `unknown`: density of the forces that no model explains.
+    """
+    reference = _without_delays(physics, batch, sensors, base, first_reference(physics, batch))
+    schedules = read_schedules(physics, batch, reference)
+    dt = float(np.median(batch.h[batch.valid]))
+    for _ in range(StateSettings.current().rounds):
+        state = _along(
+            physics, batch, sensors, base, ground, schedules, reference, LooseForceDensity.current()
+        )
+        y, g = state.measurement(base), state.acceleration(base)
+        reference = smoothed(state.motion, state.gain, y, g)
+        if sensors.listed or any(map(is_fault, base)):  # as true sensors would have seen it
+            schedules = read_schedules(physics, batch, reference)
+        normal = [state.motion.normal[: len(s.phase), i] for i, s in enumerate(schedules)]
+        schedules = tuple(loaded(s, f, dt) for s, f in zip(schedules, normal, strict=True))
+    state = _along(physics, batch, sensors, base, ground, schedules, reference, unknown)
+    masses = zip(physics.masses, np.moveaxis(state.motion.masses, -1, 0), strict=True)
+    linear = {name: (column, 0.0) for name, column in masses}
+    return replace(state, linear={**linear, GRIP: (state.motion.less_grip, 1.0)})
+
+
+def _without_delays(
+    physics: Physics, batch: Batch, sensors: SensorFaults, base: Theta, ref: Reference
+) -> Reference:
+    """The reference as sensors that are not late would have seen it."""
+    late = np.array([sensors.lateness(base, c) for c in physics.channels])
+    rates = ((ref.q, ref.v), (ref.v, ref.a), (ref.a, np.zeros_like(ref.a)))
+    return Reference(*(ahead(a, rate, batch.resampled, late) for a, rate in rates))
+
+
+def _along(
+    physics: Physics,
+    batch: Batch,
+    sensors: SensorFaults,
+    base: Theta,
+    ground: Mapping[str, float],
+    schedules: tuple[Schedule, ...],
+    reference: Reference,
+    unknown: ForceDensity,
+) -> LinearisedState:
+    """The model at `base` linearised along one reference."""
+    p, delays = values_at(physics, base)
+    states = air_states(physics, batch, read_inputs(physics, batch, reference, delays), p)
+    density = densities(physics, batch, schedules, unknown)
+    motion = linearise_along(physics, batch, schedules, reference, density, states, p)
+    mask = np.isfinite(motion.system.R)
+    mask[: StateSettings.current().lead_in] = False
+    forces = Forces(physics, batch, motion)
+    gain = gains(motion.system)
+    return LinearisedState(
+        physics, batch, sensors, dict(base), ground, schedules, motion, gain, mask, forces
+    )
+
+
+def values_at(physics: Physics, theta: Theta) -> tuple[Array, Array]:
+    """Free parameters (k,) in the order of `physics.names`, and delays (valves, 2) [s] to switching
+    on and off, at theta."""
+    names = zip(physics.names, physics.nominal, strict=True)
+    p = np.array([without_delay(n, theta.get(n, value)) for n, value in names])
+    valves = [leg for leg in physics.legs for _ in range(2)]
+    return p, np.array([physics.base.timing(leg, theta) for leg in valves])

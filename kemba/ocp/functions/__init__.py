@@ -1,0 +1,1 @@
+"""CasADi functions of a program: blocks, exact sparse derivatives, compiled code."""

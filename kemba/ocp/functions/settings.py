@@ -1,0 +1,45 @@
+"""Settings of what surrounds IPOPT: Newton steps, warm starts, compiled functions."""
+
+from __future__ import annotations
+
+from kemba.settings import Settings, setting
+
+VARIANTS = "tuned: benchmarks/variants.py"
+
+
+class Newton(Settings):
+    """Newton steps, starts and the stagnation test."""
+
+    regularisation: float = setting(
+        2e-3, "1", "multiple of the identity in the Hessian of whole robots, per scaled variable; "
+        "IPOPT's own additions are 1e-4 to 1", VARIANTS, decides=True,
+    )  # fmt: skip
+    memory: int = setting(
+        100, "1", "mumps_mem_percent: room beyond what MUMPS expects to need [%]; by default it "
+        "asks for eleven times as much at every factorisation", VARIANTS,
+    )  # fmt: skip
+    warm_push: float = setting(
+        1e-6, "1", "distance from the bounds of a warm start, and least multiplier",
+        "convention: small beside every scaled variable",
+    )  # fmt: skip
+    progress: float = setting(
+        0.8, "1", "part of the violation that may be left for a solve to count as progressing",
+        "convention: a fall by a fifth", decides=True,
+    )  # fmt: skip
+
+
+class Functions(Settings):
+    """How the functions for IPOPT are made."""
+
+    few: int = setting(
+        8, "1", "points at which evaluating one by one is as fast as all at once",
+        "tuned: timed when written, code not kept",
+    )  # fmt: skip
+    large: int = setting(
+        1000, "1", "instructions of a Hessian block that make compiling worth while",
+        "tuned: timed when written, code not kept",
+    )  # fmt: skip
+    stale: float = setting(
+        600.0, "s", "age of an unfinished compilation that is thought dead",
+        "convention: ten minutes",
+    )  # fmt: skip

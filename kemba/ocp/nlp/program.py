@@ -1,0 +1,34 @@
+"""What the wrapper of IPOPT asks of a program."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from kemba.ocp.functions.blocks import BlockProblem
+
+
+class Program(Protocol):
+    """A nonlinear program: its functions, and the bounds of its variables and rows.
+
+    `lower` and `upper` may have any shape with as many entries as the problem has variables;
+    iterates have the same shape. `g_lower` and `g_upper` are (rows,).
+    """
+
+    @property
+    def problem(self) -> BlockProblem: ...
+    @property
+    def lower(self) -> np.ndarray: ...
+    @property
+    def upper(self) -> np.ndarray: ...
+    @property
+    def g_lower(self) -> np.ndarray: ...
+    @property
+    def g_upper(self) -> np.ndarray: ...
+
+
+def violation(program: Program, g: np.ndarray) -> float:
+    """The largest violation of the rows at values g (rows,), scaled as the rows are."""
+    over = np.maximum(program.g_lower - g, g - program.g_upper)
+    return float(over.max(initial=0.0))

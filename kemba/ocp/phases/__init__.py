@@ -1,0 +1,1 @@
+"""The multi-phase program: fixed modes, free phase durations, Radau inside."""

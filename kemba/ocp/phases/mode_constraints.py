@@ -1,0 +1,167 @@
+"""Mode constraints: closed gaps stay zero, open ones positive, friction stays in its cone."""
+
+from __future__ import annotations
+
+import itertools
+
+import casadi as ca
+import numpy as np
+
+from kemba.ocp.phases.independent import Independent
+from kemba.ocp.phases.modes import AHEAD, BACK, HELD, OPEN
+from kemba.ocp.phases.program import PhaseProgram, Where
+from kemba.ocp.phases.radau import STATE
+from kemba.ocp.phases.settings import ModeConstraints
+from kemba.ocp.phases.unilateral import Constraint
+from kemba.ocp.phases.view import View
+from kemba.ocp.task.requirement import SCALES
+from kemba.ocp.transcription.first_node import state_rows
+
+INF = np.inf
+LENGTH, SPEED = SCALES["m"], SCALES["m.s-1"]  # of gaps and their rates
+
+
+def add_mode_constraints(program: PhaseProgram, start: Independent) -> None:
+    """Add the rows of every mode in every phase and at every impact.
+
+    `start`: the equalities that the task already asks for at the first node.
+    """
+    view = View(program)
+    for i, constraint in enumerate(program.constraints):
+        _gaps(program, view, i, constraint)
+        _held(program, view, i, constraint)
+        _friction(program, view, i, constraint)
+        _start(program, view, i, constraint, start)
+    _first_state(program, view, start)
+    _limits(program, view)
+    _durations(program)
+
+
+def _gaps(program: PhaseProgram, view: View, i: int, constraint: Constraint) -> None:
+    """Open gaps stay positive; where one closes it is zero, and a foot moves downwards."""
+    c, phases = program.columns, program.phases
+    settings = ModeConstraints.current()
+    closing = {phases[p].first: p for p in program.impacts if program.closes(p, i)}
+    closed = np.array([phases[p].active(i) for p in c.phase_of])
+    g = view.of(constraint.gap) / LENGTH
+    for clear in (False, True):
+        apart: Where = [
+            (c.phase_of[e], c.stages[e][stage]["q"])
+            for e in np.flatnonzero(~closed)
+            for stage in range(len(c.stages[e]))
+            if not (stage == len(c.stages[e]) - 1 and e + 1 in closing)
+            and clear != closed[max(e - settings.away, 0) : e + settings.away + 1].any()
+        ]
+        low = settings.clear / LENGTH if clear else 0.0
+        program.mode_constraint(i, "gap", view.z("q"), g, low, INF, apart)
+    touching = [(closing[node], c.end(node)["q"]) for node in sorted(closing)]
+    program.mode_constraint(i, "touch", view.z("q"), g, 0.0, 0.0, touching)
+    if constraint.friction is not None:
+        rate = view.of(constraint.rate) / SPEED
+        before = [(p, np.concatenate([c.end(n)["q"], c.end(n)["v"]])) for n, p in closing.items()]
+        program.mode_constraint(
+            i, "approach", view.z("q v"), rate, -INF, -settings.lands / SPEED, before
+        )
+
+
+def _held(program: PhaseProgram, view: View, i: int, constraint: Constraint) -> None:
+    """The rate of a closed gap is zero, and the slip of a sticking contact."""
+    c, phases = program.columns, program.phases
+    rate = view.of(constraint.rate) / SPEED
+    states: Where = [
+        (c.phase_of[e], np.concatenate([stage["q"], stage["v"]]))
+        for e in range(program.nodes)
+        for stage in c.stages[e]
+    ]
+    states += [(p, np.concatenate([c.end(phases[p].first)["q"], c.after[p]])) for p in c.after]
+    closed = [(p, z) for p, z in states if phases[p].active(i)]
+    program.mode_constraint(i, "rate", view.z("q v"), rate, 0.0, 0.0, closed)
+    if constraint.friction is None:
+        return
+    slip = view.of(constraint.friction.slip) / SPEED
+    settling = [
+        (p, np.concatenate([c.end(phases[p].first)["q"], c.end(phases[p].first)["v"]]))
+        for p in range(1, len(phases))
+        if phases[p].modes[i] == HELD and phases[p - 1].modes[i] in (AHEAD, BACK)
+        and p not in c.after
+    ]  # fmt: skip
+    sets = [(HELD, 0.0, 0.0), (AHEAD, 0.0, INF), (BACK, -INF, 0.0)]
+    for wanted, low, high in sets:
+        where = [(p, z) for p, z in states if phases[p].modes[i] == wanted]
+        program.mode_constraint(i, "slip", view.z("q v"), slip, low, high, where)
+    program.mode_constraint(i, "settles", view.z("q v"), slip, 0.0, 0.0, settling)
+
+
+def _friction(program: PhaseProgram, view: View, i: int, constraint: Constraint) -> None:
+    """Forces and impulses in the cone; on its edge while sliding."""
+    if constraint.friction is None:
+        return
+    c, phases = program.columns, program.phases
+    forces: Where = [
+        (c.phase_of[e], stage["lam"]) for e in range(program.nodes) for stage in c.stages[e]
+    ]
+    forces += list(c.impulse.items())
+    weight = program.model.mechanism.weight
+    edges = (("forward", constraint.friction.cone_forward, BACK),
+             ("backward", constraint.friction.cone_backward, AHEAD))  # fmt: skip
+    for way, cone, sliding in edges:
+        g = view.of(cone) / weight
+        for wanted, high in ((HELD, INF), (sliding, 0.0)):
+            where = [(p, lam) for p, lam in forces if phases[p].modes[i] == wanted]
+            program.mode_constraint(i, f"cone {way}", view.z("lam"), g, 0.0, high, where)
+
+
+def _start(
+    program: PhaseProgram, view: View, i: int, constraint: Constraint, start: Independent
+) -> None:
+    """Gap and rate of a constraint that is closed at first are zero; not where the task says so."""
+    mode, first = program.phases[0].modes[i], program.columns.first
+    if mode == OPEN:
+        return
+    at = np.concatenate([first["q"], first["v"]])
+    rows = [("gap", constraint.gap, LENGTH), ("rate", constraint.rate, SPEED)]
+    if constraint.friction is not None and mode == HELD:
+        rows.append(("slip", constraint.friction.slip, SPEED))
+    for name, expression, scale in rows:
+        g = view.of(expression) / scale
+        if start.adds(g, view):
+            program.add(f"{constraint.label} first {name}", view.z("q v"), g, 0.0, 0.0, [at])
+
+
+def _first_state(program: PhaseProgram, view: View, start: Independent) -> None:
+    """What holds in every state, at the first node; not where equalities there decide it."""
+    node, reduction, first = program.model.node, program.reduction, program.columns.first
+    at = np.concatenate([first[g] for g in STATE])
+    for row in state_rows(node, reduction.pairs, reduction.limits):
+        g = view.of(row.expression) / (LENGTH if row.unit == "m" else row.scale)
+        if start.rest(g, view) is not None:
+            program.add(f"{row.label} first", view.z("q v s"), g, 0.0, INF, [at])
+
+
+def _limits(program: PhaseProgram, view: View) -> None:
+    c = program.columns
+    for j in program.reduction.limits:
+        label = program.model.node.limit_rows[j].label
+        where = [
+            np.concatenate([stage["q"], stage["v"], stage["s"], c.u[e], stage["lam"]])
+            for e in range(program.nodes)
+            for stage in c.stages[e]
+        ]
+        g = view.of(program.model.node.limits[j])
+        program.add(label, view.z("q v s u lam"), g, 0.0, INF, where)
+
+
+def _durations(program: PhaseProgram) -> None:
+    """The whole motion lasts what the task allows, and valves dwell between switches."""
+    task, phases, h = program.task, program.phases, ca.SX.sym("h", len(program.phases))
+    scale = program.layout.scale[program.layout.slices["h"]][0]
+    lasting = [phase.elements * scale * h[p] / task.duration for p, phase in enumerate(phases)]
+    columns = [program.columns.h[:, 0]]
+    low, high = 1 - task.step_variation, 1 + task.step_variation
+    program.add("duration", h, sum(lasting), low, high, columns)
+    for valve in range(len(phases[0].valves)):
+        places = [phase.valves[valve] for phase in phases]
+        switches = [p for p in range(1, len(phases)) if places[p] != places[p - 1]]
+        for a, b in itertools.pairwise(switches):
+            dwell = sum(lasting[a:b], ca.SX(0))
+            program.add("dwell", h, dwell, task.min_dwell / task.duration, INF, columns)

@@ -1,0 +1,132 @@
+"""The mode sequence of an implicit Euler plan: which contacts and stops are closed, which slide."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import casadi as ca
+import numpy as np
+
+from kemba.model import Model
+from kemba.ocp.phases.settings import Reading
+from kemba.ocp.phases.unilateral import Constraint
+from kemba.ocp.transcription.solution import arrays
+from kemba.trajectory import Trajectory
+
+OPEN, HELD, AHEAD, BACK = 0, 1, 2, 3  # open; closed and sticking; sliding forward, backward
+
+
+@dataclass(frozen=True)
+class Phase:
+    """Intervals first+1 .. last with the same modes of constraints and valve positions."""
+
+    first: int
+    last: int
+    modes: tuple[int, ...]
+    valves: tuple[float, ...]
+
+    @property
+    def elements(self) -> int:
+        return self.last - self.first
+
+    def active(self, i: int) -> bool:
+        return self.modes[i] != OPEN
+
+
+def read_phases(
+    model: Model,
+    constraints: Sequence[Constraint],
+    plan: Trajectory,
+    valves: np.ndarray,
+    marks: Sequence[int],
+    trim: bool = False,
+) -> list[Phase]:
+    """Phases of a plan with `valves` (rows, n); a phase ends at every node of `marks` too.
+
+    `trim`: a foot that slides under little load has left the ground.
+    """
+    modes = np.column_stack([_modes(model, c, plan, trim) for c in constraints])
+    _valves_first(modes, valves)
+    same = (modes[1:] == modes[:-1]).all(axis=1) & (valves[1:] == valves[:-1]).all(axis=1)
+    borders = sorted({0, len(plan) - 1, *(np.flatnonzero(~same[1:]) + 1).tolist(), *marks})
+    rows = itertools.pairwise(borders)
+    phases = [
+        Phase(a, b, tuple(int(m) for m in modes[b]), tuple(float(u) for u in valves[b]))
+        for a, b in rows
+    ]
+    return [*phases[:-2], *_settling(phases[-3:])] if len(phases) > 2 else phases
+
+
+def _settling(phases: Sequence[Phase]) -> list[Phase]:
+    """The last two of three phases.
+
+    A stop or a foot may close one interval before the last valve switch. Then the switch is put
+    first. Implicit Euler spreads an impact over two intervals; in continuous time it is over at
+    once, and air that still flows would push the piston off the stop.
+    """
+    before, hit, last = phases
+    closes = any(a == OPEN != b for a, b in zip(before.modes, hit.modes, strict=True))
+    between = hit.modes == last.modes and hit.valves == before.valves != last.valves
+    if closes and between and hit.elements == 1:
+        hit = replace(hit, modes=before.modes, valves=last.valves)
+    return [hit, last]
+
+
+def _modes(model: Model, constraint: Constraint, plan: Trajectory, trim: bool) -> np.ndarray:
+    """Mode of a constraint at every row (rows,)."""
+    x, node, reading = arrays(model, plan), model.node, Reading.current()
+    names = [constraint.gap]
+    if constraint.friction is not None:
+        names.append(constraint.friction.slip)
+    evaluate = ca.Function("at", [node.q, node.v], names)
+    found = _listed(evaluate.map(len(plan))(x["q"].T, x["v"].T))
+    values = [np.array(value).ravel() for value in found]
+    force = x["lam"][:, constraint.force] / model.mechanism.weight
+    modes = np.where(force * reading.stiff > np.maximum(values[0], 0.0), HELD, OPEN)
+    if values[0][0] < reading.closed and modes[1] == OPEN:
+        modes[1] = HELD  # a contact that is closed at the start has a force
+    _fill_hops(modes, values[0], reading.shudder)
+    if constraint.friction is not None:
+        light = force < reading.light
+        slides = np.abs(values[1]) > reading.slides
+        for a, b in _runs(modes):
+            if b - a <= reading.brief and light[a:b].all():
+                modes[a:b] = OPEN
+        if trim:
+            modes[light & slides] = OPEN
+        _fill_hops(modes, values[0], reading.hop)
+        closed = modes != OPEN
+        modes[closed & slides] = np.where(values[1] > 0, AHEAD, BACK)[closed & slides]
+    return np.asarray(modes)
+
+
+def _fill_hops(modes: np.ndarray, gap: np.ndarray, hop: float) -> None:
+    """Close a gap that opens by less than `hop` [m] for a step or two between two touches."""
+    runs = _runs(modes)
+    for (_, a), (b, _) in itertools.pairwise(runs):
+        if b - a <= Reading.current().brief and gap[a:b].max() < hop:
+            modes[a:b] = HELD
+
+
+def _valves_first(modes: np.ndarray, valves: np.ndarray) -> None:
+    """Where modes and valves change at one node, change the modes one step later.
+
+    Their times are free in the program; a phase between them lets both be found.
+    """
+    for k in range(2, len(modes) - 1):
+        both = (modes[k] != modes[k - 1]).any() and (valves[k] != valves[k - 1]).any()
+        if both and (modes[k + 1] == modes[k]).all():
+            modes[k] = modes[k - 1]
+
+
+def _runs(modes: np.ndarray) -> list[tuple[int, int]]:
+    """Half-open ranges of rows in which a constraint is closed, the first row aside."""
+    closed = np.r_[0, (modes[1:] != OPEN).astype(int), 0]
+    edges = np.flatnonzero(np.diff(closed))
+    return [(int(a) + 1, int(b) + 1) for a, b in edges.reshape(-1, 2)]
+
+
+def _listed(value: object) -> list[ca.DM]:
+    return list(value) if isinstance(value, tuple | list) else [value]  # type: ignore[list-item]

@@ -1,0 +1,264 @@
+"""The multi-phase program: smooth, with phase durations free and every mode fixed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+
+from kemba.model import Model
+from kemba.ocp.functions.blocks import Block, BlockProblem
+from kemba.ocp.phases.columns import Columns
+from kemba.ocp.phases.modes import OPEN, Phase
+from kemba.ocp.phases.radau import STATE, Scheme, element, impact
+from kemba.ocp.phases.settings import Elements
+from kemba.ocp.phases.unilateral import Constraint
+from kemba.ocp.task.task import Task
+from kemba.ocp.transcription.layout import Layout
+from kemba.ocp.transcription.symmetry import Reduction
+
+INF = np.inf
+Where = list[tuple[int, np.ndarray]]  # phases and the columns of z there
+
+
+@dataclass(frozen=True)
+class Soft:
+    """A mode constraint that may give way.
+
+    `constraint`: the index of its unilateral constraint; `kind`: what it asks (gap, slip, ...);
+    `phases` (repeats,): where it holds; `above`, `below` (repeats,) or None: columns of the slacks
+    by which it leaves its upper and its lower bound.
+    """
+
+    constraint: int
+    kind: str
+    phases: np.ndarray
+    above: np.ndarray | None
+    below: np.ndarray | None
+
+
+@dataclass(frozen=True)
+class Part:
+    """Rows g and cost f of z between bounds, and where they hold (repeats, len(z))."""
+
+    labels: tuple[str, ...]
+    z: ca.SX
+    g: ca.SX
+    f: ca.SX
+    lower: float
+    upper: float
+    columns: np.ndarray
+    soft: Soft | None = None
+
+
+@dataclass(frozen=True)
+class Row:
+    """One row of the program: its meaning, the node it is about, its bounds."""
+
+    label: str
+    node: int
+    lower: float
+    upper: float
+
+
+class PhaseProgram:
+    """The program of a phase sequence.
+
+    `lower`, `upper` (size,) bound the variables x, `columns` tells where each stands; `g_lower`,
+    `g_upper` (rows,) bound the rows, `rows` says what each means. `elastic`: 0 where modes hold
+    exactly, else the price of a mode constraint that gives way by its scale.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        task: Task,
+        reduction: Reduction,
+        phases: Sequence[Phase],
+        constraints: Sequence[Constraint],
+        scheme: Scheme,
+        elastic: float = 0.0,
+    ) -> None:
+        self.scheme, self.elastic = scheme, elastic
+        self.model, self.task, self.reduction = model, task, reduction
+        self.phases, self.constraints = list(phases), list(constraints)
+        self.nodes = phases[-1].last
+        self.layout = Layout(model, reduction, task.duration / self.nodes, task.step_variation)
+        self.impacts = [p for p in range(1, len(phases)) if self._closes(p)]
+        self.columns = Columns(self.layout, phases, self.impacts, scheme.stages)
+        self.lower, self.upper = self._bounds()
+        self.element = element(model, self.layout, reduction, task.cost, scheme)
+        self.jump = impact(model, self.layout, reduction)
+        self.added: list[Part] = []
+
+    def _closes(self, p: int) -> bool:
+        """Whether a constraint that was open is closed from phase p on."""
+        return any(self.closes(p, i) for i in range(len(self.constraints)))
+
+    def closes(self, p: int, i: int) -> bool:
+        """Whether constraint i was open before phase p and is closed in it."""
+        return p > 0 and self.phases[p - 1].modes[i] == OPEN != self.phases[p].modes[i]
+
+    def _bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        layout, c, elements = self.layout, self.columns, Elements.current()
+        lower, upper = np.full(c.size, -INF), np.full(c.size, INF)
+
+        def put(index: np.ndarray, group: str) -> None:
+            part = layout.slices[group]
+            lower[index], upper[index] = layout.lower[part], layout.upper[part]
+
+        for g in STATE:
+            put(c.first[g], g)
+        states = layout.slices["s"]
+        vented = layout.lower[states] - elements.vented * layout.upper[states]
+        for e, stages in enumerate(c.stages):
+            for stage in stages:
+                for g in STATE:
+                    put(stage[g], g)
+                lower[stage["s"]] = vented
+                self._forces(lower, upper, stage["lam"], self.phases[c.phase_of[e]].modes)
+            put(c.u[e], "u")
+        nominal = self.task.duration / self.nodes / layout.scale[layout.slices["h"]]
+        lower[c.h[:, 0]] = elements.shortest * nominal
+        upper[c.h[:, 0]] = elements.longest * nominal
+        for phase in self.phases:
+            where = c.u[phase.first][[i - layout.slices["u"].start for i in layout.binary]]
+            lower[where] = upper[where] = phase.valves
+        for p in self.impacts:
+            put(c.after[p], "v")
+            self._forces(lower, upper, c.impulse[p], self.phases[p].modes)
+        return lower, upper
+
+    def _forces(
+        self, lower: np.ndarray, upper: np.ndarray, index: np.ndarray, modes: Sequence[int]
+    ) -> None:
+        """Forces are zero while open; while closed, friction is one signed force."""
+        top = self.layout.upper[self.layout.slices["lam"]]
+        lower[index] = upper[index] = 0.0
+        for constraint, mode in zip(self.constraints, modes, strict=True):
+            if mode == OPEN:
+                continue
+            j = self.place(constraint.force)
+            upper[index[j]] = top[j]
+            if constraint.friction is not None:
+                j = self.place(constraint.friction.forward)
+                lower[index[j]], upper[index[j]] = -top[j], top[j]
+
+    def place(self, force: int) -> int:
+        """Column of a force of the whole robot among the half's."""
+        return int(np.flatnonzero(self.reduction.B["lam"][force])[0])
+
+    def add(
+        self, label: str, z: ca.SX, g: ca.SX, low: float, high: float, columns: list[np.ndarray]
+    ) -> None:
+        """Add the row low <= g(z) <= high, once for each z in `columns` (repeats, len(z))."""
+        if columns:
+            part = Part((label,), z, ca.SX(g), ca.SX(0), low, high, np.array(columns))
+            self.added.append(part)
+
+    def mode_constraint(
+        self, i: int, kind: str, z: ca.SX, g: ca.SX, low: float, high: float, where: Where
+    ) -> None:
+        """The same for a mode of constraint i; in an elastic program it gives way for a price."""
+        label, columns = f"{self.constraints[i].label} {kind}", [at for _, at in where]
+        if not self.elastic or not columns:
+            self.add(label, z, g, low, high, columns)
+            return
+        slack = ca.SX.sym("slack", int(high < INF) + int(low > -INF))
+        own = self.columns.more(len(columns), slack.numel())
+        self.lower = np.concatenate([self.lower, np.zeros(own.size)])
+        self.upper = np.concatenate([self.upper, np.full(own.size, INF)])
+        above, below = (
+            own[:, j] if used else None for j, used in ((0, high < INF), (-1, low > -INF))
+        )
+        g = g - slack[0] * float(high < INF) + slack[-1] * float(low > -INF)
+        soft = Soft(i, kind, np.array([p for p, _ in where]), above, below)
+        at, price = np.hstack([np.array(columns), own]), self.elastic * ca.sum1(slack)
+        self.added.append(Part((label,), ca.vertcat(z, slack), g, price, low, high, at, soft))
+
+    def proximal(self, x: np.ndarray, weight: float) -> np.ndarray:
+        """Add weight / 2 times the squared scaled distance of states, inputs and durations from
+        where they are in x (size,); returns x with these places as fixed variables behind it."""
+        c = self.columns
+        stages = [stage for element in c.stages for stage in element]
+        drawn = [at[g] for at in (c.first, *stages) for g in STATE]
+        index = np.concatenate([*drawn, np.unique(c.u), c.h.ravel()])
+        index = index[self.lower[index] < self.upper[index]]
+        fixed = c.more(len(index), 1)
+        self.lower = np.concatenate([self.lower, x[index]])
+        self.upper = np.concatenate([self.upper, x[index]])
+        z, nothing = ca.SX.sym("z", 2), ca.SX(0, 1)
+        pull, at = weight / 2 * (z[0] - z[1]) ** 2, np.column_stack([index, fixed])
+        self.added.append(Part((), z, nothing, pull, 0.0, 0.0, at))
+        return np.concatenate([x, x[index]])
+
+    def keep_short(self, x: np.ndarray, steps: float) -> None:
+        """Bound elements by `steps` times the nominal step, or by their length in x if longer."""
+        index = self.columns.h[:, 0]
+        longest = self.upper[index] * steps / Elements.current().longest
+        self.upper[index] = np.maximum(longest, x[index])
+
+    @property
+    def soft(self) -> list[Soft]:
+        """The mode constraints that may give way."""
+        return [part.soft for part in self.added if part.soft is not None]
+
+    def loosened(self, x: np.ndarray) -> np.ndarray:
+        """x (size,) with slacks a little larger than every mode constraint needs there."""
+        x, row, leeway = x.copy(), 0, Elements.current().leeway
+        g = np.array(self.problem.g(x, [])).ravel()
+        for part in self._parts:
+            values = g[row : row + len(part.columns) * len(part.labels)]
+            row += len(values)
+            if part.soft is None:
+                continue
+            for way, over in (
+                (part.soft.above, values - part.upper),
+                (part.soft.below, part.lower - values),
+            ):
+                if way is not None:
+                    x[way] = np.maximum(over, 0.0) + leeway
+        return x
+
+    @cached_property
+    def problem(self) -> BlockProblem:
+        """The functions for IPOPT."""
+        blocks = [Block(part.z, part.g, part.f, part.columns) for part in self._parts]
+        return BlockProblem(blocks, self.columns.size, ca.SX(0, 1), worth_compiling=True)
+
+    @cached_property
+    def _parts(self) -> list[Part]:
+        c, zero = self.columns, ca.SX(0)
+        every = np.array([c.element(e) for e in range(self.nodes)])
+        body = self.element
+        found = [Part(body.labels, body.z, body.g, body.f, 0.0, 0.0, every)]
+        hits = []
+        for p in self.impacts:
+            before = c.end(self.phases[p].first)
+            hits.append(np.concatenate([*(before[g] for g in STATE), c.after[p], c.impulse[p]]))
+        if hits:
+            jump = self.jump
+            found.append(Part(jump.labels, jump.z, jump.g, zero, 0.0, 0.0, np.array(hits)))
+        return found + self.added
+
+    @cached_property
+    def rows(self) -> list[Row]:
+        """What every row means and where it holds."""
+        nodes = self.columns.nodes()
+        return [
+            Row(label, int(nodes[columns].max()), part.lower, part.upper)
+            for part in self._parts
+            for columns in part.columns
+            for label in part.labels
+        ]
+
+    @cached_property
+    def g_lower(self) -> np.ndarray:
+        return np.array([row.lower for row in self.rows])
+
+    @cached_property
+    def g_upper(self) -> np.ndarray:
+        return np.array([row.upper for row in self.rows])

@@ -1,0 +1,93 @@
+"""A task's requirements on the multi-phase program, at element ends."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import casadi as ca
+import numpy as np
+
+from kemba.ocp.phases.independent import Independent
+from kemba.ocp.phases.modes import HELD
+from kemba.ocp.phases.program import PhaseProgram
+from kemba.ocp.phases.view import View
+from kemba.ocp.task.requirement import Requirement, quantity_expression
+from kemba.ocp.transcription.stage import as_variable
+
+INF = np.inf
+
+
+def add_requirements(
+    program: PhaseProgram, requirements: Sequence[Requirement], start: Independent, end: Independent
+) -> None:
+    """Bounds where a requirement is about a variable, else rows; none where modes imply it."""
+    view = View(program)
+    _granted_at_end(program, view, end)
+    seen: set[tuple[object, ...]] = set()
+    for requirement in requirements:
+        g = view.of(quantity_expression(program.model, requirement.quantity.name))
+        z = view.z("q v s u lam")
+        key = (requirement.at, str(g), requirement.lower, requirement.upper)
+        if ca.jacobian(g, z).nnz() == 0 or key in seen or _about_valves(program, view, g):
+            continue
+        seen.add(key)
+        last = program.nodes
+        acts = ca.depends_on(g, view.z("u lam"))
+        nodes = range(int(acts), last + 1) if requirement.at is None else [requirement.node(last)]
+        if requirement.at is not None and requirement.lower == requirement.upper and not acts:
+            moment = {0: start, last: end}.get(nodes[0])
+            if moment is not None and not moment.adds(g, view):
+                continue
+        _put(program, view, requirement, g, list(nodes))
+
+
+def _about_valves(program: PhaseProgram, view: View, g: ca.SX) -> bool:
+    """Whether a requirement is about valves alone: phases keep them as the plan has them."""
+    inputs = view.layout.slices["u"].start
+    valves = [view.symbols["u"][c - inputs] for c in view.layout.binary]
+    own = {str(symbol) for symbol in ca.symvar(g)}
+    return own <= {str(symbol) for symbol in valves}
+
+
+def _put(
+    program: PhaseProgram, view: View, requirement: Requirement, g: ca.SX, nodes: list[int]
+) -> None:
+    variable = as_variable(g, view.z("q v s"))
+    columns = [_columns(program, node, full=variable is None) for node in nodes]
+    if variable is not None:
+        index, factor, offset = variable
+        ends = sorted(
+            ((requirement.lower - offset) / factor, (requirement.upper - offset) / factor)
+        )
+        at = [z[index] for z in columns]
+        program.lower[at] = np.maximum(program.lower[at], ends[0])
+        program.upper[at] = np.minimum(program.upper[at], ends[1])
+        return
+    scale = requirement.scale
+    label = f"{requirement.text}:{requirement.quantity.name}"
+    low, high = requirement.lower / scale, requirement.upper / scale
+    if not ca.depends_on(g, view.z("u lam")):
+        columns = [_columns(program, node, full=False) for node in nodes]
+        program.add(label, view.z("q v s"), g / scale, low, high, columns)
+        return
+    program.add(label, view.z("q v s u lam"), g / scale, low, high, columns)
+
+
+def _columns(program: PhaseProgram, node: int, full: bool) -> np.ndarray:
+    c = program.columns
+    at = c.end(node)
+    parts = [at["q"], at["v"], at["s"]]
+    if full and node > 0:
+        parts += [c.u[node - 1], at["lam"]]
+    return np.concatenate(parts)
+
+
+def _granted_at_end(program: PhaseProgram, view: View, end: Independent) -> None:
+    """What the last phase's closed constraints imply at the last node."""
+    for constraint, mode in zip(program.constraints, program.phases[-1].modes, strict=True):
+        if mode == 0:
+            continue
+        end.adds(view.of(constraint.gap), view)
+        end.adds(view.of(constraint.rate), view)
+        if constraint.friction is not None and mode == HELD:
+            end.adds(view.of(constraint.friction.slip), view)

@@ -1,0 +1,170 @@
+"""Settings of the refinement: how modes are read, solved and repaired. See docs/refine.md."""
+
+from __future__ import annotations
+
+from kemba.settings import Settings, setting
+
+TRIALS = "tuned: trials that docs/refine.md tells of"
+HAND = "convention: chosen by hand on the cases of benchmarks/refine.py, no comparison kept"
+STEPS = "derived: implicit Euler smears an impact over two steps"
+
+
+class Reading(Settings):
+    """How modes are read off an implicit Euler plan."""
+
+    stiff: float = setting(
+        1e-3, "m", "body weight over this length tells a force from a gap of the relaxation",
+        "derived: the product of both is at most the relaxation, 1e-6", decides=True,
+    )  # fmt: skip
+    closed: float = setting(
+        1e-6, "m", "a smaller gap at the start touches", "derived: the certificate's tolerance"
+    )
+    slides: float = setting(0.05, "m.s-1", "a faster slip is sliding", HAND, decides=True)
+    light: float = setting(
+        0.1, "1", "of body weight: a foot that bears less for a step or two does not stand",
+        HAND, decides=True,
+    )  # fmt: skip
+    shudder: float = setting(
+        5e-5, "m", "what opens less for a step or two stays closed", HAND, decides=True
+    )
+    hop: float = setting(
+        5e-3, "m", "a foot that rises less for a step or two stays down", HAND, decides=True
+    )
+    brief: int = setting(2, "1", "steps that are few", STEPS, decides=True)
+
+
+class ModeConstraints(Settings):
+    """What modes ask beyond touching and staying apart."""
+
+    clear: float = setting(
+        2e-4, "m", "least gap of what stays open; a smaller one closes when executed", TRIALS,
+        decides=True,
+    )  # fmt: skip
+    away: int = setting(
+        3, "1", "elements before and after a touch in which gaps may be smaller", TRIALS,
+        decides=True,
+    )  # fmt: skip
+    lands: float = setting(
+        0.1, "m.s-1", "least speed at which a foot comes down; a slower one touches at no certain "
+        "time", TRIALS, decides=True,
+    )  # fmt: skip
+    independent: float = setting(
+        1e-6, "1", "part of an equality's gradient that must be new beside the others",
+        "derived: far above rounding errors, far below any real direction",
+    )  # fmt: skip
+
+
+class Elements(Settings):
+    """Bounds of element durations and of what may give way."""
+
+    shortest: float = setting(
+        0.03, "1", "times the nominal step: shortest element", TRIALS, decides=True
+    )
+    longest: float = setting(
+        3.0, "1", "times the nominal step: longest element", HAND, decides=True
+    )
+    fair: float = setting(
+        2.0, "1", "times the nominal step: longest element of a good solution; on longer ones two "
+        "stages err, for lower costs", TRIALS, decides=True,
+    )  # fmt: skip
+    vented: float = setting(
+        0.01, "1", "of a state's range: room below its lower bound, since a vented chamber stays "
+        "exactly there", "tuned: without it IPOPT did not converge (docs/refine.md)",
+    )  # fmt: skip
+    leeway: float = setting(
+        1e-4, "1", "scaled slack beyond what a start needs", "convention: off the bounds"
+    )
+
+
+class Refining(Settings):
+    """How a refinement is solved."""
+
+    mirrored: float = setting(
+        1e-6, "1", "scaled: a plan nearer to its mirror image is solved by half",
+        "derived: the certificate's tolerance",
+    )  # fmt: skip
+    price: float = setting(
+        1000.0, "1", "of a mode giving way by its scale; cheaper, modes that could hold give way "
+        "too", HAND, decides=True,
+    )  # fmt: skip
+    near: float = setting(
+        10.0, "1", "proximal weight of the first solve; without, short steps wander off", HAND,
+        decides=True,
+    )  # fmt: skip
+    near_elastic: float = setting(
+        1.0, "1", "proximal weight of an elastic solve", HAND, decides=True
+    )
+    near_fine: float = setting(
+        1.0, "1", "proximal weight of the finer scheme's solve", HAND, decides=True
+    )
+    rounds: int = setting(6, "1", "elastic solves of one reading", HAND, decides=True)
+    iterations_half: int = setting(
+        300, "1", "of all solves together, half a robot", TRIALS, decides=True
+    )
+    iterations_whole: int = setting(
+        450, "1", "of all solves together, whole robot", HAND, decides=True
+    )
+    nearest_half: int = setting(
+        50, "1", "iterations of the first solve, half a robot", HAND, decides=True
+    )
+    rough_iterations: int = setting(
+        60, "1", "iterations of other solves by either scheme", HAND, decides=True
+    )
+    elastic_iterations: int = setting(
+        100, "1", "iterations of an elastic solve", HAND, decides=True
+    )
+    mu: float = setting(1e-4, "1", "barrier parameter of a warm start", HAND, decides=True)
+    elastic_mu: float = setting(
+        0.1, "1", "barrier parameter of an elastic solve", "convention: IPOPT's default"
+    )
+    push: float = setting(
+        1e-6, "1", "distance from the bounds of a warm start",
+        "convention: small beside every scaled variable",
+    )  # fmt: skip
+    rough_tol: float = setting(
+        1e-3, "1", "IPOPT's tolerance of the coarser scheme, which is solved on", HAND
+    )
+    rough_rows: float = setting(
+        1e-6, "1", "tolerance of the rows by the coarser scheme, which is solved on", HAND
+    )
+    tol: float = setting(1e-4, "1", "IPOPT's tolerance of the finer scheme", HAND, decides=True)
+    rows: float = setting(
+        1e-8, "1", "tolerance of the rows by the finer scheme",
+        "derived: 100 times below the certificate's tolerance of 1e-6",
+    )  # fmt: skip
+    pivot: float = setting(
+        1e-3, "1", "mumps_pivtol; IPOPT's 1e-6 counts wrong signs on three stages, and steps "
+        "shrink", HAND,
+    )  # fmt: skip
+    hessian: float = setting(
+        1e6, "1", "max_hessian_perturbation; beyond, tries cost a second an iteration and lead "
+        "nowhere", HAND,
+    )  # fmt: skip
+    stagnation_iterations: int = setting(
+        30, "1", "iterations without a smaller violation, after which a solve is given up", HAND,
+        decides=True,
+    )  # fmt: skip
+    stagnation_near: float = setting(
+        1e-4, "1", "scaled violation that is near enough to go on", HAND, decides=True
+    )
+    second_start: float = setting(
+        0.05, "1", "guess noise of the second start where the first plan does not refine", HAND,
+        decides=True,
+    )  # fmt: skip
+
+
+class Repair(Settings):
+    """When modes fit, and which of them change."""
+
+    fits: float = setting(3e-4, "1", "scaled: modes that give way less fit", HAND, decides=True)
+    matters: float = setting(
+        0.1, "1", "of the worst misfit: smaller ones are left for the next round", HAND,
+        decides=True,
+    )  # fmt: skip
+    sliver: int = setting(
+        3, "1", "elements: phases up to this long give way before longer ones", STEPS, decides=True
+    )
+    collapsed: float = setting(
+        3.0, "1", "times the shortest duration: a phase that short has collapsed", TRIALS,
+        decides=True,
+    )  # fmt: skip

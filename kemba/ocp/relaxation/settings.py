@@ -1,0 +1,183 @@
+"""Settings of the schedule: what each solve asks, and when one gives up. See docs/solving.md."""
+
+from __future__ import annotations
+
+from kemba.settings import Settings, setting
+
+# Both on the jumps of configs/sweeps/reliability.yaml; the code of the trials was not kept.
+TRIALS = "tuned: trials that docs/solving.md tells of"
+HAND = "convention: chosen by hand, no comparison kept"
+VARIANTS = "tuned: benchmarks/variants.py"
+PAIR = "body weights x m (or m/s)"
+
+
+class Relaxation(Settings):
+    """How far the pairs are relaxed, and what the cost holds beside the task's own."""
+
+    loose: float = setting(
+        1e-3, PAIR, "relaxation of the pairs while valves are sought", HAND, decides=True
+    )
+    tight: float = setting(
+        1e-4, PAIR, "relaxation of the pairs once valves are fixed", HAND, decides=True
+    )
+    margin: float = setting(
+        0.8, "1", "the last relaxation, as a part of what the certificate asks",
+        "convention: room for IPOPT's own tolerance on the rows", decides=True,
+    )  # fmt: skip
+    valve: float = setting(
+        0.1, "1", "weight of u(1 - u), per valve and node of the grid's mean", HAND, decides=True
+    )
+    switching: float = setting(
+        0.05, "1", "weight of squared changes of a valve; without it valves chatter in flight",
+        TRIALS, decides=True,
+    )  # fmt: skip
+    switching_moved: float = setting(
+        0.01, "1", "the same weight where switches are moved", TRIALS, decides=True
+    )
+    forces: float = setting(
+        3e-5, "1", "weight of squared scaled forces while valves are sought; without it the cost "
+        "is flat where legs share a load", TRIALS, decides=True,
+    )  # fmt: skip
+    proximal: float = setting(
+        3e-4, "1", "weight of half the squared distance from the start in the last solve",
+        TRIALS, decides=True,
+    )  # fmt: skip
+
+
+class Starts(Settings):
+    """Where each solve starts: barrier parameters and distances from the bounds."""
+
+    interior_push: float = setting(
+        0.3, "1", "bound_push and bound_frac of the first solve: far inside the bounds",
+        TRIALS, decides=True,
+    )  # fmt: skip
+    interior_mu: float = setting(
+        0.1, "1", "barrier parameter of the first solve",
+        "convention: IPOPT's default", decides=True,
+    )  # fmt: skip
+    rounded: float = setting(
+        1e-2, "1", "distance from the bounds after valves were rounded, which leaves the plan far "
+        "from feasible", TRIALS, decides=True,
+    )  # fmt: skip
+    changed: float = setting(
+        1e-3, "1", "distance from the bounds after valves were released or the grid refined",
+        VARIANTS, decides=True,
+    )  # fmt: skip
+    rounded_mu: float = setting(1e-2, "1", "barrier parameter after rounding", TRIALS, decides=True)
+    changed_mu: float = setting(
+        1e-3, "1", "barrier parameter after releasing valves or refining the grid", HAND,
+        decides=True,
+    )  # fmt: skip
+    tighten_mu: float = setting(
+        1e-5, "1", "barrier parameter of the last solve", HAND, decides=True
+    )
+    confirm_mu: float = setting(
+        1e-7, "1", "barrier parameter of the whole robot's confirming solve",
+        "derived: below the tolerance of a plan that is solved already",
+    )  # fmt: skip
+
+
+class Ends(Settings):
+    """When a solve of the schedule is done, and when it is given up."""
+
+    tol: float = setting(
+        1e-3, "1", "IPOPT's tolerance while valves are sought; these plans are changed again",
+        HAND, decides=True,
+    )  # fmt: skip
+    exact_tol: float = setting(
+        1e-2, "1", "IPOPT's tolerance of the last solve: optimal to a few digits of the cost",
+        HAND, decides=True,
+    )  # fmt: skip
+    exact_rows: float = setting(
+        1e-8, "1", "tolerance of the rows in the last solve",
+        "derived: 100 times below the certificate's tolerance of 1e-6",
+    )  # fmt: skip
+    relax_iterations: int = setting(
+        600, "1", "limit of the first solve; where there is a plan it takes 30 to 200",
+        "derived: three times the longest seen", decides=True,
+    )  # fmt: skip
+    misfit_iterations: int = setting(
+        200, "1", "limit of the first solve on a finer grid; valves that fit take 20 to 100",
+        "derived: twice the longest seen", decides=True,
+    )  # fmt: skip
+    moved_iterations: int = setting(
+        80, "1", "limit of a solve with moved switches; plans that take longer are seldom better",
+        HAND, decides=True,
+    )  # fmt: skip
+    stagnation_iterations: int = setting(
+        40, "1", "iterations without a smaller violation, after which a finer grid's valves do not "
+        "fit", HAND, decides=True,
+    )  # fmt: skip
+    stagnation_near: float = setting(
+        0.05, "1", "scaled violation that is near enough to go on", HAND, decides=True
+    )
+    confirmed: float = setting(
+        1e-7, "1", "scaled violation of the whole robot's rows that needs no further solve",
+        "derived: 10 times below the certificate's tolerance of 1e-6",
+    )  # fmt: skip
+
+
+class ValveSearch(Settings):
+    """How valve switches are moved, and on which grids valves are sought."""
+
+    reach: int = setting(4, "1", "nodes by which a switch may move at a time", HAND, decides=True)
+    pays: float = setting(
+        0.02, "1", "relative fall of the cost that makes another round worth while",
+        "convention: plans of one task differ by more from start to start", decides=True,
+    )  # fmt: skip
+    coarsest: int = setting(24, "1", "nodes of the coarsest grid", HAND, decides=True)
+    finest: int = setting(
+        80, "1", "nodes of the finest grid on which valves are sought", HAND, decides=True
+    )
+
+
+class Guess(Settings):
+    """The automatic start guess."""
+
+    stretch: float = setting(
+        0.92, "1", "leg length at take-off, between retracted (0) and stretched (1)",
+        "convention: short of the stretched knee, where virtual work is singular", decides=True,
+    )  # fmt: skip
+    rise: float = setting(
+        0.7, "1", "longest flight up to the apex, of the time before it",
+        "convention: the push needs the rest",
+    )  # fmt: skip
+    landing: float = setting(
+        0.3, "1", "leg length after a landing, between retracted (0) and stretched (1)",
+        "convention: a bent knee, when the task asks for nothing",
+    )  # fmt: skip
+    least_flight: float = setting(
+        0.05, "s", "shortest time in which the guess moves forward",
+        "convention: keeps the speed finite without a flight",
+    )  # fmt: skip
+    filled: float = setting(
+        300.0 / 324.0, "1", "largest chamber force of the guess, of the steady force",
+        "convention: a moving piston does not reach the steady force",
+    )  # fmt: skip
+    filling: float = setting(
+        0.6, "1", "time constant of the guess, of the fill time at full stroke",
+        "derived: 15 of 25 ms, the chamber in the middle of a push (Table I)",
+    )  # fmt: skip
+    difference: float = setting(
+        1e-4, "rad", "step of the knee in differences for virtual work",
+        "derived: near the cube root of the rounding error",
+    )  # fmt: skip
+
+
+class Penalty(Settings):
+    """The paper's penalty method, kept for comparison."""
+
+    single: tuple[float, ...] = setting(
+        (1e4,), "1", "weight rho of eq. 9", "literature: the paper's eq. 9"
+    )
+    ramp: tuple[float, ...] = setting(
+        (1e1, 1e2, 1e3, 1e4), "1", "weights of a ramp that ends at the paper's",
+        "literature: ramped penalties of the paper's reference",
+    )  # fmt: skip
+    unrelaxed: float = setting(
+        1e6, PAIR, "a relaxation so wide that the pairs' rows never bind",
+        "derived: above every product within the variables' bounds",
+    )  # fmt: skip
+    ramp_mu: float = setting(
+        1e-2, "1", "barrier parameter of the ramp's later solves", "convention: a warm start"
+    )

@@ -1,0 +1,11 @@
+"""Before anything is imported: one thread for linear algebra in each test process.
+
+The matrices here are small. OpenBLAS splits them all the same, and its threads wait for each other
+by spinning: beside another process that costs many times the work itself.
+"""
+
+from __future__ import annotations
+
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

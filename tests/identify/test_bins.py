@@ -1,0 +1,85 @@
+"""Bins of a comparison: p values of their errors, and q values over all of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from kemba.identify.compare.bins import ConditionBin, condition_bins, excess
+from kemba.identify.evidence.bootstrap import NullTest
+from kemba.identify.problem.problem import Rows
+
+
+def binned(errors: list[np.ndarray]) -> list[ConditionBin]:
+    """The bins of one channel per array of errors, in noise units."""
+    count = [len(e) for e in errors]
+    channel = np.repeat(np.arange(len(errors)), count)
+    label = np.full(len(channel), "flight")
+    names = tuple(f"c{i}" for i in range(len(errors)))
+    n = len(channel)
+    rows = Rows(np.zeros(n, int), channel, np.arange(n) / 1e3, label, label, names, np.ones(n))
+    return list(condition_bins(rows, label, np.arange(n), np.concatenate(errors)))
+
+
+def test_q_values_control_false_discoveries() -> None:
+    """Benjamini and Hochberg (1995) by hand: of m sorted p values, min over j >= i of m p_j / j."""
+    rng = np.random.default_rng(0)
+    errors = [rng.normal(0.0, scale, 60) for scale in np.linspace(1.0, 1.6, 12)]
+    p = np.array([excess(e) for e in errors])
+    order = np.argsort(p)
+    wanted = np.empty(12)
+    worst = 1.0
+    for rank in range(12, 0, -1):
+        i = order[rank - 1]
+        worst = min(worst, 12 * p[i] / rank)
+        wanted[i] = worst
+    found = [b.q_value for b in binned(errors)]
+    assert found == pytest.approx(wanted, rel=1e-9)
+    assert np.sum(p < 0.01) > np.sum(np.array(found) < 0.01), "else it controls nothing here"
+
+
+def test_of_many_good_conditions_none_stands_out() -> None:
+    """300 conditions of a model that is right to within what is tolerated."""
+    rng = np.random.default_rng(1)
+    found = binned([rng.normal(0.0, 1.15, 40) for _ in range(300)])
+    assert not any(b.significant for b in found)
+
+
+def test_one_bad_condition_among_many_stands_out() -> None:
+    rng = np.random.default_rng(2)
+    errors = [rng.normal(0.0, 1.0, 40) for _ in range(100)]
+    errors[17] *= 2.5
+    assert [b.channel for b in binned(errors) if b.significant] == ["c17"]
+
+
+def test_a_condition_of_too_few_windows_is_no_bin() -> None:
+    rng = np.random.default_rng(3)
+    assert [b.channel for b in binned([rng.normal(size=4), rng.normal(size=5)])] == ["c1"]
+
+
+def test_a_p_value_is_never_zero() -> None:
+    """Of 99 draws none is as good: as good as one in a hundred, no better is known."""
+    test = NullTest(np.arange(99.0), ())
+    assert test.p_value(1000.0) == 0.01
+    assert test.p_value(-1.0) == 1.0
+    assert test.p_value(98.0) == 0.02  # as good as the best counts
+
+
+def test_the_threshold_is_the_quantile_of_the_draws() -> None:
+    draws = np.arange(101.0) / 10
+    assert NullTest(draws, ()).threshold == pytest.approx(9.8)
+    assert NullTest(draws / 100, ()).threshold == 1.0, "less than a nat is nothing"
+
+
+def test_one_moment_convicts_nobody() -> None:
+    """The largest error does not count: a foot that lifts a moment early is no missing force."""
+    calm = np.full(40, 0.5)
+    calm[17] = 20.0
+    assert excess(calm) > 0.5
+    calm[18:23] = 20.0
+    assert excess(calm) < 1e-6
+
+
+@pytest.mark.parametrize(("q", "significant"), [(0.009, True), (0.011, False), (0.5, False)])
+def test_one_false_discovery_in_a_hundred_is_allowed(q: float, significant: bool) -> None:
+    assert ConditionBin("body/z", "flight", "00", "in", 2.0, q).significant == significant

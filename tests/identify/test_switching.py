@@ -1,0 +1,47 @@
+"""Late valves are the same to simulator, bench and robot identification."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from kemba.effects.pneumatics.switching import changes, delayed, instants, is_on, pulses
+from kemba.identify.robot.dynamics.air import substeps
+from kemba.identify.robot.motion.resampled import ResampledLog
+from kemba.plant import Profile
+from kemba.plant.simulation.valves import acting
+
+TIME = np.arange(400) / 1e3
+
+
+def command(seed: int) -> np.ndarray:
+    """Random pulses (n,) of 2 to 30 ms; some begin or end with the valve on."""
+    rng = np.random.default_rng(seed)
+    on, column = bool(rng.integers(2)), np.zeros(len(TIME))
+    at = 0
+    while at < len(TIME):
+        width = int(rng.integers(2, 30))
+        column[at : at + width] = on
+        at, on = at + width, not on
+    return column
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("late", [(0.006, 0.006), (0.006, 0.019), (0.021, 0.006)])
+def test_every_reader_switches_alike(seed: int, late: tuple[float, float]) -> None:
+    column = command(seed)
+    sent = pulses(TIME, column)
+    log = ResampledLog("run", TIME, column[:, None], column[:, None], (sent,), np.ones(1))
+    times, valves, _ = substeps(log, np.array([late]))
+    middle = 0.5 * (times[1:] + times[:-1])
+    simulated = acting(Profile(TIME, column), *late)
+    long = np.diff(times) > 1e-9
+    assert np.array_equal(valves[0][long], is_on(delayed(sent, *late), middle)[long])
+    assert valves[0][long].tolist() == [simulated(t) for t in middle[long]]
+    assert len(times) == len(TIME) + len(instants(sent)), "as many times whatever the delays"
+
+
+def test_changes_say_when_and_which_way() -> None:
+    times, signs = changes([(-np.inf, 0.1), (0.2, 0.3), (0.4, np.inf)])
+    assert times.tolist() == [0.1, 0.2, 0.3, 0.4]
+    assert signs.tolist() == [-1.0, 1.0, -1.0, 1.0]

@@ -1,0 +1,78 @@
+"""Rows of the phases' program, built for a plan and read without solving it."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import casadi as ca
+import numpy as np
+import pytest
+from ocp.runs import solved
+
+from kemba.config import load_yaml
+from kemba.ocp.nlp.ipopt import Control
+from kemba.ocp.phases.modes import read_phases
+from kemba.ocp.phases.program import PhaseProgram
+from kemba.ocp.phases.radau import RADAU3
+from kemba.ocp.phases.unilateral import read_constraints
+from kemba.ocp.refinement.refine import Refiner, reduction_of
+from kemba.ocp.task.requirement import resolve
+from kemba.ocp.transcription.solution import arrays
+
+
+@cache
+def built() -> tuple[PhaseProgram, np.ndarray]:
+    """The program of a jump's phases, and its start: the implicit Euler plan."""
+    run = solved("jump")
+    model, task, plan = run.model, run.task, run.plan
+    requirements = resolve(task, model, load_yaml(run.run.task))
+    half = reduction_of(model, task, requirements, plan)
+    refiner = Refiner(model, task, requirements, plan, half, Control())
+    binary = np.array([q.binary for q in model.inputs.values()])
+    inputs = half.restrict("u", arrays(model, plan)["u"])
+    valves = np.round(inputs[:, half.B["u"][binary].any(axis=0)])
+    phases = read_phases(model, read_constraints(model, half), plan, valves, refiner.marks)
+    return refiner.build(phases, plan, RADAU3)
+
+
+def values(label: str) -> tuple[np.ndarray, float, float]:
+    """Values of the rows called `label` at the start, and the bounds they must keep."""
+    program, x = built()
+    (part,) = (part for part in program.added if part.labels == (label,))
+    g = ca.Function("g", [part.z], [part.g])
+    return np.array([float(g(x[c])) for c in part.columns]), part.lower, part.upper
+
+
+def test_a_foot_comes_down_where_it_touches() -> None:
+    """The rate of the gap before the touch, in m/s, falls at 0.1 m/s or faster."""
+    rates, low, high = values("front/contact:gap approach")
+    assert (low, high) == (-np.inf, pytest.approx(-0.1))
+    assert len(rates) == 1 and -5.0 < rates[0] < -0.1
+
+
+def test_a_foot_touches_at_no_height() -> None:
+    gaps, low, high = values("front/contact:gap touch")
+    assert (low, high) == (0.0, 0.0)
+    assert np.abs(gaps).max() < 0.02  # of 0.1 m
+
+
+def test_open_gaps_stay_open() -> None:
+    program, _ = built()
+    bounds = {(r.lower, r.upper) for r in program.rows if r.label == "front/contact:gap gap"}
+    low, high = zip(*sorted(bounds), strict=True)
+    assert low == pytest.approx((0.0, 2e-3)) and high == (np.inf, np.inf)  # of 0.1 m, near, away
+
+
+def test_valves_dwell_between_their_switches() -> None:
+    """Each row is the share of the nominal duration between two switches of one valve."""
+    program, _ = built()
+    task, rows = program.task, [r for r in program.rows if r.label == "dwell"]
+    assert rows
+    for row in rows:
+        assert row.lower * task.duration == pytest.approx(task.min_dwell) and row.upper == np.inf
+
+
+def test_the_motion_lasts_what_the_task_allows() -> None:
+    program, _ = built()
+    (row,) = (r for r in program.rows if r.label == "duration")
+    assert (row.lower, row.upper) == pytest.approx((0.8, 1.2))

@@ -1,0 +1,38 @@
+"""The collocation schemes: Radau IIA's order conditions, stage by stage and over a step."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from kemba.ocp.phases.radau import RADAU3, RADAU5, Scheme
+
+SCHEMES = pytest.mark.parametrize("scheme", [RADAU3, RADAU5], ids=["order 3", "order 5"])
+
+
+@SCHEMES
+def test_every_stage_integrates_polynomials_of_its_order(scheme: Scheme) -> None:
+    """Collocation: sum_j A[i, j] c_j^k = c_i^(k+1) / (k+1) for k below the number of stages."""
+    for power in range(scheme.stages):
+        found = scheme.butcher @ scheme.points**power
+        assert found == pytest.approx(scheme.points ** (power + 1) / (power + 1), abs=1e-14)
+
+
+@SCHEMES
+def test_the_last_stage_is_the_end_of_the_step(scheme: Scheme) -> None:
+    """Stiffly accurate: constraints of the last stage hold at the node itself."""
+    assert scheme.points[-1] == 1.0
+
+
+@SCHEMES
+def test_a_step_of_a_linear_equation_is_pades(scheme: Scheme) -> None:
+    """y' = -k y: the stability function is the Pade approximation (s-1, s) of exp, L-stable."""
+    for z in (-0.1, -3.0, -1e6):
+        ones = np.ones(scheme.stages)
+        inside = np.linalg.solve(np.eye(scheme.stages) - z * scheme.butcher, ones)
+        growth = 1.0 + z * scheme.butcher[-1] @ inside
+        above, below = {
+            2: (1 + z / 3, 1 - 2 * z / 3 + z**2 / 6),
+            3: (1 + 2 * z / 5 + z**2 / 20, 1 - 3 * z / 5 + 3 * z**2 / 20 - z**3 / 60),
+        }[scheme.stages]
+        assert growth == pytest.approx(above / below, rel=1e-6, abs=1e-10)
