@@ -10,7 +10,7 @@ from kemba.effects.mechanics.ground import GroundCompliance, GroundFriction
 from kemba.plant import Commands, Profile, run, simulate
 from kemba.plant.execution.replay import peak
 from kemba.plant.kernel.events import CLOSED
-from kemba.plant.stepping.equations import equations_of
+from kemba.plant.stepping.family import equations_of
 from kemba.trajectory import Trajectory
 
 LEGS = ("front", "rear")

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from kemba.errors import KembaError
 from kemba.model import Model
 from kemba.plant.execution.replay import Replay, first_row, judge
 from kemba.plant.simulation.commands import Commands, JointControl, Profile
-from kemba.plant.simulation.simulate import STEP, Simulated, run
+from kemba.plant.simulation.simulate import STEP, Condition, Simulated, run_many, simulate_one
 from kemba.plant.stepping.arrays import Array
 from kemba.trajectory import Trajectory
 
@@ -65,6 +66,36 @@ def execute(
     table lacks a column.
     """
     table = read_controller(controller)
+    condition = condition_of(table, model, gains, step, extra, start, dead_time, valves, sample)
+    return Execution(simulate_one(condition), table, lead_of(table))
+
+
+def execute_many(
+    controller: Trajectory | str | Path, cases: Iterable[Mapping[str, Any]], jobs: int | None = None
+) -> list[Execution | KembaError]:
+    """Play a controller table under many conditions side by side on `jobs` cores (all of them).
+
+    Each case holds the arguments of `execute` but the first, as `{"model": ..., "start": ...}`.
+    An execution that fails gives its error. Raises KembaError where a case makes no sense.
+    """
+    table = read_controller(controller)
+    done = run_many((condition_of(table, **case) for case in cases), jobs)
+    lead = lead_of(table)
+    return [d if isinstance(d, KembaError) else Execution(d, table, lead) for d in done]
+
+
+def condition_of(
+    table: Trajectory,
+    model: Model,
+    gains: Gains | None = None,
+    step: float = STEP,
+    extra: float = 0.0,
+    start: Mapping[str, float] | None = None,
+    dead_time: bool = True,
+    valves: Mapping[str, Profile] | None = None,
+    sample: float | Array = 1e-3,
+) -> Condition:
+    """What `execute` simulates. Raises KembaError when the table lacks a column."""
     gains = gains or Gains(*(table.meta.get(k, v) for k, v in vars(Gains()).items()))
     profiles = {
         quantity.name: Profile.of(table.time, _column(table, quantity.name))
@@ -72,16 +103,14 @@ def execute(
         if quantity.binary
     }
     commands = Commands({**profiles, **(valves or {})}, hip_control(model, table, gains), PERIOD)
-    done = run(
-        model,
-        {**first_row(model, table), **(start or {})},
-        commands,
-        float(table.time[-1] - table.time[0]) + extra,
-        step,
-        sample,
-        dead_time,
-    )
-    return Execution(done, table, float(table.meta.get("lead", 0.0)))
+    initial = {**first_row(model, table), **(start or {})}
+    duration = float(table.time[-1] - table.time[0]) + extra
+    return Condition(model, initial, commands, duration, step, sample, dead_time)
+
+
+def lead_of(table: Trajectory) -> float:
+    """The time [s] by which a controller table starts before its plan."""
+    return float(table.meta.get("lead", 0.0))
 
 
 def read_controller(source: Trajectory | str | Path) -> Trajectory:

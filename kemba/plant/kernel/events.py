@@ -5,11 +5,11 @@ from __future__ import annotations
 from math import ceil
 from typing import NamedTuple
 
+from kemba.plant.kernel.algebra.root import first_root
 from kemba.plant.kernel.forces import touching
 from kemba.plant.kernel.impact import impact
 from kemba.plant.kernel.jit import kernel, part
 from kemba.plant.kernel.machine import Machine, Memory, State
-from kemba.plant.kernel.root import first_root
 from kemba.plant.kernel.step import step
 from kemba.plant.stepping.arrays import Array
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from kemba.plant.kernel.algebra.lcp import solve_lcp
 from kemba.plant.kernel.calls import evaluate
 from kemba.plant.kernel.jit import kernel
-from kemba.plant.kernel.lcp import solve_lcp
 from kemba.plant.kernel.machine import Machine, Memory, State
 from kemba.plant.stepping.arrays import Array
 

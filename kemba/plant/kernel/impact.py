@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from kemba.plant.kernel.algebra.linear import factor, solve
 from kemba.plant.kernel.calls import evaluate
 from kemba.plant.kernel.forces import add_forces, evaluate_pairs, remember_push, set_gaps
 from kemba.plant.kernel.jit import kernel, part
-from kemba.plant.kernel.linear import factor, solve
 from kemba.plant.kernel.machine import Machine, Memory, State
 
 

@@ -84,7 +84,7 @@ def _folder() -> str | None:
     Numba itself would look only at the file of the outermost function, and would not see that
     another file has changed.
     """
-    sources = sorted(Path(__file__).parent.glob("*.py"))
+    sources = sorted(Path(__file__).parent.rglob("*.py"))
     content = b"".join(path.read_bytes() for path in sources) + numba.__version__.encode()
     above = cache_folder()
     if above is None:

@@ -13,10 +13,10 @@ methods do for index 2; lam1 and lam2 solve small complementarity problems w = A
 
 from __future__ import annotations
 
+from kemba.plant.kernel.algebra.linear import factor, solve
 from kemba.plant.kernel.calls import evaluate
 from kemba.plant.kernel.forces import add_forces, evaluate_pairs, remember_push, set_gaps
 from kemba.plant.kernel.jit import kernel, part
-from kemba.plant.kernel.linear import factor, solve
 from kemba.plant.kernel.machine import Machine, Memory, State
 from kemba.plant.kernel.scheme import FASTEST, GAMMA, PULL_BACK, SHORTEST
 

@@ -13,7 +13,8 @@ from kemba.plant.simulation.commands import Profile
 from kemba.plant.simulation.inputs import among, breaks, input_table, merged
 from kemba.plant.simulation.valves import delayed
 from kemba.plant.stepping.arrays import Array
-from kemba.plant.stepping.equations import Equations, equations_of
+from kemba.plant.stepping.equations import Equations
+from kemba.plant.stepping.family import equations_of
 from kemba.trajectory import Trajectory
 
 ImposedMotion = Callable[[Array], tuple[Array, Array]]  # times (m,) -> x [m], v [m/s]

@@ -8,9 +8,9 @@ import numpy as np
 
 from kemba.errors import KembaError
 from kemba.model import Model
+from kemba.plant.kernel.algebra.lemke import NoSolutionError
 from kemba.plant.kernel.control import Law
 from kemba.plant.kernel.events import MOST, NOTICED, Impacts
-from kemba.plant.kernel.lemke import NoSolutionError
 from kemba.plant.kernel.machine import memory, state
 from kemba.plant.kernel.play import ASK, BURIED, DONE, EXPLODED, Progress, Schedule, play
 from kemba.plant.simulation.commands import Commands, JointControl, Profile
@@ -47,12 +47,14 @@ class Player:
         samples: Array,
         duration: float,
     ) -> None:
-        self.model, self.commands = model, commands
+        self.model, self.equations, self.commands = model, equations, commands
         self.pairs, self.machine = equations.pairs, equations.machine
         m, nu = self.machine, len(model.inputs)
         columns = len(recorded(model, equations))
         sizes = 2 * m.n + m.ns + nu + m.nl
-        self.memory = memory(m, nu, 0, columns - sizes)
+        free = equations.values(model)
+        self.memory = memory(m, nu, len(free), columns - sizes)
+        self.memory.x[2 * m.n + m.ns + nu :][: len(free)] = free
         self.now, self.spare = state(m), state(m)
         self.now.y[:] = np.concatenate(start)
         self.schedule = _schedule(model, commands, acting, samples, duration)

@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import os
+from collections.abc import Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from kemba.errors import KembaError
 from kemba.model import Model
 from kemba.plant.simulation.commands import SAME_TIME, Commands
-from kemba.plant.simulation.record import Impact
+from kemba.plant.simulation.record import Impact, trajectory
 from kemba.plant.simulation.start import initial_values
 from kemba.plant.simulation.valves import delayed
 from kemba.plant.stepping.arrays import Array
-from kemba.plant.stepping.equations import equations_of
+from kemba.plant.stepping.family import equations_of
 from kemba.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from kemba.plant.simulation.player import Player
 
 STEP, LONGEST = 1e-4, 5e-4  # s
 
@@ -26,6 +32,19 @@ class Simulated:
 
     trajectory: Trajectory
     impacts: tuple[Impact, ...]
+
+
+@dataclass(frozen=True)
+class Condition:
+    """One of many simulations: the arguments of `simulate`."""
+
+    model: Model
+    initial: Mapping[str, float] | None = None
+    commands: Commands | None = None
+    duration: float = 1.0
+    step: float = STEP
+    sample: float | Array = 1e-3
+    dead_time: bool = True
 
 
 def simulate(
@@ -59,22 +78,57 @@ def run(
     dead_time: bool = True,
 ) -> Simulated:
     """As `simulate`, with the impacts that happened."""
-    from kemba.plant.simulation.player import Player  # numba takes half a second to import
-    from kemba.plant.simulation.record import trajectory
+    condition = Condition(model, initial, commands, duration, step, sample, dead_time)
+    return simulate_one(condition)
 
+
+def simulate_one(condition: Condition) -> Simulated:
+    """The simulation that a condition describes. Raises KembaError as `simulate` does."""
+    return _played(_player(condition), condition)
+
+
+def run_many(
+    conditions: Iterable[Condition], jobs: int | None = None
+) -> list[Simulated | KembaError]:
+    """Many simulations side by side on `jobs` cores (all of them), in the order given.
+
+    Models that differ in numbers only, as `Model.with_effects` makes them, share their machine
+    code. A simulation that fails gives its error; the others go on. Raises KembaError as
+    `simulate` does where a condition makes no sense.
+    """
+    with ThreadPoolExecutor(jobs or os.cpu_count()) as pool:
+        waiting = [pool.submit(_tried, _player(c), c) for c in conditions]
+        return [future.result() for future in waiting]
+
+
+def _tried(player: Player, condition: Condition) -> Simulated | KembaError:
+    try:
+        return _played(player, condition)
+    except KembaError as error:
+        return error
+
+
+def _player(condition: Condition) -> Player:
+    from kemba.plant.simulation.player import Player  # numba takes half a second to import
+
+    model, step = condition.model, condition.step
     if model.mechanism.imposed:
         raise KembaError(model.name, "its motion is imposed", hint="use kemba.plant.rig.rigs")
     if not 0.0 < step <= LONGEST:
         expected = f"up to {LONGEST:g} s was expected"
         raise KembaError("step", f"{step:g} s is out of range", expected)
-    commands = commands or Commands()
+    commands = condition.commands or Commands()
     profiles = dict(commands.profiles)
-    acting = delayed(model, profiles) if dead_time else profiles
-    times, equations = _samples(duration, sample), equations_of(model)
-    start = initial_values(model, initial or {})
-    player = Player(model, equations, start, commands, acting, times, duration)
-    player.play(step)
-    motion = trajectory(model, equations, player.times, player.table)
+    acting = delayed(model, profiles) if condition.dead_time else profiles
+    start = initial_values(model, condition.initial or {})
+    samples = _samples(condition.duration, condition.sample)
+    equations = equations_of(model)
+    return Player(model, equations, start, commands, acting, samples, condition.duration)
+
+
+def _played(player: Player, condition: Condition) -> Simulated:
+    player.play(condition.step)
+    motion = trajectory(player.model, player.equations, player.times, player.table)
     return Simulated(motion, tuple(player.impacts))
 
 

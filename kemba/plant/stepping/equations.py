@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from weakref import WeakKeyDictionary
 
 import casadi as ca
 import numpy as np
@@ -16,6 +15,7 @@ import numpy as np
 from kemba.model import Model
 from kemba.model.node import Node
 from kemba.plant.kernel.machine import Machine
+from kemba.plant.stepping.arrays import Array
 from kemba.plant.stepping.compiled import Compiled
 from kemba.plant.stepping.forms import Forms
 from kemba.plant.stepping.imposed import impose
@@ -31,9 +31,14 @@ class Equations:
     """
 
     def __init__(self, model: Model, free: Sequence[str] = ()) -> None:
+        self.free = tuple(free)
         self.node: Node = model.build(free) if free else model.node
         self.forms = Forms(self.node)
         self.pairs: PairTable = self.forms.pairs
+
+    def values(self, model: Model) -> Array:
+        """The free parameters (np,) of a model that shares these equations."""
+        return np.array([model.parameters[name][1] for name in self.free], dtype=float)
 
     @cached_property
     def machine(self) -> Machine:
@@ -99,13 +104,3 @@ class Equations:
 
     def _symbols(self, *names: str) -> dict[str, ca.SX]:
         return {name: getattr(self.node, name) for name in names}
-
-
-_KNOWN: WeakKeyDictionary[Model, Equations] = WeakKeyDictionary()
-
-
-def equations_of(model: Model) -> Equations:
-    """The equations of a model, made once."""
-    if model not in _KNOWN:
-        _KNOWN[model] = Equations(model)
-    return _KNOWN[model]

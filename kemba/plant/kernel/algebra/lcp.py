@@ -7,9 +7,9 @@ where that fails.
 
 from __future__ import annotations
 
+from kemba.plant.kernel.algebra.lemke import lemke
+from kemba.plant.kernel.algebra.linear import solve_pivoted
 from kemba.plant.kernel.jit import kernel, part
-from kemba.plant.kernel.lemke import lemke
-from kemba.plant.kernel.linear import solve_pivoted
 from kemba.plant.kernel.machine import Lcp
 
 ROUNDING = 1e-11  # of the terms of a row; a smaller violation is none
