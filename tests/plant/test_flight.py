@@ -52,7 +52,7 @@ def test_free_flight_conserves_energy_and_momentum(seed: int) -> None:
     rates = {
         c.name: rng.normal(0.0, 1.0) for c in bare.mechanism.velocities if "knee" not in c.name
     }
-    t = simulate(bare, {**AIRBORNE, **rates}, duration=0.2, sample=0.01)
+    t = simulate(bare, {**AIRBORNE, **rates}, duration=0.2, step=1e-4, sample=0.01)
     total = energies(bare, t)
     assert np.ptp(total) < 1e-6 * total[0]
     forward = [inertia(bare, q, v)[0] @ v for q, v in zip(*states(bare, t), strict=True)]

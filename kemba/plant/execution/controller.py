@@ -14,7 +14,7 @@ from kemba.errors import KembaError
 from kemba.model import Model
 from kemba.plant.execution.replay import Replay, first_row, judge
 from kemba.plant.simulation.commands import Commands, JointControl, Profile
-from kemba.plant.simulation.simulate import STEP, Condition, Simulated, run_many, simulate_one
+from kemba.plant.simulation.simulate import Condition, Simulated, run_many, simulate_one
 from kemba.plant.stepping.arrays import Array
 from kemba.trajectory import Trajectory
 
@@ -52,7 +52,7 @@ def execute(
     controller: Trajectory | str | Path,
     model: Model,
     gains: Gains | None = None,
-    step: float = STEP,
+    step: float | None = None,
     extra: float = 0.0,
     start: dict[str, float] | None = None,
     dead_time: bool = True,
@@ -88,7 +88,7 @@ def condition_of(
     table: Trajectory,
     model: Model,
     gains: Gains | None = None,
-    step: float = STEP,
+    step: float | None = None,
     extra: float = 0.0,
     start: Mapping[str, float] | None = None,
     dead_time: bool = True,

@@ -10,6 +10,7 @@ from kemba.plant.kernel.forces import touching
 from kemba.plant.kernel.impact import impact
 from kemba.plant.kernel.jit import kernel, part
 from kemba.plant.kernel.machine import Machine, Memory, State
+from kemba.plant.kernel.pace import Pace, keeps_pace
 from kemba.plant.kernel.step import step
 from kemba.plant.stepping.arrays import Array
 
@@ -19,6 +20,7 @@ MANY, REACH = 12, 2e-5  # events within one step after which gaps close at a dis
 MOST = 10 * MANY  # events within one step
 NO_TIME = 1e-12  # s
 NOTICED = 1e-9  # N.s; a smaller impulse is no impact
+FREE, TOUCHED, TOO_LONG = 0, 1, 2  # how a step ends
 
 
 class Impacts(NamedTuple):
@@ -32,9 +34,9 @@ class Impacts(NamedTuple):
 
 @part
 def advance(
-    m: Machine, k: Memory, now: State, spare: State, until: float, longest: float, log: Impacts
+    m: Machine, k: Memory, now: State, spare: State, until: float, pace: Pace, log: Impacts
 ) -> bool:
-    """Carry `now` on to `until` [s] in steps of up to `longest` [s], with `spare` as memory.
+    """Carry `now` on to `until` [s], with `spare` as memory.
 
     False when it stops earlier because `log` is nearly full.
     """
@@ -42,13 +44,14 @@ def advance(
         if log.number[0] + MOST > len(log.time):
             return False
         left = until - now.time[0]
-        steps = max(1.0, ceil(left / longest - 1e-6))
+        steps = max(1.0, ceil(left / pace.step[0] - 1e-6))
         end = now.time[0] + left / steps
         for event in range(MOST):
             reach = CLOSED if event < MANY else REACH
-            if _until_touch(m, k, now, spare, end - now.time[0], reach):
+            what = _until_touch(m, k, now, spare, end - now.time[0], reach, pace)
+            if what == TOUCHED:
                 collide(m, k, now, reach, log)
-            if end - now.time[0] <= NO_TIME:
+            if what == TOO_LONG or end - now.time[0] <= NO_TIME:
                 break
     now.time[0] = until
     return True
@@ -76,11 +79,14 @@ def collide(m: Machine, k: Memory, now: State, reach: float, log: Impacts) -> No
 
 
 @part
-def _until_touch(m: Machine, k: Memory, now: State, new: State, h: float, reach: float) -> bool:
-    """`now` becomes the state after `h`, or at the first touch of a gap that is open; whether
-    something touches."""
+def _until_touch(
+    m: Machine, k: Memory, now: State, new: State, h: float, reach: float, pace: Pace
+) -> int:
+    """`now` becomes the state after `h`, or at the first touch of a gap that is open: TOUCHED
+    where something touches. It stays where it is when the step is TOO_LONG."""
     count = touching(m, k, now.gap, reach)
-    step(m, k, now, h, count, new)
+    if not keeps_pace(pace, h, step(m, k, now, h, count, new)):
+        return TOO_LONG
     through, near = False, False
     for i in range(len(m.gaps)):
         may_hit = m.rigid[i] and now.gap[i] > reach
@@ -105,7 +111,7 @@ def _until_touch(m: Machine, k: Memory, now: State, new: State, h: float, reach:
         now.y[i] = new.y[i]
     for i in range(len(m.gaps)):
         now.gap[i], now.rate[i] = new.gap[i], new.rate[i]
-    return near
+    return TOUCHED if near else FREE
 
 
 @part

@@ -17,7 +17,7 @@ class Machine(NamedTuple):
     `gap`, `outputs` the columns of a log. Sizes: n coordinates, ns effect states, nl forces.
     Pairs as in `PairTable`: `gaps` (ng,), `rigid` (ng,), `group` (nl,), `ungapped` (nl,); `hard`
     (nl,): rows of instances with a rigid gap; `slips` (nl, nl): row i names the rows of slip that
-    the slip speed i bounds.
+    the slip speed i bounds. `scale` (n + ns,): usual sizes of velocities and effect states.
     """
 
     full: int
@@ -33,6 +33,7 @@ class Machine(NamedTuple):
     ungapped: Array
     hard: Array
     slips: Array
+    scale: Array
 
 
 class Lcp(NamedTuple):

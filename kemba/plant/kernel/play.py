@@ -12,9 +12,11 @@ from kemba.plant.kernel.forces import evaluate_pairs, set_gaps, touching
 from kemba.plant.kernel.impact import instant
 from kemba.plant.kernel.jit import entry, part
 from kemba.plant.kernel.machine import Machine, Memory, State
+from kemba.plant.kernel.pace import Pace
 from kemba.plant.stepping.arrays import Array
 
 DONE, FULL, ASK, EXPLODED, BURIED = 0, 1, 2, 3, 4  # why the kernel comes back
+HELD = 1e-4  # s; the recorded forces hold the pairs over this
 DEEP = 5e-3  # m; what starts deeper in the ground or a stop is a mistake
 
 
@@ -49,7 +51,7 @@ def play(
     spare: State,
     plan: Schedule,
     law: Law,
-    longest: float,
+    pace: Pace,
     log: Impacts,
     table: Array,
     progress: Progress,
@@ -61,7 +63,7 @@ def play(
     """
     for mark in range(progress.mark[0], len(plan.time)):
         progress.mark[0] = mark
-        if mark > 0 and not advance(m, k, now, spare, plan.time[mark], longest, log):
+        if mark > 0 and not advance(m, k, now, spare, plan.time[mark], pace, log):
             return FULL
         for i in range(m.n, 2 * m.n):
             if not isfinite(now.y[i]):
@@ -77,7 +79,7 @@ def play(
         if mark == 0 and not _start(m, k, now, log):
             return BURIED
         if plan.row[mark] >= 0:
-            _record(m, k, now, longest, plan, mark, table)
+            _record(m, k, now, plan, mark, table)
     return DONE
 
 
@@ -96,13 +98,11 @@ def _start(m: Machine, k: Memory, now: State, log: Impacts) -> bool:
 
 
 @part
-def _record(
-    m: Machine, k: Memory, now: State, h: float, plan: Schedule, mark: int, table: Array
-) -> None:
+def _record(m: Machine, k: Memory, now: State, plan: Schedule, mark: int, table: Array) -> None:
     """A row of the record: state, inputs as sent, forces, outputs, all just after now."""
     size, nu, row = len(now.y), plan.sent.shape[1], plan.row[mark]
     first = len(k.x) - m.n - m.nl
-    instant(m, k, now, h, touching(m, k, now.gap, CLOSED), first)
+    instant(m, k, now, HELD, touching(m, k, now.gap, CLOSED), first)
     evaluate(m.outputs, k.x, k.y, k.gap)
     for i in range(size):
         table[row, i] = now.y[i]

@@ -22,10 +22,14 @@ from kemba.plant.kernel.scheme import FASTEST, GAMMA, PULL_BACK, SHORTEST
 
 
 @kernel
-def step(m: Machine, k: Memory, now: State, h: float, count: int, new: State) -> None:
+def step(m: Machine, k: Memory, now: State, h: float, count: int, new: State) -> float:
     """`new` is the state after `h` [s] with the first `count` of the pairs `k.rows` held and the
-    others left alone."""
-    n = m.n
+    others left alone.
+
+    Gives how far it is from the result of the first stage, which is of first order: the largest
+    change of a velocity or an effect state in its scale.
+    """
+    n, apart = m.n, 0.0
     for i in range(len(now.y)):
         k.x[i] = now.y[i]
     _first_stage(m, k, now, h, count)
@@ -35,6 +39,7 @@ def step(m: Machine, k: Memory, now: State, h: float, count: int, new: State) ->
         k.v[i] = now.y[n + i] + h * (3.0 * k.X[i, 0] + k.Y[i, 0]) / 2.0
     for i in range(m.ns):
         new.y[2 * n + i] = now.y[2 * n + i] + h * (3.0 * k.k1[i, 0] + k.k2[i, 0]) / 2.0
+        apart = max(apart, abs(new.y[2 * n + i] - k.x[2 * n + i]) / m.scale[n + i])
         k.x[2 * n + i] = new.y[2 * n + i]
     for i in range(n):
         k.x[i] = new.y[i]
@@ -44,8 +49,10 @@ def step(m: Machine, k: Memory, now: State, h: float, count: int, new: State) ->
         add_forces(m, k, count, k.Y, h / 2.0, k.v, True)
     for i in range(n):
         new.y[n + i] = k.v[i]
+        apart = max(apart, abs(k.v[i] - k.x[n + i]) / m.scale[i])
     set_gaps(m, k, new)
     new.time[0] = now.time[0] + h
+    return apart
 
 
 @part

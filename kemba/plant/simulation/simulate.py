@@ -23,7 +23,7 @@ from kemba.trajectory import Trajectory
 if TYPE_CHECKING:
     from kemba.plant.simulation.player import Player
 
-STEP, LONGEST = 1e-4, 5e-4  # s
+LONGEST = 5e-4  # s; steps of equal length beyond this would miss events
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Condition:
     initial: Mapping[str, float] | None = None
     commands: Commands | None = None
     duration: float = 1.0
-    step: float = STEP
+    step: float | None = None
     sample: float | Array = 1e-3
     dead_time: bool = True
 
@@ -52,17 +52,17 @@ def simulate(
     initial: Mapping[str, float] | None = None,
     commands: Commands | None = None,
     duration: float = 1.0,
-    step: float = STEP,
+    step: float | None = None,
     sample: float | Array = 1e-3,
     dead_time: bool = True,
 ) -> Trajectory:
     """The motion of `model` for `duration` [s] with every output, state, input and force.
 
     `initial`: coordinates, velocities and effect states by column name; the standing pose at rest
-    stands for what is missing. `step` [s] is the longest step; valve switchings, controller
-    ticks and impacts end steps exactly. `sample` [s], or the times themselves (m,). `dead_time`:
-    valves act later than sent, by the model's own timing; their columns show them as sent.
-    Values at a sample hold just after it.
+    stands for what is missing. Steps are as long as the motion allows; `step` [s] makes them equal
+    and no longer than that. Valve switchings, controller ticks and impacts end steps exactly.
+    `sample` [s], or the times themselves (m,). `dead_time`: valves act later than sent, by the
+    model's own timing; their columns show them as sent. Values at a sample hold just after it.
     Raises KembaError on unknown names and on models without free motion.
     """
     return run(model, initial, commands, duration, step, sample, dead_time).trajectory
@@ -73,7 +73,7 @@ def run(
     initial: Mapping[str, float] | None = None,
     commands: Commands | None = None,
     duration: float = 1.0,
-    step: float = STEP,
+    step: float | None = None,
     sample: float | Array = 1e-3,
     dead_time: bool = True,
 ) -> Simulated:
@@ -114,7 +114,7 @@ def _player(condition: Condition) -> Player:
     model, step = condition.model, condition.step
     if model.mechanism.imposed:
         raise KembaError(model.name, "its motion is imposed", hint="use kemba.plant.rig.rigs")
-    if not 0.0 < step <= LONGEST:
+    if step is not None and not 0.0 < step <= LONGEST:
         expected = f"up to {LONGEST:g} s was expected"
         raise KembaError("step", f"{step:g} s is out of range", expected)
     commands = condition.commands or Commands()

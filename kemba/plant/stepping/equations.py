@@ -22,6 +22,8 @@ from kemba.plant.stepping.imposed import impose
 from kemba.plant.stepping.native import Native
 from kemba.plant.stepping.pairs import PairTable
 
+FAST, SPIN = 1.0, 5.0  # m/s, rad/s; usual velocities of a jump
+
 
 class Equations:
     """What the plant knows of a model; `free` names its parameters that each run may change.
@@ -62,7 +64,15 @@ class Equations:
             ungapped=pairs.ungapped,
             hard=np.isin(pairs.group, rigid),
             slips=slips,
+            scale=self._scale,
         )
+
+    @property
+    def _scale(self) -> Array:
+        """Usual sizes of velocities and effect states."""
+        states = [row.scale for row in self.node.rate_rows]
+        speeds = [FAST if row.unit == "N" else SPIN for row in self.node.dynamics_rows]
+        return np.array([*speeds, *states])
 
     @cached_property
     def native(self) -> Native:
