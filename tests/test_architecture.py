@@ -19,7 +19,7 @@ ROOT = Path(__file__).parent.parent
 # From the bottom up; a room may import its own level and those below.
 LEVELS = [
     {"errors"},
-    {"files", "settings", "stopwatch", "units"},
+    {"cache", "files", "instructions", "settings", "stopwatch", "units"},
     {"folders"},
     {"quantity"},
     {"config"},

@@ -1,14 +1,15 @@
 """The plant: fine simulation of a model with hard contact, controller, rigs and sensors."""
 
 from kemba.plant.execution.certificate import replays
-from kemba.plant.execution.controller import Execution, Gains, execute
+from kemba.plant.execution.controller import Execution, Gains, execute, execute_many
 from kemba.plant.execution.replay import Replay, replay
 from kemba.plant.simulation.commands import Commands, Profile
-from kemba.plant.simulation.simulate import Simulated, run, simulate
-from kemba.plant.stepping.events import Impact
+from kemba.plant.simulation.record import Impact
+from kemba.plant.simulation.simulate import Condition, Simulated, run, run_many, simulate
 
 __all__ = [
     "Commands",
+    "Condition",
     "Execution",
     "Gains",
     "Impact",
@@ -16,8 +17,10 @@ __all__ = [
     "Replay",
     "Simulated",
     "execute",
+    "execute_many",
     "replay",
     "replays",
     "run",
+    "run_many",
     "simulate",
 ]

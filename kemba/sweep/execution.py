@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -120,7 +121,7 @@ def _plan_folder(expansion: Expansion, name: str, block: ExecuteBlock, folder: P
 def run_on_plant(work: Work) -> Replay:
     """The execution that a case asks for, compared with its plan."""
     conditions = parse(work["conditions"], Conditions)
-    plain = counterpart(work["model"], supply=conditions.supply, plant=work["plant"])
+    plain = _plant(work["model"], conditions.supply, work["plant"], work["plant_hash"])
     model = plain.with_effects(changed_effects(plain, conditions))
     table = read_controller(work["plan"])
     rng = np.random.default_rng(conditions.seed)
@@ -133,6 +134,15 @@ def run_on_plant(work: Work) -> Replay:
         valves=scattered(model, table, conditions.jitter, rng) if conditions.jitter else None,
     )
     return done.against(model, Trajectory.read(Path(work["plan"]) / "trajectory.csv"))
+
+
+@lru_cache(maxsize=8)
+def _plant(model: str, supply: float | None, plant: str, content: str) -> Model:
+    """The plant as it is, kept by a worker: cases that change its numbers share its machine code.
+
+    `content`: the hash of its files, so that a changed file is read again.
+    """
+    return counterpart(model, supply=supply, plant=plant)
 
 
 def changed_effects(model: Model, conditions: Conditions) -> list[Effect]:

@@ -41,7 +41,7 @@ def under_the_hips(time: float, sense: Sense) -> dict[str, float]:
 
 
 @cache
-def jump(model: Model | None = None, step: float = 1e-4, duration: float = 0.5) -> Simulated:
+def jump(model: Model | None = None, step: float | None = 1e-4, duration: float = 0.5) -> Simulated:
     """A push with both extend valves, the rear one 4 ms longer, and the flight after it."""
     valves = {
         "front/valve/extend": Profile.pulses((0.02, 0.20)),
@@ -51,7 +51,7 @@ def jump(model: Model | None = None, step: float = 1e-4, duration: float = 0.5) 
 
 
 @cache
-def drop(model: Model | None = None, step: float = 1e-4, duration: float = 0.3) -> Simulated:
+def drop(model: Model | None = None, step: float | None = 1e-4, duration: float = 0.3) -> Simulated:
     """Half folded legs, a little tilted, dropped from a hand's breadth."""
     start = {"body/z": 0.42, "body/pitch": 0.03, "front/piston/x": 0.03, "rear/piston/x": 0.03}
     return run(model or planning(), start, None, duration, step)

@@ -9,8 +9,10 @@ from plant.scripts import drop, jump, planning
 
 from kemba.effects.mechanics.motor import Motor
 from kemba.plant import Gains, Profile, Simulated, execute, replay, replays, run
-from kemba.plant.execution.controller import hip_feedback, saturated
+from kemba.plant.execution.controller import hip_control, motor_limits
 from kemba.plant.execution.replay import judge, touchdown
+from kemba.plant.kernel.control import limited
+from kemba.plant.kernel.jit import entry
 from kemba.plant.simulation.commands import Commands
 from kemba.trajectory import Trajectory
 
@@ -90,11 +92,9 @@ def marked_table(rows: int = 20) -> Trajectory:
 def test_the_controller_plays_the_row_whose_time_has_come(time: float, row: int) -> None:
     """Each row holds for its millisecond, the last one for good."""
     model, table = planning(), marked_table()
-    sense = {f"{leg}/hip/{n}": float(table[f"{leg}/hip/{n}"][0])
-             for leg in ("front", "rear") for n in ("q", "w")}  # fmt: skip
-    asked = hip_feedback(model, table, Gains())(time, sense)
-    assert asked["front/hip/tau"] == pytest.approx(row)
-    assert asked["rear/hip/tau"] == pytest.approx(-row)
+    (wanted,) = hip_control(model, table, Gains()).at(np.array([time]))
+    assert wanted[:, 2] == pytest.approx([row, -row])
+    assert wanted[0, 0] == table["front/hip/q"][0]
 
 
 def test_a_played_table_shows_in_the_motion_when_its_row_is_due() -> None:
@@ -142,13 +142,21 @@ def test_the_controller_brings_a_hip_back() -> None:
     assert error[-1] == pytest.approx(-0.2, abs=0.1)
 
 
+@entry
+def limited_torque(tau: float, w: float, limits: np.ndarray) -> float:
+    return limited(tau, w, limits)
+
+
 def test_the_motor_gives_less_the_faster_it_turns() -> None:
+    def torque(motor: Motor | None, tau: float, w: float) -> float:
+        return limited_torque(tau, w, np.array(motor_limits(motor)))
+
     motor = Motor()
-    assert saturated(motor, 30.0, 0.0) == 24.8
-    assert saturated(motor, 30.0, 41.9) == pytest.approx(8.3)
-    assert saturated(motor, -30.0, 41.9) == -24.8
-    assert saturated(motor, 30.0, 60.0) == 0.0
-    assert saturated(None, 30.0, 60.0) == 30.0
+    assert torque(motor, 30.0, 0.0) == 24.8
+    assert torque(motor, 30.0, 41.9) == pytest.approx(8.3)
+    assert torque(motor, -30.0, 41.9) == -24.8
+    assert torque(motor, 30.0, 60.0) == 0.0
+    assert torque(None, 30.0, 60.0) == 30.0
 
 
 def test_a_robot_in_the_air_is_held_until_plan_time_zero() -> None:

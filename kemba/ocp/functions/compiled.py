@@ -13,7 +13,6 @@ import json
 import os
 import shlex
 import shutil
-import stat
 import subprocess
 import sys
 import time
@@ -22,25 +21,10 @@ from pathlib import Path
 
 import casadi as ca
 
+from kemba.cache import cache_folder, is_mine, is_own
 from kemba.ocp.functions.settings import Functions
 
 FLAGS = ("-O1", "-fPIC", "-shared", "-ffp-contract=off")  # contraction would change the last bits
-BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
-
-
-def cache_folder() -> Path | None:
-    """Where compiled functions are kept: KEMBA_CACHE, or the user's cache folder.
-
-    None for a user without a home.
-    """
-    if own := os.environ.get("KEMBA_CACHE"):
-        return Path(own)
-    if base := os.environ.get("XDG_CACHE_HOME"):
-        return Path(base) / "kemba"
-    try:
-        return Path.home() / ".cache" / "kemba"
-    except RuntimeError:  # neither HOME nor an entry in the list of users
-        return None
 
 
 def compiled(functions: Sequence[ca.Function], wait: bool = False) -> list[ca.Function]:
@@ -70,27 +54,6 @@ def compiled(functions: Sequence[ca.Function], wait: bool = False) -> list[ca.Fu
         return list(functions)
 
 
-def is_own(path: Path) -> bool:
-    """Whether a file or folder is the user's and nobody else could have written it.
-
-    A folder above it may be the user's or the system's, and open to others only where these
-    cannot rename what is not theirs (as in a shared folder for temporary files).
-    """
-    if not _mine(path.lstat()):
-        return False
-    for above in path.resolve().parents:
-        facts = above.stat()
-        open_to_all = facts.st_mode & stat.S_IWOTH and not facts.st_mode & stat.S_ISVTX
-        if facts.st_uid not in (0, os.geteuid()) or open_to_all:
-            return False
-    return True
-
-
-def _mine(facts: os.stat_result) -> bool:
-    linked = stat.S_ISLNK(facts.st_mode)
-    return not linked and facts.st_uid == os.geteuid() and not facts.st_mode & BY_OTHERS
-
-
 def is_whole(library: Path) -> bool:
     """Whether a library in the user's own folder is what the compiler made.
 
@@ -98,7 +61,7 @@ def is_whole(library: Path) -> bool:
     """
     manifest = library.with_suffix(".json")
     try:
-        if not (_mine(library.lstat()) and _mine(manifest.lstat())):
+        if not (is_mine(library.lstat()) and is_mine(manifest.lstat())):
             return False
         facts = json.loads(manifest.read_text(encoding="utf-8"))
         content = library.read_bytes()

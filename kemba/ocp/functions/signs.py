@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 import casadi as ca
 
-from kemba.ocp.functions.rewriting import replay
+from kemba.instructions import replay
 
 EVEN = {ca.OP_COS, ca.OP_COSH, ca.OP_SQ, ca.OP_FABS}
 ODD = {ca.OP_SIN, ca.OP_TAN, ca.OP_ASIN, ca.OP_ATAN, ca.OP_SINH, ca.OP_TANH, ca.OP_TWICE}

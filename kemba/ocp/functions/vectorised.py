@@ -11,7 +11,7 @@ from contextlib import contextmanager
 
 import casadi as ca
 
-from kemba.ocp.functions.rewriting import replay
+from kemba.instructions import replay
 from kemba.ocp.functions.settings import Functions
 
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -12,8 +13,8 @@ from kemba.effects.mechanics.motor import Motor
 from kemba.errors import KembaError
 from kemba.model import Model
 from kemba.plant.execution.replay import ON_GROUND, Replay, first_row, judge
-from kemba.plant.simulation.commands import SAME_TIME, Commands, Feedback, Profile, Sense
-from kemba.plant.simulation.simulate import STEP, Simulated, run
+from kemba.plant.simulation.commands import SAME_TIME, Commands, JointControl, Profile
+from kemba.plant.simulation.simulate import Condition, Simulated, run_many, simulate_one
 from kemba.plant.simulation.start import lowest_foot
 from kemba.plant.stepping.arrays import Array
 from kemba.trajectory import Trajectory
@@ -52,7 +53,7 @@ def execute(
     controller: Trajectory | str | Path,
     model: Model,
     gains: Gains | None = None,
-    step: float = STEP,
+    step: float | None = None,
     extra: float = 0.0,
     start: dict[str, float] | None = None,
     dead_time: bool = True,
@@ -67,24 +68,65 @@ def execute(
     the table lacks a column.
     """
     table = read_controller(controller)
+    case = condition_of(table, model, gains, step, extra, start, dead_time, valves, sample)
+    condition, held = case
+    return Execution(_later(simulate_one(condition), held), table, lead_of(table))
+
+
+def execute_many(
+    controller: Trajectory | str | Path, cases: Iterable[Mapping[str, Any]], jobs: int | None = None
+) -> list[Execution | KembaError]:
+    """Play a controller table under many conditions side by side on `jobs` cores (all of them).
+
+    Each case holds the arguments of `execute` but the first, as `{"model": ..., "start": ...}`.
+    An execution that fails gives its error. Raises KembaError where a case makes no sense.
+    """
+    table = read_controller(controller)
+    ready = [condition_of(table, **case) for case in cases]
+    done = run_many((condition for condition, _ in ready), jobs)
+    lead = lead_of(table)
+    return [
+        d if isinstance(d, KembaError) else Execution(_later(d, held), table, lead)
+        for d, (_, held) in zip(done, ready, strict=True)
+    ]
+
+
+def condition_of(
+    table: Trajectory,
+    model: Model,
+    gains: Gains | None = None,
+    step: float | None = None,
+    extra: float = 0.0,
+    start: Mapping[str, float] | None = None,
+    dead_time: bool = True,
+    valves: Mapping[str, Profile] | None = None,
+    sample: float | Array = 1e-3,
+) -> tuple[Condition, float]:
+    """What `execute` simulates, and for how long [s] a robot that starts in the air was held.
+
+    Raises KembaError when the table lacks a column.
+    """
     gains = gains or Gains(*(table.meta.get(k, v) for k, v in vars(Gains()).items()))
     profiles = {
         quantity.name: Profile.of(table.time, _column(table, quantity.name))
         for quantity in model.inputs.values()
         if quantity.binary
     }
-    lead = float(table.meta.get("lead", 0.0))
     pose = {**first_row(model, table), **(start or {})}
-    held = lead if lowest_foot(model, pose) > ON_GROUND else 0.0
+    held = lead_of(table) if lowest_foot(model, pose) > ON_GROUND else 0.0
     sent = {n: Profile(p.times - held, p.values) for n, p in {**profiles, **(valves or {})}.items()}
-    feedback = hip_feedback(model, table, gains)
-    commands = Commands(sent, lambda time, sense: feedback(time + held, sense), PERIOD)
+    control = hip_control(model, table, gains)
+    commands = Commands(sent, replace(control, times=control.times - held), PERIOD)
     duration = float(table.time[-1] - table.time[0]) + extra - held
     if np.ndim(sample):
         sample = np.asarray(sample) - held
         sample = sample[(sample >= -SAME_TIME) & (sample <= duration + SAME_TIME)]
-    done = run(model, pose, commands, duration, step, sample, dead_time)
-    return Execution(_later(done, held), table, lead)
+    return Condition(model, pose, commands, duration, step, sample, dead_time), held
+
+
+def lead_of(table: Trajectory) -> float:
+    """The time [s] by which a controller table starts before its plan."""
+    return float(table.meta.get("lead", 0.0))
 
 
 def _later(done: Simulated, held: float) -> Simulated:
@@ -106,38 +148,30 @@ def read_controller(source: Trajectory | str | Path) -> Trajectory:
     return Trajectory(source.time - source.time[0], columns, source.meta)
 
 
-def hip_feedback(model: Model, table: Trajectory, gains: Gains) -> Feedback:
-    """tau = K_p (q_d - q) + K_d (w_d - w) + tau_ff within what the motors can give (eq. 10)."""
+def hip_control(model: Model, table: Trajectory, gains: Gains) -> JointControl:
+    """The hips follow a controller table within what the motors can give (eq. 10)."""
     legs = model.mechanism.legs
-    motors = {
-        leg: next((e for e in model.effects if isinstance(e, Motor) and e.on in (leg, None)), None)
+    motors = [
+        next((e for e in model.effects if isinstance(e, Motor) and e.on in (leg, None)), None)
         for leg in legs
-    }
-    reference = {
-        leg: [_column(table, f"{leg}/hip/{symbol}") for symbol in ("q", "w", "tau")] for leg in legs
-    }
-
-    def feedback(time: float, sense: Sense) -> dict[str, float]:
-        row = min(max(int(np.searchsorted(table.time, time + 1e-9)) - 1, 0), len(table) - 1)
-        torques = {}
-        for leg in legs:
-            q_d, w_d, tau = (column[row] for column in reference[leg])
-            q, w = sense[f"{leg}/hip/q"], sense[f"{leg}/hip/w"]
-            tau = gains.K_p * (q_d - q) + gains.K_d * (w_d - w) + tau
-            torques[f"{leg}/hip/tau"] = saturated(motors[leg], float(tau), w)
-        return torques
-
-    return feedback
+    ]
+    wanted = [[_column(table, f"{leg}/hip/{name}") for name in ("q", "w", "tau")] for leg in legs]
+    return JointControl(
+        joints=tuple(f"{leg}/hip" for leg in legs),
+        times=table.time,
+        wanted=np.ascontiguousarray(np.array(wanted).transpose(2, 0, 1)),
+        limits=np.array([motor_limits(motor) for motor in motors]).reshape(-1, 3),
+        K_p=gains.K_p,
+        K_d=gains.K_d,
+    )
 
 
-def saturated(motor: Motor | None, tau: float, w: float) -> float:
-    """The torque [N.m] that a motor at speed `w` [rad/s] gives when `tau` is asked."""
+def motor_limits(motor: Motor | None) -> tuple[float, float, float]:
+    """Peak torque [N.m], speed without load [rad/s], slope [N.m.s/rad] of a `JointControl`."""
     if motor is None:
-        return tau
+        return np.inf, np.inf, 1.0
     slope = motor.tau_rated / (motor.w_noload - motor.w_rated)
-    high = min(motor.tau_peak, max(0.0, slope * (motor.w_noload - w)))
-    low = -min(motor.tau_peak, max(0.0, slope * (motor.w_noload + w)))
-    return min(max(tau, low), high)
+    return motor.tau_peak, motor.w_noload, slope
 
 
 def _column(table: Trajectory, name: str) -> np.ndarray:

@@ -8,7 +8,7 @@ import numpy as np
 
 from kemba.model import Model
 from kemba.plant.simulation.commands import Commands, Profile
-from kemba.plant.simulation.simulate import STEP, Simulated, run
+from kemba.plant.simulation.simulate import Simulated, run
 from kemba.plant.stepping.arrays import Array
 from kemba.trajectory import Trajectory
 
@@ -49,7 +49,7 @@ class Replay:
         }
 
 
-def replay(model: Model, plan: Trajectory, step: float = STEP) -> Replay:
+def replay(model: Model, plan: Trajectory, step: float | None = None) -> Replay:
     """Execute the inputs of `plan` on `model` from the plan's first node.
 
     Input k of an implicit Euler plan acts on (t[k-1], t[k]]; valves act as planned, without dead

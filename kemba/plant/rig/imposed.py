@@ -9,11 +9,12 @@ import numpy as np
 from kemba.errors import KembaError
 from kemba.model import Model
 from kemba.model.rest import at_rest
-from kemba.plant.simulation.commands import SAME_TIME, Commands, Profile
-from kemba.plant.simulation.inputs import Inputs, merged
+from kemba.plant.simulation.commands import Profile
+from kemba.plant.simulation.inputs import among, breaks, input_table, merged
 from kemba.plant.simulation.valves import delayed
 from kemba.plant.stepping.arrays import Array
-from kemba.plant.stepping.equations import Equations, equations_of
+from kemba.plant.stepping.equations import Equations
+from kemba.plant.stepping.family import equations_of
 from kemba.trajectory import Trajectory
 
 ImposedMotion = Callable[[Array], tuple[Array, Array]]  # times (m,) -> x [m], v [m/s]
@@ -38,24 +39,19 @@ def drive(
         raise KembaError(
             model.name, "its motion is free", hint="use kemba.plant.simulation.simulate"
         )
-    commands = Commands(dict(valves))
     acting = delayed(model, dict(valves)) if dead_time else dict(valves)
-    inputs, eq = Inputs(model, commands, acting), equations_of(model)
-    first = float(times[0])
-    shifted = {name: Profile(p.times - first, p.values) for name, p in acting.items()}
-    breaks = Inputs(model, commands, shifted).breaks(float(times[-1]) - first) + first
-    marks = merged(np.asarray(times, dtype=float), breaks)
-    wanted = np.searchsorted(times, marks - SAME_TIME) < np.searchsorted(times, marks + SAME_TIME)
-    u = inputs.update(first, {})
-    held = motion(np.array([first]))[0]
-    s = at_rest(model, held, u) if start is None else _given(model, start)
+    eq, first, last = equations_of(model), float(times[0]), float(times[-1])
+    edges = breaks([*acting.values(), *valves.values()], first, last)
+    marks = merged(np.asarray(times, dtype=float), edges)
+    wanted = among(marks, times)
+    u, sent = (np.nan_to_num(input_table(model, p, marks)) for p in (acting, valves))
+    s = at_rest(model, motion(times[:1])[0], u[0]) if start is None else _given(model, start)
     rows = []
-    for index, time in enumerate(marks):
-        if index:
-            s = _advance(eq, motion, s, u, float(marks[index - 1]), float(time), step)
-            u = inputs.update(float(time), {})
-        if wanted[index]:
-            rows.append(_row(eq, motion, s, u, inputs.sent(float(time)), float(time)))
+    for i, time in enumerate(marks):
+        if i:
+            s = _advance(eq, motion, s, u[i - 1], float(marks[i - 1]), float(time), step)
+        if wanted[i]:
+            rows.append(_row(eq, motion, s, u[i], sent[i], float(time)))
     return _table(model, eq, np.asarray(times, dtype=float), np.array(rows))
 
 

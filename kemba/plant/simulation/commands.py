@@ -44,19 +44,50 @@ class Profile:
         return cls(times, values)
 
     def __call__(self, time: float) -> float:
-        index = int(np.searchsorted(self.times, time + SAME_TIME, side="right")) - 1
-        return float(self.values[max(index, 0)])
+        return float(self.at(np.array(time)))
+
+    def at(self, times: Array) -> Array:
+        """The values at `times` (m,) [s]."""
+        index = np.searchsorted(self.times, times + SAME_TIME, side="right") - 1
+        found: Array = self.values[np.maximum(index, 0)]
+        return found
+
+
+@dataclass(frozen=True)
+class JointControl:
+    """tau = K_p (q_d - q) + K_d (w_d - w) + tau_ff of each of the `joints`, within what its motor
+    gives (paper, eq. 10).
+
+    A joint `front/hip` has the columns `front/hip/q`, `front/hip/w` and `front/hip/tau`. `wanted`
+    (m, joints, 3): q_d [rad], w_d [rad/s] and tau_ff [N.m] from `times` (m,) [s] on. `limits`
+    (joints, 3): peak torque [N.m], speed without load [rad/s] and the slope [N.m.s/rad] at which
+    torque falls with speed; infinite where nothing limits.
+    """
+
+    joints: tuple[str, ...]
+    times: Array
+    wanted: Array
+    limits: Array
+    K_p: float
+    K_d: float
+
+    def at(self, times: Array) -> Array:
+        """What is wanted at `times` (k,) [s]: (k, joints, 3)."""
+        index = np.searchsorted(self.times, times + SAME_TIME) - 1
+        found: Array = self.wanted[np.clip(index, 0, len(self.times) - 1)]
+        return found
 
 
 @dataclass(frozen=True)
 class Commands:
     """Inputs of the plant by column name; those not named stay 0.
 
-    `profiles`: signals known beforehand, valves as sent to the solenoids. `feedback(time, sense)`
-    is asked every `period` [s] for inputs that answer to the motion and holds them in between;
-    `sense` holds coordinates, velocities and effect states by name.
+    `profiles`: signals known beforehand, valves as sent to the solenoids. `feedback` acts every
+    `period` [s] on inputs that answer to the motion and holds them in between: a `JointControl`,
+    or a function `feedback(time, sense)` of yours, where `sense` holds coordinates, velocities
+    and effect states by name.
     """
 
     profiles: Mapping[str, Profile] = field(default_factory=dict)
-    feedback: Feedback | None = None
+    feedback: Feedback | JointControl | None = None
     period: float = 1e-3

@@ -1,4 +1,4 @@
-"""CasADi functions on fixed memory, and the small symbolic linear algebra they need."""
+"""CasADi functions on fixed memory."""
 
 from __future__ import annotations
 
@@ -48,20 +48,3 @@ def _views(flat: Array, shapes: Mapping[str, tuple[int, int]]) -> dict[str, Arra
         views[key] = part if columns == 1 else part.reshape((rows, columns), order="F")
         start += rows * columns
     return views
-
-
-def eliminate(A: ca.SX, B: ca.SX) -> ca.SX:
-    """Solution X of A X = B by elimination without pivoting, as an expression.
-
-    For matrices whose symmetric part is positive definite, as inertia with dissipation is.
-    """
-    A, B = ca.densify(A), ca.densify(B)
-    n = A.shape[0]
-    for k in range(n):
-        for i in range(k + 1, n):
-            ratio = A[i, k] / A[k, k]
-            A[i, k + 1 :] -= ratio * A[k, k + 1 :]
-            B[i, :] -= ratio * B[k, :]
-    for k in reversed(range(n)):
-        B[k, :] = (B[k, :] - ca.mtimes(A[k, k + 1 :], B[k + 1 :, :])) / A[k, k]
-    return B

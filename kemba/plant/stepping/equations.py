@@ -1,60 +1,116 @@
-"""The model's residual as the stepper needs it: one compiled function per stage.
+"""The model's residual as the kernel needs it: machine code, and the structure of its pairs.
 
-See `forms` for the parts of the residual and `scheme` for the stages.
+The residual is affine in accelerations and forces: 0 = M(q) a - F - B lam. The parts are taken
+by AD from the model's own expressions, so the plant has no physics of its own.
 """
 
 from __future__ import annotations
 
-from weakref import WeakKeyDictionary
+from collections.abc import Sequence
+from functools import cached_property
 
 import casadi as ca
+import numpy as np
 
 from kemba.model import Model
+from kemba.model.node import Node
+from kemba.plant.kernel.machine import Machine
+from kemba.plant.stepping.arrays import Array
 from kemba.plant.stepping.compiled import Compiled
 from kemba.plant.stepping.forms import Forms
+from kemba.plant.stepping.imposed import impose
+from kemba.plant.stepping.native import Native
 from kemba.plant.stepping.pairs import PairTable
-from kemba.plant.stepping.scheme import first_stage, impose, second_stage
+
+FAST, SPIN = 1.0, 5.0  # m/s, rad/s; usual velocities of a jump
 
 
 class Equations:
-    """Compiled functions of a model and the structure of its complementarity pairs.
+    """What the plant knows of a model; `free` names its parameters that each run may change.
 
-    `now(q, v, s, u)`: M (n, n), F (n,), B (n, nl) and the pairs w = W v + L lam + w0 at a state.
-    `ahead(q, v, s, u)`: the same pairs only. `first`, `second`, `free`: stages of a step, see
-    `scheme`. `driven`: a step of the effect states when the motion is imposed. `measure`: outputs.
+    `machine` is for the kernel. `now(q, v, s, u)`: M (n, n), F (n,), B (n, nl) and f (ns,) at a
+    state. `driven`: a step of the effect states when the motion is imposed. `measure`: outputs.
     """
 
-    def __init__(self, model: Model) -> None:
-        node = model.node
-        self.node = node
-        self.n, self.ns = node.q.numel(), node.s.numel()
-        self.nl, self.nu = node.lam.numel(), node.u.numel()
-        forms = Forms(node)
-        self.pairs: PairTable = forms.pairs
-        symbols = {key: getattr(node, key) for key in ("q", "v", "a", "s", "sd", "lam", "u")}
-        columns = [node.outputs[o.name] for o in node.output_quantities]
-        self.measure = Compiled("measure", symbols, {"y": ca.SX(ca.vertcat(*columns))})
-        state = {key: symbols[key] for key in ("q", "v", "s", "u")}
-        if model.mechanism.imposed:
-            self.driven = Compiled("driven", *impose(forms, state))
-            return
-        now = dict(zip(("M", "F", "B", "f"), forms.parts, strict=True))
-        self.now = Compiled("now", state, {**now, **forms.rows})
-        self.ahead = Compiled("ahead", state, forms.rows)
-        step = {**state, "h": ca.SX.sym("h")}
-        self.first = Compiled("first", step, first_stage(forms, step))
-        lam = {**step, "lam": ca.SX.sym("lam", self.nl)}
-        self.second = Compiled("second", lam, second_stage(forms, lam))
-        free = second_stage(forms, {**step, "lam": ca.SX.zeros(self.nl)})
-        wanted = ("q", "v", "s", "gap", "W")
-        self.free = Compiled("free", step, {key: free[key] for key in wanted})
+    def __init__(self, model: Model, free: Sequence[str] = ()) -> None:
+        self.free = tuple(free)
+        self.node: Node = model.build(free) if free else model.node
+        self.forms = Forms(self.node)
+        self.pairs: PairTable = self.forms.pairs
 
+    def values(self, model: Model) -> Array:
+        """The free parameters (np,) of a model that shares these equations."""
+        return np.array([model.parameters[name][1] for name in self.free], dtype=float)
 
-_KNOWN: WeakKeyDictionary[Model, Equations] = WeakKeyDictionary()
+    @cached_property
+    def machine(self) -> Machine:
+        """The model as the kernel sees it."""
+        address, pairs, nl = self.native.address, self.pairs, self.node.lam.numel()
+        rigid = pairs.group[pairs.gaps[pairs.rigid]]
+        slips = np.zeros((nl, nl), dtype=bool)
+        for speed, rows in pairs.free_speeds:
+            slips[speed, rows] = True
+        return Machine(
+            full=address["full"],
+            smooth=address["smooth"],
+            pairs=address["pairs"],
+            outputs=address["outputs"],
+            n=self.node.q.numel(),
+            ns=self.node.s.numel(),
+            nl=nl,
+            gaps=pairs.gaps,
+            rigid=pairs.rigid,
+            group=pairs.group,
+            ungapped=pairs.ungapped,
+            hard=np.isin(pairs.group, rigid),
+            slips=slips,
+            scale=self._scale,
+        )
 
+    @property
+    def _scale(self) -> Array:
+        """Usual sizes of velocities and effect states."""
+        states = [row.scale for row in self.node.rate_rows]
+        speeds = [FAST if row.unit == "N" else SPIN for row in self.node.dynamics_rows]
+        return np.array([*speeds, *states])
 
-def equations_of(model: Model) -> Equations:
-    """The equations of a model, compiled once."""
-    if model not in _KNOWN:
-        _KNOWN[model] = Equations(model)
-    return _KNOWN[model]
+    @cached_property
+    def native(self) -> Native:
+        """The model's functions in machine code, as `Machine` describes them."""
+        node, forms = self.node, self.forms
+        M, F, B, f = forms.parts
+        n, ns = node.q.numel(), node.s.numel()
+        blank = ca.SX(n, n), ca.SX(ns, ns)
+        x = [node.q, node.v, node.s, node.u, node.p, node.a, node.lam]
+        rest = ca.SX.zeros(ns)
+        functions = {
+            "full": [ca.horzcat(forms.D, M, F, B), ca.horzcat(forms.A, f)],
+            "smooth": [ca.horzcat(blank[0], M, F, B), ca.horzcat(blank[1], f)],
+            "pairs": [ca.horzcat(self.pairs.W, self.pairs.L, self.pairs.w0), self.pairs.gap],
+            "outputs": ca.substitute([self._outputs], [node.sd], [rest]),
+        }
+        return Native(x, functions)
+
+    @cached_property
+    def now(self) -> Compiled:
+        """M, F, B and f at a state."""
+        parts = dict(zip(("M", "F", "B", "f"), self.forms.parts, strict=True))
+        return Compiled("now", self._symbols("q", "v", "s", "u"), parts)
+
+    @cached_property
+    def driven(self) -> Compiled:
+        """A step of the effect states along an imposed motion."""
+        return Compiled("driven", *impose(self.forms, self._symbols("q", "v", "s", "u")))
+
+    @cached_property
+    def measure(self) -> Compiled:
+        """The outputs."""
+        symbols = self._symbols("q", "v", "a", "s", "sd", "lam", "u")
+        return Compiled("measure", symbols, {"y": self._outputs})
+
+    @property
+    def _outputs(self) -> ca.SX:
+        return ca.SX(ca.vertcat(*(self.node.outputs[o.name] for o in self.node.output_quantities)))
+
+    def _symbols(self, *names: str) -> dict[str, ca.SX]:
+        return {name: getattr(self.node, name) for name in names}

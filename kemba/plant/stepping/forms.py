@@ -1,39 +1,34 @@
-"""The model's residual split into the parts that a time step needs.
-
-The residual is affine in accelerations and forces: 0 = M(q) a - F - B lam. The parts are taken
-by AD from the model's own expressions, so the plant has no physics of its own.
-"""
+"""A model's residual split into what a time step needs: 0 = M(q) a - F - B lam, s' = f."""
 
 from __future__ import annotations
-
-from typing import Any
 
 import casadi as ca
 
 from kemba.errors import KembaError
+from kemba.model.node import Node
 from kemba.plant.stepping.pairs import read_pairs
 
 
 class Forms:
-    """Expressions of a node split into what a time step needs, as functions of (q, v, s, u)."""
+    """Expressions of a node's q, v, s, u and p, and the functions that evaluate them elsewhere.
 
-    def __init__(self, node: Any) -> None:
+    `parts`: M (n, n), F (n,), B (n, nl), f (ns,). `D` (n, n) = dF/dv and `A` (ns, ns) = df/ds are
+    the stiff blocks. `pairs`: the complementarity pairs.
+    Raises KembaError where an effect breaks the affine form.
+    """
+
+    def __init__(self, node: Node) -> None:
         self.pairs = read_pairs(node)
-        self.parts = M, F, B, f = _affine(node)
+        self.parts = _affine(node)
+        _, F, _, f = self.parts
+        self.D, self.A = ca.jacobian(F, node.v), ca.jacobian(f, node.s)
         state = [node.q, node.v, node.s, node.u]
-        self.rows = {
-            "W": self.pairs.W,
-            "L": self.pairs.L,
-            "w0": self.pairs.w0,
-            "gap": self.pairs.gap,
-        }
-        self.smooth = ca.Function("smooth", state, [M, F, B, f])
-        self.stiff = ca.Function("stiff", state, [ca.jacobian(F, node.v), ca.jacobian(f, node.s)])
-        self.pair_rows = ca.Function("pairs", state, list(self.rows.values()))
+        self.rates = ca.Function("rates", state, [f], {"allow_free": True})
+        self.stiff_rates = ca.Function("stiff_rates", state, [self.A], {"allow_free": True})
 
 
-def _affine(node: Any) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
-    """M, F, B and f of a node. Raises KembaError where an effect breaks the affine form."""
+def _affine(node: Node) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
+    """M, F, B and f of a node."""
     M, B = ca.jacobian(node.dynamics, node.a), -ca.jacobian(node.dynamics, node.lam)
     f = -ca.substitute([node.rate], [node.sd], [ca.SX.zeros(node.sd.numel())])[0]
     moving = ca.vertcat(node.a, node.lam, node.sd)

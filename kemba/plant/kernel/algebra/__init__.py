@@ -1,0 +1,1 @@
+"""Small linear systems, complementarity problems and roots, compiled by numba."""

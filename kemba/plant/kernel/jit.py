@@ -1,0 +1,100 @@
+"""The compiler's switch, and the folder that keeps what it made.
+
+The first simulation on a machine waits for the compiler, later ones load what it made. Code is
+loaded only from a folder that belongs to the user and that nobody else can write; without one
+every process compiles anew.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import pickle
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from threading import Lock
+from typing import Any, TypeVar, cast
+
+import numba
+from numba import njit
+
+from kemba.cache import cache_folder, is_own
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+LEAN = {"error_model": "numpy", "_nrt": False}  # IEEE division; no counting of references
+_COMPILING = Lock()
+
+
+def kernel(function: Function) -> Function:
+    """A function of the kernel, which only others of the kernel call."""
+    return cast(Function, njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, **LEAN)(function))
+
+
+def part(function: Function) -> Function:
+    """A function of the kernel that is written into its caller: for those with one caller.
+
+    Numba compiles all that a function calls together with it. A deep nest of functions would be
+    compiled many times.
+    """
+    return cast(Function, njit(inline="always", **LEAN)(function))
+
+
+def entry(function: Function) -> Function:
+    """A function of the kernel that Python calls: compiled at its first call, or loaded from the
+    cache, with all that it calls. It lets other threads run."""
+    with _settings():
+        try:
+            made = njit(cache=FOLDER is not None, nogil=True, **LEAN)(function)
+        except RuntimeError:  # the folder cannot be written
+            made = njit(nogil=True, **LEAN)(function)
+
+    def call(*arguments: Any) -> Any:
+        nonlocal made
+        if not made.overloads:
+            with _COMPILING, _settings():
+                types = tuple(numba.typeof(value) for value in arguments)
+                try:
+                    made.compile(types)
+                except (OSError, EOFError, pickle.UnpicklingError):  # a damaged cache
+                    made = njit(nogil=True, **LEAN)(function)
+                    made.compile(types)
+        return made(*arguments)
+
+    call.__dict__["dispatcher"] = made
+    return cast(Function, call)
+
+
+@contextmanager
+def _settings() -> Iterator[None]:
+    """Our own cache, and an optimiser that does without vectors: ours have a dozen entries."""
+    wanted = {"CACHE_DIR": FOLDER or "", "OPT": 1, "LOOP_VECTORIZE": 0, "SLP_VECTORIZE": 0}
+    usual = {name: getattr(numba.config, name) for name in wanted}
+    try:
+        for name, value in wanted.items():
+            setattr(numba.config, name, value)
+        yield
+    finally:
+        for name, value in usual.items():
+            setattr(numba.config, name, value)
+
+
+def _folder() -> str | None:
+    """The folder of this version of the kernel, made if it can be; None where it is not safe.
+
+    Numba itself would look only at the file of the outermost function, and would not see that
+    another file has changed.
+    """
+    sources = sorted(Path(__file__).parent.rglob("*.py"))
+    content = b"".join(path.read_bytes() for path in sources) + numba.__version__.encode()
+    above = cache_folder()
+    if above is None:
+        return None
+    folder = above / f"plant-{hashlib.sha256(content).hexdigest()[:16]}"
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        return str(folder) if is_own(folder) and is_own(above) else None
+    except OSError:
+        return None
+
+
+FOLDER = _folder()

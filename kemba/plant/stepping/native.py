@@ -1,0 +1,146 @@
+"""CasADi expressions as machine code, made by LLVM within this process: no compiler is needed.
+
+LLVM comes with numba. Nothing is optimised, since CasADi has shared what is common: a model takes
+a few hundredths of a second to translate, and its code is twenty times quicker than CasADi's own
+virtual machine.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from kemba.errors import KembaError
+from kemba.instructions import replay
+from kemba.plant.stepping.arrays import Array
+
+BINARY = {ca.OP_ADD: "fadd", ca.OP_SUB: "fsub", ca.OP_MUL: "fmul", ca.OP_DIV: "fdiv"}
+COMPARE = {ca.OP_LT: "olt", ca.OP_LE: "ole", ca.OP_EQ: "oeq", ca.OP_NE: "une"}
+INTRINSIC = {
+    ca.OP_SQRT: "sqrt", ca.OP_FABS: "fabs", ca.OP_FLOOR: "floor", ca.OP_CEIL: "ceil",
+    ca.OP_FMIN: "minnum", ca.OP_FMAX: "maxnum", ca.OP_COPYSIGN: "copysign",
+}  # fmt: skip
+LIBRARY = {
+    ca.OP_SIN: "sin", ca.OP_COS: "cos", ca.OP_TAN: "tan", ca.OP_ASIN: "asin", ca.OP_ACOS: "acos",
+    ca.OP_ATAN: "atan", ca.OP_ATAN2: "atan2", ca.OP_SINH: "sinh", ca.OP_COSH: "cosh",
+    ca.OP_TANH: "tanh", ca.OP_ASINH: "asinh", ca.OP_ACOSH: "acosh", ca.OP_ATANH: "atanh",
+    ca.OP_EXP: "exp", ca.OP_EXPM1: "expm1", ca.OP_LOG: "log", ca.OP_LOG1P: "log1p",
+    ca.OP_POW: "pow", ca.OP_CONSTPOW: "pow", ca.OP_FMOD: "fmod", ca.OP_REMAINDER: "remainder",
+    ca.OP_HYPOT: "hypot", ca.OP_ERF: "erf",
+}  # fmt: skip
+
+
+class Native:
+    """Functions of one vector x in machine code; `address[name]` is where each begins.
+
+    `functions`: by name the outputs, up to two, each a matrix of expressions of the symbols
+    `inputs`, which x holds one after the other. The code is `f(x*, y0*, y1*)`: it writes the
+    entries that are not identically zero, by rows; the others must be zero beforehand.
+    Raises KembaError on an operation that machine code has no word for.
+    """
+
+    def __init__(self, inputs: Sequence[ca.SX], functions: Mapping[str, Sequence[ca.SX]]) -> None:
+        import llvmlite.binding as llvm
+
+        llvm.initialize_native_target()
+        llvm.initialize_native_asmprinter()
+        program = _Program()
+        x = [ca.SX(ca.vertcat(*inputs))]
+        bodies = [program.function(name, x, outputs) for name, outputs in functions.items()]
+        module = llvm.parse_assembly("\n".join([*program.declarations, *bodies]))
+        machine = llvm.Target.from_default_triple().create_target_machine(
+            cpu=llvm.get_host_cpu_name(), features=llvm.get_host_cpu_features().flatten(), opt=0
+        )
+        self._engine = llvm.create_mcjit_compiler(module, machine)  # holds the code
+        self._engine.finalize_object()
+        self.address = {name: self._engine.get_function_address(name) for name in functions}
+
+    def __call__(self, name: str, x: Array, *outputs: Array) -> None:
+        """Evaluate one function into arrays in place (for looking at; the kernel calls itself)."""
+        import ctypes
+
+        call = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
+        places = [array.ctypes.data for array in (x, *outputs, np.empty(0))[:3]]
+        call(self.address[name])(*places)
+
+
+class _Program:
+    """LLVM's assembly of functions, one line an instruction; every value has its own name."""
+
+    def __init__(self) -> None:
+        self.declarations: list[str] = []
+        self._lines: list[str] = []
+        self._count = 0
+
+    def function(self, name: str, x: list[ca.SX], outputs: Sequence[ca.SX]) -> str:
+        """The assembly of a function."""
+        self._lines, self._count = [], 0
+        shared = ca.cse([ca.sparsify(output) for output in outputs])
+        f = ca.Function(name, x, shared)
+        given = [self._new(f"load double, double* {self._at('x', i)}") for i in range(f.nnz_in(0))]
+        found = replay(f, [given], _number, self._apply)
+        for k, (values, output) in enumerate(zip(found, shared, strict=True)):
+            rows, columns = output.sparsity().get_triplet()
+            for value, row, column in zip(values, rows, columns, strict=True):
+                place = self._at(f"y{k}", row * output.shape[1] + column)
+                self._lines.append(f"store double {value}, double* {place}")
+        head = f"define void @{name}(double* %x, double* %y0, double* %y1) {{"
+        return "\n".join([head, *self._lines, "ret void", "}"])
+
+    def _apply(self, kind: int, *a: str) -> str:
+        if kind in BINARY:
+            return self._new(f"{BINARY[kind]} double {a[0]}, {a[1]}")
+        if kind in LIBRARY or kind in INTRINSIC:
+            return self._call(LIBRARY.get(kind) or f"llvm.{INTRINSIC[kind]}.f64", *a)
+        if kind in COMPARE:
+            return self._truth(self._new(f"fcmp {COMPARE[kind]} double {a[0]}, {a[1]}"))
+        if kind == ca.OP_SIGN:
+            up = self._apply(ca.OP_LT, "0.0", a[0])
+            return self._apply(ca.OP_SUB, up, self._apply(ca.OP_LT, a[0], "0.0"))
+        if kind == ca.OP_IF_ELSE_ZERO:
+            return self._new(f"select i1 {self._bit(a[0])}, double {a[1]}, double 0.0")
+        if kind in (ca.OP_AND, ca.OP_OR):
+            word = "and" if kind == ca.OP_AND else "or"
+            return self._truth(self._new(f"{word} i1 {self._bit(a[0])}, {self._bit(a[1])}"))
+        simple = {
+            ca.OP_NEG: "fneg double {0}",
+            ca.OP_TWICE: "fadd double {0}, {0}",
+            ca.OP_SQ: "fmul double {0}, {0}",
+            ca.OP_INV: "fdiv double 1.0, {0}",
+            ca.OP_ASSIGN: "fadd double {0}, -0.0",
+        }
+        if kind in simple:
+            return self._new(simple[kind].format(*a))
+        if kind == ca.OP_NOT:
+            return self._apply(ca.OP_EQ, a[0], "0.0")
+        raise KembaError("plant", f"has no machine code for CasADi's operation {kind}")
+
+    def _new(self, text: str) -> str:
+        self._count += 1
+        self._lines.append(f"%v{self._count} = {text}")
+        return f"%v{self._count}"
+
+    def _at(self, pointer: str, index: int) -> str:
+        return self._new(f"getelementptr double, double* %{pointer}, i64 {index}")
+
+    def _bit(self, value: str) -> str:
+        return self._new(f"fcmp une double {value}, 0.0")
+
+    def _truth(self, bit: str) -> str:
+        return self._new(f"uitofp i1 {bit} to double")
+
+    def _call(self, name: str, *operands: str) -> str:
+        declaration = f"declare double @{name}({', '.join(['double'] * len(operands))})"
+        if declaration not in self.declarations:
+            self.declarations.append(declaration)
+        return self._new(f"call double @{name}({', '.join(f'double {x}' for x in operands)})")
+
+
+def _number(value: float) -> str:
+    """A constant by its bits, so that nothing is rounded."""
+    bits: Any = struct.unpack("<Q", struct.pack("<d", value))[0]
+    return f"0x{bits:016X}"

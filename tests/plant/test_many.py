@@ -1,0 +1,69 @@
+"""Many simulations side by side, and machine code shared by models that differ in numbers."""
+
+import numpy as np
+import pytest
+from plant.scripts import planning, under_the_hips
+
+from kemba.effects.mechanics.boom import Boom
+from kemba.effects.mechanics.ground import GroundFriction
+from kemba.effects.mechanics.load import Payload
+from kemba.errors import KembaError
+from kemba.model import Model
+from kemba.plant import Commands, Condition, Profile, Simulated, run, run_many
+from kemba.plant.stepping.family import equations_of
+
+PUSH = Commands({f"{leg}/valve/extend": Profile.pulses((0.0, 0.1)) for leg in ("front", "rear")})
+
+
+def same(one: Simulated, other: Simulated, within: float = 0.0) -> None:
+    assert one.trajectory.headers == other.trajectory.headers
+    for name in ("body/z", "body/pitch", "front/foot/Fz", "rear/hip/tau", "front/chamber/extend/F"):
+        difference = np.abs(one.trajectory[name] - other.trajectory[name]).max()
+        assert difference <= within * (1.0 + np.abs(other.trajectory[name]).max()), name
+
+
+def test_side_by_side_is_as_one_by_one() -> None:
+    light = planning()
+    heavy = [light.with_effects([Payload(m=m)]) for m in (0.2, 0.4)]
+    feedback = Commands(PUSH.profiles, under_the_hips)
+    conditions = [
+        Condition(light, {}, PUSH, 0.15),
+        Condition(heavy[0], {"body/pitch": 0.02}, PUSH, 0.15),
+        Condition(heavy[1], {}, feedback, 0.12, 2e-4, 2e-3),
+        Condition(light, {"body/z": 0.5}, None, 0.3, dead_time=False),
+    ]
+    done = run_many(conditions, jobs=2)
+    assert len(done) == len(conditions)
+    for condition, found in zip(conditions, done, strict=True):
+        assert isinstance(found, Simulated)
+        same(found, run(**vars(condition)))
+
+
+def test_models_that_differ_in_numbers_share_their_machine_code() -> None:
+    model = planning()
+    variants = [
+        model.with_effects([GroundFriction(mu=mu), Boom(mass=mass)])
+        for mu, mass in ((0.3, 2.7), (0.5, 2.7), (0.3, 3.5), (0.9, 2.0))
+    ]
+    known = [equations_of(variant) for variant in variants]
+    assert known[2] is known[3]
+    assert set(known[3].free) == {"ground_friction.mu", "boom.mass"}
+    for i, variant in enumerate(variants):
+        other = variant.supply + 1e-9 * (1 + i)  # another structure, and nothing else
+        alone = Model(variant.mechanism, variant.effects, other)
+        assert equations_of(alone).free == ()
+        start = {"body/vx": 0.5}
+        same(run(variant, start, PUSH, 0.15), run(alone, start, PUSH, 0.15), within=1e-6)
+
+
+def test_one_that_fails_does_not_stop_the_others() -> None:
+    buried = Condition(planning(), {"body/z": 0.1}, None, 0.02)
+    fine = Condition(planning(), {}, None, 0.02)
+    done = run_many([fine, buried, fine], jobs=2)
+    assert isinstance(done[1], KembaError) and "too deep" in str(done[1])
+    assert isinstance(done[0], Simulated) and isinstance(done[2], Simulated)
+
+
+def test_a_condition_that_makes_no_sense_is_refused() -> None:
+    with pytest.raises(KembaError, match="no state"):
+        run_many([Condition(planning(), {"body/zz": 1.0})])
