@@ -1,5 +1,7 @@
 """Many simulations side by side, and machine code shared by models that differ in numbers."""
 
+import threading
+
 import numpy as np
 import pytest
 from plant.scripts import planning, under_the_hips
@@ -54,6 +56,18 @@ def test_models_that_differ_in_numbers_share_their_machine_code() -> None:
         assert equations_of(alone).free == ()
         start = {"body/vx": 0.5}
         same(run(variant, start, PUSH, 0.15), run(alone, start, PUSH, 0.15), within=1e-6)
+
+
+def test_other_threads_run_while_one_simulates() -> None:
+    """Python's own lock is free meanwhile: else this thread would hardly count."""
+    condition = Condition(planning(), {"body/z": 2.0}, None, 1.0, 2e-5, 0.5)
+    run(**vars(condition))
+    worker = threading.Thread(target=run, kwargs=vars(condition))
+    worker.start()
+    count = 0
+    while worker.is_alive():
+        count += 1
+    assert count > 10_000
 
 
 def test_one_that_fails_does_not_stop_the_others() -> None:
