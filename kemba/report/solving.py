@@ -21,6 +21,7 @@ from kemba.ocp.starts import plan_best
 from kemba.plant.execution.certificate import replays
 from kemba.plant.execution.counterpart import another_robot, counterpart
 from kemba.plant.execution.replay import ends_standing
+from kemba.plant.execution.retiming import retimed
 from kemba.report.verdict import verdicts
 from kemba.runs import RunFolder, write_json
 from kemba.trajectory import Trajectory
@@ -62,10 +63,12 @@ def solve_into(
             how = {"tell": listener.tell, "watch": listener.watch, "stop": listener.stop}
             found = plan(task, document, log=log, start=start, **how)  # type: ignore[arg-type]
         result = answer(found, str(folder.path))
-        if replay and found.status.plan:
+        table = controller_table(found.model, found.trajectory) if found.attempts else None
+        if replay and table is not None and found.status.plan:
             listener.tell("replay")
-            result |= _replayed(found)
-        _keep(found, result, folder, figure)
+            table = retimed(found.model, found.trajectory, table)
+            result |= _replayed(found, table)
+        _keep(found, result, table, folder, figure)
     except BaseException:
         with suppress(WriteError):  # the first error says more
             folder.finish("failed")
@@ -74,10 +77,9 @@ def solve_into(
     return result
 
 
-def _replayed(found: Plan) -> dict[str, Any]:
+def _replayed(found: Plan, table: Trajectory) -> dict[str, Any]:
     """The executions of a plan, and the verdict: it stays solved only if both come near enough."""
     task = found.task
-    table = controller_table(found.model, found.trajectory)
     try:
         plant = counterpart(task.model, task.payload, task.supply, task.plant)
         other = another_robot(task.model, task.plant)
@@ -106,14 +108,16 @@ def _unconfirmed(found: Plan, cause: str, remarks: Sequence[str] = ()) -> dict[s
     return {"status": Status.ACCEPTABLE, "good": False, "sentence": "; ".join(parts)}
 
 
-def _keep(found: Plan, result: dict[str, Any], folder: RunFolder, figure: bool) -> None:
+def _keep(
+    found: Plan, result: dict[str, Any], table: Trajectory | None, folder: RunFolder, figure: bool
+) -> None:
     """Write the run folder; when that fails, write the plan elsewhere and say where."""
     try:
-        _write(found, result, folder.path, figure)
+        _write(found, result, table, folder.path, figure)
     except WriteError as error:
         elsewhere = Path(tempfile.mkdtemp(prefix="kemba-kept-"))
         try:
-            _write(found, result, elsewhere, figure=False)
+            _write(found, result, table, elsewhere, figure=False)
         except WriteError:
             shutil.rmtree(elsewhere, ignore_errors=True)
             raise error from None
@@ -121,12 +125,14 @@ def _keep(found: Plan, result: dict[str, Any], folder: RunFolder, figure: bool) 
         raise type(error)(error.where, error.what, hint=hint) from None
 
 
-def _write(found: Plan, result: dict[str, Any], folder: Path, figure: bool) -> None:
+def _write(
+    found: Plan, result: dict[str, Any], table: Trajectory | None, folder: Path, figure: bool
+) -> None:
     write_json(folder / "certificate.json", result)
-    if not found.attempts:
+    if table is None:
         return  # refused before solving: there is no motion to write
     found.trajectory.write(folder / "trajectory.csv")
-    controller_table(found.model, found.trajectory).write(folder / "controller.csv")
+    table.write(folder / "controller.csv")
     if figure:
         from kemba import plotting
 

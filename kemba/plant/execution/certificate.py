@@ -28,13 +28,18 @@ def replays(
     plan that was not solved cannot even be started.
     """
     full = load_model(plant) if isinstance(plant, str) else plant
-    rest = SETTLE if ends_standing(model, plan) and _closed(controller) else 0.0
+    rest = rest_after(model, plan, controller)
     return {
         "replay": _tried(lambda: replay(model, plan)),
         "table_replay": _tried(lambda: execute(controller, model, extra=rest).against(model, plan)),
         "plant_replay": full
         and _tried(lambda: execute(controller, full, extra=rest).against(full, plan)),
     }
+
+
+def rest_after(model: Model, plan: Trajectory, controller: Trajectory) -> float:
+    """For how long [s] the last commands are held: a plan that ends standing may come to rest."""
+    return SETTLE if ends_standing(model, plan) and _closed(controller) else 0.0
 
 
 def _closed(controller: Trajectory) -> bool:
