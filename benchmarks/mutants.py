@@ -84,8 +84,10 @@ class Copy:
         command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *tests]
         path = os.pathsep.join(filter(None, [str(self.links), os.environ.get("PYTHONPATH")]))
         # files change within a second, which compiled Python does not see; solvers' code is not
-        # compiled, for every bug would leave code of its own in the user's cache
+        # compiled and the plant's is kept here, for every bug would leave code of its own in the
+        # user's cache
         setting = {"PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1", "KEMBA_COMPILE": "0"}
+        setting["KEMBA_CACHE"] = str(self.root.parent / "cache")
         try:
             done = subprocess.run(
                 command,

@@ -53,11 +53,8 @@ def deepest(t: Trajectory) -> float:
 
 
 def touchdown(done: Simulated) -> float:
-    """The time [s] of the first impact of a foot after both were at their highest."""
-    t = done.trajectory
-    highest = t.time[np.argmax(np.minimum(*(t[f"{leg}/foot/z"] for leg in LEGS)))]
-    hits = [i.time for i in done.impacts if any("contact" in label for label in i.labels)]
-    return min(time for time in hits if time > highest)
+    """The time [s] at which the first foot is back on the ground."""
+    return min(i.time for i in done.impacts if any("contact" in label for label in i.labels))
 
 
 def report(name: str) -> None:

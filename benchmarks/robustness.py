@@ -73,7 +73,7 @@ def _block(block: dict[str, Any], asked: dict[str, Any], rows: list[dict[str, An
     if block["costs_most"]:
         lines += ["", f"**`{block['costs_most']}` costs most.**"]
     cpu = block["cpu_s"]
-    return [*lines, "", f"An execution takes {cpu['median']:.1f} s of one core."]
+    return [*lines, "", f"An execution takes {cpu['median']:.2g} s of one core."]
 
 
 def _ranks(

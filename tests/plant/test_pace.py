@@ -12,8 +12,9 @@ from kemba.plant.execution.replay import peak
 
 
 def test_chosen_steps_are_as_exact_as_short_ones() -> None:
-    for motion in (jump, drop):
-        chosen, short = motion(step=None).trajectory, motion(step=2.5e-5).trajectory
+    for motion, model in ((jump, None), (drop, None), (jump, load_model("plant"))):
+        chosen = motion(model, step=None).trajectory
+        short = motion(model, step=2.5e-5).trajectory
         high = peak(chosen.time, chosen["body/z"])[1], peak(short.time, short["body/z"])[1]
         assert abs(high[0] - high[1]) < 2e-5
         assert np.abs(chosen["body/z"] - short["body/z"]).max() < 1e-4

@@ -67,7 +67,8 @@ def entry(function: Function) -> Function:
 @contextmanager
 def _settings() -> Iterator[None]:
     """Our own cache, and an optimiser that does without vectors: ours have a dozen entries."""
-    wanted = {"CACHE_DIR": FOLDER or "", "OPT": 1, "LOOP_VECTORIZE": 0, "SLP_VECTORIZE": 0}
+    level = type(numba.config.OPT)(1)
+    wanted = {"CACHE_DIR": FOLDER or "", "OPT": level, "LOOP_VECTORIZE": 0, "SLP_VECTORIZE": 0}
     usual = {name: getattr(numba.config, name) for name in wanted}
     try:
         for name, value in wanted.items():
@@ -78,7 +79,7 @@ def _settings() -> Iterator[None]:
             setattr(numba.config, name, value)
 
 
-def _folder() -> str | None:
+def find_folder() -> str | None:
     """The folder of this version of the kernel, made if it can be; None where it is not safe.
 
     Numba itself would look only at the file of the outermost function, and would not see that
@@ -97,4 +98,4 @@ def _folder() -> str | None:
         return None
 
 
-FOLDER = _folder()
+FOLDER = find_folder()

@@ -31,7 +31,8 @@ SMALLER = "try a smaller step, or look for a start that is impossible"
 # Steps that the motion chooses. The tolerance is of a velocity of 1 m/s or 5 rad/s and of the usual
 # size of an effect state: apexes then agree with steps of 12.5 us within 0.005 mm (docs/plant.md).
 TOLERANCE = 3e-5
-SHORTEST, FIRST, LONGEST = 2.5e-5, 1e-4, 1e-3  # s
+# A millisecond would step over a touch and release between its ends.
+SHORTEST, FIRST, LONGEST = 2.5e-5, 1e-4, 5e-4  # s
 ROOM = 8 * MOST  # impacts kept in the kernel before they are fetched
 
 

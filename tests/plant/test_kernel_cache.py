@@ -1,0 +1,62 @@
+"""The compiled kernel on disk: a missing or damaged cache only costs time."""
+
+import os
+import stat
+from pathlib import Path
+
+import numba
+import pytest
+
+from kemba.plant.kernel import jit
+
+
+def twice(x: float) -> float:
+    return 2.0 * x
+
+
+def test_what_was_compiled_is_loaded_again(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(jit, "FOLDER", str(tmp_path))
+    assert jit.entry(twice)(2.0) == 4.0
+    (kept,) = tmp_path.rglob("*.nbc")
+    before = kept.stat().st_mtime_ns
+    again = jit.entry(twice)
+    assert again(2.0) == 4.0
+    assert sum(again.__dict__["dispatcher"].stats.cache_hits.values()) == 1
+    assert kept.stat().st_mtime_ns == before
+
+
+@pytest.mark.parametrize("size", [0, 20])
+def test_a_damaged_cache_is_not_used(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, size: int
+) -> None:
+    monkeypatch.setattr(jit, "FOLDER", str(tmp_path))
+    jit.entry(twice)(2.0)
+    for path in [*tmp_path.rglob("*.nbc"), *tmp_path.rglob("*.nbi")]:
+        path.write_bytes(path.read_bytes()[:size])
+    assert jit.entry(twice)(2.0) == 4.0
+
+
+def test_without_a_folder_it_is_compiled_anew(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(jit, "FOLDER", None)
+    assert jit.entry(twice)(2.0) == 4.0
+    (tmp_path / "file").write_text("in the way")
+    monkeypatch.setattr(jit, "FOLDER", str(tmp_path / "file"))
+    assert jit.entry(twice)(2.0) == 4.0
+
+
+def test_only_a_folder_of_the_users_own_is_used(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("KEMBA_CACHE", str(tmp_path / "own"))
+    found = jit.find_folder()
+    assert found is not None and stat.S_IMODE(os.stat(found).st_mode) == 0o700
+    Path(found).chmod(0o777)
+    assert jit.find_folder() is None
+
+
+def test_numbas_own_settings_stay() -> None:
+    before = numba.config.OPT, numba.config.CACHE_DIR, numba.config.LOOP_VECTORIZE
+    jit.entry(twice)(3.0)
+    assert before == (numba.config.OPT, numba.config.CACHE_DIR, numba.config.LOOP_VECTORIZE)
