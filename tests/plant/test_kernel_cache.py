@@ -1,6 +1,5 @@
 """The compiled kernel on disk: a missing or damaged cache only costs time."""
 
-import os
 import stat
 from pathlib import Path
 
@@ -51,7 +50,7 @@ def test_only_a_folder_of_the_users_own_is_used(
 ) -> None:
     monkeypatch.setenv("KEMBA_CACHE", str(tmp_path / "own"))
     found = jit.find_folder()
-    assert found is not None and stat.S_IMODE(os.stat(found).st_mode) == 0o700
+    assert found is not None and stat.S_IMODE(Path(found).stat().st_mode) == 0o700
     Path(found).chmod(0o777)
     assert jit.find_folder() is None
 
