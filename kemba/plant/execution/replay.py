@@ -81,16 +81,15 @@ def judge(model: Model, plan: Trajectory, clock: Array, done: Simulated) -> Repl
     planned = int(np.argmax(plan["body/z"]))
     apex_time, apex = peak(real.time, real["body/z"])
     weight = model.mechanism.weight
-    was = touchdown(plan, clock, float(clock[planned]), ON_GROUND / 10, weight)
-    now = touchdown(real, real.time, apex_time, 1e-6, weight)
+    was = _landings(touches(plan, clock, float(clock[planned]), ON_GROUND / 10, weight))
+    now = _landings(touches(real, real.time, apex_time, 1e-6, weight))
     impacts = [i.time for i in done.impacts if any("contact:" in label for label in i.labels)]
-    if now is not None:  # the sample grid is coarser than the impact's own time
-        before = max(apex_time, float(real.time[real.time < now - 1e-9].max(initial=-np.inf)))
-        now = min([i for i in impacts if before < i <= now + 1e-9], default=now)
+    exact = [_exact(time, real.time, apex_time, impacts) for time in now]
+    late = [n - w for n, w in zip(exact, was, strict=False)] if was and now else []
     final = np.array([real[name][-1] - plan[name][-1] for name in ("body/x", "body/z")])
     return Replay(
         apex_error_m=apex - float(plan["body/z"][planned]),
-        touchdown_error_s=None if was is None or now is None else now - was,
+        touchdown_error_s=min(late, key=abs, default=None),
         final_error_m=float(np.hypot(*final)),
         fault=_fault(model, plan, real, apex_time),
         trajectory=real,
@@ -107,26 +106,42 @@ def peak(time: Array, z: Array) -> tuple[float, float]:
     return float(time[i] + shift), float(c + shift * (b + a * shift))
 
 
-def touchdown(t: Trajectory, clock: Array, after: float, low: float, weight: float) -> float | None:
-    """When [s] a foot that was in the air first stands, after `after`; None if no foot does.
+def touches(
+    t: Trajectory, clock: Array, after: float, low: float, weight: float
+) -> list[tuple[float, bool]]:
+    """When [s] a foot that was in the air touches, after `after`, and whether it carries the body.
 
-    A foot touches while it is below `low` [m]. A contact counts if it lasts 20 ms or to the end, or
+    A foot touches while it is below `low` [m]. A contact carries if it lasts 20 ms or to the end, or
     if its force, without impacts, adds up to what the weight [N] does in 20 ms (0.2 m/s of fall).
     A foot that grazes the ground on its way does neither.
     """
-    times = []
+    found = []
     for name in (name for name in t.names if name.endswith("foot/z")):
         down = t[name] <= low
         force = t[f"{name[:-1]}Fz"] if f"{name[:-1]}Fz" in t else np.zeros(len(t))
         edges = np.flatnonzero(np.diff(down.astype(int), prepend=1, append=0))
-        starts = [i for i in edges if i < len(t) and down[i]]
-        for i in starts:
+        for i in (i for i in edges if i < len(t) and down[i] and clock[i] > after):
             end = int(edges[edges > i][0])  # the first row in the air again
             took = float(np.trapezoid(force[i:end], clock[i:end]))
             lasts = end == len(t) or clock[end] - clock[i] >= LASTS
-            if clock[i] > after and (lasts or took >= LASTS * weight):
-                times.append(float(clock[i]))
-    return min(times, default=None)
+            found.append((float(clock[i]), bool(lasts or took >= LASTS * weight)))
+    return sorted(found)
+
+
+def _landings(found: list[tuple[float, bool]]) -> list[float]:
+    """The first touch that carries the body, and the first touch at all; none if none carries.
+
+    Whether a short touch carries is a matter of degree: plan and execution are compared by both,
+    and the nearer pair counts.
+    """
+    carrying = [time for time, carries in found if carries]
+    return [carrying[0], found[0][0]] if carrying else []
+
+
+def _exact(time: float, rows: Array, after: float, impacts: list[float]) -> float:
+    """The time [s] of the impact in the row before `time`: rows are coarser than impacts."""
+    before = max(after, float(rows[rows < time - 1e-9].max(initial=-np.inf)))
+    return min([i for i in impacts if before < i <= time + 1e-9], default=time)
 
 
 def ends_standing(model: Model, plan: Trajectory) -> list[str]:
