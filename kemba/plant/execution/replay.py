@@ -111,8 +111,8 @@ def touches(
 ) -> list[tuple[float, bool]]:
     """When [s] a foot that was in the air touches, after `after`, and whether it carries the body.
 
-    A foot touches while it is below `low` [m]. A contact carries if it lasts 20 ms or to the end, or
-    if its force, without impacts, adds up to what the weight [N] does in 20 ms (0.2 m/s of fall).
+    A foot touches while it is below `low` [m]. A contact carries if it lasts 20 ms or to the
+    end, or if its force, without impacts, adds up to what the weight [N] does in 20 ms (0.2 m/s).
     A foot that grazes the ground on its way does neither.
     """
     found = []
