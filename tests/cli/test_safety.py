@@ -108,7 +108,7 @@ def test_a_plan_survives_a_disk_that_fills_up(
 ) -> None:
     kept: list[Path] = []
 
-    def write(found: Any, result: Any, folder: Path, figure: bool) -> None:
+    def write(found: Any, result: Any, table: Any, folder: Path, figure: bool) -> None:
         if folder == tmp_path / "run":
             raise DiskFull(str(folder), "cannot be written: No space left", hint="free some space")
         (folder / "trajectory.csv").write_text("kept")
@@ -119,7 +119,7 @@ def test_a_plan_survives_a_disk_that_fills_up(
 
     monkeypatch.setattr(solving, "_write", write)
     with pytest.raises(DiskFull, match=r"the plan is kept in .*kemba-kept-.*; free some space"):
-        solving._keep(None, {}, Folder(), True)  # type: ignore[arg-type]
+        solving._keep(None, {}, None, Folder(), True)  # type: ignore[arg-type]
     assert (kept[0] / "trajectory.csv").read_text() == "kept"
 
 
