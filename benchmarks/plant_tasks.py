@@ -38,30 +38,27 @@ def solve(task: str) -> dict[str, Any]:
 
 
 def table(tasks: list[str]) -> Iterator[str]:
-    yield "| task | replay: apex | touchdown | end | plant: apex | touchdown | landing | exit |"
-    yield "|---|---|---|---|---|---|---|---|"
+    columns = "apex | touchdown | end"
+    yield f"| task | replay: {columns} | table: {columns} | plant: {columns} | landing | exit |"
+    yield "|---|---|---|---|---|---|---|---|---|---|---|---|"
     for task in tasks:
         answer = solve(task)
-        own, plant = answer["replay"], answer["plant_replay"]
-        if own is None or plant is None:
-            yield f"| `{task}` | {answer['sentence']} | | | | | | {answer['exit']} |"
+        executed = [answer[key] for key in ("replay", "table_replay", "plant_replay")]
+        if None in executed:
+            yield f"| `{task}` | {answer['sentence']} {'| ' * 10}| {answer['exit']} |"
             continue
-        landing = "good" if plant["landed"] else plant["fault"]
-        yield (
-            f"| `{task}` | {_mm(own['apex_error_m'])} | {_ms(own['touchdown_error_s'])} "
-            f"| {_mm(own['final_error_m'])} | {_mm(plant['apex_error_m'], 0)} "
-            f"| {_ms(plant['touchdown_error_s'], 0)} | {landing} | {answer['exit']} |"
-        )
+        errors = " | ".join(map(_errors, executed))
+        landing = "good" if executed[-1]["landed"] else executed[-1]["fault"]
+        yield f"| `{task}` | {errors} | {landing} | {answer['exit']} |"
     yield ""
     yield f"Errors are executed minus planned. Machine: {machine()}."
 
 
-def _mm(value: float, digits: int = 2) -> str:
-    return f"{1e3 * value:+.{digits}f} mm"
-
-
-def _ms(value: float | None, digits: int = 2) -> str:
-    return "-" if value is None else f"{1e3 * value:+.{digits}f} ms"
+def _errors(facts: dict[str, Any]) -> str:
+    late = facts["touchdown_error_s"]
+    touchdown = "-" if late is None else f"{1e3 * late:+.2f} ms"
+    apex, end = (f"{1e3 * facts[key]:+.2f} mm" for key in ("apex_error_m", "final_error_m"))
+    return f"{apex} | {touchdown} | {end}"
 
 
 def main() -> None:

@@ -10,6 +10,7 @@ from typing import Any
 from kemba.errors import KembaError
 from kemba.plotting import draw, load_source, svg_text
 from kemba.report.stage import stage, write_page
+from kemba.report.verdict import EXECUTIONS
 from kemba.runs import Run, load_run
 
 Rows = Iterable[tuple[str, Any]]
@@ -37,13 +38,6 @@ def report_run(run: str | Path, out: str | Path | None = None) -> Path:
     return write_page(out or found.path / "report.html", title, "\n".join(parts))
 
 
-WAYS = (
-    ("replay", "replay, same model"),
-    ("table_replay", "controller.csv, same model"),
-    ("plant_replay", "on the plant"),
-)
-
-
 def _tables(answer: Mapping[str, Any]) -> Iterable[str]:
     cost = answer["cost"]
     yield _table("plan", [
@@ -54,7 +48,7 @@ def _tables(answer: Mapping[str, Any]) -> Iterable[str]:
         ("open valves", f"{cost['valve_open_s']:.3f} s"),
     ])  # fmt: skip
     yield _table("residuals", [(k, f"{v:.1e}") for k, v in answer["residuals"].items()])
-    for key, title in WAYS:
+    for key, title in EXECUTIONS.items():
         if answer.get(key):
             yield _table(f"{title}: difference from the plan", _executed(answer[key]))
     yield _table("solving", [

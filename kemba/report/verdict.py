@@ -10,6 +10,13 @@ from kemba.ocp.task.task import Tolerances
 
 Facts = Mapping[str, Any]
 
+# the executions of a plan, by their keys in the certificate, in words
+EXECUTIONS = {
+    "replay": "re-simulation",
+    "table_replay": "re-simulation of controller.csv",
+    "plant_replay": "simulated robot",
+}
+
 
 @dataclass(frozen=True)
 class Allowed:
@@ -42,12 +49,7 @@ def verdicts(
         "table_replay": Allowed(t.table_apex, t.table_touchdown, t.table_final, lands),
         "plant_replay": Allowed(t.plant_apex, t.plant_touchdown, t.plant_final, lands),
     }
-    who = {
-        "replay": "re-simulation",
-        "table_replay": "re-simulation of controller.csv",
-        "plant_replay": "simulated robot",
-    }
-    return {key: judge(who[key], facts, allowed[key]) for key, facts in executed.items()}
+    return {key: judge(EXECUTIONS[key], facts, allowed[key]) for key, facts in executed.items()}
 
 
 def judge(who: str, facts: Facts | None, allowed: Allowed) -> Verdict:

@@ -7,6 +7,7 @@ rounding is best depends on the whole motion, so the table is simulated with oth
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
@@ -38,20 +39,14 @@ def retimed(model: Model, plan: Trajectory, table: Trajectory) -> Trajectory:
     Edges move by single ticks, one alone or the same edge of all legs together, as long as the
     largest error falls, in units of `RetimingSettings`.
     """
-    limits, extra = RetimingSettings.current(), rest_after(model, plan, table)
-    best, left = _error(model, plan, table, extra), limits.executions
-    while best > 1.0 and left > 0:
-        start = best
-        for trial in _neighbours(table):
-            left -= 1
-            found = _error(model, plan, trial, extra)
-            if found < best:
-                best, table = found, trial
-                break
-            if left <= 0:
-                break
-        if best == start:
+    error = partial(_error, model, plan, extra=rest_after(model, plan, table))
+    best, executions = error(table), iter(range(RetimingSettings.current().executions))
+    while best > 1.0:
+        trials = ((error(t), t) for _, t in zip(executions, _neighbours(table), strict=False))
+        nearer = next((trial for trial in trials if trial[0] < best), None)
+        if nearer is None:
             break
+        best, table = nearer
     return table
 
 
