@@ -28,7 +28,7 @@ from kemba.ocp import controller_table, load_task, plan
 from kemba.plant import Execution, execute, execute_many, replay, replays
 from kemba.plant.execution.counterpart import counterpart
 from kemba.plant.execution.replay import peak
-from kemba.sweep.machine import machine
+from kemba.sweep.workers.machine import machine
 from kemba.trajectory import Trajectory
 
 MARKS = ("<!-- speed: written by benchmarks/plant_speed.py -->", "<!-- end of speed -->")

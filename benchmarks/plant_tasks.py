@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from kemba.files import atomic_text
-from kemba.sweep.machine import machine
+from kemba.sweep.workers.machine import machine
 
 TASKS = ("jump", "hop", "max_jump", "drop", "stand", "jump_forward")
 MARKS = ("<!-- executions: written by benchmarks/plant_tasks.py -->", "<!-- end of executions -->")

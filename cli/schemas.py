@@ -19,7 +19,7 @@ SCHEMAS = {
     "models": "kemba.model.spec:ModelSpec",
     "robots": "kemba.mechanism.links:RobotFile",
     "cylinders": "kemba.mechanism.cylinder:CylinderTable",
-    "sweeps": "kemba.sweep.schema:Sweep",
+    "sweeps": "kemba.sweep.cases.schema:Sweep",
     "rigs": "kemba.plant.rig.bench:RigFile",
 }
 

@@ -24,7 +24,7 @@ ALLOWED = {
     "kemba/mechanism/__init__.py",
     "kemba/model/spec.py",
     "kemba/plant/execution/counterpart.py",
-    "cli/verbs/check.py",
+    "cli/verbs/inspect/check.py",
     "cli/schemas.py",
 }
 

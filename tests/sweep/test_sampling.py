@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from kemba.sweep.sampling import drawn, sample
-from kemba.sweep.schema import SolveBlock, Spread
+from kemba.sweep.cases.sampling import drawn, sample
+from kemba.sweep.cases.schema import SolveBlock, Spread
 from kemba.units import read_si
 
 

@@ -14,7 +14,7 @@ from typing import Any
 from kemba.effects import BY_KIND
 from kemba.errors import KembaError
 from kemba.files import write_json
-from kemba.sweep.case import Case, Record, perform
+from kemba.sweep.cases.case import Case, Record, perform
 
 REACHING = 5.0  # s for a connection to a scheduler; the slowest networks take one
 RESULT_WAIT = 30.0  # s; for a result that a worker holds
@@ -160,7 +160,7 @@ def _client(scheduler: str | None, jobs: int | None, most: int) -> Iterator[Any]
             dashboard_address=None,
             scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},  # any free port
             silence_logs=logging.CRITICAL,
-            preload=["kemba.sweep.preload"],
+            preload=["kemba.sweep.workers.preload"],
         ) as cluster,
         Client(cluster, set_as_default=False) as client,
     ):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from kemba.sweep.case import Record, Work
+from kemba.sweep.cases.case import Record, Work
 
 
 def solve_case(work: Work) -> Record:
@@ -21,7 +21,7 @@ def solve_case(work: Work) -> Record:
 
 def execute_case(work: Work) -> Record:
     """Execute a controller table on a plant: whether it lands, and how far it is from its plan."""
-    from kemba.sweep.execution import run_on_plant
+    from kemba.sweep.cases.execution import run_on_plant
 
     replay = run_on_plant(work)
     apex = float(max(replay.trajectory["body/z"]))

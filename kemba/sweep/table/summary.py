@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from kemba.sweep.case import Case, Record
-from kemba.sweep.influence import influence
-from kemba.sweep.schema import Sweep
+from kemba.sweep.cases.case import Case, Record
+from kemba.sweep.cases.schema import Sweep
+from kemba.sweep.table.influence import influence
 
 Rows = list[tuple[Case, Record | None]]
 TIMES = ("build_s", "solve_s", "solve_cpu_s", "wall_s", "cpu_s")

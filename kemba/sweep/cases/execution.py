@@ -22,10 +22,10 @@ from kemba.plant.execution.replay import first_row
 from kemba.plant.simulation.valves import scattered
 from kemba.quantity import to_si
 from kemba.runs import load_run, sha256
-from kemba.sweep.case import Case, Work, content_hash
-from kemba.sweep.expand import Expansion, model_hash, model_name
-from kemba.sweep.sampling import sample
-from kemba.sweep.schema import Conditions, ExecuteBlock
+from kemba.sweep.cases.case import Case, Work, content_hash
+from kemba.sweep.cases.expand import Expansion, model_hash, model_name
+from kemba.sweep.cases.sampling import sample
+from kemba.sweep.cases.schema import Conditions, ExecuteBlock
 from kemba.trajectory import Trajectory
 
 
@@ -60,7 +60,7 @@ def execute_cases(expansion: Expansion, name: str, block: ExecuteBlock, folder: 
         "model_hash": model_hash(planned),
     }
     return [
-        Case(name, index, values, "kemba.sweep.work:execute_case",
+        Case(name, index, values, "kemba.sweep.workers.work:execute_case",
              shared | {"conditions": conditions.model_dump(exclude_none=True)}, name)
         for index, (values, conditions) in enumerate(works)
     ]  # fmt: skip

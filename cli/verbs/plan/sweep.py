@@ -85,7 +85,7 @@ def _run(
 
 
 def _answer(folder: Path, status: str, summary: dict[str, Any], json: bool) -> None:
-    from kemba.sweep.summary import sentence
+    from kemba.sweep.table.summary import sentence
 
     if json:
         print_json({"folder": folder, "status": status, **summary})

@@ -14,10 +14,10 @@ from kemba.errors import KembaError
 from kemba.files import atomic_text, write_json
 from kemba.folders import LOCK
 from kemba.runs import read_manifest, versions
-from kemba.sweep.case import Case, Record
-from kemba.sweep.machine import machine
-from kemba.sweep.schema import Sweep
-from kemba.sweep.summary import best_known, cost_of, cost_ratio, summarise
+from kemba.sweep.cases.case import Case, Record
+from kemba.sweep.cases.schema import Sweep
+from kemba.sweep.table.summary import best_known, cost_of, cost_ratio, summarise
+from kemba.sweep.workers.machine import machine
 
 MANIFEST = "manifest.json"
 FORMULA = (

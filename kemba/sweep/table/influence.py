@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from kemba.settings import CHOSEN, Settings, setting
-from kemba.sweep.case import Case, Record
+from kemba.sweep.cases.case import Case, Record
 from kemba.units import read_si
 
 

@@ -14,8 +14,8 @@ from kemba.effects import BY_KIND
 from kemba.errors import KembaError
 from kemba.model.spec import load_spec, model_files
 from kemba.runs import sha256
-from kemba.sweep.case import content_hash
-from kemba.sweep.schema import Sweep
+from kemba.sweep.cases.case import content_hash
+from kemba.sweep.cases.schema import Sweep
 
 
 def load_sweep(name: str | Path, overrides: list[str] | None = None) -> tuple[Sweep, Document]:

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.special import ndtri
 from scipy.stats import qmc
 
-from kemba.sweep.schema import Block, Spread, Value
+from kemba.sweep.cases.schema import Block, Spread, Value
 from kemba.units import read_si
 
 Values = dict[str, Value]

@@ -8,11 +8,11 @@ from typing import Any
 from kemba.config import Document
 from kemba.errors import ConfigErrors, KembaError
 from kemba.ocp.task.task import parse_task
-from kemba.sweep.case import Case, content_hash
-from kemba.sweep.execution import execute_cases
-from kemba.sweep.expand import Expansion, model_hash, model_name
-from kemba.sweep.sampling import sample
-from kemba.sweep.schema import ExecuteBlock, SolveBlock, Sweep
+from kemba.sweep.cases.case import Case, content_hash
+from kemba.sweep.cases.execution import execute_cases
+from kemba.sweep.cases.expand import Expansion, model_hash, model_name
+from kemba.sweep.cases.sampling import sample
+from kemba.sweep.cases.schema import ExecuteBlock, SolveBlock, Sweep
 
 # Keys of a task that say how it is solved, not what is asked.
 HOW = {"name", "notes", "guess", "guess_noise", "seed", "method", "solver", "tolerances"}
@@ -59,5 +59,7 @@ def _solve_cases(expansion: Expansion, name: str, block: SolveBlock) -> list[Cas
         }
         aim = {key: value for key, value in work["task"].items() if key not in HOW}
         problem = content_hash([aim, work["model"]])
-        cases.append(Case(name, index, values, "kemba.sweep.work:solve_case", work, problem))
+        cases.append(
+            Case(name, index, values, "kemba.sweep.workers.work:solve_case", work, problem)
+        )
     return cases

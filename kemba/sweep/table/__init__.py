@@ -1,0 +1,1 @@
+"""Results of all cases as tables and sentences."""
