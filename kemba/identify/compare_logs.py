@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from kemba.identify.compare.compare import Comparison, compare
+from kemba.identify.evidence.colour import with_learnt_colour
+from kemba.identify.evidence.windows import free_starts
 from kemba.identify.logs.gate import check_logs
 from kemba.identify.logs.reading import load_map, read_logs, taken_on
 from kemba.identify.problem.problem import Problem
@@ -33,6 +35,7 @@ def compare_logs(
     check_logs(read)
     problem = make_problem(read, built)
     problem.validate()
+    problem = with_learnt_colour(problem, free_starts(problem))
     found = compare(problem, model, [str(log.meta["path"]) for log in read])
     if run is not None:
         plan = Trajectory.read(Path(run) / "trajectory.csv" if Path(run).is_dir() else run)
