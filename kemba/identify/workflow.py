@@ -14,6 +14,7 @@ from kemba.identify.answer import Answer
 from kemba.identify.discover import Discovery, discover
 from kemba.identify.logs.excerpt import excerpts
 from kemba.identify.logs.gate import BadData, check_logs, sentence
+from kemba.identify.logs.limits import limits_of
 from kemba.identify.logs.reading import load_map, read_logs, taken_on
 from kemba.identify.problem.problem import Problem
 from kemba.model import Model, load_model
@@ -44,7 +45,7 @@ def discover_logs(
         _apart(fitted, kept)
         built = model_of(fitted, model)
         taken_on([*fitted, *kept], built.mechanism)
-        remarks = [*built.remarks, *check_logs([*fitted, *kept])]
+        remarks = [*built.remarks, *check_logs([*fitted, *kept]), *limits_of(fitted)]
         say("preparing the logs")
         fitted, cut = excerpts(fitted)
         kept, _ = excerpts(kept)
