@@ -24,6 +24,7 @@ LEVELS = [
     {"quantity"},
     {"config"},
     {"table", "trajectory"},
+    {"logs"},
     {"mechanism"},
     {"effects"},
     {"model"},
@@ -46,6 +47,9 @@ ONLY_IN = {
     "pint": {"units"},
     "yaml": {"config"},
     "filelock": {"folders"},
+    "pandas": {"logs"},
+    "pyarrow": {"logs"},
+    "mcap": {"logs"},
 }
 SOURCES = sorted([*ROOT.glob("kemba/**/*.py"), *ROOT.glob("cli/**/*.py")])
 FOLDERS = (".", ".ci", ".github", "cli", "configs", "docs", "kemba", "tests")

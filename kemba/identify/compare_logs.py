@@ -10,9 +10,10 @@ import numpy as np
 
 from kemba.identify.compare.compare import Comparison, compare
 from kemba.identify.logs.gate import check_logs
-from kemba.identify.logs.reading import load_map, read_logs, taken_on
+from kemba.identify.logs.reading import read_logs, taken_on
 from kemba.identify.problem.problem import Problem
 from kemba.identify.workflow import make_problem, model_of
+from kemba.logs import load_map
 from kemba.trajectory import Trajectory
 
 PLANNED = ("body/x", "body/z", "body/pitch", "hip/q", "piston/x")
