@@ -95,8 +95,8 @@ class ColumnMap(BaseModel):
 
 
 def load_map(name: str | Path) -> ColumnMap:
-    """The map YAML `name`, a path or one shipped in configs/logs. Raises KembaError."""
-    path = find_config(str(name), "logs")
+    """The map YAML `name`, a path or one shipped in configs/maps. Raises KembaError."""
+    path = find_config(str(name), "maps")
     found = parse(load_yaml(path), ColumnMap)
     check_map(found, str(path))
     return found

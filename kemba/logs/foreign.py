@@ -10,7 +10,7 @@ import numpy as np
 
 from kemba.errors import KembaError, suggest
 from kemba.logs.columns import ColumnMap, Part, Source
-from kemba.logs.text import Raw, first_row
+from kemba.logs.text import Raw, as_numbers, first_row
 from kemba.quantity import convert
 from kemba.trajectory import TIME, Array, Trajectory
 
@@ -92,20 +92,13 @@ class _Reader:
         return self._numbers(cells, name) if found is None else found
 
     def _numbers(self, cells: Column, name: str) -> Array:
-        import pandas as pd
-
-        texts = pd.Series(cells).str.strip()
-        if self.layout.decimal == ",":
-            texts = texts.str.replace(",", ".", regex=False)
-        numbers = pd.to_numeric(texts, errors="coerce").to_numpy(dtype=float, copy=True)
-        empty = texts.str.lower().isin(["", "nan", "na", "null", "none", "-"]).to_numpy()
-        wrong = ~np.isfinite(numbers) & ~empty
+        numbers, wrong = as_numbers(cells, self.layout.decimal)
         if wrong.any():
             row = int(np.argmax(wrong))
             where = f"{self.path}:{row + first_row(self.layout)}:{list(self.raw).index(name) + 1}"
             hint = "`decimal`, `separator` and `skip_below` of the map" if wrong.all() else ""
             raise KembaError(where, f"{name}: '{cells[row]}' is not a number", hint=hint)
-        return np.asarray(numbers, dtype=float)
+        return numbers
 
 
 def _stamps(cells: Column) -> Column | None:

@@ -9,6 +9,7 @@ import numpy as np
 
 from kemba.errors import KembaError
 from kemba.logs.columns import ColumnMap
+from kemba.trajectory import Array
 
 Raw = dict[str, np.ndarray[Any, Any]]
 
@@ -30,7 +31,7 @@ def read_text(path: Path, layout: ColumnMap) -> Raw:
             dtype=str,
             keep_default_na=False,
             skipinitialspace=True,
-            encoding=_encoding(path),
+            encoding=encoding(path),
         )
     except pd.errors.EmptyDataError:
         raise KembaError(str(path), "is empty", "a table was expected") from None
@@ -55,7 +56,7 @@ def first_row(layout: ColumnMap) -> int:
     return layout.skip_rows + int(layout.header) + layout.skip_below + 1
 
 
-def _encoding(path: Path) -> str:
+def encoding(path: Path) -> str:
     """UTF-8 or, where the file is not, the one of older Windows programs."""
     with open(path, "rb") as stream:
         start = stream.read(1 << 20)
@@ -64,3 +65,18 @@ def _encoding(path: Path) -> str:
     except UnicodeDecodeError as error:
         return "utf-8-sig" if error.start > len(start) - 4 else "cp1252"
     return "utf-8-sig"
+
+
+def as_numbers(cells: np.ndarray[Any, Any], decimal: str) -> tuple[Array, Array]:
+    """Numbers (n,) of texts (n,), NaN where there is none, and where a cell is neither (n,).
+
+    `true` and `on` are 1, `false` and `off` are 0; an empty cell, `nan` or `-` is no reading.
+    """
+    import pandas as pd
+
+    texts = pd.Series(cells).astype(str).str.strip().str.lower()
+    texts = texts.str.replace(",", ".", regex=False) if decimal == "," else texts
+    texts = texts.replace({"true": "1", "on": "1", "false": "0", "off": "0"})
+    numbers = pd.to_numeric(texts, errors="coerce").to_numpy(dtype=float, copy=True)
+    empty = texts.isin(["", "nan", "na", "null", "none", "-"]).to_numpy()
+    return numbers, ~np.isfinite(numbers) & ~empty

@@ -72,6 +72,7 @@ def _yaml(file: Path) -> dict[str, Any]:
 
 def _whole(kind: str, parsed: Any, document: Any) -> list[str]:
     """What a file names must exist too: robots, cylinders, legs, quantities, costs, options."""
+    from kemba.logs.columns import check_map
     from kemba.mechanism import load_cylinder, load_robot
     from kemba.model import load_model
     from kemba.ocp.planning import check_feasible
@@ -84,6 +85,8 @@ def _whole(kind: str, parsed: Any, document: Any) -> list[str]:
         return load_model(document.source).remarks
     if kind == "robots":
         load_robot(document.source)
+    if kind == "maps":
+        check_map(parsed, document.source)
     if kind == "cylinders":
         load_cylinder(document.source)
     return []

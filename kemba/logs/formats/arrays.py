@@ -45,7 +45,7 @@ def read_mat(path: Path) -> Found:
 
     try:
         content = loadmat(path, appendmat=False, squeeze_me=True)
-    except (*BROKEN, MatReadError) as error:
+    except (*BROKEN, MatReadError, OSError) as error:
         what = f"is no MATLAB file that SciPy reads: {error}"
         raise KembaError(
             str(path), what, "version 5 to 7.2 was expected: save(..., '-v7')"
@@ -70,7 +70,7 @@ def write_npz(trajectory: Trajectory, path: Path) -> None:
 def read_npz(path: Path) -> Found:
     """Our own .npz by its units; else every vector of the length that most vectors have."""
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
             content = {name: file[name] for name in file.files}
     except (*BROKEN, OSError) as error:
         raise KembaError(str(path), f"is no .npz file of numbers: {error}") from None
