@@ -36,6 +36,7 @@ class Mechanism:
     table, None for a rig. `imposed`: the motion is given, forces are answers.
     `mirror` maps a coordinate to its mirror image ("-" prefixed where the sign turns).
     `standing`: coordinates with retracted pistons and each foot on the ground under its hip.
+    `tolerances`: 1 sigma of figures of its links that may be off, as shares of them, by name.
     `points`: (x, z) of places that pictures need, such as `front/pin`; nothing pushes there.
     """
 
@@ -58,6 +59,7 @@ class Mechanism:
     mirror: dict[str, str] = field(default_factory=dict)
     standing: dict[str, float] = field(default_factory=dict)
     points: dict[str, ca.SX] = field(default_factory=dict)
+    tolerances: dict[str, float] = field(default_factory=dict)
 
     @property
     def n(self) -> int:

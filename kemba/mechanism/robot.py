@@ -10,6 +10,7 @@ from kemba.mechanism.links import Robot
 from kemba.mechanism.pin_model import build_pin_model
 from kemba.mechanism.planar import Mechanism, Port
 from kemba.mechanism.recursion import FrameMotion, forward, read_joints, rnea
+from kemba.mechanism.tolerances import link_forces, link_tolerances
 from kemba.quantity import Quantity
 
 HIP_RANGE = 1.4  # rad; beyond it the knee would rise above the body
@@ -49,7 +50,23 @@ def robot_mechanism(robot: Robot) -> Mechanism:
         mirror=_mirror(robot),
         standing=standing_pose(robot),
         points=_points(robot, motions),
+        tolerances=link_tolerances(robot),
     )
+
+
+def link_regressors(mechanism: Mechanism) -> ca.Function:
+    """(q, v, a), each (n,), -> (n, k): generalised force per share by which a link is off.
+
+    The k columns are the figures of `mechanism.tolerances`, in their order. Raises KembaError for a
+    mechanism that is no robot.
+    """
+    m, robot = mechanism, mechanism.need_robot()
+    tree = tree_angles(robot, m.q)
+    rate = ca.jtimes(tree, m.q, m.v)
+    acc = ca.jtimes(rate, m.q, m.v) + ca.jtimes(tree, m.q, m.a)
+    forces = link_forces(robot, tree, rate, acc, tuple(m.tolerances))
+    columns = [ca.jtimes(tree, m.q, force, True) for force in forces]
+    return ca.Function("regress", [m.q, m.v, m.a], [ca.horzcat(ca.SX(m.n, 0), *columns)])
 
 
 def standing_pose(robot: Robot, x: float = 0.0) -> dict[str, float]:
