@@ -17,6 +17,7 @@ from kemba.effects.mechanics.boom_faults import (
 )
 from kemba.effects.mechanics.contact import Contact
 from kemba.effects.mechanics.friction import PressureFriction, SealFriction, StribeckFriction
+from kemba.effects.mechanics.geometry import Geometry
 from kemba.effects.mechanics.ground import GroundCompliance, GroundFriction
 from kemba.effects.mechanics.hip import (
     HipDamping,
@@ -87,10 +88,11 @@ BODY: tuple[type[Effect], ...] = (
     PitchFriction,
 )
 GROUND: tuple[type[Effect], ...] = (GroundCompliance, GroundFriction)
+GEOMETRY: tuple[type[Effect], ...] = (Geometry,)
 SENSORS: tuple[type[Effect], ...] = (SensorBias, SensorScale, SensorDelay)
 
 # what may be missing from a model: the candidates of identification
-MISSING: tuple[type[Effect], ...] = (*AIR, *PISTON, *HIP, *BODY, *GROUND, *SENSORS)
+MISSING: tuple[type[Effect], ...] = (*AIR, *PISTON, *HIP, *BODY, *GROUND, *GEOMETRY, *SENSORS)
 
 EFFECTS: tuple[type[Effect], ...] = (*PLANNING, *PHYSICAL, *MISSING, Expression)
 

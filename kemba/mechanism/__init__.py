@@ -4,7 +4,7 @@ from kemba.mechanism.cylinder import Cylinder
 from kemba.mechanism.links import Leg, Link, Piston, Robot
 from kemba.mechanism.planar import Mechanism, Port
 from kemba.mechanism.rig import rig_mechanism
-from kemba.mechanism.robot import robot_mechanism
+from kemba.mechanism.robot import reshaped, robot_mechanism
 from kemba.mechanism.robot_file import load_cylinder, load_robot
 
 __all__ = [
@@ -17,6 +17,7 @@ __all__ = [
     "Robot",
     "load_cylinder",
     "load_robot",
+    "reshaped",
     "rig_mechanism",
     "robot_mechanism",
 ]

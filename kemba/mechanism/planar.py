@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -33,7 +34,8 @@ class Mechanism:
     `q, v, a` are SX symbols (n,); `inverse_dynamics` (n,) is the generalised force that the
     motion (q, v, a) needs, gravity included, no effect included. `legs` are the prefixes under
     which leg ports are found ("" for a rig). `cylinder`: the one of every leg. `robot`: the link
-    table, None for a rig. `imposed`: the motion is given, forces are answers.
+    table, None for a rig; it differs by `offsets` [m] from the table `drawn`. `imposed`: the
+    motion is given, forces are answers.
     `mirror` maps a coordinate to its mirror image ("-" prefixed where the sign turns).
     `standing`: coordinates with retracted pistons and each foot on the ground under its hip.
     `tolerances`: 1 sigma of figures of its links that may be off, as shares of them, by name.
@@ -54,6 +56,8 @@ class Mechanism:
     mass: float = 1.0
     body_mass: float = 0.0
     robot: Robot | None = None
+    drawn: Robot | None = None
+    offsets: Mapping[str, float] = field(default_factory=dict)
     cylinder: Cylinder | None = None
     imposed: bool = False
     mirror: dict[str, str] = field(default_factory=dict)

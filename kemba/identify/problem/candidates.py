@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from kemba.effects import BY_KIND
 from kemba.effects.base import Effect
-from kemba.effects.sensors import SensorEffect
+from kemba.effects.mechanics.geometry import SIZES, Geometry
 from kemba.identify.problem.problem import Candidate, Parameter
 from kemba.identify.problem.sensor_faults import possible_faults
 from kemba.model.model import Model
@@ -33,12 +33,14 @@ class CandidateSettings(Settings):
 
 
 def effect_candidates(model: Model) -> dict[str, Candidate]:
-    """Every effect of the catalogue whose ports this model has and whose list lacks it."""
+    """Every effect of the catalogue whose ports this model has and whose list lacks it; those that
+    need more than their kind, such as a sensor's channel, are not among them."""
     present = {e.kind for e in model.effects}
     found = {}
     for kind, effect in BY_KIND.items():
         missing = effect.off and kind not in present
-        if missing and not issubclass(effect, SensorEffect) and _fits(model, effect):
+        whole = not any(field.is_required() for field in effect.model_fields.values())
+        if missing and whole and _fits(model, effect):
             found[kind] = candidate(effect)
     return found
 
@@ -46,6 +48,15 @@ def effect_candidates(model: Model) -> dict[str, Candidate]:
 def by_default(kind: str) -> Effect:
     """The effect of a kind as its defaults have it: absent."""
     return BY_KIND[kind](kind=kind)
+
+
+def geometry_candidates(model: Model) -> dict[str, Candidate]:
+    """Every length of the robot that the model's list does not correct."""
+    present = {e.name for e in model.effects}
+    parts = [Geometry(part=part) for part in SIZES] if model.mechanism.robot else []
+    return {
+        e.name: _candidate(e.name, Geometry, e.parameters()) for e in parts if e.name not in present
+    }
 
 
 def candidate(effect: type[Effect]) -> Candidate:
