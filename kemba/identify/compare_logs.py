@@ -45,8 +45,9 @@ def missed(plan: Trajectory, logs: Sequence[Trajectory]) -> Mapping[str, float]:
     """Largest distance of the logs from the plan, by header, while the plan lasts."""
     found: dict[str, float] = {}
     for log in logs:
-        time = log.time - log.time[0] + plan.time[0]
-        during = time <= plan.time[-1]
+        begun = min(log.time[0], 0.0) + plan.time[0]  # what comes before the plan is negative
+        time = log.time - log.time[0] + begun
+        during = (plan.time[0] <= time) & (time <= plan.time[-1])
         wanted = plan.interpolate(time[during])
         for name in wanted.names:
             if name in log and name.endswith(PLANNED):

@@ -159,6 +159,11 @@ class PhaseProgram:
             part = Part((label,), z, ca.SX(g), ca.SX(0), low, high, np.array(columns))
             self.added.append(part)
 
+    def add_cost(self, z: ca.SX, f: ca.SX, columns: np.ndarray) -> None:
+        """Add the cost f(z), whose z is at `columns` (len(z),)."""
+        part = Part((), z, ca.SX(0, 1), f, 0.0, 0.0, columns[None, :])
+        self.added.append(part)
+
     def mode_constraint(
         self, i: int, kind: str, z: ca.SX, g: ca.SX, low: float, high: float, where: Where
     ) -> None:
