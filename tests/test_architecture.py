@@ -33,6 +33,7 @@ LEVELS = [
     {"runs"},
     {"sweep"},
     {"plotting", "report"},
+    {"api"},
     {"cli"},
 ]
 LEVEL = {room: level for level, rooms in enumerate(LEVELS) for room in rooms}
@@ -47,7 +48,7 @@ ONLY_IN = {
     "pint": {"units"},
     "yaml": {"config"},
     "filelock": {"folders"},
-    "pandas": {"logs"},
+    "pandas": {"logs", "trajectory"},
     "pyarrow": {"logs"},
     "mcap": {"logs"},
 }

@@ -1,4 +1,4 @@
-"""Lengths that a machine may have other than its drawing: which they are, and a robot with others."""
+"""Lengths in which a machine may differ from its drawing, and a robot with other lengths."""
 
 from __future__ import annotations
 
