@@ -8,16 +8,7 @@ print(kemba.discover(done.logs).sentence)           # which effect does it lack?
 """
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from kemba.api import compare as compare
-    from kemba.api import discover as discover
-    from kemba.api import load_log as load_log
-    from kemba.api import load_model as load_model
-    from kemba.api import load_task as load_task
-    from kemba.api import plan as plan
-    from kemba.api import simulate as simulate
+from typing import Any
 
 __version__ = "0.1.0"
 __all__ = ["compare", "discover", "load_log", "load_model", "load_task", "plan", "simulate"]

@@ -39,7 +39,7 @@ LEVELS = [
 LEVEL = {room: level for level, rooms in enumerate(LEVELS) for room in rooms}
 ONLY_IN = {
     "pinocchio": {"mechanism"},
-    "matplotlib": {"plotting"},
+    "matplotlib": {"plotting", "api"},
     "typer": {"cli"},
     "rich": {"cli"},
     "dask": {"sweep"},

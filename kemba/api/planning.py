@@ -88,9 +88,7 @@ def plan(
         resolved, document = load_task(task, settings(changes))
     if model is not None:
         resolved = resolved.model_copy(update={"model": beside(str(model), Path())})
-    models: list[str | Path] = [
-        path for name in (resolved.model, resolved.plant) for path in model_files(name)
-    ]
+    models: list[str | Path] = [*model_files(resolved.model), *model_files(resolved.plant)]
     if not isinstance(task, Task):
         models.insert(0, find_config(task, "tasks"))
     files = [*dict.fromkeys(models), *BY_KIND.files]
