@@ -12,7 +12,7 @@ import numpy as np
 from kemba.effects.mechanics.motor import Motor
 from kemba.errors import KembaError
 from kemba.model import Model
-from kemba.plant.execution.replay import ON_GROUND, Replay, first_row, judge
+from kemba.plant.execution.replay import LandingSettings, Replay, first_row, judge
 from kemba.plant.simulation.commands import SAME_TIME, Commands, JointControl, Profile
 from kemba.plant.simulation.simulate import Condition, Simulated, run_many, simulate_one
 from kemba.plant.simulation.start import lowest_foot
@@ -113,7 +113,7 @@ def condition_of(
         if quantity.binary
     }
     pose = {**first_row(model, table), **(start or {})}
-    held = lead_of(table) if lowest_foot(model, pose) > ON_GROUND else 0.0
+    held = lead_of(table) if lowest_foot(model, pose) > LandingSettings.current().on_ground else 0.0
     sent = {n: Profile(p.times - held, p.values) for n, p in {**profiles, **(valves or {})}.items()}
     control = hip_control(model, table, gains)
     commands = Commands(sent, replace(control, times=control.times - held), PERIOD)
