@@ -8,11 +8,10 @@ from typing import Any
 from kemba.errors import KembaError
 from kemba.model import Model, load_model
 from kemba.plant.execution.controller import execute
-from kemba.plant.execution.replay import Replay, ends_standing, replay
+from kemba.plant.execution.replay import LandingSettings, Replay, ends_standing, replay
 from kemba.trajectory import Trajectory
 
 PLANT = "plant"
-SETTLE = 0.3  # s; the last commands are held before a landing is judged
 
 
 def replays(
@@ -39,7 +38,8 @@ def replays(
 
 def rest_after(model: Model, plan: Trajectory, controller: Trajectory) -> float:
     """For how long [s] the last commands are held: a plan that ends standing may come to rest."""
-    return SETTLE if ends_standing(model, plan) and _closed(controller) else 0.0
+    rests = ends_standing(model, plan) and _closed(controller)
+    return LandingSettings.current().settle if rests else 0.0
 
 
 def _closed(controller: Trajectory) -> bool:
