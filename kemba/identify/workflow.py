@@ -76,6 +76,10 @@ def make_problem(logs: Sequence[Trajectory], model: Model) -> Problem:
         from kemba.identify.bench.problem import bench_problem
 
         return bench_problem(logs, model)
+    if model.mechanism.rig:
+        from kemba.identify.rigs.problem import rig_problem
+
+        return rig_problem(logs, model)
     from kemba.identify.robot.problem import robot_problem
 
     return robot_problem(logs, model)

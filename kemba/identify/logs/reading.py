@@ -15,11 +15,12 @@ from kemba.logs import ColumnMap, open_log
 from kemba.mechanism import Mechanism
 from kemba.trajectory import Trajectory, sidecar
 
-Kind = Literal["robot", "bench"]
+Kind = Literal["robot", "bench", "cylinder", "drive", "vessel"]
 BODY = ("body/x", "body/z", "body/pitch")
 LEG = ("hip/q", "hip/tau", "piston/x", "valve/extend", "valve/retract")
 BENCH = ("piston/x", "valve/extend", "valve/retract", "piston/F")
-KINDS = ("robot", "bench")
+KINDS = ("robot", "bench", "cylinder", "drive", "vessel")
+OWN_RIGS = ("cylinder", "drive", "vessel")
 
 
 def read_log(path: str | Path, columns: ColumnMap | None = None) -> Trajectory:
@@ -55,7 +56,7 @@ def read_logs(paths: Sequence[str | Path], columns: ColumnMap | None = None) -> 
     kinds = {log.meta["kind"] for log in logs}
     if len(kinds) > 1:
         named = ", ".join(f"{log.meta['name']}: {log.meta['kind']}" for log in logs)
-        raise KembaError("", "robot and bench logs cannot be fitted together", named)
+        raise KembaError("", "logs of several kinds cannot be fitted together", named)
     _tell_apart(logs)
     return logs
 
@@ -82,22 +83,43 @@ def needed(log: Trajectory) -> tuple[str, ...]:
     """The columns without which a log says nothing: they follow from its kind and its legs."""
     if log.meta["kind"] == "bench":
         return BENCH
+    if log.meta["kind"] in OWN_RIGS:
+        return tuple(log.meta.get("logged", ()))
     legs = legs_of(log) or ("<leg>",)
     return (*BODY, *(f"{leg}/{name}" for leg in legs for name in LEG))
 
 
 def taken_on(logs: Iterable[Trajectory], mechanism: Mechanism) -> None:
-    """Note in the logs on which machine they were taken: its legs and its stroke [m]."""
+    """Note in the logs on which machine they were taken: its legs and its stroke [m], or for a rig
+    of the user's own its kind and the columns that it needs. Raises KembaError where logs of such
+    a rig meet a model of another machine."""
     for log in logs:
+        if mechanism.rig:
+            log.meta["kind"], log.meta["logged"] = mechanism.rig, mechanism.logged
+            if mechanism.bore is not None:
+                log.meta["stroke"] = mechanism.stroke
+            continue
+        if log.meta["kind"] in OWN_RIGS:
+            what = f"is a log of a {log.meta['kind']} rig, and the model has no such rig"
+            expected = f"a model with `rig: {{kind: {log.meta['kind']}, ...}}` was expected"
+            hint = "name it with --model; docs/rigs.md shows one"
+            raise KembaError(str(log.meta.get("path", log.meta["name"])), what, expected, hint)
         log.meta["stroke"] = mechanism.stroke
         if log.meta["kind"] == "robot":
             log.meta["legs"] = list(mechanism.legs)
 
 
 def kind_of(log: Trajectory, where: str | Path = "") -> Kind:
-    """Robot or bench, by the columns."""
+    """Robot, bench or a rig of the user's own, by the columns."""
     if any(name.startswith("body/") or "/hip/" in name for name in log.names):
         return "robot"
+    if "axis/q" in log:
+        return "drive"
+    if "vessel/P" in log:
+        return "vessel"
+    pressed = any(name in log for name in ("chamber/extend/P", "chamber/retract/P"))
+    if pressed and not any("valve/" in name for name in log.names):
+        return "cylinder"
     if any(name in BENCH for name in log.names):
         return "bench"
     raise KembaError(
