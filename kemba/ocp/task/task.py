@@ -74,7 +74,7 @@ class Landing(Section):
 
     impact_speed: Annotated[
         float,
-        Param("m.s-1", lower=0.15, doc="at most, of feet on the ground and pistons at their stops"),
+        Param("m.s-1", lower=0.15, doc="at most, of feet on the ground and of legs at their stops"),
     ] | None = None
 
 
