@@ -11,7 +11,7 @@ from kemba.ocp.phases.independent import Independent
 from kemba.ocp.phases.modes import HELD
 from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.view import View
-from kemba.ocp.task.requirement import Requirement, quantity_expression
+from kemba.ocp.task.requirement import Requirement, apex_node, quantity_expression
 from kemba.ocp.transcription.stage import aim_cost, as_variable
 
 INF = np.inf
@@ -22,6 +22,7 @@ def add_requirements(
 ) -> None:
     """Bounds where a requirement is about a variable, else rows; none where modes imply it."""
     view = View(program)
+    program.apex = apex_node(requirements, program.nodes)
     _granted_at_end(program, view, end)
     seen: set[tuple[object, ...]] = set()
     for requirement in requirements:

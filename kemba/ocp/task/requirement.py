@@ -181,6 +181,18 @@ def _requirement(
     return Requirement(location, quantity, at, lower, upper, during, aim)
 
 
+def highest(requirements: Sequence[Requirement]) -> Requirement | None:
+    """The goal that asks for the greatest height of the body, or None."""
+    high = (w for w in requirements if w.quantity.name == "body/z" and w.at and w.lower > -math.inf)
+    return max(high, key=lambda w: w.lower, default=None)
+
+
+def apex_node(requirements: Sequence[Requirement], nodes: int) -> int:
+    """The node of the highest goal of the body, after which it lands; 0 without such a goal."""
+    apex = highest(requirements)
+    return 0 if apex is None else apex.node(nodes)
+
+
 def flight_clearance(
     task: Task, model: Model, requirements: Sequence[Requirement]
 ) -> list[Requirement]:
@@ -191,8 +203,7 @@ def flight_clearance(
     """
     if not task.clearance:
         return []
-    high = (w for w in requirements if w.quantity.name == "body/z" and w.at and w.lower > -math.inf)
-    apex = max(high, key=lambda w: w.lower, default=None)
+    apex = highest(requirements)
     if apex is None or apex.at is None:
         raise ValueError("needs a goal for body/z at the top of the flight")
     robot = model.mechanism.need_robot()

@@ -72,15 +72,10 @@ class Goal(Section):
 class Landing(Section):
     """How softly the motion lands."""
 
-    impact_speed: (
-        Annotated[
-            float,
-            Param(
-                "m.s-1", lower=0.15, doc="at most, of feet on the ground and pistons at their stops"
-            ),
-        ]
-        | None
-    ) = None
+    impact_speed: Annotated[
+        float,
+        Param("m.s-1", lower=0.15, doc="at most, of feet on the ground and of legs at their stops"),
+    ] | None = None
 
 
 class Solver(Section):
