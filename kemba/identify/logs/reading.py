@@ -137,6 +137,17 @@ def taken_on(logs: Iterable[Trajectory], mechanism: Mechanism) -> None:
             log.meta["legs"] = list(mechanism.legs)
 
 
+def is_log(log: Trajectory) -> bool:
+    """Whether a table is a robot's or a rig's log: its sidecar says so, or its columns do."""
+    if "kind" in log.meta:
+        return True
+    try:
+        kind_of(log)
+    except KembaError:
+        return False
+    return True
+
+
 def kind_of(log: Trajectory, where: str | Path = "") -> Kind:
     """Robot or bench, by the columns."""
     if any(name.startswith("body/") or "/hip/" in name for name in log.names):
@@ -156,7 +167,7 @@ def _order(path: Path) -> tuple[str, str]:
 
 
 def _foreign(path: Path, columns: ColumnMap) -> Trajectory:
-    headers, table = read_table(path, plain_headers=True)
+    headers, table = read_table(path, {s.source for s in columns.columns.values()})
     time_source = columns.columns["time [s]"]
     time = _values(path, headers, table, "time [s]", time_source)
     found = {}
@@ -178,6 +189,8 @@ def _values(path: Path, headers: list[str], table: Array, header: str, source: S
             f"has no column '{source.source}', which the map reads as '{header}'",
             hint=suggest(source.source, headers),
         )
+    if headers.count(source.source) > 1:
+        raise KembaError(f"{path}:1", f"has the column '{source.source}' more than once")
     values: Array = table[:, headers.index(source.source)]
     unit = header[header.index("[") + 1 : -1]
     try:
