@@ -32,6 +32,7 @@ LEVELS = [
     {"runs"},
     {"sweep"},
     {"plotting", "report"},
+    {"learn"},
     {"cli"},
 ]
 LEVEL = {room: level for level, rooms in enumerate(LEVELS) for room in rooms}
@@ -97,7 +98,8 @@ PLANNING = [
     "phases",
     "refinement",
 ]
-PLANNING += ["infeasibility", "planned", "planner", "refined", "planning", "starts"]
+PLANNING += ["continuation", "infeasibility", "planned", "planner", "refined", "continued"]
+PLANNING += ["planning", "starts"]
 
 
 def test_planning_is_built_from_the_bottom_up() -> None:
