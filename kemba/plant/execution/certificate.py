@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 from kemba.errors import KembaError
 from kemba.model import Model, load_model
-from kemba.plant.execution.controller import execute
+from kemba.plant.execution.controller import execute, lead_of
 from kemba.plant.execution.replay import Replay, ends_standing, replay
-from kemba.trajectory import Trajectory
+from kemba.trajectory import Array, Trajectory
 
 PLANT = "plant"
+POINTS = re.compile(r".*/(hip|knee)/(x|z|vx|vz)")
+DIGITS = 7
 SETTLE = 0.3  # s; the last commands are held before a landing is judged
 
 
@@ -27,14 +32,45 @@ def replays(
     before its landing is judged. `plant_replay` is None without a plant; any is None where a
     plan that was not solved cannot even be started.
     """
+    done = executions(model, plan, controller, plant)
+    return {name: found.summary() if found else None for name, found in done.items()}
+
+
+def executions(
+    model: Model, plan: Trajectory, controller: Trajectory, plant: str | Model | None = PLANT
+) -> dict[str, Replay | None]:
+    """What `replays` sums up, with the motions."""
     full = load_model(plant) if isinstance(plant, str) else plant
     rest = rest_after(model, plan, controller)
+    there = full and _tried(lambda: execute(controller, full, extra=rest).against(full, plan))
     return {
         "replay": _tried(lambda: replay(model, plan)),
         "table_replay": _tried(lambda: execute(controller, model, extra=rest).against(model, plan)),
-        "plant_replay": full
-        and _tried(lambda: execute(controller, full, extra=rest).against(full, plan)),
+        "plant_replay": there or None,
     }
+
+
+def plant_run(done: Replay, controller: Trajectory) -> Trajectory:
+    """The motion of the plant for the run folder, in the plan's clock.
+
+    The places of hips and knees follow from the joints and are left out; seven digits are kept.
+    `meta` has the impacts: when [s], at which contacts and stops, the energy lost [J].
+    """
+    t, lead = done.trajectory, lead_of(controller)
+    kept = t.select(name for name in t.names if not POINTS.fullmatch(name))
+    columns = {h: _digits(kept[n]) for h, n in zip(kept.headers, kept.names, strict=True)}
+    impacts = [
+        {"time_s": round(i.time - lead, 6), "what": list(i.labels), "energy_J": round(i.lost, 6)}
+        for i in done.impacts
+    ]
+    return Trajectory(
+        np.round(kept.time - lead, 9), columns, {"kind": "simulation", "impacts": impacts}
+    )
+
+
+def _digits(values: Array) -> Array:
+    """Values (n,) with seven digits, which halves the file."""
+    return np.array([float(f"{value:.{DIGITS}g}") for value in values])
 
 
 def rest_after(model: Model, plan: Trajectory, controller: Trajectory) -> float:
@@ -47,8 +83,8 @@ def _closed(controller: Trajectory) -> bool:
     return not any(controller[name][-1] for name in controller.names if "/valve/" in name)
 
 
-def _tried(attempt: Callable[[], Replay]) -> dict[str, Any] | None:
+def _tried(attempt: Callable[[], Replay]) -> Replay | None:
     try:
-        return attempt().summary()
+        return attempt()
     except KembaError:
         return None
