@@ -21,6 +21,7 @@ SCHEMAS = {
     "cylinders": "kemba.mechanism.cylinder:CylinderTable",
     "sweeps": "kemba.sweep.cases.schema:Sweep",
     "rigs": "kemba.plant.rig.bench:RigFile",
+    "maps": "kemba.logs.columns:ColumnMap",
 }
 
 

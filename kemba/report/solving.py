@@ -18,7 +18,7 @@ from kemba.ocp.certificate.status import Status
 from kemba.ocp.nlp.watcher import Watch
 from kemba.ocp.report import answer, sentence_of
 from kemba.ocp.starts import plan_best
-from kemba.plant.execution.certificate import executions, plant_run
+from kemba.plant.execution.certificate import executions, plant_run, summaries
 from kemba.plant.execution.counterpart import another_robot, counterpart
 from kemba.plant.execution.replay import ends_standing
 from kemba.plant.execution.retiming import retimed
@@ -71,7 +71,9 @@ def solve_into(
             how = {"tell": listener.tell, "watch": listener.watch, "stop": listener.stop}
             found = plan(task, document, log=log, start=start, **how)  # type: ignore[arg-type]
         result = answer(found, str(folder.path))
-        table = controller_table(found.model, found.trajectory) if found.attempts else None
+        table = (
+            controller_table(found.model, found.trajectory, task.hold) if found.attempts else None
+        )
         plant: Trajectory | None = None
         if replay and table is not None and found.status.plan:
             listener.tell("replay")
@@ -99,9 +101,9 @@ def _replayed(found: Plan, table: Trajectory) -> tuple[dict[str, Any], Trajector
         done = executions(found.model, found.trajectory, table, plant)
     except KembaError as error:  # a model that the simulator cannot execute still has its plan
         return _unconfirmed(found, f"it cannot be simulated: {error}"), None
-    executed = {name: one.summary() if one else None for name, one in done.items()}
+    executed = summaries(found.model, done)
     there = done["plant_replay"]
-    motion = plant_run(there, table) if there else None
+    motion = plant_run(there) if there else None
     lands = bool(ends_standing(found.model, found.trajectory))
     names = [f"the plant is another robot, {other}, which {task.plant} names"] if other else []
     judged = verdicts(executed, task.tolerances, lands).values()

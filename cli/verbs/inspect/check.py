@@ -25,11 +25,12 @@ def check(
     Example: kemba-opt check planning.yaml
     """
     from kemba.errors import KembaError
+    from kemba.logs import ENDINGS
 
     answers = []
     for file in files:
         try:
-            answer = _log(file, column_map) if file.suffix == ".csv" else _yaml(file)
+            answer = _log(file, column_map) if file.suffix in ENDINGS else _yaml(file)
             answers.append({"file": str(file), "good": True, **answer})
         except KembaError as error:
             answers.append({"file": str(file), "good": False, "sentence": str(error)})
@@ -49,10 +50,9 @@ def _tell(answers: list[dict[str, Any]], json: bool, quiet: bool) -> None:
 
 
 def _log(file: Path, column_map: str | None) -> dict[str, Any]:
-    from kemba.identify.logs.reading import load_map, read_log
-    from kemba.trajectory import Trajectory
+    from kemba.logs import load_map, open_log
 
-    log = read_log(file, load_map(column_map)) if column_map else Trajectory.read(file)
+    log = open_log(file, load_map(column_map) if column_map else None)
     seconds = f"{log.time[-1] - log.time[0]:.3g} s"
     sentence = f"valid table: {len(log)} rows, {len(log.names)} columns, {seconds}"
     return {"kind": "table", "rows": len(log), "columns": log.headers, "sentence": sentence}
@@ -72,6 +72,7 @@ def _yaml(file: Path) -> dict[str, Any]:
 
 def _whole(kind: str, parsed: Any, document: Any) -> list[str]:
     """What a file names must exist too: robots, cylinders, legs, quantities, costs, options."""
+    from kemba.logs.columns import check_map
     from kemba.mechanism import load_cylinder, load_robot
     from kemba.model import load_model
     from kemba.ocp.planning import check_feasible
@@ -84,6 +85,8 @@ def _whole(kind: str, parsed: Any, document: Any) -> list[str]:
         return load_model(document.source).remarks
     if kind == "robots":
         load_robot(document.source)
+    if kind == "maps":
+        check_map(parsed, document.source)
     if kind == "cylinders":
         load_cylinder(document.source)
     return []

@@ -28,7 +28,7 @@ def in_plans_clock(log: Trajectory, table: Trajectory) -> Trajectory:
 
 def start_of(table: Trajectory) -> float:
     """Plan time [s] at which a controller table begins: valves are sent the dead time early."""
-    return min(float(table.time[0]), -float(table.meta.get("lead", 0.0)))
+    return -float(table.meta.get("lead", -table.time[0]))
 
 
 def rises(time: Array, command: Array) -> Array:

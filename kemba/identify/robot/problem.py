@@ -30,7 +30,6 @@ from kemba.identify.robot.candidates import (
 )
 from kemba.identify.robot.dynamics.physics import Physics
 from kemba.identify.robot.dynamics.settings import ForceDensity
-from kemba.identify.robot.dynamics.tolerance import ToleranceShareSettings
 from kemba.identify.robot.force_channels import robot_force_channels
 from kemba.identify.robot.formulas import formula_columns
 from kemba.identify.robot.labels import describe
@@ -88,8 +87,7 @@ class RobotProblem(Problem):
         self.candidates: dict[str, Candidate] = {**found, **sensor_candidates(sigma, model)}
         sensors = SensorFaults(model.effects)
         self.state = linearise_at(physics, batch, sensors, {}, ground, self.unknown)
-        masses = dict.fromkeys(physics.masses, (0.0, ToleranceShareSettings.current().share))
-        self.nuisance = {**physics.nuisance, **sensors.nuisance, **masses}
+        self.nuisance = {**physics.nuisance, **sensors.nuisance, **physics.links}
 
     @property
     def physics(self) -> Physics:

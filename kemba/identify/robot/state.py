@@ -144,8 +144,8 @@ def linearise_at(
         normal = [state.motion.normal[: len(s.phase), i] for i, s in enumerate(schedules)]
         schedules = tuple(loaded(s, f, dt) for s, f in zip(schedules, normal, strict=True))
     state = _along(physics, batch, sensors, base, ground, schedules, reference, unknown)
-    masses = zip(physics.masses, np.moveaxis(state.motion.masses, -1, 0), strict=True)
-    linear = {name: (column, 0.0) for name, column in masses}
+    links = zip(physics.links, np.moveaxis(state.motion.links, -1, 0), strict=True)
+    linear = {name: (column, 0.0) for name, column in links}
     return replace(state, linear={**linear, GRIP: (state.motion.less_grip, 1.0)})
 
 

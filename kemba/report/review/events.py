@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kemba.plant.execution.replay import LASTS, UPRIGHT, peak
+from kemba.plant.execution.replay import LandingSettings, peak
 from kemba.plotting import Machine
 from kemba.plotting.source import Mask
 from kemba.report.review.tracks import Track
-from kemba.settings import BY_HAND, Settings, setting
+from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Array, Trajectory
 
 
@@ -19,7 +19,7 @@ class EventSettings(Settings):
     """How the end of a motion is judged."""
 
     low: float = setting(
-        0.05, "m", "a body that ends so far below its start has not landed on its feet", BY_HAND
+        0.05, "m", "a body that ends so far below its start has not landed on its feet", CHOSEN
     )
 
 
@@ -68,7 +68,8 @@ def _flight(t: Trajectory, stands: Mask, apex: float) -> Flight:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], stands, [False]]).astype(int)))
     spans = [(t.time[a], t.time[min(b, len(t) - 1)]) for a, b in edges.reshape(-1, 2)]
     ends = float(t.time[0]), float(t.time[-1])
-    firm = [(a, b) for a, b in spans if b - a >= LASTS or a <= ends[0] or b >= ends[1]]
+    lasts = LandingSettings.current().lasts
+    firm = [(a, b) for a, b in spans if b - a >= lasts or a <= ends[0] or b >= ends[1]]
     if any(a <= apex <= b for a, b in firm):
         return Flight(None, None)
     left = [float(b) for a, b in firm if a < apex and b < ends[1]]
@@ -93,7 +94,7 @@ def _fault(t: Trajectory, apex: float) -> str | None:
     z = t["body/z"][np.isfinite(t["body/z"])]
     if "body/pitch" in t:
         pitch = t["body/pitch"][np.isfinite(t["body/pitch"])]
-        if len(pitch) and abs(pitch[-1]) > UPRIGHT:
+        if len(pitch) and abs(pitch[-1]) > LandingSettings.current().upright:
             return "tips over"
     low = EventSettings.current().low
     return "ends on the ground" if z[-1] < z[0] - low and z[-1] < apex - low else None

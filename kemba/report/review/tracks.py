@@ -11,7 +11,7 @@ import numpy as np
 from kemba.identify.logs.clock import in_plans_clock
 from kemba.plotting import Source, load_source
 from kemba.runs import PLANT_RUN, Run
-from kemba.settings import BY_HAND, Settings, setting
+from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Array, Trajectory
 
 Role = Literal["plan", "plant", "log"]
@@ -20,12 +20,12 @@ Role = Literal["plan", "plant", "log"]
 class PageSettings(Settings):
     """What a page shows of long motions and of many."""
 
-    points: int = setting(1000, "1", "points of every curve, so that the page opens fast", BY_HAND)
-    before: float = setting(0.1, "s", "shown of a log before the plan begins", BY_HAND)
-    after: float = setting(0.4, "s", "shown of a log after the plan's end", BY_HAND)
-    drawn: int = setting(5, "1", "logs drawn over each other; more cannot be told apart", BY_HAND)
+    points: int = setting(1000, "1", "points of every curve, so that the page opens fast", CHOSEN)
+    before: float = setting(0.1, "s", "shown of a log before the plan begins", CHOSEN)
+    after: float = setting(0.4, "s", "shown of a log after the plan's end", CHOSEN)
+    drawn: int = setting(5, "1", "logs drawn over each other; more cannot be told apart", CHOSEN)
     compared: int = setting(
-        3, "1", "logs that the model is compared with: more take longer than 10 s", BY_HAND
+        3, "1", "logs that the model is compared with: more take longer than 10 s", CHOSEN
     )
 
 

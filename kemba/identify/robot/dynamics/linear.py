@@ -37,7 +37,7 @@ class LinearisedMotion:
     way: Array  # (n, L, m) of the measured coordinates since the start
     places: Array  # (n, L, 3 legs): x and z of each foot, pistons
     sinking: Array  # (n, L, legs) speed of the feet, down, steady
-    masses: Array  # (n, L, k, parameters) force per share by which a mass or inertia is off
+    links: Array  # (n, L, k, figures) force per share by which a link's mass or inertia is off
     less_grip: Array  # (n, L, k) force that is missing per unit of friction coefficient
     shift: Array  # (n, L, k) acceleration that the model adds to the reference's
     A: tuple[Array, Array]  # (n, L, k, k) each: slopes of the acceleration along q and v
@@ -131,7 +131,7 @@ def linearise_along(
         travelled(rate, batch.h),
         np.concatenate([feet, y[..., k - legs :]], axis=2),
         steady(-feet_rate[..., 1::2], dt),
-        batch.deep(physics.call("masses", *mid)[0]),
+        batch.deep(physics.call("links", *mid)[0]),
         less_grip,
         shift,
         (A_q, A_v),

@@ -17,22 +17,24 @@ from kemba.plotting import Machine
 from kemba.plotting.robot.machine import EXACT
 from kemba.plotting.source import Mask
 from kemba.report.review.tracks import Track
-from kemba.settings import BY_HAND, Settings, setting
+from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Array, Trajectory
 
-SMOOTH = 0.011  # s, the window over which a measured position is made a speed
 NORMAL = 1.204e-3  # kg in a litre of air at 20 deg C and one atmosphere
 
 
 class UseSettings(Settings):
     """When a limit counts as reached, and a foot as loaded."""
 
-    full: float = setting(0.99, "1", "share of a limit that counts as reached", BY_HAND)
+    full: float = setting(0.99, "1", "share of a limit that counts as reached", CHOSEN)
     loaded: float = setting(
-        0.1, "1", "share of the weight on a foot below which its friction says nothing", BY_HAND
+        0.1, "1", "share of the weight on a foot below which its friction says nothing", CHOSEN
+    )
+    smooth: float = setting(
+        0.011, "s", "window over which a measured position is made a speed", CHOSEN
     )
     clear: float = setting(
-        8.0, "1", "times its noise that a ground force must be, for friction as its share", BY_HAND
+        8.0, "1", "times its noise that a ground force must be, for friction as its share", CHOSEN
     )
 
 
@@ -99,7 +101,7 @@ def rate(track: Track, speed: str, position: str) -> Array:
     from scipy.signal import savgol_filter
 
     step = float(np.median(np.diff(t.time)))
-    width = max(5, 2 * round(0.5 * SMOOTH / step) + 1)
+    width = max(5, 2 * round(0.5 * UseSettings.current().smooth / step) + 1)
     if width > len(t):
         return np.gradient(t[position], t.time)
     return np.asarray(savgol_filter(t[position], width, 2, deriv=1, delta=step))
