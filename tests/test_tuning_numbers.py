@@ -16,7 +16,7 @@ import kemba
 from kemba.settings import ORIGINS, Settings
 
 ROOT = Path(kemba.__file__).parent
-DRAWN = ("plotting/", "report/stage.py")  # lengths, colours and speeds of pictures
+DRAWN = ("plotting/", "report/review/", "report/stage.py")  # lengths, colours and speeds of pictures
 
 # Numbers that may stand at a module's top level, and why.
 CONSTANTS: dict[str, tuple[str, str]] = {  # file -> names, why
@@ -44,6 +44,7 @@ CONSTANTS: dict[str, tuple[str, str]] = {  # file -> names, why
     "plant/rig/tables.py": ("PAPER_RISE PAPER_FORCE PAPER_DEAD_TIME", "the paper's figures"),
     "plant/rig/bench.py": ("FORCE_NOISE", "noise of a force transducer"),
     "plant/rig/strokes.py": ("MODES", "names of valve modes"),
+    "plant/execution/certificate.py": ("DIGITS", "digits of numbers in a file"),
     "plant/execution/sensors.py": ("ENCODERS", "steps of the robot's encoders"),
     "plant/execution/repeat.py": ("VALVE_SCATTER", "scatter of the robot's valves"),
     "plant/execution/controller.py": ("PERIOD", "rate of the robot's controller"),
