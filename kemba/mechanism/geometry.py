@@ -1,4 +1,4 @@
-"""Lengths that a machine may have other than its drawing: which they are, and a robot with others."""
+"""A robot whose lengths differ from those of its drawing."""
 
 from __future__ import annotations
 

@@ -34,7 +34,8 @@ class Mechanism:
     `q, v, a` are SX symbols (n,); `inverse_dynamics` (n,) is the generalised force that the
     motion (q, v, a) needs, gravity included, no effect included. `legs` are the prefixes under
     which leg ports are found ("" for a rig). `cylinder`: the one of every leg. `robot`: the link
-    table, None for a rig; it differs by `offsets` [m] from the table `drawn`. `imposed`: the motion is given, forces are answers.
+    table, None for a rig; it differs by `offsets` [m] from the table `drawn`. `imposed`: the
+    motion is given, forces are answers.
     `mirror` maps a coordinate to its mirror image ("-" prefixed where the sign turns).
     `standing`: coordinates with retracted pistons and each foot on the ground under its hip.
     `points`: (x, z) of places that pictures need, such as `front/pin`; nothing pushes there.

@@ -162,9 +162,7 @@ def _symbols(prefix: str, quantities: Mapping[Key, Quantity]) -> tuple[ca.SX, di
     return vector, {key: vector[i] for i, key in enumerate(quantities)}
 
 
-def _assemble(
-    model: Model, mechanism: Mechanism, instances: list[Instance], p: ca.SX
-) -> Node:
+def _assemble(model: Model, mechanism: Mechanism, instances: list[Instance], p: ca.SX) -> Node:
     s, states = _symbols("s", model.states)
     lam, forces = _symbols("lam", model.forces)
     u, inputs = _symbols("u", model.inputs)
