@@ -11,7 +11,8 @@ from kemba.config import load_yaml
 from kemba.errors import KembaError
 from kemba.folders import place_for
 from kemba.identify.logs.gate import BadData
-from kemba.identify.logs.reading import load_map, read_logs
+from kemba.identify.logs.reading import read_logs
+from kemba.logs import load_map
 from kemba.model import Model, build_model, load_spec
 from kemba.plotting import Machine, load_machine
 from kemba.quantity import to_si
