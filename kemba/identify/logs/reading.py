@@ -90,7 +90,10 @@ def _without_absurd(log: Trajectory) -> Trajectory:
 
 
 def read_logs(paths: Sequence[str | Path], columns: ColumnMap | None = None) -> list[Trajectory]:
-    """Several logs of one kind, in the order of their names and not of the arguments."""
+    """Several logs of one kind, in the order of their names and not of the arguments.
+
+    Raises KembaError for none, for unreadable ones and for robot and bench logs together.
+    """
     if not paths:
         raise KembaError("", "no log given", "one or more CSV files were expected")
     unique = sorted({Path(p).resolve(): Path(p) for p in paths}.values(), key=_order)
@@ -138,7 +141,7 @@ def taken_on(logs: Iterable[Trajectory], mechanism: Mechanism) -> None:
 
 
 def kind_of(log: Trajectory, where: str | Path = "") -> Kind:
-    """Robot or bench, by the columns."""
+    """Robot or bench, by the columns. Raises KembaError for a log that is neither."""
     if any(name.startswith("body/") or "/hip/" in name for name in log.names):
         return "robot"
     if any(name in BENCH for name in log.names):
