@@ -19,6 +19,7 @@ from kemba_cli.verbs.identify.characterise import characterise
 from kemba_cli.verbs.identify.compare import compare
 from kemba_cli.verbs.identify.discover import discover
 from kemba_cli.verbs.identify.experiment import experiment
+from kemba_cli.verbs.identify.learn import learn
 from kemba_cli.verbs.inspect.check import check
 from kemba_cli.verbs.inspect.effects import effects
 from kemba_cli.verbs.inspect.map import draft_map
@@ -40,6 +41,7 @@ VERBS = (
     compare,
     discover,
     adopt,
+    learn,
     experiment,
     check,
     effects,

@@ -23,6 +23,8 @@ SCHEMAS = {
     "rigs": "kemba.plant.rig.bench:RigFile",
     "maps": "kemba.logs.columns:ColumnMap",
 }
+# what a file of a kind is called in messages, where its folder's name would mislead
+CALLED = {"maps": "column map"}
 
 
 def schema_of(kind: str) -> type[BaseModel]:

@@ -9,10 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from kemba.identify.compare.compare import Comparison, compare
-from kemba.identify.logs.gate import check_logs
-from kemba.identify.logs.reading import read_logs, taken_on
+from kemba.identify.logs.reading import read_logs
 from kemba.identify.problem.problem import Problem
-from kemba.identify.workflow import make_problem, model_of
+from kemba.identify.workflow import admitted, check_all, model_of
 from kemba.logs import load_map
 from kemba.trajectory import Trajectory
 
@@ -30,10 +29,8 @@ def compare_logs(
     columns = load_map(column_map) if column_map else None
     read = read_logs(logs, columns)
     built = model_of(read, model)
-    taken_on(read, built.mechanism)
-    check_logs(read)
-    problem = make_problem(read, built)
-    problem.validate()
+    check_all(read, built)
+    problem, _ = admitted(read, built)
     found = compare(problem, model, [str(log.meta["path"]) for log in read])
     if run is not None:
         plan = Trajectory.read(Path(run) / "trajectory.csv" if Path(run).is_dir() else run)

@@ -85,6 +85,8 @@ class _Reader:
         if name not in self.raw:
             what = f"has no column '{name}', which the map reads as '{header}'"
             raise KembaError(f"{self.path}:1", what, hint=suggest(name, list(self.raw)))
+        if f"{name}#" in {other.rpartition("#")[0] + "#" for other in self.raw}:
+            raise KembaError(f"{self.path}:1", f"has the column '{name}' more than once")
         cells = self.raw[name]
         if cells.dtype != object:
             return np.asarray(cells, dtype=float)

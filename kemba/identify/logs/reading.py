@@ -109,6 +109,17 @@ def taken_on(logs: Iterable[Trajectory], mechanism: Mechanism) -> None:
             log.meta["legs"] = list(mechanism.legs)
 
 
+def is_log(log: Trajectory) -> bool:
+    """Whether a table is a robot's or a rig's log: its sidecar says so, or its columns do."""
+    if "kind" in log.meta:
+        return True
+    try:
+        kind_of(log)
+    except KembaError:
+        return False
+    return True
+
+
 def kind_of(log: Trajectory, where: str | Path = "") -> Kind:
     """Robot, bench or a rig of the user's own, by the columns."""
     if any(name.startswith("body/") or "/hip/" in name for name in log.names):
