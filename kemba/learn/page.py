@@ -13,7 +13,7 @@ from kemba.plant.execution.certificate import rest_after
 from kemba.plant.execution.controller import execute
 from kemba.plotting.study.learning import plot_executions, plot_rounds
 from kemba.plotting.style import svg_text
-from kemba.report.page import table
+from kemba.report.review.html import pairs as table
 from kemba.report.stage import write_page
 
 Rows = Iterable[tuple[str, Any]]

@@ -148,7 +148,7 @@ def test_without_anything_the_newest_run_is_taken(
     pages = shutil.ignore_patterns("review*.html")
     shutil.copytree(jump, "runs/jump-1", ignore=pages)
     done = call("review")
-    assert "the newest run: runs/jump-1 with 2 logs" in done.stderr
+    assert "the newest run: runs/jump-1\nwith its 2 newest logs\n" in done.stderr
     assert done.stdout == "runs/jump-1/logs/review.html\n"
     again = call("review")
     assert again.stdout == "runs/jump-1/logs/review-2.html\n"
