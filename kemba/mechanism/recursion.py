@@ -45,7 +45,7 @@ class FrameMotion:
     angular: ca.SX
 
     def turn(self, local: Local) -> Vector:
-        """A vector of this frame, in the world."""
+        """A vector (2,) of this frame, in the world."""
         return (
             self.cos * local[0] - self.sin * local[1],
             self.sin * local[0] + self.cos * local[1],

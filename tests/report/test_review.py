@@ -31,16 +31,6 @@ def call(*words: str) -> Result:
 
 
 @pytest.fixture(scope="module")
-def jump(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A jump with two noisy logs."""
-    run = tmp_path_factory.mktemp("runs") / "jump-1"
-    words = ["solve", "jump.yaml", "--no-figure", "--out", str(run)]
-    assert call(*words).exit_code == 0
-    assert call("simulate", str(run), "--repeat", "2", "--noise").exit_code == 0
-    return run
-
-
-@pytest.fixture(scope="module")
 def page(jump: Path) -> tuple[dict[str, str], str]:
     """What `review` says of the jump, and its page."""
     logs = [str(path) for path in sorted((jump / "logs").glob("*.csv"))]

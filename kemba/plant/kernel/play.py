@@ -56,7 +56,7 @@ def play(
     table: Array,
     progress: Progress,
 ) -> int:
-    """Go through the marks and fill `table`; the answer says why it ends.
+    """Go through the marks and fill `table` (rows, columns); the answer says why it ends.
 
     Called again it goes on: after FULL with an emptied log, after ASK with the controller's
     inputs in `k.x`. Raises NoSolutionError.
