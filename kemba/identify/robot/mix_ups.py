@@ -134,4 +134,4 @@ def _feet(physics: Physics, y: Array, change: dict[str, Change]) -> Array:
     columns = [change.get(name, same)(y[:, i]) for i, name in enumerate(physics.channels)]
     known = np.stack(columns, axis=1)
     q = np.hstack([known[:, : 3 + count], physics.knees(known[:, 3 + count :], physics.nominal)])
-    return physics.call("feet", q, 0 * q)[0].reshape(len(y), count, 2)
+    return physics.call("feet", q, 0 * q, p=physics.nominal)[0].reshape(len(y), count, 2)
