@@ -81,7 +81,7 @@ def _replayed(found: Plan, table: Trajectory) -> dict[str, Any]:
     """The executions of a plan, and the verdict: it stays solved only if both come near enough."""
     task = found.task
     try:
-        plant = counterpart(task.model, task.payload, task.supply, task.plant)
+        plant = counterpart(task.model, task.payload, task.supply, task.plant, changes=task.effects)
         other = another_robot(task.model, task.plant)
         executed = replays(found.model, found.trajectory, table, plant)
     except KembaError as error:  # a model that the simulator cannot execute still has its plan

@@ -85,7 +85,8 @@ class Task(Section):
 
     `step_variation`: each step lasts duration/nodes within this fraction. `start` and `end` map
     quantities to values; `rest: true` there means that all rates are zero,
-    `settled: true` that every state of an effect is at its value at rest.
+    `settled: true` that every state of an effect is at its value at rest. `effects` changes
+    parameters of the model's effects: `{contact: {mu: 0.6}}`, by name or by place in its list.
     """
 
     name: FileName = "task"
@@ -95,6 +96,7 @@ class Task(Section):
     height: Annotated[float, Param("m", lower=0.0, doc="of the body's centre")] | None = None
     distance: Annotated[float, Param("m", doc="forward")] | None = None
     supply: Supply | None = None
+    effects: dict[str, dict[str, Any]] = Field(default_factory=dict)
     payload: Annotated[float, Param("kg", lower=0.0, doc="at the body's centre")] = 0.0
     duration: Annotated[float, Param("s", lower=0.01, upper=20.0, doc="nominal")] = 0.5
     nodes: Annotated[int, Field(ge=4, le=2000)] = 100
