@@ -105,7 +105,7 @@ def _rows(log: ResampledLog) -> Indices:
     limits = MixUpSettings.current()
     step = float(np.median(np.diff(log.time)))
     half = max(1, round(0.5 * limits.window / step))
-    good: Flags = np.isfinite(log.y).all(axis=1)
+    good: Flags = np.asarray(np.isfinite(log.y).all(axis=1))
     if len(log.time) < 4 * half + 1 or good.sum() < 4 * half + 1:
         return np.empty(0, dtype=int)
     z = np.interp(log.time, log.time[good], log.y[good, 1])
