@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from itertools import chain
 from pathlib import Path
 from typing import Any, TextIO
@@ -17,24 +17,20 @@ from kemba.quantity import Quantity, is_si
 Table = np.ndarray[Any, np.dtype[np.float64]]
 
 
-def read_table(path: str | Path, foreign: Collection[str] | None = None) -> tuple[list[str], Table]:
+def read_table(path: str | Path) -> tuple[list[str], Table]:
     """Headers (k) and numbers (n, k) of a CSV file; an empty cell is NaN.
 
-    `foreign`: the file is another program's, and these of its columns matter. Its headers may be
-    any texts, and its other columns may hold anything; here they are NaN. Raises KembaError with
-    file:row:column when the file cannot be read, a header is malformed, repeated or not SI, rows
-    are ragged or a cell is not a number.
+    Raises KembaError with file:row:column when the file cannot be read, a header is malformed,
+    repeated or not SI, rows are ragged or a cell is not a number.
     """
     try:
         with open(path, encoding="utf-8-sig", newline=None) as stream:
             headers = _headers(stream, path)
-            if foreign is None:
-                _check_headers(headers, path)
-            used = [i for i, name in enumerate(headers) if foreign is None or name in foreign]
+            _check_headers(headers, path)
             try:
-                table = _numbers(stream, len(headers), used)
+                table = _numbers(stream, len(headers))
             except ValueError as error:
-                raise _culprit(path, headers, used) or KembaError(str(path), str(error)) from None
+                raise _culprit(path, headers) or KembaError(str(path), str(error)) from None
     except OSError as error:
         raise KembaError(str(path), error.strerror or str(error)) from None
     except UnicodeDecodeError:
@@ -78,44 +74,32 @@ def _check_headers(headers: list[str], path: str | Path) -> None:
         seen[quantity.name] = column
 
 
-def _numbers(stream: TextIO, width: int, used: list[int]) -> Table:
-    """The rows below the header (n, width), NaN in columns that are not used; ValueError when a
-    row is faulty."""
+def _numbers(stream: TextIO, width: int) -> Table:
+    """The rows below the header (n, width); ValueError when one is faulty."""
     rows = _filled(stream, width)
     first = next(rows, None)
-    if first is None or not used:
+    if first is None:
         return np.empty((0, width))
-    found = np.loadtxt(
-        chain([first], rows),
-        delimiter=",",
-        ndmin=2,
-        comments=None,
-        quotechar='"',
-        dtype=float,
-        usecols=None if len(used) == width else used,
+    table = np.loadtxt(
+        chain([first], rows), delimiter=",", ndmin=2, comments=None, quotechar='"', dtype=float
     )
-    if found.shape[1] != len(used):
-        raise ValueError(f"{found.shape[1]} columns below {width} headers")
-    table = np.full((len(found), width), np.nan)
-    table[:, used] = found
+    if table.shape[1] != width:
+        raise ValueError(f"{table.shape[1]} columns below {width} headers")
     return table
 
 
 def _filled(stream: TextIO, width: int) -> Iterator[str]:
-    """The rows that are not blank, with `nan` in empty cells; ValueError when one is ragged."""
+    """The rows that are not blank, with `nan` in empty cells."""
     for line in stream:
         row = line.rstrip("\n")
         if ",," in row or row.startswith(",") or row.endswith(",") or " " in row:
             row = re.sub(r"(?<![^,])\s*(?![^,])", "nan", row)
         if row:
-            cells = row.count(",") + 1 if '"' not in row else len(next(csv.reader([row])))
-            if cells != width:
-                raise ValueError(f"{cells} cells below {width} headers")
             yield row
 
 
-def _culprit(path: str | Path, headers: list[str], used: list[int]) -> KembaError | None:
-    """The first faulty cell of the columns that are used, found by reading cell by cell."""
+def _culprit(path: str | Path, headers: list[str]) -> KembaError | None:
+    """The first faulty cell, found by reading cell by cell."""
     with open(path, encoding="utf-8-sig", newline=None) as stream:
         stream.readline()
         for number, cells in enumerate(csv.reader(stream), start=2):
@@ -123,7 +107,7 @@ def _culprit(path: str | Path, headers: list[str], used: list[int]) -> KembaErro
                 what = f"{len(cells)} cells below {len(headers)} headers"
                 return KembaError(f"{path}:{number}", what)
             for column, cell in enumerate(cells, start=1):
-                if column - 1 in used and cell.strip() and not _is_number(cell):
+                if cell.strip() and not _is_number(cell):
                     what = f"{headers[column - 1]}: '{cell}' is not a number"
                     return KembaError(f"{path}:{number}:{column}", what)
     return None

@@ -14,8 +14,9 @@ from kemba.identify.answer import Answer
 from kemba.identify.discover import Discovery, discover
 from kemba.identify.logs.excerpt import excerpts
 from kemba.identify.logs.gate import BadData, check_logs, sentence
-from kemba.identify.logs.reading import load_map, read_logs, taken_on
+from kemba.identify.logs.reading import read_logs, taken_on
 from kemba.identify.problem.problem import Problem
+from kemba.logs import load_map
 from kemba.model import Model, load_model
 from kemba.trajectory import Trajectory
 
@@ -105,6 +106,10 @@ def make_problem(logs: Sequence[Trajectory], model: Model) -> Problem:
         from kemba.identify.bench.problem import bench_problem
 
         return bench_problem(logs, model)
+    if model.mechanism.rig:
+        from kemba.identify.rigs.problem import rig_problem
+
+        return rig_problem(logs, model)
     from kemba.identify.robot.problem import robot_problem
 
     return robot_problem(logs, model)

@@ -31,11 +31,12 @@ def check(
     Example: kemba-opt check planning.yaml
     """
     from kemba.errors import KembaError
+    from kemba.logs import ENDINGS
 
     answers = []
     for file in files:
         try:
-            answer = _csv(file, column_map, model) if file.suffix == ".csv" else _yaml(file)
+            answer = _log(file, column_map, model) if file.suffix in ENDINGS else _yaml(file)
             answers.append({"file": str(file), "good": True, **answer})
         except KembaError as error:
             answers.append({"file": str(file), "good": False, "sentence": str(error)})
@@ -54,34 +55,34 @@ def _tell(answers: list[dict[str, Any]], json: bool, quiet: bool) -> None:
             typer.echo(f"{answer['file']}: {answer['sentence']}")
 
 
-def _csv(file: Path, column_map: str | None, model: str) -> dict[str, Any]:
-    """A log is put through the gate of compare and discover; any other CSV is a table."""
+def _log(file: Path, column_map: str | None, model: str) -> dict[str, Any]:
+    """A log is put through the gate of compare and discover; any other file is a table."""
     import os
 
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # many small products, as in compare
     from kemba.identify.workflow import check_log
-    from kemba.trajectory import Trajectory
+    from kemba.logs import open_log
 
     kind, remarks = "table", list[str]()
-    if column_map or _is_log(file):
+    if column_map or _is_measured(file):
         log, remarks = check_log(file, model, column_map)
         kind = f"log of a {log.meta['kind']}"
     else:
-        log = Trajectory.read(file)
+        log = open_log(file)
     size = f"{len(log)} rows, {len(log.names)} columns, {log.time[-1] - log.time[0]:.3g} s"
     sentence = "; ".join([f"valid {kind}: {size}", *remarks])
     facts = {"rows": len(log), "columns": log.headers, "remarks": remarks}
     return {"kind": kind.split()[0], **facts, "sentence": sentence}
 
 
-def _is_log(file: Path) -> bool:
-    """Whether a CSV is a measurement: it has a log's columns or says so, and is no run's plan."""
+def _is_measured(file: Path) -> bool:
+    """Whether a table is a log: it has a log's columns or says so, and is no run's plan."""
     from kemba.identify.logs.reading import is_log
+    from kemba.logs import open_log
     from kemba.runs import MANIFEST
-    from kemba.trajectory import Trajectory
 
     planned = (file.parent / MANIFEST).is_file()
-    return not planned and is_log(Trajectory.read(file, strict=False))
+    return not planned and is_log(open_log(file, strict=False))
 
 
 def _yaml(file: Path) -> dict[str, Any]:
@@ -99,7 +100,7 @@ def _yaml(file: Path) -> dict[str, Any]:
 
 def _whole(kind: str, parsed: Any, document: Any) -> list[str]:
     """What a file names must exist too: robots, cylinders, legs, quantities, costs, options."""
-    from kemba.identify.logs.reading import load_map
+    from kemba.logs.columns import check_map
     from kemba.mechanism import load_cylinder, load_robot
     from kemba.model import load_model
     from kemba.ocp.planning import check_feasible
@@ -112,8 +113,8 @@ def _whole(kind: str, parsed: Any, document: Any) -> list[str]:
         return load_model(document.source).remarks
     if kind == "robots":
         load_robot(document.source)
+    if kind == "maps":
+        check_map(parsed, document.source)
     if kind == "cylinders":
         load_cylinder(document.source)
-    if kind == "logs":
-        load_map(document.source)
     return []

@@ -111,8 +111,9 @@ def _rows(log: ResampledLog) -> Indices:
     z = np.interp(log.time, log.time[good], log.y[good, 1])
     fall = savgol_filter(z, 2 * half + 1, 2, deriv=2, delta=step)
     rows = np.arange(half, len(z) - half, max(1, round(limits.row / step)))
-    known = good[rows] & good[rows - half] & good[rows + half]
-    return np.asarray(rows[known & (fall[rows] > -limits.carried)])
+    known = np.asarray(good[rows] & good[rows - half] & good[rows + half])
+    carried = np.asarray(fall[rows] > -limits.carried)
+    return np.asarray(rows[known & carried])
 
 
 def _restless(
@@ -135,5 +136,5 @@ def _feet(physics: Physics, y: Array, change: dict[str, Change]) -> Array:
     count, same = len(physics.legs), np.positive
     columns = [change.get(name, same)(y[:, i]) for i, name in enumerate(physics.channels)]
     known = np.stack(columns, axis=1)
-    q = np.hstack([known[:, : 3 + count], physics.knees(known[:, 3 + count :])])
+    q = np.hstack([known[:, : 3 + count], physics.knees(known[:, 3 + count :], physics.nominal)])
     return physics.call("feet", q, 0 * q)[0].reshape(len(y), count, 2)
