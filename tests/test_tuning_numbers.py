@@ -16,7 +16,11 @@ import kemba
 from kemba.settings import ORIGINS, Settings
 
 ROOT = Path(kemba.__file__).parent
-DRAWN = ("plotting/", "report/review/", "report/stage.py")  # lengths, colours and speeds of pictures
+DRAWN = (
+    "plotting/",
+    "report/review/",
+    "report/stage.py",
+)  # lengths, colours and speeds of pictures
 
 # Numbers that may stand at a module's top level, and why.
 CONSTANTS: dict[str, tuple[str, str]] = {  # file -> names, why
