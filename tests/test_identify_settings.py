@@ -20,6 +20,7 @@ ROOM = Path(__file__).parent.parent / "kemba" / "identify"
 CONSTANTS = {
     "RANGES": "physical limits of channels, by name",
     "V_NODES": "nodes of a Gauss-Hermite formula",
+    "GAIN": "noise behind a Gaussian filter and its derivatives: mathematics",
     "BODY": "places of channels among the coordinates",
 }
 
