@@ -57,3 +57,12 @@ def _triangle(leg: Leg, x: Any) -> tuple[Any, tuple[Any, Any]]:
     reach = (femur**2 + piston.mount**2) ** 0.5
     cosine = (d**2 - femur**2 - piston.pin**2 - piston.mount**2) / (2 * piston.pin * reach)
     return cosine, (piston.mount, femur)
+
+
+def leg_per_piston(leg: Leg, x: float) -> float:
+    """By how much the distance from hip to foot grows per piston extension [1], at `x` [m]."""
+    bend = ca.SX.sym("bend")
+    f, t = leg.femur.length, leg.tibia.length
+    length = ca.sqrt(f**2 + t**2 + 2 * f * t * ca.cos(bend))
+    ratio = ca.jacobian(length, bend) / ca.jacobian(extension(leg, bend), bend)
+    return float(ca.Function("ratio", [bend], [ratio])(flexion(leg, x)))

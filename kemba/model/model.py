@@ -253,6 +253,8 @@ def _outputs(
             quantities.append(Quantity(f"body/a{axis}", "m.s-2", doc="body centre acceleration"))
     for leg, force in rod.items():
         name = full_name(leg, "piston/F")
+        if full_name(leg, "piston/x") not in mechanism.ports:
+            continue
         outputs[name] = force
         quantities.append(Quantity(name, "N", doc="air and friction on the rod, pushing positive"))
     return {"outputs": outputs, "output_quantities": tuple(quantities)}

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from kemba.errors import KembaError
+from kemba.folders import place_for
 from kemba.plotting import draw, load_source, svg_text
 from kemba.report.stage import stage, write_page
 from kemba.report.verdict import EXECUTIONS
@@ -16,8 +17,8 @@ from kemba.runs import Run, load_run
 Rows = Iterable[tuple[str, Any]]
 
 
-def report_run(run: str | Path, out: str | Path | None = None) -> Path:
-    """Write the page of a run folder to `out`, by default `report.html` in it.
+def report_run(run: str | Path, out: str | Path | None = None, force: bool = False) -> Path:
+    """Write the page of a run folder to `out`, by default a new `report.html` in it.
 
     The page needs no other file. Raises KembaError when the run has no certificate.
     """
@@ -35,23 +36,23 @@ def report_run(run: str | Path, out: str | Path | None = None) -> Path:
         what = f"its certificate or manifest is not as solve writes it ({error!r})"
         raise KembaError(str(found.path), what, hint="solve the task again") from None
     parts = [*facts, *_pictures(found), *origin]
-    return write_page(out or found.path / "report.html", title, "\n".join(parts))
+    return write_page(place_for(out, found.path / "report.html", force), title, "\n".join(parts))
 
 
 def _tables(answer: Mapping[str, Any]) -> Iterable[str]:
     cost = answer["cost"]
-    yield _table("plan", [
+    yield table("plan", [
         ("status", answer["status"]),
         ("apex", f"{answer['apex_m']:.4f} m"),
         ("duration", f"{answer['duration_s']:.4f} s"),
         ("squared torque", f"{cost['torque_squared_integral']:.4g} N².m².s"),
         ("open valves", f"{cost['valve_open_s']:.3f} s"),
     ])  # fmt: skip
-    yield _table("residuals", [(k, f"{v:.1e}") for k, v in answer["residuals"].items()])
+    yield table("residuals", [(k, f"{v:.1e}") for k, v in answer["residuals"].items()])
     for key, title in EXECUTIONS.items():
         if answer.get(key):
-            yield _table(f"{title}: difference from the plan", _executed(answer[key]))
-    yield _table("solving", [
+            yield table(f"{title}: difference from the plan", _executed(answer[key]))
+    yield table("solving", [
         ("time", f"{answer['solve_s']:.2f} s"),
         ("CPU", f"{answer['solve_cpu_s']:.2f} s"),
         ("iterations", answer["iterations"]),
@@ -59,7 +60,7 @@ def _tables(answer: Mapping[str, Any]) -> Iterable[str]:
         ("constraints", answer["constraints"]),
     ])  # fmt: skip
     if answer["worst"]:
-        yield _table("worst violations", [
+        yield table("worst violations", [
             (w["what"], f"{w['violation']:.3g} {w['unit']} at {w['time_s']:.3f} s")
             for w in answer["worst"]
         ])  # fmt: skip
@@ -73,7 +74,8 @@ def _executed(facts: Mapping[str, Any]) -> Rows:
     yield "landing", "good" if facts["landed"] else facts.get("fault") or "failed"
 
 
-def _table(title: str, rows: Rows) -> str:
+def table(title: str, rows: Rows) -> str:
+    """A small table with a caption and one fact a row."""
     lines = (f"<tr><th>{escape(k)}</th><td>{escape(str(v))}</td></tr>" for k, v in rows)
     return f"<table><caption>{escape(title)}</caption>{''.join(lines)}</table>"
 
@@ -94,4 +96,4 @@ def _sources(run: Run) -> Iterable[str]:
     facts += [("command", " ".join(manifest.get("command", [])))]
     facts += list(manifest.get("versions", {}).items())
     facts += [(name, f"SHA-256 {value[:16]}") for name, value in manifest.get("inputs", {}).items()]
-    yield f"<h2>Origin</h2>{_table('', facts)}"
+    yield f"<h2>Origin</h2>{table('', facts)}"

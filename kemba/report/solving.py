@@ -15,6 +15,7 @@ from kemba.errors import KembaError
 from kemba.files import WriteError
 from kemba.ocp import Plan, Task, controller_table, plan
 from kemba.ocp.certificate.status import Status
+from kemba.ocp.continuation.between import Origin
 from kemba.ocp.nlp.watcher import Watch
 from kemba.ocp.report import answer, sentence_of
 from kemba.ocp.starts import plan_best
@@ -46,24 +47,28 @@ def solve_into(
     jobs: int | None = None,
     replay: bool = True,
     figure: bool = True,
+    origin: Origin | None = None,
 ) -> dict[str, Any]:
     """Solve `task` and fill its run folder; returns the JSON of `solve`.
 
     `start`: a trajectory to begin from. `starts`, `jobs`: how many start guesses, on how many
-    cores. `replay`: execute the plan on the same model and on the plant, and compare both with the
-    task's tolerances; a plan that misses them is `acceptable`, not `solved`. Raises KembaError
-    where the task or a file is wrong; the manifest then says `failed`.
+    cores. `origin`: an earlier plan to continue for the changed figures. `replay`: execute the
+    plan on the same model and on the plant, and compare both with the task's tolerances; a plan
+    that misses them is `acceptable`, not `solved`. Raises KembaError where the task or a file is
+    wrong; the manifest then says `failed`.
     """
     dump_yaml(task.model_dump(exclude_none=True), folder / "task.yaml")
     log = folder / "solver.log"
     try:
-        if starts > 1 and start is None:
+        if starts > 1 and start is None and origin is None:
             found = plan_best(task, document, starts, jobs, log, listener.tell)
         else:
             how = {"tell": listener.tell, "watch": listener.watch, "stop": listener.stop}
-            found = plan(task, document, log=log, start=start, **how)  # type: ignore[arg-type]
+            found = plan(task, document, log=log, start=start, origin=origin, **how)  # type: ignore[arg-type]
         result = answer(found, str(folder.path))
-        table = controller_table(found.model, found.trajectory) if found.attempts else None
+        table = (
+            controller_table(found.model, found.trajectory, task.hold) if found.attempts else None
+        )
         if replay and table is not None and found.status.plan:
             listener.tell("replay")
             table = retimed(found.model, found.trajectory, table)

@@ -39,6 +39,8 @@ def effect_candidates(model: Model) -> dict[str, Candidate]:
     found = {}
     for kind, effect in BY_KIND.items():
         missing = effect.off and kind not in present
+        if effect.own_rigs and not model.mechanism.rig:
+            continue
         whole = not any(field.is_required() for field in effect.model_fields.values())
         if missing and whole and _fits(model, effect):
             found[kind] = candidate(effect)
@@ -68,9 +70,13 @@ def geometry_candidates(model: Model) -> dict[str, Candidate]:
     }
 
 
-def candidate(effect: type[Effect]) -> Candidate:
-    """What `effect` declares: the parameter in `off` switches it, the others are shapes."""
-    return _candidate(effect.model_fields["kind"].default, effect, effect.declared())
+def candidate(effect: type[Effect], declared: Mapping[str, Param] | None = None) -> Candidate:
+    """What `effect` declares: the parameter in `off` switches it, the others are shapes.
+
+    `declared`: parameters by name where their sizes differ from those of the class.
+    """
+    kind = effect.model_fields["kind"].default
+    return _candidate(kind, effect, effect.declared() if declared is None else declared)
 
 
 def sensor_candidates(sigmas: Mapping[str, float], model: Model) -> dict[str, Candidate]:
@@ -106,4 +112,5 @@ def _candidate(
 def _fits(model: Model, effect: type[Effect]) -> bool:
     legs = (None,) if effect.place == "body" else model.mechanism.legs
     ports = {port_name(leg, alias) for leg in legs for alias in effect.ports}
-    return ports <= set(model.mechanism.ports)
+    given = {symbol for e in model.effects for symbol in e.publishes}
+    return ports <= set(model.mechanism.ports) and given >= set(effect.needs)

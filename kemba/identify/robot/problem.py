@@ -31,15 +31,16 @@ from kemba.identify.robot.candidates import (
 from kemba.identify.robot.dynamics.physics import Physics
 from kemba.identify.robot.dynamics.reference import first_reference
 from kemba.identify.robot.dynamics.settings import ForceDensity
-from kemba.identify.robot.dynamics.tolerance import ToleranceShareSettings
 from kemba.identify.robot.force_channels import robot_force_channels
 from kemba.identify.robot.formulas import formula_columns
 from kemba.identify.robot.geometry import GEOMETRY, standing_lengths
 from kemba.identify.robot.labels import describe
 from kemba.identify.robot.missing import robot_missing
 from kemba.identify.robot.motion.batch import Batch
+from kemba.identify.robot.motion.colour import Noise
 from kemba.identify.robot.motion.expected import expected_power, predicted_error
 from kemba.identify.robot.motion.resampled import resample
+from kemba.identify.robot.noise import learnt_from, stated_noise
 from kemba.identify.robot.operating_point import changes, robot_operating_point
 from kemba.identify.robot.state import LinearisedState, linearise_at
 from kemba.identify.robot.validate import contradictions
@@ -68,6 +69,7 @@ class RobotProblem(Problem):
     """
 
     moves = True
+    learns_colour = True
     state: LinearisedState
 
     def __init__(
@@ -93,8 +95,7 @@ class RobotProblem(Problem):
         reference = first_reference(physics, batch, physics.nominal)
         self.lengths = standing_lengths(physics, batch, reference, self.candidates)
         self.state = linearise_at(physics, batch, sensors, self.lengths, ground, self.unknown)
-        masses = dict.fromkeys(physics.masses, (0.0, ToleranceShareSettings.current().share))
-        self.nuisance = {**physics.nuisance, **sensors.nuisance, **masses}
+        self.nuisance = {**physics.nuisance, **sensors.nuisance, **physics.links}
 
     @property
     def physics(self) -> Physics:
@@ -112,8 +113,23 @@ class RobotProblem(Problem):
         own = any(is_fault(name) or name.startswith(GEOMETRY) for name in base)
         base = base if own else {**self.lengths, **base}
         found.state = linearise_at(
-            old.physics, old.batch, old.sensors, base, old.ground, self.unknown
+            old.physics, old.batch, old.sensors, base, old.ground, self.unknown, old.noise
         )
+        return found
+
+    def recolour(self, residual: Array | None, careful: bool = False) -> Self:
+        """The same problem with the colour of each sensor's noise learnt anew, or as stated."""
+        if residual is None:
+            return self._with_noise(stated_noise(self.batch))
+        return self._with_noise(learnt_from(self.state, residual, drifts=careful))
+
+    def heard_as(self, other: Problem) -> Self:
+        """This problem with the noise that another one, of the same sensors, has learnt."""
+        return self._with_noise(other.state.noise) if isinstance(other, RobotProblem) else self
+
+    def _with_noise(self, noise: Noise) -> Self:
+        found = copy(self)
+        found.state = self.state.with_noise(noise)
         return found
 
     def residual(self, theta: Theta, runs: Collection[int] | None = None) -> Array:
