@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from math import ceil, floor
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
+from math import ceil, floor
 
 import casadi as ca
 

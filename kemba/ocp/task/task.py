@@ -72,10 +72,15 @@ class Goal(Section):
 class Landing(Section):
     """How softly the motion lands."""
 
-    impact_speed: Annotated[
-        float,
-        Param("m.s-1", lower=0.15, doc="at most, of feet on the ground and of legs at their stops"),
-    ] | None = None
+    impact_speed: (
+        Annotated[
+            float,
+            Param(
+                "m.s-1", lower=0.15, doc="at most, of feet on the ground and of legs at their stops"
+            ),
+        ]
+        | None
+    ) = None
 
 
 class Solver(Section):

@@ -25,8 +25,8 @@ def replays(
     through eq. 10 and the dead time on the same model, `plant_replay` that table on the plant.
 
     With the table a plan that ends standing, with its valves closed, has a moment to come to rest
-    before its landing is judged. `impacts` are those of `replay`. `plant_replay` is None without a plant; any is None where a
-    plan that was not solved cannot even be started.
+    before its landing is judged. `impacts` are those of `replay`. `plant_replay` is None without a
+    plant; any is None where a plan that was not solved cannot even be started.
     """
     full = load_model(plant) if isinstance(plant, str) else plant
     rest = rest_after(model, plan, controller)
