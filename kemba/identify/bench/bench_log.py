@@ -74,8 +74,8 @@ class BenchLog:
 
     @cached_property
     def blunt(self) -> Array:
-        """Force error (n,) [N] that the error of the velocity makes: damping, and a friction of
-        usual size where the direction of motion is in doubt. Alike for every hypothesis."""
+        """Force error (n,) [N] that the error of the velocity makes, alike for every hypothesis:
+        damping, and a friction of usual size where the direction of motion is in doubt."""
         usual = BenchLogSettings.current()
         v, sigma = self.motion.v, maximum_filter1d(self.motion.v_sigma, usual.neighbours)
         high, low = np.tanh((v + 2 * sigma) / V_COULOMB), np.tanh((v - 2 * sigma) / V_COULOMB)
@@ -98,7 +98,10 @@ def prepare(name: str, log: Trajectory) -> BenchLog:
 
 
 def noise_of(channel: str, y: Array) -> float:
-    """White noise per sample; a small least noise is added, also for simulated logs without any."""
+    """White noise (1 sigma) of a sample, from readings y (n,), in their unit.
+
+    It is never below a small least noise, so that simulated logs without any noise can be judged.
+    """
     settings = BenchLogSettings.current()
     least = settings.finest_force if channel == "piston/F" else settings.finest_pressure
     spread = float(np.ptp(y[np.isfinite(y)]))
