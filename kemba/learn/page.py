@@ -54,11 +54,12 @@ def _tables(found: Round) -> Iterable[str]:
     ]
     yield table("apex of the run that was executed", rows)
     if found.aimed is not None and found.target is not None:
-        landing = 1e3 * (found.aimed.expected.touchdown - found.target.touchdown)
+        late = found.aimed.expected.touchdown - lead_of(found.aimed.table)
+        landing = 1e3 * (late - found.target.touchdown)
         yield table("the next run", [
             ("planned apex", f"{found.target.apex:.4f} m"),
             ("expected apex", f"{found.aimed.expected.apex:.4f} m"),
-            ("touchdown after the plan's", f"{landing:+.1f} ms, lead included"),
+            ("expected touchdown", f"{landing:+.1f} ms from the plan's"),
         ])  # fmt: skip
 
 

@@ -61,7 +61,7 @@ def plot_rounds(
     figure: Figure | None = None,
 ) -> Figure:
     """Apex errors [m] of the executed runs by round, and the one `expected` of the next run."""
-    figure = paper_figure(2.0, 4.2, figure)
+    figure = paper_figure(2.0, figure=figure)
     axes = figure.add_subplot()
     axes.axhline(0.0, color=GREY, lw=0.6)
     axes.plot(rounds, 1e3 * np.asarray(apex), "o-", color=BLUE, label="executed")
