@@ -14,10 +14,11 @@ from kemba.settings import Settings
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "sensitivity.md"
 LIMIT = 0.05  # share of verdicts that may change when a threshold is doubled
+COST = 0.05  # relative change of a plan's cost that counts as another plan
 VERBS = {
     "discover": "Verdicts of `discover`: the verdict, or which effects it names",
     "compare": "Verdicts of `compare`: good, tolerable or bad, and the kinds of its hints",
-    "schedule": "Plans: good or not",
+    "schedule": "Plans: how they end, or a cost that changes by more than 5 %",
 }
 HEAD = """# Sensitivity to the thresholds
 
@@ -132,7 +133,14 @@ def section(verb: str, title: str, changes: Sequence[Change], records: Sequence[
 
 def flipped(base: dict[str, Any], answers: dict[str, Any]) -> list[str]:
     """The cases whose verdict is another."""
-    return [c for c, a in answers.items() if a is not None and key(a) != key(base[c])]
+    return [c for c, a in answers.items() if a is not None and differ(a, base[c])]
+
+
+def differ(answer: dict[str, Any], base: dict[str, Any]) -> bool:
+    """Whether a verdict is another, or a plan costs much more or less."""
+    if key(answer) != key(base):
+        return True
+    return abs(answer.get("cost", 0.0) - base.get("cost", 0.0)) > COST * base.get("cost", 1.0)
 
 
 def key(answer: dict[str, Any]) -> tuple[Any, ...]:
@@ -143,6 +151,7 @@ def key(answer: dict[str, Any]) -> tuple[Any, ...]:
 def words(answer: dict[str, Any]) -> str:
     """A verdict in short."""
     parts = [*answer.get("added", ()), *answer.get("hints", ())]
+    parts += [f"cost {answer['cost']:.3g}"] if "cost" in answer else []
     return f"{answer['verdict']} ({', '.join(parts)})" if parts else str(answer["verdict"])
 
 
@@ -159,6 +168,6 @@ def mean(base: dict[str, Any], answers: dict[str, Any], what: str) -> str:
     ratios: Iterable[float] = [
         a[what] / base[c][what]
         for c, a in answers.items()
-        if a is not None and a["verdict"] == base[c]["verdict"] == "good" and base[c][what]
+        if a is not None and a["verdict"] == base[c]["verdict"] == "solved" and base[c][what]
     ]
     return f"{sum(ratios) / len(list(ratios)):.2f}" if ratios else "-"

@@ -12,8 +12,8 @@ from kemba.learn.correction import Correction
 from kemba.learn.flight import Flight, flight_of
 from kemba.model import Model
 from kemba.plant.execution.certificate import rest_after
-from kemba.plant.execution.controller import execute, lead_of, read_controller
-from kemba.plant.execution.retiming import FALLEN, neighbours
+from kemba.plant.execution.controller import execute, read_controller
+from kemba.plant.execution.retiming import RetimingSettings, neighbours
 from kemba.plotting.robot.machine import Machine
 from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Trajectory
@@ -71,7 +71,7 @@ class Aim:
         settings = AimSettings.current()
         table = read_controller(table)
         rest, first = rest_after(self.model, self.plan, table), table
-        wanted, lead = flight_of(self.plan, self.machine), lead_of(table)
+        wanted, lead = flight_of(self.plan, self.machine), 0.0
         must_land = self._miss(table, rest, wanted, lead)[1]
         best, left = self._miss(table, rest, wanted, lead)[0], settings.executions
         while best > 1.0 and left > 0:
@@ -104,7 +104,7 @@ class Aim:
             errors.append((flight.touchdown - wanted.touchdown - lead) / settings.touchdown)
             errors.append((flight.pitch - wanted.pitch) / settings.pitch)
         miss = float(np.linalg.norm(errors))
-        return (miss if isfinite(miss) else FALLEN), lands
+        return (miss if isfinite(miss) else RetimingSettings.current().fallen), lands
 
 
 def _edges(table: Trajectory) -> dict[str, np.ndarray]:

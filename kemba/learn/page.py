@@ -10,7 +10,7 @@ from typing import Any
 from kemba.learn.round import Round
 from kemba.ocp import load_task, task_model
 from kemba.plant.execution.certificate import rest_after
-from kemba.plant.execution.controller import execute, lead_of
+from kemba.plant.execution.controller import execute
 from kemba.plotting.study.learning import plot_executions, plot_rounds
 from kemba.plotting.style import svg_text
 from kemba.report.page import table
@@ -73,7 +73,7 @@ def _executions(found: Round) -> Any:
         rest = rest_after(built, plan, commands)
         expected[what] = execute(commands, built, extra=rest).trajectory
     executed = found.past.executed[found.past.last]
-    return plot_executions(executed, expected, plan, lead_of(commands))
+    return plot_executions(executed, expected, plan, 0.0)
 
 
 def _rounds(found: Round) -> Any:

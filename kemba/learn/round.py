@@ -15,7 +15,8 @@ from kemba.identify.adopt import reference, write_model
 from kemba.identify.answer import Answer
 from kemba.identify.compare_logs import compare_logs
 from kemba.identify.discover import Discovery
-from kemba.identify.logs.reading import load_map, read_logs
+from kemba.identify.logs.reading import read_logs
+from kemba.logs import load_map
 from kemba.identify.workflow import discover_logs
 from kemba.learn.aim import Aim, Aimed
 from kemba.learn.correction import Correction, correction_from, write_correction

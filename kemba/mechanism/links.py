@@ -49,6 +49,19 @@ class LegPlace(Table):
     fold: Literal[1, -1]
 
 
+Share = Annotated[float, Param("1", lower=0.0, upper=0.1, doc="1 sigma, as a share of the figure")]
+
+
+class LinkTolerances(Table):
+    """How well masses and moments of inertia of the links are known; 0: exactly.
+
+    2 % is assumed: figures from drawings are off by 1 to 3 %.
+    """
+
+    mass: Share = 0.02
+    inertia: Share = 0.02
+
+
 class Robot(Table):
     """A planar robot: one body, one to three legs of one kind, one kind of cylinder."""
 
@@ -58,6 +71,7 @@ class Robot(Table):
     legs: Annotated[dict[str, LegPlace], Field(min_length=1, max_length=3)]
     leg: Leg
     cylinder: Cylinder
+    tolerances: LinkTolerances = LinkTolerances()
 
     @field_validator("legs")
     @classmethod

@@ -7,12 +7,14 @@ never rotated back and forth. Equal to pin.rnea on the same model (tests/oracle)
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 import numpy as np
 import pinocchio as pin
 
 Vector = tuple[ca.SX, ca.SX]
+Local = np.ndarray | tuple[Any, Any]  # (x, z) in a frame, numbers or symbols
 
 
 @dataclass(frozen=True)
@@ -21,7 +23,7 @@ class Joint:
 
     name: str
     parent: int
-    offset: np.ndarray
+    offset: Local
     turns: float  # +-1 about the counter-clockwise axis, 0 for a prismatic joint
     slides: np.ndarray  # unit axis in (x, z), zero for a revolute joint
     mass: float
@@ -42,7 +44,7 @@ class FrameMotion:
     acceleration: Vector
     angular: ca.SX
 
-    def turn(self, local: np.ndarray) -> Vector:
+    def turn(self, local: Local) -> Vector:
         """A vector of this frame, in the world."""
         return (
             self.cos * local[0] - self.sin * local[1],

@@ -17,7 +17,7 @@ from kemba.ocp.infeasibility.checks import check_task
 from kemba.ocp.infeasibility.explain import explanation, refusal
 from kemba.ocp.nlp.ipopt import Control
 from kemba.ocp.nlp.watcher import Watch
-from kemba.ocp.planned import Plan, explained
+from kemba.ocp.planned import Plan, clear, explained
 from kemba.ocp.planner import Planner, searched
 from kemba.ocp.refined import refined
 from kemba.ocp.relaxation.session import Session
@@ -66,7 +66,9 @@ def plan(
     found = searched(planner, refused is not None)
     if found.status is Status.SOLVED and task.refine == "radau":
         found = refined(planner, found)
-    elif not found.status.plan and found.status is not Status.INTERRUPTED:
+    if found.status is Status.SOLVED and task.clearance:
+        found = clear(found)
+    if not found.status.plan and found.status is not Status.INTERRUPTED:
         why = refused or explanation(task, built, planner.outcome, diagnostics, document)
         found = found if why is None else explained(found, why)
     return from_scratch(found, failed) if failed else found

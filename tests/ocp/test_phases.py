@@ -17,7 +17,7 @@ from kemba.ocp.nlp.ipopt import Control
 from kemba.ocp.phases.modes import OPEN, Phase
 from kemba.ocp.phases.radau import RADAU3, RADAU5, Scheme
 from kemba.ocp.phases.settings import ModeConstraints, Refining, Repair
-from kemba.ocp.phases.unilateral import read_constraints
+from kemba.ocp.transcription.unilateral import read_constraints
 from kemba.ocp.refinement import Refined, refine
 from kemba.ocp.refinement.refine import Refiner, reduction_of
 from kemba.ocp.refinement.repair import merged, misfit, repaired

@@ -138,8 +138,8 @@ def measured_units(rows: Rows) -> dict[str, str]:
     found = {}
     for name in rows.channels:
         last = name.rsplit("/", 1)[-1]
-        if "/foot/" not in name and last in units:
-            found[name] = f"{name} [{units[last]}]"
+        if name in rows.units or ("/foot/" not in name and last in units):
+            found[name] = f"{name} [{rows.units.get(name) or units[last]}]"
     return found
 
 
@@ -198,9 +198,13 @@ def _place(at: ConditionBin) -> str:
         "impact": "while a foot hits the ground",
         "rest": "at rest",
         "moving": "while moving",
+        "forward": "while moving forward",
+        "back": "while moving back",
     }
     valves = {"00": "both valves closed", "10": "extend valve open", "01": "retract valve open"}
     stroke = {"in": ", piston retracted", "mid": ", piston mid-stroke", "out": ", piston extended"}
     when = phases.get(at.phase, f"in {at.phase}")
+    if not at.mode:
+        return f"{at.channel} {when}{stroke.get(at.region, '')}"
     mode = valves.get(at.mode, "both valves open")
     return f"{at.channel} {when}, {mode}{stroke.get(at.region, '')}"

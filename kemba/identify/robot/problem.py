@@ -30,14 +30,15 @@ from kemba.identify.robot.candidates import (
 )
 from kemba.identify.robot.dynamics.physics import Physics
 from kemba.identify.robot.dynamics.settings import ForceDensity
-from kemba.identify.robot.dynamics.tolerance import ToleranceShareSettings
 from kemba.identify.robot.force_channels import robot_force_channels
 from kemba.identify.robot.formulas import formula_columns
 from kemba.identify.robot.labels import describe
 from kemba.identify.robot.missing import robot_missing
 from kemba.identify.robot.motion.batch import Batch
+from kemba.identify.robot.motion.colour import Noise
 from kemba.identify.robot.motion.expected import expected_power, predicted_error
 from kemba.identify.robot.motion.resampled import resample
+from kemba.identify.robot.noise import learnt_from, stated_noise
 from kemba.identify.robot.operating_point import changes, robot_operating_point
 from kemba.identify.robot.state import LinearisedState, linearise_at
 from kemba.identify.robot.validate import contradictions
@@ -65,6 +66,7 @@ class RobotProblem(Problem):
     """
 
     moves = True
+    learns_colour = True
     state: LinearisedState
 
     def __init__(
@@ -87,9 +89,9 @@ class RobotProblem(Problem):
         sigma = dict(zip(physics.channels, np.median(batch.sigma, axis=0).tolist(), strict=True))
         self.candidates: dict[str, Candidate] = {**found, **sensor_candidates(sigma, model)}
         sensors = SensorFaults(model.effects)
-        self.state = linearise_at(physics, batch, sensors, {}, ground, self.unknown)
-        masses = dict.fromkeys(physics.masses, (0.0, ToleranceShareSettings.current().share))
-        self.nuisance = {**physics.nuisance, **sensors.nuisance, **masses}
+        noise = stated_noise(batch)
+        self.state = linearise_at(physics, batch, sensors, {}, ground, self.unknown, noise)
+        self.nuisance = {**physics.nuisance, **sensors.nuisance, **physics.links}
 
     @property
     def physics(self) -> Physics:
@@ -105,8 +107,23 @@ class RobotProblem(Problem):
         """The same problem, smoothed and linearised anew with the model at `base`."""
         found, old = copy(self), self.state
         found.state = linearise_at(
-            old.physics, old.batch, old.sensors, base, old.ground, self.unknown
+            old.physics, old.batch, old.sensors, base, old.ground, self.unknown, old.noise
         )
+        return found
+
+    def recolour(self, residual: Array | None, careful: bool = False) -> Self:
+        """The same problem with the colour of each sensor's noise learnt anew, or as stated."""
+        if residual is None:
+            return self._with_noise(stated_noise(self.batch))
+        return self._with_noise(learnt_from(self.state, residual, drifts=careful))
+
+    def heard_as(self, other: Problem) -> Self:
+        """This problem with the noise that another one, of the same sensors, has learnt."""
+        return self._with_noise(other.state.noise) if isinstance(other, RobotProblem) else self
+
+    def _with_noise(self, noise: Noise) -> Self:
+        found = copy(self)
+        found.state = self.state.with_noise(noise)
         return found
 
     def residual(self, theta: Theta, runs: Collection[int] | None = None) -> Array:

@@ -22,7 +22,7 @@ from kemba.ocp.phases.notes import noted_phases
 from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.radau import RADAU5
 from kemba.ocp.phases.settings import Elements
-from kemba.ocp.phases.unilateral import read_constraints
+from kemba.ocp.transcription.unilateral import read_constraints
 from kemba.ocp.refinement.refine import Refined, Refiner, reduction_of, refine, valve_columns
 from kemba.ocp.refinement.sample import certificate, to_trajectory
 from kemba.ocp.refinement.solve import solve, warm

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from kemba.ocp.phases.modes import AHEAD, BACK, HELD, OPEN, Phase
-from kemba.ocp.phases.unilateral import Constraint
+from kemba.ocp.transcription.unilateral import Constraint
 
 LETTERS = {OPEN: "o", HELD: "h", AHEAD: "a", BACK: "b"}
 MODES = {letter: mode for mode, letter in LETTERS.items()}

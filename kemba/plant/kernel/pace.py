@@ -6,10 +6,11 @@ from math import sqrt
 from typing import NamedTuple
 
 from kemba.plant.kernel.jit import part
+from kemba.plant.kernel.settings import StepControl
 from kemba.plant.stepping.arrays import Array
 
-GROWTH, SHRINKING = 2.0, 0.3  # bounds on how the step changes at once
-SAFETY = 0.9
+_CONTROL = StepControl.current()
+GROWTH, SHRINKING, SAFETY = _CONTROL.growth, _CONTROL.shrinking, _CONTROL.safety
 
 
 class Pace(NamedTuple):

@@ -13,11 +13,11 @@ from kemba.plant.kernel.impact import instant
 from kemba.plant.kernel.jit import entry, part
 from kemba.plant.kernel.machine import Machine, Memory, State
 from kemba.plant.kernel.pace import Pace
+from kemba.plant.kernel.settings import ContactEvents
 from kemba.plant.stepping.arrays import Array
 
 DONE, FULL, ASK, EXPLODED, BURIED = 0, 1, 2, 3, 4  # why the kernel comes back
-HELD = 1e-4  # s; the recorded forces hold the pairs over this
-DEEP = 5e-3  # m; what starts deeper in the ground or a stop is a mistake
+HELD, DEEP = ContactEvents.current().held, ContactEvents.current().deep
 
 
 class Schedule(NamedTuple):

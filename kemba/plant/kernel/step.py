@@ -18,7 +18,10 @@ from kemba.plant.kernel.calls import evaluate
 from kemba.plant.kernel.forces import add_forces, evaluate_pairs, remember_push, set_gaps
 from kemba.plant.kernel.jit import kernel, part
 from kemba.plant.kernel.machine import Machine, Memory, State
-from kemba.plant.kernel.scheme import FASTEST, GAMMA, PULL_BACK, SHORTEST
+from kemba.plant.kernel.settings import GAMMA, GapDrift
+
+_DRIFT = GapDrift.current()
+PULL_BACK, SHORTEST, FASTEST = _DRIFT.share, _DRIFT.shortest, _DRIFT.fastest
 
 
 @kernel

@@ -10,8 +10,17 @@ import numpy as np
 from kemba.errors import KembaError, suggest
 from kemba.model import Model
 from kemba.plant.stepping.arrays import Array
+from kemba.settings import CHOSEN, Settings, setting
 
-PLACE = 1e-12  # m; accuracy of a knee found from its piston
+
+class KneeSearch(Settings):
+    """Newton's method for the knee angle that belongs to a piston's place."""
+
+    place: float = setting(
+        1e-12, "m", "error of the piston at which it ends", "derived: far below any sensor"
+    )
+    turn: float = setting(0.3, "rad", "largest change of the angle at once", CHOSEN)
+    rounds: int = setting(50, "1", "changes at most", CHOSEN)
 
 
 def initial_values(model: Model, values: Mapping[str, float]) -> tuple[Array, Array, Array]:
@@ -63,9 +72,10 @@ def _knee(model: Model, piston: str, knee: str, x: float) -> float:
     symbol, phi = mechanism.q[index], mechanism.port(piston).phi
     extension = ca.Function("extension", [symbol], [phi, ca.jacobian(phi, symbol)])
     angle = mechanism.standing[knee]
-    for _ in range(50):
+    settings = KneeSearch.current()
+    for _ in range(settings.rounds):
         now, slope = (float(value) for value in extension(angle))
-        angle -= float(np.clip((now - x) / slope, -0.3, 0.3))
-        if abs(now - x) < PLACE:
+        angle -= float(np.clip((now - x) / slope, -settings.turn, settings.turn))
+        if abs(now - x) < settings.place:
             return angle
     raise KembaError("initial", f"{piston} = {x:g} m cannot be reached")

@@ -8,9 +8,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from kemba.identify.problem.nominal import leg_by_leg, nominal_figures
+from kemba.identify.problem.nominal import leg_by_leg, link_figures, nominal_figures
 from kemba.identify.robot.dynamics.air import StateRunner
-from kemba.identify.robot.dynamics.tolerance import mass_regressors
+from kemba.mechanism.robot import link_regressors
 from kemba.model.model import Model
 from kemba.model.rest import rate_of
 
@@ -22,13 +22,15 @@ class Physics:
     """Residual forces, state rates and kinematics of `model`, vectorised over samples.
 
     Contact and end stops are left out: where they act is read from the data. `names` are the free
-    parameters in the order of every `p`, those of `free` first, then the nuisance ones.
+    parameters in the order of every `p`, those of `free` first, then the nuisance ones. `links`:
+    figures of links that may be off, as `Problem.nuisance`; they are no part of `p`.
     """
 
     def __init__(self, model: Model, free: tuple[str, ...], grip: float = 1.0) -> None:
         self.base = model
         self.model = leg_by_leg(model)
         self.nuisance = nominal_figures(self.model, free)
+        self.links = link_figures(model)
         self.names = (*free, *self.nuisance)
         self.nominal = np.array(
             [model.parameters[n][1] for n in free] + [v for v, _ in self.nuisance.values()]
@@ -70,7 +72,7 @@ class Physics:
             "feet": (motion, [feet, ca.jtimes(feet, m.q, m.v), ca.jacobian(feet, m.q)]),
         }
         made = {k: ca.Function(k, a, b, {"cse": True}) for k, (a, b) in named.items()}
-        self.masses, made["masses"] = mass_regressors(self.base)
+        made["links"] = link_regressors(self.mechanism)
         return made
 
     @cached_property
