@@ -54,8 +54,7 @@ def _tables(found: Round) -> Iterable[str]:
     ]
     yield table("apex of the run that was executed", rows)
     if found.aimed is not None and found.target is not None:
-        late = found.aimed.expected.touchdown - lead_of(found.aimed.table)
-        landing = 1e3 * (late - found.target.touchdown)
+        landing = 1e3 * (found.aimed.expected.touchdown - found.target.touchdown)
         yield table("the next run", [
             ("planned apex", f"{found.target.apex:.4f} m"),
             ("expected apex", f"{found.aimed.expected.apex:.4f} m"),
@@ -73,7 +72,7 @@ def _executions(found: Round) -> Any:
         rest = rest_after(built, plan, commands)
         expected[what] = execute(commands, built, extra=rest).trajectory
     executed = found.past.executed[found.past.last]
-    return plot_executions(executed, expected, plan, 0.0)
+    return plot_executions(executed, expected, plan)
 
 
 def _rounds(found: Round) -> Any:

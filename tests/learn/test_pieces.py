@@ -88,18 +88,19 @@ def test_the_correction_has_a_file_of_its_own(tmp_path: Path) -> None:
 def made(folder: Path, pulse: float, manifest: dict[str, object] | None = None) -> Path:
     """A run folder with a table that opens one valve until `pulse` [s]."""
     folder.mkdir()
-    time = np.arange(200) / 1000.0
-    columns = {"front/valve/extend [1]": (time < pulse) * 1.0}
+    time = np.arange(-6, 194) / 1000.0
+    columns = {"front/valve/extend [1]": ((time >= 0.0) & (time < pulse)) * 1.0}
     Trajectory(time, columns, {"lead": 0.006}).write(folder / "controller.csv")
     (folder / "manifest.json").write_text(json.dumps({"status": "solved", **(manifest or {})}))
     return folder
 
 
-def logged(run: Path, name: str) -> Trajectory:
+def logged(run: Path, name: str, begin: float = -0.006) -> Trajectory:
+    """A log whose first row has the time `begin` [s]."""
     table = Trajectory.read(run / "controller.csv")
-    time = np.arange(0.0, 0.195, 1.03e-3)
-    log = Trajectory(time, {"front/valve/extend [1]": np.zeros(len(time))})
-    log = log.with_columns({"front/valve/extend [1]": sent(table, log, "front/valve/extend")})
+    time = np.arange(-0.006, 0.189, 1.03e-3)
+    valve = sent(table, time, "front/valve/extend")
+    log = Trajectory(time - time[0] + begin, {"front/valve/extend [1]": valve})
     log.write(run / name)
     log.meta["path"] = str(run / name)
     return log
@@ -118,6 +119,13 @@ def test_rounds_are_counted_from_the_run_folders(tmp_path: Path) -> None:
     assert past.last == 1 and [len(past.executed[i]) for i in (0, 1)] == [1, 1]
     assert {p.name for p in past.logs} == {"a.csv", "b.csv", "c.csv"}, "earlier logs join in"
     assert [e["round"] for e in past.history] == [1]
+
+
+@pytest.mark.parametrize("begin", [-0.006, 0.0])
+def test_logs_are_put_on_the_clock_of_the_plan(tmp_path: Path, begin: float) -> None:
+    first = made(tmp_path / "first", 0.05)
+    (log,) = past_of([first], [logged(first, "a.csv", begin)]).executed[0]
+    assert log.time[0] == pytest.approx(-0.006)
 
 
 def test_a_log_of_no_run_is_refused(tmp_path: Path) -> None:
