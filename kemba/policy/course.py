@@ -21,7 +21,8 @@ from kemba.policy.modes import Array, Hybrid, Point
 from kemba.trajectory import Trajectory
 
 CLOSING = 1e-6  # m/s; a gap that closes more slowly touches without an impact
-BESIDE = 1e-6  # s; states just before and after an impact are read this far from it
+BESIDE = 2e-5  # s; states just before and after an impact are read this far from it
+PASSES = 3  # simulations in which the marks beside impacts find their place
 
 
 @dataclass(frozen=True)
@@ -111,15 +112,15 @@ def course_of(model: Model, table: Trajectory, extra: float = 0.0) -> Course:
     condition, begin = condition_of(table, model, extra=extra)
     commands, last = condition.commands, condition.duration
     assert commands is not None and isinstance(commands.feedback, JointControl)
-    first = simulate_one(condition)
     acting = delayed(model, dict(commands.profiles))
     switches = np.concatenate([p.times[1:] for p in acting.values()])
-    impacts = _clusters([i for i in first.impacts if BESIDE < i.time < last - BESIDE])
-    hits = np.array([time for time, _ in impacts])
     clock = np.arange(round((last - 1e-9) / PERIOD) + 1) * PERIOD
-    marks = merged(clock, switches[switches > 0.0], hits - BESIDE, hits + BESIDE)
-    marks = marks[marks < last - 1e-9]
-    motion = simulate_one(replace(condition, sample=marks)).trajectory
+    done = simulate_one(condition)
+    for _ in range(PASSES):  # marks near an impact move it by some microseconds
+        hits = np.array([time for time, _ in _clusters(done.impacts, last)])
+        marks = merged(clock, switches[switches > 0.0], hits - BESIDE, hits + BESIDE)
+        done = simulate_one(replace(condition, sample=marks[marks < last - 1e-9]))
+    motion, impacts = done.trajectory, _clusters(done.impacts, last)
     builder = Builder(hybrid, motion, dict(commands.profiles), acting, commands.feedback, begin)
     events = tuple(builder.events(clock, impacts))
     rows = np.flatnonzero(among(motion.time, clock))
@@ -128,10 +129,10 @@ def course_of(model: Model, table: Trajectory, extra: float = 0.0) -> Course:
     return Course(hybrid, table, shown_motion, builder.x[rows], events, commands.feedback.joints)
 
 
-def _clusters(impacts: Sequence[Hit]) -> list[tuple[float, set[str]]]:
+def _clusters(impacts: Sequence[Hit], last: float) -> list[tuple[float, set[str]]]:
     """Impacts that happen at once as one: when [s], and at which pairs."""
     found: list[tuple[float, set[str]]] = []
-    for impact in impacts:
+    for impact in (i for i in impacts if BESIDE < i.time < last - BESIDE):
         if found and impact.time - found[-1][0] < 4 * BESIDE:
             found[-1][1].update(impact.labels)
         else:
@@ -164,15 +165,15 @@ class Builder:
         """All events in order of time, by the clock of the plan."""
         time, ticks = self.motion.time, among(self.motion.time, clock)
         hits = {int(np.searchsorted(time, t)) - 1: labels for t, labels in impacts}
+        yield Impact(float(time[0]) + self.begin, self._start())
         for i in range(len(time) - 1):
             now = float(time[i]) + self.begin
             yield from self._edges(i, now)
             if ticks[i]:
                 yield Tick(now, round(now / PERIOD), self._hold(i))
-            if i in hits and time[i + 1] - time[i] < 4 * BESIDE:
+            if i in hits:
                 yield Impact(now, self._saltation(i, hits[i]))
-            else:
-                yield Flow(now, float(time[i + 1]) + self.begin, self._flow(i))
+            yield Flow(now, float(time[i + 1]) + self.begin, self._flow(i, i in hits))
 
     def point(self, i: int, valves_at: float, modes_of: int | None = None) -> Point:
         """State, inputs and modes at row i, the valves as they act at a time [s]."""
@@ -181,14 +182,21 @@ class Builder:
             u[self.inputs.index(name)] = profile(valves_at)
         return Point(self.x[i], u, self.hybrid.modes(self.motion, i if modes_of is None else modes_of))
 
-    def _flow(self, i: int) -> Array:
-        """The map of (x, torques) from row i to the next."""
+    def _start(self) -> Array:
+        """What touches at the start stops at once: the slope of that."""
+        first, n = self.point(0, 0.0), self.hybrid.n
+        reset = np.eye(self.hybrid.size)
+        reset[n : 2 * n, : 2 * n] = self.hybrid.jump(first.x, first.modes)[1]
+        return reset
+
+    def _flow(self, i: int, after: bool) -> Array:
+        """The map of (x, torques) from row i to the next; `after`: in the mode of the latter."""
         n, m = self.hybrid.size, len(self.torques)
         middle = float(self.motion.time[i] + self.motion.time[i + 1]) / 2
         slope = np.zeros((n + m, n + m))
-        here = self.point(i, middle)
+        here = self.point(i, middle, i + int(after))
         there = replace(here, x=self.x[i + 1])
-        for at in (here, there):
+        for at in (there, there) if after else (here, there):
             _, A, B = self.hybrid.flow(at)
             slope[:n, :n] += A / 2
             slope[:n, n:] += B[:, self.torques] / 2
@@ -232,16 +240,21 @@ class Builder:
             if c.label in labels and before.modes[k] == OPEN and rates[k] < -CLOSING
         ]  # fmt: skip
         orders = list(permutations(new)) if 1 < len(new) <= 3 else [tuple(new)]
-        return np.asarray(np.mean([self._in_order(before, after, order) for order in orders], axis=0))
+        return np.asarray(np.mean([self._in_order(before, after, order, labels) for order in orders], axis=0))
 
-    def _in_order(self, before: Point, after: Point, order: Sequence[int]) -> Array:
+    def _in_order(
+        self, before: Point, after: Point, order: Sequence[int], labels: set[str]
+    ) -> Array:
         """The saltation of impacts one after the other, at one instant."""
         n, size = self.hybrid.n, self.hybrid.size
         found, here = np.eye(size), before
         for position, k in enumerate(order):
             _, J = self.hybrid.gaps(here.x)
             guard = np.r_[J[k], np.zeros(size - n)]
-            modes = list(here.modes)
+            modes = [
+                m if a != OPEN or c.label in labels else OPEN  # what opens bears no impulse
+                for m, a, c in zip(here.modes, after.modes, self.hybrid.constraints, strict=True)
+            ]
             modes[k] = HELD if after.modes[k] in (OPEN, HELD) else after.modes[k]
             v, slope = self.hybrid.jump(here.x, tuple(modes))
             reset = np.eye(size)

@@ -11,7 +11,7 @@ import numpy as np
 
 from kemba.model import Model
 from kemba.ocp.phases.modes import AHEAD, BACK, HELD, OPEN
-from kemba.ocp.phases.unilateral import Constraint, read_constraints
+from kemba.ocp.transcription.unilateral import Constraint, read_constraints
 from kemba.ocp.transcription.symmetry import whole
 from kemba.settings import Settings, setting
 from kemba.trajectory import Trajectory
@@ -85,9 +85,16 @@ class Hybrid:
         self._gaps = ca.Function("gaps", [node.q], [gaps, J])
         after = ca.SX.sym("after", self.n)
         push = ca.SX.sym("push", 2 * len(self.constraints))
-        force = ca.jtimes(node.dynamics, lam, _spread(lam, self.constraints, push))
+        force = ca.jtimes(node.dynamics, lam, _spread(lam, self.constraints, push))  # linear in lam
         hit = mass @ (after - node.v) + force
         both = ca.vertcat(after, push)
+        spread = _spread(lam, self.constraints, push)
+        cones = [
+            ca.substitute(ca.vertcat(c.friction.cone_forward, c.friction.cone_backward), lam, spread)
+            if c.friction else ca.SX.zeros(2)
+            for c in self.constraints
+        ]  # fmt: skip
+        self._cones = np.array(ca.Function("cones", [push], [ca.jacobian(ca.vertcat(*cones), push)])(0))
         self._hit = ca.Function(
             "hit", [node.q, both, node.v],
             [hit, ca.jacobian(hit, both), ca.jacobian(hit, node.q), J, T,
@@ -150,6 +157,8 @@ class Hybrid:
                     line, by = np.zeros(n + 2 * count), np.zeros(2 * n)
                     if on and (part == 0 or c.friction is not None):
                         line[:n], by[:n] = D[i], Dq[i]
+                    elif part and mode in (AHEAD, BACK):  # the impulse is on the edge of the cone
+                        line[n:] = self._cones[2 * i + int(mode == AHEAD)]
                     else:
                         line[n + 2 * i + part] = 1.0
                     rows.append(line[None])
