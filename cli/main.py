@@ -21,6 +21,7 @@ from kemba_cli.verbs.identify.discover import discover
 from kemba_cli.verbs.identify.experiment import experiment
 from kemba_cli.verbs.inspect.check import check
 from kemba_cli.verbs.inspect.effects import effects
+from kemba_cli.verbs.inspect.map import draft_map
 from kemba_cli.verbs.inspect.schema import schema
 from kemba_cli.verbs.plan.export import export
 from kemba_cli.verbs.plan.simulate import simulate
@@ -55,6 +56,7 @@ app = typer.Typer(
 )
 for verb in VERBS:
     app.command()(guarded(verb))
+app.command("map")(guarded(draft_map))  # `map` is a word of Python
 
 
 def _version(wanted: bool) -> None:

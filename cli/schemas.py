@@ -21,7 +21,10 @@ SCHEMAS = {
     "cylinders": "kemba.mechanism.cylinder:CylinderTable",
     "sweeps": "kemba.sweep.cases.schema:Sweep",
     "rigs": "kemba.plant.rig.bench:RigFile",
+    "maps": "kemba.logs.columns:ColumnMap",
 }
+# what a file of a kind is called in messages, where its folder's name would mislead
+CALLED = {"maps": "column map"}
 
 
 def schema_of(kind: str) -> type[BaseModel]:

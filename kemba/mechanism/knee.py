@@ -42,3 +42,12 @@ def flexion(leg: Leg, x: float) -> float:
     if abs(cosine) > 1.0:
         raise ValueError(f"the knee cannot reach a piston extension of {x:g} m")
     return float(np.arccos(cosine) - np.arctan2(piston.mount, femur))
+
+
+def leg_per_piston(leg: Leg, x: float) -> float:
+    """By how much the distance from hip to foot grows per piston extension [1], at `x` [m]."""
+    bend = ca.SX.sym("bend")
+    f, t = leg.femur.length, leg.tibia.length
+    length = ca.sqrt(f**2 + t**2 + 2 * f * t * ca.cos(bend))
+    ratio = ca.jacobian(length, bend) / ca.jacobian(extension(leg, bend), bend)
+    return float(ca.Function("ratio", [bend], [ratio])(flexion(leg, x)))

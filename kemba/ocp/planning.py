@@ -15,7 +15,7 @@ from kemba.ocp.infeasibility.checks import check_task
 from kemba.ocp.infeasibility.explain import explanation, refusal
 from kemba.ocp.nlp.ipopt import Control
 from kemba.ocp.nlp.watcher import Watch
-from kemba.ocp.planned import Plan, explained
+from kemba.ocp.planned import Plan, clear, explained
 from kemba.ocp.planner import Planner, searched
 from kemba.ocp.refined import refined
 from kemba.ocp.relaxation.session import Session
@@ -55,7 +55,9 @@ def plan(
     planner = Planner(task, built, requirements, session, start)
     found = searched(planner, refused is not None)
     if found.status is Status.SOLVED and task.refine == "radau":
-        return refined(planner, found)
+        found = refined(planner, found)
+    if found.status is Status.SOLVED and task.clearance:
+        found = clear(found)
     if found.status.plan or found.status is Status.INTERRUPTED:
         return found
     why = refused or explanation(task, built, planner.outcome, diagnostics, document)

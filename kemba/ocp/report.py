@@ -43,6 +43,7 @@ def answer(plan: Plan, run: str) -> dict[str, Any]:
         "replay": None,
         "table_replay": None,
         "plant_replay": None,
+        "impacts": None,
         "good": plan.status is Status.SOLVED,
         "ignored": plan.model.ignored,
         "remarks": plan.model.remarks,

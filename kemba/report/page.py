@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from kemba.errors import KembaError
+from kemba.folders import place_for
 from kemba.plotting import draw, load_source, svg_text
 from kemba.report.stage import stage, write_page
 from kemba.report.verdict import EXECUTIONS
@@ -16,8 +17,8 @@ from kemba.runs import Run, load_run
 Rows = Iterable[tuple[str, Any]]
 
 
-def report_run(run: str | Path, out: str | Path | None = None) -> Path:
-    """Write the page of a run folder to `out`, by default `report.html` in it.
+def report_run(run: str | Path, out: str | Path | None = None, force: bool = False) -> Path:
+    """Write the page of a run folder to `out`, by default a new `report.html` in it.
 
     The page needs no other file. Raises KembaError when the run has no certificate.
     """
@@ -35,7 +36,7 @@ def report_run(run: str | Path, out: str | Path | None = None) -> Path:
         what = f"its certificate or manifest is not as solve writes it ({error!r})"
         raise KembaError(str(found.path), what, hint="solve the task again") from None
     parts = [*facts, *_pictures(found), *origin]
-    return write_page(out or found.path / "report.html", title, "\n".join(parts))
+    return write_page(place_for(out, found.path / "report.html", force), title, "\n".join(parts))
 
 
 def _tables(answer: Mapping[str, Any]) -> Iterable[str]:

@@ -63,7 +63,9 @@ def solve_into(
             how = {"tell": listener.tell, "watch": listener.watch, "stop": listener.stop}
             found = plan(task, document, log=log, start=start, **how)  # type: ignore[arg-type]
         result = answer(found, str(folder.path))
-        table = controller_table(found.model, found.trajectory) if found.attempts else None
+        table = (
+            controller_table(found.model, found.trajectory, task.hold) if found.attempts else None
+        )
         if replay and table is not None and found.status.plan:
             listener.tell("replay")
             table = retimed(found.model, found.trajectory, table)

@@ -13,6 +13,7 @@ import numpy as np
 import kemba
 from kemba.errors import KembaError
 from kemba.files import atomic_text, plain
+from kemba.folders import place_for
 from kemba.plotting.draw import machine_of
 from kemba.plotting.robot.sticks import CYLINDER, Pose, poses
 from kemba.plotting.source import Source, load_source
@@ -30,14 +31,19 @@ def write_view(source: Source, path: str | Path, model: str | None = None) -> Pa
     return write_page(path, source.name, stage(source, model))
 
 
-def view_run(run: str | Path, out: str | Path | None = None, model: str | None = None) -> Path:
-    """The page of a run folder or a CSV; written to `out` or beside the motion.
+def view_run(
+    run: str | Path,
+    out: str | Path | None = None,
+    model: str | None = None,
+    force: bool = False,
+) -> Path:
+    """The page of a run folder or a CSV; written to `out` or as a new file beside the motion.
 
     Raises KembaError where columns are missing or the page cannot be written.
     """
     source = load_source(run)
     assert source.path is not None
-    return write_view(source, out or source.path.with_name("view.html"), model)
+    return write_view(source, place_for(out, source.path.with_name("view.html"), force), model)
 
 
 def stage(source: Source, model: str | None = None) -> str:

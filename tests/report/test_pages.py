@@ -12,7 +12,8 @@ from scipy.io import loadmat
 from typer.testing import CliRunner, Result
 
 from kemba.config import shipped_configs
-from kemba.identify.logs.reading import load_map, read_log
+from kemba.identify.logs.reading import read_log
+from kemba.logs import load_map
 from kemba.plotting import load_source
 from kemba.report.stage import scene
 from kemba.trajectory import Trajectory
@@ -130,7 +131,10 @@ def test_another_programs_columns_come_back(run: Path, tmp_path: Path) -> None:
 def test_wrong_endings_are_told(run: Path, tmp_path: Path) -> None:
     done = call("export", str(run), "--out", str(tmp_path / "plan.xls"))
     assert done.exit_code == 2
-    assert "no format '.xls'; one of .mat, .npz, .json, .csv was expected" in done.stderr
+    assert (
+        "no format '.xls'; one of .csv, .parquet, .mcap, .mat, .npz, .json was expected"
+        in done.stderr
+    )
     done = call("export", str(run), "--out", str(tmp_path / "a.mat"), "--map", "authors.yaml")
     assert done.exit_code == 2 and "goes with .csv only" in done.stderr
 

@@ -44,7 +44,7 @@ def plot(
     """
     from kemba import plotting
     from kemba.folders import fresh, next_free
-    from kemba.identify.logs.reading import load_map
+    from kemba.logs import load_map
     from kemba.plotting.window import open_window, show_windows
 
     for path, option in ((save, "--save"), (animate, "--animate")):

@@ -7,12 +7,15 @@ from typing import Annotated
 
 import typer
 
-from kemba_cli.common import Json, OwnEffects, Quiet, print_json
+from kemba_cli.common import Force, Json, OwnEffects, Quiet, print_json
 
 
 def report(
     run: Annotated[Path, typer.Argument(help="Run folder, as solve writes it.")],
-    out: Annotated[Path | None, typer.Option(help="HTML to write (report.html in RUN).")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="HTML to write (a new report.html in RUN).")
+    ] = None,
+    force: Force = False,
     own_effects: OwnEffects = None,
     json: Json = False,
     quiet: Quiet = False,
@@ -23,5 +26,5 @@ def report(
     """
     from kemba.report.page import report_run
 
-    path = report_run(run, out)
+    path = report_run(run, out, force)
     print_json({"report": str(path)}) if json else typer.echo(path)

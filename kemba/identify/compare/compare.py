@@ -128,7 +128,7 @@ def conditions(problem: Problem, theta: Theta | None = None) -> list[ConditionBi
 def _tolerant(rows: Rows, region: Texts, window: Windows, found: Tolerant) -> tuple[float, bool]:
     """Error ratio of what the figures' tolerance leaves; whether it is within the noise, and the
     figures are not too far off."""
-    if found.p_value < BinSettings.current().false_discoveries:
+    if found.q_value < BinSettings.current().false_discoveries:
         return rms(window.sums(found.left)), False
     sums = window.sums(found.left)
     clean = not any(c.significant for c in condition_bins(rows, region, window.first, sums))
@@ -141,8 +141,8 @@ def measured_units(rows: Rows) -> dict[str, str]:
     found = {}
     for name in rows.channels:
         last = name.rsplit("/", 1)[-1]
-        if "/foot/" not in name and last in units:
-            found[name] = f"{name} [{units[last]}]"
+        if name in rows.units or ("/foot/" not in name and last in units):
+            found[name] = f"{name} [{rows.units.get(name) or units[last]}]"
     return found
 
 
@@ -201,9 +201,13 @@ def _place(at: ConditionBin) -> str:
         "impact": "while a foot hits the ground",
         "rest": "at rest",
         "moving": "while moving",
+        "forward": "while moving forward",
+        "back": "while moving back",
     }
     valves = {"00": "both valves closed", "10": "extend valve open", "01": "retract valve open"}
     stroke = {"in": ", piston retracted", "mid": ", piston mid-stroke", "out": ", piston extended"}
     when = phases.get(at.phase, f"in {at.phase}")
+    if not at.mode:
+        return f"{at.channel} {when}{stroke.get(at.region, '')}"
     mode = valves.get(at.mode, "both valves open")
     return f"{at.channel} {when}, {mode}{stroke.get(at.region, '')}"

@@ -10,6 +10,7 @@ import numpy as np
 
 from kemba.model import Model
 from kemba.ocp.certificate.certify import Certificate
+from kemba.ocp.certificate.grazing import LASTS
 from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.nlp.ipopt import Control, Iterate
 from kemba.ocp.phases.independent import Independent
@@ -19,7 +20,7 @@ from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.radau import RADAU3, RADAU5, STATE, Scheme
 from kemba.ocp.phases.requirements import add_requirements
 from kemba.ocp.phases.settings import Elements, Refining, Repair
-from kemba.ocp.phases.unilateral import read_constraints
+from kemba.ocp.transcription.unilateral import read_constraints
 from kemba.ocp.refinement.repair import misfit, repaired, simplified
 from kemba.ocp.refinement.sample import certificate, to_trajectory
 from kemba.ocp.refinement.solve import rough, solve, warm
@@ -119,7 +120,9 @@ class Refiner:
         valves = np.round(inputs[:, _binary(self.model, self.reduction)])
         found = Refined(None, None, Ending.GAVE_UP, 0)
         for trim in (False, True):
-            phases = read_phases(self.model, constraints, self.plan, valves, self.marks, trim)
+            brief = LASTS if self.task.clearance else 0.0
+            plan, marks = self.plan, self.marks
+            phases = read_phases(self.model, constraints, plan, valves, marks, trim, brief)
             if phases in self.seen:
                 break
             found = self.exact(phases, self.plan)

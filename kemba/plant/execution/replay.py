@@ -8,6 +8,7 @@ import numpy as np
 
 from kemba.model import Model
 from kemba.plant.simulation.commands import Commands, Profile
+from kemba.plant.simulation.record import Impact
 from kemba.plant.simulation.simulate import Simulated, run
 from kemba.plant.stepping.arrays import Array
 from kemba.settings import CHOSEN, Settings, setting
@@ -50,6 +51,7 @@ class Replay:
     final_error_m: float
     fault: str | None
     trajectory: Trajectory
+    impacts: tuple[Impact, ...]
 
     @property
     def landed(self) -> bool:
@@ -111,6 +113,7 @@ def judge(model: Model, plan: Trajectory, clock: Array, done: Simulated) -> Repl
         final_error_m=float(np.hypot(*final)),
         fault=_fault(model, plan, real, apex_time),
         trajectory=real,
+        impacts=done.impacts,
     )
 
 

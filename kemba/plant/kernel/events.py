@@ -23,12 +23,14 @@ FREE, TOUCHED, TOO_LONG = 0, 1, 2  # how a step ends
 
 
 class Impacts(NamedTuple):
-    """The impacts so far: how many, and by row time [s], energy lost [J] and impulses (nl,)."""
+    """The impacts so far: how many, and by row time [s], energy lost [J], impulses (nl,) [N.s] and
+    rates (ng,) [m/s] of the gaps just before."""
 
     number: Array
     time: Array
     lost: Array
     impulse: Array
+    rate: Array
 
 
 @part
@@ -66,6 +68,8 @@ def collide(m: Machine, k: Memory, now: State, reach: float, log: Impacts) -> No
             count += 1
     if count == 0:
         return
+    for i in range(len(m.gaps)):
+        log.rate[at, i] = now.rate[i]
     log.time[at], log.lost[at] = now.time[0], impact(m, k, now, count)
     for row in range(m.nl):
         log.impulse[at, row] = 0.0

@@ -64,9 +64,9 @@ class Player:
         recording = self.schedule.row >= 0
         self.times, self.table = self.schedule.time[recording], np.empty((recording.sum(), columns))
         self.impacts: list[Impact] = []
-        self._log = Impacts(
-            np.zeros(1, dtype=int), np.zeros(ROOM), np.zeros(ROOM), np.zeros((ROOM, m.nl))
-        )
+        count, (times, lost) = np.zeros(1, dtype=int), np.zeros((2, ROOM))
+        rates = np.zeros((ROOM, len(m.gaps)))
+        self._log = Impacts(count, times, lost, np.zeros((ROOM, m.nl)), rates)
         self._progress = Progress(np.zeros(1, dtype=int), np.zeros(1, dtype=bool))
         mechanism = model.mechanism
         sensed = (*mechanism.coordinates, *mechanism.velocities, *model.states.values())
@@ -111,9 +111,11 @@ class Player:
         log, gaps = self._log, self.pairs.gaps
         for i in range(log.number[0]):
             impulses = log.impulse[i][gaps]
-            labels = tuple(self.pairs.labels[row] for row in gaps[impulses > NOTICED])
-            found = Impact(float(log.time[i]), labels, float(impulses.max()), float(log.lost[i]))
-            self.impacts.append(found)
+            hit = impulses > NOTICED
+            labels = tuple(self.pairs.labels[row] for row in gaps[hit])
+            speeds = tuple((-log.rate[i][hit]).tolist())
+            size, lost = float(impulses.max()), float(log.lost[i])
+            self.impacts.append(Impact(float(log.time[i]), labels, size, lost, speeds))
         log.number[0] = 0
 
     def _answer(self) -> None:
