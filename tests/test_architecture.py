@@ -33,6 +33,7 @@ LEVELS = [
     {"runs"},
     {"sweep"},
     {"plotting", "report"},
+    {"learn"},
     {"api"},
     {"cli"},
 ]
@@ -102,7 +103,8 @@ PLANNING = [
     "phases",
     "refinement",
 ]
-PLANNING += ["infeasibility", "planned", "planner", "refined", "planning", "starts"]
+PLANNING += ["continuation", "infeasibility", "planned", "planner", "refined", "continued"]
+PLANNING += ["planning", "starts"]
 
 
 def test_planning_is_built_from_the_bottom_up() -> None:

@@ -10,6 +10,7 @@ from kemba.config import dump_yaml, parse
 from kemba.effects import BY_KIND
 from kemba.errors import KembaError, suggest
 from kemba.files import read_json
+from kemba.identify.problem.candidates import where_field
 from kemba.model.spec import ModelSpec, load_spec
 
 
@@ -41,9 +42,7 @@ def item(name: str, parameters: Mapping[str, Mapping[str, Any]]) -> dict[str, An
     values = {p: float(f"{v['value']:.6g}") for p, v in parameters.items()}
     if kind not in BY_KIND:
         raise KembaError(name, "is no effect of the catalogue", hint=suggest(kind, BY_KIND))
-    where = {}
-    if place:
-        where = {"channel": place} if kind.startswith("sensor_") else {"on": place}
+    where = {where_field(kind): place} if place else {}
     return {"kind": kind, **where, **values}
 
 

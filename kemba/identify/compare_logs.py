@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from kemba.identify.compare.compare import Comparison, compare
+from kemba.identify.evidence.colour import with_learnt_colour
+from kemba.identify.evidence.windows import free_starts
 from kemba.identify.logs.reading import read_logs
 from kemba.identify.problem.problem import Problem
 from kemba.identify.workflow import admitted, check_all, model_of
@@ -31,6 +33,7 @@ def compare_logs(
     built = model_of(read, model)
     check_all(read, built)
     problem, _ = admitted(read, built)
+    problem = with_learnt_colour(problem, free_starts(problem))
     found = compare(problem, model, [str(log.meta["path"]) for log in read])
     if run is not None:
         plan = Trajectory.read(Path(run) / "trajectory.csv" if Path(run).is_dir() else run)

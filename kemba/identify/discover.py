@@ -56,6 +56,7 @@ def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> 
     search.say("asking whether nothing would look like this")
     test = null_test(search)
     best, p_value, dismissed = _believed(search, best, test)
+    holdout = holdout.heard_as(search.problem) if holdout else None
     formula = look(search, best)
     drift = drifting(search, best)
     if drift is not None and formula is not None and drift.nats > formula.gain:

@@ -1,4 +1,4 @@
-"""Lengths in which a machine may differ from its drawing, and a robot with other lengths."""
+"""A robot whose lengths differ from those of its drawing."""
 
 from __future__ import annotations
 

@@ -98,7 +98,8 @@ def reshaped(mechanism: Mechanism, offsets: Offsets, symbols: Offsets | None = N
 
 
 def _closed(robot: Robot, offsets: Offsets) -> Robot:
-    """The robot, if its lengths are positive and its knee closes at both ends of the stroke."""
+    """The robot as it is. Raises KembaError where a length is not positive or a knee cannot close
+    at an end of the stroke."""
     for part, d in offsets.items():
         if nominal_length(robot.leg, part) <= 0.0:
             raise KembaError(

@@ -40,6 +40,7 @@ class Plan:
     constraints: int
     relax: tuple[Relax, ...] = ()
     refined: bool = False
+    continued: bool | None = None  # whether it comes from an earlier plan, where one was given
 
     @property
     def iterations(self) -> int:

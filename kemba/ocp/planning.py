@@ -11,6 +11,8 @@ from kemba.effects.mechanics.load import Payload
 from kemba.errors import KembaError
 from kemba.model import Model, load_model
 from kemba.ocp.certificate.status import Status
+from kemba.ocp.continuation.between import Origin
+from kemba.ocp.continued import continued, from_scratch
 from kemba.ocp.infeasibility.checks import check_task
 from kemba.ocp.infeasibility.explain import explanation, refusal
 from kemba.ocp.nlp.ipopt import Control
@@ -36,12 +38,15 @@ def plan(
     watch: Watch | None = None,
     start: Trajectory | None = None,
     stop: Callable[[], bool] | None = None,
+    origin: Origin | None = None,
 ) -> Plan:
     """Solve a task. Never raises for a task that cannot be met: the status says so.
 
     Raises ConfigErrors for wrong names, units and solver options. `log` collects IPOPT's text,
     `tell` gets the name of every solve, `watch` is called after every iteration; `start` is a
-    trajectory to begin with; `stop` is asked after every iteration whether to end.
+    trajectory to begin with; `stop` is asked after every iteration whether to end. `origin`: an
+    earlier plan that is solved again for the changed figures; where that fails, the plan is made
+    from scratch, and `Plan.continued` is False.
     """
     document = document or Document(task.model_dump())
     building = Stopwatch()
@@ -53,15 +58,20 @@ def plan(
     deadline = time.monotonic() + task.solver.time_limit
     session = Session(Control(deadline, log, watch, stop), tell, building=building)
     planner = Planner(task, built, requirements, session, start)
+    failed = ""
+    if origin is not None and refused is None:
+        near, failed = continued(planner, origin)
+        if near is not None:
+            return near
     found = searched(planner, refused is not None)
     if found.status is Status.SOLVED and task.refine == "radau":
         found = refined(planner, found)
     if found.status is Status.SOLVED and task.clearance:
         found = clear(found)
-    if found.status.plan or found.status is Status.INTERRUPTED:
-        return found
-    why = refused or explanation(task, built, planner.outcome, diagnostics, document)
-    return found if why is None else explained(found, why)
+    if not found.status.plan and found.status is not Status.INTERRUPTED:
+        why = refused or explanation(task, built, planner.outcome, diagnostics, document)
+        found = found if why is None else explained(found, why)
+    return from_scratch(found, failed) if failed else found
 
 
 def task_model(task: Task, name: str | Path | None = None) -> Model:

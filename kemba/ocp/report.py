@@ -45,6 +45,7 @@ def answer(plan: Plan, run: str) -> dict[str, Any]:
         "plant_replay": None,
         "impacts": None,
         "good": plan.status is Status.SOLVED,
+        "continued": plan.continued,
         "ignored": plan.model.ignored,
         "remarks": plan.model.remarks,
         "relax": [

@@ -24,7 +24,7 @@ def report(
 
     Example: kemba-opt report runs/jump-1
     """
-    from kemba.report.page import report_run
+    from kemba.report.review.page import report_run
 
     path = report_run(run, out, force)
     print_json({"report": str(path)}) if json else typer.echo(path)

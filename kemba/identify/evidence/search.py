@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from kemba.identify.evidence.colour import with_learnt_colour
 from kemba.identify.evidence.linear import Linear, estimate, names_of
 from kemba.identify.evidence.null_model import Baseline
 from kemba.identify.evidence.point import LinearisationPoint
@@ -114,7 +115,7 @@ class Search:
             self.say(f"looking again as if {' + '.join(guess)} were there")
             among = self._contenders()
             self.problem = self.problem.relinearise(point.fit.theta)
-            self.start(among)
+            self.start(among, point.fit.theta)
             self.visit(guess)
             best = self._round(NULL, settings.leaders)
             if best in (guess, NULL):
@@ -141,8 +142,12 @@ class Search:
         better = first and tables[first] + log_prior(first, count) > null
         return first if better else NULL
 
-    def start(self, among: frozenset[Hypothesis] | None = None) -> None:
-        """Null fit, noise colour, and the linear table at the null."""
+    def start(
+        self, among: frozenset[Hypothesis] | None = None, theta: Mapping[str, float] | None = None
+    ) -> None:
+        """Null fit, noise colour, and the linear table at the null; `theta`: the best guess."""
+        if self.problem.moves:
+            self.problem = with_learnt_colour(self.problem, theta or {}, careful=bool(theta))
         self.base = Baseline(self.problem, among)
         self.problem = self.base.problem
         self.points = {NULL: self.base.point}

@@ -34,7 +34,7 @@ def read_log(path: str | Path, columns: ColumnMap | None = None) -> Trajectory:
     log.meta["kind"] = check_kind(log.meta["kind"], KINDS, beside)
     if "noise" in log.meta:
         units = {name: log.unit(name) for name in log.names}
-        log.meta["noise"] = check_noise(log.meta["noise"], units, beside)
+        log.meta["noise"], log.meta["noise_time"] = check_noise(log.meta["noise"], units, beside)
     return _without_absurd(log)
 
 

@@ -47,9 +47,18 @@ def effect_candidates(model: Model) -> dict[str, Candidate]:
     return found
 
 
-def by_default(kind: str) -> Effect:
-    """The effect of a kind as its defaults have it: absent."""
-    return BY_KIND[kind](kind=kind)
+def by_default(name: str) -> Effect:
+    """The effect of a name as its defaults have it: absent."""
+    kind, _, place = name.partition(":")
+    where = {where_field(kind): place} if place else {}
+    return BY_KIND[kind].model_validate({"kind": kind, **where})
+
+
+def where_field(kind: str) -> str:
+    """The field that says where an effect acts, the second part of its name: a sensor's `channel`,
+    the `part` of a length, else the leg that it is `on`."""
+    fields = BY_KIND[kind].model_fields
+    return next((name for name, field in fields.items() if field.is_required()), "on")
 
 
 def geometry_candidates(model: Model) -> dict[str, Candidate]:

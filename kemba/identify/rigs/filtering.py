@@ -22,7 +22,7 @@ GAIN = (0.5311, 0.3756, 0.4600)
 REACH = 4.0  # widths of the Gaussian beyond which it is cut off
 
 
-class FilterSettings(Settings):
+class RigFilterSettings(Settings):
     """How the channels of a rig's log are filtered."""
 
     widths: tuple[int, ...] = setting(
@@ -82,7 +82,7 @@ def filtered(
     the rate] and the force of the inertia `heavy` well against the other channels. `known`: noise
     (1 sigma) by name, "" for the position. Rows with a missing reading are left out.
     """
-    settings, known = FilterSettings.current(), known or {}
+    settings, known = RigFilterSettings.current(), known or {}
     good = np.isfinite(position) & np.all([np.isfinite(y) for y in others.values()], axis=0)
     time, position = time[good], position[good]
     others = {name: y[good] for name, y in others.items()}

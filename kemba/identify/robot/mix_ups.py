@@ -102,14 +102,15 @@ def _rows(log: ResampledLog) -> Array:
     limits = MixUpSettings.current()
     step = float(np.median(np.diff(log.time)))
     half = max(1, round(0.5 * limits.window / step))
-    good = np.isfinite(log.y).all(axis=1)
+    good = np.asarray(np.isfinite(log.y).all(axis=1))
     if len(log.time) < 4 * half + 1 or good.sum() < 4 * half + 1:
         return np.empty(0, dtype=int)
     z = np.interp(log.time, log.time[good], log.y[good, 1])
     fall = savgol_filter(z, 2 * half + 1, 2, deriv=2, delta=step)
     rows = np.arange(half, len(z) - half, max(1, round(limits.row / step)))
-    known = good[rows] & good[rows - half] & good[rows + half]
-    return np.asarray(rows[known & (fall[rows] > -limits.carried)])
+    known = np.asarray(good[rows] & good[rows - half] & good[rows + half])
+    carried = np.asarray(fall[rows] > -limits.carried)
+    return np.asarray(rows[known & carried])
 
 
 def _restless(physics: Physics, log: ResampledLog, rows: Array, change: dict[str, Change]) -> float:
@@ -130,5 +131,5 @@ def _feet(physics: Physics, y: Array, change: dict[str, Change]) -> Array:
     count, same = len(physics.legs), np.positive
     columns = [change.get(name, same)(y[:, i]) for i, name in enumerate(physics.channels)]
     known = np.stack(columns, axis=1)
-    q = np.hstack([known[:, : 3 + count], physics.knees(known[:, 3 + count :])])
+    q = np.hstack([known[:, : 3 + count], physics.knees(known[:, 3 + count :], physics.nominal)])
     return physics.call("feet", q, 0 * q)[0].reshape(len(y), count, 2)

@@ -117,7 +117,7 @@ class Refiner:
         """The first reading that solves, else how the last one ended."""
         constraints = read_constraints(self.model, self.reduction)
         inputs = self.reduction.restrict("u", arrays(self.model, self.plan)["u"])
-        valves = np.round(inputs[:, _binary(self.model, self.reduction)])
+        valves = np.round(inputs[:, valve_columns(self.model, self.reduction)])
         found = Refined(None, None, Ending.GAVE_UP, 0)
         for trim in (False, True):
             brief = LASTS if self.task.clearance else 0.0
@@ -259,7 +259,8 @@ def reduction_of(
     return half
 
 
-def _binary(model: Model, reduction: Reduction) -> list[int]:
+def valve_columns(model: Model, reduction: Reduction) -> list[int]:
+    """Places of the valves among the inputs of a half or whole robot."""
     places = [i for i, q in enumerate(model.inputs.values()) if q.binary]
     B = reduction.B["u"]
     return [j for j in range(B.shape[1]) if B[places, j].any()]

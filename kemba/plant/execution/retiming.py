@@ -44,7 +44,7 @@ def retimed(model: Model, plan: Trajectory, table: Trajectory) -> Trajectory:
     error = partial(_error, model, plan, extra=rest_after(model, plan, table))
     best, executions = error(table), iter(range(RetimingSettings.current().executions))
     while best > 1.0:
-        trials = ((error(t), t) for _, t in zip(executions, _neighbours(table), strict=False))
+        trials = ((error(t), t) for _, t in zip(executions, neighbours(table), strict=False))
         nearer = next((trial for trial in trials if trial[0] < best), None)
         if nearer is None:
             break
@@ -65,7 +65,7 @@ def _error(model: Model, plan: Trajectory, table: Trajectory, extra: float) -> f
     return float(np.max(np.abs(errors))) + (limits.fallen if falls else 0.0)
 
 
-def _neighbours(table: Trajectory) -> Iterator[Trajectory]:
+def neighbours(table: Trajectory) -> Iterator[Trajectory]:
     """Tables with one edge, or the same edge of all legs, a tick earlier or later."""
     edges = _edges(table)
     groups = [[(name, k)] for name, ticks in edges.items() for k in range(len(ticks))]
