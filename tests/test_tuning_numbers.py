@@ -16,10 +16,14 @@ import kemba
 from kemba.settings import ORIGINS, Settings
 
 ROOT = Path(kemba.__file__).parent
-DRAWN = ("plotting/", "report/review/", "report/stage.py")  # lengths, colours and speeds of pictures
+DRAWN = (
+    "plotting/",
+    "report/review/",
+    "report/stage.py",
+)  # lengths, colours and speeds of pictures
 
 # Numbers that may stand at a module's top level, and why.
-CONSTANTS: dict[str, tuple[str, str]] = {  # file -> names, why
+CONSTANTS = {  # file -> names, why
     # physics
     "effects/pneumatics/constants.py": ("ATMOSPHERE KAPPA GAS TEMPERATURE", "constants of air"),
     "effects/pneumatics/flow.py": (
@@ -62,6 +66,8 @@ CONSTANTS: dict[str, tuple[str, str]] = {  # file -> names, why
     "ocp/transcription/stage.py": ("ANGLE_ARM COST_SCALE AIM", "units of moments and costs"),
     "ocp/task/requirement.py": ("SCALES MOMENTS FLIGHT ROUND", "moments of a task; units"),
     # tuning numbers that are to become settings
+    "identify/robot/dynamics/physics.py": ("FOLDED", "how far a knee folds at most"),
+    "learn/round.py": ("SUPPLY", "of a model that names none"),
     "identify/rigs/filtering.py": ("GAIN REACH", "a Gaussian's cut"),
     "logs/draft/matching.py": ("ENOUGH SAID_TOO UNRELATED NOTHING", "how names are matched"),
     "logs/draft/stamps.py": ("GAPS", "steps of time that must rise"),

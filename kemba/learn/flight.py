@@ -21,7 +21,9 @@ class FlightSettings(Settings):
     down: float = setting(
         3e-3, "m", "a lower foot stands", "derived: ten times the noise of the body's height"
     )
-    upright: float = setting(0.35, "rad", "a landing with more pitch failed", "as in replays")
+    upright: float = setting(
+        0.35, "rad", "a landing with more pitch failed", "derived: as in replays"
+    )
 
 
 @dataclass(frozen=True)
