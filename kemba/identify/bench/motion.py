@@ -69,8 +69,8 @@ def smooth_motion(time: Array, x: Array, v: Array | None = None) -> SmoothedMoti
 def _adaptive(values: Array, sigma: float, step: float) -> tuple[Array, Array, Array, Array]:
     """Position, rate, its error and the half width chosen sample by sample.
 
-    A cubic cannot follow every motion. A quintic in the same window follows more of them. The square
-    of their difference, without the share that noise has in it, estimates the square of the
+    A cubic cannot follow every motion. A quintic in the same window follows more of them. The
+    square of their difference, without the share that noise has in it, estimates the square of the
     cubic's bias.
     """
     n = len(values)
@@ -126,8 +126,10 @@ def _weights(width: int, order: int) -> tuple[Array, Array]:
 def _weigh_in(
     grid: Array, rate: Array, spread: Array, half: Array, time: Array, v: Array
 ) -> tuple[Array, Array]:
-    """The mean of measured and derived velocity, weighted by their errors; the derived one where the
-    two contradict each other."""
+    """The mean of measured and derived velocity, weighted by their errors.
+
+    Where the two contradict each other, the derived one counts alone.
+    """
     settings, good = MotionSettings.current(), np.isfinite(v)
     measured = np.interp(grid, time[good], v[good])
     sigma = max(difference_sigma(v[good]), settings.finest_speed)
