@@ -153,6 +153,12 @@ def newest_run(holds: str = "trajectory.csv", folder: str | Path = "runs") -> Pa
     return max(found, key=lambda run: _begun(run, holds))
 
 
+def newest_logs(run: Path) -> list[Path]:
+    """The logs of a run that were written last: those of its newest folder `logs`, `logs-2`, ..."""
+    found = [sorted(folder.glob("*.csv")) for folder in run.glob("logs*")]
+    return max(filter(None, found), key=lambda logs: logs[0].stat().st_mtime, default=[])
+
+
 def _begun(run: Path, holds: str) -> tuple[str, float]:
     """When a run was begun: by its manifest, whose seconds may be those of others, then by age."""
     began = str(read_manifest(run).get("started", "")) if (run / MANIFEST).is_file() else ""

@@ -11,8 +11,8 @@ import numpy as np
 
 from kemba.model import Model
 from kemba.ocp.phases.settings import Reading
-from kemba.ocp.transcription.unilateral import Constraint
 from kemba.ocp.transcription.solution import arrays
+from kemba.ocp.transcription.unilateral import Constraint
 from kemba.trajectory import Trajectory
 
 OPEN, HELD, AHEAD, BACK = 0, 1, 2, 3  # open; closed and sticking; sliding forward, backward
@@ -111,7 +111,7 @@ def _modes(model: Model, constraint: Constraint, plan: Trajectory, trim: bool) -
 def drop_grazes(modes: np.ndarray, time: np.ndarray, brief: float) -> None:
     """Open a contact that closes for less than `brief` [s] between two times in the air."""
     for a, b in _runs(modes):
-        if 1 < a and b < len(modes) and time[b - 1] - time[a - 1] < brief:
+        if a > 1 and b < len(modes) and time[b - 1] - time[a - 1] < brief:
             modes[a:b] = OPEN
 
 
