@@ -11,8 +11,8 @@ import numpy as np
 
 from kemba.model import Model
 from kemba.ocp.phases.modes import AHEAD, BACK, HELD, OPEN
-from kemba.ocp.transcription.unilateral import Constraint, read_constraints
 from kemba.ocp.transcription.symmetry import whole
+from kemba.ocp.transcription.unilateral import Constraint, read_constraints
 from kemba.settings import Settings, setting
 from kemba.trajectory import Trajectory
 
