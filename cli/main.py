@@ -19,8 +19,10 @@ from kemba_cli.verbs.identify.characterise import characterise
 from kemba_cli.verbs.identify.compare import compare
 from kemba_cli.verbs.identify.discover import discover
 from kemba_cli.verbs.identify.experiment import experiment
+from kemba_cli.verbs.identify.learn import learn
 from kemba_cli.verbs.inspect.check import check
 from kemba_cli.verbs.inspect.effects import effects
+from kemba_cli.verbs.inspect.map import draft_map
 from kemba_cli.verbs.inspect.schema import schema
 from kemba_cli.verbs.plan.export import export
 from kemba_cli.verbs.plan.simulate import simulate
@@ -28,6 +30,7 @@ from kemba_cli.verbs.plan.solve import solve
 from kemba_cli.verbs.plan.sweep import sweep
 from kemba_cli.verbs.show.plot import plot
 from kemba_cli.verbs.show.report import report
+from kemba_cli.verbs.show.review import review
 from kemba_cli.verbs.show.view import view
 
 VERBS = (
@@ -38,12 +41,14 @@ VERBS = (
     compare,
     discover,
     adopt,
+    learn,
     experiment,
     check,
     effects,
     plot,
     view,
     report,
+    review,
     export,
     schema,
 )
@@ -55,6 +60,7 @@ app = typer.Typer(
 )
 for verb in VERBS:
     app.command()(guarded(verb))
+app.command("map")(guarded(draft_map))  # `map` is a word of Python
 
 
 def _version(wanted: bool) -> None:

@@ -72,14 +72,23 @@ class Param:
     lower: float = -math.inf
     upper: float = math.inf
     doc: str = ""
+    rotary: str = ""
 
     def validate(self, value: Any) -> float:
         """`value` in `unit`. Raises ValueError where its dimension is another or it is out of
         bounds."""
-        number = to_si(value, self.unit)
+        number = self._number(value)
         if not self.lower <= number <= self.upper:
             raise ValueError(f"'{value}' is out of range; {self.bounds} was expected")
         return number
+
+    def _number(self, value: Any) -> float:
+        try:
+            return to_si(value, self.unit)
+        except ValueError:
+            if not self.rotary:
+                raise
+        return to_si(value, self.rotary)
 
     @property
     def bounds(self) -> str:
@@ -103,7 +112,8 @@ class Param:
     ) -> dict[str, Any]:
         limits = {"minimum": self.lower, "maximum": self.upper}
         number = {key: limit for key, limit in limits.items() if math.isfinite(limit)}
-        text = f"{self.doc} [{self.unit}]" if self.doc else f"[{self.unit}]"
+        unit = f"{self.unit} or {self.rotary}" if self.rotary else self.unit
+        text = f"{self.doc} [{unit}]" if self.doc else f"[{unit}]"
         return {
             "anyOf": [{"type": "number", **number}, {"type": "string"}],
             "unit": self.unit,

@@ -16,7 +16,7 @@ from kemba.quantity import Param, Quantity, Tolerance
 REMEASURED = Tolerance(0.1, source="assumed: a discovery from a few logs is that sure of a size")
 
 if TYPE_CHECKING:
-    from kemba.mechanism import Cylinder
+    from kemba.mechanism import Bore, Cylinder
 
 
 @dataclass(frozen=True)
@@ -68,13 +68,15 @@ class Contribution:
 class At(Protocol):
     """What an effect sees: ports, own states, inputs and forces, signals, others' values.
 
-    `at.piston`, `at.hip`, `at.foot_x`, `at.foot_z`, `at.body_x`, `at.body_z`, `at.pitch` are
-    ports; any other attribute is looked up by symbol, first at this leg, then at the robot.
+    `at.piston`, `at.hip`, `at.foot_x`, `at.foot_z`, `at.body_x`, `at.body_z`, `at.pitch`
+    and, on a drive, `at.axis` are ports; any other attribute is looked up by symbol, first at this
+    leg, then at the robot.
     """
 
     supply: float  # Pa
     gravity: float  # m.s-2
     body_mass: float  # kg, of the body link alone
+    sign_speed: float  # m.s-1 or rad.s-1; the sign of a piston's or an axis' rate is smooth within
     piston: PortAt
     hip: PortAt
     foot_x: PortAt
@@ -82,10 +84,11 @@ class At(Protocol):
     body_x: PortAt
     body_z: PortAt
     pitch: PortAt
+    axis: PortAt
 
     @property
-    def cylinder(self) -> Cylinder:
-        """The cylinder of every leg: bore, areas, tube volume."""
+    def cylinder(self) -> Bore:
+        """The cylinder of every leg: bore, areas, stroke."""
 
     @property
     def stroke(self) -> float:
@@ -94,6 +97,10 @@ class At(Protocol):
     @property
     def legs(self) -> list[At]:
         """Every leg, as its own effects see it (for effects of the whole robot)."""
+
+    @property
+    def sense(self) -> Any:
+        """Direction in which the piston's seals slide, from -1 to 1."""
 
     def standing(self, name: str) -> float:
         """Value of a coordinate of this place in the standing pose, pistons retracted."""
@@ -129,6 +136,8 @@ class Effect(BaseModel):
     publishes: ClassVar[tuple[str, ...]] = ()
     carried_by: ClassVar[Mapping[str, str]] = {}  # published value: the own state that moves it
     off: ClassVar[Mapping[str, float]] = {}
+    own_rigs: ClassVar[bool] = False  # True: looked for as missing on rigs of the user's own only
+    needs: ClassVar[tuple[str, ...]] = ()  # published values without which it cannot be missing
     replaces: ClassVar[tuple[str, ...]] = ()  # kinds that this one replaces in a model
     mirror: ClassVar[Mapping[str, str]] = {}  # symbols that change sign or name in the mirror
     dissipative: ClassVar[bool] = False
@@ -166,6 +175,11 @@ class Effect(BaseModel):
     def evaluate(self, at: At) -> Contribution:
         """Efforts, rates, pairs, limits at one place."""
         return Contribution()
+
+    @property
+    def geometry(self) -> Mapping[str, Any]:
+        """Lengths of the mechanism that it changes: part -> true minus nominal [m]."""
+        return {}
 
     @property
     def leg(self) -> str | None:

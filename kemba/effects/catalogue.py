@@ -16,7 +16,13 @@ from kemba.effects.mechanics.boom_faults import (
     PitchFriction,
 )
 from kemba.effects.mechanics.contact import Contact
-from kemba.effects.mechanics.friction import PressureFriction, SealFriction, StribeckFriction
+from kemba.effects.mechanics.friction import (
+    DirectionFriction,
+    PressureFriction,
+    SealFriction,
+    StribeckFriction,
+)
+from kemba.effects.mechanics.geometry import Geometry
 from kemba.effects.mechanics.ground import GroundCompliance, GroundFriction
 from kemba.effects.mechanics.hip import (
     HipDamping,
@@ -32,6 +38,7 @@ from kemba.effects.mechanics.piston import EndCushion, GasSpring, PistonDamping,
 from kemba.effects.mechanics.stops import EndStop
 from kemba.effects.pneumatics.chamber import Chamber
 from kemba.effects.pneumatics.damping import ModeDamping
+from kemba.effects.pneumatics.gas import GasTemperature, VesselChamber, WallHeat
 from kemba.effects.pneumatics.hose import BothModeLoss, CrossLeak, HoseLag
 from kemba.effects.pneumatics.orifice import OrificeChamber
 from kemba.effects.pneumatics.supply import RiseTimeScale, SupplyDroop, SupplyScale
@@ -39,6 +46,24 @@ from kemba.effects.pneumatics.supply_line import SupplyLine
 from kemba.effects.pneumatics.timing import ValveCloseDelay, ValveDelay
 from kemba.effects.pneumatics.valve import Valve
 from kemba.effects.registry import Registry
+from kemba.effects.rigs.axis import (
+    AxisLag,
+    AxisOffset,
+    AxisScale,
+    Cogging,
+    DriveAxis,
+    ExtraInertia,
+)
+from kemba.effects.rigs.chambers import MeasuredChambers
+from kemba.effects.rigs.friction import (
+    AxisDamping,
+    AxisDirection,
+    AxisFriction,
+    AxisOneWay,
+    AxisStribeck,
+    GearFriction,
+    Presliding,
+)
 from kemba.effects.sensors import SensorBias, SensorDelay, SensorScale
 from kemba.errors import KembaError
 
@@ -46,7 +71,10 @@ from kemba.errors import KembaError
 PLANNING: tuple[type[Effect], ...] = (Valve, Chamber, ModeDamping, EndStop, Motor, Boom, Contact)
 
 # the same air, seen closer
-PHYSICAL: tuple[type[Effect], ...] = (OrificeChamber, SupplyLine)
+PHYSICAL: tuple[type[Effect], ...] = (OrificeChamber, SupplyLine, GasTemperature)
+
+# what a rig of the user's own brings along
+OWN_RIGS: tuple[type[Effect], ...] = (MeasuredChambers, DriveAxis, VesselChamber)
 
 # what a real machine may have beside it
 AIR: tuple[type[Effect], ...] = (
@@ -58,11 +86,13 @@ AIR: tuple[type[Effect], ...] = (
     HoseLag,
     CrossLeak,
     BothModeLoss,
+    WallHeat,
 )
 PISTON: tuple[type[Effect], ...] = (
     SealFriction,
     StribeckFriction,
     PressureFriction,
+    DirectionFriction,
     PistonDamping,
     QuadraticDamping,
     EndCushion,
@@ -87,12 +117,36 @@ BODY: tuple[type[Effect], ...] = (
     PitchFriction,
 )
 GROUND: tuple[type[Effect], ...] = (GroundCompliance, GroundFriction)
+DRIVE: tuple[type[Effect], ...] = (
+    AxisFriction,
+    AxisDamping,
+    AxisDirection,
+    AxisOneWay,
+    AxisStribeck,
+    GearFriction,
+    Presliding,
+    Cogging,
+    AxisOffset,
+    AxisScale,
+    AxisLag,
+    ExtraInertia,
+)
+GEOMETRY: tuple[type[Effect], ...] = (Geometry,)
 SENSORS: tuple[type[Effect], ...] = (SensorBias, SensorScale, SensorDelay)
 
 # what may be missing from a model: the candidates of identification
-MISSING: tuple[type[Effect], ...] = (*AIR, *PISTON, *HIP, *BODY, *GROUND, *SENSORS)
+MISSING: tuple[type[Effect], ...] = (
+    *AIR,
+    *PISTON,
+    *HIP,
+    *BODY,
+    *GROUND,
+    *GEOMETRY,
+    *DRIVE,
+    *SENSORS,
+)
 
-EFFECTS: tuple[type[Effect], ...] = (*PLANNING, *PHYSICAL, *MISSING, Expression)
+EFFECTS: tuple[type[Effect], ...] = (*PLANNING, *PHYSICAL, *OWN_RIGS, *MISSING, Expression)
 
 # these and the effects from outside, by kind
 BY_KIND = Registry(EFFECTS)

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from typing import Any, get_args
 
 from kemba.effects.base import Effect
-from kemba.effects.catalogue import BY_KIND, EFFECTS, MISSING, PHYSICAL, PLANNING
+from kemba.effects.catalogue import BY_KIND, EFFECTS, MISSING, OWN_RIGS, PHYSICAL, PLANNING
 from kemba.effects.registry import kind_of
 from kemba.errors import KembaError, suggest
 from kemba.quantity import Param
@@ -18,6 +18,8 @@ INTRODUCTION = """# The catalogue of effects
 Written by `kemba-opt effects --markdown`; do not edit. Symbols, per leg: x, v piston extension and
 rate; F_e, F_r chamber forces; u_e, u_r valves after the dead time; tau_c a chamber's time constant;
 q, w hip angle and rate; tau hip torque. Forces are added to the right-hand side, pushing positive.
+At the axis of a drive q, v, a are position, rate and acceleration, tau the motor's force; a rotary
+axis has N.m for N and rad for m. On rigs of your own tanh(v/0.01) is tanh(v/sign_speed).
 "size" is what would matter in practice, a prior width rather than a limit; that of a scale k is the
 size of k - 1. "off" is the value at which an effect is absent; parameters without one are shapes.
 """
@@ -25,10 +27,11 @@ size of k - 1. "off" is the value at which an effect is absent; parameters witho
 
 def chapters() -> dict[str, tuple[type[Effect], ...]]:
     """The effects known now by the chapters of the catalogue."""
-    own = tuple(e for e in EFFECTS if e not in (*PLANNING, *PHYSICAL, *MISSING))
+    own = tuple(e for e in EFFECTS if e not in (*PLANNING, *PHYSICAL, *OWN_RIGS, *MISSING))
     found = {
         "The planning model": PLANNING,
         "Physical chambers": PHYSICAL,
+        "What rigs of your own bring along": OWN_RIGS,
         "What may be missing": MISSING,
         "Your own": own,
     }
@@ -68,7 +71,7 @@ def _parameter(effect: type[Effect], name: str) -> dict[str, Any]:
     off = effect.off.get(name)
     return {
         "name": name,
-        "unit": "channel's" if name in getattr(effect, "in_channel_unit", ()) else param.unit,
+        "unit": "channel's" if name in getattr(effect, "in_channel_unit", ()) else _unit(param),
         "size": param.size,
         "default": _usual(effect, effect.model_fields[name].default),
         "off": "infinity" if off is not None and math.isinf(off) else off,
@@ -76,6 +79,10 @@ def _parameter(effect: type[Effect], name: str) -> dict[str, Any]:
         "upper": param.upper if math.isfinite(param.upper) else None,
         "doc": param.doc,
     }
+
+
+def _unit(param: Param) -> str:
+    return f"{param.unit} or {param.rotary}" if param.rotary else param.unit
 
 
 def _tables(effect: type[Effect]) -> Iterator[dict[str, Any]]:

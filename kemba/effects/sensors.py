@@ -37,6 +37,7 @@ CHANNELS: dict[str, tuple[str, float]] = {
     "Fx": ("N", 2.0),
     "Fz": ("N", 2.0),
     "P": ("Pa", 2e3),
+    "T": ("K", 0.5),
 }
 
 

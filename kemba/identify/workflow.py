@@ -15,8 +15,9 @@ from kemba.identify.discover import Discovery, discover
 from kemba.identify.logs.excerpt import excerpts
 from kemba.identify.logs.gate import BadData, check_logs, sentence
 from kemba.identify.logs.limits import limits_of
-from kemba.identify.logs.reading import load_map, read_logs, taken_on
+from kemba.identify.logs.reading import read_logs, taken_on
 from kemba.identify.problem.problem import Problem
+from kemba.logs import load_map
 from kemba.model import Model, load_model
 from kemba.trajectory import Trajectory
 
@@ -44,14 +45,11 @@ def discover_logs(
     try:
         _apart(fitted, kept)
         built = model_of(fitted, model)
-        taken_on([*fitted, *kept], built.mechanism)
-        remarks = [*built.remarks, *check_logs([*fitted, *kept]), *limits_of(fitted)]
+        checked = [*check_all([*fitted, *kept], built), *limits_of(fitted)]
         say("preparing the logs")
-        fitted, cut = excerpts(fitted)
-        kept, _ = excerpts(kept)
-        problem = make_problem(fitted, built)
-        remarks = [*remarks, *cut, *problem.validate()]
-        judge = make_problem(kept, built) if kept else None
+        problem, remarks = admitted(fitted, built)
+        remarks = [*built.remarks, *checked, *remarks]
+        judge = make_problem(excerpts(kept)[0], built) if kept else None
         left = time_limit - (time.monotonic() - started)
         found = discover(problem, judge, left, say)
         answer = found.answer
@@ -70,12 +68,49 @@ def model_of(logs: Sequence[Trajectory], name: str) -> Model:
     return load_model(name, rig=logs[0].meta["kind"] == "bench")
 
 
+def check_all(logs: Sequence[Trajectory], model: Model) -> list[str]:
+    """Remarks on logs that were taken on the machine of `model`, each looked at by itself.
+
+    Raises BadData with every fault.
+    """
+    taken_on(logs, model.mechanism)
+    return check_logs(logs)
+
+
+def admitted(logs: Sequence[Trajectory], model: Model) -> tuple[Problem, list[str]]:
+    """The problem that logs pose, shortened where they are long, and remarks.
+
+    Raises BadData where they contradict themselves or any model. Together with `check_all` this
+    is the gate of `check`, `compare` and `discover`.
+    """
+    shortened, cut = excerpts(logs)
+    problem = make_problem(shortened, model)
+    return problem, [*cut, *problem.validate()]
+
+
+def check_log(
+    path: str | Path, model: str = "planning", column_map: str | Path | None = None
+) -> tuple[Trajectory, list[str]]:
+    """A log that `compare` and `discover` will accept, and remarks on it.
+
+    Raises KembaError where the file cannot be read; BadData where the log cannot be right.
+    """
+    logs = read_logs([path], load_map(column_map) if column_map else None)
+    built = model_of(logs, model)
+    remarks = [*built.remarks, *check_all(logs, built)]
+    return logs[0], [*remarks, *admitted(logs, built)[1]]
+
+
 def make_problem(logs: Sequence[Trajectory], model: Model) -> Problem:
     """The problem of explaining bench or robot logs with a model."""
     if logs[0].meta["kind"] == "bench":
         from kemba.identify.bench.problem import bench_problem
 
         return bench_problem(logs, model)
+    if model.mechanism.rig:
+        from kemba.identify.rigs.problem import rig_problem
+
+        return rig_problem(logs, model)
     from kemba.identify.robot.problem import robot_problem
 
     return robot_problem(logs, model)

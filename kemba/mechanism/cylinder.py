@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from typing import Annotated, Any
 
 from pydantic import model_validator
 
 from kemba.errors import KembaError
+from kemba.mechanism.bore import Bore, Diameter, Stroke
 from kemba.mechanism.table import Table
 from kemba.quantity import Param
 
-# A cylinder of a tenth of a millimetre or of ten metres is a mistake in the unit.
-Diameter = Annotated[float, Param("m", lower=1e-4, upper=1.0, doc="diameter")]
-Stroke = Annotated[float, Param("m", lower=1e-4, upper=10.0, doc="way of the rod")]
 Volume = Annotated[float, Param("m3", lower=1e-9, doc="tubes and ports of one chamber")]
 Pascal = Annotated[float, Param("Pa", lower=0.0, doc="pressure of the supply")]
 Newton = Annotated[float, Param("N", lower=0.0, doc="steady force of a chamber")]
@@ -25,7 +22,7 @@ Ends = tuple[Second, Second]
 FORCES, DAMPINGS, TIMES = ("F_extend", "F_retract"), ("c_extend", "c_retract"), ("fill", "vent")
 
 
-class Cylinder(Table):
+class Cylinder(Bore):
     """One double-acting cylinder, used in every leg; the rod passes through the retract chamber.
 
     Lengths [m], volume [m3]. `F_*` [N] and `c_*` [N.s.m-1] hold at the supply pressures `pressures`
@@ -33,9 +30,7 @@ class Cylinder(Table):
     a chamber. Raises ValueError where figures contradict each other.
     """
 
-    bore: Diameter
     rod: Diameter
-    stroke: Stroke
     tube: Volume
     pressures: tuple[Pascal, ...]
     F_extend: tuple[Newton, ...]
@@ -61,16 +56,6 @@ class Cylinder(Table):
                     "one entry for each pressure was expected"
                 )
         return self
-
-    @property
-    def area_extend(self) -> float:
-        """Area [m2] on which the extend chamber pushes."""
-        return math.pi / 4 * self.bore**2
-
-    @property
-    def area_retract(self) -> float:
-        """Area [m2] on which the retract chamber pushes: of the bore less the rod."""
-        return math.pi / 4 * (self.bore**2 - self.rod**2)
 
     @property
     def largest(self) -> float:

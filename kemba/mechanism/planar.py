@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import casadi as ca
 
 from kemba.errors import KembaError, suggest
+from kemba.mechanism.bore import Bore
 from kemba.mechanism.cylinder import Cylinder
 from kemba.mechanism.links import Robot
 from kemba.quantity import Quantity
@@ -33,9 +35,14 @@ class Mechanism:
     `q, v, a` are SX symbols (n,); `inverse_dynamics` (n,) is the generalised force that the
     motion (q, v, a) needs, gravity included, no effect included. `legs` are the prefixes under
     which leg ports are found ("" for a rig). `cylinder`: the one of every leg. `robot`: the link
-    table, None for a rig. `imposed`: the motion is given, forces are answers.
+    table, None for a rig; it differs by `offsets` [m] from the table `drawn`. `bore`: the
+    cylinder's dimensions where nothing else of it is known. `sign_speed`: rate [m.s-1] of a piston
+    within which the sign of its friction is smoothed. `rig`: the kind of a rig of the user's own,
+    `logged` the columns that its logs must have and their units. `imposed`: the motion is given,
+    forces are answers.
     `mirror` maps a coordinate to its mirror image ("-" prefixed where the sign turns).
     `standing`: coordinates with retracted pistons and each foot on the ground under its hip.
+    `tolerances`: 1 sigma of figures of its links that may be off, as shares of them, by name.
     `points`: (x, z) of places that pictures need, such as `front/pin`; nothing pushes there.
     """
 
@@ -53,11 +60,18 @@ class Mechanism:
     mass: float = 1.0
     body_mass: float = 0.0
     robot: Robot | None = None
+    drawn: Robot | None = None
+    offsets: Mapping[str, float] = field(default_factory=dict)
     cylinder: Cylinder | None = None
+    bore: Bore | None = None
+    sign_speed: float = 0.01
+    rig: str = ""
+    logged: dict[str, str] = field(default_factory=dict)
     imposed: bool = False
     mirror: dict[str, str] = field(default_factory=dict)
     standing: dict[str, float] = field(default_factory=dict)
     points: dict[str, ca.SX] = field(default_factory=dict)
+    tolerances: dict[str, float] = field(default_factory=dict)
 
     @property
     def n(self) -> int:
@@ -67,7 +81,11 @@ class Mechanism:
     @property
     def stroke(self) -> float:
         """Way of every piston [m]. Raises KembaError for a mechanism without pistons."""
-        return self.need_cylinder().stroke
+        return self.need_bore().stroke
+
+    def need_bore(self) -> Bore:
+        """The dimensions of the cylinder. Raises KembaError for a mechanism without pistons."""
+        return self.bore or self.need_cylinder()
 
     def need_cylinder(self) -> Cylinder:
         """The cylinder of every leg. Raises KembaError for a mechanism without pistons."""

@@ -10,11 +10,18 @@ import casadi as ca
 
 from kemba.effects import BY_KIND
 from kemba.effects.base import At, Contribution, Effect, PortAt, Signal
+from kemba.effects.mechanics.laws import direction
 from kemba.errors import KembaError, suggest
-from kemba.mechanism import Cylinder, Mechanism
+from kemba.mechanism import Bore, Mechanism
 from kemba.quantity import Quantity
 
-LEG_PORTS = {"piston": "piston/x", "hip": "hip/q", "foot_x": "foot/x", "foot_z": "foot/z"}
+LEG_PORTS = {
+    "piston": "piston/x",
+    "hip": "hip/q",
+    "foot_x": "foot/x",
+    "foot_z": "foot/z",
+    "axis": "axis/q",
+}
 BODY_PORTS = {"body_x": "body/x", "body_z": "body/z", "pitch": "body/pitch"}
 
 Key = tuple[str | None, str]  # (leg, symbol); leg None: the whole robot
@@ -211,16 +218,26 @@ class _Place:
         self.supply = scene.supply
         self.gravity = scene.mechanism.gravity
         self.body_mass = scene.mechanism.body_mass
+        self.sign_speed = scene.mechanism.sign_speed
 
     @property
-    def cylinder(self) -> Cylinder:
-        """The cylinder of every leg. Raises KembaError for a mechanism without pistons."""
-        return self._scene.mechanism.need_cylinder()
+    def cylinder(self) -> Bore:
+        """Dimensions of every leg's cylinder. Raises KembaError where there are no pistons."""
+        return self._scene.mechanism.need_bore()
 
     @property
     def stroke(self) -> float:
         """Stroke of every piston [m]. Raises KembaError for a mechanism without pistons."""
         return self._scene.mechanism.stroke
+
+    @property
+    def sense(self) -> Any:
+        """Direction in which the piston's seals slide: what an effect publishes, else the sign of
+        its rate."""
+        for instance in self._scene.instances:
+            if instance.leg == self._leg and "sense" in instance.effect.publishes:
+                return self._scene.lookup(self._leg, "sense")
+        return direction(self.piston.v, self.sign_speed)
 
     @property
     def legs(self) -> list[At]:

@@ -13,9 +13,10 @@ from kemba.effects import AnyEffect, Effect
 from kemba.effects.catalogue import CHAMBERS
 from kemba.effects.pneumatics.constants import ATMOSPHERE
 from kemba.errors import KembaError
-from kemba.mechanism import load_robot, rig_mechanism, robot_mechanism
+from kemba.mechanism import OwnRig, load_robot, rig_mechanism, robot_mechanism
 from kemba.mechanism.robot_file import find_file, robot_files
 from kemba.model.model import Model
+from kemba.model.own_rig import own_model
 from kemba.quantity import Param
 
 Supply = Annotated[float, Param("Pa", 0.1e6, lower=ATMOSPHERE, doc="supply pressure")]
@@ -26,8 +27,9 @@ class ModelSpec(BaseModel):
 
     `base` names another model whose effects come first; one of the same name replaces it.
     `robot` is a path relative to the file that says it, then to the current folder, then a
-    shipped name; once loaded, the whole path. `chambers: orifice` swaps the first-order chambers
-    for eq. 1-3.
+    shipped name; once loaded, the whole path. `rig`: one of the user's own in the place of a
+    robot; without any effects only pressure x area, or inertia, counts. `chambers: orifice` swaps
+    the first-order chambers for eq. 1-3.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -35,6 +37,7 @@ class ModelSpec(BaseModel):
     name: str = "model"
     base: str | None = None
     robot: str | None = None
+    rig: OwnRig | None = None
     supply: Supply | None = None
     chambers: Literal["first_order", "orifice"] | None = None
     effects: tuple[AnyEffect, ...] = Field(default=())
@@ -47,7 +50,8 @@ def load_spec(name: str | Path = "planning") -> ModelSpec:
     for _, base in bases:
         merged = {e.name: e for e in (*base.effects, *spec.effects)}
         update: dict[str, Any] = {
-            key: getattr(spec, key) or getattr(base, key) for key in ("robot", "supply", "chambers")
+            key: getattr(spec, key) or getattr(base, key)
+            for key in ("robot", "rig", "supply", "chambers")
         }
         spec = spec.model_copy(update={**update, "effects": tuple(merged.values())})
     return spec.model_copy(update={"base": None})
@@ -108,6 +112,8 @@ def build_model(
     `rig`: the same effects on the piston of the bench; effects whose ports it lacks are left out.
     Raises KembaError where the spec names no robot, or a file or an effect is wrong.
     """
+    if spec.rig is not None:
+        return own_model(spec.rig, (*spec.effects, *extra), spec.name)
     if spec.robot is None:
         expected = "robot: a robot's file, or base: a model that names one, was expected"
         raise KembaError(f"model {spec.name}", "robot: missing", expected)

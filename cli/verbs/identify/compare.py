@@ -65,7 +65,8 @@ def _print(found: Comparison) -> None:
         table.add_row(c.name.replace("[", r"\["), *numbers)
     results().print(table)
     for at in sorted((c for c in found.bins if c.significant), key=lambda c: c.q_value)[:SHOWN]:
-        where = f"{at.channel} in {at.phase}, valves {at.mode}, piston {at.region}"
+        parts = (f"valves {at.mode}" * bool(at.mode), f"piston {at.region}" * bool(at.region))
+        where = ", ".join((f"{at.channel} in {at.phase}", *filter(None, parts)))
         typer.echo(f"  {where}: {at.ratio:.2g} times the noise (q = {at.q_value:.1g})")
     for hint in found.hints[:SHOWN]:
         typer.echo(f"  {hint.text}")

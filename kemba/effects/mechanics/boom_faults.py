@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, ClassVar, Literal
 
 from kemba.effects.base import At, Contribution, Effect
-from kemba.effects.mechanics.friction import direction
+from kemba.effects.mechanics.laws import direction
 from kemba.quantity import Param
 
 V_BOOM = 0.02  # m.s-1

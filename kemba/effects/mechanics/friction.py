@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, Literal
-
-import casadi as ca
+from typing import Annotated, ClassVar, Literal
 
 from kemba.effects.base import At, Contribution, Effect
+from kemba.effects.mechanics.laws import fading
 from kemba.quantity import Param
 
 V_COULOMB = 0.01  # m.s-1; below it the sign of v is smoothed
-
-
-def direction(v: Any, width: float = V_COULOMB) -> Any:
-    """The sign of a rate, smooth within `width`."""
-    return ca.tanh(v / width)
 
 
 class SealFriction(Effect):
@@ -31,7 +25,7 @@ class SealFriction(Effect):
     dissipative: ClassVar[bool] = True
 
     def evaluate(self, at: At) -> Contribution:
-        return Contribution(effort={"piston": -self.F_c * direction(at.piston.v)})
+        return Contribution(effort={"piston": -self.F_c * at.sense})
 
 
 class StribeckFriction(Effect):
@@ -49,9 +43,8 @@ class StribeckFriction(Effect):
     dissipative: ClassVar[bool] = True
 
     def evaluate(self, at: At) -> Contribution:
-        v = at.piston.v
-        fading = ca.exp(-((v / self.v_b) ** 2))
-        return Contribution(effort={"piston": -self.F_s * fading * direction(v)})
+        force = self.F_s * fading(at.piston.v, self.v_b)
+        return Contribution(effort={"piston": -force * at.sense})
 
 
 class PressureFriction(Effect):
@@ -69,4 +62,26 @@ class PressureFriction(Effect):
 
     def evaluate(self, at: At) -> Contribution:
         load = self.mu * (at.F_e + at.F_r)
-        return Contribution(effort={"piston": -load * direction(at.piston.v)})
+        return Contribution(effort={"piston": -load * at.sense})
+
+
+class DirectionFriction(Effect):
+    """Seals whose lips hold harder one way: more friction when extending by F_d, less by F_d when
+    retracting. While the piston moves, it looks like a force sensor whose zero is off."""
+
+    kind: Literal["direction_friction"] = "direction_friction"
+    F_d: Annotated[float, Param("N", 3.0, doc="half the difference, extending less retracting")] = (
+        0.0
+    )
+
+    family: ClassVar[str] = "piston"
+    equation: ClassVar[str] = "-F_d tanh(v/0.01)^2"
+    source: ClassVar[str] = (
+        "asymmetric lips of seals and wipers: H. K. Mueller, B. S. Nau, Fluid Sealing Technology"
+    )
+    ports: ClassVar[tuple[str, ...]] = ("piston",)
+    off: ClassVar[dict[str, float]] = {"F_d": 0.0}
+    own_rigs: ClassVar[bool] = True
+
+    def evaluate(self, at: At) -> Contribution:
+        return Contribution(effort={"piston": -self.F_d * at.sense**2})

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, ClassVar, Literal
 
 from kemba.effects.base import At, Contribution, Effect, Signal
-from kemba.effects.mechanics.friction import direction
+from kemba.effects.mechanics.laws import coulomb, viscous
 from kemba.quantity import Param, Quantity
 
 W_COULOMB = 0.1  # rad.s-1
@@ -25,7 +25,7 @@ class HipFriction(Effect):
     dissipative: ClassVar[bool] = True
 
     def evaluate(self, at: At) -> Contribution:
-        return Contribution(effort={"hip": -self.T_c * direction(at.hip.v, W_COULOMB)})
+        return Contribution(effort={"hip": coulomb(self.T_c, at.hip.v, W_COULOMB)})
 
 
 class HipDamping(Effect):
@@ -42,7 +42,7 @@ class HipDamping(Effect):
     dissipative: ClassVar[bool] = True
 
     def evaluate(self, at: At) -> Contribution:
-        return Contribution(effort={"hip": -self.b * at.hip.v})
+        return Contribution(effort={"hip": viscous(self.b, at.hip.v)})
 
 
 class TorqueScale(Effect):

@@ -11,6 +11,7 @@ from kemba.effects.base import At, Contribution, Effect
 from kemba.effects.pneumatics.chamber import OF_A_KIND, Pascal
 from kemba.effects.pneumatics.constants import ATMOSPHERE, GAS, KAPPA, TEMPERATURE
 from kemba.effects.pneumatics.flow import CHOKED, mass_flow, phi
+from kemba.effects.pneumatics.gas import Air
 from kemba.effects.pneumatics.tables import at_supply, beyond, filled
 from kemba.quantity import Param, Quantity, Tolerance
 
@@ -50,6 +51,7 @@ class OrificeChamber(Effect):
     publishes: ClassVar[tuple[str, ...]] = (
         *("F_e", "F_r", "F_static_e", "F_static_r", "tau_e", "tau_r"),
         *("draw_e", "draw_r", "full"),
+        *("air_e", "air_r", "exponent"),
     )
     carried_by: ClassVar[dict[str, str]] = {"F_e": "P_e", "F_r": "P_r"}
     replaces: ClassVar[tuple[str, ...]] = ("chamber", "mode_damping")
@@ -95,6 +97,8 @@ class OrificeChamber(Effect):
         draw_r = at.u_r * mass_flow(a_fill, P_s, at.P_r)
         vent_e = (1 - at.u_e) * mass_flow(a_vent, at.P_e, ATMOSPHERE)
         vent_r = (1 - at.u_r) * mass_flow(a_vent, at.P_r, ATMOSPHERE)
+        air_e = Air(at.P_e, V_e, A_e * v, draw_e, vent_e, 4 * V_e / at.cylinder.bore + 2 * A_e)
+        air_r = Air(at.P_r, V_r, -A_r * v, draw_r, vent_r, 4 * V_r / at.cylinder.bore + 2 * A_r)
         F_e, F_r = A_e * (at.P_e - ATMOSPHERE), A_r * (at.P_r - ATMOSPHERE)
         return Contribution(
             effort={"piston": F_e - F_r},
@@ -112,6 +116,9 @@ class OrificeChamber(Effect):
                 "draw_e": draw_e,
                 "draw_r": draw_r,
                 "full": full,
+                "air_e": air_e,
+                "air_r": air_r,
+                "exponent": self.n,
             },
             outputs=(
                 (Quantity("chamber/extend/F", "N", doc="extend chamber"), F_e),

@@ -9,7 +9,9 @@ import numpy as np
 
 from kemba.effects.sensors import CHANNELS
 from kemba.errors import ConfigErrors, KembaError, suggest
-from kemba.identify.logs.reading import legs_of, needed
+from kemba.identify.logs.fault import log_fault as _fault
+from kemba.identify.logs.own_rigs import own_faults
+from kemba.identify.logs.reading import OWN_RIGS, legs_of, needed
 from kemba.identify.logs.settings import GateSettings
 from kemba.identify.problem.noise import difference_sigma
 from kemba.trajectory import TIME, Array, Trajectory
@@ -46,6 +48,8 @@ def check_logs(logs: Sequence[Trajectory]) -> list[str]:
 
 def _faults(log: Trajectory) -> list[KembaError]:
     """Faults of one log; a later check runs only where the earlier ones found nothing."""
+    if log.meta["kind"] in OWN_RIGS:
+        return own_faults(log)
     for stage in (_columns, _time, _cells, _values):
         found = list(stage(log))
         if found:
@@ -245,23 +249,6 @@ def _remarks(log: Trajectory) -> Iterator[str]:
         missing = int((~np.isfinite(log[column])).sum())
         if missing:
             yield f"{name}: {column}: {missing} readings missing"
-
-
-def _fault(
-    log: Trajectory,
-    what: str,
-    expected: str = "",
-    hint: str = "",
-    row: int | None = None,
-    column: str = "",
-) -> KembaError:
-    where = log.meta.get("path", log.meta.get("name", "log"))
-    if row is not None:
-        names = ["time", *log.names]
-        bare = column.split(" [")[0]
-        at = names.index(bare) + 1 if bare in names else 1
-        where = f"{where}:{row + 2}:{at}"
-    return KembaError(f"{where}: {column}" if column else where, what, expected, hint)
 
 
 def sentence(faults: Iterable[KembaError]) -> str:

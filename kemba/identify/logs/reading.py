@@ -7,68 +7,26 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
 
-from kemba.config import find_config, load_yaml, parse
-from kemba.errors import KembaError, suggest
+from kemba.errors import KembaError
 from kemba.identify.logs.settings import GateSettings
 from kemba.identify.logs.sidecar import check_kind, check_noise
+from kemba.logs import ColumnMap, open_log
 from kemba.mechanism import Mechanism
-from kemba.quantity import Quantity, convert
-from kemba.table import read_table
-from kemba.trajectory import Array, Trajectory, sidecar
+from kemba.trajectory import Trajectory, sidecar
 
-Kind = Literal["robot", "bench"]
+Kind = Literal["robot", "bench", "cylinder", "drive", "vessel"]
 BODY = ("body/x", "body/z", "body/pitch")
 LEG = ("hip/q", "hip/tau", "piston/x", "valve/extend", "valve/retract")
 BENCH = ("piston/x", "valve/extend", "valve/retract", "piston/F")
-KINDS = ("robot", "bench")
-
-
-class Source(BaseModel):
-    """Where a column comes from: ours = sign * scale * source [unit in SI] + offset.
-
-    `delay`: seconds by which the source column lags behind the others.
-    """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    source: str
-    unit: str | None = None
-    scale: float = 1.0
-    sign: Literal[-1, 1] = 1
-    offset: float = 0.0
-    delay: float = 0.0
-
-
-class ColumnMap(BaseModel):
-    """A map file: our header (`piston/x [m]`, `time [s]`) -> the foreign column."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    kind: Kind | None = None
-    notes: str = ""
-    columns: dict[str, Source] = Field(min_length=2)
-
-
-def load_map(name: str | Path) -> ColumnMap:
-    """The map YAML `name`, a path or one shipped in configs/logs. Raises KembaError."""
-    path = find_config(str(name), "logs")
-    found = parse(load_yaml(path), ColumnMap)
-    if "time [s]" not in found.columns:
-        raise KembaError(str(path), "columns: 'time [s]' is not mapped", "every log needs its time")
-    for header in found.columns:
-        if header != "time [s]":
-            Quantity.from_header(header)
-    return found
+KINDS = ("robot", "bench", "cylinder", "drive", "vessel")
+OWN_RIGS = ("cylinder", "drive", "vessel")
 
 
 def read_log(path: str | Path, columns: ColumnMap | None = None) -> Trajectory:
     """One log, unchecked; `meta` has its kind and name. Raises KembaError with row and column."""
     path = Path(path)
-    if path.is_dir():
-        raise KembaError(str(path), "is a folder", "a CSV log was expected")
-    log = Trajectory.read(path, strict=False) if columns is None else _foreign(path, columns)
+    log = open_log(path, columns, strict=False)
     log.meta.setdefault("kind", (columns and columns.kind) or kind_of(log, path))
     log.meta["name"] = path.stem
     log.meta["path"] = str(path)
@@ -90,7 +48,10 @@ def _without_absurd(log: Trajectory) -> Trajectory:
 
 
 def read_logs(paths: Sequence[str | Path], columns: ColumnMap | None = None) -> list[Trajectory]:
-    """Several logs of one kind, in the order of their names and not of the arguments."""
+    """Several logs of one kind, in the order of their names and not of the arguments.
+
+    Raises KembaError for none, for unreadable ones and for robot and bench logs together.
+    """
     if not paths:
         raise KembaError("", "no log given", "one or more CSV files were expected")
     unique = sorted({Path(p).resolve(): Path(p) for p in paths}.values(), key=_order)
@@ -98,7 +59,7 @@ def read_logs(paths: Sequence[str | Path], columns: ColumnMap | None = None) -> 
     kinds = {log.meta["kind"] for log in logs}
     if len(kinds) > 1:
         named = ", ".join(f"{log.meta['name']}: {log.meta['kind']}" for log in logs)
-        raise KembaError("", "robot and bench logs cannot be fitted together", named)
+        raise KembaError("", "logs of several kinds cannot be fitted together", named)
     _tell_apart(logs)
     return logs
 
@@ -125,22 +86,57 @@ def needed(log: Trajectory) -> tuple[str, ...]:
     """The columns without which a log says nothing: they follow from its kind and its legs."""
     if log.meta["kind"] == "bench":
         return BENCH
+    if log.meta["kind"] in OWN_RIGS:
+        return tuple(log.meta.get("logged", ()))
     legs = legs_of(log) or ("<leg>",)
     return (*BODY, *(f"{leg}/{name}" for leg in legs for name in LEG))
 
 
 def taken_on(logs: Iterable[Trajectory], mechanism: Mechanism) -> None:
-    """Note in the logs on which machine they were taken: its legs and its stroke [m]."""
+    """Note in the logs on which machine they were taken: its legs and its stroke [m], or for a rig
+    of the user's own its kind and the columns that it needs. Raises KembaError where logs of such
+    a rig meet a model of another machine."""
     for log in logs:
+        if mechanism.rig:
+            log.meta["kind"], log.meta["logged"] = mechanism.rig, mechanism.logged
+            if mechanism.bore is not None:
+                log.meta["stroke"] = mechanism.stroke
+            continue
+        if log.meta["kind"] in OWN_RIGS:
+            what = f"is a log of a {log.meta['kind']} rig, and the model has no such rig"
+            expected = f"a model with `rig: {{kind: {log.meta['kind']}, ...}}` was expected"
+            hint = "name it with --model; docs/rigs.md shows one"
+            raise KembaError(str(log.meta.get("path", log.meta["name"])), what, expected, hint)
         log.meta["stroke"] = mechanism.stroke
         if log.meta["kind"] == "robot":
             log.meta["legs"] = list(mechanism.legs)
 
 
+def is_log(log: Trajectory) -> bool:
+    """Whether a table is a robot's or a rig's log: its sidecar says so, or its columns do."""
+    if "kind" in log.meta:
+        return True
+    try:
+        kind_of(log)
+    except KembaError:
+        return False
+    return True
+
+
 def kind_of(log: Trajectory, where: str | Path = "") -> Kind:
-    """Robot or bench, by the columns."""
+    """Robot, bench or a rig of the user's own, by the columns.
+
+    Raises KembaError for a log that is none of these.
+    """
     if any(name.startswith("body/") or "/hip/" in name for name in log.names):
         return "robot"
+    if "axis/q" in log:
+        return "drive"
+    if "vessel/P" in log:
+        return "vessel"
+    pressed = any(name in log for name in ("chamber/extend/P", "chamber/retract/P"))
+    if pressed and not any("valve/" in name for name in log.names):
+        return "cylinder"
     if any(name in BENCH for name in log.names):
         return "bench"
     raise KembaError(
@@ -153,43 +149,3 @@ def kind_of(log: Trajectory, where: str | Path = "") -> Kind:
 
 def _order(path: Path) -> tuple[str, str]:
     return path.name, str(path)
-
-
-def _foreign(path: Path, columns: ColumnMap) -> Trajectory:
-    headers, table = read_table(path, plain_headers=True)
-    time_source = columns.columns["time [s]"]
-    time = _values(path, headers, table, "time [s]", time_source)
-    found = {}
-    for header, source in columns.columns.items():
-        if header == "time [s]":
-            continue
-        values = _values(path, headers, table, header, source)
-        if source.delay:
-            values = _earlier(time, values, source.delay, hold="/valve/" in f"/{header}")
-        found[header] = values
-    meta = load_yaml(sidecar(path)).data if sidecar(path).is_file() else {}
-    return Trajectory(time, found, meta)
-
-
-def _values(path: Path, headers: list[str], table: Array, header: str, source: Source) -> Array:
-    if source.source not in headers:
-        raise KembaError(
-            f"{path}:1",
-            f"has no column '{source.source}', which the map reads as '{header}'",
-            hint=suggest(source.source, headers),
-        )
-    values: Array = table[:, headers.index(source.source)]
-    unit = header[header.index("[") + 1 : -1]
-    try:
-        values = convert(values, source.unit or unit, unit)
-    except ValueError as error:
-        raise KembaError(str(path), f"map of '{header}': unit '{source.unit}' {error}") from None
-    return np.asarray(source.sign * source.scale * values + source.offset)
-
-
-def _earlier(time: Array, values: Array, delay: float, hold: bool) -> Array:
-    """The column as it would be without its lag."""
-    if hold:
-        at = np.clip(np.searchsorted(time, time + delay, side="right") - 1, 0, len(time) - 1)
-        return np.asarray(values[at])
-    return np.interp(time + delay, time, values)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from kemba.effects import BY_KIND
 from kemba.effects.base import Effect
-from kemba.effects.sensors import SensorEffect
+from kemba.effects.mechanics.geometry import SIZES, Geometry
 from kemba.identify.problem.problem import Candidate, Parameter
 from kemba.identify.problem.sensor_faults import possible_faults
 from kemba.model.model import Model
@@ -33,24 +33,50 @@ class CandidateSettings(Settings):
 
 
 def effect_candidates(model: Model) -> dict[str, Candidate]:
-    """Every effect of the catalogue whose ports this model has and whose list lacks it."""
+    """Every effect of the catalogue whose ports this model has and whose list lacks it; those that
+    need more than their kind, such as a sensor's channel, are not among them."""
     present = {e.kind for e in model.effects}
     found = {}
     for kind, effect in BY_KIND.items():
         missing = effect.off and kind not in present
-        if missing and not issubclass(effect, SensorEffect) and _fits(model, effect):
+        if effect.own_rigs and not model.mechanism.rig:
+            continue
+        whole = not any(field.is_required() for field in effect.model_fields.values())
+        if missing and whole and _fits(model, effect):
             found[kind] = candidate(effect)
     return found
 
 
-def by_default(kind: str) -> Effect:
-    """The effect of a kind as its defaults have it: absent."""
-    return BY_KIND[kind](kind=kind)
+def by_default(name: str) -> Effect:
+    """The effect of a name as its defaults have it: absent."""
+    kind, _, place = name.partition(":")
+    where = {where_field(kind): place} if place else {}
+    return BY_KIND[kind].model_validate({"kind": kind, **where})
 
 
-def candidate(effect: type[Effect]) -> Candidate:
-    """What `effect` declares: the parameter in `off` switches it, the others are shapes."""
-    return _candidate(effect.model_fields["kind"].default, effect, effect.declared())
+def where_field(kind: str) -> str:
+    """The field that says where an effect acts, the second part of its name: a sensor's `channel`,
+    the `part` of a length, else the leg that it is `on`."""
+    fields = BY_KIND[kind].model_fields
+    return next((name for name, field in fields.items() if field.is_required()), "on")
+
+
+def geometry_candidates(model: Model) -> dict[str, Candidate]:
+    """Every length of the robot that the model's list does not correct."""
+    present = {e.name for e in model.effects}
+    parts = [Geometry(part=part) for part in SIZES] if model.mechanism.robot else []
+    return {
+        e.name: _candidate(e.name, Geometry, e.parameters()) for e in parts if e.name not in present
+    }
+
+
+def candidate(effect: type[Effect], declared: Mapping[str, Param] | None = None) -> Candidate:
+    """What `effect` declares: the parameter in `off` switches it, the others are shapes.
+
+    `declared`: parameters by name where their sizes differ from those of the class.
+    """
+    kind = effect.model_fields["kind"].default
+    return _candidate(kind, effect, effect.declared() if declared is None else declared)
 
 
 def sensor_candidates(sigmas: Mapping[str, float], model: Model) -> dict[str, Candidate]:
@@ -86,4 +112,5 @@ def _candidate(
 def _fits(model: Model, effect: type[Effect]) -> bool:
     legs = (None,) if effect.place == "body" else model.mechanism.legs
     ports = {port_name(leg, alias) for leg in legs for alias in effect.ports}
-    return ports <= set(model.mechanism.ports)
+    given = {symbol for e in model.effects for symbol in e.publishes}
+    return ports <= set(model.mechanism.ports) and given >= set(effect.needs)

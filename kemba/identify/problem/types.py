@@ -93,6 +93,7 @@ class Rows:
     `run` indexes Problem.runs, `channel` indexes `channels`; `time` [s] in its run; `phase` and
     `mode` are labels ("flight", "10"); rows of one run and channel stand in the order of time.
     `sigma` is the noise (1 sigma, in the channel's unit) that the raw residual was divided by.
+    `units` of channels by name, where their names do not tell them.
     """
 
     run: Labels
@@ -102,6 +103,7 @@ class Rows:
     mode: Texts
     channels: tuple[str, ...]
     sigma: Array
+    units: Mapping[str, str] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.time)

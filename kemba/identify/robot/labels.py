@@ -51,7 +51,7 @@ def describe(
         for key, values in whole.items():
             found.setdefault(key, []).append(values[own])
     joined = {key: np.concatenate(parts) for key, parts in found.items()}
-    return Rows(channels=channels, **joined)
+    return Rows(channels=channels, **joined)  # type: ignore[arg-type]
 
 
 def valve_modes(physics: Physics, inputs: Array, channels: Sequence[str]) -> Texts:

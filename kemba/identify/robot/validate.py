@@ -9,6 +9,7 @@ from scipy.optimize import lsq_linear
 
 from kemba.errors import KembaError
 from kemba.identify.problem.types import Array, Flags, Rows
+from kemba.identify.robot.mix_ups import mixed_up
 from kemba.identify.robot.state import LinearisedState
 from kemba.settings import BY_HAND, Settings, setting
 
@@ -47,7 +48,7 @@ def contradictions(
     absurd = RobotValidateSettings.current().absurd
     forgiven: Array | None = None
     for i, log in enumerate(state.batch.resampled):
-        sunk = list(_sunk(state, i))
+        sunk = list(mixed_up(state.physics, log)) or list(_sunk(state, i))
         yield from sunk
         own = rows.run == i
         power = _power(state.physics.channels, r, rows, own)

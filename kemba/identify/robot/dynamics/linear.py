@@ -39,7 +39,7 @@ class LinearisedMotion:
     way: Array  # (n, L, m) of the measured coordinates since the start
     places: Array  # (n, L, 3 legs): x and z of each foot, pistons
     sinking: Array  # (n, L, legs) speed of the feet, down, steady
-    masses: Array  # (n, L, k, parameters) force per share by which a mass or inertia is off
+    links: Array  # (n, L, k, figures) force per share by which a link's mass or inertia is off
     less_grip: Array  # (n, L, k) force that is missing per unit of friction coefficient
     shift: Array  # (n, L, k) acceleration that the model adds to the reference's
     A: tuple[Array, Array]  # (n, L, k, k) each: slopes of the acceleration along q and v
@@ -103,8 +103,8 @@ def linearise_along(
     inverse = batch.deep(np.asarray(np.linalg.inv(physics.call("mass", *mid, s, u, p=p)[0])))
     force = batch.deep(physics.call("residual", *mid, s, u, p=p)[0])
     at_nodes = [batch.flat(ref.q), batch.flat(ref.v)]
-    y, rate, Jy = (batch.deep(a) for a in physics.call("measured", *at_nodes))
-    feet, feet_rate, Jf = (batch.deep(a) for a in physics.call("feet", *at_nodes))
+    y, rate, Jy = (batch.deep(a) for a in physics.call("measured", *at_nodes, p=p))
+    feet, feet_rate, Jf = (batch.deep(a) for a in physics.call("feet", *at_nodes, p=p))
     slip = batch.pad([x.slides for x in schedules], 0.0)
     density, slipping = density.copy(), ContactForceSettings.current().slipping
     for leg in range(legs):  # a sliding foot pushes along the edge of its cone
@@ -139,7 +139,7 @@ def linearise_along(
         travelled(rate, batch.h),
         np.concatenate([feet, y[..., k - legs :]], axis=2),
         steady(-feet_rate[..., 1::2], dt),
-        batch.deep(physics.call("masses", *mid)[0]),
+        batch.deep(physics.call("links", *mid)[0]),
         less_grip,
         shift,
         (A_q, A_v),

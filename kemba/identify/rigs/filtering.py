@@ -1,0 +1,161 @@
+"""Position, rate and acceleration of a measured motion, and all other channels filtered alike.
+
+A balance of forces holds for filtered channels as it holds for the channels themselves, if each of
+them goes through the same filter ("parallel filtering", M. Gautier, 1997). So the filter costs no
+accuracy of an inertia, and a rate is the difference of the filtered position.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+
+from kemba.identify.problem.noise import difference_sigma
+from kemba.identify.problem.types import Array
+from kemba.settings import BY_HAND, Settings, setting
+
+# noise of value, rate, acceleration behind a Gaussian of s samples: c sigma / (step^k s^(k + 1/2))
+GAIN = (0.5311, 0.3756, 0.4600)
+
+
+class RigFilterSettings(Settings):
+    """How the channels of a rig's log are filtered."""
+
+    widths: tuple[int, ...] = setting(
+        (3, 4, 6, 8, 12, 16, 24, 32), "1", "widths (1 sigma) in samples that are tried", BY_HAND
+    )
+    creep: float = setting(
+        0.2,
+        "1",
+        "noise of the rate that is small enough, as a share of `sign_speed`",
+        "derived: the sign of a rate is then certain",
+    )
+    weight: float = setting(
+        0.01,
+        "1",
+        "noise of the inertia's force that is small enough, as a share of the force's spread",
+        BY_HAND,
+    )
+    reach: float = setting(
+        4.0, "1", "widths beyond which the Gaussian is cut off", "convention: 6e-5 of it is lost"
+    )
+    gap: float = setting(5.0, "1", "rows farther apart than so many usual steps are a gap", BY_HAND)
+    finest: float = setting(5e-4, "1", "smallest noise, as a share of a channel's range", BY_HAND)
+
+
+@dataclass(frozen=True)
+class Filtered:
+    """Channels on a regular grid, filtered; the grid has jumps where the log has gaps.
+
+    `time` [s], `q`, `v`, `a` (n,): position and its rates; `others` (n,) by name. `rows` (k,):
+    indices of the rows that are judged, away from gaps. `q_sigma`, `v_sigma`, `a_sigma`: noise of
+    the filtered position and its rates; `sigma`: noise of the others by name. `width` [s] of the
+    filter. `begins` (m,): first index of every stretch without a gap.
+    """
+
+    time: Array
+    q: Array
+    v: Array
+    a: Array
+    others: dict[str, Array]
+    rows: np.ndarray
+    q_sigma: float
+    v_sigma: float
+    a_sigma: float
+    sigma: dict[str, float]
+    width: float
+    begins: np.ndarray
+
+
+def filtered(
+    time: Array,
+    position: Array,
+    others: Mapping[str, Array],
+    creep: float,
+    heavy: float = 0.0,
+    known: Mapping[str, float] | None = None,
+) -> Filtered:
+    """The channels of one log, all through one filter.
+
+    The filter is the narrowest one behind which the rate is known well against `creep` [unit of
+    the rate] and the force of the inertia `heavy` well against the other channels. `known`: noise
+    (1 sigma) by name, "" for the position. Rows with a missing reading are left out.
+    """
+    settings, known = RigFilterSettings.current(), known or {}
+    good = np.isfinite(position) & np.all([np.isfinite(y) for y in others.values()], axis=0)
+    time, position = time[good], position[good]
+    others = {name: y[good] for name, y in others.items()}
+    step = float(np.median(np.diff(time)))
+    noise = known.get("", max(difference_sigma(position), settings.finest * np.ptp(position) / 50))
+    force = max((float(np.std(y)) for y in others.values()), default=1.0)
+    width = next(
+        (s for s in settings.widths
+         if _rate_noise(noise, step, s) <= settings.creep * creep
+         and heavy * _bend_noise(noise, step, s) <= settings.weight * force),
+        settings.widths[-1],
+    )  # fmt: skip
+    names = list(others)
+    parts, begins, rows, count = [], [], [], 0
+    for first, last in _stretches(time, settings.gap * step):
+        n = int((time[last] - time[first]) / step) + 1
+        if n < 2 * settings.reach * width + 3:
+            continue
+        grid = time[first] + step * np.arange(n)
+        columns = [np.interp(grid, time, y) for y in (position, *others.values())]
+        smooth = [
+            gaussian_filter1d(y, width, truncate=settings.reach, mode="nearest") for y in columns
+        ]
+        v = np.gradient(smooth[0], step)
+        parts.append(np.stack([grid, smooth[0], v, np.gradient(v, step), *smooth[1:]]))
+        begins.append(count)
+        edge = int(settings.reach * width) + 2
+        rows.append(count + np.arange(edge, n - edge, width))
+        count += n
+    if not parts:
+        return _nothing(names)
+    table = np.concatenate(parts, axis=1)
+    sigma = {
+        name: GAIN[0] / np.sqrt(width)
+        * known.get(name, max(difference_sigma(y), settings.finest * float(np.ptp(y))))
+        for name, y in others.items()
+    }  # fmt: skip
+    return Filtered(
+        table[0],
+        table[1],
+        table[2],
+        table[3],
+        dict(zip(names, table[4:], strict=True)),
+        np.concatenate(rows),
+        GAIN[0] * noise / np.sqrt(width),
+        _rate_noise(noise, step, width),
+        _bend_noise(noise, step, width),
+        sigma,
+        width * step,
+        np.array(begins),
+    )
+
+
+def _rate_noise(sigma: float, step: float, width: int) -> float:
+    return float(GAIN[1] * sigma / (step * width**1.5))
+
+
+def _bend_noise(sigma: float, step: float, width: int) -> float:
+    return float(GAIN[2] * sigma / (step**2 * width**2.5))
+
+
+def _stretches(time: Array, longest: float) -> list[tuple[int, int]]:
+    """First and last row of every stretch without a longer step."""
+    cuts = np.flatnonzero(np.diff(time) > longest)
+    firsts, lasts = np.append(0, cuts + 1), np.append(cuts, len(time) - 1)
+    return list(zip(firsts.tolist(), lasts.tolist(), strict=True))
+
+
+def _nothing(names: list[str]) -> Filtered:
+    none = np.zeros(0)
+    index = np.zeros(0, dtype=int)
+    empty = dict.fromkeys(names, none)
+    zero = dict.fromkeys(names, 0.0)
+    return Filtered(none, none, none, none, empty, index, 0.0, 0.0, 0.0, zero, 0.0, index)

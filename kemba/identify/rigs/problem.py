@@ -1,0 +1,194 @@
+"""Logs of a cylinder with measured pressures or of a drive: the balance of forces as residuals."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from copy import copy
+
+import numpy as np
+from typing_extensions import Self
+
+from kemba.identify.bench.missing import lagged
+from kemba.identify.problem.noise import Colour, learn, whiten
+from kemba.identify.problem.problem import Problem
+from kemba.identify.problem.sensor_faults import is_straight
+from kemba.identify.problem.types import (
+    Array,
+    ForceChannel,
+    MissingForce,
+    OperatingPoint,
+    Rows,
+    Theta,
+)
+from kemba.identify.rigs.candidates import possible_candidates
+from kemba.identify.rigs.predictor import Predictor
+from kemba.identify.rigs.rig_log import RigLog, prepare
+from kemba.identify.rigs.sizes import sized, usual_force
+from kemba.model.model import Model
+from kemba.settings import Settings, setting
+from kemba.trajectory import Trajectory
+
+
+class RigProblemSettings(Settings):
+    """How well the sensors of a rig are known."""
+
+    weather: float = setting(
+        1e3,
+        "Pa",
+        "prior sigma of the zero of a pressure sensor",
+        "derived: the pressure of the air changes by 1 kPa (1 sigma) with the weather",
+    )
+
+
+class RigProblem(Problem):
+    """`Problem` for logs of a cylinder or a drive. One row per judged row of a log: predicted less
+    measured force, over its noise; `colour` of the noise by run."""
+
+    learns_colour = True
+
+    def __init__(self, logs: Sequence[RigLog], model: Model) -> None:
+        self.model, self.logs = model, tuple(logs)
+        self.runs = tuple(log.name for log in self.logs)
+        possible = possible_candidates(model, self.logs)
+        predictor = Predictor(model, possible)
+        self.candidates = sized(predictor, self.logs, possible)
+        self.usual = usual_force(predictor, self.logs)
+        self.predictor = predictor
+        predictor.candidates = self.candidates
+        self.nuisance = predictor.figures | predictor.sensors.nuisance
+        zero = RigProblemSettings.current().weather
+        for name in model.mechanism.logged:
+            key = f"sensor_bias:{name}"
+            if name.endswith("/P") and key not in predictor.sensors.listed:
+                self.nuisance[f"{key}.b"] = (0.0, zero)
+                self.candidates.pop(key, None)
+        self._sigma = [np.sqrt(predictor.variance(log, self.usual)) for log in self.logs]
+        self.colour: Mapping[int, Colour] = {}
+
+    @property
+    def answer(self) -> str:
+        """The channel that is predicted."""
+        return self.predictor.answer
+
+    @property
+    def unit(self) -> str:
+        """Unit of that channel."""
+        return self.model.mechanism.logged[self.answer]
+
+    def residual(self, theta: Theta, runs: Collection[int] | None = None) -> Array:
+        parts = []
+        for i in self._all(runs):
+            r = self.predictor.gap(self.logs[i], theta) / self._sigma[i]
+            parts.append(whiten(r, self.colour[i]) if i in self.colour else r)
+        return np.concatenate(parts)
+
+    def rows(self, runs: Collection[int] | None = None) -> Rows:
+        still, parts = self.model.mechanism.sign_speed, []
+        for i in self._all(runs):
+            log = self.logs[i]
+            n, v = len(log.time), log.speed
+            phase = np.where(np.abs(v) < still, "rest", np.where(v > 0, "forward", "back"))
+            parts.append((np.full(n, i), log.time, phase, self._sigma[i]))
+        run, time, phase, sigma = (np.concatenate(p) for p in zip(*parts, strict=True))
+        n = len(run)
+        mode = np.full(n, "", dtype=object)
+        return Rows(
+            run,
+            np.zeros(n, dtype=int),
+            time,
+            phase,
+            mode,
+            (self.answer,),
+            sigma,
+            {self.answer: self.unit},
+        )
+
+    def recolour(self, residual: Array | None, careful: bool = False) -> Self:
+        """The same problem, each run's colour learnt from `residual` (n,), or forgotten."""
+        found = copy(self)
+        found.colour = {}
+        if residual is not None:
+            run = self.rows().run
+            found.colour = {
+                i: learn(residual[run == i], careful=careful) for i in range(len(self.logs))
+            }
+        return found
+
+    def whiten(self, columns: Array) -> Array:
+        """Columns (n, k) that were not whitened, as `jacobian` would return them."""
+        run, out = self.rows().run, columns.copy()
+        for i, colour in self.colour.items():
+            out[run == i] = whiten(columns[run == i], colour)
+        return np.asarray(out)
+
+    def is_straight(self, name: str) -> bool:
+        """Whether the residual is linear in a figure."""
+        return is_straight(name)
+
+    def operating_point(self) -> OperatingPoint:
+        """The piston of every row; a drive has none."""
+        bore = self.model.mechanism.bore
+        if bore is None:
+            return OperatingPoint.nowhere(sum(len(log.time) for log in self.logs))
+        place, speed, force = (np.concatenate(p) for p in zip(*self._seen(), strict=True))
+        return OperatingPoint(place, speed, force, bore.stroke)
+
+    def force_channels(self) -> list[ForceChannel]:
+        """Where a force may be missing: on the rod, or on the axis."""
+        sigma = np.concatenate(self._sigma)
+        place, speed, force = (np.concatenate(p) for p in zip(*self._seen(), strict=True))
+        slow = np.abs(speed) < self.model.mechanism.sign_speed
+        unit = "m" if self.model.mechanism.bore else self.model.mechanism.logged["axis/q"]
+        quantities = {
+            f"speed [{unit}/s]": np.where(slow, np.nan, speed),
+            f"position [{unit}]": place,
+            f"load [{self.unit}]": force,
+        }
+
+        def columns(shapes: Array) -> Array:
+            return self.whiten(np.asarray(shapes / sigma[:, None]))
+
+        name = "rod" if self.model.mechanism.bore else "axis"
+        return [ForceChannel(name, self.unit, self.usual, quantities, columns)]
+
+    def missing_force(
+        self, theta: Theta | None = None, strength: Array | None = None
+    ) -> list[MissingForce]:
+        """The force that is missing, per run."""
+        found, known = [], None if strength is None else float(strength[0])
+        for log, sigma in zip(self.logs, self._sigma, strict=True):
+            gap = -self.predictor.gap(log, theta or {})
+            force, spread, used = lagged(log.time, gap, sigma**2, known)
+            found.append(
+                MissingForce(
+                    log.name,
+                    log.time,
+                    (self.answer,),
+                    (self.unit,),
+                    force[:, None],
+                    spread[:, None],
+                    np.array([used]),
+                )
+            )
+        return found
+
+    def window_errors(self, theta: Theta) -> Mapping[str, Array]:
+        """Measured less predicted force (n,)."""
+        gaps = [-self.predictor.gap(log, theta) for log in self.logs]
+        return {self.answer: np.concatenate(gaps)}
+
+    def _all(self, runs: Collection[int] | None) -> Collection[int]:
+        return range(len(self.logs)) if runs is None else runs
+
+    def _seen(self) -> list[tuple[Array, Array, Array]]:
+        """Position, rate and measured force (k,) of every run."""
+        found = []
+        for log in self.logs:
+            c, rows = log.channels, log.channels.rows
+            found.append((c.q[rows], c.v[rows], c.others[self.answer][rows]))
+        return found
+
+
+def rig_problem(logs: Sequence[Trajectory], model: Model) -> RigProblem:
+    """The problem of explaining logs of a cylinder or a drive with `model` and its candidates."""
+    return RigProblem([prepare(log, model) for log in logs], model)

@@ -1,0 +1,66 @@
+"""One log of a cylinder or a drive, prepared for the balance of forces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from kemba.errors import KembaError
+from kemba.identify.logs.gate import BadData
+from kemba.identify.problem.types import Array
+from kemba.identify.rigs.filtering import Filtered, filtered
+from kemba.model.model import Model
+from kemba.trajectory import Trajectory
+
+ANSWER = {"cylinder": "piston/F", "drive": "axis/tau"}
+PLACE = {"cylinder": "piston/x", "drive": "axis/q"}
+
+
+@dataclass(frozen=True)
+class RigLog:
+    """The filtered channels of one log; `doubt` (k,): share of a friction's size by which it is
+    uncertain at each judged row, because the sign of the rate is."""
+
+    name: str
+    channels: Filtered
+    doubt: Array
+
+    @property
+    def time(self) -> Array:
+        """Times (k,) [s] of the judged rows."""
+        return np.asarray(self.channels.time[self.channels.rows])
+
+    @property
+    def speed(self) -> Array:
+        """Rate (k,) at the judged rows."""
+        return np.asarray(self.channels.v[self.channels.rows])
+
+
+def prepare(log: Trajectory, model: Model) -> RigLog:
+    """A log of `model`'s rig. Raises BadData where its stretches without gaps are too short."""
+    mechanism = model.mechanism
+    place = PLACE[mechanism.rig]
+    names = [name for name in mechanism.logged if name != place]
+    given = log.meta.get("noise", {})
+    known = {("" if name == place else name): sigma for name, sigma in given.items()}
+    heavy = _inertia(model)
+    found = filtered(
+        log.time, log[place], {n: log[n] for n in names}, mechanism.sign_speed, heavy, known
+    )
+    name = str(log.meta.get("name", "log"))
+    if not len(found.rows):
+        what = "has no stretch without gaps that is long enough for a rate"
+        hint = "log faster, or longer without a break"
+        raise BadData([KembaError(str(log.meta.get("path", name)), what, hint=hint)])
+    v, a = found.v[found.rows], found.a[found.rows]
+    blur = 2.0 * np.hypot(found.v_sigma, a * found.width)
+    high, low = (np.tanh((v + side * blur) / mechanism.sign_speed) for side in (1.0, -1.0))
+    return RigLog(name, found, 0.5 * (high - low))
+
+
+def _inertia(model: Model) -> float:
+    """Inertia of a drive, 0 of a cylinder: its rod is taken to have none."""
+    if model.mechanism.rig != "drive":
+        return 0.0
+    return float(model.parameters["drive_axis.J"][1])
