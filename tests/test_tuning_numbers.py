@@ -70,7 +70,7 @@ CONSTANTS = {  # file -> names, why
     "policy/course.py": ("CLOSING BESIDE PASSES", "how impacts are read"),
     "identify/robot/dynamics/physics.py": ("FOLDED", "how far a knee folds at most"),
     "learn/round.py": ("SUPPLY", "of a model that names none"),
-    "identify/rigs/filtering.py": ("GAIN REACH", "a Gaussian's cut"),
+    "identify/rigs/filtering.py": ("GAIN", "a Gaussian's cut"),
     "logs/draft/matching.py": ("ENOUGH SAID_TOO UNRELATED NOTHING", "how names are matched"),
     "logs/draft/stamps.py": ("GAPS", "steps of time that must rise"),
     "ocp/certificate/grazing.py": ("LASTS TOUCHES", "as in plant/execution/replay.py"),
