@@ -53,7 +53,7 @@ CONSTANTS = {  # file -> names, why
     "plant/execution/repeat.py": ("VALVE_SCATTER", "scatter of the robot's valves"),
     "plant/execution/controller.py": ("PERIOD", "rate of the robot's controller"),
     "ocp/controller.py": ("PERIOD", "rate of the robot's controller"),
-    "effects/drive/axis.py": ("PLATE", "tolerance of an effect's figures"),
+    "effects/rigs/axis.py": ("PLATE", "tolerance of an effect's figures"),
     "effects/mechanics/geometry.py": ("SIZES", "sizes of an effect's parameters"),
     "mechanism/own_rigs.py": ("GRAVITY", "of the earth"),
     # formulas and formats
@@ -65,10 +65,12 @@ CONSTANTS = {  # file -> names, why
     "logs/draft/layout.py": ("LINES", "lines of a table that are looked at"),
     "ocp/transcription/stage.py": ("ANGLE_ARM COST_SCALE AIM", "units of moments and costs"),
     "ocp/task/requirement.py": ("SCALES MOMENTS FLIGHT ROUND", "moments of a task; units"),
+    "contract/cases.py": ("OWN_RIGS", "figures of example rigs"),
     # tuning numbers that are to become settings
+    "policy/course.py": ("CLOSING BESIDE PASSES", "how impacts are read"),
     "identify/robot/dynamics/physics.py": ("FOLDED", "how far a knee folds at most"),
     "learn/round.py": ("SUPPLY", "of a model that names none"),
-    "identify/rigs/filtering.py": ("GAIN REACH", "a Gaussian's cut"),
+    "identify/rigs/filtering.py": ("GAIN", "a Gaussian's cut"),
     "logs/draft/matching.py": ("ENOUGH SAID_TOO UNRELATED NOTHING", "how names are matched"),
     "logs/draft/stamps.py": ("GAPS", "steps of time that must rise"),
     "ocp/certificate/grazing.py": ("LASTS TOUCHES", "as in plant/execution/replay.py"),
