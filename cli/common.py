@@ -64,6 +64,15 @@ def say(text: str, quiet: bool = False) -> None:
         typer.echo(text, err=True)
 
 
+def newest(quiet: bool, holds: str = "trajectory.csv") -> Path:
+    """The newest run here that has the file `holds`; says which. Raises KembaError."""
+    from kemba.runs import newest_run
+
+    run = newest_run(holds)
+    say(f"the newest run: {run}", quiet)
+    return run
+
+
 def print_json(data: Any) -> None:
     """The one JSON object of `--json` on stdout; NaN becomes null."""
     from kemba.files import plain

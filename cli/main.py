@@ -30,6 +30,7 @@ from kemba_cli.verbs.plan.solve import solve
 from kemba_cli.verbs.plan.sweep import sweep
 from kemba_cli.verbs.show.plot import plot
 from kemba_cli.verbs.show.report import report
+from kemba_cli.verbs.show.review import review
 from kemba_cli.verbs.show.view import view
 
 VERBS = (
@@ -47,6 +48,7 @@ VERBS = (
     plot,
     view,
     report,
+    review,
     export,
     schema,
 )

@@ -22,6 +22,7 @@ from kemba.trajectory import Trajectory
 __all__ = ["Run", "RunFolder", "load_run", "write_json"]
 
 MANIFEST = "manifest.json"
+PLANT_RUN = "plant.csv"  # the motion of the simulated robot, in the plan's clock
 LIBRARIES = ("casadi", "pin", "numpy")
 
 
@@ -138,6 +139,30 @@ def load_run(path: str | Path) -> Run:
         expected = f"a folder with a {MANIFEST}, as solve writes it, was expected"
         raise KembaError(str(folder), "is not a run folder", expected)
     return Run(folder, read_manifest(folder))
+
+
+def newest_run(holds: str = "trajectory.csv", folder: str | Path = "runs") -> Path:
+    """The run in `folder` that was begun last, of those with the file `holds`.
+
+    Raises KembaError where there is none.
+    """
+    found = [file.parent for file in Path(folder).glob(f"*/{holds}")]
+    if not found:
+        hint = "make one with: kemba-opt solve jump.yaml"
+        raise KembaError(str(folder), f"no run here has a {holds}", "a run was expected", hint)
+    return max(found, key=lambda run: _begun(run, holds))
+
+
+def newest_logs(run: Path) -> list[Path]:
+    """The logs of a run that were written last: those of its newest folder `logs`, `logs-2`, ..."""
+    found = [sorted(folder.glob("*.csv")) for folder in run.glob("logs*")]
+    return max(filter(None, found), key=lambda logs: logs[0].stat().st_mtime, default=[])
+
+
+def _begun(run: Path, holds: str) -> tuple[str, float]:
+    """When a run was begun: by its manifest, whose seconds may be those of others, then by age."""
+    began = str(read_manifest(run).get("started", "")) if (run / MANIFEST).is_file() else ""
+    return began, (run / holds).stat().st_mtime
 
 
 def versions() -> dict[str, str]:

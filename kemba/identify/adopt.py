@@ -34,7 +34,10 @@ def write_model(
 
 
 def item(name: str, parameters: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-    """One effect of a model's list from its row of the ranking."""
+    """One effect of a model's list from its row of the ranking.
+
+    Raises KembaError for an effect that the catalogue lacks.
+    """
     kind, _, place = name.partition(":")
     values = {p: float(f"{v['value']:.6g}") for p, v in parameters.items()}
     if kind not in BY_KIND:

@@ -111,7 +111,8 @@ def values(search: Search, hypothesis: Hypothesis, effect: str) -> dict[str, Val
 
 
 def reported(candidate: Candidate, name: str, unit: str, triple: Array) -> tuple[str, str, Array]:
-    """A parameter as the catalogue names it, also where it was searched reciprocally."""
+    """Name, unit and `triple` (3,) = value, low, high of a parameter as the catalogue has it, also
+    where the search was for its reciprocal value."""
     if name not in candidate.reciprocal:
         return name, unit, triple
     name, unit = candidate.reciprocal[name]

@@ -121,7 +121,7 @@ def write_answer(answer: Answer, out: Path, model: str) -> None:
     data: dict[str, Any] = answer.json()
     for stale in ("model.yaml", "answer.json"):
         (out / stale).unlink(missing_ok=True)
-    if answer.verdict == "missing":
+    if answer.added:
         path = write_model(out / "model.yaml", model, data["ranking"], answer.added)
         answer.model = data["model"] = str(path)
     write_json(out / "answer.json", data | {"base": reference(model)})

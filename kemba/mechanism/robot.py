@@ -13,8 +13,15 @@ from kemba.mechanism import knee
 from kemba.mechanism.links import Offsets, Robot, altered, nominal_length
 from kemba.mechanism.pin_model import build_pin_model
 from kemba.mechanism.planar import Mechanism, Port
-from kemba.mechanism.recursion import FrameMotion, Joint, forward, read_joints, rnea
-from kemba.mechanism.tolerances import link_forces, link_tolerances
+from kemba.mechanism.recursion import (
+    FrameMotion,
+    Joint,
+    forward,
+    link_forces,
+    link_tolerances,
+    read_joints,
+    rnea,
+)
 from kemba.quantity import Quantity
 
 HIP_RANGE = 1.4  # rad; beyond it the knee would rise above the body
@@ -65,7 +72,7 @@ def robot_mechanism(
         mirror=_mirror(robot),
         standing=standing_pose(robot),
         points=_points(shape, motions),
-        tolerances=link_tolerances(robot),
+        tolerances=link_tolerances(joints, robot.tolerances.model_dump()),
     )
 
 
@@ -79,7 +86,8 @@ def link_regressors(mechanism: Mechanism) -> ca.Function:
     tree = tree_angles(robot, m.q)
     rate = ca.jtimes(tree, m.q, m.v)
     acc = ca.jtimes(rate, m.q, m.v) + ca.jtimes(tree, m.q, m.a)
-    forces = link_forces(robot, tree, rate, acc, tuple(m.tolerances))
+    joints = read_joints(build_pin_model(robot))
+    forces = link_forces(joints, m.tolerances, (tree, rate, acc), robot.gravity)
     columns = [ca.jtimes(tree, m.q, force, True) for force in forces]
     return ca.Function("regress", [m.q, m.v, m.a], [ca.horzcat(ca.SX(m.n, 0), *columns)])
 

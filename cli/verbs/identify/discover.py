@@ -73,6 +73,8 @@ def _tell(answer: Answer, out: Path, json: bool, quiet: bool) -> None:
         print_json(answer.json())
         return
     typer.echo(answer.sentence)
+    if answer.ranking:
+        typer.echo("  How likely each effect is among the missing ones (need not add up to 100 %):")
     for ranked in answer.ranking[:5]:
         values = ", ".join(f"{name} = {value}" for name, value in ranked.parameters.items())
         typer.echo(f"  {100 * ranked.probability:5.1f} %  {ranked.effect:28s} {values}")

@@ -83,7 +83,7 @@ def solve(
         _dry_run(resolved, document, model, json)
         return
     resolved = resolved.model_copy(update={"model": beside(model or resolved.model, Path())})
-    built = task_model(resolved)
+    built = task_model(resolved, document=document)
     resolve(resolved, built, document)
     if built.ignored:
         say(f"no plan can use {', '.join(built.ignored)}: it changes what is measured only", quiet)

@@ -7,16 +7,17 @@ from typing import Annotated
 
 import typer
 
-from kemba_cli.common import Force, Json, OwnEffects, Quiet, print_json
+from kemba_cli.common import Force, Json, OwnEffects, Quiet, newest, print_json
 
 
 def plot(
     runs: Annotated[
-        list[Path],
+        list[Path] | None,
         typer.Argument(
-            help="Run folders and CSVs, several over each other; or one folder of bench logs."
+            help="Run folders and CSVs, several over each other; one folder of bench logs "
+            "(the newest run)."
         ),
-    ],
+    ] = None,
     save: Annotated[
         Path | None,
         typer.Option(help="PNG, PDF or SVG (a new one beside the first run)."),
@@ -50,6 +51,7 @@ def plot(
     for path, option in ((save, "--save"), (animate, "--animate")):
         if path is not None:
             fresh(path, force, option)
+    runs = runs or [newest(quiet)]
     window = open_window() if show else None
     logs = plotting.bench_logs(runs[0]) if len(runs) == 1 else {}
     if logs and animate:
@@ -69,7 +71,7 @@ def plot(
     paths = {kind: str(path) for kind, path in written.items()}
     if json:
         print_json({**paths, "runs": names})
-    elif not quiet:
+    else:
         for path in paths.values():
             typer.echo(path)
     if show:

@@ -113,13 +113,14 @@ class WallHeat(Effect):
 class VesselChamber(Effect):
     """Air in a vessel of fixed volume that blows down through an orifice; the rig brings it along.
 
-    `a` is the effective area: that of the hole times its discharge coefficient.
+    `a` is the effective area: that of the hole times its discharge coefficient. `wall` [m2]: area
+    of the inner wall; `ambient` [K]: its temperature; `outside` [Pa]: pressure behind the hole.
     """
 
     kind: Literal["vessel_chamber"] = "vessel_chamber"
     V: Annotated[float, Param("m3", 1e-3, lower=1e-9, doc="inside")] = 1e-3
     a: Annotated[float, Param("m2", 1e-6, lower=0.0, doc="effective area of the orifice")] = 1e-6
-    wall: Annotated[float, Param("m2", 0.1, lower=0.0, doc="area of the inner wall")] = 0.05
+    wall: float = 0.05
     ambient: float = TEMPERATURE
     outside: float = 101325.0
 

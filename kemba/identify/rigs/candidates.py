@@ -1,4 +1,4 @@
-"""What may be missing on a rig of the user's own: effects that fit it, and faults of its sensors."""
+"""What may be missing on a rig of the user's own: effects that fit it, sensor faults."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def possible_candidates(model: Model, logs: Sequence[RigLog]) -> dict[str, Candi
 
 
 def stands(model: Model, kind: str) -> bool:
-    """Whether the model can have the effect: it may read what nothing gives here, such as valves."""
+    """Whether the model can have the effect: some read what is not here, such as valves."""
     try:
         _ = model.with_effects([by_default(kind)]).node
     except KembaError:

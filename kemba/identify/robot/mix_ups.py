@@ -2,21 +2,24 @@
 
 While the ground carries the robot, its lowest foot is on the ground and stands still, and each
 foot does so for a part of the time. Where the measured motion says otherwise, each usual mistake is
-put right in turn; the one after which the feet stand is named. Only the geometry of the robot is used, no forces.
+put right in turn; the one after which the feet stand is named. Only the geometry of the robot is
+used, no forces.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 import numpy as np
 from scipy.signal import savgol_filter
 
 from kemba.errors import KembaError
-from kemba.identify.robot.dynamics.physics import Array, Physics
+from kemba.identify.robot.dynamics.physics import Array, Flags, Physics
 from kemba.identify.robot.motion.resampled import ResampledLog
 from kemba.settings import BY_HAND, Settings, setting
 
+Indices = np.ndarray[Any, np.dtype[np.int_]]
 Change = Callable[[Array], Array]
 MixUp = tuple[str, dict[str, Change]]
 
@@ -97,23 +100,24 @@ def _turned(offset: float) -> Change:
     return lambda y: offset - y
 
 
-def _rows(log: ResampledLog) -> Array:
+def _rows(log: ResampledLog) -> Indices:
     """Rows (n,) at which the ground carries the robot, half a window from the ends at least."""
     limits = MixUpSettings.current()
     step = float(np.median(np.diff(log.time)))
     half = max(1, round(0.5 * limits.window / step))
-    good = np.isfinite(log.y).all(axis=1)
+    good: Flags = np.asarray(np.isfinite(log.y).all(axis=1))
     if len(log.time) < 4 * half + 1 or good.sum() < 4 * half + 1:
         return np.empty(0, dtype=int)
     z = np.interp(log.time, log.time[good], log.y[good, 1])
     fall = savgol_filter(z, 2 * half + 1, 2, deriv=2, delta=step)
     rows = np.arange(half, len(z) - half, max(1, round(limits.row / step)))
-    known = good[rows] & good[rows - half] & good[rows + half]
-    return np.asarray(rows[known & (fall[rows] > -limits.carried)])
+    known = np.asarray(good[rows] & good[rows - half] & good[rows + half])
+    carried = np.asarray(fall[rows] > -limits.carried)
+    return np.asarray(rows[known & carried])
 
 
 def _restless(
-    physics: Physics, log: ResampledLog, rows: Array, change: dict[str, Change], p: Array
+    physics: Physics, log: ResampledLog, rows: Indices, change: dict[str, Change], p: Array
 ) -> float:
     """How far [m] feet are from the ground and from their place one window before.
 

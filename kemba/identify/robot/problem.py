@@ -92,9 +92,12 @@ class RobotProblem(Problem):
         sigma = dict(zip(physics.channels, np.median(batch.sigma, axis=0).tolist(), strict=True))
         self.candidates: dict[str, Candidate] = {**found, **sensor_candidates(sigma, model)}
         sensors = SensorFaults(model.effects)
+        noise = stated_noise(batch)
         reference = first_reference(physics, batch, physics.nominal)
         self.lengths = standing_lengths(physics, batch, reference, self.candidates)
-        self.state = linearise_at(physics, batch, sensors, self.lengths, ground, self.unknown)
+        self.state = linearise_at(
+            physics, batch, sensors, self.lengths, ground, self.unknown, noise
+        )
         self.nuisance = {**physics.nuisance, **sensors.nuisance, **physics.links}
 
     @property
@@ -133,7 +136,7 @@ class RobotProblem(Problem):
         return found
 
     def residual(self, theta: Theta, runs: Collection[int] | None = None) -> Array:
-        """Whitened (predicted - measured), rows as `rows` describes them."""
+        """Whitened (predicted - measured) (n,), rows as `rows` describes them."""
         return self.state.pick(self.state.residuals([theta]), runs)[:, 0]
 
     def jacobian(
@@ -217,7 +220,7 @@ class RobotProblem(Problem):
     def missing_force(
         self, theta: Theta | None = None, strength: Array | None = None
     ) -> list[MissingForce]:
-        """Force on the body, moments at pitch and hips, force on the rods."""
+        """Forces on body and rods, moments at pitch and hips; `strength` (k,): 1 sigma each."""
         return robot_missing(self.state, theta or {}, strength)
 
     def force_channels(self) -> list[ForceChannel]:
@@ -241,7 +244,7 @@ class RobotProblem(Problem):
         return self.jacobian(self.lengths, [c.key for c in faults]) * [c.lead.size for c in faults]
 
     def formulas(self, theta: Theta) -> Mapping[str, Array]:
-        """Simple terms on rods, hips and body; the same at every theta."""
+        """Simple terms on rods, hips and body: formula -> column (n,), the same at every theta."""
         return formula_columns(self.state)
 
 
