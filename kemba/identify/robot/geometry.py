@@ -43,7 +43,7 @@ class StandingSettings(Settings):
     bands: tuple[float, ...] = setting(
         (0.02, 0.01, 5e-3, 4e-3), "m", "bands about the ground, from round to round", BY_HAND
     )
-    noise: float = setting(1e-3, "m", "noise of a standing foot's height", BY_HAND)
+    noise: float = setting(7e-4, "m", "noise of a standing foot's height", BY_HAND)
     together: float = setting(
         4.0, "1", "samples that err together, so that they count as one", BY_HAND
     )
@@ -52,7 +52,7 @@ class StandingSettings(Settings):
     angle: float = setting(4e-3, "rad", "prior sigma of the zeros of pitch and hips", BY_HAND)
     piston: float = setting(6e-4, "m", "prior sigma of the zero of a piston", BY_HAND)
     gain: float = setting(
-        15.0, "nats", "gain over faults of sensors alone from which lengths are believed", BY_HAND
+        6.0, "nats", "gain over faults of sensors alone from which lengths are believed", BY_HAND
     )
 
 
