@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -48,3 +50,19 @@ def test_a_notebook_runs(path: Path, tmp_path: Path) -> None:
     assert any(
         "image/png" in json.dumps(output) or "<img" in json.dumps(output) for output in shown
     )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", ["planner", "identifier", "extender"])
+def test_a_strangers_path(path: str, tmp_path: Path) -> None:
+    """Each from an empty folder, command by command, as a stranger would type it."""
+    own = {"PATH": os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])}
+    script = ROOT / f"examples/paths/{path}.sh"
+    done = subprocess.run(
+        ["sh", str(script)],
+        cwd=tmp_path,
+        env={**os.environ, **own},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr

@@ -128,7 +128,7 @@ def conditions(problem: Problem, theta: Theta | None = None) -> list[ConditionBi
 def _tolerant(rows: Rows, region: Texts, window: Windows, found: Tolerant) -> tuple[float, bool]:
     """Error ratio of what the figures' tolerance leaves; whether it is within the noise, and the
     figures are not too far off."""
-    if found.p_value < BinSettings.current().false_discoveries:
+    if found.q_value < BinSettings.current().false_discoveries:
         return rms(window.sums(found.left)), False
     sums = window.sums(found.left)
     clean = not any(c.significant for c in condition_bins(rows, region, window.first, sums))

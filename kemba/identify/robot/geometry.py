@@ -16,8 +16,8 @@ from kemba.identify.problem.types import Array, Candidate, Flags
 from kemba.identify.robot.dynamics.physics import Physics
 from kemba.identify.robot.dynamics.reference import Reference
 from kemba.identify.robot.motion.batch import Batch
-from kemba.mechanism.geometry import altered
 from kemba.mechanism.knee import flexion_of
+from kemba.mechanism.links import altered
 from kemba.settings import BY_HAND, Settings, setting
 
 GEOMETRY = "geometry:"  # names of the lengths begin so

@@ -39,7 +39,7 @@ def assigned(
 
 
 def fits(target: Target, unit: str | None, values: Array) -> bool:
-    """Whether a column's unit and values can be those of a target."""
+    """Whether a column's unit and values (n,) can be those of a target."""
     if target.is_valve:
         return two_levels(values)
     if unit is None:

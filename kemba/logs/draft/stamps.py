@@ -27,7 +27,7 @@ class Stamp:
 
 
 def numbers(raw: Raw, decimal: str) -> dict[str, Array]:
-    """The columns that hold numbers; texts are left out."""
+    """The columns (n,) that hold numbers; texts are left out."""
     found = {}
     for name, cells in raw.items():
         values = as_numbers(cells, decimal)[0] if cells.dtype == object else cells.astype(float)
@@ -37,7 +37,7 @@ def numbers(raw: Raw, decimal: str) -> dict[str, Array]:
 
 
 def stamp_of(raw: Raw, values: Mapping[str, Array]) -> Stamp | None:
-    """The time: a column that rises and whose name says so, else the first one that rises."""
+    """The time: a column (n,) that rises and whose name says so, else the first one that rises."""
     said = [name for name in values if "time" in _says(name)]
     parts = [name for name in values if "rest" in _says(name)]
     seconds = [name for name in said if name not in parts and _rises(values[name], strictly=False)]
