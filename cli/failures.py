@@ -14,6 +14,8 @@ from typing import Any
 import typer
 
 from kemba.errors import KembaError
+from kemba_cli.common import loud
+from kemba_cli.memory import shortage, used_up
 
 OF_THE_DISK = (
     *(errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO),
@@ -31,6 +33,10 @@ def guarded(verb: Callable[..., None]) -> Callable[..., None]:
 
     @functools.wraps(verb)
     def run(*args: Any, **options: Any) -> None:
+        short = shortage()
+        if short:
+            typer.echo(short, err=True)
+            raise typer.Exit(BAD_ANSWER)
         try:
             verb(*args, **options)
         except (typer.Exit, typer.Abort, typer.BadParameter):
@@ -47,7 +53,7 @@ def guarded(verb: Callable[..., None]) -> Callable[..., None]:
             if isinstance(error, OSError) and error.errno in OF_THE_DISK:
                 typer.echo(_disk(error), err=True)
                 raise typer.Exit(BAD_ANSWER) from None
-            typer.echo(_crash(error), err=True)
+            typer.echo(used_up(error) or _crash(error), err=True)
             raise typer.Exit(BAD_ANSWER) from None
 
     return run
@@ -70,7 +76,7 @@ def _disk(error: OSError) -> str:
 def _crash(error: Exception) -> str:
     """The message on an unexpected exception: short, or the traceback with KEMBA_DEBUG."""
     whole = "".join(traceback.format_exception(error))
-    if os.environ.get("KEMBA_DEBUG"):
+    if os.environ.get("KEMBA_DEBUG") or loud.get():
         return whole
     try:
         with tempfile.NamedTemporaryFile(

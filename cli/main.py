@@ -14,13 +14,16 @@ import typer
 
 import kemba
 from kemba_cli.failures import guarded
+from kemba_cli.verbose import with_verbose
 from kemba_cli.verbs.identify.adopt import adopt
 from kemba_cli.verbs.identify.characterise import characterise
 from kemba_cli.verbs.identify.compare import compare
 from kemba_cli.verbs.identify.discover import discover
 from kemba_cli.verbs.identify.experiment import experiment
+from kemba_cli.verbs.identify.learn import learn
 from kemba_cli.verbs.inspect.check import check
 from kemba_cli.verbs.inspect.effects import effects
+from kemba_cli.verbs.inspect.map import draft_map
 from kemba_cli.verbs.inspect.schema import schema
 from kemba_cli.verbs.plan.export import export
 from kemba_cli.verbs.plan.simulate import simulate
@@ -28,6 +31,7 @@ from kemba_cli.verbs.plan.solve import solve
 from kemba_cli.verbs.plan.sweep import sweep
 from kemba_cli.verbs.show.plot import plot
 from kemba_cli.verbs.show.report import report
+from kemba_cli.verbs.show.review import review
 from kemba_cli.verbs.show.view import view
 
 VERBS = (
@@ -38,12 +42,14 @@ VERBS = (
     compare,
     discover,
     adopt,
+    learn,
     experiment,
     check,
     effects,
     plot,
     view,
     report,
+    review,
     export,
     schema,
 )
@@ -54,7 +60,8 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 for verb in VERBS:
-    app.command()(guarded(verb))
+    app.command()(with_verbose(guarded(verb)))
+app.command("map")(with_verbose(guarded(draft_map)))  # `map` is a word of Python
 
 
 def _version(wanted: bool) -> None:

@@ -1,3 +1,25 @@
-"""Plan, execute and explain jumps of a legged robot with pneumatic knees."""
+"""Plan, execute and explain jumps of a legged robot with pneumatic knees.
+
+import kemba
+jump = kemba.plan("jump.yaml", height="0.6 m")      # a run folder with a certified plan
+done = kemba.simulate(jump, repeat=3, noise=True)   # logs, as on hardware
+print(kemba.compare(done.logs).sentence)            # where does the model fail?
+print(kemba.discover(done.logs).sentence)           # which effect does it lack?
+"""
+
+from importlib import import_module
+from typing import Any
 
 __version__ = "0.1.0"
+__all__ = ["compare", "discover", "load_log", "load_model", "load_task", "plan", "simulate"]
+
+
+def __getattr__(name: str) -> Any:
+    """The library's functions, imported when first asked for: `--help` must not wait for them."""
+    if name in __all__:
+        return getattr(import_module("kemba.api"), name)
+    raise AttributeError(f"module 'kemba' has no attribute '{name}'")
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__version__"]

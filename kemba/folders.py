@@ -34,6 +34,15 @@ def fresh(path: str | Path, force: bool = False, option: str = "--out") -> Path:
     return path
 
 
+def place_for(out: str | Path | None, default: Path, force: bool = False) -> Path:
+    """Where a new file goes: to `out` when it is given, else to `default` or the next free name
+    beside it. With `force` files are replaced. Raises KembaError as `fresh` does.
+    """
+    if out is not None:
+        return fresh(out, force)
+    return fresh(default if force else next_free(default), force)
+
+
 def next_free(path: Path) -> Path:
     """`path`, or `path-2`, `path-3`, ... (`figure-2.png`): the first that holds nothing yet."""
     number, found = 1, path

@@ -17,18 +17,16 @@ from kemba.quantity import Quantity, is_si
 Table = np.ndarray[Any, np.dtype[np.float64]]
 
 
-def read_table(path: str | Path, plain_headers: bool = False) -> tuple[list[str], Table]:
+def read_table(path: str | Path) -> tuple[list[str], Table]:
     """Headers (k) and numbers (n, k) of a CSV file; an empty cell is NaN.
 
-    `plain_headers` accepts any texts as headers, for foreign logs. Raises KembaError with
-    file:row:column when the file cannot be read, a header is malformed, repeated or not SI, rows
-    are ragged or a cell is not a number.
+    Raises KembaError with file:row:column when the file cannot be read, a header is malformed,
+    repeated or not SI, rows are ragged or a cell is not a number.
     """
     try:
         with open(path, encoding="utf-8-sig", newline=None) as stream:
             headers = _headers(stream, path)
-            if not plain_headers:
-                _check_headers(headers, path)
+            _check_headers(headers, path)
             try:
                 table = _numbers(stream, len(headers))
             except ValueError as error:

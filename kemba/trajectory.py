@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -61,6 +61,37 @@ class Trajectory:
 
     def __repr__(self) -> str:
         return f"Trajectory({len(self)} rows: {', '.join(self.headers)})"
+
+    def keys(self) -> tuple[str, ...]:
+        """The columns' names, so that `dict(trajectory)` holds all columns."""
+        return self.names
+
+    def items(self) -> Iterator[tuple[str, Array]]:
+        """Names and columns (n,)."""
+        return iter(self._columns.items())
+
+    def __iter__(self) -> Iterator[str]:
+        """The columns' names. As in pandas, `len` counts rows, not names."""
+        return iter(self._columns)
+
+    def get(self, name: str, default: Any = None) -> Any:
+        """The column `name` (n,), or `default` where there is none."""
+        return self._columns.get(name, default)
+
+    @property
+    def columns(self) -> dict[str, Array]:
+        """The columns (n,) by header, without the time."""
+        return dict(zip(self.headers, self._columns.values(), strict=True))
+
+    def to_pandas(self) -> Any:
+        """A DataFrame: columns by header, the time [s] as index."""
+        import pandas as pd
+
+        return pd.DataFrame(self.columns, index=pd.Index(self.time, name=TIME))
+
+    def _repr_html_(self) -> str:
+        """The first and last rows, for notebooks."""
+        return str(self.to_pandas()._repr_html_())
 
     @property
     def names(self) -> tuple[str, ...]:

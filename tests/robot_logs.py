@@ -39,6 +39,7 @@ def hops(
     figures_off: float = 0.0,
     pushes: np.ndarray | None = None,
     faults: tuple[dict, ...] = (),
+    sensors: measure.Sensors | None = None,
 ) -> tuple[list[Trajectory], list[np.ndarray]]:
     """Logs with hidden `effects`, and per run the forces (n, 7) of `pushes` (1 sigma) in them."""
     rng = np.random.default_rng(seed)
@@ -48,7 +49,7 @@ def hops(
         script = hop(seed + i)
         push = cases.coloured(script.ticks, np.zeros(7) if pushes is None else pushes, rng)
         truth = run.simulate(script, list(effects), robot, pushes=push)
-        columns = measure.robot_log(truth, measure.Sensors(), faults, rng)
+        columns = measure.robot_log(truth, sensors or measure.Sensors(), faults, rng)
         time = columns.pop("time [s]")
         logs.append(Trajectory(time, columns, {"kind": "robot", "name": f"hop{i}"}))
         forces.append(push)

@@ -24,6 +24,7 @@ LEVELS = [
     {"quantity"},
     {"config"},
     {"table", "trajectory"},
+    {"logs"},
     {"mechanism"},
     {"effects"},
     {"model"},
@@ -32,12 +33,14 @@ LEVELS = [
     {"runs"},
     {"sweep"},
     {"plotting", "report"},
+    {"learn"},
+    {"api"},
     {"cli"},
 ]
 LEVEL = {room: level for level, rooms in enumerate(LEVELS) for room in rooms}
 ONLY_IN = {
     "pinocchio": {"mechanism"},
-    "matplotlib": {"plotting"},
+    "matplotlib": {"plotting", "api"},
     "typer": {"cli"},
     "rich": {"cli"},
     "dask": {"sweep"},
@@ -46,6 +49,9 @@ ONLY_IN = {
     "pint": {"units"},
     "yaml": {"config"},
     "filelock": {"folders"},
+    "pandas": {"logs", "trajectory"},
+    "pyarrow": {"logs"},
+    "mcap": {"logs"},
 }
 SOURCES = sorted([*ROOT.glob("kemba/**/*.py"), *ROOT.glob("cli/**/*.py")])
 FOLDERS = (".", ".ci", ".github", "cli", "configs", "docs", "kemba", "tests")
@@ -97,7 +103,8 @@ PLANNING = [
     "phases",
     "refinement",
 ]
-PLANNING += ["infeasibility", "planned", "planner", "refined", "planning", "starts"]
+PLANNING += ["continuation", "infeasibility", "planned", "planner", "refined", "continued"]
+PLANNING += ["planning", "starts"]
 
 
 def test_planning_is_built_from_the_bottom_up() -> None:

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from kemba.config import shipped_configs
 from kemba.mechanism.cylinder import CylinderTable
-from kemba.mechanism.links import Leg, LegPlace, Link, Piston, RobotFile
+from kemba.mechanism.links import Leg, LegPlace, Link, LinkTolerances, Piston, RobotFile
 from kemba.model import load_model
 from kemba.ocp.task.costs import COSTS
 from kemba.ocp.task.task import Bound, Goal, Solver, Task, Tolerances
@@ -37,6 +37,7 @@ SECTIONS: dict[str, type[Any]] = {
     "Leg": Leg,
     "Link": Link,
     "Lengths of the piston": Piston,
+    "Tolerances of the links": LinkTolerances,
     "Cylinder": CylinderTable,
 }
 

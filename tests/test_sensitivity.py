@@ -12,7 +12,7 @@ from kemba.settings import Settings, setting
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 
-from sensitivity import Case, remembered
+from sensitivity_cases import Case, Memory
 from sensitivity_page import Change, flipped, section
 
 
@@ -78,7 +78,7 @@ def test_slow_functions_are_called_again_where_their_settings_changed() -> None:
         calls.append(theta)
         return theta["a"] * Early.current().gain
 
-    quick = remembered(slow)
+    quick = Memory().remembered(slow)
     assert quick({"a": 1.0}) == quick({"a": 1.0}) == 2.0 and len(calls) == 1
     with changed(Unread, number=5.0):
         assert quick({"a": 1.0}) == 2.0 and len(calls) == 1

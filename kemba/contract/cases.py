@@ -33,6 +33,7 @@ REQUIRED: dict[str, dict[str, Any]] = {
         "force": "-F0*exp(-(x/d)**2)",
         "parameters": {"F0": "8 N", "d": "5 mm"},
     },
+    "geometry": {"part": "femur/length"},
 }
 
 

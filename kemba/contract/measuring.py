@@ -5,14 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from kemba.contract.cases import Broken, Placed, points, slopes
+from kemba.contract.settings import ContractSettings
 from kemba.effects.base import Effect
 from kemba.effects.sensors import SensorEffect
 from kemba.effects.series import Series
-
-SEEN = 1e-3  # of a channel of size 1: a fault that changes less is none
-UNDONE = 1e-3  # of a channel of size 1; a shift in time reads between rows 0.5 ms apart
-WIDEST = 0.1  # a figure less certain than this is a parameter to fit, not a tolerance
-NOTHING = 1e-9  # slope of the residual below which a figure has no influence
 
 
 def measures(effect: type[Effect]) -> bool:
@@ -36,9 +32,9 @@ def sensor_fault_can_be_undone(placed: Placed) -> None:
     time = np.linspace(0.0, 1.0, 2001)
     true = Series(time, np.sin(9 * time), (9 * np.cos(9 * time),))
     shown = fault.measured(true)
-    if np.abs(shown.value - true.value).max() <= SEEN:
+    if np.abs(shown.value - true.value).max() <= ContractSettings.current().seen:
         raise Broken("it changes nothing that is measured")
-    if np.abs(fault.undone(shown).value - true.value).max() > UNDONE:
+    if np.abs(fault.undone(shown).value - true.value).max() > ContractSettings.current().undone:
         raise Broken("`undone` does not give back the input of `measured`")
 
 
@@ -47,7 +43,7 @@ def nominal_figures_matter(placed: Placed) -> None:
 
     Raises Broken where it is not so.
     """
-    effect = placed.resolved
+    effect, settings = placed.resolved, ContractSettings.current()
     for name, tolerance in effect.nominal.items():
         if name not in type(effect).model_fields:
             raise Broken(f"`nominal` names '{name}', which is no field")
@@ -57,8 +53,9 @@ def nominal_figures_matter(placed: Placed) -> None:
             raise Broken(f"{name}: its tolerance has no source")
     tolerances = effect.tolerances()
     for figure, share in tolerances.items():
-        if not 0.0 < share <= WIDEST:
-            raise Broken(f"{figure}: its tolerance is {share:g} of it; 0 to {WIDEST:g} expected")
+        if not 0.0 < share <= settings.widest:
+            expected = f"0 to {settings.widest:g} expected"
+            raise Broken(f"{figure}: its tolerance is {share:g} of it; {expected}")
     missing = set(effect.nominal) - {name.partition("[")[0] for name in tolerances}
     if missing:
         raise Broken(f"`tolerances` leaves '{sorted(missing)[0]}' out")
@@ -69,5 +66,5 @@ def nominal_figures_matter(placed: Placed) -> None:
     found = [np.abs(scaled(**x, p=ones)["dp"].full()) for x in points(placed.model, 12)]
     largest = np.max(found, axis=(0, 1))
     for figure, slope in zip(tolerances, largest, strict=True):
-        if slope <= NOTHING:
+        if slope <= settings.nothing:
             raise Broken(f"{figure} has a tolerance, but it changes nothing")

@@ -14,11 +14,9 @@ from kemba.contract.cases import (
     values_of,
     without,
 )
+from kemba.contract.settings import ContractSettings
 from kemba.effects.sensors import SensorEffect
 from kemba.model import Model
-
-NOTHING = 1e-9  # slope of the residual below which a parameter has no influence
-TINY = 1e-6  # W; rounding of a dissipated power
 
 
 def finite(placed: Placed) -> None:
@@ -55,7 +53,7 @@ def every_parameter_matters(placed: Placed) -> None:
     )
     for i, name in enumerate(effect.parameters()):
         moves_bounds = effect.bind({name: 1.1 * effect.value(name)}).inputs() != effect.inputs()
-        if not moves_bounds and slope[:, i].max() <= NOTHING:
+        if not moves_bounds and slope[:, i].max() <= ContractSettings.current().nothing:
             raise Broken(f"{name} changes nothing")
 
 
@@ -115,9 +113,9 @@ def dissipates(placed: Placed) -> None:
     for point in points(placed.model, 12):
         change = values_of(placed.model, point)["dynamics"] - values_of(base, point)["dynamics"]
         lost.append(float(point["v"] @ change))
-    if min(lost) < -NOTHING:
+    if min(lost) < -ContractSettings.current().nothing:
         raise Broken(f"it gives {-min(lost):.3g} W; `dissipative` says that it only takes")
-    if max(lost) <= TINY:
+    if max(lost) <= ContractSettings.current().power:
         raise Broken("it takes no energy at all")
 
 

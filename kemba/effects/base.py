@@ -177,6 +177,11 @@ class Effect(BaseModel):
         return Contribution()
 
     @property
+    def geometry(self) -> Mapping[str, Any]:
+        """Lengths of the mechanism that it changes: part -> true minus nominal [m]."""
+        return {}
+
+    @property
     def leg(self) -> str | None:
         """The one leg it is restricted to."""
         return self.on

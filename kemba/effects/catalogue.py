@@ -22,6 +22,7 @@ from kemba.effects.mechanics.friction import (
     SealFriction,
     StribeckFriction,
 )
+from kemba.effects.mechanics.geometry import Geometry
 from kemba.effects.mechanics.ground import GroundCompliance, GroundFriction
 from kemba.effects.mechanics.hip import (
     HipDamping,
@@ -130,6 +131,7 @@ DRIVE: tuple[type[Effect], ...] = (
     AxisLag,
     ExtraInertia,
 )
+GEOMETRY: tuple[type[Effect], ...] = (Geometry,)
 SENSORS: tuple[type[Effect], ...] = (SensorBias, SensorScale, SensorDelay)
 
 # what may be missing from a model: the candidates of identification
@@ -139,6 +141,7 @@ MISSING: tuple[type[Effect], ...] = (
     *HIP,
     *BODY,
     *GROUND,
+    *GEOMETRY,
     *DRIVE,
     *SENSORS,
 )

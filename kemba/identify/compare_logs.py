@@ -9,10 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from kemba.identify.compare.compare import Comparison, compare
-from kemba.identify.logs.gate import check_logs
-from kemba.identify.logs.reading import load_map, read_logs, taken_on
+from kemba.identify.evidence.colour import with_learnt_colour
+from kemba.identify.evidence.windows import free_starts
+from kemba.identify.logs.reading import read_logs
 from kemba.identify.problem.problem import Problem
-from kemba.identify.workflow import make_problem, model_of
+from kemba.identify.workflow import admitted, check_all, model_of
+from kemba.logs import load_map
 from kemba.trajectory import Trajectory
 
 PLANNED = ("body/x", "body/z", "body/pitch", "hip/q", "piston/x")
@@ -29,10 +31,9 @@ def compare_logs(
     columns = load_map(column_map) if column_map else None
     read = read_logs(logs, columns)
     built = model_of(read, model)
-    taken_on(read, built.mechanism)
-    check_logs(read)
-    problem = make_problem(read, built)
-    problem.validate()
+    check_all(read, built)
+    problem, _ = admitted(read, built)
+    problem = with_learnt_colour(problem, free_starts(problem))
     found = compare(problem, model, [str(log.meta["path"]) for log in read])
     if run is not None:
         plan = Trajectory.read(Path(run) / "trajectory.csv" if Path(run).is_dir() else run)
@@ -44,8 +45,9 @@ def missed(plan: Trajectory, logs: Sequence[Trajectory]) -> Mapping[str, float]:
     """Largest distance of the logs from the plan, by header, while the plan lasts."""
     found: dict[str, float] = {}
     for log in logs:
-        time = log.time - log.time[0] + plan.time[0]
-        during = time <= plan.time[-1]
+        begun = min(log.time[0], 0.0) + plan.time[0]  # what comes before the plan is negative
+        time = log.time - log.time[0] + begun
+        during = (plan.time[0] <= time) & (time <= plan.time[-1])
         wanted = plan.interpolate(time[during])
         for name in wanted.names:
             if name in log and name.endswith(PLANNED):

@@ -14,8 +14,10 @@ from kemba.identify.answer import Answer
 from kemba.identify.discover import Discovery, discover
 from kemba.identify.logs.excerpt import excerpts
 from kemba.identify.logs.gate import BadData, check_logs, sentence
-from kemba.identify.logs.reading import load_map, read_logs, taken_on
+from kemba.identify.logs.limits import limits_of
+from kemba.identify.logs.reading import read_logs, taken_on
 from kemba.identify.problem.problem import Problem
+from kemba.logs import load_map
 from kemba.model import Model, load_model
 from kemba.trajectory import Trajectory
 
@@ -43,14 +45,11 @@ def discover_logs(
     try:
         _apart(fitted, kept)
         built = model_of(fitted, model)
-        taken_on([*fitted, *kept], built.mechanism)
-        remarks = [*built.remarks, *check_logs([*fitted, *kept])]
+        checked = [*check_all([*fitted, *kept], built), *limits_of(fitted)]
         say("preparing the logs")
-        fitted, cut = excerpts(fitted)
-        kept, _ = excerpts(kept)
-        problem = make_problem(fitted, built)
-        remarks = [*remarks, *cut, *problem.validate()]
-        judge = make_problem(kept, built) if kept else None
+        problem, remarks = admitted(fitted, built)
+        remarks = [*built.remarks, *checked, *remarks]
+        judge = make_problem(excerpts(kept)[0], built) if kept else None
         left = time_limit - (time.monotonic() - started)
         found = discover(problem, judge, left, say)
         answer = found.answer
@@ -67,6 +66,39 @@ def discover_logs(
 def model_of(logs: Sequence[Trajectory], name: str) -> Model:
     """The model `name` of the robot, or for bench logs of one of its pistons."""
     return load_model(name, rig=logs[0].meta["kind"] == "bench")
+
+
+def check_all(logs: Sequence[Trajectory], model: Model) -> list[str]:
+    """Remarks on logs that were taken on the machine of `model`, each looked at by itself.
+
+    Raises BadData with every fault.
+    """
+    taken_on(logs, model.mechanism)
+    return check_logs(logs)
+
+
+def admitted(logs: Sequence[Trajectory], model: Model) -> tuple[Problem, list[str]]:
+    """The problem that logs pose, shortened where they are long, and remarks.
+
+    Raises BadData where they contradict themselves or any model. Together with `check_all` this
+    is the gate of `check`, `compare` and `discover`.
+    """
+    shortened, cut = excerpts(logs)
+    problem = make_problem(shortened, model)
+    return problem, [*cut, *problem.validate()]
+
+
+def check_log(
+    path: str | Path, model: str = "planning", column_map: str | Path | None = None
+) -> tuple[Trajectory, list[str]]:
+    """A log that `compare` and `discover` will accept, and remarks on it.
+
+    Raises KembaError where the file cannot be read; BadData where the log cannot be right.
+    """
+    logs = read_logs([path], load_map(column_map) if column_map else None)
+    built = model_of(logs, model)
+    remarks = [*built.remarks, *check_all(logs, built)]
+    return logs[0], [*remarks, *admitted(logs, built)[1]]
 
 
 def make_problem(logs: Sequence[Trajectory], model: Model) -> Problem:
@@ -94,7 +126,7 @@ def write_answer(answer: Answer, out: Path, model: str) -> None:
     data: dict[str, Any] = answer.json()
     for stale in ("model.yaml", "answer.json"):
         (out / stale).unlink(missing_ok=True)
-    if answer.verdict == "missing":
+    if answer.added:
         path = write_model(out / "model.yaml", model, data["ranking"], answer.added)
         answer.model = data["model"] = str(path)
     write_json(out / "answer.json", data | {"base": reference(model)})

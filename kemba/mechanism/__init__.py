@@ -6,7 +6,7 @@ from kemba.mechanism.links import Leg, Link, Piston, Robot
 from kemba.mechanism.own_rigs import CylinderRig, DriveRig, OwnRig, VesselRig, own_mechanism
 from kemba.mechanism.planar import Mechanism, Port
 from kemba.mechanism.rig import rig_mechanism
-from kemba.mechanism.robot import robot_mechanism
+from kemba.mechanism.robot import reshaped, robot_mechanism
 from kemba.mechanism.robot_file import load_cylinder, load_robot
 
 __all__ = [
@@ -25,6 +25,7 @@ __all__ = [
     "load_cylinder",
     "load_robot",
     "own_mechanism",
+    "reshaped",
     "rig_mechanism",
     "robot_mechanism",
 ]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator
 
@@ -10,6 +11,9 @@ from kemba.mechanism.cylinder import Cylinder, CylinderTable
 from kemba.mechanism.table import Inertia, Length, Mass, Table
 from kemba.quantity import Param
 
+# part, as row/field of a leg in the link table: `femur/length` -> true minus nominal [m], a number
+# or a symbol
+Offsets = Mapping[str, Any]
 RESERVED = ("body", "supply", "piston")  # first parts of columns that belong to no leg
 
 
@@ -49,6 +53,19 @@ class LegPlace(Table):
     fold: Literal[1, -1]
 
 
+Share = Annotated[float, Param("1", lower=0.0, upper=0.1, doc="1 sigma, as a share of the figure")]
+
+
+class LinkTolerances(Table):
+    """How well masses and moments of inertia of the links are known; 0: exactly.
+
+    2 % is assumed: figures from drawings are off by 1 to 3 %.
+    """
+
+    mass: Share = 0.02
+    inertia: Share = 0.02
+
+
 class Robot(Table):
     """A planar robot: one body, one to three legs of one kind, one kind of cylinder."""
 
@@ -58,6 +75,7 @@ class Robot(Table):
     legs: Annotated[dict[str, LegPlace], Field(min_length=1, max_length=3)]
     leg: Leg
     cylinder: Cylinder
+    tolerances: LinkTolerances = LinkTolerances()
 
     @field_validator("legs")
     @classmethod
@@ -80,3 +98,23 @@ class RobotFile(Robot):
     """A robot as its YAML writes it: figures of the cylinder may be left to another cylinder."""
 
     cylinder: CylinderTable  # type: ignore[assignment]
+
+
+def altered(robot: Robot, offsets: Offsets) -> Robot:
+    """The robot with its lengths changed by `offsets`; masses and centres of mass stay.
+
+    Offsets may be symbols; the result is then not checked, and only for expressions.
+    """
+    leg = robot.leg
+    for part, d in offsets.items():
+        row, name = part.split("/")
+        table = getattr(leg, row)
+        table = table.model_copy(update={name: getattr(table, name) + d})
+        leg = leg.model_copy(update={row: table})
+    return robot.model_copy(update={"leg": leg})
+
+
+def nominal_length(leg: Leg, part: str) -> float:
+    """Length [m] of a part as the link table has it."""
+    row, name = part.split("/")
+    return float(getattr(getattr(leg, row), name))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -34,12 +35,14 @@ class Mechanism:
     `q, v, a` are SX symbols (n,); `inverse_dynamics` (n,) is the generalised force that the
     motion (q, v, a) needs, gravity included, no effect included. `legs` are the prefixes under
     which leg ports are found ("" for a rig). `cylinder`: the one of every leg. `robot`: the link
-    table, None for a rig. `bore`: the cylinder's dimensions where nothing else of it is known.
-    `sign_speed`: rate [m.s-1] of a piston within which the sign of its friction is smoothed.
-    `rig`: the kind of a rig of the user's own, `logged` the columns that its logs must have and
-    their units. `imposed`: the motion is given, forces are answers.
+    table, None for a rig; it differs by `offsets` [m] from the table `drawn`. `bore`: the
+    cylinder's dimensions where nothing else of it is known. `sign_speed`: rate [m.s-1] of a piston
+    within which the sign of its friction is smoothed. `rig`: the kind of a rig of the user's own,
+    `logged` the columns that its logs must have and their units. `imposed`: the motion is given,
+    forces are answers.
     `mirror` maps a coordinate to its mirror image ("-" prefixed where the sign turns).
     `standing`: coordinates with retracted pistons and each foot on the ground under its hip.
+    `tolerances`: 1 sigma of figures of its links that may be off, as shares of them, by name.
     `points`: (x, z) of places that pictures need, such as `front/pin`; nothing pushes there.
     """
 
@@ -57,6 +60,8 @@ class Mechanism:
     mass: float = 1.0
     body_mass: float = 0.0
     robot: Robot | None = None
+    drawn: Robot | None = None
+    offsets: Mapping[str, float] = field(default_factory=dict)
     cylinder: Cylinder | None = None
     bore: Bore | None = None
     sign_speed: float = 0.01
@@ -66,6 +71,7 @@ class Mechanism:
     mirror: dict[str, str] = field(default_factory=dict)
     standing: dict[str, float] = field(default_factory=dict)
     points: dict[str, ca.SX] = field(default_factory=dict)
+    tolerances: dict[str, float] = field(default_factory=dict)
 
     @property
     def n(self) -> int:

@@ -2,27 +2,48 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import casadi as ca
 import numpy as np
 
+from kemba.errors import KembaError
 from kemba.mechanism import knee
-from kemba.mechanism.links import Robot
+from kemba.mechanism.links import Offsets, Robot, altered, nominal_length
 from kemba.mechanism.pin_model import build_pin_model
 from kemba.mechanism.planar import Mechanism, Port
-from kemba.mechanism.recursion import FrameMotion, forward, read_joints, rnea
+from kemba.mechanism.recursion import (
+    FrameMotion,
+    Joint,
+    forward,
+    link_forces,
+    link_tolerances,
+    read_joints,
+    rnea,
+)
 from kemba.quantity import Quantity
 
 HIP_RANGE = 1.4  # rad; beyond it the knee would rise above the body
 
 
-def robot_mechanism(robot: Robot) -> Mechanism:
-    """The mechanism of a link table: q = (x, z, pitch, hips, knees), n = 3 + 2 legs."""
+def robot_mechanism(
+    drawn: Robot, offsets: Offsets | None = None, symbols: Offsets | None = None
+) -> Mechanism:
+    """The mechanism of a link table: q = (x, z, pitch, hips, knees), n = 3 + 2 legs.
+
+    `offsets` [m]: lengths that differ from those of the table `drawn`. `symbols`: the same
+    offsets in expressions, where these depend on parameters. Raises KembaError where the knee
+    cannot close with these lengths.
+    """
+    offsets = dict(offsets or {})
+    robot = _closed(altered(drawn, offsets), offsets)
     coordinates, velocities = _coordinates(robot)
     n = len(coordinates)
     q, v, a = ca.SX.sym("q", n), ca.SX.sym("v", n), ca.SX.sym("a", n)
-    model = build_pin_model(robot)
-    joints = read_joints(model)
-    tree = tree_angles(robot, q)
+    shape = altered(drawn, {**offsets, **(symbols or {})})
+    joints = _placed(read_joints(build_pin_model(robot)), shape)
+    tree = tree_angles(shape, q)
     tree_v = ca.jtimes(tree, q, v)
     tree_a = ca.jtimes(tree_v, q, v) + ca.jtimes(tree, q, a)
     tree_tau = rnea(joints, tree, tree_v, tree_a, robot.gravity)
@@ -38,18 +59,73 @@ def robot_mechanism(robot: Robot) -> Mechanism:
         coordinates=coordinates,
         velocities=velocities,
         inverse_dynamics=ca.jtimes(tree, q, tree_tau, True),
-        ports=_ports(robot, q, motions),
+        ports=_ports(shape, q, motions),
         legs=tuple(robot.legs),
         weight=float(mass * robot.gravity),
         mass=float(mass),
         body_mass=robot.body.mass,
         gravity=robot.gravity,
         robot=robot,
+        drawn=drawn,
+        offsets=offsets,
         cylinder=robot.cylinder,
         mirror=_mirror(robot),
         standing=standing_pose(robot),
-        points=_points(robot, motions),
+        points=_points(shape, motions),
+        tolerances=link_tolerances(joints, robot.tolerances.model_dump()),
     )
+
+
+def link_regressors(mechanism: Mechanism) -> ca.Function:
+    """(q, v, a), each (n,), -> (n, k): generalised force per share by which a link is off.
+
+    The k columns are the figures of `mechanism.tolerances`, in their order. Raises KembaError for a
+    mechanism that is no robot.
+    """
+    m, robot = mechanism, mechanism.need_robot()
+    tree = tree_angles(robot, m.q)
+    rate = ca.jtimes(tree, m.q, m.v)
+    acc = ca.jtimes(rate, m.q, m.v) + ca.jtimes(tree, m.q, m.a)
+    joints = read_joints(build_pin_model(robot))
+    forces = link_forces(joints, m.tolerances, (tree, rate, acc), robot.gravity)
+    columns = [ca.jtimes(tree, m.q, force, True) for force in forces]
+    return ca.Function("regress", [m.q, m.v, m.a], [ca.horzcat(ca.SX(m.n, 0), *columns)])
+
+
+def reshaped(mechanism: Mechanism, offsets: Offsets, symbols: Offsets | None = None) -> Mechanism:
+    """The same mechanism with its lengths `offsets` [m] off the link table; `symbols`: the same in
+    expressions. A rig has none of these lengths and stays as it is."""
+    if mechanism.drawn is None or (not symbols and dict(offsets) == dict(mechanism.offsets)):
+        return mechanism
+    return robot_mechanism(mechanism.drawn, offsets, symbols)
+
+
+def _placed(joints: list[Joint], robot: Robot) -> list[Joint]:
+    """The joints at the places that the lengths of `robot` give them, which may be symbols."""
+    offsets: dict[str, Any] = {}
+    for name, place in robot.legs.items():
+        offsets[f"{name}/knee"] = (0.0, -robot.leg.femur.length)
+        offsets[f"{name}/cylinder"] = (place.fold * robot.leg.piston.mount, 0.0)
+    return [replace(j, offset=offsets.get(j.name, j.offset)) for j in joints]
+
+
+def _closed(robot: Robot, offsets: Offsets) -> Robot:
+    """The robot, if its lengths are positive and its knee closes at both ends of the stroke."""
+    for part, d in offsets.items():
+        if nominal_length(robot.leg, part) <= 0.0:
+            raise KembaError(
+                f"effects.geometry:{part}",
+                f"d = {1e3 * d:g} mm leaves nothing of this length",
+                "a small difference between machine and drawing was expected",
+            )
+    for x in (0.0, robot.stroke) if offsets else ():
+        try:
+            knee.flexion(robot.leg, x)
+        except ValueError as error:
+            name = "effects.geometry:" + next(iter(offsets))
+            expected = "lengths that close the triangle femur, mount, pin at both ends"
+            raise KembaError(name, str(error), f"{expected} were expected") from None
+    return robot
 
 
 def standing_pose(robot: Robot, x: float = 0.0) -> dict[str, float]:
@@ -119,7 +195,7 @@ def _ports(robot: Robot, q: ca.SX, motions: dict[str, FrameMotion]) -> dict[str,
     for i, (leg, place) in enumerate(robot.legs.items()):
         bend = place.fold * q[3 + legs + i]
         hip, tibia = motions[f"{leg}/hip"], motions[f"{leg}/knee"]
-        foot = tibia.turn(np.array([0.0, -robot.leg.tibia.length]))
+        foot = tibia.turn((0.0, -robot.leg.tibia.length))
         x, z = tibia.position
         ports += [
             _port(f"{leg}/hip/q", f"{leg}/hip/w", "rad", q[3 + i], "femur against body"),
@@ -146,7 +222,7 @@ def _points(robot: Robot, motions: dict[str, FrameMotion]) -> dict[str, ca.SX]:
     points: dict[str, ca.SX] = {}
     for leg in robot.legs:
         hip, tibia = motions[f"{leg}/hip"], motions[f"{leg}/knee"]
-        sole = tibia.turn(np.array([0.0, -robot.leg.tibia.length]))
+        sole = tibia.turn((0.0, -robot.leg.tibia.length))
         foot = (tibia.position[0] + sole[0], tibia.position[1] + sole[1])
         places = {
             "hip": hip.position,

@@ -11,7 +11,7 @@ import casadi as ca
 
 from kemba.effects.base import Effect
 from kemba.errors import KembaError, suggest
-from kemba.mechanism import Mechanism
+from kemba.mechanism import Mechanism, reshaped
 from kemba.model.node import Node, Row
 from kemba.model.scene import Instance, Key, Scene, full_name, place_effects, port_name
 from kemba.quantity import Param, Quantity
@@ -32,9 +32,10 @@ class Model:
         supply: float = 0.7e6,
         name: str = "model",
     ) -> None:
-        self.mechanism = mechanism
         cylinder = mechanism.cylinder
         self.effects = tuple(e.of_cylinder(cylinder) if cylinder else e for e in effects)
+        self.mechanism = reshaped(mechanism, lengths(self.effects))
+        mechanism = self.mechanism
         self.supply, self.name = supply, name
         self.remarks = [text for e in self.effects for text in e.remarks(supply)]
         self.instances = place_effects(mechanism, self.effects)
@@ -125,7 +126,14 @@ class Model:
         instances = [
             Instance(i.effect.bind(bound.get(i.effect.name, {})), i.leg) for i in self.instances
         ]
-        return _assemble(self, instances, p)
+        free_lengths = lengths(i.effect for i in instances if i.effect.name in bound)
+        mechanism = reshaped(self.mechanism, self.mechanism.offsets, free_lengths)
+        return _assemble(self, mechanism, instances, p)
+
+
+def lengths(effects: Iterable[Effect]) -> dict[str, Any]:
+    """Lengths [m] by which the effects of a model change its mechanism, by part."""
+    return {part: d for effect in effects for part, d in effect.geometry.items()}
 
 
 def _with(effect: Effect, values: Mapping[str, float]) -> Effect:
@@ -154,8 +162,7 @@ def _symbols(prefix: str, quantities: Mapping[Key, Quantity]) -> tuple[ca.SX, di
     return vector, {key: vector[i] for i, key in enumerate(quantities)}
 
 
-def _assemble(model: Model, instances: list[Instance], p: ca.SX) -> Node:
-    mechanism = model.mechanism
+def _assemble(model: Model, mechanism: Mechanism, instances: list[Instance], p: ca.SX) -> Node:
     s, states = _symbols("s", model.states)
     lam, forces = _symbols("lam", model.forces)
     u, inputs = _symbols("u", model.inputs)

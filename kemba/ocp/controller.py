@@ -11,16 +11,18 @@ from kemba.trajectory import Trajectory
 PERIOD = 1e-3  # s
 
 
-def controller_table(model: Model, plan: Trajectory) -> Trajectory:
+def controller_table(model: Model, plan: Trajectory, hold: float = 0.0) -> Trajectory:
     """What the controller plays, one row a tick; each row holds until the next.
 
-    Time starts at the first command: plan time plus the lead, in which the first pose is held.
-    Hip angles and rates are the plan's at the tick, because the controller compares them with what
-    it measures there. The torque is the mean of the plan over the tick, so that the angular
-    impulse is the plan's. Valves are exactly 0 or 1, sent their dead time early, and their edges
-    are rounded to ticks all together: see `kemba.ocp.edges`.
+    Its clock is the plan's. It starts `hold` [s] before the plan, or the longest dead time of a
+    valve if that is longer; until then the first pose is held, valves closed. Hip angles and rates
+    are the plan's at the tick, because the controller compares them with what it measures there.
+    The torque is the mean of the plan over the tick, so that the angular impulse is the plan's.
+    Valves are exactly 0 or 1, sent their dead time early, and their edges are rounded to ticks all
+    together: see `kemba.ocp.edges`.
     """
-    lead = int(np.ceil(max(max(model.timing(leg)) for leg in model.mechanism.legs) / PERIOD - 1e-9))
+    dead = max(max(model.timing(leg)) for leg in model.mechanism.legs)
+    lead = int(np.ceil(max(dead, hold) / PERIOD - 1e-9))
     duration = plan.time[-1] - plan.time[0]
     ticks = np.arange(lead + int(np.ceil(duration / PERIOD - 1e-9)) + 1)
     clock = plan.time[0] + (ticks - lead) * PERIOD
@@ -40,7 +42,9 @@ def controller_table(model: Model, plan: Trajectory) -> Trajectory:
     for leg in model.mechanism.legs:
         columns[f"{leg}/piston/x [m]"] = states[f"{leg}/piston/x"]
     return Trajectory(
-        ticks / round(1 / PERIOD), columns, {"kind": "controller", "lead": lead * PERIOD}
+        (ticks - lead) / round(1 / PERIOD),
+        columns,
+        {"kind": "controller", "lead": lead / round(1 / PERIOD)},
     )
 
 

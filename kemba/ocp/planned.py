@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from kemba.model import Model
 from kemba.ocp.certificate.certify import Certificate, certify, costs
+from kemba.ocp.certificate.grazing import grazes
 from kemba.ocp.certificate.status import Status, verdict
 from kemba.ocp.infeasibility.diagnostic import Relax
 from kemba.ocp.infeasibility.explain import Explanation
@@ -39,6 +40,7 @@ class Plan:
     constraints: int
     relax: tuple[Relax, ...] = ()
     refined: bool = False
+    continued: bool | None = None  # whether it comes from an earlier plan, where one was given
 
     @property
     def iterations(self) -> int:
@@ -82,3 +84,12 @@ def explained(found: Plan, why: Explanation) -> Plan:
     if not why.proven:
         return replace(found, sentence=f"{found.sentence}; {why.sentence}")
     return replace(found, status=Status.INFEASIBLE, sentence=why.sentence, relax=why.relax)
+
+
+def clear(found: Plan) -> Plan:
+    """The same; not what was asked where a foot grazes the ground in flight."""
+    touches = grazes(found.trajectory)
+    if not touches:
+        return found
+    what = f"`clearance` is not kept: {touches[0].sentence}"
+    return replace(found, status=Status.ACCEPTABLE, sentence=f"{what}; {found.sentence}")

@@ -43,7 +43,9 @@ def answer(plan: Plan, run: str) -> dict[str, Any]:
         "replay": None,
         "table_replay": None,
         "plant_replay": None,
+        "impacts": None,
         "good": plan.status is Status.SOLVED,
+        "continued": plan.continued,
         "ignored": plan.model.ignored,
         "remarks": plan.model.remarks,
         "relax": [

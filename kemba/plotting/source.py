@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from kemba.errors import KembaError
-from kemba.identify.logs.reading import ColumnMap, read_log
+from kemba.logs import ColumnMap, open_log
 from kemba.trajectory import Array, Trajectory
 
 PLAN_FILE = "trajectory.csv"
@@ -62,7 +62,7 @@ def is_plan(trajectory: Trajectory, path: Path | None = None) -> bool:
 
 
 def load_source(path: str | Path, columns: ColumnMap | None = None) -> Source:
-    """The plan in a run folder, or the trajectory in a CSV; `columns` maps foreign columns.
+    """The plan in a run folder, or the trajectory in a log file; `columns` maps foreign columns.
 
     Raises KembaError.
     """
@@ -71,9 +71,9 @@ def load_source(path: str | Path, columns: ColumnMap | None = None) -> Source:
     if not file.is_file():
         what = f"has no {PLAN_FILE}" if path.is_dir() else "no such file or folder"
         runs = ", ".join(str(found.parent) for found in sorted(Path("runs").glob(f"*/{PLAN_FILE}")))
-        expected = "a run folder or a CSV in the log format was expected"
+        expected = "a run folder or a log was expected"
         raise KembaError(str(path), what, expected, f"runs here: {runs}" if runs else "")
-    trajectory = Trajectory.read(file) if columns is None else read_log(file, columns)
+    trajectory = open_log(file, columns, strict=columns is None)
     if len(trajectory) < 2:
         raise KembaError(str(file), "has one row only", "at least two were expected")
     return Source(_name(file), trajectory, is_plan(trajectory, file), file)

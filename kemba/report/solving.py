@@ -15,15 +15,16 @@ from kemba.errors import KembaError
 from kemba.files import WriteError
 from kemba.ocp import Plan, Task, controller_table, plan
 from kemba.ocp.certificate.status import Status
+from kemba.ocp.continuation.between import Origin
 from kemba.ocp.nlp.watcher import Watch
 from kemba.ocp.report import answer, sentence_of
 from kemba.ocp.starts import plan_best
-from kemba.plant.execution.certificate import replays
+from kemba.plant.execution.certificate import executions, plant_run, summaries
 from kemba.plant.execution.counterpart import another_robot, counterpart
 from kemba.plant.execution.replay import ends_standing
 from kemba.plant.execution.retiming import retimed
 from kemba.report.verdict import verdicts
-from kemba.runs import RunFolder, write_json
+from kemba.runs import PLANT_RUN, RunFolder, write_json
 from kemba.trajectory import Trajectory
 
 
@@ -36,6 +37,14 @@ class Listener:
     stop: Callable[[], bool] | None = None
 
 
+@dataclass(frozen=True)
+class Motions:
+    """What is written beside the plan: the controller's table, and the motion of the plant."""
+
+    table: Trajectory | None = None
+    plant: Trajectory | None = None
+
+
 def solve_into(
     folder: RunFolder,
     task: Task,
@@ -46,29 +55,35 @@ def solve_into(
     jobs: int | None = None,
     replay: bool = True,
     figure: bool = True,
+    origin: Origin | None = None,
 ) -> dict[str, Any]:
     """Solve `task` and fill its run folder; returns the JSON of `solve`.
 
     `start`: a trajectory to begin from. `starts`, `jobs`: how many start guesses, on how many
-    cores. `replay`: execute the plan on the same model and on the plant, and compare both with the
-    task's tolerances; a plan that misses them is `acceptable`, not `solved`. Raises KembaError
-    where the task or a file is wrong; the manifest then says `failed`.
+    cores. `origin`: an earlier plan to continue for the changed figures. `replay`: execute the
+    plan on the same model and on the plant, and compare both with the task's tolerances; a plan
+    that misses them is `acceptable`, not `solved`. Raises KembaError where the task or a file is
+    wrong; the manifest then says `failed`.
     """
     dump_yaml(task.model_dump(exclude_none=True), folder / "task.yaml")
     log = folder / "solver.log"
     try:
-        if starts > 1 and start is None:
+        if starts > 1 and start is None and origin is None:
             found = plan_best(task, document, starts, jobs, log, listener.tell)
         else:
             how = {"tell": listener.tell, "watch": listener.watch, "stop": listener.stop}
-            found = plan(task, document, log=log, start=start, **how)  # type: ignore[arg-type]
+            found = plan(task, document, log=log, start=start, origin=origin, **how)  # type: ignore[arg-type]
         result = answer(found, str(folder.path))
-        table = controller_table(found.model, found.trajectory) if found.attempts else None
+        table = (
+            controller_table(found.model, found.trajectory, task.hold) if found.attempts else None
+        )
+        plant: Trajectory | None = None
         if replay and table is not None and found.status.plan:
             listener.tell("replay")
             table = retimed(found.model, found.trajectory, table)
-            result |= _replayed(found, table)
-        _keep(found, result, table, folder, figure)
+            replayed, plant = _replayed(found, table)
+            result |= replayed
+        _keep(found, result, Motions(table, plant), folder, figure)
     except BaseException:
         with suppress(WriteError):  # the first error says more
             folder.finish("failed")
@@ -77,24 +92,30 @@ def solve_into(
     return result
 
 
-def _replayed(found: Plan, table: Trajectory) -> dict[str, Any]:
-    """The executions of a plan, and the verdict: it stays solved only if both come near enough."""
+def _replayed(found: Plan, table: Trajectory) -> tuple[dict[str, Any], Trajectory | None]:
+    """The executions of a plan with the verdict, and the motion of the plant.
+
+    The plan stays solved only if all executions come near enough.
+    """
     task = found.task
     try:
-        plant = counterpart(task.model, task.payload, task.supply, task.plant)
+        plant = counterpart(task.model, task.payload, task.supply, task.plant, changes=task.effects)
         other = another_robot(task.model, task.plant)
-        executed = replays(found.model, found.trajectory, table, plant)
+        done = executions(found.model, found.trajectory, table, plant)
     except KembaError as error:  # a model that the simulator cannot execute still has its plan
-        return _unconfirmed(found, f"it cannot be simulated: {error}")
+        return _unconfirmed(found, f"it cannot be simulated: {error}"), None
+    executed = summaries(found.model, done)
+    there = done["plant_replay"]
+    motion = plant_run(there) if there else None
     lands = bool(ends_standing(found.model, found.trajectory))
     names = [f"the plant is another robot, {other}, which {task.plant} names"] if other else []
     judged = verdicts(executed, task.tolerances, lands).values()
     if all(verdict.good for verdict in judged):
         parts = [sentence_of(found), *names, *(verdict.sentence for verdict in judged)]
-        return {**executed, "sentence": "; ".join(parts)}
+        return {**executed, "sentence": "; ".join(parts)}, motion
     causes = [verdict.sentence for verdict in judged if not verdict.good]
     matches = [verdict.sentence for verdict in judged if verdict.good]
-    return {**executed, **_unconfirmed(found, " and ".join(causes), [*names, *matches])}
+    return {**executed, **_unconfirmed(found, " and ".join(causes), [*names, *matches])}, motion
 
 
 def _unconfirmed(found: Plan, cause: str, remarks: Sequence[str] = ()) -> dict[str, Any]:
@@ -109,15 +130,15 @@ def _unconfirmed(found: Plan, cause: str, remarks: Sequence[str] = ()) -> dict[s
 
 
 def _keep(
-    found: Plan, result: dict[str, Any], table: Trajectory | None, folder: RunFolder, figure: bool
+    found: Plan, result: dict[str, Any], motions: Motions, folder: RunFolder, figure: bool
 ) -> None:
     """Write the run folder; when that fails, write the plan elsewhere and say where."""
     try:
-        _write(found, result, table, folder.path, figure)
+        _write(found, result, motions, folder.path, figure)
     except WriteError as error:
         elsewhere = Path(tempfile.mkdtemp(prefix="kemba-kept-"))
         try:
-            _write(found, result, table, elsewhere, figure=False)
+            _write(found, result, motions, elsewhere, figure=False)
         except WriteError:
             shutil.rmtree(elsewhere, ignore_errors=True)
             raise error from None
@@ -126,13 +147,15 @@ def _keep(
 
 
 def _write(
-    found: Plan, result: dict[str, Any], table: Trajectory | None, folder: Path, figure: bool
+    found: Plan, result: dict[str, Any], motions: Motions, folder: Path, figure: bool
 ) -> None:
     write_json(folder / "certificate.json", result)
-    if table is None:
+    if motions.table is None:
         return  # refused before solving: there is no motion to write
     found.trajectory.write(folder / "trajectory.csv")
-    table.write(folder / "controller.csv")
+    motions.table.write(folder / "controller.csv")
+    if motions.plant is not None:
+        motions.plant.write(folder / PLANT_RUN)
     if figure:
         from kemba import plotting
 

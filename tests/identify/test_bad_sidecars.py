@@ -38,6 +38,19 @@ def test_noise_may_be_given_in_any_unit_of_its_dimension(log_file: Path, line: s
     assert log.meta["noise"] == {"piston/x": pytest.approx(3e-4)}
 
 
+def test_noise_may_have_a_correlation_time(log_file: Path) -> None:
+    line = "piston/x: {sigma: 0.3 mm, time: 10 ms}"
+    log = read_log(beside(log_file, f"noise:\n  {line}\n  piston/F: 1\n"))
+    assert log.meta["noise"] == {"piston/x": pytest.approx(3e-4), "piston/F": 1.0}
+    assert log.meta["noise_time"] == {"piston/x": pytest.approx(0.01)}
+
+
+@pytest.mark.parametrize("group", ["{sigma: 1}", "{sigma: 1, time: 0}", "{sigma: -1, time: 1}"])
+def test_a_group_of_noise_that_cannot_be_is_told(log_file: Path, group: str) -> None:
+    with pytest.raises(KembaError, match=r"log\.meta\.yaml: noise: piston/x"):
+        read_log(beside(log_file, f"noise:\n  piston/x [m]: {group}\n"))
+
+
 @pytest.mark.parametrize("kind", ["[robot]", "3", "null", "robto"])
 def test_a_kind_that_is_none_is_told(log_file: Path, kind: str) -> None:
     with pytest.raises(KembaError, match=r"log\.meta\.yaml: kind.*'kind: robot' or 'kind: bench'"):

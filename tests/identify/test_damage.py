@@ -13,8 +13,9 @@ from kemba.errors import KembaError
 from kemba.identify.answer import Answer
 from kemba.identify.logs.excerpt import excerpts
 from kemba.identify.logs.gate import check_logs
-from kemba.identify.logs.reading import load_map, read_log
+from kemba.identify.logs.reading import read_log
 from kemba.identify.workflow import discover_logs
+from kemba.logs import load_map
 from kemba.trajectory import Trajectory
 
 DATA = Path(__file__).parent / "data"

@@ -9,7 +9,8 @@ import pytest
 
 from kemba.errors import KembaError
 from kemba.identify.logs.gate import check_logs
-from kemba.identify.logs.reading import ColumnMap, Source, load_map, read_log, read_logs
+from kemba.identify.logs.reading import read_log, read_logs
+from kemba.logs import ColumnMap, Source, load_map
 from kemba.trajectory import Trajectory
 
 DATA = Path(__file__).parent / "data"

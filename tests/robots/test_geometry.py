@@ -11,7 +11,7 @@ from kemba.config import shipped_configs
 from kemba.effects.pneumatics.chamber import Chamber
 from kemba.effects.pneumatics.timing import ValveDelay
 from kemba.errors import KembaError
-from kemba.identify.robot.dynamics.tolerance import mass_regressors
+from kemba.mechanism.robot import link_regressors
 from kemba.model import Model, load_model
 from kemba.model.spec import load_spec
 from kemba.ocp.infeasibility.flight import inertia_and_weight, leg_swing
@@ -33,7 +33,7 @@ def heavy(tmp_path: Path) -> Path:
 
 def regressors(model: Model) -> dict[str, np.ndarray]:
     """Generalised force by share of a figure, standing, all accelerations 1."""
-    names, function = mass_regressors(model)
+    names, function = model.mechanism.tolerances, link_regressors(model.mechanism)
     q = [model.mechanism.standing[c.name] for c in model.mechanism.coordinates]
     columns = np.array(function(q, np.zeros(len(q)), np.ones(len(q))))
     return dict(zip(names, columns.T, strict=True))
@@ -46,7 +46,7 @@ def test_a_heavier_femur_is_seen_by_everyone(heavy: Path) -> None:
     assert own.mechanism.mass - shipped.mechanism.mass == pytest.approx(more)
     assert inertia_and_weight(own)[0] - inertia_and_weight(shipped)[0] == pytest.approx(more)
     assert leg_swing(own) - leg_swing(shipped) == pytest.approx(2 * 2 * 4 * 0.335 * 0.095)
-    name = "tolerance.front/hip.mass"  # the femur turns with the hip
+    name = "front/hip.mass"  # the femur turns with the hip
     ratio = regressors(own)[name] / np.where(
         regressors(shipped)[name], regressors(shipped)[name], 1
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.signal import lfilter
 
 from .catalogue import SENSOR_KINDS, SENSOR_SIZES
 from .figures import AREA_E, AREA_R, ATMOSPHERE
@@ -29,6 +30,7 @@ CHANNELS = {
     "foot/Fz": ("N", 2.0, 0.1),
 }
 SIDES = ("front", "rear")
+DRIFT_MEMORY = 1.0  # s
 
 
 def base(channel: str) -> str:
@@ -47,6 +49,9 @@ class Sensors:
     noise: float = 1.0
     sigma: dict[str, float] = field(default_factory=dict)
     quantise: bool = True
+    keep: float = 0.0  # AR(1): share of the noise that is left after a millisecond
+    drift: float = 0.0  # sigma of a slow drift, in sigmas of the noise; memory 1 s
+    steps: float = 1.0  # quantisation steps are so many times as wide
     clock_error: float = 5e-6  # sigma of the written time stamps (s)
     gaps: float = 0.0  # share of rows with a missing cell, per measured channel
     velocities: bool = False
@@ -60,8 +65,12 @@ class Sensors:
 
     def spread(self, channel: str) -> float:
         """Noise per sample with the quantisation counted in, for the sidecar."""
-        step = CHANNELS[base(channel)][2] if self.quantise else 0.0
-        return float(np.hypot(self.noise * self.one_sigma(channel), step / np.sqrt(12.0)))
+        noise = self.noise * self.one_sigma(channel)
+        return float(np.hypot(noise, self.step(channel) / np.sqrt(12.0)))
+
+    def step(self, channel: str) -> float:
+        """Quantisation step of a channel; 0: none."""
+        return self.steps * CHANNELS[base(channel)][2] if self.quantise else 0.0
 
 
 def sensor_fault(name: str, size: float = 1.0, sensors: Sensors | None = None, **value) -> dict:
@@ -85,13 +94,33 @@ def read(channel, times, truth_times, truth, sensors: Sensors, faults, rng) -> n
         scale += fault["parameters"].get("k", 0.0)
         bias += fault["parameters"].get("b", 0.0)
     value = scale * np.interp(times - shift, truth_times, truth) + bias
-    value = value + sensors.noise * sensors.one_sigma(channel) * rng.standard_normal(times.size)
-    step = CHANNELS[base(channel)][2]
-    if sensors.quantise and step > 0.0:
+    value = value + sensors.noise * sensors.one_sigma(channel) * noise(times, sensors, rng)
+    step = sensors.step(channel)
+    if step > 0.0:
         value = np.round(value / step) * step
     if sensors.gaps > 0.0:
         value[rng.random(times.size) < sensors.gaps] = np.nan
     return value
+
+
+def noise(times: np.ndarray, sensors: Sensors, rng) -> np.ndarray:
+    """Noise of unit sigma: white, or AR(1) with `keep` per millisecond, plus a slow drift."""
+    white = rng.standard_normal(times.size)
+    if sensors.keep == 0.0 and sensors.drift == 0.0:
+        return white
+    dt = float(np.median(np.diff(times)))
+    fast = autoregressive(white, sensors.keep ** (dt / 1e-3))
+    if sensors.drift == 0.0:
+        return fast
+    slow = autoregressive(rng.standard_normal(times.size), np.exp(-dt / DRIFT_MEMORY))
+    return fast + sensors.drift * slow
+
+
+def autoregressive(white: np.ndarray, keep: float) -> np.ndarray:
+    """AR(1) noise of unit sigma, `keep` of which is left after each sample."""
+    drive = np.sqrt(1.0 - keep**2) * white
+    drive[0] = white[0]
+    return lfilter([1.0], [1.0, -keep], drive)
 
 
 def time_stamps(ticks: np.ndarray, sensors: Sensors, rng) -> np.ndarray:

@@ -20,7 +20,8 @@ def characterise(
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Model YAML to write.")] = None,
     figures: Annotated[
-        Path | None, typer.Option(help="Folder for the paper's figure of each rig.")
+        Path | None,
+        typer.Option("--figure", "--figures", help="Folder for the paper's figure of each rig."),
     ] = None,
     model: Annotated[
         str, typer.Option(help="Model YAML whose robot has the cylinder that was tested.")

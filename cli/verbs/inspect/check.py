@@ -16,20 +16,27 @@ def check(
     column_map: Annotated[
         str | None, typer.Option("--map", help="Column map YAML for foreign logs.")
     ] = None,
+    model: Annotated[
+        str, typer.Option(help="Model YAML of the machine that the logs are from.")
+    ] = "planning",
     own_effects: OwnEffects = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
     """Validate any YAML or log, with all mistakes at once.
 
+    A log must pass the checks of compare and discover. CSVs that are no logs (plans in run
+    folders, tables of other quantities) are checked as tables.
+
     Example: kemba-opt check planning.yaml
     """
     from kemba.errors import KembaError
+    from kemba.logs import ENDINGS
 
     answers = []
     for file in files:
         try:
-            answer = _log(file, column_map) if file.suffix == ".csv" else _yaml(file)
+            answer = _log(file, column_map, model) if file.suffix in ENDINGS else _yaml(file)
             answers.append({"file": str(file), "good": True, **answer})
         except KembaError as error:
             answers.append({"file": str(file), "good": False, "sentence": str(error)})
@@ -48,30 +55,52 @@ def _tell(answers: list[dict[str, Any]], json: bool, quiet: bool) -> None:
             typer.echo(f"{answer['file']}: {answer['sentence']}")
 
 
-def _log(file: Path, column_map: str | None) -> dict[str, Any]:
-    from kemba.identify.logs.reading import load_map, read_log
-    from kemba.trajectory import Trajectory
+def _log(file: Path, column_map: str | None, model: str) -> dict[str, Any]:
+    """A log is put through the gate of compare and discover; any other file is a table."""
+    import os
 
-    log = read_log(file, load_map(column_map)) if column_map else Trajectory.read(file)
-    seconds = f"{log.time[-1] - log.time[0]:.3g} s"
-    sentence = f"valid table: {len(log)} rows, {len(log.names)} columns, {seconds}"
-    return {"kind": "table", "rows": len(log), "columns": log.headers, "sentence": sentence}
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # many small products, as in compare
+    from kemba.identify.workflow import check_log
+    from kemba.logs import open_log
+
+    kind, remarks = "table", list[str]()
+    if column_map or _is_measured(file):
+        log, remarks = check_log(file, model, column_map)
+        kind = f"log of a {log.meta['kind']}"
+    else:
+        log = open_log(file)
+    size = f"{len(log)} rows, {len(log.names)} columns, {log.time[-1] - log.time[0]:.3g} s"
+    sentence = "; ".join([f"valid {kind}: {size}", *remarks])
+    facts = {"rows": len(log), "columns": log.headers, "remarks": remarks}
+    return {"kind": kind.split()[0], **facts, "sentence": sentence}
+
+
+def _is_measured(file: Path) -> bool:
+    """Whether a table is a log: it has a log's columns or says so, and is no run's plan."""
+    from kemba.identify.logs.reading import is_log
+    from kemba.logs import open_log
+    from kemba.runs import MANIFEST
+
+    planned = (file.parent / MANIFEST).is_file()
+    return not planned and is_log(open_log(file, strict=False))
 
 
 def _yaml(file: Path) -> dict[str, Any]:
     from kemba.config import load_yaml, locate, parse
-    from kemba_cli.schemas import SCHEMAS, kind_of, schema_of
+    from kemba_cli.schemas import CALLED, SCHEMAS, kind_of, schema_of
 
     document = load_yaml(locate(file, SCHEMAS))
     kind = kind_of(document)
     parsed = parse(document, schema_of(kind))
     remarks = _whole(kind, parsed, document)
-    sentence = "; ".join([f"valid {kind.removesuffix('s')} file", *remarks])
+    called = CALLED.get(kind, f"{kind.removesuffix('s')} file")
+    sentence = "; ".join([f"valid {called}", *remarks])
     return {"kind": kind, "sentence": sentence, "remarks": remarks}
 
 
 def _whole(kind: str, parsed: Any, document: Any) -> list[str]:
     """What a file names must exist too: robots, cylinders, legs, quantities, costs, options."""
+    from kemba.logs.columns import check_map
     from kemba.mechanism import load_cylinder, load_robot
     from kemba.model import load_model
     from kemba.ocp.planning import check_feasible
@@ -84,6 +113,8 @@ def _whole(kind: str, parsed: Any, document: Any) -> list[str]:
         return load_model(document.source).remarks
     if kind == "robots":
         load_robot(document.source)
+    if kind == "maps":
+        check_map(parsed, document.source)
     if kind == "cylinders":
         load_cylinder(document.source)
     return []

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from kemba_cli.common import Json, OwnEffects, Quiet, print_json
+from kemba_cli.common import Force, Json, OwnEffects, Quiet, print_json
 
 
 def schema(
@@ -15,6 +15,7 @@ def schema(
     out: Annotated[
         Path | None, typer.Option(help="Write KIND.schema.json files into this folder.")
     ] = None,
+    force: Force = False,
     own_effects: OwnEffects = None,
     json: Json = False,
     quiet: Quiet = False,
@@ -24,6 +25,7 @@ def schema(
     Example: kemba-opt schema models
     """
     from kemba.files import write_json
+    from kemba.folders import fresh
     from kemba_cli.schemas import SCHEMAS, schema_of
 
     kinds = [kind] if kind else list(SCHEMAS)
@@ -31,7 +33,7 @@ def schema(
     if out is None:
         print_json(found[kind] if kind else found)
         return
-    paths = {name: out / f"{name}.schema.json" for name in found}
+    paths = {name: fresh(out / f"{name}.schema.json", force) for name in found}
     for name, content in found.items():
         write_json(paths[name], content)
     print_json(paths) if json else typer.echo("\n".join(map(str, paths.values())))

@@ -11,8 +11,10 @@ from kemba_cli.common import Force, Json, OwnEffects, Quiet, print_json
 
 
 def export(
-    run: Annotated[Path, typer.Argument(help="Run folder (its plan), or any CSV of ours.")],
-    out: Annotated[Path, typer.Option(help="File to write: .mat, .npz, .json or .csv.")],
+    run: Annotated[Path, typer.Argument(help="Run folder (its plan), or any log.")],
+    out: Annotated[
+        Path, typer.Option(help="File to write: .csv, .parquet, .mcap, .mat, .npz or .json.")
+    ],
     column_map: Annotated[
         str | None,
         typer.Option("--map", help="Column map YAML of the program that is to read the .csv."),
@@ -22,12 +24,12 @@ def export(
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Write a plan or a log for MATLAB, NumPy, JSON, or with another program's columns.
+    """Write a plan or a log in another format: PlotJuggler, Foxglove, MATLAB, pandas, own columns.
 
     Example: kemba-opt export runs/jump-1 --out jump.mat
     """
     from kemba.folders import fresh
-    from kemba.identify.logs.reading import load_map
+    from kemba.logs import load_map
     from kemba.plotting import load_source
     from kemba.report.export import export as write
 

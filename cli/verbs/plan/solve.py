@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from kemba_cli.common import Json, OwnEffects, Quiet, print_json, say
+from kemba_cli.common import Force, Json, OwnEffects, Quiet, print_json, say
 
 if TYPE_CHECKING:
     from kemba.ocp import Task
@@ -28,6 +28,12 @@ def solve(
     resume: Annotated[
         Path | None, typer.Option(help="Continue from this run; its task unless TASK is given.")
     ] = None,
+    earlier: Annotated[
+        Path | None,
+        typer.Option(
+            "--from", help="Change the plan of this run (other height, supply, payload, model)."
+        ),
+    ] = None,
     time_limit: Annotated[float | None, typer.Option(help="Seconds of solving at most.")] = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Check the task and say its size; solve nothing.")
@@ -36,6 +42,7 @@ def solve(
     jobs: Annotated[int | None, typer.Option(min=1, help="Starts at a time.")] = None,
     replay: Annotated[bool, typer.Option(help="Execute the plan in simulation.")] = True,
     figure: Annotated[bool, typer.Option(help="Draw the plan.")] = True,
+    force: Force = False,
     own_effects: OwnEffects = None,
     json: Json = False,
     quiet: Quiet = False,
@@ -57,7 +64,14 @@ def solve(
     from kemba.runs import RunFolder
     from kemba_cli.progress import Progress
 
-    start = None
+    start, origin = None, None
+    if resume is not None and earlier is not None:
+        raise typer.BadParameter("--resume and --from exclude each other", param_hint="--from")
+    if earlier is not None:
+        from kemba.report.earlier import origin_of
+
+        origin = origin_of(earlier)
+        task = task or str(earlier / "task.yaml")
     if resume is not None:
         task, out, start = _resumed(resume, task, out)
     if task is None:
@@ -70,7 +84,7 @@ def solve(
         _dry_run(resolved, document, model, json)
         return
     resolved = resolved.model_copy(update={"model": beside(model or resolved.model, Path())})
-    built = task_model(resolved)
+    built = task_model(resolved, document=document)
     resolve(resolved, built, document)
     if built.ignored:
         say(f"no plan can use {', '.join(built.ignored)}: it changes what is measured only", quiet)
@@ -78,11 +92,11 @@ def solve(
         say(remark, quiet)
     models = [path for name in (resolved.model, resolved.plant) for path in model_files(name)]
     inputs = [find_config(task, "tasks"), *dict.fromkeys(models), *BY_KIND.files]
-    folder = RunFolder.create(out, resolved.name, inputs)
+    folder = RunFolder.create(out, resolved.name, inputs, force=force)
     with Progress(quiet or json) as progress, Interrupt(lambda text: say(text, quiet)) as stop:
         listener = Listener(progress.tell, progress.watch, stop)
         answer = solve_into(
-            folder, resolved, document, listener, start, starts, jobs, replay, figure
+            folder, resolved, document, listener, start, starts, jobs, replay, figure, origin
         )
     if json:
         print_json(answer)

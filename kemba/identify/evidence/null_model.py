@@ -6,11 +6,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from kemba.identify.evidence.colour import best_fit, learnt_colour
 from kemba.identify.evidence.linear import (
     Linear,
     condense,
     estimate,
-    linearise,
     moved,
     names_of,
     priors,
@@ -155,20 +155,8 @@ class Baseline:
         A residual of the null would not do: a missing effect would pass for coloured noise. Returns
         the Jacobian at theta under the new colour when it is wanted (`keep`).
         """
-        if not self.problem.learns_colour:
-            return None
-        plain = self.problem.recolour(None)
-        linear, jacobian, r = linearise(plain, theta, self.division.blocks)
-        left = r + jacobian @ (best_fit(linear) - linear.at)
-        self.problem = plain.recolour(left, careful=not keep)
+        if not self.problem.learns_colour or self.problem.moves:
+            return None  # where the motion moves, the search learns the colour with it
+        blocks = self.division.blocks
+        self.problem, jacobian = learnt_colour(self.problem, theta, blocks, careful=not keep)
         return self.problem.whiten(jacobian) if keep else None
-
-
-def best_fit(linear: Linear) -> Array:
-    """z (k,) of the best fit, every parameter free within its prior."""
-    gram, slope, _ = linear.total
-    precision = 1.0 / linear.width**2
-    shift = linear.mean - linear.at
-    h = (gram + np.diag(precision)) * np.outer(linear.width, linear.width)
-    eta = linear.width * (precision * shift - slope)
-    return linear.at + linear.width * np.linalg.solve(h, eta)

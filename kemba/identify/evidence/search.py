@@ -8,57 +8,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from kemba.identify.evidence.colour import with_learnt_colour
 from kemba.identify.evidence.linear import Linear, estimate, names_of
 from kemba.identify.evidence.null_model import Baseline
 from kemba.identify.evidence.point import LinearisationPoint
 from kemba.identify.evidence.refit import Fit, refit
+from kemba.identify.evidence.search_settings import SearchSettings
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis, log_prior, probabilities
 from kemba.identify.problem.problem import Problem
-from kemba.settings import BY_HAND, Settings, setting
-
-
-class SearchSettings(Settings):
-    """Which hypotheses are refitted."""
-
-    leaders: int = setting(6, "1", "effects that are refitted in a round", BY_HAND, decides=True)
-    sure: int = setting(
-        3, "1", "leaders that are refitted however far behind they are", BY_HAND, decides=True
-    )
-    far: float = setting(
-        40.0, "nats", "other leaders are refitted when not farther behind", BY_HAND, decides=True
-    )
-    far_share: float = setting(
-        0.7, "1", "or no farther behind than this share of the gain", BY_HAND, decides=True
-    )
-    promising: float = setting(
-        0.5,
-        "1",
-        "share of the best gain with which an effect is tried again",
-        BY_HAND,
-        decides=True,
-    )
-    followed: int = setting(
-        2, "1", "times that the motion is found again with the best guess", BY_HAND, decides=True
-    )
-    largest: int = setting(
-        3, "1", "effects in one answer", "convention: more need another experiment", decides=True
-    )
-    leaders_grown: int = setting(
-        3, "1", "effects that are refitted beside the best answer", BY_HAND, decides=True
-    )
-    leaders_swapped: int = setting(
-        2, "1", "effects that are refitted in place of one of the answer", BY_HAND, decides=True
-    )
-    gain: float = setting(
-        3.0, "nats", "gain from which a pair recommends its members", BY_HAND, decides=True
-    )
-    least: float = setting(
-        0.1,
-        "1",
-        "size of an effect from which its secant replaces its slope",
-        BY_HAND,
-        decides=True,
-    )
 
 
 @dataclass
@@ -95,7 +52,7 @@ class Search:
             for hypothesis in promising:
                 self.visit(hypothesis)
             best = self._round(NULL, leaders)
-            best = self._grow(best)
+            best = self._swap(self._grow(best))
         return best
 
     def _follow(self, best: Hypothesis) -> Hypothesis:
@@ -114,12 +71,30 @@ class Search:
             self.say(f"looking again as if {' + '.join(guess)} were there")
             among = self._contenders()
             self.problem = self.problem.relinearise(point.fit.theta)
-            self.start(among)
+            self.start(among, point.fit.theta)
             self.visit(guess)
             best = self._round(NULL, settings.leaders)
             if best in (guess, NULL):
                 break
-        return self._grow(best) if best else best
+        return self._swap(self._regrow(self._grow(best))) if best else best
+
+    def _regrow(self, best: Hypothesis) -> Hypothesis:
+        """Find the motion again with an answer of several effects, and let it grow from there.
+
+        Each effect that joins changes the motion, and with it what the others seem to be.
+        """
+        for _ in range(SearchSettings.current().regrown):
+            if len(best) < 2 or time.monotonic() > self.deadline:
+                break
+            theta, before = self.points[best].fit.theta, best
+            self.say(f"looking again as if {' + '.join(best)} were there")
+            self.problem = self.problem.relinearise(theta)
+            self.start(frozenset(), theta)
+            self.visit(best)
+            best = self._grow(best)
+            if best == before:
+                break
+        return best
 
     def _contenders(self) -> frozenset[Hypothesis]:
         """Single effects that were refitted, or whose linear evidence gains a good share of the
@@ -141,8 +116,12 @@ class Search:
         better = first and tables[first] + log_prior(first, count) > null
         return first if better else NULL
 
-    def start(self, among: frozenset[Hypothesis] | None = None) -> None:
-        """Null fit, noise colour, and the linear table at the null."""
+    def start(
+        self, among: frozenset[Hypothesis] | None = None, theta: Mapping[str, float] | None = None
+    ) -> None:
+        """Null fit, noise colour, and the linear table at the null; `theta`: the best guess."""
+        if self.problem.moves:
+            self.problem = with_learnt_colour(self.problem, theta or {}, careful=bool(theta))
         self.base = Baseline(self.problem, among)
         self.problem = self.base.problem
         self.points = {NULL: self.base.point}
@@ -254,18 +233,28 @@ class Search:
         return max(self.points, key=lambda h: self.points[h].log_evidence + log_prior(h, count))
 
     def _grow(self, best: Hypothesis) -> Hypothesis:
-        """Add effects while the evidence grows; then try to swap each for another."""
+        """Add effects, one by one, while the evidence grows."""
         settings = SearchSettings.current()
         while len(best) < settings.largest and time.monotonic() < self.deadline:
             grown = self._round(best, settings.leaders_grown)
             if grown == best or len(grown) <= len(best):
                 break
             best = grown
-        for member in best if len(best) > 1 else ():
-            rest = tuple(h for h in best if h != member)
-            self.visit(rest)
-            self._round(rest, settings.leaders_swapped)
-        return self.best()
+        return best
+
+    def _swap(self, best: Hypothesis) -> Hypothesis:
+        """Take each effect away, or swap it for another; what was swapped may grow again."""
+        for _ in range(SearchSettings.current().swapped):
+            before = best
+            for member in best if len(best) > 1 else ():
+                rest = tuple(h for h in best if h != member)
+                self.visit(rest)
+                self._round(rest, SearchSettings.current().leaders_swapped)
+            best = self.best()
+            if best == before or time.monotonic() > self.deadline:
+                break
+            best = self._grow(best)
+        return best
 
     def _promising(self) -> list[Hypothesis]:
         """Refitted hypotheses that gained a good share of what the best one gained."""

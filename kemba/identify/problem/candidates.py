@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from kemba.effects import BY_KIND
 from kemba.effects.base import Effect
-from kemba.effects.sensors import SensorEffect
+from kemba.effects.mechanics.geometry import SIZES, Geometry
 from kemba.identify.problem.problem import Candidate, Parameter
 from kemba.identify.problem.sensor_faults import possible_faults
 from kemba.model.model import Model
@@ -33,21 +33,53 @@ class CandidateSettings(Settings):
 
 
 def effect_candidates(model: Model) -> dict[str, Candidate]:
-    """Every effect of the catalogue whose ports this model has and whose list lacks it."""
+    """Every effect of the catalogue whose ports this model has and whose list lacks it; those that
+    need more than their kind, such as a sensor's channel, are not among them."""
     present = {e.kind for e in model.effects}
     found = {}
     for kind, effect in BY_KIND.items():
         missing = effect.off and kind not in present
         if effect.own_rigs and not model.mechanism.rig:
             continue
-        if missing and not issubclass(effect, SensorEffect) and _fits(model, effect):
+        whole = not any(field.is_required() for field in effect.model_fields.values())
+        if missing and whole and _fits(model, effect):
             found[kind] = candidate(effect)
     return found
 
 
-def by_default(kind: str) -> Effect:
-    """The effect of a kind as its defaults have it: absent."""
-    return BY_KIND[kind](kind=kind)
+def by_default(name: str) -> Effect:
+    """The effect of a name as its defaults have it: absent."""
+    kind, _, place = name.partition(":")
+    where = {where_field(kind): place} if place else {}
+    return BY_KIND[kind].model_validate({"kind": kind, **where})
+
+
+def where_field(kind: str) -> str:
+    """The field that says where an effect acts, the second part of its name: a sensor's `channel`,
+    the `part` of a length, else the leg that it is `on`."""
+    fields = BY_KIND[kind].model_fields
+    return next((name for name, field in fields.items() if field.is_required()), "on")
+
+
+def leg_candidates(model: Model, kinds: Iterable[str]) -> dict[str, Candidate]:
+    """Each of these kinds of effects on one leg only, as `seal_friction:front`, beside one value
+    for all legs.
+
+    Effects with a state of their own are left out: a leg cannot have the same state twice.
+    """
+    legs = model.mechanism.legs
+    own = [k for k in kinds if BY_KIND[k].place == "leg" and not by_default(k).states()]
+    names = {f"{kind}:{leg}": BY_KIND[kind] for kind in own for leg in legs if len(legs) > 1}
+    return {name: _candidate(name, effect, effect.declared()) for name, effect in names.items()}
+
+
+def geometry_candidates(model: Model) -> dict[str, Candidate]:
+    """Every length of the robot that the model's list does not correct."""
+    present = {e.name for e in model.effects}
+    parts = [Geometry(part=part) for part in SIZES] if model.mechanism.robot else []
+    return {
+        e.name: _candidate(e.name, Geometry, e.parameters()) for e in parts if e.name not in present
+    }
 
 
 def candidate(effect: type[Effect], declared: Mapping[str, Param] | None = None) -> Candidate:

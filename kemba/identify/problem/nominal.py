@@ -1,6 +1,6 @@
 """Nominal figures that every fit leaves free: what a machine has a little different from its model.
 
-Which they are and by how much is declared by the effect whose figures they are.
+Which they are and by how much is declared by the effect or the mechanism whose figures they are.
 """
 
 from __future__ import annotations
@@ -23,6 +23,12 @@ def nominal_figures(model: Model, except_for: Iterable[str] = ()) -> dict[str, t
         if effect.name not in free
         for figure, share in effect.tolerances().items()
     }
+
+
+def link_figures(model: Model) -> dict[str, tuple[float, float]]:
+    """Share 0 by which a link's figure is off, and its 1 sigma, by name; {} for a rig."""
+    found = model.mechanism.tolerances
+    return {f"tolerance.{name}": (0.0, share) for name, share in found.items()}
 
 
 def leg_by_leg(model: Model) -> Model:

@@ -159,6 +159,10 @@ class Problem(ABC):
         spikes are no physics and get less weight."""
         return self
 
+    def heard_as(self, other: Problem) -> Self:
+        """This problem with the noise colour that `other`, logs of the same sensors, has learnt."""
+        return self
+
     def whiten(self, columns: Array) -> Array:
         """Columns (n, k) of a problem without colour as they are under this one's colour."""
         return columns

@@ -7,8 +7,9 @@ from pathlib import Path
 
 from kemba.identify.logs.excerpt import excerpts
 from kemba.identify.logs.gate import check_logs
-from kemba.identify.logs.reading import load_map, read_logs, taken_on
+from kemba.identify.logs.reading import read_logs, taken_on
 from kemba.identify.rigs.characterise import RigFit, fit_rig
+from kemba.logs import load_map
 from kemba.model import load_model
 
 

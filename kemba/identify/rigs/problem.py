@@ -108,7 +108,7 @@ class RigProblem(Problem):
         )
 
     def recolour(self, residual: Array | None, careful: bool = False) -> Self:
-        """The same problem, each run's colour learnt anew, or forgotten."""
+        """The same problem, each run's colour learnt from `residual` (n,), or forgotten."""
         found = copy(self)
         found.colour = {}
         if residual is not None:
@@ -177,7 +177,7 @@ class RigProblem(Problem):
         return found
 
     def window_errors(self, theta: Theta) -> Mapping[str, Array]:
-        """Measured less predicted force."""
+        """Measured less predicted force (n,)."""
         gaps = [-self.predictor.gap(log, theta) for log in self.logs]
         return {self.answer: np.concatenate(gaps)}
 

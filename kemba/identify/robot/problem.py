@@ -11,7 +11,7 @@ from typing_extensions import Self
 from kemba.identify.logs.gate import BadData
 from kemba.identify.problem.candidates import sensor_candidates
 from kemba.identify.problem.problem import Problem
-from kemba.identify.problem.sensor_faults import SensorFaults, is_straight
+from kemba.identify.problem.sensor_faults import SensorFaults, is_fault, is_straight
 from kemba.identify.problem.types import (
     Array,
     Candidate,
@@ -29,15 +29,18 @@ from kemba.identify.robot.candidates import (
     robot_candidates,
 )
 from kemba.identify.robot.dynamics.physics import Physics
+from kemba.identify.robot.dynamics.reference import first_reference
 from kemba.identify.robot.dynamics.settings import ForceDensity
-from kemba.identify.robot.dynamics.tolerance import ToleranceShareSettings
 from kemba.identify.robot.force_channels import robot_force_channels
 from kemba.identify.robot.formulas import formula_columns
+from kemba.identify.robot.geometry import GEOMETRY, standing_lengths
 from kemba.identify.robot.labels import describe
 from kemba.identify.robot.missing import robot_missing
 from kemba.identify.robot.motion.batch import Batch
+from kemba.identify.robot.motion.colour import Noise
 from kemba.identify.robot.motion.expected import expected_power, predicted_error
 from kemba.identify.robot.motion.resampled import resample
+from kemba.identify.robot.noise import learnt_from, stated_noise
 from kemba.identify.robot.operating_point import changes, robot_operating_point
 from kemba.identify.robot.state import LinearisedState, linearise_at
 from kemba.identify.robot.validate import contradictions
@@ -60,11 +63,13 @@ class RobotProblemSettings(Settings):
 class RobotProblem(Problem):
     """`Problem` for robot logs; see the text of `kemba.identify.robot.state`.
 
-    `state`: the logs with the model linearised along their motion. `unknown`: density of the forces
-    that no model explains.
+    `state`: the logs with the model linearised along their motion. `lengths`: those at which feet
+    stand, where they are not the model's; contacts are read with them. `unknown`: density of the
+    forces that no model explains.
     """
 
     moves = True
+    learns_colour = True
     state: LinearisedState
 
     def __init__(
@@ -87,9 +92,13 @@ class RobotProblem(Problem):
         sigma = dict(zip(physics.channels, np.median(batch.sigma, axis=0).tolist(), strict=True))
         self.candidates: dict[str, Candidate] = {**found, **sensor_candidates(sigma, model)}
         sensors = SensorFaults(model.effects)
-        self.state = linearise_at(physics, batch, sensors, {}, ground, self.unknown)
-        masses = dict.fromkeys(physics.masses, (0.0, ToleranceShareSettings.current().share))
-        self.nuisance = {**physics.nuisance, **sensors.nuisance, **masses}
+        noise = stated_noise(batch)
+        reference = first_reference(physics, batch, physics.nominal)
+        self.lengths = standing_lengths(physics, batch, reference, self.candidates)
+        self.state = linearise_at(
+            physics, batch, sensors, self.lengths, ground, self.unknown, noise
+        )
+        self.nuisance = {**physics.nuisance, **sensors.nuisance, **physics.links}
 
     @property
     def physics(self) -> Physics:
@@ -104,13 +113,30 @@ class RobotProblem(Problem):
     def relinearise(self, base: Theta) -> Self:
         """The same problem, smoothed and linearised anew with the model at `base`."""
         found, old = copy(self), self.state
+        own = any(is_fault(name) or name.startswith(GEOMETRY) for name in base)
+        base = base if own else {**self.lengths, **base}
         found.state = linearise_at(
-            old.physics, old.batch, old.sensors, base, old.ground, self.unknown
+            old.physics, old.batch, old.sensors, base, old.ground, self.unknown, old.noise
         )
         return found
 
+    def recolour(self, residual: Array | None, careful: bool = False) -> Self:
+        """The same problem with the colour of each sensor's noise learnt anew, or as stated."""
+        if residual is None:
+            return self._with_noise(stated_noise(self.batch))
+        return self._with_noise(learnt_from(self.state, residual, drifts=careful))
+
+    def heard_as(self, other: Problem) -> Self:
+        """This problem with the noise that another one, of the same sensors, has learnt."""
+        return self._with_noise(other.state.noise) if isinstance(other, RobotProblem) else self
+
+    def _with_noise(self, noise: Noise) -> Self:
+        found = copy(self)
+        found.state = self.state.with_noise(noise)
+        return found
+
     def residual(self, theta: Theta, runs: Collection[int] | None = None) -> Array:
-        """Whitened (predicted - measured), rows as `rows` describes them."""
+        """Whitened (predicted - measured) (n,), rows as `rows` describes them."""
         return self.state.pick(self.state.residuals([theta]), runs)[:, 0]
 
     def jacobian(
@@ -139,9 +165,9 @@ class RobotProblem(Problem):
         return self.state.slopes({**typical, **theta}, names)
 
     def _is_direct(self, name: str) -> bool:
-        """Whether the force is linear in it: shapes, states and delays are not."""
+        """Whether the force is linear in it: shapes, states, delays and lengths are not."""
         physics = self.physics
-        if name in physics.moving or name in physics.base.delays:
+        if name in physics.moving or name in physics.base.delays or name.startswith(GEOMETRY):
             return False
         lead = any(name == c.key for c in self.candidates.values())
         return name in self.state.linear or (
@@ -194,7 +220,7 @@ class RobotProblem(Problem):
     def missing_force(
         self, theta: Theta | None = None, strength: Array | None = None
     ) -> list[MissingForce]:
-        """Force on the body, moments at pitch and hips, force on the rods."""
+        """Forces on body and rods, moments at pitch and hips; `strength` (k,): 1 sigma each."""
         return robot_missing(self.state, theta or {}, strength)
 
     def force_channels(self) -> list[ForceChannel]:
@@ -204,19 +230,21 @@ class RobotProblem(Problem):
     def validate(self) -> list[str]:
         """No remarks. Raises BadData where a log contradicts itself or any model."""
         faults = list(
-            contradictions(self.state, self.rows(), self.residual({}), self._sensor_columns)
+            contradictions(
+                self.state, self.rows(), self.residual(self.lengths), self._sensor_columns
+            )
         )
         if faults:
             raise BadData(faults)
         return []
 
     def _sensor_columns(self) -> Array:
-        """Columns (n, k) of every sensor fault, per size."""
-        faults = [c for c in self.candidates.values() if c.sensor]
-        return self.jacobian({}, [c.key for c in faults]) * [c.lead.size for c in faults]
+        """Columns (n, k) of every sensor fault and every length, per size."""
+        faults = [c for c in self.candidates.values() if c.sensor or c.effect.startswith(GEOMETRY)]
+        return self.jacobian(self.lengths, [c.key for c in faults]) * [c.lead.size for c in faults]
 
     def formulas(self, theta: Theta) -> Mapping[str, Array]:
-        """Simple terms on rods, hips and body; the same at every theta."""
+        """Simple terms on rods, hips and body: formula -> column (n,), the same at every theta."""
         return formula_columns(self.state)
 
 

@@ -28,6 +28,7 @@ from kemba.identify.robot.dynamics.reference import (
 )
 from kemba.identify.robot.dynamics.settings import ForceDensity, LooseForceDensity
 from kemba.identify.robot.motion.batch import Batch
+from kemba.identify.robot.motion.colour import Noise
 from kemba.identify.robot.motion.contact import Schedule, loaded
 from kemba.identify.robot.motion.filter import Gains, gains, innovations
 from kemba.identify.robot.motion.sensing import ahead, sensed
@@ -53,6 +54,7 @@ class LinearisedState:
     rows that are data. `forces`: the model's force along the motion at any parameters. `linear`:
     name -> generalised force (n, L, k) per unit of a parameter that stands beside the model, and
     its nominal value. `ground`: parameters of the model's soft ground, empty where it is rigid.
+    `noise` of the sensors, as it is coloured; empty: white.
     """
 
     physics: Physics
@@ -65,6 +67,7 @@ class LinearisedState:
     gain: Gains
     mask: Flags
     forces: Forces
+    noise: Noise = ()
     linear: Mapping[str, tuple[Array, float]] = field(default_factory=dict)
 
     def measurement(self, theta: Theta) -> Array:
@@ -72,10 +75,23 @@ class LinearisedState:
         theta see it; NaN where nothing was measured."""
         motion, batch = self.motion, self.batch
         faults = {c: self.sensors.at(theta, c) for c in self.physics.channels}
-        seen = sensed(faults, batch.resampled, motion.y, motion.way)
+        y, places = self.seen(theta)
+        seen = sensed(faults, batch.resampled, y, motion.way)
         soft = {**self.ground, **theta}
         depth = motion.penetration(soft.get(SOFTNESS, 0.0), soft.get("ground_compliance.d", 1.0))
-        return np.concatenate([batch.y - seen, -motion.places - depth], axis=2)
+        return np.concatenate([batch.y - seen, -places - depth], axis=2)
+
+    def seen(self, theta: Theta) -> tuple[Array, Array]:
+        """Channels (n, L, k), and places (n, L, 3 legs) of feet and pistons, along the reference,
+        of a robot with the lengths at theta."""
+        p, _ = values_at(self.physics, theta)
+        at, _ = values_at(self.physics, self.base)
+        own = self.physics.lengths
+        if np.array_equal(p[own], at[own]):
+            return self.motion.y, self.motion.places
+        nodes = (self.batch.flat(a) for a in (self.motion.ref.q, self.motion.ref.v))
+        y, feet = (self.batch.deep(a) for a in self.physics.call("seen", *nodes, p=p))
+        return y, np.concatenate([feet, y[..., y.shape[2] - len(self.physics.legs) :]], axis=2)
 
     def acceleration(self, theta: Theta) -> Array:
         """Acceleration (n, L, k) that the model at theta adds to the reference's."""
@@ -112,6 +128,22 @@ class LinearisedState:
         g = np.stack([self.acceleration(t) for t in thetas], axis=-1)
         return self.whitened(y, g)
 
+    def with_noise(self, noise: Noise) -> LinearisedState:
+        """The same logs and motion, filtered with this noise of the sensors."""
+        motion = self.motion.with_noise(noise, self.batch)
+        return replace(self, motion=motion, gain=gains(motion.system), noise=tuple(noise))
+
+    def spread(self, rows: Array) -> Array:
+        """Rows (rows,) as `pick` gives them of all runs -> (n, L, m), NaN where there is no row."""
+        whole = np.full(self.mask.shape, np.nan).swapaxes(0, 1)  # (L, n, m)
+        done = 0
+        for i in range(len(self.batch.resampled)):
+            own = self.mask[:, i].T
+            part = np.full(own.shape, np.nan)
+            part[own] = rows[done : done + int(own.sum())]
+            whole[i], done = part.T, done + int(own.sum())
+        return np.asarray(whole.swapaxes(0, 1))
+
     def pick(self, columns: Array, runs: Collection[int] | None = None) -> Array:
         """(n, L, m, ...) -> rows (rows, ...): run by run, channel by channel, in time."""
         chosen = range(len(self.batch.resampled)) if runs is None else runs
@@ -125,27 +157,28 @@ def linearise_at(
     base: Theta,
     ground: Mapping[str, float],
     unknown: ForceDensity,
+    noise: Noise = (),
 ) -> LinearisedState:
     """The logs smoothed with the model at `base`, and the model linearised along that motion.
 
-    `unknown`: density of the forces that no model explains.
+    `unknown`: density of the forces that no model explains; `noise` of the sensors.
     """
-    reference = _without_delays(physics, batch, sensors, base, first_reference(physics, batch))
-    schedules = read_schedules(physics, batch, reference)
+    p = values_at(physics, base)[0]
+    reference = _without_delays(physics, batch, sensors, base, first_reference(physics, batch, p))
+    schedules = read_schedules(physics, batch, reference, p)
     dt = float(np.median(batch.h[batch.valid]))
     for _ in range(StateSettings.current().rounds):
-        state = _along(
-            physics, batch, sensors, base, ground, schedules, reference, LooseForceDensity.current()
-        )
+        loose = LooseForceDensity.current()
+        state = _along(physics, batch, sensors, base, ground, schedules, reference, loose, noise)
         y, g = state.measurement(base), state.acceleration(base)
         reference = smoothed(state.motion, state.gain, y, g)
         if sensors.listed or any(map(is_fault, base)):  # as true sensors would have seen it
-            schedules = read_schedules(physics, batch, reference)
+            schedules = read_schedules(physics, batch, reference, p)
         normal = [state.motion.normal[: len(s.phase), i] for i, s in enumerate(schedules)]
         schedules = tuple(loaded(s, f, dt) for s, f in zip(schedules, normal, strict=True))
-    state = _along(physics, batch, sensors, base, ground, schedules, reference, unknown)
-    masses = zip(physics.masses, np.moveaxis(state.motion.masses, -1, 0), strict=True)
-    linear = {name: (column, 0.0) for name, column in masses}
+    state = _along(physics, batch, sensors, base, ground, schedules, reference, unknown, noise)
+    links = zip(physics.links, np.moveaxis(state.motion.links, -1, 0), strict=True)
+    linear = {name: (column, 0.0) for name, column in links}
     return replace(state, linear={**linear, GRIP: (state.motion.less_grip, 1.0)})
 
 
@@ -167,18 +200,19 @@ def _along(
     schedules: tuple[Schedule, ...],
     reference: Reference,
     unknown: ForceDensity,
+    noise: Noise,
 ) -> LinearisedState:
     """The model at `base` linearised along one reference."""
     p, delays = values_at(physics, base)
     states = air_states(physics, batch, read_inputs(physics, batch, reference, delays), p)
     density = densities(physics, batch, schedules, unknown)
-    motion = linearise_along(physics, batch, schedules, reference, density, states, p)
+    motion = linearise_along(physics, batch, schedules, reference, density, states, p, noise)
     mask = np.isfinite(motion.system.R)
     mask[: StateSettings.current().lead_in] = False
     forces = Forces(physics, batch, motion)
     gain = gains(motion.system)
     return LinearisedState(
-        physics, batch, sensors, dict(base), ground, schedules, motion, gain, mask, forces
+        physics, batch, sensors, dict(base), ground, schedules, motion, gain, mask, forces, noise
     )
 
 

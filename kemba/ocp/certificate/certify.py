@@ -192,10 +192,10 @@ class Measurement:
         for requirement in requirements:
             name, unit = requirement.quantity.name, requirement.quantity.unit
             first = int(name in acting)
-            at = slice(first, None)
-            if requirement.at is not None:
-                first = requirement.node(nodes)
-                at = slice(first, first + 1)
+            at = requirement.nodes(nodes, first)
+            if not at:
+                continue
+            first = at[0]
             values = self.trajectory[name][at, None]
             over = np.maximum(requirement.lower - values, values - requirement.upper)
             label = (f"{requirement.text}:{name}", unit, requirement.scale)

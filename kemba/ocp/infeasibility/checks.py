@@ -49,11 +49,13 @@ def moments(
     task: Task, requirements: Sequence[Requirement]
 ) -> Iterator[tuple[str, list[Requirement]]]:
     """Every moment by name, with the requirements that hold at it or throughout."""
-    always = [w for w in requirements if w.at is None]
+    always = [w for w in requirements if w.always]
+    lasting = [w for w in requirements if w.at is None and not w.always]
     timed = sorted((w for w in requirements if w.at is not None), key=lambda w: w.node(task.nodes))
     for node, group in groupby(timed, key=lambda w: w.node(task.nodes)):
         names = {0: "the start", task.nodes: "the end"}
-        yield names.get(node, f"node {node} of {task.nodes}"), [*group, *always]
+        here = [w for w in lasting if node in w.nodes(task.nodes)]
+        yield names.get(node, f"node {node} of {task.nodes}"), [*group, *here, *always]
     if always and not timed:
         yield "every moment", always
 

@@ -65,7 +65,7 @@ def flight_of(model: Model, requirements: Sequence[Requirement], poses: Poses) -
     mass, weight = inertia_and_weight(model)
     end = [w for w in requirements if w.at == 1.0]
     lands = any(w.quantity.name.endswith("foot/z") and w.upper <= 1e-6 for w in end)
-    below = [w for w in requirements if w.quantity.name == "body/z" and w.at is None]
+    below = [w for w in requirements if w.quantity.name == "body/z" and w.always]
     return Flight(
         requirement,
         requirement.lower,

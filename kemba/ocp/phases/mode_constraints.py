@@ -7,15 +7,16 @@ import itertools
 import casadi as ca
 import numpy as np
 
+from kemba.model.impact import felt
 from kemba.ocp.phases.independent import Independent
 from kemba.ocp.phases.modes import AHEAD, BACK, HELD, OPEN
 from kemba.ocp.phases.program import PhaseProgram, Where
 from kemba.ocp.phases.radau import STATE
 from kemba.ocp.phases.settings import ModeConstraints
-from kemba.ocp.phases.unilateral import Constraint
 from kemba.ocp.phases.view import View
 from kemba.ocp.task.requirement import SCALES
 from kemba.ocp.transcription.first_node import state_rows
+from kemba.ocp.transcription.unilateral import Constraint
 
 INF = np.inf
 LENGTH, SPEED = SCALES["m"], SCALES["m.s-1"]  # of gaps and their rates
@@ -55,13 +56,17 @@ def _gaps(program: PhaseProgram, view: View, i: int, constraint: Constraint) -> 
         low = settings.clear / LENGTH if clear else 0.0
         program.mode_constraint(i, "gap", view.z("q"), g, low, INF, apart)
     touching = [(closing[node], c.end(node)["q"]) for node in sorted(closing)]
+    rate = view.of(constraint.rate) / SPEED
+    hits = {n: (p, np.concatenate([c.end(n)["q"], c.end(n)["v"]])) for n, p in closing.items()}
+    soft = program.task.landing.impact_speed
+    if soft is not None:
+        late = [at for node, at in hits.items() if node > program.apex]
+        own = felt(program.model.mechanism, constraint.label)
+        program.mode_constraint(i, "lands", view.z("q v"), own * rate, -soft / SPEED, INF, late)
     program.mode_constraint(i, "touch", view.z("q"), g, 0.0, 0.0, touching)
     if constraint.friction is not None:
-        rate = view.of(constraint.rate) / SPEED
-        before = [(p, np.concatenate([c.end(n)["q"], c.end(n)["v"]])) for n, p in closing.items()]
-        program.mode_constraint(
-            i, "approach", view.z("q v"), rate, -INF, -settings.lands / SPEED, before
-        )
+        low = -settings.lands / SPEED
+        program.mode_constraint(i, "approach", view.z("q v"), rate, -INF, low, list(hits.values()))
 
 
 def _held(program: PhaseProgram, view: View, i: int, constraint: Constraint) -> None:

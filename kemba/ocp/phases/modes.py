@@ -11,8 +11,8 @@ import numpy as np
 
 from kemba.model import Model
 from kemba.ocp.phases.settings import Reading
-from kemba.ocp.phases.unilateral import Constraint
 from kemba.ocp.transcription.solution import arrays
+from kemba.ocp.transcription.unilateral import Constraint
 from kemba.trajectory import Trajectory
 
 OPEN, HELD, AHEAD, BACK = 0, 1, 2, 3  # open; closed and sticking; sliding forward, backward
@@ -44,12 +44,16 @@ def read_phases(
     valves: np.ndarray,
     marks: Sequence[int],
     trim: bool = False,
+    brief: float = 0.0,
 ) -> list[Phase]:
     """Phases of a plan with `valves` (rows, n); a phase ends at every node of `marks` too.
 
-    `trim`: a foot that slides under little load has left the ground.
+    `trim`: a foot that slides under little load has left the ground. A foot that touches for less
+    than `brief` [s] on its way through the air does not touch.
     """
     modes = np.column_stack([_modes(model, c, plan, trim) for c in constraints])
+    for i in (i for i, c in enumerate(constraints) if c.friction is not None):
+        drop_grazes(modes[:, i], plan.time, brief)
     _valves_first(modes, valves)
     same = (modes[1:] == modes[:-1]).all(axis=1) & (valves[1:] == valves[:-1]).all(axis=1)
     borders = sorted({0, len(plan) - 1, *(np.flatnonzero(~same[1:]) + 1).tolist(), *marks})
@@ -102,6 +106,13 @@ def _modes(model: Model, constraint: Constraint, plan: Trajectory, trim: bool) -
         closed = modes != OPEN
         modes[closed & slides] = np.where(values[1] > 0, AHEAD, BACK)[closed & slides]
     return np.asarray(modes)
+
+
+def drop_grazes(modes: np.ndarray, time: np.ndarray, brief: float) -> None:
+    """Open a contact that closes for less than `brief` [s] between two times in the air."""
+    for a, b in _runs(modes):
+        if a > 1 and b < len(modes) and time[b - 1] - time[a - 1] < brief:
+            modes[a:b] = OPEN
 
 
 def _fill_hops(modes: np.ndarray, gap: np.ndarray, hop: float) -> None:

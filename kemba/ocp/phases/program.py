@@ -15,10 +15,10 @@ from kemba.ocp.phases.columns import Columns
 from kemba.ocp.phases.modes import OPEN, Phase
 from kemba.ocp.phases.radau import STATE, Scheme, element, impact
 from kemba.ocp.phases.settings import Elements
-from kemba.ocp.phases.unilateral import Constraint
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.layout import Layout
 from kemba.ocp.transcription.symmetry import Reduction
+from kemba.ocp.transcription.unilateral import Constraint
 
 INF = np.inf
 Where = list[tuple[int, np.ndarray]]  # phases and the columns of z there
@@ -93,6 +93,7 @@ class PhaseProgram:
         self.element = element(model, self.layout, reduction, task.cost, scheme)
         self.jump = impact(model, self.layout, reduction)
         self.added: list[Part] = []
+        self.apex = 0  # the node after which impacts are those of the landing
 
     def _closes(self, p: int) -> bool:
         """Whether a constraint that was open is closed from phase p on."""
@@ -158,6 +159,11 @@ class PhaseProgram:
         if columns:
             part = Part((label,), z, ca.SX(g), ca.SX(0), low, high, np.array(columns))
             self.added.append(part)
+
+    def add_cost(self, z: ca.SX, f: ca.SX, columns: np.ndarray) -> None:
+        """Add the cost f(z), whose z is at `columns` (len(z),)."""
+        part = Part((), z, ca.SX(0, 1), f, 0.0, 0.0, columns[None, :])
+        self.added.append(part)
 
     def mode_constraint(
         self, i: int, kind: str, z: ca.SX, g: ca.SX, low: float, high: float, where: Where

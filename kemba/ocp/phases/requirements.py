@@ -11,8 +11,8 @@ from kemba.ocp.phases.independent import Independent
 from kemba.ocp.phases.modes import HELD
 from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.view import View
-from kemba.ocp.task.requirement import Requirement, quantity_expression
-from kemba.ocp.transcription.stage import as_variable
+from kemba.ocp.task.requirement import Requirement, apex_node, quantity_expression
+from kemba.ocp.transcription.stage import aim_cost, as_variable
 
 INF = np.inf
 
@@ -22,23 +22,27 @@ def add_requirements(
 ) -> None:
     """Bounds where a requirement is about a variable, else rows; none where modes imply it."""
     view = View(program)
+    program.apex = apex_node(requirements, program.nodes)
     _granted_at_end(program, view, end)
     seen: set[tuple[object, ...]] = set()
     for requirement in requirements:
         g = view.of(quantity_expression(program.model, requirement.quantity.name))
         z = view.z("q v s u lam")
-        key = (requirement.at, str(g), requirement.lower, requirement.upper)
+        key = requirement.at, requirement.during, str(g), requirement.lower, requirement.upper
         if ca.jacobian(g, z).nnz() == 0 or key in seen or _about_valves(program, view, g):
             continue
         seen.add(key)
+        if requirement.aim:
+            at = _columns(program, requirement.node(program.nodes), full=True)
+            program.add_cost(z, aim_cost(requirement, g), at)
         last = program.nodes
         acts = ca.depends_on(g, view.z("u lam"))
-        nodes = range(int(acts), last + 1) if requirement.at is None else [requirement.node(last)]
+        nodes = requirement.nodes(last, int(acts))
         if requirement.at is not None and requirement.lower == requirement.upper and not acts:
             moment = {0: start, last: end}.get(nodes[0])
             if moment is not None and not moment.adds(g, view):
                 continue
-        _put(program, view, requirement, g, list(nodes))
+        _put(program, view, requirement, g, nodes)
 
 
 def _about_valves(program: PhaseProgram, view: View, g: ca.SX) -> bool:

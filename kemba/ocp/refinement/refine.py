@@ -10,6 +10,7 @@ import numpy as np
 
 from kemba.model import Model
 from kemba.ocp.certificate.certify import Certificate
+from kemba.ocp.certificate.grazing import LASTS
 from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.nlp.ipopt import Control, Iterate
 from kemba.ocp.phases.independent import Independent
@@ -19,7 +20,6 @@ from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.radau import RADAU3, RADAU5, STATE, Scheme
 from kemba.ocp.phases.requirements import add_requirements
 from kemba.ocp.phases.settings import Elements, Refining, Repair
-from kemba.ocp.phases.unilateral import read_constraints
 from kemba.ocp.refinement.repair import misfit, repaired, simplified
 from kemba.ocp.refinement.sample import certificate, to_trajectory
 from kemba.ocp.refinement.solve import rough, solve, warm
@@ -33,6 +33,7 @@ from kemba.ocp.transcription.symmetry import (
     requirements_are_symmetric,
     whole,
 )
+from kemba.ocp.transcription.unilateral import read_constraints
 from kemba.trajectory import Trajectory
 
 
@@ -116,10 +117,12 @@ class Refiner:
         """The first reading that solves, else how the last one ended."""
         constraints = read_constraints(self.model, self.reduction)
         inputs = self.reduction.restrict("u", arrays(self.model, self.plan)["u"])
-        valves = np.round(inputs[:, _binary(self.model, self.reduction)])
+        valves = np.round(inputs[:, valve_columns(self.model, self.reduction)])
         found = Refined(None, None, Ending.GAVE_UP, 0)
         for trim in (False, True):
-            phases = read_phases(self.model, constraints, self.plan, valves, self.marks, trim)
+            brief = LASTS if self.task.clearance else 0.0
+            plan, marks = self.plan, self.marks
+            phases = read_phases(self.model, constraints, plan, valves, marks, trim, brief)
             if phases in self.seen:
                 break
             found = self.exact(phases, self.plan)
@@ -256,7 +259,8 @@ def reduction_of(
     return half
 
 
-def _binary(model: Model, reduction: Reduction) -> list[int]:
+def valve_columns(model: Model, reduction: Reduction) -> list[int]:
+    """Places of the valves among the inputs of a half or whole robot."""
     places = [i for i, q in enumerate(model.inputs.values()) if q.binary]
     B = reduction.B["u"]
     return [j for j in range(B.shape[1]) if B[places, j].any()]

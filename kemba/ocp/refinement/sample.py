@@ -6,6 +6,7 @@ import casadi as ca
 import numpy as np
 
 from kemba.ocp.certificate.certify import Certificate, Violation, first_state
+from kemba.ocp.phases.notes import phase_notes
 from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.radau import STATE
 from kemba.ocp.transcription.layout import STEP
@@ -46,6 +47,7 @@ def to_trajectory(program: PhaseProgram, x: np.ndarray) -> Trajectory:
     times = np.concatenate([[0.0], np.cumsum(h)])
     a, sd = layout.full(rates, "v"), layout.full(rates, "s")
     plan = written(program.model, program.task.name, times, values, a, sd)
+    plan.meta |= phase_notes(program.phases, program.constraints)
     return plan.with_columns(_impulses(program, x))
 
 

@@ -73,7 +73,7 @@ def body_course(
     if peak is None or peak.at is None:
         return Course([0.0, duration], [z0, z1 or z0], [0.0, 0.0], (duration, duration))
     apex, t_apex = peak.lower, peak.at * duration
-    feet = (w for w in requirements if w.quantity.name.endswith("foot/z") and w.at == peak.at)
+    feet = (w for w in requirements if w.quantity.name.endswith("foot/z") and w.holds(peak.at))
     lift = max((w.lower for w in feet), default=0.0)
     if lift > 0.0 and z0 < apex <= top:  # standing reaches it, but is not what is asked
         top = max(apex - lift, (z0 + apex) / 2)

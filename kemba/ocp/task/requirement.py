@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
+from math import ceil, floor
 
 import casadi as ca
 
@@ -21,18 +22,26 @@ from kemba.quantity import Quantity, to_si
 SPECIAL = ("rest", "settled")
 # How much of each unit matters in a requirement; other units have the scale of the quantity.
 SCALES = {"m": 0.1, "rad": 0.2, "m.s-1": 1.0, "rad.s-1": 5.0}
+FLIGHT = 0.7  # the part of the flight in which `clearance` holds; feet come down in the rest
+ROUND = 1e-9  # nodes; above rounding errors
 MOMENTS = {"start": 0.0, "middle": 0.5, "end": 1.0}
 
 
 @dataclass(frozen=True)
 class Requirement:
-    """lower <= quantity <= upper at one moment (fraction of the nodes) or, at None, throughout."""
+    """lower <= quantity <= upper at one moment (fraction of the nodes) or, at None, throughout
+    `during` (fractions of the nodes; the whole motion by default).
+
+    `aim`: 1 where the quantity is to be as large as possible, -1 as small as possible, else 0.
+    """
 
     location: Location
     quantity: Quantity
     at: float | None
     lower: float
     upper: float
+    during: tuple[float, float] = (0.0, 1.0)
+    aim: int = 0
 
     @property
     def scale(self) -> float:
@@ -48,6 +57,22 @@ class Requirement:
     def node(self, nodes: int) -> int:
         """The node at which it holds."""
         return round((self.at or 0.0) * nodes)
+
+    def nodes(self, count: int, first: int = 0) -> list[int]:
+        """The nodes at which it holds on a grid of `count`, from `first` on."""
+        if self.at is not None:
+            return [self.node(count)]
+        begin, end = (share * count for share in self.during)
+        return list(range(max(first, ceil(begin - ROUND)), floor(end + ROUND) + 1))
+
+    @property
+    def always(self) -> bool:
+        """Whether it holds throughout the motion."""
+        return self.at is None and self.during == (0.0, 1.0)
+
+    def holds(self, at: float) -> bool:
+        """Whether it holds at a moment (fraction of the nodes)."""
+        return self.at == at if self.at is not None else self.during[0] <= at <= self.during[1]
 
 
 def quantities(model: Model) -> dict[str, Quantity]:
@@ -92,6 +117,10 @@ def resolve(task: Task, model: Model, document: Document) -> list[Requirement]:
             errors.append(document.error(place, f"{written(place)}: {error.what}", hint=error.hint))
         except ValueError as error:
             errors.append(document.error(location, f"{written(location)}: {error}"))
+    try:
+        requirements += flight_clearance(task, model, requirements)
+    except ValueError as error:
+        errors.append(document.error(("clearance",), f"clearance: {error}"))
     errors += cost_errors(task.cost, document)
     errors += option_errors(task.solver.options, document)
     if errors:
@@ -133,18 +162,60 @@ def _requirement(
             raise ValueError(f"'{location[-1]}' is either true or left out")
         value = 0.0 if location[-1] == "rest" else quantity.value
         return Requirement(location, quantity, at, value, value)
+    during, aim = (0.0, 1.0), 0
+    if isinstance(bound, Goal):
+        during = bound.during or during
+        at = None if bound.during else at
+        aim = int(bound.maximise) - int(bound.minimise)
     if bound.equals is not None:
         if bound.at_least is not None or bound.at_most is not None:
             raise ValueError("'equals' does not go with 'at_least' or 'at_most'")
         value = _number(task, bound.equals, quantity)
-        return Requirement(location, quantity, at, value, value)
+        return Requirement(location, quantity, at, value, value, during, aim)
     lower = -math.inf if bound.at_least is None else _number(task, bound.at_least, quantity)
     upper = math.inf if bound.at_most is None else _number(task, bound.at_most, quantity)
-    if lower == -math.inf and upper == math.inf:
+    if lower == -math.inf and upper == math.inf and not aim:
         raise ValueError("asks for nothing; 'equals', 'at_least' or 'at_most' was expected")
     if lower > upper:
         raise ValueError(f"at_least {lower:g} is above at_most {upper:g} {quantity.unit}")
-    return Requirement(location, quantity, at, lower, upper)
+    return Requirement(location, quantity, at, lower, upper, during, aim)
+
+
+def highest(requirements: Sequence[Requirement]) -> Requirement | None:
+    """The goal that asks for the greatest height of the body, or None."""
+    high = (w for w in requirements if w.quantity.name == "body/z" and w.at and w.lower > -math.inf)
+    return max(high, key=lambda w: w.lower, default=None)
+
+
+def apex_node(requirements: Sequence[Requirement], nodes: int) -> int:
+    """The node of the highest goal of the body, after which it lands; 0 without such a goal."""
+    apex = highest(requirements)
+    return 0 if apex is None else apex.node(nodes)
+
+
+def flight_clearance(
+    task: Task, model: Model, requirements: Sequence[Requirement]
+) -> list[Requirement]:
+    """Every foot at least as high as the task's clearance in the middle of the flight.
+
+    The flight is the ballistic one about the highest goal of the body, from stretched legs; of it
+    the middle part counts. Raises ValueError where no goal says when the robot flies.
+    """
+    if not task.clearance:
+        return []
+    apex = highest(requirements)
+    if apex is None or apex.at is None:
+        raise ValueError("needs a goal for body/z at the top of the flight")
+    robot = model.mechanism.need_robot()
+    above = apex.lower - robot.leg.femur.length - robot.leg.tibia.length
+    rise = math.sqrt(2 * max(above, task.clearance) / model.mechanism.gravity)
+    half = FLIGHT * rise / task.duration
+    during = max(apex.at - half, 0.0), min(apex.at + half, 1.0)
+    known = quantities(model)
+    return [
+        Requirement(("clearance",), known[f"{leg}/foot/z"], None, task.clearance, math.inf, during)
+        for leg in model.mechanism.legs
+    ]
 
 
 def _number(task: Task, value: float | str, quantity: Quantity) -> float:

@@ -36,14 +36,51 @@ class Bound(Section):
         return data if isinstance(data, dict) else {"equals": data}
 
 
+Share = Annotated[float, Param("1", lower=0.0, upper=1.0, doc="of the nodes")]
+
+
 class Goal(Section):
-    """What one quantity should be at a moment: start, middle, end or a fraction of the nodes."""
+    """What one quantity should be at a moment, or during a part of the motion.
+
+    `at`: start, middle, end or a fraction of the nodes; `during`: two fractions, from and to.
+    `maximise`, `minimise`: as large or as small as possible, besides what else is asked of it.
+    """
 
     quantity: str
-    at: Literal["start", "middle", "end"] | Annotated[float, Field(ge=0, le=1)] = "end"
+    at: Literal["start", "middle", "end"] | Share = "end"
+    during: tuple[Share, Share] | None = None
     equals: Value | None = None
     at_least: Value | None = None
     at_most: Value | None = None
+    maximise: bool = False
+    minimise: bool = False
+
+    @model_validator(mode="after")
+    def _sensible(self) -> Goal:
+        if self.maximise and self.minimise:
+            raise ValueError("'maximise' does not go with 'minimise'")
+        if self.during is not None:
+            if "at" in self.model_fields_set:
+                raise ValueError("'during' does not go with 'at'")
+            if self.maximise or self.minimise:
+                raise ValueError("'maximise' and 'minimise' need a moment, 'at', not 'during'")
+            if self.during[0] > self.during[1]:
+                raise ValueError("'during' goes from an earlier to a later part of the motion")
+        return self
+
+
+class Landing(Section):
+    """How softly the motion lands."""
+
+    impact_speed: (
+        Annotated[
+            float,
+            Param(
+                "m.s-1", lower=0.15, doc="at most, of feet on the ground and of legs at their stops"
+            ),
+        ]
+        | None
+    ) = None
 
 
 class Solver(Section):
@@ -85,7 +122,10 @@ class Task(Section):
 
     `step_variation`: each step lasts duration/nodes within this fraction. `start` and `end` map
     quantities to values; `rest: true` there means that all rates are zero,
-    `settled: true` that every state of an effect is at its value at rest.
+    `settled: true` that every state of an effect is at its value at rest. `hold`: for so long
+    before the plan the controller keeps the first pose, valves closed, so that the robot settles.
+    `effects` changes parameters of the model's effects, by name or by place in its list:
+    `{contact: {mu: 0.6}}`.
     """
 
     name: FileName = "task"
@@ -95,7 +135,11 @@ class Task(Section):
     height: Annotated[float, Param("m", lower=0.0, doc="of the body's centre")] | None = None
     distance: Annotated[float, Param("m", doc="forward")] | None = None
     supply: Supply | None = None
+    effects: dict[str, dict[str, Any]] = Field(default_factory=dict)
     payload: Annotated[float, Param("kg", lower=0.0, doc="at the body's centre")] = 0.0
+    clearance: Annotated[float, Param("m", lower=0.0, doc="of the feet in flight")] | None = None
+    landing: Landing = Field(default_factory=Landing)
+    hold: Annotated[float, Param("s", lower=0.0, upper=10.0, doc="before plan time 0")] = 0.0
     duration: Annotated[float, Param("s", lower=0.01, upper=20.0, doc="nominal")] = 0.5
     nodes: Annotated[int, Field(ge=4, le=2000)] = 100
     step_variation: Annotated[float, Param("1", lower=0.0, upper=0.9)] = 0.2

@@ -11,11 +11,13 @@ import numpy as np
 from kemba.model import Model
 from kemba.model.node import Row
 from kemba.ocp.task.costs import COSTS
+from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.transcription.layout import STEP, Layout
 from kemba.ocp.transcription.symmetry import Reduction
 
 ANGLE_ARM = 0.2  # m; turns a moment defect into a force defect
 COST_SCALE = 10.0  # N2.m2.s; makes a plan's cost 0.01 to 10 beside penalties near one
+AIM = 3.0  # of the scaled cost, for a scale of a quantity that is to be large or small
 
 INF = np.inf
 
@@ -168,6 +170,12 @@ def _signs(
         INF,
         [scales[i] for i in kept],
     )
+
+
+def aim_cost(requirement: Requirement, g: ca.SX) -> ca.SX:
+    """The cost of a quantity, here as an expression `g`, that is to be as large or small as
+    possible."""
+    return ca.densify(-AIM * requirement.aim * g / requirement.scale)
 
 
 def as_variable(g: ca.SX, y: ca.SX) -> tuple[int, float, float] | None:

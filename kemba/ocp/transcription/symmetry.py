@@ -189,12 +189,18 @@ def mirrored_requirements(model: Model, requirements: Sequence[Requirement]) -> 
     order = ("q", "v", "s", "lam", "u")
     here = np.array(values(*(point[k] for k in order))).ravel()
     there = np.array(values(*(image[k] for k in order))).ravel()
-    asked = {(names.index(w.quantity.name), w.at, w.lower, w.upper) for w in requirements}
+    asked = {(names.index(w.quantity.name), *_when(w), w.lower, w.upper) for w in requirements}
 
     def has_image(w: Requirement) -> bool:
         value = there[names.index(w.quantity.name)]
-        same = {(i, w.at, w.lower, w.upper) for i in np.flatnonzero(np.isclose(here, value))}
-        turned = {(i, w.at, -w.upper, -w.lower) for i in np.flatnonzero(np.isclose(here, -value))}
+        same = {(i, *_when(w), w.lower, w.upper) for i in np.flatnonzero(np.isclose(here, value))}
+        back = (-w.upper, -w.lower)
+        turned = {(i, *_when(w, -1), *back) for i in np.flatnonzero(np.isclose(here, -value))}
         return bool(asked & (same | turned))
 
     return [w for w in requirements if has_image(w)]
+
+
+def _when(w: Requirement, sign: int = 1) -> tuple[object, ...]:
+    """When a requirement holds, and whether the quantity or its negative is to be large."""
+    return w.at, w.during, sign * w.aim

@@ -26,11 +26,20 @@ import numpy as np
 
 from kemba.model import Model
 from kemba.ocp.functions.blocks import Block, BlockProblem
-from kemba.ocp.task.requirement import Requirement, quantity_expression
+from kemba.ocp.task.requirement import Requirement, apex_node, quantity_expression
 from kemba.ocp.task.task import Task
+from kemba.ocp.transcription.approach import approach_rows
 from kemba.ocp.transcription.first_node import Held, granted, state_rows
 from kemba.ocp.transcription.layout import GROUPS, STEP, Layout
-from kemba.ocp.transcription.stage import INF, Rows, Stage, as_variable, bounded_below, build_stage
+from kemba.ocp.transcription.stage import (
+    INF,
+    Rows,
+    Stage,
+    aim_cost,
+    as_variable,
+    bounded_below,
+    build_stage,
+)
 from kemba.ocp.transcription.symmetry import Reduction
 
 RequirementBlock = tuple[Block, Rows, list[int]]  # with the nodes at which its rows hold
@@ -75,6 +84,7 @@ class Transcription:
         index = np.arange((nodes + 1) * self.shape[1]).reshape(self.shape)
         self.held: list[Held] = []  # requirements that hold exactly at the first node
         moments = self.requirement_blocks(index) + self._first_node_blocks(index)
+        moments += self._aims(index) + self._soft_landing(index)
         pairs = np.hstack([index[:-1, :n], index[1:, :n]])
         both, p = ca.vertcat(stage.y0, stage.y), ca.vertcat(stage.eps, stage.weights)
         blocks = [Block(both, stage.g, stage.cost, pairs)]
@@ -83,7 +93,7 @@ class Transcription:
         for block, rows, where in moments:
             blocks.append(block)
             meanings += [m for k in where for m in _meanings(rows, k)]
-            g_bounds += [(rows.lower, rows.upper)] * len(where)
+            g_bounds += [(rows.lower, rows.upper)] * len(where) * len(rows.labels)
         self.meanings = meanings
         self.g_lower, self.g_upper = (np.array(b) for b in zip(*g_bounds, strict=True))
         self.problem = BlockProblem(blocks, index.size, p, worth_compiling=True)
@@ -143,6 +153,26 @@ class Transcription:
             blocks.append((Block(stage.y, rows.g, ca.SX(0), at), rows, [0]))
         return blocks
 
+    def _aims(self, index: np.ndarray) -> list[RequirementBlock]:
+        """The cost of quantities that are to be as large or as small as possible."""
+        nothing = Rows("requirement", ca.SX(0, 1), 0.0, 0.0, (), (), ())
+        return [
+            (Block(self.stage.y, nothing.g, aim_cost(r, g), index[at, : self.layout.size]),
+             nothing, [])
+            for r, g, at in self.requirement_expressions() if r.aim
+        ]  # fmt: skip
+
+    def _soft_landing(self, index: np.ndarray) -> list[RequirementBlock]:
+        """The speed of impacts after the apex, in the intervals that end at its later nodes."""
+        speed, stage, n = self.task.landing.impact_speed, self.stage, self.layout.size
+        if speed is None:
+            return []
+        step = self.task.duration / self.nodes
+        rows = approach_rows(self.model, self.reduction, stage, self.of_state, speed, step)
+        where = list(range(apex_node(self.requirements, self.nodes) + 1, self.nodes + 1))
+        both = np.hstack([index[:-1, :n], index[1:, :n]])[np.array(where) - 1]
+        return [(Block(ca.vertcat(stage.y0, stage.y), rows.g, ca.SX(0), both), rows, where)]
+
     def of_state(self, expression: ca.SX) -> ca.SX:
         """An expression of the node's q, v, s, u, lam in the stage's y."""
         full = [ca.densify(self.layout.full(self.stage.y, g)) for g in GROUPS if g != "h"]
@@ -163,6 +193,7 @@ class Transcription:
             key = (
                 requirement.location,
                 requirement.at,
+                requirement.during,
                 str(g),
                 requirement.lower,
                 requirement.upper,
@@ -172,12 +203,7 @@ class Transcription:
             seen.add(key)
             # inputs and forces act on the interval before a node, so the first node has none
             acts = ca.depends_on(expression, ca.vertcat(node.u, node.lam))
-            where = list(range(int(acts), self.nodes + 1))
-            yield (
-                requirement,
-                g,
-                where if requirement.at is None else [requirement.node(self.nodes)],
-            )
+            yield requirement, g, requirement.nodes(self.nodes, int(acts))
 
     def _tighten(
         self, where: list[int], variable: tuple[int, float, float], requirement: Requirement

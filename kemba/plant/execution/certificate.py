@@ -2,44 +2,86 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Mapping
 from typing import Any
+
+import numpy as np
 
 from kemba.errors import KembaError
 from kemba.model import Model, load_model
 from kemba.plant.execution.controller import execute
-from kemba.plant.execution.replay import Replay, ends_standing, replay
-from kemba.trajectory import Trajectory
+from kemba.plant.execution.impacts import told
+from kemba.plant.execution.replay import LandingSettings, Replay, ends_standing, replay
+from kemba.trajectory import Array, Trajectory
 
 PLANT = "plant"
-SETTLE = 0.3  # s; the last commands are held before a landing is judged
+POINTS = re.compile(r".*/(hip|knee)/(x|z|vx|vz)")
+DIGITS = 7
 
 
 def replays(
     model: Model, plan: Trajectory, controller: Trajectory, plant: str | Model | None = PLANT
 ) -> dict[str, Any]:
-    """The entries `replay`, `table_replay` and `plant_replay` of the certificate.
+    """The entries `replay`, `table_replay`, `plant_replay` and `impacts` of the certificate.
 
     `replay` plays the inputs of the plan on its own model, `table_replay` the controller's table
     through eq. 10 and the dead time on the same model, `plant_replay` that table on the plant.
 
     With the table a plan that ends standing, with its valves closed, has a moment to come to rest
-    before its landing is judged. `plant_replay` is None without a plant; any is None where a
-    plan that was not solved cannot even be started.
+    before its landing is judged. `impacts` are those of `replay`. `plant_replay` is None without
+    a plant; any is None where a plan that was not solved cannot even be started.
     """
+    return summaries(model, executions(model, plan, controller, plant))
+
+
+def executions(
+    model: Model, plan: Trajectory, controller: Trajectory, plant: str | Model | None = PLANT
+) -> dict[str, Replay | None]:
+    """What `replays` sums up, with the motions."""
     full = load_model(plant) if isinstance(plant, str) else plant
     rest = rest_after(model, plan, controller)
+    there = full and _tried(lambda: execute(controller, full, extra=rest).against(full, plan))
     return {
         "replay": _tried(lambda: replay(model, plan)),
         "table_replay": _tried(lambda: execute(controller, model, extra=rest).against(model, plan)),
-        "plant_replay": full
-        and _tried(lambda: execute(controller, full, extra=rest).against(full, plan)),
+        "plant_replay": there or None,
     }
+
+
+def summaries(model: Model, done: Mapping[str, Replay | None]) -> dict[str, Any]:
+    """Executions as the certificate has them, with the impacts of the first."""
+    own = done["replay"]
+    figures = {name: found.summary() if found else None for name, found in done.items()}
+    return {**figures, "impacts": told(model, own.impacts) if own else None}
+
+
+def plant_run(done: Replay) -> Trajectory:
+    """The motion of the plant for the run folder, in the plan's clock.
+
+    The places of hips and knees follow from the joints and are left out; seven digits are kept.
+    `meta` has all impacts: when [s], at which contacts and stops, the energy lost [J].
+    """
+    t = done.trajectory
+    kept = t.select(name for name in t.names if not POINTS.fullmatch(name))
+    columns = {h: _digits(kept[n]) for h, n in zip(kept.headers, kept.names, strict=True)}
+    impacts = [
+        {"time_s": round(i.time, 6), "what": list(i.labels), "energy_J": round(i.lost, 6)}
+        for i in done.impacts
+    ]
+    meta = {"kind": "simulation", "impacts": impacts}
+    return Trajectory(np.round(kept.time, 9), columns, meta)
+
+
+def _digits(values: Array) -> Array:
+    """Values (n,) with seven digits, which halves the file."""
+    return np.array([float(f"{value:.{DIGITS}g}") for value in values])
 
 
 def rest_after(model: Model, plan: Trajectory, controller: Trajectory) -> float:
     """For how long [s] the last commands are held: a plan that ends standing may come to rest."""
-    return SETTLE if ends_standing(model, plan) and _closed(controller) else 0.0
+    rests = ends_standing(model, plan) and _closed(controller)
+    return LandingSettings.current().settle if rests else 0.0
 
 
 def _closed(controller: Trajectory) -> bool:
@@ -47,8 +89,8 @@ def _closed(controller: Trajectory) -> bool:
     return not any(controller[name][-1] for name in controller.names if "/valve/" in name)
 
 
-def _tried(attempt: Callable[[], Replay]) -> dict[str, Any] | None:
+def _tried(attempt: Callable[[], Replay]) -> Replay | None:
     try:
-        return attempt().summary()
+        return attempt()
     except KembaError:
         return None

@@ -12,7 +12,7 @@ import numpy as np
 from kemba.effects.mechanics.motor import Motor
 from kemba.errors import KembaError
 from kemba.model import Model
-from kemba.plant.execution.replay import ON_GROUND, Replay, first_row, judge
+from kemba.plant.execution.replay import LandingSettings, Replay, first_row, judge
 from kemba.plant.simulation.commands import SAME_TIME, Commands, JointControl, Profile
 from kemba.plant.simulation.simulate import Condition, Simulated, run_many, simulate_one
 from kemba.plant.simulation.start import lowest_foot
@@ -32,21 +32,19 @@ class Gains:
 
 @dataclass(frozen=True)
 class Execution:
-    """An executed controller table: what happened, and the impacts. `lead` [s] is the time by
-    which the table starts before the plan."""
+    """An executed controller table: what happened, and the impacts."""
 
     run: Simulated
     table: Trajectory
-    lead: float
 
     @property
     def trajectory(self) -> Trajectory:
-        """The motion, in the clock of the controller."""
+        """The motion, in the clock of the table: the plan begins at 0."""
         return self.run.trajectory
 
     def against(self, model: Model, plan: Trajectory) -> Replay:
         """The execution compared with the plan it came from."""
-        return judge(model, plan, plan.time - plan.time[0] + self.lead, self.run)
+        return judge(model, plan, plan.time - plan.time[0], self.run)
 
 
 def execute(
@@ -63,14 +61,14 @@ def execute(
     """Play a controller table (a run folder, `controller.csv`, or its trajectory) on `model`.
 
     The robot starts at rest in the table's first pose, changed by `start`. A robot that starts in
-    the air is held until plan time 0, the end of the lead; its motion begins there. After the last
-    row the last commands stay for `extra` [s]. `valves` replace the table's. Raises KembaError when
-    the table lacks a column.
+    the air is held until plan time 0; its motion begins there. After the last row the last commands
+    stay for `extra` [s]. `valves` replace the table's. Raises KembaError when the table lacks a
+    column.
     """
     table = read_controller(controller)
     case = condition_of(table, model, gains, step, extra, start, dead_time, valves, sample)
-    condition, held = case
-    return Execution(_later(simulate_one(condition), held), table, lead_of(table))
+    condition, begin = case
+    return Execution(_later(simulate_one(condition), begin), table)
 
 
 def execute_many(
@@ -84,10 +82,9 @@ def execute_many(
     table = read_controller(controller)
     ready = [condition_of(table, **case) for case in cases]
     done = run_many((condition for condition, _ in ready), jobs)
-    lead = lead_of(table)
     return [
-        d if isinstance(d, KembaError) else Execution(_later(d, held), table, lead)
-        for d, (_, held) in zip(done, ready, strict=True)
+        d if isinstance(d, KembaError) else Execution(_later(d, begin), table)
+        for d, (_, begin) in zip(done, ready, strict=True)
     ]
 
 
@@ -102,7 +99,7 @@ def condition_of(
     valves: Mapping[str, Profile] | None = None,
     sample: float | Array = 1e-3,
 ) -> tuple[Condition, float]:
-    """What `execute` simulates, and for how long [s] a robot that starts in the air was held.
+    """What `execute` simulates, and when [s] by the table's clock it begins.
 
     Raises KembaError when the table lacks a column.
     """
@@ -113,39 +110,41 @@ def condition_of(
         if quantity.binary
     }
     pose = {**first_row(model, table), **(start or {})}
-    held = lead_of(table) if lowest_foot(model, pose) > ON_GROUND else 0.0
-    sent = {n: Profile(p.times - held, p.values) for n, p in {**profiles, **(valves or {})}.items()}
+    falls = lowest_foot(model, pose) > LandingSettings.current().on_ground
+    begin = 0.0 if falls else float(table.time[0])
+    both = {**profiles, **(valves or {})}
+    sent = {name: Profile(p.times - begin, p.values) for name, p in both.items()}
     control = hip_control(model, table, gains)
-    commands = Commands(sent, replace(control, times=control.times - held), PERIOD)
-    duration = float(table.time[-1] - table.time[0]) + extra - held
+    commands = Commands(sent, replace(control, times=control.times - begin), PERIOD)
+    duration = float(table.time[-1]) + extra - begin
     if np.ndim(sample):
-        sample = np.asarray(sample) - held
+        sample = np.asarray(sample) - begin
         sample = sample[(sample >= -SAME_TIME) & (sample <= duration + SAME_TIME)]
-    return Condition(model, pose, commands, duration, step, sample, dead_time), held
+    return Condition(model, pose, commands, duration, step, sample, dead_time), begin
 
 
-def lead_of(table: Trajectory) -> float:
-    """The time [s] by which a controller table starts before its plan."""
-    return float(table.meta.get("lead", 0.0))
-
-
-def _later(done: Simulated, held: float) -> Simulated:
-    """The simulated motion with `held` [s] added to its times."""
-    if not held:
+def _later(done: Simulated, begin: float) -> Simulated:
+    """The simulated motion with its times from `begin` [s] on."""
+    if not begin:
         return done
     t = done.trajectory
     columns = {h: t[n] for h, n in zip(t.headers, t.names, strict=True)}
-    impacts = tuple(replace(impact, time=impact.time + held) for impact in done.impacts)
-    return Simulated(Trajectory(t.time + held, columns, t.meta), impacts)
+    impacts = tuple(replace(impact, time=impact.time + begin) for impact in done.impacts)
+    return Simulated(Trajectory(t.time + begin, columns, t.meta), impacts)
 
 
 def read_controller(source: Trajectory | str | Path) -> Trajectory:
-    """The controller table of a run folder, a CSV file or in memory, starting at 0 s."""
+    """The controller table of a run folder, a CSV file or in memory, by the clock of its plan.
+
+    `lead` in its metadata is the time [s] by which it starts before the plan, whatever the time of
+    its first row; without it the table's own clock is taken.
+    """
     if not isinstance(source, Trajectory):
         path = Path(source)
         source = Trajectory.read(path / "controller.csv" if path.is_dir() else path)
     columns = {h: source[n] for h, n in zip(source.headers, source.names, strict=True)}
-    return Trajectory(source.time - source.time[0], columns, source.meta)
+    begin = -float(source.meta.get("lead", -source.time[0]))
+    return Trajectory(source.time - source.time[0] + begin, columns, source.meta)
 
 
 def hip_control(model: Model, table: Trajectory, gains: Gains) -> JointControl:

@@ -66,7 +66,8 @@ def repeat_run(
         rng = np.random.default_rng([seed, number])
         sensors = Sensors.usual() if noise else Sensors()
         valves = scattered(model, table, VALVE_SCATTER, rng) if noise else None
-        sample = sensors.times(float(table.time[-1]), rng)
+        begin = float(table.time[0])
+        sample = begin + sensors.times(float(table.time[-1]) - begin, rng)
         done = execute(table, model, gains, valves=valves, sample=sample)
         log = _as_sent(take_log(done.trajectory, sensors, rng, model.effects), table)
         log.meta |= {"run": number, "repeat_of": controller.parent.name, "plant": model.name}
@@ -105,4 +106,5 @@ def plant_of(run: str | Path, name: str | None = None) -> Model:
         None if supply is None else to_si(supply, "Pa"),
         name or own,
         own_effects=name in (None, own),
+        changes=task.get("effects"),
     )

@@ -8,13 +8,32 @@ import numpy as np
 
 from kemba.model import Model
 from kemba.plant.simulation.commands import Commands, Profile
+from kemba.plant.simulation.record import Impact
 from kemba.plant.simulation.simulate import Simulated, run
 from kemba.plant.stepping.arrays import Array
+from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Trajectory
 
-ON_GROUND = 1e-3  # m; planned feet below this count as standing
-UPRIGHT = 0.35  # rad; a landing with more pitch has failed
-LASTS = 0.02  # s; a shorter contact is no touchdown, unless it takes as much as the weight in that
+
+class LandingSettings(Settings):
+    """What counts as standing, as a touchdown and as a landing."""
+
+    on_ground: float = setting(1e-3, "m", "planned feet below this stand", CHOSEN)
+    touches: float = setting(1e-4, "m", "planned feet below this touch", CHOSEN)
+    exact: float = setting(
+        1e-6, "m", "executed feet below this touch", "derived: the kernel's closed gap"
+    )
+    lifted: float = setting(5e-3, "m", "a foot above this at the end stands no more", CHOSEN)
+    upright: float = setting(0.35, "rad", "a landing with more pitch has failed", CHOSEN)
+    lasts: float = setting(
+        0.02,
+        "s",
+        "a shorter contact is no touchdown, unless it takes as much as the weight in that",
+        "derived: the weight takes 0.2 m/s of the fall in that time",
+    )
+    settle: float = setting(
+        0.3, "s", "the last commands are held so long before a landing is judged", CHOSEN
+    )
 
 
 @dataclass(frozen=True)
@@ -22,9 +41,9 @@ class Replay:
     """How far an executed plan ends from the plan; errors are executed minus planned.
 
     `touchdown_error_s`, of the first touchdown that carries the body, is None when either has none
-    after its apex. `fault`: what the
-    robot does wrong (`tips over`). It is None when at the end the feet that stand in the plan
-    stand, the body is upright, and neither a hip nor a knee met the ground.
+    after its apex. `fault`: what the robot does wrong (`tips over`). It is None when at the end the
+    feet that stand in the plan stand, the body is upright, and neither a hip nor a knee met the
+    ground.
     """
 
     apex_error_m: float
@@ -32,6 +51,7 @@ class Replay:
     final_error_m: float
     fault: str | None
     trajectory: Trajectory
+    impacts: tuple[Impact, ...]
 
     @property
     def landed(self) -> bool:
@@ -77,12 +97,12 @@ def first_row(model: Model, plan: Trajectory) -> dict[str, float]:
 
 def judge(model: Model, plan: Trajectory, clock: Array, done: Simulated) -> Replay:
     """Compare what was executed with the plan, whose times are `clock` [s] of the execution."""
-    real = done.trajectory
+    real, settings = done.trajectory, LandingSettings.current()
     planned = int(np.argmax(plan["body/z"]))
     apex_time, apex = peak(real.time, real["body/z"])
     weight = model.mechanism.weight
-    was = _landings(touches(plan, clock, float(clock[planned]), ON_GROUND / 10, weight))
-    now = _landings(touches(real, real.time, apex_time, 1e-6, weight))
+    was = _landings(touches(plan, clock, float(clock[planned]), settings.touches, weight))
+    now = _landings(touches(real, real.time, apex_time, settings.exact, weight))
     impacts = [i.time for i in done.impacts if any("contact:" in label for label in i.labels)]
     exact = [_exact(time, real.time, apex_time, impacts) for time in now]
     late = [n - w for n, w in zip(exact, was, strict=False)] if was and now else []
@@ -93,6 +113,7 @@ def judge(model: Model, plan: Trajectory, clock: Array, done: Simulated) -> Repl
         final_error_m=float(np.hypot(*final)),
         fault=_fault(model, plan, real, apex_time),
         trajectory=real,
+        impacts=done.impacts,
     )
 
 
@@ -115,7 +136,7 @@ def touches(
     end, or if its force, without impacts, adds up to what the weight [N] does in 20 ms (0.2 m/s).
     A foot that grazes the ground on its way does neither.
     """
-    found = []
+    found, least = [], LandingSettings.current().lasts
     for name in (name for name in t.names if name.endswith("foot/z")):
         down = t[name] <= low
         force = t[f"{name[:-1]}Fz"] if f"{name[:-1]}Fz" in t else np.zeros(len(t))
@@ -123,8 +144,8 @@ def touches(
         for i in (i for i in edges if i < len(t) and down[i] and clock[i] > after):
             end = int(edges[edges > i][0])  # the first row in the air again
             took = float(np.trapezoid(force[i:end], clock[i:end]))
-            lasts = end == len(t) or clock[end] - clock[i] >= LASTS
-            found.append((float(clock[i]), bool(lasts or took >= LASTS * weight)))
+            lasts = end == len(t) or clock[end] - clock[i] >= least
+            found.append((float(clock[i]), bool(lasts or took >= least * weight)))
     return sorted(found)
 
 
@@ -146,23 +167,24 @@ def _exact(time: float, rows: Array, after: float, impacts: list[float]) -> floa
 
 def ends_standing(model: Model, plan: Trajectory) -> list[str]:
     """The legs on which a plan stands at its end."""
+    low = LandingSettings.current().on_ground
     return [
         leg
         for leg in model.mechanism.legs
-        if f"{leg}/foot/z" not in plan or plan[f"{leg}/foot/z"][-1] <= ON_GROUND
+        if f"{leg}/foot/z" not in plan or plan[f"{leg}/foot/z"][-1] <= low
     ]
 
 
 def _fault(model: Model, plan: Trajectory, real: Trajectory, apex_time: float) -> str | None:
-    standing = ends_standing(model, plan)
+    standing, settings = ends_standing(model, plan), LandingSettings.current()
     if not standing:
         return "ends in the air"
-    if abs(real["body/pitch"][-1]) > UPRIGHT:
+    if abs(real["body/pitch"][-1]) > settings.upright:
         return "tips over"
     late = real.time > apex_time
     for point in ("hip", "knee"):
         for leg in model.mechanism.legs:
             if (real[f"{leg}/{point}/z"][late] <= 0.0).any():
                 return f"meets the ground with the {leg} {point}"
-    up = [leg for leg in standing if real[f"{leg}/foot/z"][-1] > 5 * ON_GROUND]
+    up = [leg for leg in standing if real[f"{leg}/foot/z"][-1] > settings.lifted]
     return f"ends with the {up[0]} foot in the air" if up else None

@@ -20,7 +20,6 @@ from kemba.plant.stepping.arrays import Array
 from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Trajectory
 
-FALLEN = 1e3  # more than any error of a robot that stands
 Edges = dict[str, list[int]]  # by valve column: ticks at which it opens, closes, opens ...
 
 
@@ -30,6 +29,9 @@ class RetimingSettings(Settings):
     apex: float = setting(0.5e-3, "m", "apex error that needs no search", CHOSEN)
     touchdown: float = setting(1e-3, "s", "touchdown error that needs no search", "derived: a tick")
     final: float = setting(0.01, "m", "error of the end that needs no search", CHOSEN)
+    fallen: float = setting(
+        1e3, "1", "error of a robot that falls, in units of those", "convention: beyond any other"
+    )
     executions: int = setting(80, "1", "simulations at most", CHOSEN)
 
 
@@ -42,7 +44,7 @@ def retimed(model: Model, plan: Trajectory, table: Trajectory) -> Trajectory:
     error = partial(_error, model, plan, extra=rest_after(model, plan, table))
     best, executions = error(table), iter(range(RetimingSettings.current().executions))
     while best > 1.0:
-        trials = ((error(t), t) for _, t in zip(executions, _neighbours(table), strict=False))
+        trials = ((error(t), t) for _, t in zip(executions, neighbours(table), strict=False))
         nearer = next((trial for trial in trials if trial[0] < best), None)
         if nearer is None:
             break
@@ -60,10 +62,10 @@ def _error(model: Model, plan: Trajectory, table: Trajectory, extra: float) -> f
     errors = [facts.apex_error_m / limits.apex, facts.final_error_m / limits.final]
     errors.append((facts.touchdown_error_s or 0.0) / limits.touchdown)
     falls = not facts.landed and bool(ends_standing(model, plan))
-    return float(np.max(np.abs(errors))) + (FALLEN if falls else 0.0)
+    return float(np.max(np.abs(errors))) + (limits.fallen if falls else 0.0)
 
 
-def _neighbours(table: Trajectory) -> Iterator[Trajectory]:
+def neighbours(table: Trajectory) -> Iterator[Trajectory]:
     """Tables with one edge, or the same edge of all legs, a tick earlier or later."""
     edges = _edges(table)
     groups = [[(name, k)] for name, ticks in edges.items() for k in range(len(ticks))]

@@ -11,34 +11,35 @@ from kemba.plant.kernel.impact import impact
 from kemba.plant.kernel.jit import kernel, part
 from kemba.plant.kernel.machine import Machine, Memory, State
 from kemba.plant.kernel.pace import Pace, keeps_pace
+from kemba.plant.kernel.settings import ContactEvents
 from kemba.plant.kernel.step import step
 from kemba.plant.stepping.arrays import Array
 
-CLOSED = 1e-6  # m; a gap below this counts as touching
-MISSED = 1e-8  # m; a touchdown located worse than this is searched again
-MANY, REACH = 12, 2e-5  # events within one step after which gaps close at a distance [m]
-MOST = 10 * MANY  # events within one step
-NO_TIME = 1e-12  # s
-NOTICED = 1e-9  # N.s; a smaller impulse is no impact
+_EVENTS = ContactEvents.current()
+CLOSED, MISSED, SEARCHES = _EVENTS.closed, _EVENTS.missed, _EVENTS.searches
+MANY, REACH, MOST = _EVENTS.many, _EVENTS.reach, _EVENTS.most
+NO_TIME, NOTICED = _EVENTS.soonest, _EVENTS.noticed
 FREE, TOUCHED, TOO_LONG = 0, 1, 2  # how a step ends
 
 
 class Impacts(NamedTuple):
-    """The impacts so far: how many, and by row time [s], energy lost [J] and impulses (nl,)."""
+    """The impacts so far: how many, and by row time [s], energy lost [J], impulses (nl,) [N.s] and
+    rates (ng,) [m/s] of the gaps just before."""
 
     number: Array
     time: Array
     lost: Array
     impulse: Array
+    rate: Array
 
 
 @part
 def advance(
     m: Machine, k: Memory, now: State, spare: State, until: float, pace: Pace, log: Impacts
 ) -> bool:
-    """Carry `now` on to `until` [s], with `spare` as memory.
+    """Simulate from `now` to the time `until` [s]; `now` is changed, `spare` is used as memory.
 
-    False when it stops earlier because `log` is nearly full.
+    Gives False when it stops earlier because `log` is nearly full.
     """
     while until - now.time[0] > NO_TIME:
         if log.number[0] + MOST > len(log.time):
@@ -67,6 +68,8 @@ def collide(m: Machine, k: Memory, now: State, reach: float, log: Impacts) -> No
             count += 1
     if count == 0:
         return
+    for i in range(len(m.gaps)):
+        log.rate[at, i] = now.rate[i]
     log.time[at], log.lost[at] = now.time[0], impact(m, k, now, count)
     for row in range(m.nl):
         log.impulse[at, row] = 0.0
@@ -82,8 +85,11 @@ def collide(m: Machine, k: Memory, now: State, reach: float, log: Impacts) -> No
 def _until_touch(
     m: Machine, k: Memory, now: State, new: State, h: float, reach: float, pace: Pace
 ) -> int:
-    """`now` becomes the state after `h`, or at the first touch of a gap that is open: TOUCHED
-    where something touches. It stays where it is when the step is TOO_LONG."""
+    """One step: `now` becomes the state after `h` [s], or at the first touch of an open gap.
+
+    Gives TOUCHED where something touches, else FREE; TOO_LONG where the step must be shorter, and
+    then `now` does not change.
+    """
     count = touching(m, k, now.gap, reach)
     if not keeps_pace(pace, h, step(m, k, now, h, count, new)):
         return TOO_LONG
@@ -93,7 +99,7 @@ def _until_touch(
         k.hits[i] = may_hit and new.gap[i] < 0.0
         through |= k.hits[i]
         near |= may_hit and new.gap[i] <= reach and new.rate[i] < 0.0
-    for _ in range(4):
+    for _ in range(SEARCHES):
         if not through:
             break
         near = True

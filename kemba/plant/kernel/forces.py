@@ -6,20 +6,21 @@ from kemba.plant.kernel.algebra.lcp import solve_lcp
 from kemba.plant.kernel.calls import evaluate
 from kemba.plant.kernel.jit import kernel
 from kemba.plant.kernel.machine import Machine, Memory, State
+from kemba.plant.kernel.settings import ContactEvents
 from kemba.plant.stepping.arrays import Array
 
-SOFT_REACH = 1e-3  # m; compliant gaps this close take part, whether they push or not
+COMPLIANT = ContactEvents.current().compliant
 
 
 @kernel
 def touching(m: Machine, k: Memory, gap: Array, reach: float) -> int:
     """How many pairs take part; their rows are the first of `k.rows`: gaps within `reach` [m]
-    (compliant ones within `SOFT_REACH`) with the friction that belongs to them."""
+    (compliant ones within `COMPLIANT`) with the friction that belongs to them."""
     count = 0
     for row in range(m.nl):
         part, is_gap = m.ungapped[row], False
         for i in range(len(m.gaps)):
-            near = gap[i] <= (reach if m.rigid[i] else SOFT_REACH)
+            near = gap[i] <= (reach if m.rigid[i] else COMPLIANT)
             if m.gaps[i] == row:
                 part, is_gap = near, True
             elif near and not is_gap and m.group[m.gaps[i]] == m.group[row]:

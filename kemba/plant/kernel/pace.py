@@ -1,4 +1,4 @@
-"""How long steps are: as long as the two stages of a step agree."""
+"""How long steps are: as long as the results of both stages of a step agree."""
 
 from __future__ import annotations
 
@@ -6,10 +6,11 @@ from math import sqrt
 from typing import NamedTuple
 
 from kemba.plant.kernel.jit import part
+from kemba.plant.kernel.settings import StepControl
 from kemba.plant.stepping.arrays import Array
 
-GROWTH, SHRINKING = 2.0, 0.3  # bounds on how the step changes at once
-SAFETY = 0.9
+_CONTROL = StepControl.current()
+GROWTH, SHRINKING, SAFETY = _CONTROL.growth, _CONTROL.shrinking, _CONTROL.safety
 
 
 class Pace(NamedTuple):
@@ -27,9 +28,9 @@ class Pace(NamedTuple):
 
 @part
 def keeps_pace(pace: Pace, h: float, apart: float) -> bool:
-    """Whether a step of `h` [s] whose stages are `apart` was short enough; sets the next length.
+    """Whether a step of `h` [s] was short enough; sets the length of the next one.
 
-    They differ by the square of the length.
+    `apart`: how far the results of its stages differ. It grows with the square of the length.
     """
     if apart < 1e-9 * pace.tolerance:
         factor = GROWTH

@@ -15,10 +15,16 @@ from kemba.plant.simulation.valves import delayed
 from kemba.plant.stepping.arrays import Array
 from kemba.plant.stepping.equations import Equations
 from kemba.plant.stepping.family import equations_of
+from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Trajectory
 
 ImposedMotion = Callable[[Array], tuple[Array, Array]]  # times (m,) -> x [m], v [m/s]
-STEP = 2e-4  # s
+
+
+class ImposedSettings(Settings):
+    """The simulation of a piston whose motion is imposed."""
+
+    step: float = setting(2e-4, "s", "longest step of the air", CHOSEN)
 
 
 def drive(
@@ -27,7 +33,7 @@ def drive(
     valves: Mapping[str, Profile],
     times: Array,
     start: Mapping[str, float] | None = None,
-    step: float = STEP,
+    step: float | None = None,
     dead_time: bool = True,
 ) -> Trajectory:
     """The force of a bench piston moved as `motion` says, sampled at `times` (m,) [s].
@@ -39,6 +45,7 @@ def drive(
         raise KembaError(
             model.name, "its motion is free", hint="use kemba.plant.simulation.simulate"
         )
+    step = ImposedSettings.current().step if step is None else step
     acting = delayed(model, dict(valves)) if dead_time else dict(valves)
     eq, first, last = equations_of(model), float(times[0]), float(times[-1])
     edges = breaks([*acting.values(), *valves.values()], first, last)

@@ -14,6 +14,7 @@ from kemba.plant.kernel.events import MOST, NOTICED, Impacts
 from kemba.plant.kernel.machine import memory, state
 from kemba.plant.kernel.pace import Pace
 from kemba.plant.kernel.play import ASK, BURIED, DONE, EXPLODED, Progress, Schedule, play
+from kemba.plant.kernel.settings import StepLength
 from kemba.plant.simulation.commands import Commands, JointControl, Profile
 from kemba.plant.simulation.inputs import (
     among,
@@ -28,11 +29,6 @@ from kemba.plant.stepping.arrays import Array
 from kemba.plant.stepping.equations import Equations
 
 SMALLER = "try a smaller step, or look for a start that is impossible"
-# Steps that the motion chooses. The tolerance is of a velocity of 1 m/s or 5 rad/s and of the usual
-# size of an effect state: apexes then agree with steps of 12.5 us within 0.005 mm (docs/plant.md).
-TOLERANCE = 3e-5
-# A millisecond would step over a touch and release between its ends.
-SHORTEST, FIRST, LONGEST = 2.5e-5, 1e-4, 5e-4  # s
 ROOM = 8 * MOST  # impacts kept in the kernel before they are fetched
 
 
@@ -68,9 +64,9 @@ class Player:
         recording = self.schedule.row >= 0
         self.times, self.table = self.schedule.time[recording], np.empty((recording.sum(), columns))
         self.impacts: list[Impact] = []
-        self._log = Impacts(
-            np.zeros(1, dtype=int), np.zeros(ROOM), np.zeros(ROOM), np.zeros((ROOM, m.nl))
-        )
+        count, (times, lost) = np.zeros(1, dtype=int), np.zeros((2, ROOM))
+        rates = np.zeros((ROOM, len(m.gaps)))
+        self._log = Impacts(count, times, lost, np.zeros((ROOM, m.nl)), rates)
         self._progress = Progress(np.zeros(1, dtype=int), np.zeros(1, dtype=bool))
         mechanism = model.mechanism
         sensed = (*mechanism.coordinates, *mechanism.velocities, *model.states.values())
@@ -82,7 +78,8 @@ class Player:
         Raises KembaError.
         """
         if step is None:
-            pace = Pace(np.array([FIRST]), SHORTEST, LONGEST, TOLERANCE)
+            s = StepLength.current()
+            pace = Pace(np.array([s.first]), s.shortest, s.longest, s.tolerance)
         else:
             pace = Pace(np.array([step]), step, step, np.inf)
         why = -1
@@ -114,9 +111,11 @@ class Player:
         log, gaps = self._log, self.pairs.gaps
         for i in range(log.number[0]):
             impulses = log.impulse[i][gaps]
-            labels = tuple(self.pairs.labels[row] for row in gaps[impulses > NOTICED])
-            found = Impact(float(log.time[i]), labels, float(impulses.max()), float(log.lost[i]))
-            self.impacts.append(found)
+            hit = impulses > NOTICED
+            labels = tuple(self.pairs.labels[row] for row in gaps[hit])
+            speeds = tuple((-log.rate[i][hit]).tolist())
+            size, lost = float(impulses.max()), float(log.lost[i])
+            self.impacts.append(Impact(float(log.time[i]), labels, size, lost, speeds))
         log.number[0] = 0
 
     def _answer(self) -> None:

@@ -13,13 +13,14 @@ from kemba.trajectory import Trajectory
 
 @dataclass(frozen=True)
 class Impact:
-    """An inelastic impact: when [s], at which pairs, its largest impulse [N.s], and the kinetic
-    energy lost [J]."""
+    """An inelastic impact: when [s], at which pairs, its largest impulse [N.s], the kinetic
+    energy lost [J], and how fast the gap of each pair was closing before [m/s]."""
 
     time: float
     labels: tuple[str, ...]
     impulse: float
     lost: float
+    speeds: tuple[float, ...]
 
 
 def recorded(model: Model, equations: Equations) -> list[Quantity]:

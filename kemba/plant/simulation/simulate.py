@@ -12,6 +12,7 @@ import numpy as np
 
 from kemba.errors import KembaError
 from kemba.model import Model
+from kemba.plant.kernel.settings import StepLength
 from kemba.plant.simulation.commands import SAME_TIME, Commands
 from kemba.plant.simulation.record import Impact, trajectory
 from kemba.plant.simulation.start import initial_values
@@ -22,8 +23,6 @@ from kemba.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from kemba.plant.simulation.player import Player
-
-LONGEST = 5e-4  # s; steps of equal length beyond this would miss events
 
 
 @dataclass(frozen=True)
@@ -77,7 +76,7 @@ def run(
     sample: float | Array = 1e-3,
     dead_time: bool = True,
 ) -> Simulated:
-    """As `simulate`, with the impacts that happened."""
+    """As `simulate`, with the impacts that happened; `sample` [s] or the times (m,)."""
     condition = Condition(model, initial, commands, duration, step, sample, dead_time)
     return simulate_one(condition)
 
@@ -114,8 +113,9 @@ def _player(condition: Condition) -> Player:
     model, step = condition.model, condition.step
     if model.mechanism.imposed:
         raise KembaError(model.name, "its motion is imposed", hint="use kemba.plant.rig.rigs")
-    if step is not None and not 0.0 < step <= LONGEST:
-        expected = f"up to {LONGEST:g} s was expected"
+    longest = StepLength.current().longest  # longer ones of equal length would miss events, too
+    if step is not None and not 0.0 < step <= longest:
+        expected = f"up to {longest:g} s was expected"
         raise KembaError("step", f"{step:g} s is out of range", expected)
     commands = condition.commands or Commands()
     profiles = dict(commands.profiles)

@@ -10,12 +10,21 @@ import numpy as np
 from kemba.errors import KembaError, suggest
 from kemba.model import Model
 from kemba.plant.stepping.arrays import Array
+from kemba.settings import CHOSEN, Settings, setting
 
-PLACE = 1e-12  # m; accuracy of a knee found from its piston
+
+class KneeSearch(Settings):
+    """Newton's method for the knee angle that belongs to a piston's place."""
+
+    place: float = setting(
+        1e-12, "m", "error of the piston at which it ends", "derived: far below any sensor"
+    )
+    turn: float = setting(0.3, "rad", "largest change of the angle at once", CHOSEN)
+    rounds: int = setting(50, "1", "changes at most", CHOSEN)
 
 
 def initial_values(model: Model, values: Mapping[str, float]) -> tuple[Array, Array, Array]:
-    """Coordinates, velocities and effect states with the `values` by column name.
+    """Coordinates (n,), velocities (n,) and effect states (ns,) with the `values` by column name.
 
     What is missing stands as in the standing pose, at rest, effect states at their nominal value;
     without `body/z` the lower foot is put on the ground. `LEG/piston/x` may stand for
@@ -63,9 +72,10 @@ def _knee(model: Model, piston: str, knee: str, x: float) -> float:
     symbol, phi = mechanism.q[index], mechanism.port(piston).phi
     extension = ca.Function("extension", [symbol], [phi, ca.jacobian(phi, symbol)])
     angle = mechanism.standing[knee]
-    for _ in range(50):
+    settings = KneeSearch.current()
+    for _ in range(settings.rounds):
         now, slope = (float(value) for value in extension(angle))
-        angle -= float(np.clip((now - x) / slope, -0.3, 0.3))
-        if abs(now - x) < PLACE:
+        angle -= float(np.clip((now - x) / slope, -settings.turn, settings.turn))
+        if abs(now - x) < settings.place:
             return angle
     raise KembaError("initial", f"{piston} = {x:g} m cannot be reached")

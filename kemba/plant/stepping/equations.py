@@ -15,14 +15,13 @@ import numpy as np
 from kemba.model import Model
 from kemba.model.node import Node
 from kemba.plant.kernel.machine import Machine
+from kemba.plant.kernel.settings import StepLength
 from kemba.plant.stepping.arrays import Array
 from kemba.plant.stepping.compiled import Compiled
 from kemba.plant.stepping.forms import Forms
 from kemba.plant.stepping.imposed import impose
 from kemba.plant.stepping.native import Native
 from kemba.plant.stepping.pairs import PairTable
-
-FAST, SPIN = 1.0, 5.0  # m/s, rad/s; usual velocities of a jump
 
 
 class Equations:
@@ -71,7 +70,9 @@ class Equations:
     def _scale(self) -> Array:
         """Usual sizes of velocities and effect states."""
         states = [row.scale for row in self.node.rate_rows]
-        speeds = [FAST if row.unit == "N" else SPIN for row in self.node.dynamics_rows]
+        usual = StepLength.current()
+        rows = self.node.dynamics_rows
+        speeds = [usual.speed if row.unit == "N" else usual.spin for row in rows]
         return np.array([*speeds, *states])
 
     @cached_property

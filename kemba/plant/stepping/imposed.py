@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from kemba.plant.kernel.scheme import GAMMA
+from kemba.plant.kernel.settings import GAMMA
 from kemba.plant.stepping.forms import Forms
 
 Symbols = dict[str, ca.SX]

@@ -114,7 +114,7 @@ def _plan_folder(expansion: Expansion, name: str, block: ExecuteBlock, folder: P
             at = ("blocks", name, "task")
             raise expansion.document.error(at, f"{block.task}: {found.sentence}")
         found.trajectory.write(path / "trajectory.csv")
-        controller_table(found.model, found.trajectory).write(path / "controller.csv")
+        controller_table(found.model, found.trajectory, task.hold).write(path / "controller.csv")
     return path
 
 

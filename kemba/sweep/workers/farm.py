@@ -14,15 +14,23 @@ from typing import Any
 from kemba.effects import BY_KIND
 from kemba.errors import KembaError
 from kemba.files import write_json
+from kemba.settings import CHOSEN, Settings, setting
 from kemba.sweep.cases.case import Case, Record, perform
 
-REACHING = 5.0  # s for a connection to a scheduler; the slowest networks take one
-RESULT_WAIT = 30.0  # s; for a result that a worker holds
 # Instead of Dask's own, with which workers give memory back at once; a solver asks for it again at
 # once, which costs a fifth of the time.
 ENVIRONMENT = {"OPENBLAS_NUM_THREADS": 1}
 
 Tell = Callable[[Case, Record], None]
+
+
+class FarmSettings(Settings):
+    """How long workers and schedulers are waited for."""
+
+    reaching: float = setting(
+        5.0, "s", "for a connection to a scheduler", "convention: slow networks take a second"
+    )
+    result: float = setting(30.0, "s", "for a result that a worker holds", CHOSEN)
 
 
 def run_cases(
@@ -92,9 +100,9 @@ def _record(task: Any) -> Record | None:
 
     try:
         if task.status == "finished":
-            return dict(task.result(timeout=RESULT_WAIT))
+            return dict(task.result(timeout=FarmSettings.current().result))
         if task.status == "error":
-            error = task.exception(timeout=RESULT_WAIT)
+            error = task.exception(timeout=FarmSettings.current().result)
             sentence = f"its worker died, again and again ({type(error).__name__})"
             if isinstance(error, KembaError):  # it could not begin
                 sentence = str(error)
@@ -115,7 +123,7 @@ def check_scheduler(scheduler: str) -> None:
         raise KembaError(f"--scheduler {scheduler}", what, "such as tcp://host:8786")
     try:
         place = (match["host"].strip("[]"), int(match["port"]))
-        socket.create_connection(place, timeout=REACHING).close()
+        socket.create_connection(place, timeout=FarmSettings.current().reaching).close()
     except (OSError, OverflowError, UnicodeError) as error:
         raise _unreachable(scheduler, error) from None
 

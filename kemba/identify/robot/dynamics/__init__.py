@@ -1,1 +1,1 @@
-"""A robot model along measured motion: forces, air, tolerances, linearisation."""
+"""A robot model along measured motion: forces, air, linearisation."""

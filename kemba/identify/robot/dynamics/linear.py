@@ -12,6 +12,7 @@ from kemba.identify.robot.dynamics.physics import Physics
 from kemba.identify.robot.dynamics.reference import Reference, integrator
 from kemba.identify.robot.dynamics.settings import ContactForceSettings, PlaceSettings
 from kemba.identify.robot.motion.batch import Batch
+from kemba.identify.robot.motion.colour import Noise, coloured
 from kemba.identify.robot.motion.contact import Schedule, steady
 from kemba.identify.robot.motion.filter import Gains, System, smooth
 from kemba.identify.robot.motion.sensing import travelled
@@ -28,7 +29,8 @@ class LinearisedMotion:
     ref: Reference
     middle: tuple[Array, Array, Array]  # (N, k) each: q, v, a in the middle of each step
     states: tuple[Array, Array]  # (n, L, .): effect states and inputs, mean over each step
-    system: System
+    system: System  # with the noise of the sensors as it is coloured
+    plain: System  # the same with white noise
     inverse: Array  # (n, L, k, k) of the mass matrix
     contact: Array  # (n, L, k) generalised contact and stop force found in the data
     normal: Array  # (n, L, legs) contact force, up, steady
@@ -37,7 +39,7 @@ class LinearisedMotion:
     way: Array  # (n, L, m) of the measured coordinates since the start
     places: Array  # (n, L, 3 legs): x and z of each foot, pistons
     sinking: Array  # (n, L, legs) speed of the feet, down, steady
-    masses: Array  # (n, L, k, parameters) force per share by which a mass or inertia is off
+    links: Array  # (n, L, k, figures) force per share by which a link's mass or inertia is off
     less_grip: Array  # (n, L, k) force that is missing per unit of friction coefficient
     shift: Array  # (n, L, k) acceleration that the model adds to the reference's
     A: tuple[Array, Array]  # (n, L, k, k) each: slopes of the acceleration along q and v
@@ -61,11 +63,14 @@ class LinearisedMotion:
         return replace(self.system, W=W)
 
     def extend(self, g: Array) -> Array:
-        """Accelerations `g` (n, L, k, c) with zeros for the places of feet and stops, on which no
-        force acts."""
-        return np.concatenate(
-            [g, np.zeros((*g.shape[:2], 3 * self.normal.shape[2], g.shape[3]))], 2
-        )
+        """Accelerations `g` (n, L, k, c) with zeros for the places of feet and stops and for the
+        noise of sensors, on which no force acts."""
+        more = self.system.G.shape[-1] - g.shape[2]
+        return np.concatenate([g, np.zeros((*g.shape[:2], more, g.shape[3]))], 2)
+
+    def with_noise(self, noise: Noise, batch: Batch) -> LinearisedMotion:
+        """The same motion, read by sensors with this noise."""
+        return replace(self, system=coloured(self.plain, noise, batch.sigma, batch.h))
 
     def penetration(self, softness: float, d: float) -> Array:
         """Depth (n, L, 3 legs) [m] of the feet in a ground of stiffness 1/softness [N.m-1] and
@@ -85,10 +90,12 @@ def linearise_along(
     density: Array,
     states: tuple[Array, Array],
     p: Array,
+    noise: Noise = (),
 ) -> LinearisedMotion:
     """The model along `ref`, with unknown forces of `density` (n, L, c) per channel and foot axis.
 
-    `states`: effect states and inputs (n, L, .); `p` (parameters,) in the order of `physics.names`.
+    `states`: effect states and inputs (n, L, .); `p` (parameters,) in the order of `physics.names`;
+    `noise` of the sensors.
     """
     k, legs = physics.mechanism.n, len(physics.legs)
     mid = tuple(batch.flat(a) for a in ref.middle(batch.h))
@@ -96,8 +103,8 @@ def linearise_along(
     inverse = batch.deep(np.asarray(np.linalg.inv(physics.call("mass", *mid, s, u, p=p)[0])))
     force = batch.deep(physics.call("residual", *mid, s, u, p=p)[0])
     at_nodes = [batch.flat(ref.q), batch.flat(ref.v)]
-    y, rate, Jy = (batch.deep(a) for a in physics.call("measured", *at_nodes))
-    feet, feet_rate, Jf = (batch.deep(a) for a in physics.call("feet", *at_nodes))
+    y, rate, Jy = (batch.deep(a) for a in physics.call("measured", *at_nodes, p=p))
+    feet, feet_rate, Jf = (batch.deep(a) for a in physics.call("feet", *at_nodes, p=p))
     slip = batch.pad([x.slides for x in schedules], 0.0)
     density, slipping = density.copy(), ContactForceSettings.current().slipping
     for leg in range(legs):  # a sliding foot pushes along the edge of its cone
@@ -122,6 +129,7 @@ def linearise_along(
         ref,
         mid,
         states,
+        coloured(system, noise, batch.sigma, batch.h),
         system,
         np.where(run_ends(batch)[..., None, None], 0.0, inverse),
         contact,
@@ -131,7 +139,7 @@ def linearise_along(
         travelled(rate, batch.h),
         np.concatenate([feet, y[..., k - legs :]], axis=2),
         steady(-feet_rate[..., 1::2], dt),
-        batch.deep(physics.call("masses", *mid)[0]),
+        batch.deep(physics.call("links", *mid)[0]),
         less_grip,
         shift,
         (A_q, A_v),

@@ -12,6 +12,7 @@ import numpy as np
 from kemba.identify.robot.motion.resampled import ResampledLog
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
+Flags = np.ndarray[Any, np.dtype[np.bool_]]
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,7 @@ class Batch:
         return max(len(t.time) for t in self.resampled)
 
     @cached_property
-    def valid(self) -> np.ndarray[Any, np.dtype[np.bool_]]:
+    def valid(self) -> Flags:
         """(n, L): is this a node of the run?"""
         return np.arange(self.n)[:, None] < [len(t.time) for t in self.resampled]
 
@@ -37,10 +38,12 @@ class Batch:
 
     @cached_property
     def time(self) -> Array:
+        """(n, L): times of the nodes [s], zero past a run's end."""
         return self.pad([t.time for t in self.resampled], 0.0)
 
     @cached_property
     def y(self) -> Array:
+        """(n, L, m): readings, NaN past a run's end."""
         return self.pad([t.y for t in self.resampled], np.nan)
 
     @cached_property
@@ -52,6 +55,19 @@ class Batch:
     def sigma(self) -> Array:
         """(L, m): noise of one node's value."""
         return np.stack([t.sigma for t in self.resampled])
+
+    @cached_property
+    def memory(self) -> Array:
+        """(m,): stated correlation time [s] of each channel's noise, NaN where none is stated."""
+        memories = np.stack([t.memory for t in self.resampled])
+        known = np.isfinite(memories).any(axis=0)
+        return np.where(known, np.nan_to_num(memories).max(axis=0), np.nan)
+
+    @cached_property
+    def stated(self) -> Flags:
+        """(m,): whether the noise of a channel is stated for every run."""
+        found: Flags = np.all([t.stated for t in self.resampled], axis=0)
+        return found
 
     def pad(self, parts: Sequence[Array], value: float) -> Array:
         """(n, L, .) of one array (n_l, .) per run."""

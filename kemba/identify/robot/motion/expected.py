@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from kemba.identify.robot.motion.colour import simulated
 from kemba.identify.robot.motion.filter import Gains, System, innovations
 from kemba.settings import BY_HAND, Settings, setting
 
@@ -28,9 +29,8 @@ def expected_power(system: System, gain: Gains, seed: int = 0) -> Array:
     """
     settings = ExpectedSettings.current()
     rng = np.random.default_rng(seed)
-    sigma = np.sqrt(np.where(np.isfinite(system.R), system.R, 0.0))
-    y = sigma[..., None] * rng.standard_normal((*sigma.shape, settings.draws))
-    g = np.zeros((*sigma.shape[:2], system.G.shape[-1], settings.draws))
+    y = simulated(system, settings.draws, rng)
+    g = np.zeros((*y.shape[:2], system.G.shape[-1], settings.draws))
     _, errors = innovations(system, gain, y, g)
     power = np.mean((gain.whitener @ errors) ** 2, axis=-1)
     width = settings.width

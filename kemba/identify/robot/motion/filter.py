@@ -28,7 +28,8 @@ class System:
     """Deviations from a reference, x' = F x + G (g + w), y = H x + n, over n steps of L runs.
 
     F (n, L, d, d), G (n, L, d, k), W (n, L, k, k) the covariance of w per step, H (n, L, m, d),
-    R (n, L, m) variances of the rows (infinite: not measured), P0 (L, d, d).
+    R (n, L, m) variances of the rows (infinite: not measured), P0 (L, d, d). `lags`: so many of the
+    last states are coloured noise of sensors.
     """
 
     F: Array
@@ -37,6 +38,7 @@ class System:
     H: Array
     R: Array
     P0: Array
+    lags: int = 0
 
 
 @dataclass(frozen=True)

@@ -34,7 +34,8 @@ class ResamplingSettings(Settings):
 class ResampledLog:
     """One run: `time` (n,) of the nodes, `y` (n, m) with NaN where nothing was measured,
     `torque` (n, legs) held from each node, the pulses `sent` to each valve, `sigma` (m,) of one
-    value of `y`."""
+    value of `y`. `memory` (m,): correlation time [s] of the noise as the sidecar states it, NaN
+    where it does not; `stated` (m,): whether the sidecar states its sigma."""
 
     name: str
     time: Array
@@ -42,6 +43,8 @@ class ResampledLog:
     torque: Array
     sent: tuple[list[Pulse], ...]
     sigma: Array
+    memory: Array
+    stated: np.ndarray[Any, np.dtype[np.bool_]]
 
 
 def resample(
@@ -55,9 +58,13 @@ def resample(
     valves = [f"{leg}/valve/{side}" for leg in legs for side in ("extend", "retract")]
     sent = tuple(pulses(time, _held(log[v][keep])) for v in valves)
     sigma = np.array([_sigma(log, c, raw[:, i]) for i, c in enumerate(channels)])
+    times = log.meta.get("noise_time") or {}
+    memory = np.array([times.get(c, np.nan) for c in channels])
+    stated = np.array([_stated(log, c) is not None for c in channels])
     time, raw, torque, count = _thin(time, raw, torque)
     time, raw, torque = _fill(time, raw, torque)
-    return ResampledLog(name, time, raw, torque, sent, sigma / np.sqrt(count))
+    less = np.where(np.isfinite(memory), 1.0, np.sqrt(count))  # the mean of white noise is smaller
+    return ResampledLog(name, time, raw, torque, sent, sigma / less, memory, stated)
 
 
 def _held(values: Array) -> Array:
@@ -68,13 +75,21 @@ def _held(values: Array) -> Array:
 
 def _sigma(log: Trajectory, channel: str, values: Array) -> float:
     """Noise of one sample: as the sidecar says, else as its values tell, else the usual one."""
+    stated = _stated(log, channel)
+    if stated is not None:
+        return stated
+    if np.isfinite(values).sum() < WhiteNoiseSettings.current().fewest:
+        return CHANNELS[channel.split("/")[-1]][1]
+    return max(difference_sigma(values), ResamplingSettings.current().finest)
+
+
+def _stated(log: Trajectory, channel: str) -> float | None:
+    """Noise of a channel as the sidecar says, if it does."""
     noise = log.meta.get("noise") or {}
     for key in (channel, f"{channel} [{log.unit(channel)}]"):
         if key in noise:
             return float(noise[key])
-    if np.isfinite(values).sum() < WhiteNoiseSettings.current().fewest:
-        return CHANNELS[channel.split("/")[-1]][1]
-    return max(difference_sigma(values), ResamplingSettings.current().finest)
+    return None
 
 
 def _thin(time: Array, raw: Array, torque: Array) -> tuple[Array, Array, Array, int]:

@@ -11,9 +11,9 @@ from kemba.plant.kernel.algebra.lemke import lemke
 from kemba.plant.kernel.algebra.linear import solve_pivoted
 from kemba.plant.kernel.jit import kernel, part
 from kemba.plant.kernel.machine import Lcp
+from kemba.plant.kernel.settings import Complementarity
 
-ROUNDING = 1e-11  # of the terms of a row; a smaller violation is none
-SWAPS = 6  # changes of the active set before Lemke's method takes over
+ROUNDING, SWAPS = Complementarity.current().rounding, Complementarity.current().swaps
 
 
 @kernel

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from kemba.plant.kernel.jit import kernel, part
 from kemba.plant.kernel.machine import Lcp
+from kemba.plant.kernel.settings import Complementarity
 from kemba.plant.stepping.arrays import Array
 
-NEGLIGIBLE = 1e-11  # of a column's largest entry; a smaller one is no pivot
-TIE = 1e-12  # ratios that differ by less are equal
+_NUMBERS = Complementarity.current()
+NEGLIGIBLE, TIE, PIVOTS = _NUMBERS.negligible, _NUMBERS.tie, _NUMBERS.pivots
 
 
 class NoSolutionError(ArithmeticError):
@@ -29,7 +30,7 @@ def lemke(w: Lcp, n: int) -> None:
     if w.table[row, 2 * n + 1] >= 0.0:
         return
     entering = 2 * n
-    for _ in range(50 * n):
+    for _ in range(PIVOTS * n):
         leaving = w.basis[row]
         _pivot(w.table, n, row, entering)
         w.basis[row] = entering

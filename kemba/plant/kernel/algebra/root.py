@@ -5,8 +5,9 @@ from __future__ import annotations
 from math import copysign, sqrt
 
 from kemba.plant.kernel.jit import part
+from kemba.plant.kernel.settings import ContactEvents
 
-BEYOND = 1.5  # steps; how far a root may lie behind the end of the step
+BEYOND = ContactEvents.current().beyond
 
 
 @part

@@ -1,0 +1,48 @@
+"""`kemba-opt map`: draft a column map for a log of another program."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from kemba_cli.common import Force, Json, OwnEffects, Quiet, print_json, say
+from kemba_cli.failures import BAD_ANSWER
+
+
+def draft_map(
+    log: Annotated[Path, typer.Argument(help="Log of another program, any text table or format.")],
+    out: Annotated[
+        Path | None, typer.Option(help="Map to write; LOG_map.yaml here without it.")
+    ] = None,
+    model: Annotated[str, typer.Option(help="Model YAML: its robot names the legs.")] = "planning",
+    force: Force = False,
+    own_effects: OwnEffects = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Draft a column map by guessing from names, units and ranges; say what is still missing.
+
+    Example: kemba-opt map their_log.csv --out their_map.yaml
+    """
+    from kemba.files import atomic_text
+    from kemba.folders import fresh
+    from kemba.logs.draft.draft import draft_map as draft
+    from kemba.model import load_model
+
+    out = out or Path(f"{log.stem}_map.yaml")
+    fresh(out, force)
+    found = draft(log, load_model(model).mechanism.legs)
+    with atomic_text(out) as stream:
+        stream.write(found.text(log.name))
+    answer = {"map": str(out), "kind": found.kind, "columns": found.columns}
+    if json:
+        print_json({**answer, "missing": found.missing, "ignored": found.ignored})
+    else:
+        typer.echo(out)
+    if found.missing:
+        listed = ", ".join(f"'{header}'" for header in found.missing)
+        say(f"not found: {listed}. Add them to {out}; without them the log says too little.", quiet)
+        raise typer.Exit(BAD_ANSWER)
+    say(f"Read {out}, then: kemba-opt check {log} --map {out}", quiet)

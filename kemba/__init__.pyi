@@ -1,0 +1,9 @@
+from kemba.api import compare as compare
+from kemba.api import discover as discover
+from kemba.api import load_log as load_log
+from kemba.api import load_model as load_model
+from kemba.api import load_task as load_task
+from kemba.api import plan as plan
+from kemba.api import simulate as simulate
+
+__version__: str

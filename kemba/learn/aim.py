@@ -1,0 +1,120 @@
+"""A controller table whose execution, with what the model cannot explain added, meets the plan."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf, isfinite
+
+import numpy as np
+
+from kemba.errors import KembaError
+from kemba.learn.correction import Correction
+from kemba.learn.flight import Flight, flight_of
+from kemba.model import Model
+from kemba.plant.execution.certificate import rest_after
+from kemba.plant.execution.controller import execute, read_controller
+from kemba.plant.execution.retiming import RetimingSettings, neighbours
+from kemba.plotting.robot.machine import Machine
+from kemba.settings import CHOSEN, Settings, setting
+from kemba.trajectory import Trajectory
+
+
+class AimSettings(Settings):
+    """How a table is corrected: by moving valve edges, which sets push duration and landing."""
+
+    apex: float = setting(1e-3, "m", "apex error that needs no search", CHOSEN)
+    touchdown: float = setting(3e-3, "s", "touchdown error that needs no search", CHOSEN)
+    pitch: float = setting(0.02, "rad", "pitch error at touchdown that needs no search", CHOSEN)
+    moved: int = setting(8, "ms", "by which an edge moves at most", CHOSEN, decides=True)
+    executions: int = setting(150, "1", "simulations at most", CHOSEN)
+
+
+@dataclass(frozen=True)
+class Aimed:
+    """A table, what it is expected to do (simulation and correction together), and its edges'
+    movement in ticks by column."""
+
+    table: Trajectory
+    expected: Flight
+    moved: dict[str, list[int]]
+
+
+@dataclass(frozen=True)
+class Aim:
+    """The plan on its model, and what executions do beyond that model."""
+
+    model: Model
+    machine: Machine
+    plan: Trajectory
+    correction: Correction
+
+    def expected(self, table: Trajectory, rest: float) -> tuple[Flight, bool]:
+        """The flight to expect of a table, and whether its simulation lands as planned.
+
+        Raises KembaError where the table cannot be simulated.
+        """
+        done = execute(table, self.model, extra=rest)
+        seen, add = flight_of(done.trajectory, self.machine), self.correction
+        lands = done.against(self.model, self.plan).landed
+        flight = Flight(
+            seen.apex + add.apex,
+            seen.apex_time,
+            seen.touchdown + add.touchdown,
+            seen.pitch + add.pitch,
+            seen.upright,
+        )
+        return flight, lands
+
+    def corrected(self, table: Trajectory) -> Aimed:
+        """The table with valve edges moved tick by tick as long as it is expected to come nearer
+        to the plan."""
+        settings = AimSettings.current()
+        table = read_controller(table)
+        rest, first = rest_after(self.model, self.plan, table), table
+        wanted = flight_of(self.plan, self.machine)
+        best, must_land = self._miss(table, rest, wanted)
+        left = settings.executions
+        while best > 1.0 and left > 0:
+            nearest, choice = best, None
+            for trial in neighbours(table):
+                if left <= 0 or not _within(first, trial, settings.moved):
+                    continue
+                left -= 1
+                miss, lands = self._miss(trial, rest, wanted)
+                if miss < nearest and (lands or not must_land):
+                    nearest, choice = miss, trial
+                    if miss < 0.7 * best:
+                        break  # good progress: go on from here
+            if choice is None:
+                break
+            best, table = nearest, choice
+        return Aimed(table, self.expected(table, rest)[0], _moved(first, table))
+
+    def _miss(self, table: Trajectory, rest: float, wanted: Flight) -> tuple[float, bool]:
+        """The root of squared errors in units of what needs no search, and whether it lands."""
+        settings = AimSettings.current()
+        try:
+            flight, lands = self.expected(table, rest)
+        except KembaError:
+            return inf, False
+        errors = [(flight.apex - wanted.apex) / settings.apex]
+        if isfinite(wanted.touchdown):
+            errors.append((flight.touchdown - wanted.touchdown) / settings.touchdown)
+            errors.append((flight.pitch - wanted.pitch) / settings.pitch)
+        miss = float(np.linalg.norm(errors))
+        return (miss if isfinite(miss) else RetimingSettings.current().fallen), lands
+
+
+def _edges(table: Trajectory) -> dict[str, np.ndarray]:
+    names = [name for name in table.names if "/valve/" in name]
+    return {name: np.flatnonzero(np.diff(table[name], prepend=0.0)) for name in names}
+
+
+def _moved(first: Trajectory, table: Trajectory) -> dict[str, list[int]]:
+    """By how many ticks each edge moved, by column."""
+    before, after = _edges(first), _edges(table)
+    return {name: (after[name] - before[name]).tolist() for name in before}
+
+
+def _within(first: Trajectory, table: Trajectory, most: int) -> bool:
+    return all(abs(k) <= most for edges in _moved(first, table).values() for k in edges)

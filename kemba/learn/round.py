@@ -1,0 +1,250 @@
+"""One round: compare, discover, adopt, plan anew, correct."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kemba.config import Document, beside, dump_yaml
+from kemba.errors import KembaError
+from kemba.identify.adopt import reference, write_model
+from kemba.identify.answer import Answer
+from kemba.identify.compare_logs import compare_logs
+from kemba.identify.discover import Discovery
+from kemba.identify.logs.reading import read_logs
+from kemba.identify.workflow import discover_logs
+from kemba.learn.aim import Aim, Aimed
+from kemba.learn.correction import Correction, correction_from, write_correction
+from kemba.learn.flight import Flight, flight_of
+from kemba.learn.rounds import Past, entry, past_of
+from kemba.logs import load_map
+from kemba.model import Model, load_spec
+from kemba.ocp import Task, load_task, task_model
+from kemba.plant.execution.certificate import rest_after
+from kemba.plant.execution.controller import execute
+from kemba.plant.execution.replay import ends_standing
+from kemba.plotting.robot.machine import Machine, load_machine
+from kemba.report import Listener, solve_into
+from kemba.report.earlier import origin_of
+from kemba.report.verdict import verdicts
+from kemba.runs import Run, RunFolder, write_json
+from kemba.trajectory import Trajectory
+
+PLAIN = "controller_uncorrected.csv"
+SUPPLY = 0.7e6  # Pa, of a model that names none
+LEARNT = ("missing", "partly")  # verdicts that give a model
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What `learn` is asked: runs, their logs, the task to plan next, and how."""
+
+    runs: Sequence[str | Path]
+    logs: Sequence[str | Path]
+    target: str | Path
+    overrides: Sequence[str] = ()
+    holdout: Sequence[str | Path] = ()
+    column_map: str | Path | None = None
+    time_limit: float = 300.0  # of discover [s]
+    correct: bool = True
+
+
+@dataclass
+class Round:
+    """What a round found, for its page and its JSON."""
+
+    past: Past
+    model: str
+    answer: Answer
+    discovery: Discovery | None
+    compare_before: float
+    compare_after: float
+    planned: Flight
+    executed: list[Flight]
+    simulated: Flight
+    before: Flight  # simulated on the model before this round
+    correction: Correction = field(default_factory=Correction)
+    result: dict[str, Any] = field(default_factory=dict)
+    aimed: Aimed | None = None
+    target: Flight | None = None
+
+    @property
+    def expected_apex_error(self) -> float | None:
+        """Expected minus planned apex [m] of the new run."""
+        if self.aimed is None or self.target is None:
+            return None
+        return self.aimed.expected.apex - self.target.apex
+
+    @property
+    def executed_apex_error(self) -> float:
+        """Mean executed minus planned apex [m] of the run that was learnt from."""
+        return float(np.mean([f.apex for f in self.executed])) - self.planned.apex
+
+    @property
+    def good(self) -> bool:
+        """Whether there is a new plan that its own executions confirm."""
+        return bool(self.result.get("confirmed"))
+
+    def json(self) -> dict[str, Any]:
+        """The object that `--json` prints."""
+        return {
+            "round": self.past.round,
+            "verdict": self.answer.verdict,
+            "added": list(self.answer.added),
+            "compare_before": self.compare_before,
+            "compare_after": self.compare_after,
+            "model": self.model,
+            "run": self.result.get("run"),
+            "expected_apex_error_m": self.expected_apex_error,
+            "executed_apex_error_m": self.executed_apex_error,
+            "unexplained_apex_m": self.correction.apex,
+            "good": self.good,
+            "sentence": self.sentence,
+        }
+
+    @property
+    def sentence(self) -> str:
+        """The round in words."""
+        missed = f"executions missed the planned apex by {1e3 * self.executed_apex_error:+.1f} mm"
+        error = f"the model's error goes from {self.compare_before:.2f} to "
+        parts = [
+            f"round {self.past.round}: {missed}",
+            self.answer.sentence,
+            f"{error}{self.compare_after:.2f} times the noise",
+        ]
+        if self.expected_apex_error is not None:
+            expected = f"{1e3 * self.expected_apex_error:+.1f} mm"
+            parts.append(f"the next run is expected to miss its apex by {expected}")
+        if not self.good:
+            parts.append(f"but the next plan is not confirmed: {self.result.get('sentence')}")
+        return "; ".join(parts)
+
+
+def learn(asked: Asked, folder: RunFolder, listener: Listener) -> Round:
+    """One round, written to `folder`: model, plan, corrected table, learning.json.
+
+    Raises KembaError where runs, logs and target do not fit together, or the logs cannot be right.
+    """
+    columns = load_map(asked.column_map) if asked.column_map else None
+    logs = read_logs(asked.logs, columns)
+    past = past_of(asked.runs, logs, asked.holdout)
+    run = past.runs[past.last]
+    old = load_task(run.task)[0]
+    found = _learnt(asked, past, run, old, folder, listener.tell)
+    task, document = load_task(asked.target, list(asked.overrides))
+    task = task.model_copy(update={"model": found.model, "plant": beside(task.plant, Path())})
+    if asked.correct:
+        found = replace(found, correction=correction_from(found.executed, found.simulated))
+    return _planned(found, task, document, folder, listener)
+
+
+def _learnt(
+    asked: Asked, past: Past, run: Run, old: Task, folder: RunFolder, tell: Callable[[str], None]
+) -> Round:
+    """Compare with the run's model, discover, compare with the model found."""
+    kept, out = [*asked.holdout] or [*past.logs], folder / "answer"
+    out.mkdir()
+    tell("compare")
+    here = as_executed(old.model, old, out / "model_of_the_run.yaml")
+    before, _ = compare_logs(kept, here, asked.column_map)
+    answer, discovery = discover_logs(
+        past.logs, asked.holdout, here, asked.column_map, asked.time_limit, tell, out
+    )
+    if answer.verdict == "bad-data":
+        raise KembaError("--logs", answer.sentence, hint="see kemba-opt check LOG")
+    model, after = old.model, before.noise_ratio
+    if answer.verdict in LEARNT and answer.added:
+        tell("compare with what was learnt")
+        found = write_model(out / "model.yaml", old.model, answer.json()["ranking"], answer.added)
+        model = str(found.resolve())
+        here = as_executed(model, old, out / "model_learnt_of_the_run.yaml")
+        after = compare_logs(kept, here, asked.column_map)[0].noise_ratio
+    machine = load_machine(old.model)
+    table, plan = run.controller, run.trajectory
+    learnt = task_model(old.model_copy(update={"model": model}))
+    return Round(
+        past=past,
+        model=model,
+        answer=answer,
+        discovery=discovery,
+        compare_before=before.noise_ratio,
+        compare_after=after,
+        planned=flight_of(plan, machine),
+        executed=[flight_of(log, machine) for log in past.executed[past.last]],
+        simulated=_simulated(learnt, plan, table, machine),
+        before=_simulated(task_model(old), plan, table, machine),
+    )
+
+
+def as_executed(model: str, task: Task, path: Path) -> str:
+    """A model with the supply and payload of a task, written to `path` where it needs them."""
+    spec = load_spec(model)
+    if not task.payload and task.supply in (None, spec.supply or SUPPLY):
+        return model
+    extra = [{"kind": "payload", "m": task.payload}] if task.payload else []
+    data = {"name": f"{spec.name}_of_the_run", "base": reference(model), "effects": extra}
+    dump_yaml(data | ({"supply": task.supply} if task.supply else {}), path)
+    return str(path)
+
+
+def _simulated(model: Model, plan: Trajectory, table: Trajectory, machine: Machine) -> Flight:
+    done = execute(table, model, extra=rest_after(model, plan, table))
+    return flight_of(done.trajectory, machine)
+
+
+def _planned(
+    found: Round, task: Task, document: Document, folder: RunFolder, listener: Listener
+) -> Round:
+    """The target planned with the learnt model, from the old plan, and its table corrected."""
+    past = found.past
+    facts = {
+        "verdict": found.answer.verdict,
+        "added": list(found.answer.added),
+        "model": found.model,
+        "executed_apex_error_m": found.executed_apex_error,
+        "compare_before": found.compare_before,
+        "compare_after": found.compare_after,
+    }
+    folder.manifest |= entry(past, facts)
+    origin = origin_of(past.runs[past.last].path)
+    result = solve_into(folder, task, document, listener, origin=origin)
+    result = {**result, "confirmed": _confirmed(result, task, folder / "trajectory.csv")}
+    found = replace(found, result=result)
+    if (folder / "controller.csv").is_file() and result["status"] != "infeasible":
+        listener.tell("correction")
+        found = _corrected(found, task, folder)
+    write_json(folder / "learning.json", found.json())
+    return found
+
+
+def _corrected(found: Round, task: Task, folder: RunFolder) -> Round:
+    """controller.csv with the correction in it; the plan's own table is kept beside it."""
+    machine, model = load_machine(task.model), task_model(task)
+    plain = Trajectory.read(folder / "controller.csv")
+    plan = Trajectory.read(folder / "trajectory.csv")
+    aimed = Aim(model, machine, plan, found.correction).corrected(plain)
+    if any(k for edges in aimed.moved.values() for k in edges):
+        plain.write(folder / PLAIN)
+        columns = {h: aimed.table[n] for h, n in zip(plain.headers, plain.names, strict=True)}
+        Trajectory(plain.time, columns, plain.meta).write(folder / "controller.csv")
+    target = flight_of(plan, machine)
+    reached = {
+        "expected_apex_m": aimed.expected.apex,
+        "planned_apex_m": target.apex,
+        "expected_touchdown_s": aimed.expected.touchdown,
+    }
+    write_correction(folder / "correction.yaml", found.correction, aimed.moved, reached)
+    return replace(found, aimed=aimed, target=target)
+
+
+def _confirmed(result: dict[str, Any], task: Task, plan: Path) -> bool:
+    """Whether the plan comes true on its own, learnt model; the shipped plant is no judge here."""
+    executed = {key: result.get(key) for key in ("replay", "table_replay")}
+    if not all(executed.values()):
+        return False
+    lands = bool(ends_standing(task_model(task), Trajectory.read(plan)))
+    return all(v.good for v in verdicts(executed, task.tolerances, lands).values())

@@ -1,0 +1,123 @@
+"""Which runs and logs a round has behind it, as the run folders tell."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kemba.errors import KembaError
+from kemba.plant.execution.controller import read_controller
+from kemba.runs import Run, load_run, sha256
+from kemba.settings import CHOSEN, Settings, setting
+from kemba.trajectory import Array, Trajectory
+
+ENTRY = "learn"  # of the manifest of a run that `learn` made
+
+
+class MatchSettings(Settings):
+    """When a log is an execution of a run."""
+
+    valves: float = setting(
+        0.02, "1", "share of rows in which a valve command differs from the table", CHOSEN
+    )
+
+
+@dataclass(frozen=True)
+class Past:
+    """What a new round knows: its number, the runs, the logs of each, and all logs to fit.
+
+    `executed` maps the places of `runs` to the new logs of that run, by the clock of its plan;
+    `history` holds the entries
+    of earlier rounds.
+    """
+
+    round: int
+    runs: tuple[Run, ...]
+    executed: dict[int, list[Trajectory]]
+    logs: tuple[Path, ...]
+    history: list[dict[str, Any]] = field(default_factory=list)
+
+    @property
+    def last(self) -> int:
+        """The place of the last run that was executed."""
+        return max(self.executed)
+
+
+def past_of(
+    runs: Sequence[str | Path], logs: Sequence[Trajectory], holdout: Iterable[str | Path] = ()
+) -> Past:
+    """The runs in the order of their rounds, with their logs; earlier logs join in.
+
+    Raises KembaError where a log is of none of the runs, or a held-out log was learnt from.
+    """
+    found = sorted((load_run(run) for run in runs), key=_round)
+    executed: dict[int, list[Trajectory]] = {}
+    for log in logs:
+        place, timed = _placed(log, found)
+        executed.setdefault(place, []).append(timed)
+    entries = {e["round"]: e for run in found for e in _entries(run)}
+    history = [entries[number] for number in sorted(entries)]
+    earlier = [Path(path) for entry in history for path in entry["logs"]]
+    new = [Path(log.meta["path"]) for log in logs]
+    listed = {path.resolve(): path for path in [*earlier, *new] if path.is_file()}
+    used = {digest for entry in history for digest in entry["logs"].values()}
+    for path in holdout:
+        if Path(path).resolve() in listed or sha256(path) in used:
+            what = "was already learnt from, so it cannot judge what was learnt"
+            raise KembaError(str(path), what, hint="keep another log with --holdout")
+    number = 1 + max(map(_round, found))
+    return Past(number, tuple(found), executed, tuple(listed.values()), history)
+
+
+def entry(past: Past, facts: dict[str, Any]) -> dict[str, Any]:
+    """What the manifest of a new run says of its round, earlier rounds included."""
+    logs = {str(path.resolve()): sha256(path) for path in past.logs}
+    own = {"round": past.round, "runs": [str(r.path) for r in past.runs], "logs": logs, **facts}
+    return {ENTRY: own, "learnt_before": past.history}
+
+
+def sent(table: Trajectory, time: Array, name: str) -> Array:
+    """A valve command of a table at times (n,) [s] of its clock."""
+    row = np.searchsorted(table.time, time + 1e-9, side="right") - 1
+    return np.asarray(table[name][np.clip(row, 0, len(table) - 1)])
+
+
+def _round(run: Run) -> int:
+    return int(run.manifest.get(ENTRY, {}).get("round", 0))
+
+
+def _entries(run: Run) -> list[dict[str, Any]]:
+    own = run.manifest.get(ENTRY)
+    return [*run.manifest.get("learnt_before", []), *([own] if own else [])]
+
+
+def _placed(log: Trajectory, runs: Sequence[Run]) -> tuple[int, Trajectory]:
+    """The run whose valve commands the log shows, and the log by the clock of that run's plan.
+
+    A log begins where the table begins, or it has the plan's clock already.
+    """
+    tried = []
+    for place, run in enumerate(runs):
+        table = read_controller(run.controller)
+        for begin in (float(log.time[0]), float(table.time[0])):
+            time = log.time - log.time[0] + begin
+            tried.append((_differs(table, log, time), place, time))
+    miss, place, time = min(tried, key=lambda trial: trial[0])
+    if miss > MatchSettings.current().valves:
+        what = f"its valve commands differ from the run's in {miss:.0%} of the rows"
+        hint = "give the run that was executed, or logs that begin where its controller.csv begins"
+        raise KembaError(str(log.meta["path"]), what, f"an execution of {runs[place].path}", hint)
+    columns = {h: log[n] for h, n in zip(log.headers, log.names, strict=True)}
+    return place, Trajectory(time, columns, log.meta)
+
+
+def _differs(table: Trajectory, log: Trajectory, time: Array) -> float:
+    """The largest share of rows, at `time` [s], in which a valve command differs from the table."""
+    names = [name for name in table.names if "/valve/" in name]
+    if any(name not in log for name in names):
+        return 1.0
+    return max(float(np.mean(sent(table, time, n) != np.round(log[n]))) for n in names)

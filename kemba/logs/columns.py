@@ -1,0 +1,118 @@
+"""Column maps: how the columns of another program become ours."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from kemba.config import find_config, load_yaml, parse
+from kemba.errors import KembaError
+from kemba.quantity import Param, Quantity
+from kemba.trajectory import TIME
+from kemba.units import read_si, to_si
+
+SEPARATORS = {"tab": "\t", "whitespace": r"\s+"}
+Number = float | str
+
+
+class Part(BaseModel):
+    """A column that is added to another one: the nanoseconds of a time stamp."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    source: str | int = Field(description="header of the foreign column, or its number from 1")
+    unit: str | None = Field(None, description="unit of the foreign column; else our unit")
+
+
+class Source(BaseModel):
+    """Where a column comes from: ours = sign * scale * source [converted to SI] + offset.
+
+    A column with `threshold` is a valve: 1 where the source lies above it, else 0.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    source: str | int = Field(description="header of the foreign column, or its number from 1")
+    unit: str | None = Field(None, description="unit of the foreign column; else our unit")
+    add: Part | None = Field(None, description="a second column that is added to the first")
+    scale: float = Field(1.0, description="factor")
+    sign: Literal[-1, 1] = Field(1, description="-1 where the foreign column counts backwards")
+    offset: Number = Field(0.0, description="added last: `-90 deg`; a bare number is in our unit")
+    delay: Annotated[float, Param("s", doc="how late the column is")] = 0.0
+    threshold: Number | None = Field(
+        None, description="of a valve: on above it, in the foreign column's unit"
+    )
+
+    @model_validator(mode="after")
+    def _threshold_alone(self) -> Source:
+        if self.threshold is not None and (self.scale != 1 or self.offset != 0 or self.add):
+            raise ValueError("goes with no scale, offset or second column: 'threshold'")
+        return self
+
+    def offset_in(self, unit: str) -> float:
+        """The offset in our unit. Raises ValueError where its dimension is another."""
+        return to_si(self.offset, unit)
+
+    def level(self) -> float:
+        """The threshold in the foreign column's own numbers."""
+        if isinstance(self.threshold, str):
+            return to_si(self.threshold, self.unit) if self.unit else read_si(self.threshold)[0]
+        return float(self.threshold or 0.0)
+
+
+class ColumnMap(BaseModel):
+    """A map file: our header (`piston/x [m]`, `time [s]`) -> the foreign column.
+
+    Columns that it does not name are ignored, whatever they hold.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    kind: str | None = Field(None, description="robot, bench, cylinder or drive; else by columns")
+    notes: str = ""
+    separator: str = Field(",", min_length=1, description="`;`, `tab`, `whitespace`, ...")
+    decimal: Literal[".", ","] = Field(".", description="the decimal sign")
+    skip_rows: int = Field(0, ge=0, description="rows above the header that are no table")
+    skip_below: int = Field(0, ge=0, description="rows below the header that are no data: units")
+    header: bool = Field(True, description="false: no header, sources are column numbers")
+    origin: Literal["first"] | None = Field(
+        None, description="`first`: time counts from the first row, as for stamps since 1970"
+    )
+    columns: dict[str, Source] = Field(min_length=2, description="our header -> foreign column")
+
+    @model_validator(mode="after")
+    def _separator_is_not_decimal(self) -> ColumnMap:
+        if self.separator == self.decimal:
+            raise ValueError(f"separator and decimal sign are both '{self.decimal}'")
+        return self
+
+    @property
+    def pattern(self) -> str:
+        """The separator as pandas takes it."""
+        return SEPARATORS.get(self.separator, self.separator)
+
+
+def load_map(name: str | Path) -> ColumnMap:
+    """The map YAML `name`, a path or one shipped in configs/maps. Raises KembaError."""
+    path = find_config(str(name), "maps")
+    found = parse(load_yaml(path), ColumnMap)
+    check_map(found, str(path))
+    return found
+
+
+def check_map(found: ColumnMap, where: str) -> None:
+    """Raise KembaError where a map has no time, a malformed header or a unit that does not fit."""
+    if TIME not in found.columns:
+        raise KembaError(where, f"columns: '{TIME}' is not mapped", "every log needs its time")
+    for header, source in found.columns.items():
+        try:
+            unit = "s" if header == TIME else Quantity.from_header(header).unit
+            source.offset_in(unit)
+            source.level()
+        except KembaError as error:
+            what = f"columns: {error.what}"
+            raise KembaError(where, what, error.expected, error.hint) from None
+        except ValueError as error:
+            raise KembaError(where, f"columns: '{header}': {error}") from None

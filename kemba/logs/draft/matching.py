@@ -1,0 +1,69 @@
+"""Which foreign column is which of ours: the assignment that agrees best with all names."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from kemba.logs.draft.ranges import two_levels
+from kemba.logs.draft.targets import Target
+from kemba.logs.draft.words import Meaning, Names
+from kemba.quantity import convert
+from kemba.trajectory import Array
+
+ENOUGH = 0.6  # share of what a name must say: two of three, or one of two that is unambiguous
+SAID_TOO = 0.1  # preference for a name that also says what it may
+UNRELATED = 0.3  # doubt by a word that is about something else, such as the `a` of `valve_a`
+NOTHING = -1.0
+
+
+def assigned(
+    names: Names, values: Mapping[str, Array], targets: Sequence[Target]
+) -> dict[str, str]:
+    """Our header -> name of the foreign column.
+
+    Each column is used once. Columns with a unit of another dimension are no candidates.
+    """
+    from scipy.optimize import linear_sum_assignment
+
+    columns = list(values)
+    scores = np.full((len(targets), len(columns)), NOTHING)
+    for j, name in enumerate(columns):
+        for i, target in enumerate(targets):
+            if fits(target, names.unit(name), values[name]):
+                scores[i, j] = agreement(names.says(name), target)
+    rows, chosen = linear_sum_assignment(scores, maximize=True)
+    pairs = zip(rows.tolist(), chosen.tolist(), strict=True)
+    return {targets[i].header: columns[j] for i, j in pairs if scores[i, j] >= ENOUGH}
+
+
+def fits(target: Target, unit: str | None, values: Array) -> bool:
+    """Whether a column's unit and values (n,) can be those of a target."""
+    if target.is_valve:
+        return two_levels(values)
+    if unit is None:
+        return True
+    try:
+        convert(1.0, unit, target.unit)
+    except ValueError:
+        return False
+    return True
+
+
+def agreement(says: Meaning, target: Target) -> float:
+    """How well a name fits a target: at most about 1, `NOTHING` where it says something else."""
+    score = 0.0
+    for group, wanted in target.means.items():
+        if group in says and wanted not in says[group]:
+            return NOTHING
+        score += len(says[group]) ** -0.5 if group in says else 0.0
+    score /= len(target.means)
+    for group, found in says.items():
+        if group in target.may:
+            if target.may[group] not in found:
+                return NOTHING
+            score += SAID_TOO
+        elif group not in target.means:
+            score -= UNRELATED * (group in ("kind", "leg", "part"))
+    return score

@@ -1,0 +1,50 @@
+"""Logs as Parquet tables, one column each."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from kemba.errors import KembaError
+from kemba.files import atomic_path, plain
+from kemba.logs.text import Raw
+from kemba.trajectory import TIME, Trajectory
+
+META = b"kemba"
+
+
+def write_parquet(trajectory: Trajectory, path: Path) -> None:
+    """One column per header; the metadata are in the schema as JSON."""
+    values = [trajectory.time, *(trajectory[name] for name in trajectory.names)]
+    headers = [TIME, *trajectory.headers]
+    table = pa.table(dict(zip(headers, values, strict=True)))
+    meta = {META: json.dumps(plain(trajectory.meta)).encode()}
+    with atomic_path(path) as temporary:
+        pq.write_table(table.replace_schema_metadata(meta), temporary)
+
+
+def read_parquet(path: Path) -> tuple[Raw, dict[str, Any]]:
+    """The columns, numbers as floats and anything else as texts, and the metadata."""
+    try:
+        table = pq.read_table(path)
+    except OSError as error:
+        raise KembaError(str(path), error.strerror or str(error)) from None
+    except pa.ArrowException as error:
+        raise KembaError(str(path), f"is no Parquet file: {error}") from None
+    meta = json.loads((table.schema.metadata or {}).get(META, b"{}"))
+    columns = zip(table.column_names, table.columns, strict=True)
+    return {name: _values(column) for name, column in columns}, meta
+
+
+def _values(column: pa.ChunkedArray) -> np.ndarray[Any, Any]:
+    kind = column.type
+    if pa.types.is_integer(kind) and column.null_count == 0:
+        return np.array(column.to_pylist(), dtype=object)  # stamps since 1970 exceed a float
+    if pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_boolean(kind):
+        return np.asarray(column.cast(pa.float64()).to_numpy(), dtype=float)
+    return np.array(["" if v is None else str(v) for v in column.to_pylist()], dtype=object)

@@ -1,0 +1,1 @@
+"""A plan for changed figures from the plan of an earlier run, on its own phases."""

@@ -1,0 +1,169 @@
+"""The earlier plan solved again for changed figures: near it first, then the best one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from kemba.errors import KembaError
+from kemba.model import Model
+from kemba.ocp.continuation.between import (
+    Origin,
+    completed,
+    model_between,
+    requirements_between,
+)
+from kemba.ocp.nlp.ending import Ending
+from kemba.ocp.nlp.ipopt import Control
+from kemba.ocp.phases.modes import Phase
+from kemba.ocp.phases.notes import noted_phases
+from kemba.ocp.phases.program import PhaseProgram
+from kemba.ocp.phases.radau import RADAU5
+from kemba.ocp.phases.settings import Elements
+from kemba.ocp.refinement.refine import Refined, Refiner, reduction_of, refine, valve_columns
+from kemba.ocp.refinement.sample import certificate, to_trajectory
+from kemba.ocp.refinement.solve import solve, warm
+from kemba.ocp.relaxation.session import Attempt
+from kemba.ocp.task.requirement import Requirement
+from kemba.ocp.task.task import Task
+from kemba.ocp.transcription.symmetry import Reduction
+from kemba.ocp.transcription.unilateral import read_constraints
+from kemba.settings import Settings, setting
+from kemba.trajectory import Trajectory
+
+TRIED = "tuned: jump and jump_forward with other heights, supplies, payloads and distances"
+
+
+class Continuing(Settings):
+    """How an earlier plan is solved again for changed figures."""
+
+    near: float = setting(
+        1.0, "1", "proximal weight of the solve that stays near the earlier plan; at 0 half of the "
+        "trials did not converge", TRIED, decides=True,
+    )  # fmt: skip
+    iterations: int = setting(
+        60, "1", "iterations of each solve; those that converged took 16 to 46", TRIED, decides=True
+    )
+    close: float = setting(
+        0.1, "1", "proximal weight where the best plan is sought and 0 does not converge", TRIED,
+        decides=True,
+    )  # fmt: skip
+    solves: int = setting(
+        8, "1", "solves at most on the way to the changed figures",
+        "convention: a plan from scratch costs about as much", decides=True,
+    )  # fmt: skip
+    dear: float = setting(
+        3.0, "1", "times the earlier plan's squared torque beyond which the user is told",
+        "convention: more than such a change usually asks for",
+    )  # fmt: skip
+    shortest: float = setting(
+        0.1, "1", "of the way: a shorter step is not tried", "convention: ten steps at most",
+        decides=True,
+    )  # fmt: skip
+
+
+@dataclass
+class Continuation:
+    """From an earlier plan to the one that is asked; `steps` collects how its solves ended."""
+
+    model: Model
+    task: Task
+    requirements: Sequence[Requirement]
+    origin: Origin
+    control: Control
+    tell: Callable[[str], None] = lambda text: None
+    steps: list[Attempt] = field(default_factory=list)
+    size: tuple[int, int] = (0, 0)  # variables and rows of the last program
+
+    def run(self) -> Refined:
+        """The plan on the phases of the earlier one; where these do not fit, on phases read
+        anew."""
+        try:
+            start = completed(self.origin.plan, self.model)
+            reduction = reduction_of(self.model, self.task, self.requirements, start)
+            phases = self._phases(reduction)
+            if phases is not None:
+                found = self._walk(start, phases, reduction)
+                if found.done:
+                    return found
+            return self._read_anew(start)
+        except KembaError as error:
+            why = f"the earlier plan does not fit this model: {error}"
+            return Refined(None, None, Ending.UNSUITABLE, 0, reason=why)
+        except ValueError as error:
+            return Refined(None, None, Ending.UNSUITABLE, 0, reason=f"the model {error}")
+
+    def _phases(self, reduction: Reduction) -> list[Phase] | None:
+        constraints = read_constraints(self.model, reduction)
+        plan, valves = self.origin.plan, len(valve_columns(self.model, reduction))
+        return noted_phases(plan.meta, constraints, valves, len(plan) - 1)
+
+    def _walk(self, start: Trajectory, phases: list[Phase], reduction: Reduction) -> Refined:
+        """In one step if it converges, else in halves; then the best plan for what is asked."""
+        settings = Continuing.current()
+        done, step = 0.0, 1.0
+        found = Refined(None, None, Ending.GAVE_UP, 0)
+        for _ in range(settings.solves):
+            share = min(1.0, done + step)
+            self.tell(f"from the earlier plan: {share:.0%} of the change")
+            found = self._solved(share, start, phases, reduction, settings.near)
+            if found.trajectory is not None:
+                start, done = found.trajectory, share
+                if done >= 1.0:
+                    return self._best(found, phases, reduction)
+            elif found.done or step / 2 < settings.shortest:
+                break
+            else:
+                step /= 2
+        return replace(found, trajectory=None, certificate=None)
+
+    def _best(self, near: Refined, phases: list[Phase], reduction: Reduction) -> Refined:
+        """The cheapest plan from the near one, which is kept where that does not converge."""
+        assert near.trajectory is not None
+        self.tell("from the earlier plan: the best one")
+        for weight in (0.0, Continuing.current().close):
+            best = self._solved(1.0, near.trajectory, phases, reduction, weight)
+            if best.done:
+                return best
+        return near
+
+    def _solved(
+        self,
+        share: float,
+        start: Trajectory,
+        phases: list[Phase],
+        reduction: Reduction,
+        weight: float,
+    ) -> Refined:
+        """The plan at `share` of the change from a trajectory, with a proximal `weight`."""
+        model = model_between(self.origin.model, self.model, share)
+        asked = requirements_between(self.origin.requirements, self.requirements, share)
+        refiner = Refiner(model, self.task, asked, start, reduction, self.control)
+        program, x = refiner.build(phases, start, RADAU5)
+        program.keep_short(x, Elements.current().fair)
+        if weight:
+            x = program.proximal(x, weight)
+        found = solve(program, x, warm(Continuing.current().iterations), self.control)
+        assert found.ending is not None
+        name = f"near the earlier plan, {share:.0%}" if weight else "from the earlier plan"
+        self.steps.append(Attempt(name, found.ending, found.iterations))
+        self.size = len(program.lower), len(program.rows)
+        return _ended(program, found.Y, found.ending, found.iterations)
+
+    def _read_anew(self, start: Trajectory) -> Refined:
+        self.tell("from the earlier plan: its phases read anew")
+        found = refine(self.model, self.task, self.requirements, start, control=self.control)
+        self.steps.append(Attempt("phases read anew", found.ending, found.iterations))
+        return found
+
+
+def _ended(program: PhaseProgram, x: np.ndarray, ending: Ending, iterations: int) -> Refined:
+    """A solved program as a plan with what it violates; without them where it is not solved."""
+    phases = tuple(program.phases)
+    if not ending.good:
+        return Refined(None, None, ending, iterations, phases)
+    trajectory = to_trajectory(program, x)
+    measured = certificate(program, x, trajectory)
+    return Refined(trajectory, measured, ending, iterations, phases)

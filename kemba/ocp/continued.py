@@ -1,0 +1,68 @@
+"""Plans from an earlier run's plan, judged; and what is said where that fails."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from kemba.ocp.certificate.certify import costs
+from kemba.ocp.certificate.status import Status, verdict
+from kemba.ocp.continuation.between import Origin
+from kemba.ocp.continuation.continue_plan import Continuation, Continuing
+from kemba.ocp.nlp.ending import Ending
+from kemba.ocp.planned import Plan
+from kemba.ocp.planner import Planner
+from kemba.stopwatch import Stopwatch
+
+TORQUE = "torque_squared_integral"
+
+
+def continued(planner: Planner, origin: Origin) -> tuple[Plan | None, str]:
+    """The earlier plan for the changed figures; None and the reason where that fails.
+
+    A task with `refine: none` asks for an implicit Euler plan, which this way cannot give.
+    """
+    session, task, model = planner.session, planner.task, planner.model
+    if task.refine != "radau":
+        return None, "it gives refined plans, and this task asks for refine: none"
+    way = Continuation(model, task, planner.requirements, origin, session.control, session.tell)
+    solving = Stopwatch()
+    with solving.running():
+        answer = way.run()
+    session.attempts += way.steps
+    new, certificate = answer.trajectory, answer.certificate
+    if answer.ending is Ending.INTERRUPTED or new is None or certificate is None:
+        return None, answer.sentence
+    if not certificate.within(task.tolerances):
+        return None, "its result misses the task's tolerances"
+    status, sentence = verdict(task, certificate, new, answer.ending)
+    facts = f"{sentence}, refined on {len(answer.phases)} phases from the earlier plan"
+    cost, before = costs(model, new), costs(origin.model, origin.plan)
+    if cost[TORQUE] > Continuing.current().dear * before[TORQUE]:
+        times = f"{cost[TORQUE] / before[TORQUE]:.0f} times the squared torque"
+        facts += f"; it takes {times} of the earlier plan, one without --from may take less"
+    found = Plan(
+        task=task,
+        model=model,
+        requirements=tuple(planner.requirements),
+        trajectory=new,
+        certificate=certificate,
+        status=status,
+        sentence=facts,
+        cost=cost,
+        attempts=tuple(session.attempts),
+        solve_s=solving.wall,
+        solve_cpu_s=solving.cpu,
+        build_s=session.building.wall,
+        variables=way.size[0],
+        constraints=way.size[1],
+        refined=True,
+        continued=True,
+    )
+    return found, ""
+
+
+def from_scratch(found: Plan, why: str) -> Plan:
+    """A plan that was made anew because continuing the earlier one failed; its sentence says so."""
+    said = f"{found.sentence}; made from scratch, because the earlier plan could not be continued"
+    sentence = found.sentence if found.status is Status.INTERRUPTED else f"{said} ({why})"
+    return replace(found, sentence=sentence, continued=False)

@@ -1,0 +1,148 @@
+"""Maps that are drafted for logs of other programs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import foreign_files
+import numpy as np
+import pytest
+from typer.testing import CliRunner, Result
+
+from kemba.errors import KembaError
+from kemba.identify.logs.reading import needed, read_log
+from kemba.logs import ColumnMap, Source, load_map
+from kemba.logs.draft.draft import draft_map
+from kemba.logs.draft.layout import layout_of
+from kemba.logs.draft.targets import bench_targets, robot_targets
+from kemba.logs.draft.words import meaning, named_unit
+from kemba_cli.main import app
+
+LEGS = ("front", "rear")
+FILES = {
+    "german": ("log.csv", foreign_files.german),
+    "snake": ("log.parquet", foreign_files.snake),
+    "abbreviated": ("log.csv", foreign_files.abbreviated),
+    "player": ("log.tsv", foreign_files.player),
+}
+
+
+def call(*words: str) -> Result:
+    return CliRunner().invoke(app, list(words))
+
+
+@pytest.mark.parametrize("program", FILES)
+def test_a_drafted_map_gives_the_log_back(program: str, tmp_path: Path) -> None:
+    log = foreign_files.robot_log()
+    name, write = FILES[program]
+    path = write(log, tmp_path / name)
+    done = call("map", str(path), "--out", str(tmp_path / "map.yaml"))
+    assert done.exit_code == 0, done.stderr
+    assert f"kemba-opt check {path} --map {tmp_path / 'map.yaml'}" in done.stderr
+    back = read_log(path, load_map(tmp_path / "map.yaml"))
+    assert set(needed(back)) <= set(back.names)
+    assert np.allclose(back.time, log.time, atol=2e-7)
+    for column in needed(log):
+        assert np.allclose(back[column], log[column], atol=1e-9), column
+
+
+def test_joint_states_without_a_header(tmp_path: Path) -> None:
+    """Joints are found; what a JointState does not hold is said to be missing."""
+    log = foreign_files.robot_log()
+    path = foreign_files.joint_state(log, tmp_path / "log.csv")
+    done = call("map", str(path), "--out", str(tmp_path / "map.yaml"), "--json")
+    assert done.exit_code == 1
+    assert "'body/z [m]'" in done.stderr and "'front/valve/extend [1]'" in done.stderr
+    back = read_log(path, load_map(tmp_path / "map.yaml"))
+    assert np.allclose(back.time, log.time, atol=2e-9)
+    for leg in LEGS:
+        for column in ("hip/q", "hip/tau", "piston/x"):
+            assert np.allclose(back[f"{leg}/{column}"], log[f"{leg}/{column}"]), column
+
+
+def test_a_bench_log_in_volts_and_bar(tmp_path: Path) -> None:
+    path = tmp_path / "bench.txt"
+    i = np.arange(400)
+    on = 4.9 * (i // 50 % 2)
+    rows = np.column_stack([i, 20 + i % 40, on, 4.9 - on, 0.1 + i / 100, i - 200])
+    head = "made by a logger\nt_ms pos_mm valve_1 valve_2 p_ext loadcell\nms mm V V bar N\n"
+    with path.open("w") as stream:
+        stream.write(head)
+        np.savetxt(stream, rows, fmt="%.6g")
+    draft = draft_map(path, LEGS)
+    assert draft.kind == "bench" and not draft.missing
+    assert draft.layout == {"separator": "whitespace", "skip_rows": 1, "skip_below": 1}
+    assert draft.columns["time [s]"] == {"source": "t_ms", "unit": "ms"}
+    assert draft.columns["piston/x [m]"] == {"source": "pos_mm", "unit": "mm"}
+    assert draft.columns["valve/extend [1]"] == {"source": "valve_1", "threshold": 2.45}
+    pressure = draft.columns["chamber/extend/P [Pa]"]
+    assert pressure == {"source": "p_ext", "unit": "bar", "offset": "1.01325 bar"}
+
+
+def test_a_drive_is_recognised(tmp_path: Path) -> None:
+    t = np.arange(100) * 1e-3
+    path = tmp_path / "drive.csv"
+    rows = "\n".join(f"{a},{b},{c}" for a, b, c in zip(t, 0.3 * t, 5 * t, strict=True))
+    path.write_text(f"t,position,force\n{rows}\n")
+    draft = draft_map(path, LEGS)
+    assert draft.kind == "drive"
+    assert list(draft.columns) == ["time [s]", "axis/q [m]", "axis/tau [N]"]
+
+
+def test_our_own_names_need_no_guess(tmp_path: Path) -> None:
+    log = foreign_files.robot_log()
+    log.write(tmp_path / "log.csv")
+    draft = draft_map(tmp_path / "log.csv", LEGS)
+    assert set(draft.columns) == {"time [s]", *log.headers}
+    assert all(source["source"] == header for header, source in draft.columns.items())
+
+
+def test_what_is_no_table_is_told(tmp_path: Path) -> None:
+    (tmp_path / "note.txt").write_text("dear diary\nno numbers today\n")
+    done = call("map", str(tmp_path / "note.txt"))
+    assert done.exit_code == 2 and "no table that kemba recognises" in done.stderr
+    assert not (tmp_path / "note_map.yaml").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "layout"),
+    [
+        ("a,b\n1.5,2\n3,4\n", {}),
+        ("a;b\n1,5;2\n3;4\n", {"separator": ";", "decimal": ","}),
+        ("1 2 3\n4 5 6\n", {"separator": "whitespace", "header": False}),
+        ("title\n\na\tb\n1\t2\n3\t4\n", {"separator": "tab", "skip_rows": 2}),
+    ],
+)
+def test_layouts(text: str, layout: dict[str, object], tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text(text)
+    assert layout_of(tmp_path / "a.csv") == layout
+
+
+def test_names_say_what_they_mean() -> None:
+    assert named_unit("pos [mm]") == ("pos", "mm")
+    assert named_unit("pos_mm") == ("pos", "mm")
+    assert named_unit("hip_front") == ("hip_front", None)
+    assert meaning("frontHipTorque", LEGS) == {
+        "leg": {"front"}, "part": {"hip"}, "kind": {"torque"},
+    }  # fmt: skip
+
+
+def test_a_mapped_cell_that_is_no_number_is_told(tmp_path: Path) -> None:
+    """Columns that the map does not name may hold anything."""
+    path = tmp_path / "a.csv"
+    path.write_text("t;x;note\n0;0,01;start\n1;oops;\n")
+    (tmp_path / "m.yaml").write_text(
+        "kind: bench\nseparator: ';'\ndecimal: ','\ncolumns:\n"
+        "  time [s]: {source: t, unit: ms}\n  piston/x [m]: {source: x}\n"
+    )
+    with pytest.raises(KembaError, match=r"a.csv:3:2: x: 'oops' is not a number"):
+        read_log(path, load_map(tmp_path / "m.yaml"))
+
+
+def test_the_page_lists_the_columns_that_a_log_needs() -> None:
+    page = (Path(__file__).parents[2] / "docs/logs.md").read_text(encoding="utf-8")
+    for targets in (robot_targets(("LEG",)), bench_targets()):
+        for target in targets:
+            assert f"`{target.header}`" in page, target.header
+    for entry in (*ColumnMap.model_fields, *Source.model_fields):
+        assert f"{entry}:" in page or f"`{entry}`" in page, entry

@@ -1,0 +1,119 @@
+"""Binary formats of logs give back every bit; damaged files are told in words."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from foreign_files import robot_log
+from mcap.reader import make_reader
+from mcap.writer import Writer
+from scipy.io import savemat
+
+from kemba.errors import KembaError
+from kemba.identify.logs.reading import read_log
+from kemba.logs import ColumnMap, Source, open_log
+from kemba.report.export import export
+from kemba.trajectory import Trajectory
+
+ENDINGS = ("parquet", "mcap", "mat", "npz", "json")
+
+
+def awkward() -> Trajectory:
+    """Times before zero, missing readings, numbers at the ends of what a float can hold."""
+    log = robot_log(50)
+    z = log["body/z"].copy()
+    z[3], z[4], z[5] = np.nan, 5e-324, -1.7976931348623157e308
+    time = log.time / 3 - 0.1
+    columns = {h: log[n] for h, n in zip(log.headers, log.names, strict=True)}
+    meta = {"kind": "robot", "repeat_of": "jump_a", "noise": {"body/z [m]": 3e-4}}
+    return Trajectory(time, {**columns, "body/z [m]": z}, meta)
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_round_trip_is_exact(ending: str, tmp_path: Path) -> None:
+    log = awkward()
+    back = open_log(export(log, tmp_path / f"log.{ending}"))
+    assert back.headers == log.headers
+    assert back.time.tobytes() == log.time.tobytes()
+    for name in log.names:
+        assert back[name].tobytes() == log[name].tobytes(), name
+    assert back.meta == log.meta
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_logs_of_every_format_are_logs(ending: str, tmp_path: Path) -> None:
+    log = read_log(export(robot_log(), tmp_path / f"log.{ending}"))
+    assert log.meta["kind"] == "robot" and log.meta["name"] == "log"
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+@pytest.mark.parametrize("cut", [0, 1, 2])
+def test_damaged_files_are_told(ending: str, cut: int, tmp_path: Path) -> None:
+    path = export(robot_log(60), tmp_path / f"log.{ending}")
+    whole = path.read_bytes()
+    half = len(whole) // 2
+    path.write_bytes([whole[:half], b"", whole[:half] + b"\0" * 64 + whole[half + 64 :]][cut])
+    try:
+        open_log(path)
+    except KembaError as error:
+        assert "log." + ending in str(error)
+    else:
+        assert cut == 2  # 64 zeros may lie in a place that no reader looks at
+
+
+def test_mcap_is_what_viewers_read(tmp_path: Path) -> None:
+    """A topic per part with a JSON Schema that names units; stamps of the log's clock."""
+    path = export(robot_log(20), tmp_path / "log.mcap")
+    with path.open("rb") as stream:
+        reader = make_reader(stream)
+        found = [(s, c, m) for s, c, m in reader.iter_messages(topics=["/front/hip"])]
+    schema, channel, message = found[3]
+    assert schema is not None and schema.encoding == "jsonschema"
+    assert json.loads(schema.data)["properties"]["tau"]["description"] == "[N.m]"
+    assert channel.message_encoding == "json"
+    assert message.log_time == 3_000_000
+    assert set(json.loads(message.data)) == {"time", "q", "tau"}
+
+
+def test_an_mcap_of_others_becomes_columns(tmp_path: Path) -> None:
+    """Topics at different rates: the slower one keeps its last value."""
+    path = tmp_path / "other.mcap"
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        fast, slow = (writer.register_channel(t, "json", 0) for t in ("/fast", "/slow"))
+        for i in range(10):
+            stamp = 10**18 + i * 10**6
+            writer.add_message(fast, stamp, json.dumps({"position": [i, 2 * i]}).encode(), stamp)
+            if i % 5 == 2:
+                writer.add_message(slow, stamp, json.dumps({"load": i}).encode(), stamp)
+        writer.finish()
+    columns = {
+        "time [s]": Source(source="time", unit="ns"),
+        "piston/x [m]": Source(source="/fast/position/1", unit="mm"),
+        "piston/F [N]": Source(source="/slow/load"),
+    }
+    log = open_log(path, ColumnMap(kind="bench", origin="first", columns=columns))
+    assert log.time == pytest.approx(np.arange(10) * 1e-3, abs=1e-12)
+    assert log["piston/x"] == pytest.approx(np.arange(10) * 2e-3)
+    assert np.isnan(log["piston/F"][:2]).all()
+    assert log["piston/F"][2:].tolist() == [2.0] * 5 + [7.0] * 3
+
+
+def test_a_mat_file_of_others_is_mapped(tmp_path: Path) -> None:
+    """Vectors of the usual length are columns; matrices, texts and scalars are not."""
+    t = np.arange(30) * 1e-3
+    content = {"t": t, "qm": t[:, None] * 2, "vir": t**2, "note": "EMPS", "gtau": 35.15}
+    savemat(tmp_path / "drive.mat", content)
+    columns = {
+        "time [s]": Source(source="t"),
+        "piston/x [m]": Source(source="qm"),
+        "piston/F [N]": Source(source="vir", scale=35.15),
+    }
+    log = open_log(tmp_path / "drive.mat", ColumnMap(columns=columns))
+    assert log["piston/F"] == pytest.approx(35.15 * t**2)
+    with pytest.raises(KembaError, match="kemba-opt map"):
+        open_log(tmp_path / "drive.mat")

@@ -1,0 +1,131 @@
+"""Plans for changed figures from an earlier plan: refined, replaying, and honest when it fails."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from kemba.effects.mechanics.friction import SealFriction
+from kemba.effects.mechanics.load import Payload
+from kemba.model import load_model
+from kemba.ocp.continuation.between import completed, model_between, requirements_between
+from kemba.ocp.phases.modes import Phase
+from kemba.ocp.phases.notes import noted_phases, phase_notes
+from kemba.ocp.transcription.symmetry import whole
+from kemba.ocp.transcription.unilateral import read_constraints
+from kemba.report.earlier import origin_of
+from kemba.runs import load_run
+from kemba.trajectory import Trajectory
+from kemba_cli.main import app
+
+SIZE = ("--set", "nodes=60", "--no-figure", "--json")
+
+
+def solve(*words: str | Path) -> tuple[int, dict[str, object]]:
+    done = CliRunner().invoke(app, ["solve", *map(str, words)])
+    assert done.stdout, done.output
+    return done.exit_code, json.loads(done.stdout)
+
+
+@pytest.fixture(scope="module")
+def hop(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("earlier") / "run"
+    code, answer = solve("hop.yaml", *SIZE, "--out", folder)
+    assert code == 0, answer["sentence"]
+    assert answer["continued"] is None
+    return folder
+
+
+@pytest.mark.parametrize("change", ["height=0.37 m", "supply=0.67 MPa", "payload=0.3 kg"])
+def test_a_near_task_is_continued(hop: Path, tmp_path: Path, change: str) -> None:
+    _, answer = solve("--from", hop, "--set", change, "--no-figure", "--json",
+                      "--out", tmp_path / "run")  # fmt: skip
+    assert answer["continued"] is True
+    assert "from the earlier plan" in str(answer["sentence"])
+    replay = answer["replay"]
+    assert isinstance(replay, dict) and replay["landed"]
+    assert abs(replay["apex_error_m"]) < 1e-4
+    assert answer["apex_m"] == pytest.approx(0.37 if "height" in change else 0.35, abs=1e-5)
+    kept = load_run(hop).trajectory.meta["phases"]
+    assert load_run(tmp_path / "run").trajectory.meta["phases"] == kept
+
+
+def test_a_learnt_model_is_continued(hop: Path, tmp_path: Path) -> None:
+    model = tmp_path / "learnt.yaml"
+    model.write_text(
+        "name: learnt\nbase: planning\neffects:\n  - {kind: seal_friction, F_c: 8 N}\n"
+        "  - {kind: hose_lag, T: 4 ms}\n"  # with states that the earlier plan lacks
+    )
+    _, answer = solve("--from", hop, "--model", model, "--no-figure", "--json",
+                      "--out", tmp_path / "run")  # fmt: skip
+    assert answer["continued"] is True
+    replay = answer["replay"]
+    assert isinstance(replay, dict) and abs(replay["apex_error_m"]) < 1e-3  # steep friction
+
+
+def test_what_cannot_be_continued_is_made_from_scratch(hop: Path, tmp_path: Path) -> None:
+    code, answer = solve("--from", hop, "--set", "refine=none", "--no-figure", "--json",
+                         "--no-replay", "--out", tmp_path / "run")  # fmt: skip
+    assert code == 0 and answer["continued"] is False
+    assert "made from scratch, because the earlier plan could not be continued" in str(
+        answer["sentence"]
+    )
+
+
+def test_from_and_resume_exclude_each_other(hop: Path) -> None:
+    done = CliRunner().invoke(app, ["solve", "--from", str(hop), "--resume", str(hop)])
+    assert done.exit_code == 2 and "exclude" in done.stderr
+
+
+def test_phases_survive_their_notes() -> None:
+    model = load_model("planning")
+    constraints = read_constraints(model, whole(model.node))
+    phases = [
+        Phase(0, 5, (1, 0, 2, 0, 0, 1), (1.0, 0.0, 0.0, 1.0)),
+        Phase(5, 9, (0, 0, 3, 0, 0, 1), (1.0, 1.0, 0.0, 1.0)),
+    ]
+    notes = phase_notes(phases, constraints)
+    assert noted_phases(notes, constraints, 4, 9) == phases
+    assert noted_phases(notes, constraints, 4, 10) is None, "another number of nodes"
+    assert noted_phases(notes, constraints[1:], 4, 9) is None, "another robot"
+    assert noted_phases(notes, constraints, 2, 9) is None, "other valves"
+    assert noted_phases({}, constraints, 4, 9) is None
+    torn = {**notes, "phases": [notes["phases"][1]]}
+    assert noted_phases(torn, constraints, 4, 9) is None, "a phase is missing"
+
+
+def test_between_two_models() -> None:
+    old = load_model("planning", supply=0.7e6)
+    new = load_model("planning", [Payload(m=0.4), SealFriction(F_c=8.0)], supply=0.6e6)
+    half = model_between(old, new, 0.5)
+    assert half.supply == pytest.approx(0.65e6)
+    assert half.effect("payload").value("m") == pytest.approx(0.2)
+    assert half.effect("seal_friction").value("F_c") == pytest.approx(4.0)
+    assert model_between(old, new, 1.0) is new
+
+
+def test_between_two_tasks(hop: Path) -> None:
+    origin = origin_of(hop)
+    apex = next(r for r in origin.requirements if r.location == ("goals", "apex"))
+    higher = requirements_between(
+        [apex], [type(apex)(apex.location, apex.quantity, apex.at, 0.45, 0.45)], 0.25
+    )[0]
+    assert higher.lower == pytest.approx(0.75 * apex.lower + 0.25 * 0.45)
+
+
+def test_columns_of_new_effects_are_filled(hop: Path) -> None:
+    origin = origin_of(hop)
+    short = Trajectory(
+        origin.plan.time,
+        {
+            h: origin.plan[n]
+            for h, n in zip(origin.plan.headers, origin.plan.names, strict=True)
+            if "foot/Fz" not in n
+        },
+    )
+    found = completed(short, origin.model)
+    assert np.all(found["front/foot/Fz"] == 0.0)

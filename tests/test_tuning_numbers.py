@@ -1,0 +1,183 @@
+"""Tuning numbers are settings with unit, meaning and origin; other numbers are explained."""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import importlib
+import pkgutil
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+import kemba
+from kemba.settings import ORIGINS, Settings
+
+ROOT = Path(kemba.__file__).parent
+DRAWN = (
+    "plotting/",
+    "report/review/",
+    "report/stage.py",
+)  # lengths, colours and speeds of pictures
+
+# Numbers that may stand at a module's top level, and why.
+CONSTANTS = {  # file -> names, why
+    # physics
+    "effects/pneumatics/constants.py": ("ATMOSPHERE KAPPA GAS TEMPERATURE", "constants of air"),
+    "effects/pneumatics/flow.py": (
+        "CHOKED SUBSONIC SOFT",
+        "the critical pressure ratio; smoothing",
+    ),
+    "effects/pneumatics/chamber.py": ("OF_A_KIND ENTRY", "tolerances of an effect's figures"),
+    "effects/pneumatics/damping.py": ("NONE", "tolerances of an effect's figures"),
+    "effects/pneumatics/switching.py": ("ON", "what a valve takes for a command"),
+    "effects/pneumatics/timing.py": (
+        "EARLIEST",
+        "nothing switches before its command",
+    ),
+    "effects/mechanics/boom_faults.py": ("V_BOOM W_PITCH", "smoothing widths of formulas"),
+    "effects/mechanics/friction.py": ("V_COULOMB", "smoothing width of a formula"),
+    "effects/mechanics/ground.py": ("SMOOTH", "smoothing width of a formula"),
+    "effects/mechanics/hip.py": ("W_COULOMB", "smoothing width of a formula"),
+    "effects/base.py": ("REMEASURED", "tolerance of what a discovery has measured"),
+    "effects/sensors.py": ("CHANNELS", "noise of the robot's sensors"),
+    "mechanism/pin_model.py": ("COUNTER_CLOCKWISE DOWN", "directions"),
+    "mechanism/robot.py": ("HIP_RANGE", "geometry: where the knee would rise above the body"),
+    "plant/rig/tables.py": ("PAPER_RISE PAPER_FORCE PAPER_DEAD_TIME", "the paper's figures"),
+    "plant/rig/bench.py": ("FORCE_NOISE", "noise of a force transducer"),
+    "plant/rig/strokes.py": ("MODES", "names of valve modes"),
+    "plant/execution/certificate.py": ("DIGITS", "digits of numbers in a file"),
+    "plant/execution/sensors.py": ("ENCODERS", "steps of the robot's encoders"),
+    "plant/execution/repeat.py": ("VALVE_SCATTER", "scatter of the robot's valves"),
+    "plant/execution/controller.py": ("PERIOD", "rate of the robot's controller"),
+    "ocp/controller.py": ("PERIOD", "rate of the robot's controller"),
+    "effects/rigs/axis.py": ("PLATE", "tolerance of an effect's figures"),
+    "effects/mechanics/geometry.py": ("SIZES", "sizes of an effect's parameters"),
+    "mechanism/own_rigs.py": ("GRAVITY", "of the earth"),
+    # formulas and formats
+    "logs/formats/mcap.py": ("NS", "nanoseconds of a second"),
+    "logs/draft/ranges.py": (
+        "LENGTH STROKE ANGLE PRESSURE STEP STAMPED ABSOLUTE",
+        "readings by which units are guessed",
+    ),
+    "logs/draft/layout.py": ("LINES", "lines of a table that are looked at"),
+    "ocp/transcription/stage.py": ("ANGLE_ARM COST_SCALE AIM", "units of moments and costs"),
+    "ocp/task/requirement.py": ("SCALES MOMENTS FLIGHT ROUND", "moments of a task; units"),
+    "contract/cases.py": ("OWN_RIGS", "figures of example rigs"),
+    # tuning numbers that are to become settings
+    "policy/course.py": ("CLOSING BESIDE PASSES", "how impacts are read"),
+    "identify/robot/dynamics/physics.py": ("FOLDED", "how far a knee folds at most"),
+    "learn/round.py": ("SUPPLY", "of a model that names none"),
+    "identify/rigs/filtering.py": ("GAIN", "a Gaussian's cut"),
+    "logs/draft/matching.py": ("ENOUGH SAID_TOO UNRELATED NOTHING", "how names are matched"),
+    "logs/draft/stamps.py": ("GAPS", "steps of time that must rise"),
+    "ocp/certificate/grazing.py": ("LASTS TOUCHES", "as in plant/execution/replay.py"),
+    "plant/execution/impacts.py": ("SLOW", "slower impacts are not told"),
+    "plant/kernel/settings.py": ("GAMMA", "coefficient of the integration scheme"),
+    "ocp/phases/radau.py": ("RADAU3 _R RADAU5", "coefficients of the integration schemes"),
+    "identify/bench/rig_model.py": ("V_NODES V_MIDDLE", "nodes of a Gauss-Hermite formula"),
+    "identify/logs/gate.py": ("RANGES", "physical limits of channels, by name"),
+    "identify/robot/force_channels.py": ("BODY", "places of channels among the coordinates"),
+    "ocp/functions/constants.py": ("SHAPING", "numbers that CasADi simplifies"),
+    "ocp/transcription/layout.py": ("STEP", "unit of steps, shared by all grids"),
+    "ocp/phases/modes.py": ("OPEN HELD AHEAD BACK", "names of modes"),
+    "plant/kernel/play.py": ("DONE FULL ASK EXPLODED BURIED", "names of endings"),
+    "plant/kernel/events.py": ("FREE TOUCHED TOO_LONG", "names of endings"),
+    # rounding and sizes of memory
+    "ocp/transcription/first_node.py": ("SAME", "rounding"),
+    "plant/simulation/commands.py": ("SAME_TIME", "rounding of times"),
+    "plant/simulation/player.py": ("ROOM", "size of memory"),
+    # limits of files, messages and reports
+    "effects/expression.py": ("TRIED TRIED_AT_LEG", "values at which a formula is tried"),
+    "plant/rig/rigs.py": ("VALVES SPEEDS", "what a bench test does unless its file says more"),
+    "effects/formula.py": ("LONGEST DEEPEST", "longest text that is read"),
+    "config/complaints.py": ("MOST SHOWN", "length of messages"),
+    "config/document.py": ("WIDE", "length of messages"),
+    "config/names.py": ("LONGEST NAME", "longest name"),
+    "config/scalars.py": ("LONGEST_NUMBER", "longest text that is read"),
+    "config/writer.py": ("WIDTH", "width of lines"),
+    "errors.py": ("LISTED", "length of messages"),
+    "folders.py": ("PROBE", "free space that a run takes"),
+    "ocp/refinement/sample.py": ("WORST", "violations that a report lists"),
+    "sweep/workers/farm.py": ("ENVIRONMENT", "environment of workers"),
+    "units.py": ("ALIASES", "powers of units"),
+}
+
+
+def numbers(node: ast.expr) -> Iterator[float]:
+    """Numbers in an expression."""
+    for part in ast.walk(node):
+        if isinstance(part, ast.Constant) and type(part.value) in (int, float):
+            yield part.value
+
+
+@cache
+def constants() -> dict[str, list[str]]:
+    """File -> names at its top level to which an expression with a number is assigned."""
+    found: dict[str, list[str]] = {}
+    for path in sorted(ROOT.rglob("*.py")):
+        file = path.relative_to(ROOT).as_posix()
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if file.startswith(DRAWN) or not isinstance(node, ast.Assign | ast.AnnAssign):
+                continue
+            if node.value is None or isinstance(node.value, ast.Subscript):  # a type
+                continue
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            names = [n.id for t in targets for n in ast.walk(t) if isinstance(n, ast.Name)]
+            if list(numbers(node.value)) and names:
+                found.setdefault(file, []).extend(names)
+    return found
+
+
+def classes() -> list[type[Settings]]:
+    """Every class of settings of the package."""
+    for module in pkgutil.walk_packages(kemba.__path__, "kemba."):
+        importlib.import_module(module.name)
+    return [c for c in Settings.classes if c.__module__.startswith("kemba.")]
+
+
+def test_no_tuning_number_hides_at_the_top_of_a_module() -> None:
+    explained = {file: set(names.split()) for file, (names, _) in CONSTANTS.items()}
+    found = [
+        f"{file}: {name}"
+        for file, names in constants().items()
+        for name in names
+        if name not in explained.get(file, ())
+    ]
+    assert not found, (
+        f"make these settings (kemba/settings.py), or explain them in CONSTANTS: {found}"
+    )
+
+
+def test_no_explanation_outlives_its_constant() -> None:
+    told = {f"{file}: {name}" for file, (names, _) in CONSTANTS.items() for name in names.split()}
+    assert not told - {f"{file}: {name}" for file, names in constants().items() for name in names}
+
+
+@pytest.mark.parametrize("cls", classes(), ids=lambda cls: cls.__name__)
+def test_every_setting_says_what_it_is(cls: type[Settings]) -> None:
+    assert cls.__doc__ and not cls.__doc__.startswith(f"{cls.__name__}("), "say what it is for"
+    for field in dataclasses.fields(cls):  # type: ignore[arg-type]
+        about = field.metadata
+        assert about.get("unit") and about.get("doc"), f"{cls.__name__}.{field.name}"
+        kind, _, reason = about["origin"].partition(":")
+        assert kind in ORIGINS and reason.strip(), f"{cls.__name__}.{field.name}: {about['origin']}"
+        assert about["decides"] in (True, False)
+
+
+def test_names_of_settings_are_unique() -> None:
+    names = [cls.__name__ for cls in classes()]
+    assert len(names) == len(set(names))
+
+
+def test_thresholds_of_verdicts_and_stages_are_in_the_sensitivity_study() -> None:
+    deciding = {
+        f"{cls.__name__}.{field.name}"
+        for cls in classes()
+        for field in dataclasses.fields(cls)  # type: ignore[arg-type]
+        if field.metadata["decides"]
+    }
+    assert {"Relaxation.loose", "Starts.interior_push", "Ends.tol", "ValveSearch.reach"} <= deciding
+    assert {"DiscoverSettings.significant", "GateSettings.missing"} <= deciding
