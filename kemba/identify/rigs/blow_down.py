@@ -8,6 +8,7 @@ import casadi as ca
 import numpy as np
 
 from kemba.identify.problem.types import Array
+from kemba.model.exponential import midpoint_step
 from kemba.model.model import Model
 from kemba.model.rest import rate_of
 from kemba.settings import BY_HAND, Settings, setting
@@ -16,7 +17,7 @@ from kemba.settings import BY_HAND, Settings, setting
 class BlowDownSettings(Settings):
     """Integration of a blow-down."""
 
-    steps: int = setting(400, "1", "steps of the classic Runge-Kutta rule over a log", BY_HAND)
+    steps: int = setting(2000, "1", "steps over a log", BY_HAND)
 
 
 class BlowDown:
@@ -28,13 +29,9 @@ class BlowDown:
         held = [node.q, node.v, node.a, node.u]
         still = [ca.SX.zeros(x.sparsity()) for x in held]
         rate = ca.substitute([rate_of(node)], held, still)[0]
-        f = ca.Function("f", [node.s, node.p], [rate])
-        s, h, p = ca.SX.sym("s", node.s.numel()), ca.SX.sym("h"), node.p
-        k1 = f(s, p)
-        k2 = f(s + h / 2 * k1, p)
-        k3 = f(s + h / 2 * k2, p)
-        k4 = f(s + h * k3, p)
-        step = ca.Function("step", [s, h, p], [s + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)])
+        h = ca.SX.sym("h")
+        after, _ = midpoint_step(rate, node.s, [node.p], [node.p], h)
+        step = ca.Function("step", [node.s, h, node.p], [ca.densify(after)])
         self._count = BlowDownSettings.current().steps
         self._steps = step.mapaccum(self._count)
 

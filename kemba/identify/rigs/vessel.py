@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,7 +26,13 @@ class VesselSettings(Settings):
     """How well a vessel's readings and its start are known."""
 
     noise: float = setting(
-        0.005, "1", "noise of a reading over the range of its channel", BY_HAND, decides=True
+        0.01, "1", "noise of a reading over the range of its channel", BY_HAND, decides=True
+    )
+    warmth: float = setting(
+        0.5, "K", "smallest noise of a temperature", "literature: IEC 60584 class 1 allows 1.5 K"
+    )
+    late: float = setting(
+        0.02, "1", "usual delay of a sensor, such as a thermometer's, over a log's length", BY_HAND
     )
     start_pressure: float = setting(
         0.02, "1", "prior sigma of the pressure at the start, as a share", BY_HAND
@@ -50,6 +56,11 @@ class VesselLog:
         """Time [s] of the first reading."""
         return min(float(time[0]) for time, _ in self.readings.values())
 
+    @property
+    def duration(self) -> float:
+        """Time [s] from the first to the last reading."""
+        return max(float(time[-1]) for time, _ in self.readings.values()) - self.begin
+
 
 def prepare(log: Trajectory, ambient: float) -> VesselLog:
     """The readings of a log; a vessel without a temperature at its first row is at `ambient`."""
@@ -60,6 +71,7 @@ def prepare(log: Trajectory, ambient: float) -> VesselLog:
             good = np.isfinite(log[name])
             readings[name] = (log.time[good], log[name][good])
             spread = settings.noise * float(np.ptp(readings[name][1]))
+            spread = max(spread, settings.warmth) if name == "vessel/T" else spread
             sigma[name] = float(known.get(name, spread))
     first = {n: (float(t[0]), float(y[0])) for n, (t, y) in readings.items()}
     begin = min(t for t, _ in first.values())
@@ -75,18 +87,27 @@ class VesselProblem(Problem):
     `figures`: more numbers of the model that theta may scale, with 1 sigma of the factor.
     """
 
+    bends = True
+
     def __init__(
         self, logs: Sequence[VesselLog], model: Model, figures: Mapping[str, float] | None = None
     ) -> None:
         self.model, self.logs = model, tuple(logs)
+        settings = VesselSettings.current()
         self.runs = tuple(log.name for log in self.logs)
         sigmas = {n: float(np.median([g.sigma[n] for g in self.logs if n in g.sigma]))
                   for n in CHANNELS if any(n in g.sigma for g in self.logs)}  # fmt: skip
-        self.candidates = standing_candidates(model) | sensor_candidates(sigmas, model)
+        self.candidates = standing_candidates(model)
+        longest = max(log.duration for log in self.logs)
+        for name, fault in sensor_candidates(sigmas, model).items():
+            if fault.lead.unit == "s":
+                size = settings.late * longest
+                fault = replace(fault, lead=replace(fault.lead, size=size))
+            self.candidates[name] = fault
         self.sensors, self.figures = SensorFaults(model.effects), nominal_figures(model)
         self.figures |= {name: (1.0, sigma) for name, sigma in (figures or {}).items()}
         self._known: dict[tuple[str, ...], BlowDown] = {}
-        settings, starts = VesselSettings.current(), {}
+        starts = {}
         for i, log in enumerate(self.logs):
             starts[f"start:vessel/P[{i}]"] = (0.0, settings.start_pressure * log.start[0])
             starts[f"start:vessel/T[{i}]"] = (0.0, settings.start_temperature)
@@ -107,8 +128,7 @@ class VesselProblem(Problem):
         blow, values = self._blow_down(theta), self._values(theta)
         shift = [theta.get(f"start:{name}[{index}]", 0.0) for name in CHANNELS]
         start = np.array(log.start) + shift
-        last = max(float(t[-1]) for t, _ in log.readings.values())
-        time, states = blow.run(log.begin, last, start, values)
+        time, states = blow.run(log.begin, log.begin + log.duration, start, values)
         found = {}
         for name, (at, _) in log.readings.items():
             true = Series(time, states[CHANNELS.index(name)])
