@@ -124,6 +124,7 @@ class Task(Section):
     quantities to values; `rest: true` there means that all rates are zero,
     `settled: true` that every state of an effect is at its value at rest. `hold`: for so long
     before the plan the controller keeps the first pose, valves closed, so that the robot settles.
+    `robust`: by how many scenarios, drawn from the file `uncertainties`, plans are chosen.
     """
 
     name: FileName = "task"
@@ -145,6 +146,8 @@ class Task(Section):
     bounds: dict[str, Bound] = Field(default_factory=dict)
     goals: dict[str, Goal] = Field(default_factory=dict)
     cost: dict[str, float] = Field(default_factory=lambda: {"torque_squared": 1.0})
+    robust: Annotated[int, Field(ge=0, le=10_000)] = 0
+    uncertainties: str = "usual"
     guess: Literal["automatic", "standing"] = "automatic"
     guess_noise: Annotated[float, Param("1", lower=0.0, upper=1.0)] = 0.0
     seed: int = 0
@@ -175,5 +178,6 @@ def parse_task(document: Document) -> Task:
     if not document.source:
         return task
     folder = Path(document.source).parent
-    models = {key: beside(getattr(task, key), folder) for key in ("model", "plant")}
+    named = ("model", "plant", "uncertainties")
+    models = {key: beside(getattr(task, key), folder) for key in named}
     return task.model_copy(update=models)
