@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
@@ -25,6 +26,7 @@ import resource, signal
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, ({size}, {size}))
 """
+INTERRUPTED = 130
 LONGEST = 600.0  # s of wall time; a busy machine is slow
 
 
@@ -86,11 +88,11 @@ def struck(verb: Verb, fault: Fault, folder: Path, usual: dict[str, Any], second
     whole = code == 0
     if whole and contents(out, verb.results) != usual:
         wrong.append("exit code 0, but other results")
-    if not whole:
+    if code == INTERRUPTED and _status(out) == "interrupted":
+        pass  # the best plan so far: clearly partial, and continued with --resume
+    elif not whole:
         again = run(verb, folder)
-        finished = again.returncode == 2 and (
-            "finished run" in again.stderr or "holds" in again.stderr
-        )
+        finished = again.returncode == 2 and "holds" in again.stderr  # a run or results
         if again.returncode and not finished:
             wrong.append(f"cannot be run again: {again.stderr[-300:]}")
         elif contents(out, verb.results) != usual:
@@ -99,6 +101,11 @@ def struck(verb: Verb, fault: Fault, folder: Path, usual: dict[str, Any], second
     if left and fault.signal != signal.SIGKILL:
         wrong.append(f"left {left}")
     return Trace(fault, code, said, wrong)
+
+
+def _status(out: Path) -> str:
+    file = out / "manifest.json"
+    return str(json.loads(file.read_text())["status"]) if file.is_file() else ""
 
 
 def _struck(verb: Verb, fault: Fault, folder: Path, seconds: float) -> tuple[int, str]:
