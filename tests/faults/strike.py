@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from faults.verbs import Verb, contents, emptied, half_written
+from kemba.folders import LOCK
 
 MAIN = "from kemba_cli.main import main; main()"
 # time.time() jumps back by a day at its 20th call, as after a wrong clock was corrected
@@ -97,8 +98,8 @@ def struck(verb: Verb, fault: Fault, folder: Path, usual: dict[str, Any], second
             wrong.append(f"cannot be run again: {again.stderr[-300:]}")
         elif contents(out, verb.results) != usual:
             wrong.append("other results after it was run again")
-    left = [p.name for p in out.glob(".*.tmp*")] if out.is_dir() else []
-    if left and fault.signal != signal.SIGKILL:
+    left = [p.name for p in out.glob(".*") if p.name != LOCK] if out.is_dir() else []
+    if left and fault.signal not in (signal.SIGKILL, signal.SIGTERM):  # these end it at once
         wrong.append(f"left {left}")
     return Trace(fault, code, said, wrong)
 
