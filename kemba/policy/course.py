@@ -22,6 +22,7 @@ from kemba.trajectory import Trajectory
 
 CLOSING = 1e-6  # m/s; a gap that closes more slowly touches without an impact
 BESIDE = 2e-5  # s; states just before and after an impact are read this far from it
+FINER = 20  # rows within a step in which a foot leaves the ground or begins to slide
 PASSES = 3  # simulations in which the marks beside impacts find their place
 
 
@@ -115,11 +116,16 @@ def course_of(model: Model, table: Trajectory, extra: float = 0.0) -> Course:
     acting = delayed(model, dict(commands.profiles))
     switches = np.concatenate([p.times[1:] for p in acting.values()])
     clock = np.arange(round((last - 1e-9) / PERIOD) + 1) * PERIOD
-    done = simulate_one(condition)
-    for _ in range(PASSES):  # marks near an impact move it by some microseconds
-        hits = np.array([time for time, _ in _clusters(done.impacts, last)])
-        marks = merged(clock, switches[switches > 0.0], hits - BESIDE, hits + BESIDE)
+    done, finer = simulate_one(condition), np.zeros(0)
+    for number in range(PASSES):  # marks near an impact move it by some microseconds
+        hits = np.array([time[:2] for time in _clusters(done.impacts, last)]).reshape(-1, 2)
+        beside = (hits + [-BESIDE, BESIDE]).ravel()
+        marks = merged(clock, switches[switches > 0.0], beside, finer)
+        inside = ((marks[:, None] > hits[:, 0] - BESIDE) & (marks[:, None] < hits[:, 1] + BESIDE)).any(1)
+        marks = marks[~inside]
         done = simulate_one(replace(condition, sample=marks[marks < last - 1e-9]))
+        if number == 0:
+            finer = _changes(hybrid, done.trajectory)
     motion, impacts = done.trajectory, _clusters(done.impacts, last)
     builder = Builder(hybrid, motion, dict(commands.profiles), acting, commands.feedback, begin)
     events = tuple(builder.events(clock, impacts))
@@ -129,14 +135,23 @@ def course_of(model: Model, table: Trajectory, extra: float = 0.0) -> Course:
     return Course(hybrid, table, shown_motion, builder.x[rows], events, commands.feedback.joints)
 
 
-def _clusters(impacts: Sequence[Hit], last: float) -> list[tuple[float, set[str]]]:
-    """Impacts that happen at once as one: when [s], and at which pairs."""
-    found: list[tuple[float, set[str]]] = []
+def _changes(hybrid: Hybrid, motion: Trajectory) -> Array:
+    """Times [s] within every step in which a contact changes, so that the change is found."""
+    modes = [hybrid.modes(motion, i) for i in range(len(motion))]
+    steps = [i for i in range(len(modes) - 1) if modes[i] != modes[i + 1]]
+    inner = [np.linspace(motion.time[i], motion.time[i + 1], FINER + 1)[1:-1] for i in steps]
+    return np.concatenate([np.zeros(0), *inner])
+
+
+def _clusters(impacts: Sequence[Hit], last: float) -> list[tuple[float, float, set[str]]]:
+    """Impacts that happen at once as one: from when to when [s], and at which pairs."""
+    found: list[tuple[float, float, set[str]]] = []
     for impact in (i for i in impacts if BESIDE < i.time < last - BESIDE):
-        if found and impact.time - found[-1][0] < 4 * BESIDE:
-            found[-1][1].update(impact.labels)
+        if found and impact.time - found[-1][1] < 4 * BESIDE:
+            begin, _, labels = found.pop()
+            found.append((begin, impact.time, labels | set(impact.labels)))
         else:
-            found.append((impact.time, set(impact.labels)))
+            found.append((impact.time, impact.time, set(impact.labels)))
     return found
 
 
@@ -161,10 +176,12 @@ class Builder:
         self.x = np.column_stack([motion[name] for name in self.names])
         self.torques = [self.inputs.index(f"{joint}/tau") for joint in control.joints]
 
-    def events(self, clock: Array, impacts: Sequence[tuple[float, set[str]]]) -> Iterator[Event]:
+    def events(
+        self, clock: Array, impacts: Sequence[tuple[float, float, set[str]]]
+    ) -> Iterator[Event]:
         """All events in order of time, by the clock of the plan."""
         time, ticks = self.motion.time, among(self.motion.time, clock)
-        hits = {int(np.searchsorted(time, t)) - 1: labels for t, labels in impacts}
+        hits = {int(np.searchsorted(time, t)) - 1: labels for t, _, labels in impacts}
         yield Impact(float(time[0]) + self.begin, self._start())
         for i in range(len(time) - 1):
             now = float(time[i]) + self.begin
@@ -255,7 +272,8 @@ class Builder:
                 m if a != OPEN or c.label in labels else OPEN  # what opens bears no impulse
                 for m, a, c in zip(here.modes, after.modes, self.hybrid.constraints, strict=True)
             ]
-            modes[k] = HELD if after.modes[k] in (OPEN, HELD) else after.modes[k]
+            modes[k] = HELD
+            modes = list(self.hybrid.landing(here.x, tuple(modes), k))
             v, slope = self.hybrid.jump(here.x, tuple(modes))
             reset = np.eye(size)
             reset[n : 2 * n, : 2 * n] = slope

@@ -144,8 +144,30 @@ class Hybrid:
                 first += 4
         return keep
 
+    def landing(self, x: Array, modes: Modes, hit: int) -> Modes:
+        """The modes of an impact of constraint `hit`: feet whose friction does not hold them slide,
+        and others that would be pulled open."""
+        for _ in range(2 * len(modes)):
+            push = self._impact(x, modes)[1]
+            changed = list(modes)
+            for i, (c, mode) in enumerate(zip(self.constraints, modes, strict=True)):
+                forward, backward = self._cones[2 * i : 2 * i + 2] @ push
+                if mode == HELD and c.friction is not None and min(forward, backward) < 0.0:
+                    changed[i] = BACK if forward < backward else AHEAD
+                elif mode != OPEN and push[2 * i] < 0.0 and i != hit:
+                    changed[i] = OPEN
+            if tuple(changed) == modes:
+                break
+            modes = tuple(changed)
+        return modes
+
     def jump(self, x: Array, modes: Modes) -> tuple[Array, Array]:
         """The velocities (n,) after an inelastic impact into `modes`, and d(v+)/d(q, v)."""
+        v, _, slope = self._impact(x, modes)
+        return v, slope
+
+    def _impact(self, x: Array, modes: Modes) -> tuple[Array, Array, Array]:
+        """Velocities (n,) after an impact, impulses (2 c,), and d(v+)/d(q, v)."""
         n, count = self.n, len(self.constraints)
         q, v = x[:n], x[n : 2 * n]
         both = np.zeros(n + 2 * count)
@@ -166,7 +188,7 @@ class Hybrid:
                     right.append(np.array([line @ both]))
             whole_K = np.vstack(rows)
             both = both - np.linalg.solve(whole_K, np.concatenate(right))
-        return both[:n], -np.linalg.solve(whole_K, np.vstack(slope))[:n]
+        return both[:n], both[n:], -np.linalg.solve(whole_K, np.vstack(slope))[:n]
 
     def gaps(self, x: Array) -> tuple[Array, Array]:
         """Gaps (c,) and their slopes by q (c, n)."""
