@@ -21,6 +21,7 @@ from kemba.policy.modes import Array, Hybrid, Point
 from kemba.trajectory import Trajectory
 
 CLOSING = 1e-6  # m/s; a gap that closes more slowly touches without an impact
+SAME = 1e-8  # s; switches nearer than this are one
 BESIDE = 2e-5  # s; states just before and after an impact are read this far from it
 FINER = 20  # rows within a step in which a foot leaves the ground or begins to slide
 PASSES = 3  # simulations in which the marks beside impacts find their place
@@ -114,14 +115,16 @@ def course_of(model: Model, table: Trajectory, extra: float = 0.0) -> Course:
     commands, last = condition.commands, condition.duration
     assert commands is not None and isinstance(commands.feedback, JointControl)
     acting = delayed(model, dict(commands.profiles))
-    switches = np.concatenate([p.times[1:] for p in acting.values()])
+    switches = np.concatenate([_switches(p) for p in acting.values()])
     clock = np.arange(round((last - 1e-9) / PERIOD) + 1) * PERIOD
     done, finer = simulate_one(condition), np.zeros(0)
     for number in range(PASSES):  # marks near an impact move it by some microseconds
         hits = np.array([time[:2] for time in _clusters(done.impacts, last)]).reshape(-1, 2)
-        beside = (hits + [-BESIDE, BESIDE]).ravel()
+        beside = np.concatenate([hits[:, 0] - BESIDE, hits[:, 1] + BESIDE])
         marks = merged(clock, switches[switches > 0.0], beside, finer)
-        inside = ((marks[:, None] > hits[:, 0] - BESIDE) & (marks[:, None] < hits[:, 1] + BESIDE)).any(1)
+        inside = (
+            (marks[:, None] > hits[:, 0] - BESIDE) & (marks[:, None] < hits[:, 1] + BESIDE)
+        ).any(1)
         marks = marks[~inside]
         done = simulate_one(replace(condition, sample=marks[marks < last - 1e-9]))
         if number == 0:
@@ -133,6 +136,12 @@ def course_of(model: Model, table: Trajectory, extra: float = 0.0) -> Course:
     shown = {h: motion[n][rows] for h, n in zip(motion.headers, motion.names, strict=True)}
     shown_motion = Trajectory(motion.time[rows] + begin, shown)
     return Course(hybrid, table, shown_motion, builder.x[rows], events, commands.feedback.joints)
+
+
+def _switches(profile: Profile) -> Array:
+    """When [s] a valve that is closed at first opens, closes, opens ..."""
+    changes = np.diff(np.round(profile.values), prepend=0.0) != 0.0
+    return np.asarray(profile.times[changes])
 
 
 def _changes(hybrid: Hybrid, motion: Trajectory) -> Array:
@@ -177,7 +186,7 @@ class Builder:
         self.torques = [self.inputs.index(f"{joint}/tau") for joint in control.joints]
 
     def events(
-        self, clock: Array, impacts: Sequence[tuple[float, float, set[str]]]
+        self, clock: np.ndarray, impacts: Sequence[tuple[float, float, set[str]]]
     ) -> Iterator[Event]:
         """All events in order of time, by the clock of the plan."""
         time, ticks = self.motion.time, among(self.motion.time, clock)
@@ -197,7 +206,9 @@ class Builder:
         u = np.array([self.motion[name][i] for name in self.inputs])
         for name, profile in self.acting.items():
             u[self.inputs.index(name)] = profile(valves_at)
-        return Point(self.x[i], u, self.hybrid.modes(self.motion, i if modes_of is None else modes_of))
+        return Point(
+            self.x[i], u, self.hybrid.modes(self.motion, i if modes_of is None else modes_of)
+        )
 
     def _start(self) -> Array:
         """What touches at the start stops at once: the slope of that."""
@@ -226,22 +237,24 @@ class Builder:
         for j, joint in enumerate(self.control.joints):
             q, w = (self.names.index(f"{joint}/{s}") for s in ("q", "w"))
             q_d, w_d, ahead = wanted[j]
-            asked = self.control.K_p * (q_d - self.x[i, q]) + self.control.K_d * (w_d - self.x[i, w])
+            K_p, K_d, x = self.control.K_p, self.control.K_d, self.x[i]
+            asked = K_p * (q_d - x[q]) + K_d * (w_d - x[w])
             if abs(asked + ahead - self.motion[f"{joint}/tau"][i]) < 1e-6:
-                hold[j, [q, w]] = -self.control.K_p, -self.control.K_d
+                hold[j, [q, w]] = -K_p, -K_d
         return hold
 
     def _edges(self, i: int, now: float) -> Iterator[Edge]:
         """The valves that switch at row i."""
         time = float(self.motion.time[i])
         for name, profile in self.acting.items():
-            at = np.flatnonzero(np.abs(profile.times - time) < 1e-8)
-            if not len(at) or at[0] == 0 or len(profile.times) != len(self.sent[name].times):
+            acts, sent = _switches(profile), _switches(self.sent[name])
+            at = np.flatnonzero(np.abs(acts - time) < SAME)
+            if not len(at) or len(acts) != len(sent):  # pulses that merged cannot be told apart
                 continue
-            rates = [self.hybrid.flow(self.point(i, time + s * 1e-7, max(i - 1, 0)))[0] for s in (-1, 1)]
-            k = int(at[0])
-            sent = round((float(self.sent[name].times[k]) + self.begin) / PERIOD)
-            yield Edge(now, name, k - 1, sent, rates[0] - rates[1])
+            modes_of, k = max(i - 1, 0), int(at[0])
+            before, after = (self.point(i, time + s * 2 * SAME, modes_of) for s in (-1, 1))
+            late = self.hybrid.flow(before)[0] - self.hybrid.flow(after)[0]
+            yield Edge(now, name, k, round((float(sent[k]) + self.begin) / PERIOD), late)
 
     def _saltation(self, i: int, labels: set[str]) -> Array:
         """The slope (n, n) of the state after an impact, between rows i and i + 1.
@@ -257,7 +270,9 @@ class Builder:
             if c.label in labels and before.modes[k] == OPEN and rates[k] < -CLOSING
         ]  # fmt: skip
         orders = list(permutations(new)) if 1 < len(new) <= 3 else [tuple(new)]
-        return np.asarray(np.mean([self._in_order(before, after, order, labels) for order in orders], axis=0))
+        return np.asarray(
+            np.mean([self._in_order(before, after, order, labels) for order in orders], axis=0)
+        )
 
     def _in_order(
         self, before: Point, after: Point, order: Sequence[int], labels: set[str]

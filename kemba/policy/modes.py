@@ -11,8 +11,8 @@ import numpy as np
 
 from kemba.model import Model
 from kemba.ocp.phases.modes import AHEAD, BACK, HELD, OPEN
-from kemba.ocp.transcription.unilateral import Constraint, read_constraints
 from kemba.ocp.transcription.symmetry import whole
+from kemba.ocp.transcription.unilateral import Constraint, read_constraints
 from kemba.settings import Settings, setting
 from kemba.trajectory import Trajectory
 
@@ -56,7 +56,7 @@ class Hybrid:
         a, lam = node.a, node.lam
         zero = ca.SX.zeros(self.ns)
         speed = -ca.substitute(node.rate, node.sd, zero)
-        rows, self._places = [node.dynamics], []
+        rows = [node.dynamics]
         for c in self.constraints:
             rows += [_second(node, c.rate, a), lam[c.force]]
             if c.friction is not None:
@@ -89,12 +89,12 @@ class Hybrid:
         hit = mass @ (after - node.v) + force
         both = ca.vertcat(after, push)
         spread = _spread(lam, self.constraints, push)
+        frictions = [c.friction for c in self.constraints]
         cones = [
-            ca.substitute(ca.vertcat(c.friction.cone_forward, c.friction.cone_backward), lam, spread)
-            if c.friction else ca.SX.zeros(2)
-            for c in self.constraints
-        ]  # fmt: skip
-        self._cones = np.array(ca.Function("cones", [push], [ca.jacobian(ca.vertcat(*cones), push)])(0))
+            ca.vertcat(f.cone_forward, f.cone_backward) if f else ca.SX.zeros(2) for f in frictions
+        ]
+        by_push = ca.jacobian(ca.substitute(ca.vertcat(*cones), lam, spread), push)
+        self._cones = np.array(ca.Function("cones", [push], [by_push])(0))
         self._hit = ca.Function(
             "hit", [node.q, both, node.v],
             [hit, ca.jacobian(hit, both), ca.jacobian(hit, node.q), J, T,
@@ -171,7 +171,9 @@ class Hybrid:
         n, count = self.n, len(self.constraints)
         q, v = x[:n], x[n : 2 * n]
         both = np.zeros(n + 2 * count)
-        for _ in range(2):  # affine in the unknowns: the first pass solves, the second differentiates
+        for _ in range(
+            2
+        ):  # affine in the unknowns: the first pass solves, the second differentiates
             hit, K, Q, J, T, Jq, Tq = (np.array(m) for m in self._hit(q, both, v))
             rows, slope, right = [K], [np.hstack([Q, K[:, :n] * -1.0])], [hit.ravel()]
             for i, (c, mode) in enumerate(zip(self.constraints, modes, strict=True)):
@@ -188,7 +190,8 @@ class Hybrid:
                     right.append(np.array([line @ both]))
             whole_K = np.vstack(rows)
             both = both - np.linalg.solve(whole_K, np.concatenate(right))
-        return both[:n], both[n:], -np.linalg.solve(whole_K, np.vstack(slope))[:n]
+        by_state = -np.linalg.solve(whole_K, np.vstack(slope))[:n]
+        return both[:n], both[n:], np.asarray(by_state, dtype=float)
 
     def gaps(self, x: Array) -> tuple[Array, Array]:
         """Gaps (c,) and their slopes by q (c, n)."""
