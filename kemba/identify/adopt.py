@@ -10,6 +10,7 @@ from kemba.config import dump_yaml, parse
 from kemba.effects import BY_KIND
 from kemba.errors import KembaError, suggest
 from kemba.files import read_json
+from kemba.identify.problem.candidates import where_field
 from kemba.model.spec import ModelSpec, load_spec
 
 
@@ -33,14 +34,15 @@ def write_model(
 
 
 def item(name: str, parameters: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-    """One effect of a model's list from its row of the ranking."""
+    """One effect of a model's list from its row of the ranking.
+
+    Raises KembaError for an effect that the catalogue lacks.
+    """
     kind, _, place = name.partition(":")
     values = {p: float(f"{v['value']:.6g}") for p, v in parameters.items()}
     if kind not in BY_KIND:
         raise KembaError(name, "is no effect of the catalogue", hint=suggest(kind, BY_KIND))
-    where = {}
-    if place:
-        where = {"channel": place} if kind.startswith("sensor_") else {"on": place}
+    where = {where_field(kind): place} if place else {}
     return {"kind": kind, **where, **values}
 
 

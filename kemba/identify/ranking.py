@@ -37,9 +37,8 @@ def ranked(
     found = []
     before = error(search, NULL, holdout)
     for effect in order[: RankingSettings.current().shown]:
-        hypothesis = best if effect in best else (effect,)
-        point = search.points.get(hypothesis)
-        if point is None:
+        hypothesis = best if effect in best else _likeliest_with(search, effect)
+        if not hypothesis:
             continue
         found.append(
             Ranked(
@@ -53,6 +52,14 @@ def ranked(
             )
         )
     return found
+
+
+def _likeliest_with(search: Search, effect: str) -> Hypothesis:
+    """This effect alone, if it was refitted; else the likeliest hypothesis that has it."""
+    if (effect,) in search.points:
+        return (effect,)
+    having = [h for h in search.points if effect in h]
+    return max(having, key=lambda h: search.points[h].log_evidence, default=NULL)
 
 
 def _doubted(probability: Mapping[Hypothesis, float]) -> dict[Hypothesis, float]:
@@ -111,7 +118,8 @@ def values(search: Search, hypothesis: Hypothesis, effect: str) -> dict[str, Val
 
 
 def reported(candidate: Candidate, name: str, unit: str, triple: Array) -> tuple[str, str, Array]:
-    """A parameter as the catalogue names it, also where it was searched reciprocally."""
+    """Name, unit and `triple` (3,) = value, low, high of a parameter as the catalogue has it, also
+    where the search was for its reciprocal value."""
     if name not in candidate.reciprocal:
         return name, unit, triple
     name, unit = candidate.reciprocal[name]

@@ -13,7 +13,7 @@ from kemba.plant.execution.certificate import rest_after
 from kemba.plant.execution.controller import execute
 from kemba.plotting.study.learning import plot_executions, plot_rounds
 from kemba.plotting.style import svg_text
-from kemba.report.page import table
+from kemba.report.review.html import pairs
 from kemba.report.stage import write_page
 
 Rows = Iterable[tuple[str, Any]]
@@ -38,7 +38,7 @@ def write_learning(found: Round, folder: Path) -> Path:
 
 
 def _tables(found: Round) -> Iterable[str]:
-    yield table("what was learnt", [
+    yield pairs("what was learnt", [
         ("verdict", found.answer.verdict),
         ("added", ", ".join(found.answer.added) or "nothing"),
         ("model error before", f"{found.compare_before:.2f} x noise"),
@@ -52,10 +52,10 @@ def _tables(found: Round) -> Iterable[str]:
         ("model before", f"{found.before.apex:.4f} m"),
         ("model after", f"{found.simulated.apex:.4f} m"),
     ]
-    yield table("apex of the run that was executed", rows)
+    yield pairs("apex of the run that was executed", rows)
     if found.aimed is not None and found.target is not None:
         landing = 1e3 * (found.aimed.expected.touchdown - found.target.touchdown)
-        yield table("the next run", [
+        yield pairs("the next run", [
             ("planned apex", f"{found.target.apex:.4f} m"),
             ("expected apex", f"{found.aimed.expected.apex:.4f} m"),
             ("expected touchdown", f"{landing:+.1f} ms from the plan's"),

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import casadi as ca
 import numpy as np
 
 from kemba.mechanism.links import Leg
+
+REACH = 1.0 - 1e-9  # largest cosine of an angle whose slope is still finite
 
 
 def pivot_to_pin(leg: Leg, flexion: ca.SX) -> tuple[ca.SX, ca.SX]:
@@ -34,14 +38,27 @@ def flexion(leg: Leg, x: float) -> float:
 
     Raises ValueError where the linkage cannot reach.
     """
+    cosine, phase = _triangle(leg, x)
+    if abs(cosine) > 1.0:
+        raise ValueError(f"the knee cannot reach a piston extension of {x:g} m")
+    return float(np.arccos(cosine) - np.arctan2(*phase))
+
+
+def flexion_of(leg: Leg, x: ca.SX) -> ca.SX:
+    """The same as an expression; where the linkage cannot reach, the knee ends at its limit."""
+    cosine, phase = _triangle(leg, x)
+    bend: ca.SX = ca.acos(ca.fmax(-REACH, ca.fmin(REACH, cosine))) - ca.atan2(*phase)
+    return bend
+
+
+def _triangle(leg: Leg, x: Any) -> tuple[Any, tuple[Any, Any]]:
+    """Cosine of the flexion plus a phase, and the two sides whose angle that phase is."""
     piston, femur = leg.piston, leg.femur.length
     d = piston.retracted + x
     # |d|^2 = f^2 + p^2 + m^2 + 2 p (f cos k - m sin k) = f^2 + p^2 + m^2 + 2 p r cos(k + phase)
-    reach = np.hypot(femur, piston.mount)
+    reach = (femur**2 + piston.mount**2) ** 0.5
     cosine = (d**2 - femur**2 - piston.pin**2 - piston.mount**2) / (2 * piston.pin * reach)
-    if abs(cosine) > 1.0:
-        raise ValueError(f"the knee cannot reach a piston extension of {x:g} m")
-    return float(np.arccos(cosine) - np.arctan2(piston.mount, femur))
+    return cosine, (piston.mount, femur)
 
 
 def leg_per_piston(leg: Leg, x: float) -> float:

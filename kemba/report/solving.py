@@ -19,12 +19,12 @@ from kemba.ocp.continuation.between import Origin
 from kemba.ocp.nlp.watcher import Watch
 from kemba.ocp.report import answer, sentence_of
 from kemba.ocp.starts import plan_best
-from kemba.plant.execution.certificate import replays
+from kemba.plant.execution.certificate import executions, plant_run, summaries
 from kemba.plant.execution.counterpart import another_robot, counterpart
 from kemba.plant.execution.replay import ends_standing
 from kemba.plant.execution.retiming import retimed
 from kemba.report.verdict import verdicts
-from kemba.runs import RunFolder, write_json
+from kemba.runs import PLANT_RUN, RunFolder, write_json
 from kemba.trajectory import Trajectory
 
 
@@ -35,6 +35,14 @@ class Listener:
     tell: Callable[[str], None] = lambda text: None
     watch: Watch | None = None
     stop: Callable[[], bool] | None = None
+
+
+@dataclass(frozen=True)
+class Motions:
+    """What is written beside the plan: the controller's table, and the motion of the plant."""
+
+    table: Trajectory | None = None
+    plant: Trajectory | None = None
 
 
 def solve_into(
@@ -69,11 +77,13 @@ def solve_into(
         table = (
             controller_table(found.model, found.trajectory, task.hold) if found.attempts else None
         )
+        plant: Trajectory | None = None
         if replay and table is not None and found.status.plan:
             listener.tell("replay")
             table = retimed(found.model, found.trajectory, table)
-            result |= _replayed(found, table)
-        _keep(found, result, table, folder, figure)
+            replayed, plant = _replayed(found, table)
+            result |= replayed
+        _keep(found, result, Motions(table, plant), folder, figure)
     except BaseException:
         with suppress(WriteError):  # the first error says more
             folder.finish("failed")
@@ -82,24 +92,30 @@ def solve_into(
     return result
 
 
-def _replayed(found: Plan, table: Trajectory) -> dict[str, Any]:
-    """The executions of a plan, and the verdict: it stays solved only if both come near enough."""
+def _replayed(found: Plan, table: Trajectory) -> tuple[dict[str, Any], Trajectory | None]:
+    """The executions of a plan with the verdict, and the motion of the plant.
+
+    The plan stays solved only if all executions come near enough.
+    """
     task = found.task
     try:
-        plant = counterpart(task.model, task.payload, task.supply, task.plant)
+        plant = counterpart(task.model, task.payload, task.supply, task.plant, changes=task.effects)
         other = another_robot(task.model, task.plant)
-        executed = replays(found.model, found.trajectory, table, plant)
+        done = executions(found.model, found.trajectory, table, plant)
     except KembaError as error:  # a model that the simulator cannot execute still has its plan
-        return _unconfirmed(found, f"it cannot be simulated: {error}")
+        return _unconfirmed(found, f"it cannot be simulated: {error}"), None
+    executed = summaries(found.model, done)
+    there = done["plant_replay"]
+    motion = plant_run(there) if there else None
     lands = bool(ends_standing(found.model, found.trajectory))
     names = [f"the plant is another robot, {other}, which {task.plant} names"] if other else []
     judged = verdicts(executed, task.tolerances, lands).values()
     if all(verdict.good for verdict in judged):
         parts = [sentence_of(found), *names, *(verdict.sentence for verdict in judged)]
-        return {**executed, "sentence": "; ".join(parts)}
+        return {**executed, "sentence": "; ".join(parts)}, motion
     causes = [verdict.sentence for verdict in judged if not verdict.good]
     matches = [verdict.sentence for verdict in judged if verdict.good]
-    return {**executed, **_unconfirmed(found, " and ".join(causes), [*names, *matches])}
+    return {**executed, **_unconfirmed(found, " and ".join(causes), [*names, *matches])}, motion
 
 
 def _unconfirmed(found: Plan, cause: str, remarks: Sequence[str] = ()) -> dict[str, Any]:
@@ -114,15 +130,15 @@ def _unconfirmed(found: Plan, cause: str, remarks: Sequence[str] = ()) -> dict[s
 
 
 def _keep(
-    found: Plan, result: dict[str, Any], table: Trajectory | None, folder: RunFolder, figure: bool
+    found: Plan, result: dict[str, Any], motions: Motions, folder: RunFolder, figure: bool
 ) -> None:
     """Write the run folder; when that fails, write the plan elsewhere and say where."""
     try:
-        _write(found, result, table, folder.path, figure)
+        _write(found, result, motions, folder.path, figure)
     except WriteError as error:
         elsewhere = Path(tempfile.mkdtemp(prefix="kemba-kept-"))
         try:
-            _write(found, result, table, elsewhere, figure=False)
+            _write(found, result, motions, elsewhere, figure=False)
         except WriteError:
             shutil.rmtree(elsewhere, ignore_errors=True)
             raise error from None
@@ -131,13 +147,15 @@ def _keep(
 
 
 def _write(
-    found: Plan, result: dict[str, Any], table: Trajectory | None, folder: Path, figure: bool
+    found: Plan, result: dict[str, Any], motions: Motions, folder: Path, figure: bool
 ) -> None:
     write_json(folder / "certificate.json", result)
-    if table is None:
+    if motions.table is None:
         return  # refused before solving: there is no motion to write
     found.trajectory.write(folder / "trajectory.csv")
-    table.write(folder / "controller.csv")
+    motions.table.write(folder / "controller.csv")
+    if motions.plant is not None:
+        motions.plant.write(folder / PLANT_RUN)
     if figure:
         from kemba import plotting
 

@@ -17,10 +17,11 @@ from kemba.folders import place_for
 from kemba.plotting.draw import machine_of
 from kemba.plotting.robot.sticks import CYLINDER, Pose, poses
 from kemba.plotting.source import Source, load_source
+from kemba.trajectory import Array
 
 PAGES = Path(__file__).parent / "pages"
 RATE = 250.0  # poses per second of motion
-SLOWER = 5.0  # times slower than life
+AROUND = 0.3  # s, shown before and after the ghost moves
 
 
 def write_view(source: Source, path: str | Path, model: str | None = None) -> Path:
@@ -46,40 +47,66 @@ def view_run(
     return write_view(source, place_for(out, source.path.with_name("view.html"), force), model)
 
 
-def stage(source: Source, model: str | None = None) -> str:
-    """The viewer with its scene as HTML. Raises KembaError when columns are missing."""
-    shown = scene(source, model)
+def stage(
+    source: Source, model: str | None = None, ghost: Source | None = None, name: str = ""
+) -> str:
+    """The viewer with its scene as HTML; `ghost`: a second motion, drawn pale.
+
+    Raises KembaError when columns are missing.
+    """
+    shown = scene(source, model, ghost)
     text = json.dumps(plain(shown), separators=(",", ":"), allow_nan=False)
     text = text.replace("<", "\\u003c")  # no name of a leg can end the script
-    return fill("stage.html", slower=f"{SLOWER:g}", viewer=page_text("viewer.js"), scene=text)
+    who = f"Shown: {name or source.name}."
+    if ghost is not None:
+        who += f" Pale blue: {'the plan' if ghost.plan else ghost.name}."
+    high = max(centre[1] for centre in shown["robots"][0]["centres"])
+    alt = f"{who} The robot in 3-D from the side; its body rises to {high:.2f} m."
+    return fill(
+        "stage.html", who=escape(who), alt=escape(alt), viewer=page_text("viewer.js"), scene=text
+    )
 
 
-def scene(source: Source, model: str | None = None) -> dict[str, Any]:
-    """Times [s], points [m], valves and contacts of every pose, and the size [m] of it all.
+def scene(source: Source, model: str | None = None, ghost: Source | None = None) -> dict[str, Any]:
+    """Times [s]; of every robot points [m], valves and contacts; the size [m] of it all.
 
     Raises KembaError where columns are missing.
     """
-    machine, time = machine_of(source, model), source.trajectory.time
-    count = max(2, round((time[-1] - time[0]) * RATE) + 1)
-    shown = [] if source.bench else poses(source, machine, np.linspace(time[0], time[-1], count))
-    if not shown:
+    machine = machine_of(source, model)
+    times = _times(source, ghost)
+    shown = [poses(one, machine, times) for one in (source, ghost) if one and not one.bench]
+    if not shown or not shown[0]:
         expected = "body/z, hip/q and piston/x or knee/q of every leg were expected"
         raise KembaError(source.name, "cannot be shown", expected)
-    places = np.array([list(pose.points.values()) for pose in shown])
+    places = np.array([list(pose.points.values()) for robot in shown for pose in robot])
     low, high = places.min(axis=(0, 1)), places.max(axis=(0, 1))
     legs = machine.mechanism.legs
     return {
-        "time": [round(pose.time, 4) for pose in shown],
-        "points": {name: _rounded(shown, name) for name in shown[0].points},
-        "valves": {leg: ["".join(map(str, pose.valves[leg])) for pose in shown] for leg in legs},
-        "stands": {leg: [int(pose.stands[leg]) for pose in shown] for leg in legs},
-        "centres": [pose.centre.round(4) for pose in shown],
+        "time": [round(float(time), 4) for time in times],
+        "robots": [_robot(robot, legs) for robot in shown if robot],
         "legs": legs,
         "cylinder": CYLINDER,
         "range": [low[0], high[0]],
         "centre": [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2],
         "size": float(max(high - low)),
-        "slower": SLOWER,
+    }
+
+
+def _times(source: Source, ghost: Source | None) -> Array:
+    """Times [s] of the poses: while the ghost moves, and a little longer."""
+    low, high = (float(source.trajectory.time[i]) for i in (0, -1))
+    if ghost is not None:
+        low = max(low, float(ghost.trajectory.time[0]) - AROUND)
+        high = min(high, float(ghost.trajectory.time[-1]) + AROUND)
+    return np.linspace(low, high, max(2, round((high - low) * RATE) + 1))
+
+
+def _robot(shown: list[Pose], legs: tuple[str, ...]) -> dict[str, Any]:
+    return {
+        "points": {name: _rounded(shown, name) for name in shown[0].points},
+        "valves": {leg: ["".join(map(str, pose.valves[leg])) for pose in shown] for leg in legs},
+        "stands": {leg: [int(pose.stands[leg]) for pose in shown] for leg in legs},
+        "centres": [pose.centre.round(4) for pose in shown],
     }
 
 

@@ -49,7 +49,8 @@ def verdicts(
         "table_replay": Allowed(t.table_apex, t.table_touchdown, t.table_final, lands),
         "plant_replay": Allowed(t.plant_apex, t.plant_touchdown, t.plant_final, lands),
     }
-    return {key: judge(EXECUTIONS[key], facts, allowed[key]) for key in EXECUTIONS if key in executed for facts in [executed[key]]}
+    keys = [key for key in EXECUTIONS if key in executed]
+    return {key: judge(EXECUTIONS[key], executed[key], allowed[key]) for key in keys}
 
 
 def judge(who: str, facts: Facts | None, allowed: Allowed) -> Verdict:

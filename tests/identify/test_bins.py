@@ -5,7 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kemba.identify.compare.bins import ConditionBin, condition_bins, excess
+from kemba.identify.compare.bins import (
+    BinSettings,
+    ConditionBin,
+    condition_bins,
+    correlation_length,
+    excess,
+)
+from kemba.identify.compare.tolerance import Slopes, within_tolerance
 from kemba.identify.evidence.bootstrap import NullTest
 from kemba.identify.problem.problem import Rows
 
@@ -41,7 +48,8 @@ def test_q_values_control_false_discoveries() -> None:
 def test_of_many_good_conditions_none_stands_out() -> None:
     """300 conditions of a model that is right to within what is tolerated."""
     rng = np.random.default_rng(1)
-    found = binned([rng.normal(0.0, 1.15, 40) for _ in range(300)])
+    most = BinSettings.current().tolerated
+    found = binned([rng.normal(0.0, most, 40) for _ in range(300)])
     assert not any(b.significant for b in found)
 
 
@@ -78,6 +86,37 @@ def test_one_moment_convicts_nobody() -> None:
     assert excess(calm) > 0.5
     calm[18:23] = 20.0
     assert excess(calm) < 1e-6
+
+
+def test_correlated_values_count_as_few() -> None:
+    """Of y = phi y + noise a mean needs (1 + phi) / (1 - phi) times as many values."""
+    rng = np.random.default_rng(4)
+    white, y = rng.normal(size=200_000), np.zeros(200_000)
+    for i in range(1, len(y)):
+        y[i] = 0.8 * y[i - 1] + white[i]
+    assert correlation_length(white) == pytest.approx(1.0, abs=0.05)
+    assert correlation_length(y) == pytest.approx(9.0, rel=0.1)
+    assert correlation_length(np.ones(5)) == 1.0
+
+
+def test_slow_errors_need_a_longer_log() -> None:
+    """The same errors, each repeated 50 times, say no more than once; white and slow noise mixed
+    hide this from the correlation of neighbours."""
+    rng = np.random.default_rng(5)
+    slow = np.repeat(1.5 * rng.normal(size=12), 50)
+    assert excess(slow + 0.5 * rng.normal(size=600)) > 1e-3
+    assert excess(1.6 * rng.normal(size=600)) < 1e-9
+
+
+@pytest.mark.parametrize(("off", "tolerable"), [(1.0, True), (6.0, False)])
+def test_figures_may_be_off_by_their_tolerance_and_not_by_more(off: float, tolerable: bool) -> None:
+    """The error itself is explained either way; what tells is how far the figure would be off."""
+    rng = np.random.default_rng(6)
+    by_figure = 5.0 * rng.normal(size=(4000, 1))
+    known = Slopes((), np.zeros((4000, 0)), by_figure)
+    found = within_tolerance(rng.normal(size=4000) + off * by_figure[:, 0], known)
+    assert np.std(found.left) == pytest.approx(1.0, abs=0.05)
+    assert (found.q_value > 0.01) is tolerable
 
 
 @pytest.mark.parametrize(("q", "significant"), [(0.009, True), (0.011, False), (0.5, False)])

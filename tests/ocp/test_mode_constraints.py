@@ -14,10 +14,10 @@ from kemba.ocp.nlp.ipopt import Control
 from kemba.ocp.phases.modes import read_phases
 from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.radau import RADAU3
-from kemba.ocp.transcription.unilateral import read_constraints
 from kemba.ocp.refinement.refine import Refiner, reduction_of
 from kemba.ocp.task.requirement import resolve
 from kemba.ocp.transcription.solution import arrays
+from kemba.ocp.transcription.unilateral import read_constraints
 
 
 @cache

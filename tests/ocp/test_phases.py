@@ -17,12 +17,12 @@ from kemba.ocp.nlp.ipopt import Control
 from kemba.ocp.phases.modes import OPEN, Phase
 from kemba.ocp.phases.radau import RADAU3, RADAU5, Scheme
 from kemba.ocp.phases.settings import ModeConstraints, Refining, Repair
-from kemba.ocp.transcription.unilateral import read_constraints
 from kemba.ocp.refinement import Refined, refine
 from kemba.ocp.refinement.refine import Refiner, reduction_of
 from kemba.ocp.refinement.repair import merged, misfit, repaired
 from kemba.ocp.relaxation.valve_search import switching
 from kemba.ocp.transcription.solution import arrays
+from kemba.ocp.transcription.unilateral import read_constraints
 from kemba.plant.execution.replay import replay
 from kemba.settings import changed
 

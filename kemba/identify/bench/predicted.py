@@ -62,7 +62,10 @@ class PredictedLogs:
 
 
 def standardised(log: BenchLog, readings: Mapping[str, tuple[Array, Array]]) -> dict[str, Array]:
-    """Channel -> (predicted - measured) / sigma of the rows that count."""
+    """Channel -> (predicted - measured) / sigma (k,) of the rows that count.
+
+    `readings`: channel -> predicted values (n,) and variances (n,).
+    """
     return {
         c: ((y - log.measured[c]) / np.sqrt(variance))[log.keep[c]]
         for c, (y, variance) in readings.items()

@@ -100,6 +100,7 @@ class BenchProblem(Problem):
         return tuple(dict.fromkeys(c for log in self.logs for c in log.measured))
 
     def residual(self, theta: Theta, runs: Collection[int] | None = None) -> Array:
+        """Whitened residuals (n,), run by run, then channel by channel."""
         parts = []
         for i in range(len(self.logs)) if runs is None else runs:
             for channel, r in self.predicted.standardised(theta, i).items():
@@ -167,11 +168,11 @@ class BenchProblem(Problem):
     def missing_force(
         self, theta: Theta | None = None, strength: Array | None = None
     ) -> list[MissingForce]:
-        """The force that is missing on the rod."""
+        """The force that is missing on the rod; `strength` (1,): its 1 sigma [N]."""
         return bench_missing(self.predicted, theta or {}, strength)
 
     def formulas(self, theta: Theta) -> Mapping[str, Array]:
-        """Simple force terms of position, speed and valves."""
+        """Simple force terms of position, speed and valves: formula -> column (n,)."""
         names, columns = formula_columns(self.predicted, theta)
         return dict(zip(names, self.whiten(columns).T, strict=True))
 
@@ -184,7 +185,8 @@ class BenchProblem(Problem):
         return leftover(self.predicted, theta, self.candidates)
 
     def recolour(self, residual: Array | None, careful: bool = False) -> Self:
-        """The same problem, each run's and channel's colour learnt anew, or forgotten."""
+        """The same problem with the colour of every run and channel learnt from `residual` (n,), or
+        forgotten."""
         found = copy(self)
         found.colour = {} if residual is None else self._learnt(residual, careful)
         return found

@@ -13,7 +13,7 @@ from kemba.identify.compare.bins import BinSettings, ConditionBin, condition_bin
 from kemba.identify.compare.force_profiles import ForceProfile, force_profiles
 from kemba.identify.compare.hints import Hint, Response, conflicts, lacking, lagged
 from kemba.identify.compare.missing_force import Peak, peaks
-from kemba.identify.compare.tolerance import slopes, within_tolerance
+from kemba.identify.compare.tolerance import Tolerant, slopes, within_tolerance
 from kemba.identify.evidence.windows import Windows, aggregation_windows, free_starts, rms
 from kemba.identify.problem.problem import Array, MissingForce, Problem, Rows, Texts, Theta
 from kemba.settings import BY_HAND, Settings, setting
@@ -96,8 +96,8 @@ def compare(problem: Problem, model: str, logs: Sequence[str] = ()) -> Compariso
     responses = tuple(lagged(problem, rows, r / np.sqrt(problem.expected_power())))
     forces = tuple(force_profiles(problem, r))
     sent = [s.hint for s in responses if s.certain]
-    left = within_tolerance(r, known)
-    ratio, clean = _tolerant(rows, region, window, left)
+    tolerant = within_tolerance(r, known)
+    ratio, clean = _tolerant(rows, region, window, tolerant)
     found = Comparison(
         tuple(logs) or problem.runs,
         model,
@@ -105,7 +105,7 @@ def compare(problem: Problem, model: str, logs: Sequence[str] = ()) -> Compariso
         tuple(_channels(problem, rows, r, window, start)),
         tuple(condition_bins(rows, region, window.first, sums)),
         ratio,
-        clean and not any(profile.matters for profile in force_profiles(problem, left)),
+        clean and not any(profile.matters for profile in force_profiles(problem, tolerant.left)),
         (*sent, *conflicts(problem, rows, r, known)),
         responses,
         forces,
@@ -125,9 +125,12 @@ def conditions(problem: Problem, theta: Theta | None = None) -> list[ConditionBi
     return list(condition_bins(rows, region, window.first, window.sums(r)))
 
 
-def _tolerant(rows: Rows, region: Texts, window: Windows, left: Array) -> tuple[float, bool]:
-    """Error ratio of what the figures' tolerance leaves, and whether it is within the noise."""
-    sums = window.sums(left)
+def _tolerant(rows: Rows, region: Texts, window: Windows, found: Tolerant) -> tuple[float, bool]:
+    """Error ratio of what the figures' tolerance leaves; whether it is within the noise, and the
+    figures are not too far off."""
+    if found.q_value < BinSettings.current().false_discoveries:
+        return rms(window.sums(found.left)), False
+    sums = window.sums(found.left)
     clean = not any(c.significant for c in condition_bins(rows, region, window.first, sums))
     return rms(sums), clean and rms(sums) <= BinSettings.current().tolerated
 
@@ -175,7 +178,7 @@ def phrase(found: Comparison) -> str:
         return f"The model explains the logs to within the noise: its error is {ratio}."
     if not bad:
         return f"The model's error is {ratio}; no single condition stands out."
-    worst = f"worst: {_place(bad[0])} ({bad[0].ratio:.2g} times)"
+    worst = f"worst: {place_of(bad[0])} ({bad[0].ratio:.2g} times)"
     if found.tolerable:
         return (
             f"The nominal model errs by {ratio}; {worst}; but parameters within their usual "
@@ -191,7 +194,8 @@ def phrase(found: Comparison) -> str:
     return "; ".join(parts) + "."
 
 
-def _place(at: ConditionBin) -> str:
+def place_of(at: ConditionBin) -> str:
+    """A condition in plain words."""
     phases = {
         "stance2": "while two feet stand",
         "stance1": "while one foot stands",

@@ -122,8 +122,8 @@ def _of(channel: ForceChannel, residual: Array) -> list[ForceProfile | None]:
 
 
 def force_profile(channel: ForceChannel, label: str, residual: Array) -> ForceProfile | None:
-    """The missing force of a channel by bins of one of its quantities; None where the quantity
-    hardly varies."""
+    """The missing force of a channel by bins of the quantity `label`, fitted to `residual` (n,);
+    None where the quantity hardly varies."""
     values = channel.quantities[label]
     edges = bins(values)
     if edges is None:
@@ -155,7 +155,7 @@ def lags() -> Array:
 
 
 def middle(edges: Array) -> Array:
-    """Centres of bins."""
+    """Centres (k - 1,) of bins with these edges (k,)."""
     return np.asarray(0.5 * (edges[1:] + edges[:-1]))
 
 

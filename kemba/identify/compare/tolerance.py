@@ -5,22 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import lsq_linear
+from scipy.stats import false_discovery_control, norm
 
+from kemba.identify.evidence.spike_slab import SpikeSlabSettings
 from kemba.identify.problem.problem import Array, Candidate, Problem, Theta
-from kemba.settings import Settings, setting
-
-
-class ToleranceSettings(Settings):
-    """How far nominal figures may be off."""
-
-    widest: float = setting(
-        2.0,
-        "1",
-        "largest error of a figure, in prior sigmas",
-        "convention: 95 % of them",
-        decides=True,
-    )
 
 
 @dataclass(frozen=True)
@@ -47,10 +35,28 @@ def slopes(problem: Problem, at: Theta) -> Slopes:
     return Slopes(leads, jacobian[:, : len(leads)], jacobian[:, len(leads) :])
 
 
-def within_tolerance(residual: Array, known: Slopes) -> Array:
-    """The part (n,) of a residual (n,) that is left when every nuisance parameter takes its best
-    value within `widest` prior sigmas."""
-    widest = ToleranceSettings.current().widest
-    q, triangle = np.linalg.qr(known.by_nuisance)
-    step = lsq_linear(triangle, -q.T @ residual, (-widest, widest)).x
-    return np.asarray(residual + known.by_nuisance @ step)
+@dataclass(frozen=True)
+class Tolerant:
+    """What is left when the model is as good as models are.
+
+    `left` (n,): the residual. `q_value`: of the figure or absent effect that is farthest off; it
+    controls false discoveries over all of them.
+    """
+
+    left: Array
+    q_value: float
+
+
+def within_tolerance(residual: Array, known: Slopes) -> Tolerant:
+    """The likeliest explanation of a residual (n,) by a model that lacks nothing.
+
+    Each nuisance parameter is off by about its prior sigma, and each absent effect is there with a
+    small share of its size, as under every hypothesis of `discover`. The likeliest values, in units
+    of these sigmas, are then no larger than standard normal numbers are.
+    """
+    spike = SpikeSlabSettings.current().spike
+    columns = np.hstack([spike * known.by_lead, known.by_nuisance])
+    h = columns.T @ columns + np.eye(columns.shape[1])
+    off = -np.linalg.solve(h, columns.T @ residual)
+    q = false_discovery_control(2.0 * norm.sf(np.abs(off))) if len(off) else np.ones(1)
+    return Tolerant(residual + columns @ off, float(q.min()))

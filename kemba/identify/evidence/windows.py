@@ -84,10 +84,10 @@ def changes(rows: Rows, region: Texts) -> np.ndarray[Any, np.dtype[np.bool_]]:
 
 
 def codes(labels: np.ndarray[Any, Any]) -> Labels:
-    """Labels as whole numbers."""
+    """Labels (n,) as whole numbers (n,), the same number for the same label."""
     return np.asarray(np.unique(labels.astype(str), return_inverse=True)[1])
 
 
 def rms(z: Array) -> float:
-    """Root mean square; NaN of nothing."""
+    """Root mean square of z (n,); NaN of nothing."""
     return float(np.sqrt(np.mean(z**2))) if len(z) else float("nan")

@@ -48,7 +48,10 @@ def _without_absurd(log: Trajectory) -> Trajectory:
 
 
 def read_logs(paths: Sequence[str | Path], columns: ColumnMap | None = None) -> list[Trajectory]:
-    """Several logs of one kind, in the order of their names and not of the arguments."""
+    """Several logs of one kind, in the order of their names and not of the arguments.
+
+    Raises KembaError for none, for unreadable ones and for robot and bench logs together.
+    """
     if not paths:
         raise KembaError("", "no log given", "one or more CSV files were expected")
     unique = sorted({Path(p).resolve(): Path(p) for p in paths}.values(), key=_order)
@@ -121,7 +124,10 @@ def is_log(log: Trajectory) -> bool:
 
 
 def kind_of(log: Trajectory, where: str | Path = "") -> Kind:
-    """Robot, bench or a rig of the user's own, by the columns."""
+    """Robot, bench or a rig of the user's own, by the columns.
+
+    Raises KembaError for a log that is none of these.
+    """
     if any(name.startswith("body/") or "/hip/" in name for name in log.names):
         return "robot"
     if "axis/q" in log:

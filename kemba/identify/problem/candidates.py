@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from kemba.effects import BY_KIND
 from kemba.effects.base import Effect
@@ -47,9 +47,30 @@ def effect_candidates(model: Model) -> dict[str, Candidate]:
     return found
 
 
-def by_default(kind: str) -> Effect:
-    """The effect of a kind as its defaults have it: absent."""
-    return BY_KIND[kind](kind=kind)
+def by_default(name: str) -> Effect:
+    """The effect of a name as its defaults have it: absent."""
+    kind, _, place = name.partition(":")
+    where = {where_field(kind): place} if place else {}
+    return BY_KIND[kind].model_validate({"kind": kind, **where})
+
+
+def where_field(kind: str) -> str:
+    """The field that says where an effect acts, the second part of its name: a sensor's `channel`,
+    the `part` of a length, else the leg that it is `on`."""
+    fields = BY_KIND[kind].model_fields
+    return next((name for name, field in fields.items() if field.is_required()), "on")
+
+
+def leg_candidates(model: Model, kinds: Iterable[str]) -> dict[str, Candidate]:
+    """Each of these kinds of effects on one leg only, as `seal_friction:front`, beside one value
+    for all legs.
+
+    Effects with a state of their own are left out: a leg cannot have the same state twice.
+    """
+    legs = model.mechanism.legs
+    own = [k for k in kinds if BY_KIND[k].place == "leg" and not by_default(k).states()]
+    names = {f"{kind}:{leg}": BY_KIND[kind] for kind in own for leg in legs if len(legs) > 1}
+    return {name: _candidate(name, effect, effect.declared()) for name, effect in names.items()}
 
 
 def geometry_candidates(model: Model) -> dict[str, Candidate]:

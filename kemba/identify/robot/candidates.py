@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
-from kemba.effects import BY_KIND
-from kemba.identify.problem.candidates import CandidateSettings, effect_candidates
+from kemba.identify.problem.candidates import (
+    CandidateSettings,
+    by_default,
+    effect_candidates,
+    geometry_candidates,
+    leg_candidates,
+)
 from kemba.identify.problem.problem import Candidate, Parameter
 from kemba.model.model import Model
 from kemba.settings import BY_HAND, Settings, setting
 
 GROUND = ("ground_compliance", "ground_friction", "contact")
+SHARED = ("supply_scale",)  # one supply feeds all legs
 SOFTNESS = "ground_compliance.softness"
 GRIP = "ground_friction.mu"
 LAGS = ("hose_lag.T", "motor_lag.T")
@@ -23,8 +29,14 @@ class RobotCandidateSettings(Settings):
 
 
 def robot_candidates(model: Model) -> dict[str, Candidate]:
-    """The effects that `model` lacks; a soft ground is searched by its softness 1/k."""
-    found, settings = effect_candidates(model), RobotCandidateSettings.current()
+    """The effects that `model` lacks, also on one leg only, and its lengths.
+
+    A soft ground is searched by its softness 1/k.
+    """
+    found = effect_candidates(model)
+    apart = leg_candidates(model, [n for n in found if n not in (*GROUND, *SHARED)])
+    found = {**found, **apart, **geometry_candidates(model)}
+    settings = RobotCandidateSettings.current()
     if "ground_compliance" in found:
         found["ground_compliance"] = Candidate(
             "ground_compliance",
@@ -37,16 +49,14 @@ def robot_candidates(model: Model) -> dict[str, Candidate]:
 
 def in_the_air(found: dict[str, Candidate]) -> tuple[Candidate, ...]:
     """The candidates that stand in the model's equations; ground and sensors do not."""
-    return tuple(c for c in found.values() if c.effect in BY_KIND and c.effect not in GROUND)
+    return tuple(c for c in found.values() if not c.sensor and c.effect not in GROUND)
 
 
 def extended(model: Model, candidates: tuple[Candidate, ...]) -> Model:
     """The model without its ground, and with every candidate on its list, switched off."""
     kept = [e for e in model.effects if e.kind not in GROUND]
     bare = Model(model.mechanism, kept, model.supply, model.name)
-    return bare.with_effects(
-        BY_KIND[c.effect].model_validate({"kind": c.effect}) for c in candidates
-    )
+    return bare.with_effects(by_default(c.effect) for c in candidates)
 
 
 def ground_of(model: Model) -> tuple[float, dict[str, float]]:

@@ -11,7 +11,7 @@ from typing_extensions import Self
 from kemba.identify.logs.gate import BadData
 from kemba.identify.problem.candidates import sensor_candidates
 from kemba.identify.problem.problem import Problem
-from kemba.identify.problem.sensor_faults import SensorFaults, is_straight
+from kemba.identify.problem.sensor_faults import SensorFaults, is_fault, is_straight
 from kemba.identify.problem.types import (
     Array,
     Candidate,
@@ -29,9 +29,11 @@ from kemba.identify.robot.candidates import (
     robot_candidates,
 )
 from kemba.identify.robot.dynamics.physics import Physics
+from kemba.identify.robot.dynamics.reference import first_reference
 from kemba.identify.robot.dynamics.settings import ForceDensity
 from kemba.identify.robot.force_channels import robot_force_channels
 from kemba.identify.robot.formulas import formula_columns
+from kemba.identify.robot.geometry import GEOMETRY, standing_lengths
 from kemba.identify.robot.labels import describe
 from kemba.identify.robot.missing import robot_missing
 from kemba.identify.robot.motion.batch import Batch
@@ -61,8 +63,9 @@ class RobotProblemSettings(Settings):
 class RobotProblem(Problem):
     """`Problem` for robot logs; see the text of `kemba.identify.robot.state`.
 
-    `state`: the logs with the model linearised along their motion. `unknown`: density of the forces
-    that no model explains.
+    `state`: the logs with the model linearised along their motion. `lengths`: those at which feet
+    stand, where they are not the model's; contacts are read with them. `unknown`: density of the
+    forces that no model explains.
     """
 
     moves = True
@@ -90,7 +93,11 @@ class RobotProblem(Problem):
         self.candidates: dict[str, Candidate] = {**found, **sensor_candidates(sigma, model)}
         sensors = SensorFaults(model.effects)
         noise = stated_noise(batch)
-        self.state = linearise_at(physics, batch, sensors, {}, ground, self.unknown, noise)
+        reference = first_reference(physics, batch, physics.nominal)
+        self.lengths = standing_lengths(physics, batch, reference, self.candidates)
+        self.state = linearise_at(
+            physics, batch, sensors, self.lengths, ground, self.unknown, noise
+        )
         self.nuisance = {**physics.nuisance, **sensors.nuisance, **physics.links}
 
     @property
@@ -106,6 +113,8 @@ class RobotProblem(Problem):
     def relinearise(self, base: Theta) -> Self:
         """The same problem, smoothed and linearised anew with the model at `base`."""
         found, old = copy(self), self.state
+        own = any(is_fault(name) or name.startswith(GEOMETRY) for name in base)
+        base = base if own else {**self.lengths, **base}
         found.state = linearise_at(
             old.physics, old.batch, old.sensors, base, old.ground, self.unknown, old.noise
         )
@@ -127,7 +136,7 @@ class RobotProblem(Problem):
         return found
 
     def residual(self, theta: Theta, runs: Collection[int] | None = None) -> Array:
-        """Whitened (predicted - measured), rows as `rows` describes them."""
+        """Whitened (predicted - measured) (n,), rows as `rows` describes them."""
         return self.state.pick(self.state.residuals([theta]), runs)[:, 0]
 
     def jacobian(
@@ -156,9 +165,9 @@ class RobotProblem(Problem):
         return self.state.slopes({**typical, **theta}, names)
 
     def _is_direct(self, name: str) -> bool:
-        """Whether the force is linear in it: shapes, states and delays are not."""
+        """Whether the force is linear in it: shapes, states, delays and lengths are not."""
         physics = self.physics
-        if name in physics.moving or name in physics.base.delays:
+        if name in physics.moving or name in physics.base.delays or name.startswith(GEOMETRY):
             return False
         lead = any(name == c.key for c in self.candidates.values())
         return name in self.state.linear or (
@@ -211,7 +220,7 @@ class RobotProblem(Problem):
     def missing_force(
         self, theta: Theta | None = None, strength: Array | None = None
     ) -> list[MissingForce]:
-        """Force on the body, moments at pitch and hips, force on the rods."""
+        """Forces on body and rods, moments at pitch and hips; `strength` (k,): 1 sigma each."""
         return robot_missing(self.state, theta or {}, strength)
 
     def force_channels(self) -> list[ForceChannel]:
@@ -221,19 +230,21 @@ class RobotProblem(Problem):
     def validate(self) -> list[str]:
         """No remarks. Raises BadData where a log contradicts itself or any model."""
         faults = list(
-            contradictions(self.state, self.rows(), self.residual({}), self._sensor_columns)
+            contradictions(
+                self.state, self.rows(), self.residual(self.lengths), self._sensor_columns
+            )
         )
         if faults:
             raise BadData(faults)
         return []
 
     def _sensor_columns(self) -> Array:
-        """Columns (n, k) of every sensor fault, per size."""
-        faults = [c for c in self.candidates.values() if c.sensor]
-        return self.jacobian({}, [c.key for c in faults]) * [c.lead.size for c in faults]
+        """Columns (n, k) of every sensor fault and every length, per size."""
+        faults = [c for c in self.candidates.values() if c.sensor or c.effect.startswith(GEOMETRY)]
+        return self.jacobian(self.lengths, [c.key for c in faults]) * [c.lead.size for c in faults]
 
     def formulas(self, theta: Theta) -> Mapping[str, Array]:
-        """Simple terms on rods, hips and body; the same at every theta."""
+        """Simple terms on rods, hips and body: formula -> column (n,), the same at every theta."""
         return formula_columns(self.state)
 
 

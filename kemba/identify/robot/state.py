@@ -75,10 +75,23 @@ class LinearisedState:
         theta see it; NaN where nothing was measured."""
         motion, batch = self.motion, self.batch
         faults = {c: self.sensors.at(theta, c) for c in self.physics.channels}
-        seen = sensed(faults, batch.resampled, motion.y, motion.way)
+        y, places = self.seen(theta)
+        seen = sensed(faults, batch.resampled, y, motion.way)
         soft = {**self.ground, **theta}
         depth = motion.penetration(soft.get(SOFTNESS, 0.0), soft.get("ground_compliance.d", 1.0))
-        return np.concatenate([batch.y - seen, -motion.places - depth], axis=2)
+        return np.concatenate([batch.y - seen, -places - depth], axis=2)
+
+    def seen(self, theta: Theta) -> tuple[Array, Array]:
+        """Channels (n, L, k), and places (n, L, 3 legs) of feet and pistons, along the reference,
+        of a robot with the lengths at theta."""
+        p, _ = values_at(self.physics, theta)
+        at, _ = values_at(self.physics, self.base)
+        own = self.physics.lengths
+        if np.array_equal(p[own], at[own]):
+            return self.motion.y, self.motion.places
+        nodes = (self.batch.flat(a) for a in (self.motion.ref.q, self.motion.ref.v))
+        y, feet = (self.batch.deep(a) for a in self.physics.call("seen", *nodes, p=p))
+        return y, np.concatenate([feet, y[..., y.shape[2] - len(self.physics.legs) :]], axis=2)
 
     def acceleration(self, theta: Theta) -> Array:
         """Acceleration (n, L, k) that the model at theta adds to the reference's."""
@@ -150,8 +163,9 @@ def linearise_at(
 
     `unknown`: density of the forces that no model explains; `noise` of the sensors.
     """
-    reference = _without_delays(physics, batch, sensors, base, first_reference(physics, batch))
-    schedules = read_schedules(physics, batch, reference)
+    p = values_at(physics, base)[0]
+    reference = _without_delays(physics, batch, sensors, base, first_reference(physics, batch, p))
+    schedules = read_schedules(physics, batch, reference, p)
     dt = float(np.median(batch.h[batch.valid]))
     for _ in range(StateSettings.current().rounds):
         loose = LooseForceDensity.current()
@@ -159,7 +173,7 @@ def linearise_at(
         y, g = state.measurement(base), state.acceleration(base)
         reference = smoothed(state.motion, state.gain, y, g)
         if sensors.listed or any(map(is_fault, base)):  # as true sensors would have seen it
-            schedules = read_schedules(physics, batch, reference)
+            schedules = read_schedules(physics, batch, reference, p)
         normal = [state.motion.normal[: len(s.phase), i] for i, s in enumerate(schedules)]
         schedules = tuple(loaded(s, f, dt) for s, f in zip(schedules, normal, strict=True))
     state = _along(physics, batch, sensors, base, ground, schedules, reference, unknown, noise)

@@ -13,10 +13,10 @@ from kemba.ocp.phases.modes import AHEAD, BACK, HELD, OPEN
 from kemba.ocp.phases.program import PhaseProgram, Where
 from kemba.ocp.phases.radau import STATE
 from kemba.ocp.phases.settings import ModeConstraints
-from kemba.ocp.transcription.unilateral import Constraint
 from kemba.ocp.phases.view import View
 from kemba.ocp.task.requirement import SCALES
 from kemba.ocp.transcription.first_node import state_rows
+from kemba.ocp.transcription.unilateral import Constraint
 
 INF = np.inf
 LENGTH, SPEED = SCALES["m"], SCALES["m.s-1"]  # of gaps and their rates

@@ -11,8 +11,8 @@ import numpy as np
 
 from kemba.model import Model
 from kemba.ocp.phases.settings import Reading
-from kemba.ocp.transcription.unilateral import Constraint
 from kemba.ocp.transcription.solution import arrays
+from kemba.ocp.transcription.unilateral import Constraint
 from kemba.trajectory import Trajectory
 
 OPEN, HELD, AHEAD, BACK = 0, 1, 2, 3  # open; closed and sticking; sliding forward, backward
@@ -53,7 +53,7 @@ def read_phases(
     """
     modes = np.column_stack([_modes(model, c, plan, trim) for c in constraints])
     for i in (i for i, c in enumerate(constraints) if c.friction is not None):
-        _drop_grazes(modes[:, i], plan.time, brief)
+        drop_grazes(modes[:, i], plan.time, brief)
     _valves_first(modes, valves)
     same = (modes[1:] == modes[:-1]).all(axis=1) & (valves[1:] == valves[:-1]).all(axis=1)
     borders = sorted({0, len(plan) - 1, *(np.flatnonzero(~same[1:]) + 1).tolist(), *marks})
@@ -108,10 +108,10 @@ def _modes(model: Model, constraint: Constraint, plan: Trajectory, trim: bool) -
     return np.asarray(modes)
 
 
-def _drop_grazes(modes: np.ndarray, time: np.ndarray, brief: float) -> None:
+def drop_grazes(modes: np.ndarray, time: np.ndarray, brief: float) -> None:
     """Open a contact that closes for less than `brief` [s] between two times in the air."""
     for a, b in _runs(modes):
-        if 1 < a and b < len(modes) and time[b - 1] - time[a - 1] < brief:
+        if a > 1 and b < len(modes) and time[b - 1] - time[a - 1] < brief:
             modes[a:b] = OPEN
 
 

@@ -15,10 +15,10 @@ from kemba.ocp.phases.columns import Columns
 from kemba.ocp.phases.modes import OPEN, Phase
 from kemba.ocp.phases.radau import STATE, Scheme, element, impact
 from kemba.ocp.phases.settings import Elements
-from kemba.ocp.transcription.unilateral import Constraint
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.layout import Layout
 from kemba.ocp.transcription.symmetry import Reduction
+from kemba.ocp.transcription.unilateral import Constraint
 
 INF = np.inf
 Where = list[tuple[int, np.ndarray]]  # phases and the columns of z there

@@ -20,7 +20,6 @@ from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.radau import RADAU3, RADAU5, STATE, Scheme
 from kemba.ocp.phases.requirements import add_requirements
 from kemba.ocp.phases.settings import Elements, Refining, Repair
-from kemba.ocp.transcription.unilateral import read_constraints
 from kemba.ocp.refinement.repair import misfit, repaired, simplified
 from kemba.ocp.refinement.sample import certificate, to_trajectory
 from kemba.ocp.refinement.solve import rough, solve, warm
@@ -34,6 +33,7 @@ from kemba.ocp.transcription.symmetry import (
     requirements_are_symmetric,
     whole,
 )
+from kemba.ocp.transcription.unilateral import read_constraints
 from kemba.trajectory import Trajectory
 
 

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Mapping
 from typing import Any
+
+import numpy as np
 
 from kemba.errors import KembaError
 from kemba.model import Model, load_model
 from kemba.plant.execution.controller import execute
 from kemba.plant.execution.impacts import told
 from kemba.plant.execution.replay import LandingSettings, Replay, ends_standing, replay
-from kemba.trajectory import Trajectory
+from kemba.trajectory import Array, Trajectory
 
 PLANT = "plant"
+POINTS = re.compile(r".*/(hip|knee)/(x|z|vx|vz)")
+DIGITS = 7
 
 
 def replays(
@@ -24,20 +29,53 @@ def replays(
     through eq. 10 and the dead time on the same model, `plant_replay` that table on the plant.
 
     With the table a plan that ends standing, with its valves closed, has a moment to come to rest
-    before its landing is judged. `impacts` are those of `replay`. `plant_replay` is None without a plant; any is None where a
-    plan that was not solved cannot even be started.
+    before its landing is judged. `impacts` are those of `replay`. `plant_replay` is None without
+    a plant; any is None where a plan that was not solved cannot even be started.
     """
+    return summaries(model, executions(model, plan, controller, plant))
+
+
+def executions(
+    model: Model, plan: Trajectory, controller: Trajectory, plant: str | Model | None = PLANT
+) -> dict[str, Replay | None]:
+    """What `replays` sums up, with the motions."""
     full = load_model(plant) if isinstance(plant, str) else plant
     rest = rest_after(model, plan, controller)
-    own = _tried(lambda: replay(model, plan))
-    table = _tried(lambda: execute(controller, model, extra=rest).against(model, plan))
-    real = full and _tried(lambda: execute(controller, full, extra=rest).against(full, plan))
+    there = full and _tried(lambda: execute(controller, full, extra=rest).against(full, plan))
     return {
-        "replay": own and own.summary(),
-        "table_replay": table and table.summary(),
-        "plant_replay": real and real.summary(),
-        "impacts": own and told(model, own.impacts),
+        "replay": _tried(lambda: replay(model, plan)),
+        "table_replay": _tried(lambda: execute(controller, model, extra=rest).against(model, plan)),
+        "plant_replay": there or None,
     }
+
+
+def summaries(model: Model, done: Mapping[str, Replay | None]) -> dict[str, Any]:
+    """Executions as the certificate has them, with the impacts of the first."""
+    own = done["replay"]
+    figures = {name: found.summary() if found else None for name, found in done.items()}
+    return {**figures, "impacts": told(model, own.impacts) if own else None}
+
+
+def plant_run(done: Replay) -> Trajectory:
+    """The motion of the plant for the run folder, in the plan's clock.
+
+    The places of hips and knees follow from the joints and are left out; seven digits are kept.
+    `meta` has all impacts: when [s], at which contacts and stops, the energy lost [J].
+    """
+    t = done.trajectory
+    kept = t.select(name for name in t.names if not POINTS.fullmatch(name))
+    columns = {h: _digits(kept[n]) for h, n in zip(kept.headers, kept.names, strict=True)}
+    impacts = [
+        {"time_s": round(i.time, 6), "what": list(i.labels), "energy_J": round(i.lost, 6)}
+        for i in done.impacts
+    ]
+    meta = {"kind": "simulation", "impacts": impacts}
+    return Trajectory(np.round(kept.time, 9), columns, meta)
+
+
+def _digits(values: Array) -> Array:
+    """Values (n,) with seven digits, which halves the file."""
+    return np.array([float(f"{value:.{DIGITS}g}") for value in values])
 
 
 def rest_after(model: Model, plan: Trajectory, controller: Trajectory) -> float:

@@ -61,8 +61,9 @@ def execute(
     """Play a controller table (a run folder, `controller.csv`, or its trajectory) on `model`.
 
     The robot starts at rest in the table's first pose, changed by `start`. A robot that starts in
-    the air is held until plan time 0; its motion begins there. After the last row the last commands stay for `extra` [s]. `valves` replace the table's. Raises KembaError when
-    the table lacks a column.
+    the air is held until plan time 0; its motion begins there. After the last row the last commands
+    stay for `extra` [s]. `valves` replace the table's. Raises KembaError when the table lacks a
+    column.
     """
     table = read_controller(controller)
     case = condition_of(table, model, gains, step, extra, start, dead_time, valves, sample)

@@ -28,5 +28,5 @@ def _call(typing: Any, address: Any, x: Any, first: Any, second: Any) -> Any:
 
 @kernel
 def evaluate(address: int, x: Array, first: Array, second: Array) -> None:
-    """Evaluate a model's function of `x` into two arrays."""
+    """Call machine code at `address`: from x (k,) it fills the arrays `first` and `second`."""
     _call(address, x.ctypes.data, first.ctypes.data, second.ctypes.data)

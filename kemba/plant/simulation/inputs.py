@@ -51,7 +51,7 @@ def ticks(commands: Commands, duration: float) -> Array:
 
 
 def merged(*times: Array) -> Array:
-    """All the times in order, those closer than `SAME_TIME` as one."""
+    """All the times (m,) [s] in order; those closer than `SAME_TIME` count once."""
     every = np.unique(np.concatenate(times))
     return every[np.r_[True, np.diff(every) > SAME_TIME]] if len(every) else every
 

@@ -76,7 +76,7 @@ def run(
     sample: float | Array = 1e-3,
     dead_time: bool = True,
 ) -> Simulated:
-    """As `simulate`, with the impacts that happened."""
+    """As `simulate`, with the impacts that happened; `sample` [s] or the times (m,)."""
     condition = Condition(model, initial, commands, duration, step, sample, dead_time)
     return simulate_one(condition)
 

@@ -24,7 +24,7 @@ class KneeSearch(Settings):
 
 
 def initial_values(model: Model, values: Mapping[str, float]) -> tuple[Array, Array, Array]:
-    """Coordinates, velocities and effect states with the `values` by column name.
+    """Coordinates (n,), velocities (n,) and effect states (ns,) with the `values` by column name.
 
     What is missing stands as in the standing pose, at rest, effect states at their nominal value;
     without `body/z` the lower foot is put on the ground. `LEG/piston/x` may stand for

@@ -103,8 +103,8 @@ def linearise_along(
     inverse = batch.deep(np.asarray(np.linalg.inv(physics.call("mass", *mid, s, u, p=p)[0])))
     force = batch.deep(physics.call("residual", *mid, s, u, p=p)[0])
     at_nodes = [batch.flat(ref.q), batch.flat(ref.v)]
-    y, rate, Jy = (batch.deep(a) for a in physics.call("measured", *at_nodes))
-    feet, feet_rate, Jf = (batch.deep(a) for a in physics.call("feet", *at_nodes))
+    y, rate, Jy = (batch.deep(a) for a in physics.call("measured", *at_nodes, p=p))
+    feet, feet_rate, Jf = (batch.deep(a) for a in physics.call("feet", *at_nodes, p=p))
     slip = batch.pad([x.slides for x in schedules], 0.0)
     density, slipping = density.copy(), ContactForceSettings.current().slipping
     for leg in range(legs):  # a sliding foot pushes along the edge of its cone

@@ -15,6 +15,8 @@ from kemba.model.model import Model
 from kemba.model.rest import rate_of
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
+FOLDED = 2.9  # rad; a knee folds less far, whatever the lengths of its leg
+
 Flags = np.ndarray[Any, np.dtype[np.bool_]]
 
 
@@ -45,6 +47,7 @@ class Physics:
         p = ca.vertcat(*(self.p[int(i)] for i in np.flatnonzero(self.moves)))
         states = list(self.model.states.values())
         self.states = StateRunner([node.q, node.v, node.s, node.u, p], rate, states)
+        self.lengths = np.array([n.startswith("geometry:") for n in self.names])
         self.grip = grip
         self._maps: dict[tuple[str, int], ca.Function] = {}
 
@@ -57,19 +60,20 @@ class Physics:
     @cached_property
     def functions(self) -> dict[str, ca.Function]:
         """All functions of samples, by name."""
-        node, m = self.node, self.mechanism
+        node = self.node
         r = ca.substitute(node.dynamics, node.lam, ca.SX.zeros(node.lam.numel()))
         full = [node.q, node.v, node.a, node.s, node.u, self.p]
-        y = ca.vertcat(*(m.motion(name)[0] for name in self.channels))
-        feet = ca.vertcat(*(m.motion(f"{g}/foot/{x}")[0] for g in self.legs for x in "xz"))
-        motion = [m.q, m.v]
+        y = ca.vertcat(*(node.outputs[name] for name in self.channels))
+        feet = ca.vertcat(*(node.outputs[f"{g}/foot/{x}"] for g in self.legs for x in "xz"))
+        motion = [node.q, node.v, self.p]
         named = {
             "residual": (full, [r]),
             "mass": (full, [ca.jacobian(r, node.a)]),
             "stiffness": (full, [ca.jacobian(r, x) for x in (node.q, node.v)]),
             "by_parameter": (full, [ca.jacobian(r, self.p)]),
-            "measured": (motion, [y, ca.jtimes(y, m.q, m.v), ca.jacobian(y, m.q)]),
-            "feet": (motion, [feet, ca.jtimes(feet, m.q, m.v), ca.jacobian(feet, m.q)]),
+            "measured": (motion, [y, ca.jtimes(y, node.q, node.v), ca.jacobian(y, node.q)]),
+            "feet": (motion, [feet, ca.jtimes(feet, node.q, node.v), ca.jacobian(feet, node.q)]),
+            "seen": (motion, [y, feet]),
         }
         made = {k: ca.Function(k, a, b, {"cse": True}) for k, (a, b) in named.items()}
         made["links"] = link_regressors(self.mechanism)
@@ -104,20 +108,20 @@ class Physics:
             blocks.append(block[:, :, 0] if columns == 1 else block)
         return blocks
 
-    def knees(self, pistons: Array) -> Array:
-        """Knee coordinates (n, legs) of piston extensions (n, legs)."""
+    def knees(self, pistons: Array, p: Array) -> Array:
+        """Knee coordinates (n, legs) of piston extensions (n, legs) at parameters p (k,)."""
         return np.column_stack(
-            [np.interp(pistons[:, i], *self._knee(i)) for i in range(len(self.legs))]
+            [np.interp(pistons[:, i], *self._knee(i, p)) for i in range(len(self.legs))]
         )
 
-    def _knee(self, i: int) -> tuple[Array, Array]:
+    def _knee(self, i: int, p: Array) -> tuple[Array, Array]:
         """Piston extension and knee angle on a fine grid, the extension increasing."""
         m, k = self.mechanism, 3 + len(self.legs) + i
         low, high = m.coordinates[k].lower, m.coordinates[k].upper
-        grid = np.linspace(low, high, 4001)
+        grid = np.sign(low + high) * np.linspace(0.0, FOLDED, 4001)
         q = np.zeros((len(grid), m.n))
         q[:, k] = grid
-        x = self.call("measured", q, 0 * q)[0][:, k]
+        x = self.call("measured", q, 0 * q, p=p)[0][:, k]
         order = np.argsort(x)
         return x[order], grid[order]
 

@@ -50,14 +50,15 @@ def integrator(h: Array, k: int, extra: int) -> tuple[Array, Array]:
     return F, G
 
 
-def first_reference(physics: Physics, batch: Batch) -> Reference:
-    """Every coordinate smoothed on its own, without the model."""
+def first_reference(physics: Physics, batch: Batch, p: Array) -> Reference:
+    """Every coordinate smoothed on its own; of the model only its lengths count, at `p`."""
     k, legs = physics.mechanism.n, len(physics.legs)
     y = batch.flat(batch.y)
     pistons = y[:, -legs:]
-    knees = np.where(np.isfinite(pistons), physics.knees(np.nan_to_num(pistons)), np.nan)
+    knees = np.where(np.isfinite(pistons), physics.knees(np.nan_to_num(pistons), p), np.nan)
     q = np.hstack([y[:, :-legs], knees])
-    slope = np.diagonal(physics.call("measured", np.nan_to_num(q), 0 * q)[2], axis1=1, axis2=2)
+    known = np.nan_to_num(q)
+    slope = np.diagonal(physics.call("measured", known, 0 * known, p=p)[2], axis1=1, axis2=2)
     q, slope = batch.deep(q, np.nan), batch.deep(np.abs(slope), 1.0)
     F, G = integrator(batch.h, k, 0)
     settings = KinematicSettings.current()
@@ -74,12 +75,14 @@ def first_reference(physics: Physics, batch: Batch) -> Reference:
     return Reference(x[..., :k], x[..., k:], np.where(batch.valid[..., None], w, 0.0))
 
 
-def read_schedules(physics: Physics, batch: Batch, ref: Reference) -> tuple[Schedule, ...]:
-    """Contact read from the motion of each run."""
+def read_schedules(
+    physics: Physics, batch: Batch, ref: Reference, p: Array
+) -> tuple[Schedule, ...]:
+    """Contact read from the motion of each run; `p` (k,) gives the lengths of the legs."""
     q, v = batch.flat(ref.q), batch.flat(ref.v)
     legs = len(physics.legs)
-    feet = batch.deep(physics.call("feet", q, v)[0].reshape(-1, legs, 2))
-    y = batch.deep(physics.call("measured", q, v)[0])
+    feet = batch.deep(physics.call("feet", q, v, p=p)[0].reshape(-1, legs, 2))
+    y = batch.deep(physics.call("measured", q, v, p=p)[0])
     found = []
     for i, log in enumerate(batch.resampled):
         n = len(log.time)

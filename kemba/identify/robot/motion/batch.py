@@ -38,10 +38,12 @@ class Batch:
 
     @cached_property
     def time(self) -> Array:
+        """(n, L): times of the nodes [s], zero past a run's end."""
         return self.pad([t.time for t in self.resampled], 0.0)
 
     @cached_property
     def y(self) -> Array:
+        """(n, L, m): readings, NaN past a run's end."""
         return self.pad([t.y for t in self.resampled], np.nan)
 
     @cached_property

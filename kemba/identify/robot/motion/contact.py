@@ -174,7 +174,10 @@ def slope(values: Array, dt: float) -> Array:
 
 
 def ground_level(z: Array, rate: Array) -> float:
-    """Height at which a foot rests: sensors may be off by more than a centimetre."""
+    """Height [m] at which a foot rests, from heights z (n,) and their `rate` (n,) [m.s-1].
+
+    It need not be zero: sensors may be off by more than a centimetre.
+    """
     limits = ContactSettings.current()
     resting = z[(np.abs(z) < limits.level_search) & (np.abs(rate) < limits.level_rate)]
     if len(resting) <= limits.level_rows:
@@ -184,7 +187,8 @@ def ground_level(z: Array, rate: Array) -> float:
 
 
 def stop_levels(x: Array, stroke: float) -> tuple[float, float]:
-    """Readings at the two stops: the extreme ones, if they are near the ends of the stroke."""
+    """Readings [m] at the two stops: the extreme ones of x (n,) [m], if they are near the ends of
+    the stroke."""
     search, ordered = ContactSettings.current().stop_search, np.sort(x)
     few = min(ContactSettings.current().stop_rows, len(x) - 1)
     low, high = float(ordered[few]), float(ordered[-1 - few])

@@ -44,9 +44,9 @@ def solve(factors: Array, X: Array, columns: int) -> None:
 
 @part
 def solve_pivoted(A: Array, b: Array, n: int) -> bool:
-    """The first n of b replaced by the solution of A y = b, or False where A is singular.
+    """The first n of b (m,) become the solution of A y = b; False where A (m, m) is singular.
 
-    Uses up the first n rows and columns of A.
+    Overwrites the first n rows and columns of A.
     """
     for k in range(n):
         best = k

@@ -1,0 +1,73 @@
+"""`kemba-opt review`: plan, simulated robot and logs on one page, with a verdict."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from kemba_cli.common import Force, Json, OwnEffects, Quiet, newest, print_json, say
+from kemba_cli.failures import BAD_ANSWER
+
+
+def review(
+    logs: Annotated[
+        list[Path] | None, typer.Argument(help="Logs (CSV) of one machine, any order.")
+    ] = None,
+    run: Annotated[Path | None, typer.Option(help="Run folder that was executed.")] = None,
+    answer: Annotated[Path | None, typer.Option(help="Folder that discover wrote.")] = None,
+    model: Annotated[
+        str | None, typer.Option(help="Model YAML to judge, not the run's own.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="HTML to write (a new review.html beside the logs).")
+    ] = None,
+    column_map: Annotated[
+        str | None, typer.Option("--map", help="Column map YAML for foreign logs.")
+    ] = None,
+    show: Annotated[bool, typer.Option("--show", help="Open it in the browser.")] = False,
+    force: Force = False,
+    own_effects: OwnEffects = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Write one page about a jump: the verdict, plan and logs over each other, what is missing.
+
+    With nothing given it takes the newest run and its logs. The page needs no other file.
+
+    Example: kemba-opt review log-1.csv log-2.csv --run runs/jump-1
+    """
+    import os
+
+    # many small products: more BLAS threads only wait for each other
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    from kemba.report.review.page import review as write
+    from kemba.runs import newest_logs
+
+    logs = list(logs or [])
+    if not logs and run is None and answer is None:
+        run = newest(quiet, "certificate.json")
+        logs = newest_logs(run)
+        say(f"with its {len(logs)} newest logs" if logs else "it has no logs yet", quiet)
+    page, verdict = write(logs, run, answer, model, column_map, out, force)
+    if json:
+        print_json(
+            {
+                "review": str(page),
+                "verdict": verdict.grade,
+                "sentence": verdict.sentence,
+                "next": verdict.next,
+                "command": verdict.command,
+            }
+        )
+    else:
+        typer.echo(page)
+        say(verdict.sentence, quiet)
+        say(f"next: {verdict.next} {verdict.command}".rstrip(), quiet)
+    if show:
+        import webbrowser
+
+        webbrowser.open(page.resolve().as_uri())
+    if verdict.grade == "bad":
+        raise typer.Exit(BAD_ANSWER)

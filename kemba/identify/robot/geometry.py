@@ -1,0 +1,203 @@
+"""Lengths of the legs from feet that stand: what needs no forces is found before any force.
+
+A foot that stands is at the height of the ground, whatever pushes it. Lengths that bring more rows
+of the logs to one height are believed where they do so much better than faults of sensors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import casadi as ca
+import numpy as np
+from scipy.optimize import least_squares
+
+from kemba.identify.problem.types import Array, Candidate, Flags
+from kemba.identify.robot.dynamics.physics import Physics
+from kemba.identify.robot.dynamics.reference import Reference
+from kemba.identify.robot.motion.batch import Batch
+from kemba.mechanism.knee import flexion_of
+from kemba.mechanism.links import altered
+from kemba.settings import BY_HAND, Settings, setting
+
+GEOMETRY = "geometry:"  # names of the lengths begin so
+
+
+class StandingSettings(Settings):
+    """How lengths are found from feet that stand."""
+
+    every: float = setting(0.005, "s", "time between the samples that are used", BY_HAND)
+    level: float = setting(
+        0.02,
+        "m",
+        "height at which the ground may seem to be",
+        "convention: as the search for the ground in contact.py",
+    )
+    window: float = setting(5e-3, "m", "height of the band in which standing feet are", BY_HAND)
+    tried: tuple[float, ...] = setting(
+        (-3.5, -2.5, -1.75, -1.25, -0.75, -0.35, 0.35, 0.75, 1.25, 1.75, 2.5, 3.5),
+        "1",
+        "lengths that are tried first, one at a time, in sizes",
+        BY_HAND,
+    )
+    bands: tuple[float, ...] = setting(
+        (0.02, 0.01, 5e-3, 4e-3), "m", "bands about the ground, from round to round", BY_HAND
+    )
+    noise: float = setting(7e-4, "m", "noise of a standing foot's height", BY_HAND)
+    together: float = setting(
+        4.0, "1", "samples that err together, so that they count as one", BY_HAND
+    )
+    prior: float = setting(2.0, "1", "prior width of a length, in sizes", BY_HAND)
+    reach: float = setting(2.5, "1", "largest value of each, in prior widths", BY_HAND)
+    body: float = setting(3e-3, "m", "prior sigma of the zero of the body's height", BY_HAND)
+    angle: float = setting(4e-3, "rad", "prior sigma of the zeros of pitch and hips", BY_HAND)
+    piston: float = setting(6e-4, "m", "prior sigma of the zero of a piston", BY_HAND)
+    deep: float = setting(0.02, "m", "depth below the ground at which no foot can be", BY_HAND)
+    often: float = setting(
+        0.01, "1", "share of samples so deep from which lengths are not believed", BY_HAND
+    )
+    gain: float = setting(
+        6.0, "nats", "gain over faults of sensors alone from which lengths are believed", BY_HAND
+    )
+
+
+class Standing:
+    """Heights of the feet at samples of a motion, for any lengths of the legs.
+
+    `names`: the lengths, as they are called in theta; zeros of pitch, height, hips and pistons
+    follow them in every vector x (k,).
+    """
+
+    def __init__(
+        self, physics: Physics, batch: Batch, reference: Reference, names: Sequence[str]
+    ) -> None:
+        self.names, self.legs = tuple(names), len(physics.legs)
+        dt = float(np.median(batch.h[batch.valid]))
+        step = max(1, round(StandingSettings.current().every / dt))
+        q = batch.flat(reference.q)[::step]
+        y = physics.call("seen", q, 0 * q, p=physics.nominal)[0]
+        self.samples = [ca.DM(q[:, : 3 + self.legs].T), ca.DM(y[:, -self.legs :].T)]
+        self._map = self._function(physics).map(len(q))
+
+    def _function(self, physics: Physics) -> ca.Function:
+        """(q without knees, pistons, x) -> heights (legs,) and their slopes along x."""
+        node, legs, robot = physics.node, self.legs, physics.mechanism.need_robot()
+        x = ca.SX.sym("x", len(self.names) + 2 + 2 * legs)
+        lengths = {n: x[i] for i, n in enumerate(self.names)}
+        zeros = x[len(self.names) :]
+        body, pistons = ca.SX.sym("q", 3 + legs), ca.SX.sym("s", legs)
+        shape = altered(robot, {n.removeprefix(GEOMETRY).removesuffix(".d"): d
+                                for n, d in lengths.items()})  # fmt: skip
+        extension = pistons - zeros[2 + legs :]
+        knees = [
+            place.fold * flexion_of(shape.leg, extension[i])
+            for i, place in enumerate(robot.legs.values())
+        ]
+        off = ca.vertcat(0.0, zeros[1], zeros[0], zeros[2 : 2 + legs])
+        q = ca.vertcat(body - off, *knees)
+        nominal = zip(physics.names, physics.nominal.tolist(), strict=True)
+        p = ca.vertcat(*(lengths.get(n, ca.SX(value)) for n, value in nominal))
+        feet = ca.vertcat(*(node.outputs[f"{leg}/foot/z"] for leg in physics.legs))
+        heights = ca.substitute(feet, ca.vertcat(node.q, node.p), ca.vertcat(q, p))
+        return ca.Function("standing", [body, pistons, x], [heights, ca.jacobian(heights, x)])
+
+    def heights(self, x: Array) -> tuple[Array, Array]:
+        """Heights (n, legs) [m] of the feet, and their slopes (n, legs, k)."""
+        count = self.samples[0].shape[1]
+        z, slopes = self._map(*self.samples, ca.repmat(ca.DM(x), 1, count))
+        deep = slopes.full().reshape(self.legs, count, len(x)).transpose(1, 0, 2)
+        return z.full().T, deep
+
+
+def standing_lengths(
+    physics: Physics, batch: Batch, reference: Reference, candidates: Mapping[str, Candidate]
+) -> dict[str, float]:
+    """Theta with the lengths at which feet stand on the ground; empty where those of the model are
+    as good, or where no lengths are candidates."""
+    sizes = {c.key: c.lead.size for c in candidates.values() if c.effect.startswith(GEOMETRY)}
+    if not sizes:
+        return {}
+    standing = Standing(physics, batch, reference, tuple(sizes))
+    settings, legs = StandingSettings.current(), standing.legs
+    zeros = [settings.angle, settings.body, *[settings.angle] * legs, *[settings.piston] * legs]
+    width = np.array([*(settings.prior * s for s in sizes.values()), *zeros])
+    start = np.zeros(len(width))
+    most = _most_rows(standing.heights(start)[0])
+    for i, size in enumerate(sizes.values()):
+        for share in settings.tried:
+            trial = np.zeros(len(width))
+            trial[i] = share * size
+            count = _most_rows(standing.heights(trial)[0])
+            if count > most:
+                most, start = count, trial
+    x, cost, rows = _refined(standing, start, width)
+    _, without, _ = _only(standing, (), x, width, rows)
+    if without - cost < settings.gain:
+        return {}
+    singles = [_only(standing, (i,), x, width, rows) for i in range(len(sizes))]
+    one, alone, _ = min(singles, key=lambda fit: fit[1])
+    x = one if alone - cost < settings.gain else x
+    if np.mean(standing.heights(x)[0] < -settings.deep) > settings.often:
+        return {}  # feet in the ground: columns are wrong, not lengths
+    return {n: float(d) for n, d in zip(sizes, x, strict=False) if abs(d) > 0.01 * sizes[n]}
+
+
+def _only(
+    standing: Standing, free: Sequence[int], x: Array, width: Array, rows: Flags
+) -> tuple[Array, float, Flags]:
+    """The refined fit with all lengths but the `free` ones as the model has them."""
+    held = np.array([i not in free for i in range(len(standing.names))])
+    narrow, begin = width.copy(), x.copy()
+    narrow[: len(held)][held] *= 1e-6
+    begin[: len(held)][held] = 0.0
+    return _refined(standing, begin, narrow, rows)
+
+
+def _most_rows(heights: Array) -> int:
+    """The most samples at one height near that of the ground."""
+    return len(_crowd(heights))
+
+
+def _crowd(heights: Array) -> Array:
+    """The heights of the samples that stand at one height near that of the ground."""
+    settings = StandingSettings.current()
+    near = np.sort(heights[np.abs(heights) < settings.level])
+    ends = np.searchsorted(near, near + settings.window)
+    first = int(np.argmax(ends - np.arange(len(near)))) if len(near) else 0
+    return near[first : ends[first]] if len(near) else near
+
+
+def _refined(
+    standing: Standing, x: Array, width: Array, rows: Flags | None = None
+) -> tuple[Array, float, Flags]:
+    """The best x (k,) with prior widths (k,), half the sum of squares, and the samples (n, legs)
+    that stand; `rows`: which samples are known to."""
+    settings = StandingSettings.current()
+    weight = 1.0 / (settings.noise * np.sqrt(settings.together))
+    cost = 0.0
+    for band in settings.bands:
+        heights, _ = standing.heights(x)
+        crowd = _crowd(heights)
+        level = float(np.median(crowd)) if len(crowd) else 0.0
+        known = np.abs(heights - level) < band if rows is None else rows
+        x, cost = _fit(standing, x, width, known, weight)
+    return x, cost, known
+
+
+def _fit(
+    standing: Standing, x: Array, width: Array, rows: Flags, weight: float
+) -> tuple[Array, float]:
+    """The fit of the samples `rows` to the ground, robust against feet that do not stand."""
+
+    def residual(z: Array) -> Array:
+        return np.append(weight * standing.heights(z * width)[0][rows], z)
+
+    def slopes(z: Array) -> Array:
+        return np.vstack([weight * standing.heights(z * width)[1][rows] * width, np.eye(len(z))])
+
+    reach = StandingSettings.current().reach
+    start = np.clip(x / width, -0.99 * reach, 0.99 * reach)
+    found = least_squares(
+        residual, start, slopes, (-reach, reach), loss="soft_l1", f_scale=2.0, max_nfev=10
+    )
+    return found.x * width, float(found.cost)

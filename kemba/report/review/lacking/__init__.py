@@ -1,0 +1,1 @@
+"""Where the model fails on the logs, and what it lacks."""

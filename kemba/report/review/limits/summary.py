@@ -1,0 +1,165 @@
+"""Numbers of all motions side by side: events, limits, slips, energy and air."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from html import escape
+from typing import Any
+
+import numpy as np
+
+from kemba.model import Model
+from kemba.plotting import Machine
+from kemba.report.review.charts import Book, Chart, Line
+from kemba.report.review.events import Events, Flight
+from kemba.report.review.html import table
+from kemba.report.review.limits.energy import Energy, energy_of, put_in
+from kemba.report.review.limits.torque_speed import torque_speed
+from kemba.report.review.limits.use import NORMAL, Use, droop, full_for, motor_of, slides, use_of
+from kemba.report.review.tracks import Track
+from kemba.trajectory import Array
+
+
+def event_table(tracks: Sequence[Track], events: Sequence[Events | None]) -> str:
+    """Apex, lift-off and touchdown of every motion."""
+    legs = list(dict.fromkeys(leg for e in events if e for leg in e.flights))
+    heads = ["motion", "apex of the body's centre", "feet rise", "lift-off"]
+    heads += [f"touchdown {leg}" for leg in legs] + ["end"]
+    rows = []
+    for track, e in zip(tracks, events, strict=True):
+        if e is None:
+            continue
+        rows.append(
+            [
+                escape(track.name),
+                f"{e.apex:.3f} m at {e.apex_time:.3f} s",
+                _or_dash(e.feet, 100, "cm", 1),
+                _or_dash(e.lift_off, 1, "s", 3),
+                *(_touchdown(e.flights.get(leg)) for leg in legs),
+                f"<b>{escape(e.fault)}</b>" if e.fault else "upright",
+            ]
+        )
+    title = "In the plan's clock. The apex is that of the body's centre, which is above the feet."
+    return table(title, heads, rows)
+
+
+def _touchdown(flight: Flight | None) -> str:
+    if flight is None:
+        return "-"
+    text = _or_dash(flight.landed, 1, "s", 3)
+    if flight.grazes:
+        text += f" (grazes at {', '.join(f'{time:.3f}' for time in flight.grazes)} s)"
+    return text
+
+
+def limit_parts(book: Book, model: Model, machine: Machine) -> list[str]:
+    """Torque-speed planes, use of motor and friction cone in time, and a table of it all."""
+    legs = machine.mechanism.legs
+    used = {leg: [use_of(track, model, machine, leg) for track in book.tracks] for leg in legs}
+    planes, charts = [], []
+    for leg, uses in used.items():
+        motor = motor_of(model, leg)
+        if motor:
+            planes.append(torque_speed(leg, book.tracks, uses, motor))
+    for title, name in (
+        ("share of the torque there is", "motor"),
+        ("share of the friction cone", "cone"),
+    ):
+        for leg, uses in used.items():
+            lines = [
+                Line(track.name, 100.0 * _onto(book.grid, track, getattr(use, name)), i)
+                for i, (track, use) in enumerate(zip(book.tracks, uses, strict=True))
+            ]
+            charts.append(book.add(Chart(f"{leg.title()}: {title}", "%", lines, levels=(100.0,))))
+    grid = f'<div class="grid legs">{"".join(planes)}{"".join(charts)}</div>'
+    return [_limit_table(book.tracks, used, machine), grid]
+
+
+def _limit_table(
+    tracks: Sequence[Track], used: Mapping[str, Sequence[Use]], machine: Machine
+) -> str:
+    rows = []
+    for i, track in enumerate(tracks):
+        coordinates = machine.coordinates(track.t)
+        points = machine.points(coordinates) if coordinates is not None else {}
+        for leg, uses in used.items():
+            foot = points[f"{leg}/foot"][:, 0] if points else None
+            slid = slides(track, leg, machine.stance(track.t, leg), foot)
+            rows.append(
+                [
+                    escape(track.name),
+                    escape(leg),
+                    _largest(np.abs(uses[i].torque), "N.m", 1),
+                    _largest(100 * uses[i].motor, "%", 0),
+                    f"{1e3 * full_for(track, uses[i].motor):.0f} ms",
+                    _largest(100 * uses[i].cone, "%", 0),
+                    _or_dash(slid, 1e3, "mm", 1),
+                    _or_dash(droop(track.t), 100, "%", 0),
+                ]
+            )
+    heads = ["motion", "leg", "largest torque", "of what there is", "at the limit for"]
+    heads += ["largest use of friction", "foot slides", "lowest supply"]
+    return table("Limits: 100 % is all there is", heads, rows)
+
+
+def energy_parts(book: Book, machine: Machine, certificate: Mapping[str, Any]) -> list[str]:
+    """Work in time, and a table of work, impacts and air drawn."""
+    cylinder = machine.mechanism.need_cylinder()
+    found = [energy_of(t, machine.mechanism.legs, cylinder, certificate) for t in book.tracks]
+    rows = [
+        [escape(track.name), *_both(one.pistons), *_both(one.hips), _impacts(one), _air(one)]
+        for track, one in zip(book.tracks, found, strict=True)
+    ]
+    heads = ["motion", "pistons put in", "take out", "hips put in", "take out", "impacts take"]
+    text = table("Energy", [*heads, "air drawn"], rows)
+    charts = []
+    for title, name in (("Work of the pistons", "pistons"), ("Work of the hips", "hips")):
+        lines = [
+            Line(track.name, _onto(book.grid, track, work), i)
+            for i, (track, one) in enumerate(zip(book.tracks, found, strict=True))
+            if (work := getattr(one, name)) is not None
+        ]
+        charts.append(book.add(Chart(title, "J", lines, least=1.0)))
+    note = (
+        '<p class="soft">Work of the pistons: of the force on the rod, after friction and damping. '
+        "Air drawn: what the "
+        "chambers hold more after each time a valve was on, at 20 deg C; 1 l at atmospheric "
+        "pressure.</p>"
+    )
+    return [text, f'<div class="grid">{"".join(charts)}</div>', note]
+
+
+def _onto(grid: Array, track: Track, values: Array) -> Array:
+    """Values by row of a motion at the times of the page."""
+    time, known = track.t.time, np.isfinite(values)
+    if not known.any():
+        return np.full(len(grid), np.nan)
+    at = np.clip(np.searchsorted(time, grid), 0, len(time) - 1)
+    found = np.interp(grid, time[known], values[known])
+    outside = (grid < time[0] - 1e-9) | (grid > time[-1] + 1e-9) | ~known[at]
+    return np.where(outside, np.nan, found)
+
+
+def _largest(values: Array, unit: str, digits: int) -> str:
+    known = values[np.isfinite(values)]
+    return f"{known.max():.{digits}f} {unit}" if len(known) else "-"
+
+
+def _or_dash(value: float | None, factor: float, unit: str, digits: int) -> str:
+    known = value is not None and np.isfinite(value)
+    return f"{factor * value:.{digits}f} {unit}" if known and value is not None else "-"
+
+
+def _both(work: Array | None) -> tuple[str, str]:
+    pair = put_in(work)
+    return (f"{pair[0]:.1f} J", f"{pair[1]:.1f} J") if pair else ("-", "-")
+
+
+def _impacts(one: Energy) -> str:
+    return "-" if one.impacts is None else f"{one.impacts:.1f} J"
+
+
+def _air(one: Energy) -> str:
+    if one.drawn is None:
+        return "-"
+    return f"{1e3 * one.drawn:.2f} g ({one.drawn / NORMAL:.1f} l)"

@@ -1,0 +1,198 @@
+"""The first line of the page: the verdict in one plain sentence, and what to do next."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+from typing import Any, Literal
+
+from kemba.identify.compare.compare import Comparison
+from kemba.report.review.events import Events
+
+Facts = Mapping[str, Any]
+Grade = Literal["good", "fair", "bad"]
+MANY = 4  # log names that a command still lists one by one
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """`bad` is red: do not go on with this. `fair`: usable, but something is to be done."""
+
+    grade: Grade
+    sentence: str
+    next: str
+    command: str = ""
+
+    def html(self) -> str:
+        """As the first thing on the page."""
+        command = f" <code>{escape(self.command)}</code>" if self.command else ""
+        return (
+            f'<div class="verdict {self.grade}" role="status"><p class="first">'
+            f"{escape(self.sentence)}</p><p><b>Next:</b> {escape(self.next)}{command}</p></div>"
+        )
+
+
+def of_plan(certificate: Facts, run: str, events: Events | None) -> Verdict:
+    """Whether the plan may go to the robot."""
+    sentence = str(certificate["sentence"]).split(";")[0]
+    if not certificate.get("good", certificate["status"] == "solved"):
+        if not sentence.startswith("FAILED"):
+            sentence = f"FAILED: {sentence}"
+        return Verdict("bad", _stop(sentence), _after_failure(certificate))
+    feet = ""
+    if events and events.feet is not None:
+        feet = f"; the feet rise {100 * events.feet:.1f} cm"
+    plant = certificate.get("plant_replay")
+    robot = "no simulated robot has tried it"
+    if plant:
+        error = 1e3 * plant["apex_error_m"]
+        side = "higher" if error >= 0 else "lower"
+        lands = "lands and " if plant.get("landed") else ""
+        robot = f"the simulated robot {lands}reaches {abs(error):.0f} mm {side}"
+    height = certificate["apex_m"]
+    return Verdict(
+        "good",
+        f"The plan is good: the body's centre reaches {height:.3f} m{feet}; {robot}.",
+        "send controller.csv to the robot, or execute it on the simulated one:",
+        f"kemba-opt simulate {shlex.quote(run)} --repeat 3 --noise",
+    )
+
+
+def _after_failure(certificate: Facts) -> str:
+    relax = certificate.get("relax") or []
+    if relax:
+        one = relax[0]
+        return (
+            f"ask for less: {one['requirement']} asks {one['asked']:.4g} {one['unit']}, and "
+            f"{one['reachable']:.4g} {one['unit']} can be reached."
+        )
+    if certificate["status"] == "acceptable":
+        return (
+            "do not send it to the robot. See below where the simulated robot leaves the plan, "
+            "change the task (another height, duration or landing), and solve it again."
+        )
+    return (
+        "do not send it to the robot. See the worst violations below, change the task, "
+        "and solve it again."
+    )
+
+
+def of_logs(
+    events: Sequence[tuple[str, Events | None]],
+    plan: Events | None,
+    found: Comparison | None,
+    answer: Facts | None,
+    words: Mapping[str, str],
+) -> Verdict:
+    """What the logs show; `words`: names of files for the commands (`logs`, `answer`, `task`)."""
+    fallen = [(name, e.fault) for name, e in events if e and e.fault]
+    if fallen:
+        name, fault = fallen[0]
+        more = f" ({len(fallen)} of {len(events)} logs)" if len(events) > 1 else ""
+        return Verdict(
+            "bad",
+            f"FAILED: in {name} the robot {fault}{more}.",
+            "see below where it leaves the plan; then ask what the model lacks:",
+            f"kemba-opt discover {words['logs']}",
+        )
+    parts = [_flown([e for _, e in events if e], plan)]
+    if answer:
+        said = of_answer(answer, words)
+        return Verdict(said.grade, _joined([*parts, said.sentence]), said.next, said.command)
+    if found is None:
+        return Verdict("fair", _joined(parts), "compare it with a model:", "kemba-opt compare")
+    ratio = f"{found.noise_ratio:.2g} times the noise"
+    if found.good:
+        return Verdict(
+            "good",
+            _joined([*parts, f"the model explains the logs to within the noise ({ratio})"]),
+            "nothing is to be added to the model; plan the next jump with it.",
+        )
+    if found.tolerable:
+        text = f"the model errs by {ratio}, which figures within their tolerance would explain"
+        aim = "go on with this model, or identify its figures:"
+        return Verdict("fair", _joined([*parts, text]), aim, f"kemba-opt discover {words['logs']}")
+    return Verdict(
+        "fair",
+        _joined([*parts, f"the model does not explain the logs: its error is {ratio}"]),
+        "find what the model lacks:",
+        f"kemba-opt discover {words['logs']}",
+    )
+
+
+def of_bad_data(text: str, words: Mapping[str, str]) -> Verdict:
+    """Logs that cannot be right."""
+    return Verdict(
+        "bad",
+        f"FAILED: a log cannot be right: {_stop(text)}",
+        "correct the log, or map its columns with --map; then check it:",
+        f"kemba-opt check {words['logs']}",
+    )
+
+
+def of_answer(answer: Facts, words: Mapping[str, str]) -> Verdict:
+    """What `discover` answered. A verdict that is not known here is given in its own words."""
+    verdict, folder = str(answer["verdict"]), words["answer"]
+    own = str(answer.get("sentence") or verdict).split(". ")[0].rstrip(".") + "."
+    if verdict in ("missing", "partly"):
+        added = [str(name) for name in answer.get("added") or ()]
+        names = _listed(added) or "an effect"
+        before, after = answer.get("error_before"), answer.get("error_after")
+        falls = ""
+        if isinstance(before, int | float) and isinstance(after, int | float):
+            them = "them" if len(added) > 1 else "it"
+            falls = (
+                f"; with {them} the error falls from {before:.2f} to {after:.2f} times the noise"
+            )
+        rest = ", and something more that is not known" if verdict == "partly" else ""
+        if not answer.get("model"):
+            return Verdict("fair", f"The model lacks {names}{rest}{falls}.", "take more logs.")
+        aim = "plan again with the corrected model:"
+        task = words.get("task", "jump.yaml")
+        command = f"kemba-opt solve {task} --model {folder}/model.yaml"
+        return Verdict("fair", f"The model lacks {names}{rest}{falls}.", aim, command)
+    if verdict == "nothing":
+        return Verdict("good", own, "nothing is to be added to the model; plan the next jump.")
+    if verdict == "bad-data":
+        return Verdict("bad", f"FAILED: {own}", "correct the logs, and run discover again.")
+    aim = "design the test that tells more:"
+    return Verdict("fair", own, aim, f"kemba-opt experiment {folder}")
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Names in a sentence: a, b and c."""
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+
+
+def _flown(events: Sequence[Events], plan: Events | None) -> str:
+    """The robot's jumps in words; empty without any."""
+    if not events:
+        return ""
+    heights = [e.apex for e in events]
+    mean = sum(heights) / len(heights)
+    if plan is None:
+        return f"The robot's body reaches {mean:.3f} m"
+    error = 1e3 * (mean - plan.apex)
+    side = "above" if error >= 0 else "below"
+    return f"The robot reaches {mean:.3f} m, {abs(error):.0f} mm {side} the plan, and stays upright"
+
+
+def _joined(parts: Sequence[str]) -> str:
+    shown = [part.rstrip(".") for part in parts if part]
+    first, *others = shown
+    text = "; ".join([first, *(other[:1].lower() + other[1:] for other in others)])
+    return text[:1].upper() + text[1:] + "."
+
+
+def _stop(text: str) -> str:
+    return text if text.endswith((".", "!", "?")) else f"{text}."
+
+
+def names_of(paths: Sequence[str]) -> str:
+    """Log files for a command; of many in one folder `folder/*.csv`."""
+    if len(paths) < MANY:
+        return " ".join(shlex.quote(path) for path in paths)
+    folders = dict.fromkeys(path.rpartition("/")[0] for path in paths)
+    return " ".join(f"{shlex.quote(folder) + '/' if folder else ''}*.csv" for folder in folders)

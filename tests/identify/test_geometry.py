@@ -1,0 +1,64 @@
+"""Lengths found from feet that stand, and named by `discover`, before any force is blamed."""
+
+from __future__ import annotations
+
+import pytest
+
+pytest.importorskip("numba")
+
+from robot_logs import hops
+from twin.catalogue import hidden
+
+from kemba.effects.mechanics.geometry import Geometry
+from kemba.identify.adopt import item
+from kemba.identify.discover import discover
+from kemba.identify.robot.problem import RobotProblem, robot_problem
+from kemba.mechanism import robot_mechanism
+from kemba.model import Model, load_model
+from kemba.model.spec import ModelSpec
+
+SHORT = {"femur/length": 6.0e-3, "tibia/length": 20e-3, "piston/pin": 1.4e-3}
+
+
+def unlisted(part: str, seed: int) -> RobotProblem:
+    """Hops of the twin under a planning model in whose robot file this part is too short."""
+    logs, _ = hops(runs=2, seed=seed, figures_off=0.01)
+    planning = load_model("planning")
+    short = planning.with_effects([Geometry(part=part, d=-SHORT[part])]).mechanism.need_robot()
+    drawn = robot_mechanism(short)
+    return robot_problem(logs, Model(drawn, planning.effects, planning.supply, planning.name))
+
+
+@pytest.mark.parametrize("part", sorted(SHORT))
+def test_standing_feet_show_a_wrong_length(part: str) -> None:
+    problem = unlisted(part, 3)
+    found = problem.lengths.get(f"geometry:{part}.d", 0.0)
+    assert found == pytest.approx(SHORT[part], abs=1.5e-3), problem.lengths
+    problem.validate()  # a wrong length is to be found; it is not bad data
+
+
+def test_friction_of_one_leg_is_named_with_its_leg() -> None:
+    logs, _ = hops(hidden("seal_friction", 1.2, "front"), runs=2, seed=3, figures_off=0.01)
+    problem = robot_problem(logs, load_model("planning"))
+    answer = discover(problem).answer
+    assert answer.added == ("seal_friction:front",), answer.sentence
+    row = item(answer.ranking[0].effect, {"F_c": {"value": 12.0}})
+    assert row == {"kind": "seal_friction", "on": "front", "F_c": 12.0}
+
+
+def test_right_lengths_are_left_alone() -> None:
+    logs, _ = hops(runs=2, seed=3, figures_off=0.01)
+    assert robot_problem(logs, load_model("planning")).lengths == {}
+
+
+def test_a_long_femur_is_named_and_nothing_else() -> None:
+    answer = discover(unlisted("femur/length", 3)).answer
+    assert answer.added == ("geometry:femur/length",), answer.sentence
+    assert answer.ranking[0].parameters["d"].value == pytest.approx(6.0e-3, abs=1e-3)
+    assert answer.error_after < 1.3 < answer.error_before
+
+
+def test_it_is_written_as_a_model_reads_it() -> None:
+    row = item("geometry:tibia/length", {"d": {"value": 0.02}})
+    spec = ModelSpec.model_validate({"base": "planning", "effects": [row]})
+    assert spec.effects[0] == Geometry(part="tibia/length", d=0.02)
