@@ -7,20 +7,21 @@ from pathlib import Path
 from benchmarks.real import data
 from benchmarks.real.say import answered, fitted, listed
 
+# half the difference of force between the two directions at one x, fitted by hand
 HALVES = {
     "O-ring": "3.4 N and 0.0133 of p A",
     "KDN": "5.3 N and 0.004 of p A",
-}  # by the data's README
+}
 
 
 def section(scratch: Path, download: bool) -> list[str]:
     """Lines of the page about the cylinder."""
     lines = ["## A pneumatic cylinder with two seals", ""]
     lines += [
-        "Bore 25 mm, one chamber at 1, 3, 5 and 7 bar, driven to and fro at 10 mm/s, 100 rows a second",
-        "with gaps of up to 2.7 s (Zillen et al., HardwareX 2024, CC0). Model: `configs/models/",
-        "cylinder_rig.yaml`, pressure times area alone. Half the difference of the two directions,",
-        "read off by hand, is given as the expectation.",
+        "Bore 25 mm, one chamber at 1, 3, 5 and 7 bar, driven to and fro at 10 mm/s, 100 rows a",
+        "second with gaps of up to 2.7 s (Zillen et al., HardwareX 2024, CC0). Model:",
+        "`configs/models/cylinder_rig.yaml`, pressure times area alone. Expected is half the",
+        "difference of force between the two directions, read off by hand.",
         "",
     ]
     for seal, bars in data.SEALS.items():

@@ -15,8 +15,8 @@ def section(scratch: Path, download: bool) -> list[str]:
     lines = ["## EMPS: a linear drive with a ball screw", ""]
     lines += [
         "24 841 rows at 1 kHz. Model: `configs/models/drive_rig.yaml`, 95 kg without any friction.",
-        "Published by least squares: M = 95.11 kg, F_v = 203.5 N.s/m, F_c = 20.39 N, offset -3.165 N",
-        "(its sign is that of the motor's force: +3.165 N in our convention).",
+        "Published by least squares: M = 95.11 kg, F_v = 203.5 N.s/m, F_c = 20.39 N, offset",
+        "-3.165 N (of the motor's force: F_0 = +3.165 N in our convention).",
         "",
     ]
     lines += answered([log], "drive_rig", scratch)

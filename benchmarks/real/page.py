@@ -20,8 +20,8 @@ PAGE = Path(__file__).parents[2] / "docs" / "real-data.md"
 HEAD = """# Real data
 
 Written by `python -m benchmarks.real.page`; do not edit. Nobody here made these data, and the
-project does not keep them: `benchmarks/real/registry.yaml` names source, licence and SHA-256 of each
-file, `KEMBA_DATA` the folder with them. Sentences and tables are as the tool gives them.
+project does not keep them: `benchmarks/real/registry.yaml` names source, licence and SHA-256 of
+each file, `KEMBA_DATA` the folder with them. Sentences and tables are as the tool gives them.
 
 Errors of `discover` are held-out and whitened: 1 is what the most flexible model of the catalogue
 leaves. Errors of `characterise` are in units of the noise of the sensors.
