@@ -41,7 +41,8 @@ def schema_of(kind: str) -> type[BaseModel]:
 
 
 def kind_of(document: Document) -> str:
-    """The kind of a document: by its folder, else by the schema that shares most keys with it.
+    """The kind of a document: by its folder, else by the schema that shares most keys with it, of
+    several the one with the fewest other keys.
 
     Raises KembaError where it shares no key with any schema.
     """
@@ -49,9 +50,9 @@ def kind_of(document: Document) -> str:
     if folder in SCHEMAS:
         return folder
     keys: set[Any] = set(document.data if isinstance(document.data, dict) else ())
-    shared = {kind: len(keys & set(schema_of(kind).model_fields)) for kind in SCHEMAS}
-    best = max(shared, key=lambda kind: shared[kind])
-    if not shared[best]:
+    known = {kind: set(schema_of(kind).model_fields) for kind in SCHEMAS}
+    best = max(SCHEMAS, key=lambda kind: (len(keys & known[kind]), -len(known[kind])))
+    if not keys & known[best]:
         expected = f"keys of one of these were expected: {', '.join(SCHEMAS)}"
         raise KembaError(document.source, "is no kind of file that kemba knows", expected)
     return best

@@ -83,7 +83,9 @@ def test_discover_looks_for_it(own: Path) -> None:
 def test_every_verb_takes_it(own: Path) -> None:
     for verb in app.registered_commands:
         assert verb.callback is not None
-        shown = kemba(verb.name or verb.callback.__name__, "--effects", "nowhere.py", "--json", "x", "y")
+        shown = kemba(
+            verb.name or verb.callback.__name__, "--effects", "nowhere.py", "--json", "x", "y"
+        )
         assert (shown.exit_code, "no-such" in shown.stderr) == (2, False)
         assert "nowhere.py" in shown.stderr, verb.callback.__name__
 

@@ -16,12 +16,12 @@ from kemba.identify.answer import Answer
 from kemba.identify.compare_logs import compare_logs
 from kemba.identify.discover import Discovery
 from kemba.identify.logs.reading import read_logs
-from kemba.logs import load_map
 from kemba.identify.workflow import discover_logs
 from kemba.learn.aim import Aim, Aimed
 from kemba.learn.correction import Correction, correction_from, write_correction
 from kemba.learn.flight import Flight, flight_of
 from kemba.learn.rounds import Past, entry, past_of
+from kemba.logs import load_map
 from kemba.model import Model, load_spec
 from kemba.ocp import Task, load_task, task_model
 from kemba.plant.execution.certificate import rest_after

@@ -6,10 +6,11 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from kemba.config import Document
+from kemba.config import Document, find_config
 from kemba.effects.mechanics.load import Payload
 from kemba.errors import KembaError
 from kemba.model import Model, load_model
+from kemba.model.changes import changed_effects
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.continuation.between import Origin
 from kemba.ocp.continued import continued, from_scratch
@@ -51,7 +52,7 @@ def plan(
     document = document or Document(task.model_dump())
     building = Stopwatch()
     with building.running():
-        built = task_model(task, model)
+        built = task_model(task, model, document)
         requirements = resolve(task, built, document)
         diagnostics = check_task(task, built, requirements, document)
         refused = refusal(diagnostics)
@@ -74,10 +75,26 @@ def plan(
     return from_scratch(found, failed) if failed else found
 
 
-def task_model(task: Task, name: str | Path | None = None) -> Model:
-    """The model of a task: its own unless `name` is given, with the task's supply and payload."""
-    extra = [Payload(m=task.payload)] if task.payload else []
+def task_model(
+    task: Task, name: str | Path | None = None, document: Document | None = None
+) -> Model:
+    """The model of a task: its own unless `name` is given, with the task's supply, payload and
+    changed effects. `document` gives the places of mistakes. Raises KembaError."""
+    if name is None and document is not None:
+        look_up(task, document)
+    extra = changed_effects(name or task.model, task.effects, document)
+    extra += [Payload(m=task.payload)] if task.payload else []
     return load_model(name or task.model, extra, task.supply)
+
+
+def look_up(task: Task, document: Document) -> None:
+    """Raise KembaError, at the line of the task, where it names a model that there is not."""
+    for key, name in (("model", task.model), ("plant", task.plant)):
+        try:
+            find_config(name, "models")
+        except KembaError as error:
+            what = f"{key}: '{name}' {error.what}"
+            raise document.error((key,), what, error.expected, error.hint) from None
 
 
 def check_feasible(
@@ -87,7 +104,7 @@ def check_feasible(
 
     Raises KembaError for wrong names and units, and for what certainly cannot be met.
     """
-    built = task_model(task, model)
+    built = task_model(task, model, document)
     requirements = resolve(task, built, document)
     refused = refusal(check_task(task, built, requirements, document))
     if refused is not None:

@@ -110,7 +110,7 @@ def _replayed(found: Plan, table: Trajectory) -> tuple[dict[str, Any], Trajector
     """
     task = found.task
     try:
-        plant = counterpart(task.model, task.payload, task.supply, task.plant)
+        plant = counterpart(task.model, task.payload, task.supply, task.plant, changes=task.effects)
         other = another_robot(task.model, task.plant)
         done = executions(found.model, found.trajectory, table, plant)
     except KembaError as error:  # a model that the simulator cannot execute still has its plan

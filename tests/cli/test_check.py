@@ -49,14 +49,34 @@ def test_a_bad_model_is_explained_on_stderr() -> None:
 
 
 def test_all_files_are_checked() -> None:
-    Path("log.csv").write_text("time [s],body/z [m]\n0,0.2\n0.5,0.3\n")
+    Path("air.csv").write_text("time [s],air/T [K]\n0,290\n0.5,291\n")
     Path("bad.csv").write_text("time [s],body/z [m]\n0,high\n")
-    done = run("check", "bad.csv", "log.csv", "kemba.yaml")
+    done = run("check", "bad.csv", "air.csv", "kemba.yaml")
     assert done.exit_code == 2
     assert done.stderr == "bad.csv:2:2: body/z [m]: 'high' is not a number\n"
     assert done.stdout == (
-        "log.csv: valid table: 2 rows, 1 columns, 0.5 s\nkemba.yaml: valid robot file\n"
+        "air.csv: valid table: 2 rows, 1 columns, 0.5 s\nkemba.yaml: valid robot file\n"
     )
+
+
+def test_column_maps_are_checked() -> None:
+    assert run("check", "authors.yaml").stdout == "authors.yaml: valid column map\n"
+    Path("map.yaml").write_text(
+        "columns:\n  time [s]: {source: t, scal: 2}\n  x [m]: {source: x}\n"
+    )
+    done = run("check", "map.yaml")
+    assert done.exit_code == 2
+    assert "map.yaml:2:25: columns.time [s].scal: unknown key" in done.stderr
+    Path("map.yaml").write_text("columns:\n  x [m]: {source: x}\n  y [m]: {source: y}\n")
+    assert "'time [s]' is not mapped" in run("check", "map.yaml").stderr
+
+
+def test_a_plan_is_a_table_and_no_log() -> None:
+    """It has no torques, say, and nobody will compare it."""
+    Path("plan.csv").write_text("time [s],body/z [m]\n0,0.2\n0.5,0.3\n")
+    assert "plan.csv: needs the column 'body/x'" in run("check", "plan.csv").stderr
+    Path("manifest.json").write_text("{}")
+    assert run("check", "plan.csv").stdout == "plan.csv: valid table: 2 rows, 1 columns, 0.5 s\n"
 
 
 def test_json_is_one_object() -> None:
@@ -80,3 +100,6 @@ def test_schemas_for_editors() -> None:
     )
     assert run("schema", "--out", "schemas").exit_code == 0
     assert json.loads(Path("schemas/models.schema.json").read_text())["title"] == "ModelSpec"
+    again = run("schema", "--out", "schemas")
+    assert again.exit_code == 2 and "exists already; give another name, or --force" in again.stderr
+    assert run("schema", "--out", "schemas", "--force").exit_code == 0

@@ -63,6 +63,20 @@ def test_a_report_holds_the_whole_run(run: Path) -> None:
     assert "SHA-256" in page.text and "casadi" in page.text
 
 
+@pytest.mark.parametrize("verb", ["report", "view"])
+def test_pages_are_kept(verb: str, run: Path) -> None:
+    first = Path(call(verb, str(run)).stdout.strip())
+    first.write_text("mine")
+    second = Path(call(verb, str(run)).stdout.strip())
+    assert second != first and first.read_text() == "mine"
+    refused = call(verb, str(run), "--out", str(second))
+    assert (
+        refused.exit_code == 2 and "exists already; give another name, or --force" in refused.stderr
+    )
+    assert call(verb, str(run), "--out", str(first), "--force").exit_code == 0
+    assert first.read_text() != "mine"
+
+
 def test_a_report_needs_a_run(tmp_path: Path) -> None:
     done = call("report", str(tmp_path))
     assert done.exit_code == 2 and "is not a run folder" in done.stderr
@@ -124,7 +138,6 @@ def test_another_programs_columns_come_back(run: Path, tmp_path: Path) -> None:
     np.testing.assert_allclose(again["rear/hip/q"], plan["rear/hip/q"], atol=1e-12)
     lag = np.gradient(plan["body/pitch"], plan.time)
     assert np.abs(again["body/pitch"] - plan["body/pitch"]).max() <= 4e-3 * np.abs(lag).max() + 1e-9
-    assert call("check", str(out), "--map", str(tmp_path / "other.yaml")).exit_code == 0
     figure = tmp_path / "foreign.png"
     drawn = ("plot", str(out), "--map", str(tmp_path / "other.yaml"), "--save", str(figure))
     assert call(*drawn).exit_code == 0 and figure.is_file()

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from kemba_cli.common import Json, OwnEffects, Quiet, print_json, say
+from kemba_cli.common import Force, Json, OwnEffects, Quiet, print_json, say
 
 if TYPE_CHECKING:
     from kemba.ocp import Task
@@ -46,6 +46,7 @@ def solve(
     jobs: Annotated[int | None, typer.Option(min=1, help="Starts at a time.")] = None,
     replay: Annotated[bool, typer.Option(help="Execute the plan in simulation.")] = True,
     figure: Annotated[bool, typer.Option(help="Draw the plan.")] = True,
+    force: Force = False,
     own_effects: OwnEffects = None,
     json: Json = False,
     quiet: Quiet = False,
@@ -89,7 +90,7 @@ def solve(
         _dry_run(resolved, document, model, json)
         return
     resolved = resolved.model_copy(update={"model": beside(model or resolved.model, Path())})
-    built = task_model(resolved)
+    built = task_model(resolved, document=document)
     resolve(resolved, built, document)
     if built.ignored:
         say(f"no plan can use {', '.join(built.ignored)}: it changes what is measured only", quiet)
@@ -97,7 +98,7 @@ def solve(
         say(remark, quiet)
     models = [path for name in (resolved.model, resolved.plant) for path in model_files(name)]
     inputs = [find_config(task, "tasks"), *dict.fromkeys(models), *BY_KIND.files]
-    folder = RunFolder.create(out, resolved.name, inputs)
+    folder = RunFolder.create(out, resolved.name, inputs, force=force)
     with Progress(quiet or json) as progress, Interrupt(lambda text: say(text, quiet)) as stop:
         listener = Listener(progress.tell, progress.watch, stop)
         answer = solve_into(

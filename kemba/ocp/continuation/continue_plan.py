@@ -22,7 +22,6 @@ from kemba.ocp.phases.notes import noted_phases
 from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.radau import RADAU5
 from kemba.ocp.phases.settings import Elements
-from kemba.ocp.transcription.unilateral import read_constraints
 from kemba.ocp.refinement.refine import Refined, Refiner, reduction_of, refine, valve_columns
 from kemba.ocp.refinement.sample import certificate, to_trajectory
 from kemba.ocp.refinement.solve import solve, warm
@@ -30,6 +29,7 @@ from kemba.ocp.relaxation.session import Attempt
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.symmetry import Reduction
+from kemba.ocp.transcription.unilateral import read_constraints
 from kemba.settings import Settings, setting
 from kemba.trajectory import Trajectory
 

@@ -124,6 +124,8 @@ class Task(Section):
     quantities to values; `rest: true` there means that all rates are zero,
     `settled: true` that every state of an effect is at its value at rest. `hold`: for so long
     before the plan the controller keeps the first pose, valves closed, so that the robot settles.
+    `effects` changes parameters of the model's effects, by name or by place in its list:
+    `{contact: {mu: 0.6}}`.
     `robust`: by how many scenarios, drawn from the file `uncertainties`, plans are chosen.
     """
 
@@ -134,6 +136,7 @@ class Task(Section):
     height: Annotated[float, Param("m", lower=0.0, doc="of the body's centre")] | None = None
     distance: Annotated[float, Param("m", doc="forward")] | None = None
     supply: Supply | None = None
+    effects: dict[str, dict[str, Any]] = Field(default_factory=dict)
     payload: Annotated[float, Param("kg", lower=0.0, doc="at the body's centre")] = 0.0
     clearance: Annotated[float, Param("m", lower=0.0, doc="of the feet in flight")] | None = None
     landing: Landing = Field(default_factory=Landing)

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 from kemba.effects import Effect
 from kemba.effects.catalogue import CHAMBERS
 from kemba.effects.mechanics.load import Payload
 from kemba.mechanism import load_robot
 from kemba.model import Model, build_model, load_spec
+from kemba.model.changes import changed_effects
 from kemba.model.spec import own_robot
 
 PLAIN = "planning"
@@ -18,17 +22,19 @@ def counterpart(
     supply: float | None = None,
     plant: str = "plant",
     own_effects: bool = True,
+    changes: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> Model:
     """The model YAML `plant` on the robot of the planning model `model`, with its own effects.
 
     A plant whose own file names a robot keeps that one. Own effects are those of `model` that the
     shipped planning model lacks, except those of the air and those that the plant itself
-    describes; `own_effects` False leaves them all out. `payload` [kg] and
-    `supply` [Pa] are the task's. Raises KembaError as `load_model` does.
+    describes; `own_effects` False leaves them all out. `payload` [kg],
+    `supply` [Pa] and `changes` of effects are the task's. Raises KembaError as `load_model` does.
     """
     spec, own = load_spec(plant), load_spec(model)
     plain: list[Effect] = [*load_spec(PLAIN).effects]
-    mine: list[Effect] = [e for e in own.effects if e not in plain]
+    named = {e.name: e for e in (*own.effects, *changed_effects(model, changes or {}))}
+    mine: list[Effect] = [e for e in named.values() if e not in plain]
     theirs: list[Effect] = [e for e in spec.effects if e not in plain]
     theirs += [e for make in CHAMBERS.values() for e in make()]
     fixed = {e.name for e in theirs}

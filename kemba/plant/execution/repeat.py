@@ -106,4 +106,5 @@ def plant_of(run: str | Path, name: str | None = None) -> Model:
         None if supply is None else to_si(supply, "Pa"),
         name or own,
         own_effects=name in (None, own),
+        changes=task.get("effects"),
     )

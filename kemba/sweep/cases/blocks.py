@@ -52,7 +52,7 @@ def _solve_cases(expansion: Expansion, name: str, block: SolveBlock) -> list[Cas
         task = parse_task(document)
         task = task.model_copy(update={"model": model_name(expansion, block.model or task.model)})
         if index == 0:  # names of quantities are the same in all
-            resolve(task, task_model(task), document)
+            resolve(task, task_model(task, document=document), document)
         work: dict[str, Any] = {
             "task": task.model_dump(exclude_none=True),
             "model": model_hash(task.model),

@@ -1,0 +1,58 @@
+"""Parameters of a model's effects that a task changes: `effects: {contact: {mu: 0.6}}`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from kemba.config import Document, parse
+from kemba.effects import Effect
+from kemba.errors import suggest
+from kemba.model.spec import load_spec
+
+Changes = Mapping[str, Mapping[str, Any]]
+
+
+def changed_effects(
+    model: str | Path, changes: Changes, document: Document | None = None
+) -> list[Effect]:
+    """The effects of the model YAML `model` that `changes` names, with their parameters changed.
+
+    A key of `changes` is the name of an effect (`contact`, `valve_delay:front`) or its place in
+    the model's list, from 0, with those of its bases first. `document`: the task, whose places
+    are named in messages. Raises KembaError where there is no such effect, and ConfigErrors with
+    every wrong parameter.
+    """
+    if not changes:
+        return []
+    source = document or Document({"effects": dict(changes)})
+    listed = load_spec(model).effects
+    found: dict[str, Effect] = {}
+    for key, values in changes.items():
+        effect = _named(listed, key, str(model), source)
+        effect = found.get(effect.name, effect)
+        found[effect.name] = parse(_part(source, key, effect, values), type(effect))
+    return list(found.values())
+
+
+def _named(listed: tuple[Effect, ...], key: str, model: str, source: Document) -> Effect:
+    """The effect of a list by its name or place."""
+    if key.isdigit() and int(key) < len(listed):
+        return listed[int(key)]
+    found = [effect for effect in listed if effect.name == key]
+    if found:
+        return found[0]
+    names = [effect.name for effect in listed]
+    what = f"effects: the model '{model}' has no effect '{key}'"
+    expected = f"0 to {len(names) - 1}, or a name on its list, was expected"
+    raise source.error(("effects", key), what, expected, suggest(key, names))
+
+
+def _part(source: Document, key: str, effect: Effect, values: Mapping[str, Any]) -> Document:
+    """One changed effect as a document of its own; its parts keep their places in the task."""
+    at = ("effects", key)
+    kept = {p[2:]: mark for p, mark in source.marks.items() if p[:2] == at}
+    told = {p[2:]: text for p, text in source.overrides.items() if p[:2] == at}
+    data = {**effect.model_dump(exclude_unset=True), "kind": effect.kind, **values}
+    return Document(data, source.source, source.lines, kept, told)

@@ -1,0 +1,113 @@
+"""Columns of robot logs with a wrong sign or zero are named, whatever the motion."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kemba.identify.robot.dynamics.physics import Array, Physics
+from kemba.identify.robot.mix_ups import mix_ups, mixed_up
+from kemba.identify.robot.motion.resampled import ResampledLog
+from kemba.model.spec import load_model
+
+Change = Callable[[Array], Array]
+PITCH, QUARTER = 0.15, np.pi / 2
+
+
+@pytest.fixture(scope="module")
+def physics() -> Physics:
+    return Physics(load_model("planning"), ())
+
+
+@pytest.fixture(scope="module")
+def standing(physics: Physics) -> ResampledLog:
+    """The body leans, rises and moves ahead over feet that stand still."""
+    time = np.arange(0.0, 0.8, 1e-3)
+    wave = np.sin(2 * np.pi * time[::20] / 0.8)
+    start = [0.0, 0.0, 0.0, 0.5, -0.5, *physics.knees(np.full((1, 2), 0.035))[0]]
+    q = np.tile(start, (len(wave), 1))
+    goal = physics.call("feet", q[:1], 0 * q[:1])[0]
+    height = -goal[0, 1]
+    goal[0, 1::2] = 0.0
+    q[:, :3] = np.stack([0.03 * wave, height + 0.01 * wave, PITCH * wave], axis=1)
+    for _ in range(40):  # Newton's method on the places of the feet
+        feet, _, slope = physics.call("feet", q, 0 * q)
+        step = np.linalg.solve(slope[:, :, 3:], (feet - goal)[:, :, None])[:, :, 0]
+        q[:, 3:] -= np.clip(step, -0.1, 0.1)
+    feet = physics.call("feet", q, 0 * q)[0]
+    assert np.abs(feet - goal).max() < 1e-6
+    y = physics.call("measured", q, 0 * q)[0]
+    fine = np.stack([np.interp(time, time[::20], column) for column in y.T], axis=1)
+    noise = 2e-4 * np.random.default_rng(0).standard_normal(fine.shape)
+    return ResampledLog("leans", time, fine + noise, np.zeros((800, 2)), (), np.full(7, 2e-4))
+
+
+def changed(
+    log: ResampledLog, physics: Physics, **changes: Callable[[Array], Array]
+) -> ResampledLog:
+    y = log.y.copy()
+    for i, name in enumerate(physics.channels):
+        for end, change in changes.items():
+            if name.endswith(end.replace("__", "/")):
+                y[:, i] = change(y[:, i])
+    return replace(log, y=y)
+
+
+MISTAKES: dict[str, tuple[dict[str, Change], str]] = {
+    "pitch": ({"pitch": np.negative}, "body/pitch has the reversed sign"),
+    "degrees": ({"pitch": np.degrees}, "body/pitch is in degrees"),
+    "backwards": ({"body__x": np.negative}, "body/x has the reversed sign"),
+    "zero": (
+        {"hip__q": lambda q: q + QUARTER},
+        r"hip/q of every leg counts from another zero \(\+90 degrees",
+    ),
+    "one zero": (
+        {"rear__hip__q": lambda q: q - QUARTER},
+        r"hip/q of the rear leg counts from another zero \(-90 degrees",
+    ),
+    "hips": ({"hip__q": np.negative}, "hip/q of every leg has the reversed sign"),
+    "end": (
+        {"front__piston__x": lambda x: 0.07 - x},
+        "piston/x of the front leg counts from the extended end",
+    ),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_is_named(mistake: str, physics: Physics, standing: ResampledLog) -> None:
+    changes, words = MISTAKES[mistake]
+    (fault,) = mixed_up(physics, changed(standing, physics, **changes))
+    assert re.search(words, str(fault)), str(fault)
+
+
+def test_what_is_right_is_left_alone(physics: Physics, standing: ResampledLog) -> None:
+    assert not list(mixed_up(physics, standing))
+
+
+def test_faults_of_sensors_are_not_taken_for_mistakes(
+    physics: Physics, standing: ResampledLog
+) -> None:
+    """These are for `discover` to find."""
+    for changes in (
+        {"body__z": lambda z: z - 0.02},
+        {"hip__q": lambda q: 1.05 * q},
+        {"pitch": lambda p: p + 0.03},
+        {"piston__x": lambda x: np.roll(x, 5)},
+    ):
+        assert not list(mixed_up(physics, changed(standing, physics, **changes)))
+
+
+def test_a_flight_tells_nothing(physics: Physics, standing: ResampledLog) -> None:
+    falling = standing.y.copy()
+    falling[:, 1] += 3.0 - 4.905 * standing.time**2
+    turned = replace(changed(standing, physics, pitch=np.negative), y=falling)
+    assert not list(mixed_up(physics, turned))
+
+
+def test_one_leg_is_not_told_twice() -> None:
+    texts = [text for text, _ in mix_ups(("leg",), 0.07)]
+    assert len(texts) == len(set(texts)) and not any("every leg" in text for text in texts)
