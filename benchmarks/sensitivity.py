@@ -7,8 +7,8 @@
 
 `discover` and `compare`: cases of the blind studies, made by the twin in tests/twin. `schedule`:
 shipped tasks. Only settings marked `decides` are changed, one at a time. A case is run again from
-the first stage on that reads the setting; where no stage reads it, nothing can change and nothing is
-run. Results are kept in the file, so an interrupted study goes on where it stopped; later lines
+the first stage on that reads the setting; where no stage reads it, nothing can change and nothing
+is run. Results are kept in the file, so an interrupted study goes on where it stopped; later lines
 replace earlier ones. Its parts may run at the same time.
 """
 

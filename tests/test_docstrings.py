@@ -13,7 +13,7 @@ import kemba
 ROOT = Path(kemba.__file__).parent
 ARRAY = re.compile(r"\b(Array|ndarray|Flags|Labels)\b")
 SHAPE = re.compile(r"\([^()]*,[^()]*\)|\((n|m|k)\)|\[\w")  # (n, 3), (n,), (n) or `values[i]`
-FEW = 0.03  # share of functions that may be forgotten
+FEW = 0.05  # share of functions that may be forgotten
 
 
 @dataclass(frozen=True)

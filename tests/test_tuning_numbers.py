@@ -23,7 +23,7 @@ DRAWN = (
 )  # lengths, colours and speeds of pictures
 
 # Numbers that may stand at a module's top level, and why.
-CONSTANTS: dict[str, tuple[str, str]] = {  # file -> names, why
+CONSTANTS = {  # file -> names, why
     # physics
     "effects/pneumatics/constants.py": ("ATMOSPHERE KAPPA GAS TEMPERATURE", "constants of air"),
     "effects/pneumatics/flow.py": (
@@ -53,7 +53,27 @@ CONSTANTS: dict[str, tuple[str, str]] = {  # file -> names, why
     "plant/execution/repeat.py": ("VALVE_SCATTER", "scatter of the robot's valves"),
     "plant/execution/controller.py": ("PERIOD", "rate of the robot's controller"),
     "ocp/controller.py": ("PERIOD", "rate of the robot's controller"),
+    "effects/rigs/axis.py": ("PLATE", "tolerance of an effect's figures"),
+    "effects/mechanics/geometry.py": ("SIZES", "sizes of an effect's parameters"),
+    "mechanism/own_rigs.py": ("GRAVITY", "of the earth"),
     # formulas and formats
+    "logs/formats/mcap.py": ("NS", "nanoseconds of a second"),
+    "logs/draft/ranges.py": (
+        "LENGTH STROKE ANGLE PRESSURE STEP STAMPED ABSOLUTE",
+        "readings by which units are guessed",
+    ),
+    "logs/draft/layout.py": ("LINES", "lines of a table that are looked at"),
+    "ocp/transcription/stage.py": ("ANGLE_ARM COST_SCALE AIM", "units of moments and costs"),
+    "ocp/task/requirement.py": ("SCALES MOMENTS FLIGHT ROUND", "moments of a task; units"),
+    "contract/cases.py": ("OWN_RIGS", "figures of example rigs"),
+    # tuning numbers that are to become settings
+    "policy/course.py": ("CLOSING BESIDE PASSES", "how impacts are read"),
+    "identify/robot/dynamics/physics.py": ("FOLDED", "how far a knee folds at most"),
+    "learn/round.py": ("SUPPLY", "of a model that names none"),
+    "identify/rigs/filtering.py": ("GAIN", "a Gaussian's cut"),
+    "logs/draft/matching.py": ("NOTHING", "what a name that says something else scores"),
+    "ocp/certificate/grazing.py": ("LASTS TOUCHES", "as in plant/execution/replay.py"),
+    "plant/execution/impacts.py": ("SLOW", "slower impacts are not told"),
     "plant/kernel/settings.py": ("GAMMA", "coefficient of the integration scheme"),
     "ocp/phases/radau.py": ("RADAU3 _R RADAU5", "coefficients of the integration schemes"),
     "identify/bench/rig_model.py": ("V_NODES V_MIDDLE", "nodes of a Gauss-Hermite formula"),
@@ -61,11 +81,6 @@ CONSTANTS: dict[str, tuple[str, str]] = {  # file -> names, why
     "identify/robot/force_channels.py": ("BODY", "places of channels among the coordinates"),
     "ocp/functions/constants.py": ("SHAPING", "numbers that CasADi simplifies"),
     "ocp/transcription/layout.py": ("STEP", "unit of steps, shared by all grids"),
-    "ocp/transcription/stage.py": ("ANGLE_ARM COST_SCALE", "units of moments and costs"),
-    "ocp/task/requirement.py": (
-        "SCALES MOMENTS",
-        "moments of a task; units",
-    ),
     "ocp/phases/modes.py": ("OPEN HELD AHEAD BACK", "names of modes"),
     "plant/kernel/play.py": ("DONE FULL ASK EXPLODED BURIED", "names of endings"),
     "plant/kernel/events.py": ("FREE TOUCHED TOO_LONG", "names of endings"),

@@ -87,7 +87,8 @@ def right(record: Record) -> bool:
 def among_first(record: Record, count: int) -> bool:
     """Whether something was found missing and a hidden effect is among the first so many."""
     first = [r["effect"] for r in record["answer"]["ranking"][:count]]
-    return record["answer"]["verdict"] == "missing" and bool(set(first) & set(hidden(record)))
+    found = record["answer"]["verdict"] in ("missing", "partly")
+    return found and bool(set(first) & set(hidden(record)))
 
 
 def sure_and_wrong(record: Record) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -13,10 +13,13 @@ import numpy as np
 
 from kemba.effects import Effect
 from kemba.effects.catalogue import PHYSICAL
+from kemba.effects.pneumatics.gas import GasTemperature
 from kemba.effects.registry import kind_of
 from kemba.effects.sensors import SensorEffect
 from kemba.errors import KembaError
+from kemba.mechanism.own_rigs import CylinderRig, DriveRig, Load, VesselRig
 from kemba.model import Model, load_spec
+from kemba.model.own_rig import own_model
 from kemba.model.spec import build_model
 
 Array = np.ndarray
@@ -32,6 +35,14 @@ REQUIRED: dict[str, dict[str, Any]] = {
     },
     "geometry": {"part": "femur/length"},
 }
+
+
+# a pendulum, so that every figure of a drive matters
+OWN_RIGS = (
+    CylinderRig(bore=0.025, rod=0.010, stroke=0.070),
+    DriveRig(motion="rotary", inertia=0.5, load=Load(mass=1.0, arm=0.2)),
+    VesselRig(volume=0.016, orifice=2.7e-3),
+)
 
 
 class Broken(Exception):  # noqa: N818  a promise that is not kept, no fault of this program
@@ -58,25 +69,34 @@ def example(effect: type[Effect]) -> Effect:
 
 
 def model_of(*effects: Effect, rig: bool = False) -> Model:
-    """The planning model with `effects`; with orifice chambers where they are needed.
+    """The first machine on which `effects` stand, with them: the planning model, the same with
+    orifice chambers, with air that has a temperature, then a cylinder, a drive, a vessel.
 
-    `rig`: the model of the bench piston. Raises KembaError when the effects fit in neither.
+    `rig`: the bench piston in the place of the robot. Raises KembaError when none suits.
     """
-    spec = load_spec("planning")
-    physical = build_model(spec.model_copy(update={"chambers": "orifice"}), rig=rig)
-    if any(isinstance(effect, PHYSICAL) for effect in effects):
-        return physical.with_effects(effects)
-    model = build_model(spec, rig=rig).with_effects(effects)
-    try:
-        _ = model.node
-    except KembaError as error:
+    physical = any(isinstance(effect, PHYSICAL) for effect in effects)
+    first: KembaError | None = None
+    for machine in _machines(rig, physical):
         try:
-            other = physical.with_effects(effects)
-            _ = other.node
-        except KembaError:
-            raise error from None
-        return other
-    return model
+            model = machine().with_effects(effects)
+            _ = model.node
+        except KembaError as error:
+            first = first or error
+        else:
+            return model
+    assert first is not None
+    raise first
+
+
+def _machines(rig: bool, physical: bool) -> Iterator[Callable[[], Model]]:
+    spec = load_spec("planning")
+    orifice = spec.model_copy(update={"chambers": "orifice"})
+    if not physical:
+        yield lambda: build_model(spec, rig=rig)
+    yield lambda: build_model(orifice, rig=rig)
+    yield lambda: build_model(orifice, [GasTemperature()], rig=rig)
+    for own in OWN_RIGS:
+        yield lambda own=own: own_model(own)  # type: ignore[misc]
 
 
 def without(model: Model, name: str) -> Model:
@@ -140,7 +160,7 @@ def points(model: Model, count: int = 6, seed: int = 1) -> Iterator[Point]:
     for i in range(count):
         border = i < 3
         q = stand + (0.0 if border else 1.0) * 0.02 * rng.standard_normal(n)
-        if mechanism.imposed:
+        if mechanism.imposed and not mechanism.rig:
             q = np.array([[0.0], [mechanism.stroke], [0.5 * mechanism.stroke]][min(i, 2)])
         yield {
             "q": q,

@@ -10,6 +10,7 @@ from pathlib import Path
 from kemba.contract import measuring, physics, words
 from kemba.contract.cases import Broken, Placed
 from kemba.effects import Effect
+from kemba.effects.catalogue import DRIVE, OWN_RIGS
 from kemba.effects.registry import kind_of
 from kemba.errors import KembaError
 
@@ -25,7 +26,7 @@ def _switched(effect: type[Effect]) -> bool:
 
 
 def _on_one_leg(effect: type[Effect]) -> bool:
-    return bool(effect.off) and effect.place == "leg"
+    return bool(effect.off) and _on_legs(effect)
 
 
 def _dissipative(effect: type[Effect]) -> bool:
@@ -33,7 +34,7 @@ def _dissipative(effect: type[Effect]) -> bool:
 
 
 def _on_legs(effect: type[Effect]) -> bool:
-    return effect.place == "leg"
+    return effect.place == "leg" and effect not in (*DRIVE, *OWN_RIGS)
 
 
 @dataclass(frozen=True)

@@ -98,6 +98,10 @@ class At(Protocol):
     def legs(self) -> list[At]:
         """Every leg, as its own effects see it (for effects of the whole robot)."""
 
+    @property
+    def sense(self) -> Any:
+        """Direction in which the piston's seals slide, from -1 to 1."""
+
     def standing(self, name: str) -> float:
         """Value of a coordinate of this place in the standing pose, pistons retracted."""
 

@@ -5,23 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from kemba.effects.base import Effect
-from kemba.effects.drive.axis import (
-    AxisLag,
-    AxisOffset,
-    AxisScale,
-    Cogging,
-    DriveAxis,
-    ExtraInertia,
-)
-from kemba.effects.drive.friction import (
-    AxisDamping,
-    AxisDirection,
-    AxisFriction,
-    AxisOneWay,
-    AxisStribeck,
-    GearFriction,
-    Presliding,
-)
 from kemba.effects.expression import Expression
 from kemba.effects.mechanics.boom import Boom
 from kemba.effects.mechanics.boom_faults import (
@@ -57,13 +40,30 @@ from kemba.effects.pneumatics.chamber import Chamber
 from kemba.effects.pneumatics.damping import ModeDamping
 from kemba.effects.pneumatics.gas import GasTemperature, VesselChamber, WallHeat
 from kemba.effects.pneumatics.hose import BothModeLoss, CrossLeak, HoseLag
-from kemba.effects.pneumatics.measured import MeasuredChambers
 from kemba.effects.pneumatics.orifice import OrificeChamber
 from kemba.effects.pneumatics.supply import RiseTimeScale, SupplyDroop, SupplyScale
 from kemba.effects.pneumatics.supply_line import SupplyLine
 from kemba.effects.pneumatics.timing import ValveCloseDelay, ValveDelay
 from kemba.effects.pneumatics.valve import Valve
 from kemba.effects.registry import Registry
+from kemba.effects.rigs.axis import (
+    AxisLag,
+    AxisOffset,
+    AxisScale,
+    Cogging,
+    DriveAxis,
+    ExtraInertia,
+)
+from kemba.effects.rigs.chambers import MeasuredChambers
+from kemba.effects.rigs.friction import (
+    AxisDamping,
+    AxisDirection,
+    AxisFriction,
+    AxisOneWay,
+    AxisStribeck,
+    GearFriction,
+    Presliding,
+)
 from kemba.effects.sensors import SensorBias, SensorDelay, SensorScale
 from kemba.errors import KembaError
 

@@ -10,7 +10,17 @@ import numpy as np
 
 from kemba.identify.settings import DiscoverSettings
 
-Verdict = Literal["missing", "nothing", "unknown", "bad-data"]
+Verdict = Literal["missing", "partly", "nothing", "unknown", "bad-data"]
+
+PROBABILITY = (
+    "The probability of an effect is that of its being among the missing ones. Several effects can "
+    "be missing at once, so that the probabilities need not add up to 100 %."
+)
+
+
+def excess(error: float) -> float:
+    """The part of an error, in units of the noise, that noise does not make."""
+    return float(np.sqrt(max(error**2 - 1.0, 0.0)))
 
 
 @dataclass(frozen=True)
@@ -45,7 +55,12 @@ class Ranked:
 
 @dataclass
 class Answer:
-    """What `discover` answers; `json()` is its machine-readable form."""
+    """What `discover` answers; `json()` is its machine-readable form.
+
+    Errors are of data that the fit has not seen, in units of the noise; `ranking`, `ladder` and
+    sentence show the same number. `added`: what `model` has; with the verdict `partly` only what is
+    sure. `rest`: where the error sits that is left; `next`: what to measure to learn more of it.
+    """
 
     verdict: Verdict
     p_value_nothing: float = float("nan")
@@ -62,9 +77,24 @@ class Answer:
     runtime_s: float = 0.0
     remarks: Sequence[str] = ()
     ladder: Sequence[tuple[str, float]] = ()  # step, held-out error
+    rest: str = ""
+    next: str = ""
+    found: tuple[str, ...] = ()  # effects of the best answer, sure or not
+
+    @property
+    def excess_before(self) -> float:
+        """Error beyond the noise of the model as it is."""
+        return excess(self.error_before)
+
+    @property
+    def excess_after(self) -> float:
+        """Error beyond the noise that the best answer leaves."""
+        return excess(self.error_after)
 
     def json(self) -> dict[str, Any]:
-        return asdict(self)
+        """The object that `--json` prints."""
+        more = {"excess_before": self.excess_before, "excess_after": self.excess_after}
+        return {**asdict(self), **more, "probabilities": PROBABILITY}
 
 
 def phrase(answer: Answer) -> str:
@@ -81,6 +111,8 @@ def phrase(answer: Answer) -> str:
         more = f" A formula that fits: {answer.formula}." if answer.formula else ""
         why = f": {answer.remarks[0]}" if answer.remarks else ""
         return f"Something is missing that no effect of the catalogue explains{why}.{more}"
+    if answer.verdict == "partly":
+        return _partly(answer)
     parts = [r for r in answer.ranking if r.effect in answer.added]
     named = " and ".join(_named(r) for r in parts)
     before, after = f"{answer.error_before:.2f}", f"{answer.error_after:.2f}"
@@ -88,6 +120,27 @@ def phrase(answer: Answer) -> str:
     if float(after) >= float(before):
         falls = f"was {before} and is {after}"
     return f"Missing: {named}; the held-out error {falls} times the noise.{_doubt(parts)}"
+
+
+def _partly(answer: Answer) -> str:
+    """What is sure, what is likely, how much of the error it explains, and where the rest sits."""
+    sure = [r for r in answer.ranking if r.effect in answer.added]
+    unsure = set(answer.found) - set(answer.added)
+    likely = [r for r in answer.ranking if r.effect in unsure]
+    parts = []
+    if sure:
+        parts.append(f"Missing, among others: {' and '.join(map(_named, sure))}.")
+    if likely:
+        parts.append(f"Likely, but not sure: {' and '.join(map(_named, likely))}.{_doubt(likely)}")
+    share = 1.0 - answer.excess_after / max(answer.excess_before, 1e-9)
+    before, after = f"{answer.error_before:.2f}", f"{answer.error_after:.2f}"
+    parts.append(
+        f"Together they explain {100 * max(share, 0.0):.0f} % of the error beyond the noise (the "
+        f"held-out error goes from {before} to {after} times the noise)."
+    )
+    parts += [f"Still unexplained: {answer.rest}." if answer.rest else ""]
+    parts += [f"Next: {answer.next}." if answer.next else ""]
+    return " ".join(part for part in parts if part)
 
 
 def _named(ranked: Ranked) -> str:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kemba.identify.answer import Answer, Ranked, phrase
+from kemba.identify.answer import Answer, Ranked, Verdict, excess, phrase
 from kemba.identify.doubt.cross_validation import left_out
 from kemba.identify.doubt.run_consistency import Drift, drifting
 from kemba.identify.doubt.unexplained import Formula, look, unfinished
@@ -18,7 +18,8 @@ from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
 from kemba.identify.problem.problem import Problem
 from kemba.identify.ranking import error, ladder, ranked, strength
-from kemba.identify.settings import DiscoverSettings
+from kemba.identify.rest import rest_of
+from kemba.identify.settings import DiscoverSettings, VerdictSettings
 
 Talk = Callable[[str], None]
 
@@ -31,6 +32,14 @@ class Discovery:
     search: Search
     best: Hypothesis
     holdout: Problem | None = None
+
+
+@dataclass(frozen=True)
+class Doubts:
+    """Why an answer is not complete. `part`: it explains enough of the error to be a part."""
+
+    reasons: tuple[str, ...] = ()
+    part: bool = False
 
 
 def discover(
@@ -61,7 +70,7 @@ def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> 
     drift = drifting(search, best)
     if drift is not None and formula is not None and drift.nats > formula.gain:
         formula = None
-    doubts = [] if formula else doubts_about(search, best, drift, holdout)
+    doubts = Doubts() if formula else doubts_about(search, best, drift, holdout)
     ranking = ranked(search, best, dismissed, holdout)
     answer = _answer(search, best, p_value, test, ranking, formula, holdout, doubts)
     return Discovery(answer, search, best, holdout)
@@ -101,7 +110,8 @@ def _believed(
             continue
         smaller = [h for h in search.points if len(h) == len(best) - 1 and set(h) < set(best)]
         against = max(smaller, key=lambda h: search.points[h].log_evidence, default=NULL)
-        if not left_out(search, best, against).refuted:
+        gain = left_out(search, best, against)
+        if not gain.refuted and (len(best) == 1 or gain.pays):
             return best, p_value, dismissed
         dismissed.add(best)
         best = against
@@ -125,19 +135,35 @@ def material(search: Search, hypothesis: Hypothesis) -> Hypothesis:
 
 def doubts_about(
     search: Search, best: Hypothesis, drift: Drift | None, holdout: Problem | None
-) -> list[str]:
-    """Why the best answer cannot be complete."""
-    settings = DiscoverSettings.current()
+) -> Doubts:
+    """Why the best answer cannot be complete, and whether it is a part of one."""
+    settings, reasons = VerdictSettings.current(), []
     if drift is not None:
-        return [str(drift)]
-    if unfinished(search, best):
-        return ["the error that is left repeats itself with motion and valves"]
+        reasons.append(str(drift))
+    elif unfinished(search, best):
+        reasons.append("the error that is left repeats itself with motion and valves")
     before, after = (error(search, h, holdout) for h in (NULL, best))
-    if best and after > max(settings.unexplained, settings.left * before):
-        return [
+    least = settings.part_of_structure if reasons else settings.part
+    if best and after > settings.whole and excess(after) > settings.whole_share * excess(before):
+        reasons.append(
             f"{' and '.join(best)} fits best, but leaves an error of {after:.3g} times the noise"
-        ]
-    return []
+        )
+    part = bool(best) and excess(after) <= (1.0 - least) * excess(before)
+    return Doubts(tuple(reasons), part)
+
+
+def verdict_on(best: Hypothesis, formula: Formula | None, doubts: Doubts) -> Verdict:
+    """Missing, where the answer is complete; partly, where it explains enough of the error."""
+    if formula is not None or (doubts.reasons and not doubts.part):
+        return "unknown"
+    if not best:
+        return "nothing"
+    return "partly" if doubts.reasons else "missing"
+
+
+def is_sure(ranked: Ranked) -> bool:
+    """Whether an effect is likely enough to be added to a model, and nothing could stand for it."""
+    return ranked.probability >= VerdictSettings.current().sure and not ranked.equivalent_to
 
 
 def _answer(
@@ -148,19 +174,23 @@ def _answer(
     ranking: Sequence[Ranked],
     formula: Formula | None,
     holdout: Problem | None,
-    doubts: Sequence[str] = (),
+    doubts: Doubts,
 ) -> Answer:
     problem = search.problem
     before = error(search, NULL, holdout)
     after = error(search, best, holdout) if best else before
-    verdict = "unknown" if formula or doubts else "missing" if best else "nothing"
+    verdict = verdict_on(best, formula, doubts)
+    named = tuple(r.effect for r in ranking if r.effect in best)
+    sure = tuple(r.effect for r in ranking if r.effect in named and is_sure(r))
+    added = {"missing": named, "partly": sure}.get(verdict, ())
     ranker = search.base.ranker(search.points[NULL].linear)
     sizes = smallest_detectable(ranker, test.threshold)
     answer = Answer(
-        verdict=verdict,  # type: ignore[arg-type]
+        verdict=verdict,
         p_value_nothing=p_value if not formula else min(p_value, float(np.exp(-formula.gain))),
         ranking=ranking,
-        added=tuple(r.effect for r in ranking if r.effect in best) if verdict == "missing" else (),
+        added=added,
+        found=named if verdict in ("missing", "partly") else (),
         error_before=before,
         error_after=after,
         smallest_detectable={
@@ -170,6 +200,9 @@ def _answer(
         split_by="held-out logs" if holdout else "runs" if len(problem.runs) > 3 else "time blocks",
         ladder=ladder(search, best, holdout),
     )
-    answer.remarks = list(doubts)
+    answer.remarks = list(doubts.reasons)
+    if verdict == "partly":
+        left = rest_of(search, best, [e for e in named if e not in sure])
+        answer.rest, answer.next = left.where, left.next
     answer.sentence = phrase(answer)
     return answer

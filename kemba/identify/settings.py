@@ -25,16 +25,6 @@ class DiscoverSettings(Settings):
     matters_too: float = setting(
         0.3, "1", "the same for an effect beside a stronger one", BY_HAND, decides=True
     )
-    unexplained: float = setting(
-        1.3,
-        "1",
-        "error, in noise units, that an answer may leave without being doubted",
-        BY_HAND,
-        decides=True,
-    )
-    left: float = setting(
-        0.9, "1", "share of the error that an answer may leave", BY_HAND, decides=True
-    )
     fine: float = setting(
         0.1,
         "s",
@@ -45,6 +35,30 @@ class DiscoverSettings(Settings):
     )
     searching: float = setting(
         0.8, "1", "share of the time limit after which the search ends", BY_HAND
+    )
+
+
+class VerdictSettings(Settings):
+    """When an answer is complete (`missing`), and when it is a part of one (`partly`)."""
+
+    whole: float = setting(
+        1.5, "1", "error, in noise units, that a whole answer may leave", BY_HAND, decides=True
+    )
+    whole_share: float = setting(
+        0.2, "1", "or share of the error beyond the noise", BY_HAND, decides=True
+    )
+    part: float = setting(
+        0.1,
+        "1",
+        "smallest share of the error beyond the noise that a part of an answer explains",
+        BY_HAND,
+        decides=True,
+    )
+    part_of_structure: float = setting(
+        0.5, "1", "the same where what is left repeats itself", BY_HAND, decides=True
+    )
+    sure: float = setting(
+        0.95, "1", "probability from which an effect is sure", "convention: 95 %", decides=True
     )
 
 

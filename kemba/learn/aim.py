@@ -71,16 +71,16 @@ class Aim:
         settings = AimSettings.current()
         table = read_controller(table)
         rest, first = rest_after(self.model, self.plan, table), table
-        wanted, lead = flight_of(self.plan, self.machine), 0.0
-        must_land = self._miss(table, rest, wanted, lead)[1]
-        best, left = self._miss(table, rest, wanted, lead)[0], settings.executions
+        wanted = flight_of(self.plan, self.machine)
+        best, must_land = self._miss(table, rest, wanted)
+        left = settings.executions
         while best > 1.0 and left > 0:
             nearest, choice = best, None
             for trial in neighbours(table):
                 if left <= 0 or not _within(first, trial, settings.moved):
                     continue
                 left -= 1
-                miss, lands = self._miss(trial, rest, wanted, lead)
+                miss, lands = self._miss(trial, rest, wanted)
                 if miss < nearest and (lands or not must_land):
                     nearest, choice = miss, trial
                     if miss < 0.7 * best:
@@ -90,9 +90,7 @@ class Aim:
             best, table = nearest, choice
         return Aimed(table, self.expected(table, rest)[0], _moved(first, table))
 
-    def _miss(
-        self, table: Trajectory, rest: float, wanted: Flight, lead: float
-    ) -> tuple[float, bool]:
+    def _miss(self, table: Trajectory, rest: float, wanted: Flight) -> tuple[float, bool]:
         """The root of squared errors in units of what needs no search, and whether it lands."""
         settings = AimSettings.current()
         try:
@@ -101,7 +99,7 @@ class Aim:
             return inf, False
         errors = [(flight.apex - wanted.apex) / settings.apex]
         if isfinite(wanted.touchdown):
-            errors.append((flight.touchdown - wanted.touchdown - lead) / settings.touchdown)
+            errors.append((flight.touchdown - wanted.touchdown) / settings.touchdown)
             errors.append((flight.pitch - wanted.pitch) / settings.pitch)
         miss = float(np.linalg.norm(errors))
         return (miss if isfinite(miss) else RetimingSettings.current().fallen), lands

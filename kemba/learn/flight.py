@@ -21,13 +21,15 @@ class FlightSettings(Settings):
     down: float = setting(
         3e-3, "m", "a lower foot stands", "derived: ten times the noise of the body's height"
     )
-    upright: float = setting(0.35, "rad", "a landing with more pitch failed", "as in replays")
+    upright: float = setting(
+        0.35, "rad", "a landing with more pitch failed", "convention: as in replays"
+    )
 
 
 @dataclass(frozen=True)
 class Flight:
     """Apex [m] and its time [s]; touchdown [s] and the pitch [rad] there, NaN where no foot comes
-    down after the apex; whether the body ends upright. Times count from the first row."""
+    down after the apex; whether the body ends upright. The clock is that of the motion."""
 
     apex: float
     apex_time: float
@@ -40,9 +42,9 @@ def flight_of(motion: Trajectory, machine: Machine) -> Flight:
     """The flight of a motion with body/z, body/pitch and every leg's hip and piston (or knee)."""
     settings = FlightSettings.current()
     known = np.isfinite(motion["body/z"])
-    time, z = motion.time[known] - motion.time[0], motion["body/z"][known]
+    time, z = motion.time[known], motion["body/z"][known]
     apex_time, apex = _peak(time, z, settings.around)
-    clock = motion.time - motion.time[0]
+    clock = motion.time
     pitch = motion["body/pitch"] if "body/pitch" in motion else np.zeros(len(clock))
     touchdown = _touchdown(clock, _lowest_foot(motion, machine), apex_time, settings.down)
     last = float(pitch[np.isfinite(pitch)][-1])

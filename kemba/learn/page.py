@@ -58,7 +58,7 @@ def _tables(found: Round) -> Iterable[str]:
         yield pairs("the next run", [
             ("planned apex", f"{found.target.apex:.4f} m"),
             ("expected apex", f"{found.aimed.expected.apex:.4f} m"),
-            ("touchdown after the plan's", f"{landing:+.1f} ms, lead included"),
+            ("expected touchdown", f"{landing:+.1f} ms from the plan's"),
         ])  # fmt: skip
 
 
@@ -72,7 +72,7 @@ def _executions(found: Round) -> Any:
         rest = rest_after(built, plan, commands)
         expected[what] = execute(commands, built, extra=rest).trajectory
     executed = found.past.executed[found.past.last]
-    return plot_executions(executed, expected, plan, 0.0)
+    return plot_executions(executed, expected, plan)
 
 
 def _rounds(found: Round) -> Any:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from kemba.errors import KembaError
+from kemba.plant.execution.controller import read_controller
 from kemba.runs import Run, load_run, sha256
 from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Array, Trajectory
@@ -29,7 +30,8 @@ class MatchSettings(Settings):
 class Past:
     """What a new round knows: its number, the runs, the logs of each, and all logs to fit.
 
-    `executed` maps the places of `runs` to the new logs of that run; `history` holds the entries
+    `executed` maps the places of `runs` to the new logs of that run, by the clock of its plan;
+    `history` holds the entries
     of earlier rounds.
     """
 
@@ -55,7 +57,8 @@ def past_of(
     found = sorted((load_run(run) for run in runs), key=_round)
     executed: dict[int, list[Trajectory]] = {}
     for log in logs:
-        executed.setdefault(_place(log, found), []).append(log)
+        place, timed = _placed(log, found)
+        executed.setdefault(place, []).append(timed)
     entries = {e["round"]: e for run in found for e in _entries(run)}
     history = [entries[number] for number in sorted(entries)]
     earlier = [Path(path) for entry in history for path in entry["logs"]]
@@ -77,10 +80,9 @@ def entry(past: Past, facts: dict[str, Any]) -> dict[str, Any]:
     return {ENTRY: own, "learnt_before": past.history}
 
 
-def sent(table: Trajectory, log: Trajectory, name: str) -> Array:
-    """A valve command of a table at the rows of a log of the same length of time."""
-    clock = log.time - log.time[0] + table.time[0]
-    row = np.searchsorted(table.time, clock + 1e-9, side="right") - 1
+def sent(table: Trajectory, time: Array, name: str) -> Array:
+    """A valve command of a table at times (n,) [s] of its clock."""
+    row = np.searchsorted(table.time, time + 1e-9, side="right") - 1
     return np.asarray(table[name][np.clip(row, 0, len(table) - 1)])
 
 
@@ -93,20 +95,29 @@ def _entries(run: Run) -> list[dict[str, Any]]:
     return [*run.manifest.get("learnt_before", []), *([own] if own else [])]
 
 
-def _place(log: Trajectory, runs: Sequence[Run]) -> int:
-    """The run whose valve commands the log shows."""
-    misses = [_differs(run.controller, log) for run in runs]
-    best = int(np.argmin(misses))
-    if misses[best] > MatchSettings.current().valves:
-        what = f"its valve commands differ from the run's in {misses[best]:.0%} of the rows"
+def _placed(log: Trajectory, runs: Sequence[Run]) -> tuple[int, Trajectory]:
+    """The run whose valve commands the log shows, and the log by the clock of that run's plan.
+
+    A log begins where the table begins, or it has the plan's clock already.
+    """
+    tried = []
+    for place, run in enumerate(runs):
+        table = read_controller(run.controller)
+        for begin in (float(log.time[0]), float(table.time[0])):
+            time = log.time - log.time[0] + begin
+            tried.append((_differs(table, log, time), place, time))
+    miss, place, time = min(tried, key=lambda trial: trial[0])
+    if miss > MatchSettings.current().valves:
+        what = f"its valve commands differ from the run's in {miss:.0%} of the rows"
         hint = "give the run that was executed, or logs that begin where its controller.csv begins"
-        raise KembaError(str(log.meta["path"]), what, f"an execution of {runs[best].path}", hint)
-    return best
+        raise KembaError(str(log.meta["path"]), what, f"an execution of {runs[place].path}", hint)
+    columns = {h: log[n] for h, n in zip(log.headers, log.names, strict=True)}
+    return place, Trajectory(time, columns, log.meta)
 
 
-def _differs(table: Trajectory, log: Trajectory) -> float:
-    """The largest share of rows in which a valve command of the log differs from the table."""
+def _differs(table: Trajectory, log: Trajectory, time: Array) -> float:
+    """The largest share of rows, at `time` [s], in which a valve command differs from the table."""
     names = [name for name in table.names if "/valve/" in name]
     if any(name not in log for name in names):
         return 1.0
-    return max(float(np.mean(sent(table, log, n) != np.round(log[n]))) for n in names)
+    return max(float(np.mean(sent(table, time, n) != np.round(log[n]))) for n in names)

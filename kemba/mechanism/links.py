@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator
 
@@ -10,6 +11,9 @@ from kemba.mechanism.cylinder import Cylinder, CylinderTable
 from kemba.mechanism.table import Inertia, Length, Mass, Table
 from kemba.quantity import Param
 
+# part, as row/field of a leg in the link table: `femur/length` -> true minus nominal [m], a number
+# or a symbol
+Offsets = Mapping[str, Any]
 RESERVED = ("body", "supply", "piston")  # first parts of columns that belong to no leg
 
 
@@ -94,3 +98,23 @@ class RobotFile(Robot):
     """A robot as its YAML writes it: figures of the cylinder may be left to another cylinder."""
 
     cylinder: CylinderTable  # type: ignore[assignment]
+
+
+def altered(robot: Robot, offsets: Offsets) -> Robot:
+    """The robot with its lengths changed by `offsets`; masses and centres of mass stay.
+
+    Offsets may be symbols; the result is then not checked, and only for expressions.
+    """
+    leg = robot.leg
+    for part, d in offsets.items():
+        row, name = part.split("/")
+        table = getattr(leg, row)
+        table = table.model_copy(update={name: getattr(table, name) + d})
+        leg = leg.model_copy(update={row: table})
+    return robot.model_copy(update={"leg": leg})
+
+
+def nominal_length(leg: Leg, part: str) -> float:
+    """Length [m] of a part as the link table has it."""
+    row, name = part.split("/")
+    return float(getattr(getattr(leg, row), name))

@@ -16,6 +16,7 @@ from kemba.quantity import Param, Quantity
 GRAVITY = 9.81  # m.s-2
 
 Rod = Annotated[float, Param("m", lower=0.0, upper=1.0, doc="diameter; 0: no rod in a chamber")]
+Length = Annotated[float, Param("m", lower=1e-7, upper=0.1, doc="travel until seals slide")]
 Speed = Annotated[float, Param("m.s-1", lower=1e-7, doc="sign is smooth within", rotary="rad.s-1")]
 Moving = Annotated[float, Param("kg", lower=1e-9, doc="what moves", rotary="kg.m2")]
 Arm = Annotated[float, Param("m", lower=1e-6, doc="centre of mass from the axis")]
@@ -31,7 +32,8 @@ class CylinderRig(Bore):
     """A cylinder whose motion, force and chamber pressures are measured.
 
     `rod`: diameter where it passes the retract chamber. `chambers`: those whose pressure is
-    measured; the other one is open to the air.
+    measured; the other one is open to the air. `seal_travel`: way after a turn within which the
+    seals stretch before they slide.
     """
 
     kind: Literal["cylinder"] = "cylinder"
@@ -39,7 +41,14 @@ class CylinderRig(Bore):
     chambers: tuple[Literal["extend", "retract"], ...] = Field(
         default=("extend", "retract"), min_length=1, max_length=2
     )
+    seal_travel: Length | None = None
     sign_speed: Speed = 1e-3
+
+    @property
+    def stretch(self) -> float:
+        """Travel [m] until seals slide: 1 % of the bore unless given (a ring's cord is a tenth of
+        the bore, and shears by a tenth of itself)."""
+        return self.seal_travel or 0.01 * self.bore
 
     @model_validator(mode="after")
     def _consistent(self) -> CylinderRig:

@@ -6,7 +6,8 @@ never rotated back and forth. Equal to pin.rnea on the same model (tests/oracle)
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
@@ -164,3 +165,46 @@ def _along(joint: Joint, motion: FrameMotion, force: Vector, moment: ca.SX) -> c
 
 def _cross(arm: Vector, force: Vector) -> ca.SX:
     return arm[0] * force[1] - arm[1] * force[0]
+
+
+def link_tolerances(joints: Iterable[Joint], shares: Mapping[str, float]) -> dict[str, float]:
+    """1 sigma of every figure that may be off, as a share of it, by `leg/link.figure`.
+
+    Links are named by the joint that carries them: `front/hip.mass` is that of the front femur.
+    `shares`: 1 sigma by figure; figures with 0 are known exactly and left out.
+    """
+    return {
+        f"{joint.name}.{figure}": share
+        for joint in joints
+        if joint.mass
+        for figure, share in shares.items()
+        if share
+    }
+
+
+def link_forces(
+    joints: Sequence[Joint],
+    figures: Iterable[str],
+    motion: tuple[ca.SX, ca.SX, ca.SX],
+    gravity: float,
+) -> list[ca.SX]:
+    """Generalised forces (joints,) per share by which each of `figures` is off.
+
+    `motion`: angles, rates and accelerations (joints,) of the opened tree. Figures are named as in
+    `link_tolerances`. Raises ValueError for others.
+    """
+    names = [joint.name for joint in joints]
+    forces = []
+    for name in figures:
+        link, _, figure = name.rpartition(".")
+        whole = _alone(joints, names.index(link))
+        mass = rnea([replace(joint, inertia=0.0) for joint in whole], *motion, gravity)
+        forces.append(mass if figure == "mass" else rnea(whole, *motion, gravity) - mass)
+    return forces
+
+
+def _alone(joints: Sequence[Joint], kept: int) -> list[Joint]:
+    """The joints with one link only; all others weigh nothing, and no joint has a rotor."""
+    links = [replace(joint, armature=0.0) for joint in joints]
+    bare = [replace(joint, mass=0.0, inertia=0.0, com=np.zeros(2)) for joint in links]
+    return [*bare[:kept], links[kept], *bare[kept + 1 :]]

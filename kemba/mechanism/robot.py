@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import casadi as ca
 import numpy as np
 
 from kemba.errors import KembaError
 from kemba.mechanism import knee
-from kemba.mechanism.geometry import Offsets, altered, nominal_length, placed
-from kemba.mechanism.links import Robot
+from kemba.mechanism.links import Offsets, Robot, altered, nominal_length
 from kemba.mechanism.pin_model import build_pin_model
 from kemba.mechanism.planar import Mechanism, Port
-from kemba.mechanism.recursion import FrameMotion, forward, read_joints, rnea
-from kemba.mechanism.tolerances import link_forces, link_tolerances
+from kemba.mechanism.recursion import (
+    FrameMotion,
+    Joint,
+    forward,
+    link_forces,
+    link_tolerances,
+    read_joints,
+    rnea,
+)
 from kemba.quantity import Quantity
 
 HIP_RANGE = 1.4  # rad; beyond it the knee would rise above the body
@@ -33,7 +42,7 @@ def robot_mechanism(
     n = len(coordinates)
     q, v, a = ca.SX.sym("q", n), ca.SX.sym("v", n), ca.SX.sym("a", n)
     shape = altered(drawn, {**offsets, **(symbols or {})})
-    joints = placed(read_joints(build_pin_model(robot)), shape)
+    joints = _placed(read_joints(build_pin_model(robot)), shape)
     tree = tree_angles(shape, q)
     tree_v = ca.jtimes(tree, q, v)
     tree_a = ca.jtimes(tree_v, q, v) + ca.jtimes(tree, q, a)
@@ -63,7 +72,7 @@ def robot_mechanism(
         mirror=_mirror(robot),
         standing=standing_pose(robot),
         points=_points(shape, motions),
-        tolerances=link_tolerances(robot),
+        tolerances=link_tolerances(joints, robot.tolerances.model_dump()),
     )
 
 
@@ -77,7 +86,8 @@ def link_regressors(mechanism: Mechanism) -> ca.Function:
     tree = tree_angles(robot, m.q)
     rate = ca.jtimes(tree, m.q, m.v)
     acc = ca.jtimes(rate, m.q, m.v) + ca.jtimes(tree, m.q, m.a)
-    forces = link_forces(robot, tree, rate, acc, tuple(m.tolerances))
+    joints = read_joints(build_pin_model(robot))
+    forces = link_forces(joints, m.tolerances, (tree, rate, acc), robot.gravity)
     columns = [ca.jtimes(tree, m.q, force, True) for force in forces]
     return ca.Function("regress", [m.q, m.v, m.a], [ca.horzcat(ca.SX(m.n, 0), *columns)])
 
@@ -90,9 +100,17 @@ def reshaped(mechanism: Mechanism, offsets: Offsets, symbols: Offsets | None = N
     return robot_mechanism(mechanism.drawn, offsets, symbols)
 
 
+def _placed(joints: list[Joint], robot: Robot) -> list[Joint]:
+    """The joints at the places that the lengths of `robot` give them, which may be symbols."""
+    offsets: dict[str, Any] = {}
+    for name, place in robot.legs.items():
+        offsets[f"{name}/knee"] = (0.0, -robot.leg.femur.length)
+        offsets[f"{name}/cylinder"] = (place.fold * robot.leg.piston.mount, 0.0)
+    return [replace(j, offset=offsets.get(j.name, j.offset)) for j in joints]
+
+
 def _closed(robot: Robot, offsets: Offsets) -> Robot:
-    """The robot as it is. Raises KembaError where a length is not positive or a knee cannot close
-    at an end of the stroke."""
+    """The robot, if its lengths are positive and its knee closes at both ends of the stroke."""
     for part, d in offsets.items():
         if nominal_length(robot.leg, part) <= 0.0:
             raise KembaError(

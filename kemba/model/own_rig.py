@@ -6,9 +6,9 @@ import math
 from collections.abc import Iterable
 
 from kemba.effects.base import Effect
-from kemba.effects.drive.axis import DriveAxis
 from kemba.effects.pneumatics.gas import VesselChamber
-from kemba.effects.pneumatics.measured import MeasuredChambers
+from kemba.effects.rigs.axis import DriveAxis
+from kemba.effects.rigs.chambers import MeasuredChambers
 from kemba.mechanism import CylinderRig, DriveRig, VesselRig, own_mechanism
 from kemba.model.model import Model
 
@@ -24,10 +24,10 @@ def own_model(
 def brought_along(rig: CylinderRig | DriveRig | VesselRig) -> Effect:
     """The physics that every rig of this kind has."""
     if isinstance(rig, CylinderRig):
-        return MeasuredChambers(chambers=rig.chambers)
+        return MeasuredChambers(chambers=rig.chambers, travel=rig.stretch)
     if isinstance(rig, DriveRig):
         load, arm = (rig.load.mass, rig.load.arm) if rig.load else (0.0, None)
-        return DriveAxis(J=rig.inertia, m=load, arm=arm or 0.0)
+        return DriveAxis(J=rig.inertia, m=load, arm=arm or 0.0, hangs=arm is not None)
     opening = math.pi / 4 * rig.orifice**2 * rig.discharge
     figures = {"ambient": rig.ambient, "outside": rig.outside}
     return VesselChamber(V=rig.volume, a=opening, wall=rig.area, **figures)

@@ -10,6 +10,7 @@ import casadi as ca
 
 from kemba.effects import BY_KIND
 from kemba.effects.base import At, Contribution, Effect, PortAt, Signal
+from kemba.effects.mechanics.laws import direction
 from kemba.errors import KembaError, suggest
 from kemba.mechanism import Bore, Mechanism
 from kemba.quantity import Quantity
@@ -228,6 +229,15 @@ class _Place:
     def stroke(self) -> float:
         """Stroke of every piston [m]. Raises KembaError for a mechanism without pistons."""
         return self._scene.mechanism.stroke
+
+    @property
+    def sense(self) -> Any:
+        """Direction in which the piston's seals slide: what an effect publishes, else the sign of
+        its rate."""
+        for instance in self._scene.instances:
+            if instance.leg == self._leg and "sense" in instance.effect.publishes:
+                return self._scene.lookup(self._leg, "sense")
+        return direction(self.piston.v, self.sign_speed)
 
     @property
     def legs(self) -> list[At]:

@@ -15,10 +15,11 @@ def controller_table(model: Model, plan: Trajectory, hold: float = 0.0) -> Traje
     """What the controller plays, one row a tick; each row holds until the next.
 
     Its clock is the plan's. It starts `hold` [s] before the plan, or the longest dead time of a
-    valve if that is longer; until then the first pose is held, valves closed. Hip angles and rates are the plan's at the tick, because the controller compares them with what
-    it measures there. The torque is the mean of the plan over the tick, so that the angular
-    impulse is the plan's. Valves are exactly 0 or 1, sent their dead time early, and their edges
-    are rounded to ticks all together: see `kemba.ocp.edges`.
+    valve if that is longer; until then the first pose is held, valves closed. Hip angles and rates
+    are the plan's at the tick, because the controller compares them with what it measures there.
+    The torque is the mean of the plan over the tick, so that the angular impulse is the plan's.
+    Valves are exactly 0 or 1, sent their dead time early, and their edges are rounded to ticks all
+    together: see `kemba.ocp.edges`.
     """
     dead = max(max(model.timing(leg)) for leg in model.mechanism.legs)
     lead = int(np.ceil(max(dead, hold) / PERIOD - 1e-9))

@@ -6,17 +6,23 @@ import numpy as np
 import pytest
 
 from kemba.contract.cases import example, points, slopes, values_of
-from kemba.effects.catalogue import MISSING, SENSORS, Expression
+from kemba.effects.catalogue import DRIVE, MISSING, SENSORS, Expression
+from kemba.effects.pneumatics.gas import GasTemperature
 from kemba.model import Model, load_spec
 from kemba.model.spec import build_model
 
-EVERY = [example(effect) for effect in (*MISSING, Expression) if effect not in SENSORS]
+ELSEWHERE = (*SENSORS, *DRIVE)
+EVERY = [example(effect) for effect in (*MISSING, Expression) if effect not in ELSEWHERE]
 CHAMBERS = pytest.mark.parametrize("chambers", ["first_order", "orifice"])
 
 
 def model_with_all(chambers: str, rig: bool = False) -> Model:
     spec = load_spec("planning").model_copy(update={"chambers": chambers})
     every = [e for e in EVERY if not rig or set(e.ports) <= {"piston"}]
+    if chambers == "orifice":
+        every = [*every, GasTemperature()]
+    else:
+        every = [e for e in every if not e.needs]
     return build_model(spec, extra=every, rig=rig)
 
 

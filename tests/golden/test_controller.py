@@ -38,5 +38,19 @@ def test_controller_table(tmp_path: Path) -> None:
     )
     assert written.splitlines()[0] == golden.splitlines()[0]
     expected = Trajectory.read(GOLDEN)
+    assert np.allclose(found.time, expected.time, rtol=0, atol=1e-12)
     for name in expected.names:
         assert np.allclose(found[name], expected[name], rtol=0, atol=1e-12), name
+
+
+def test_a_hold_comes_before_the_plan() -> None:
+    """Before plan time 0 the first pose, no torque and closed valves; after it the same table."""
+    plain = controller_table(load_model(), by_hand())
+    held = controller_table(load_model(), by_hand(), 0.3)
+    assert held.time[0] == -0.3 and held.meta["lead"] == 0.3
+    early, later = held.time < -0.0065, held.time >= -0.0065
+    for name in held.names:
+        assert np.array_equal(held[name][later], plain[name]), name
+    assert np.all(held["front/hip/q"][early] == 0.0)
+    assert not any(held[name][early].any() for name in held.names if "/valve/" in name)
+    assert np.allclose(held.time[later], plain.time, rtol=0, atol=1e-12)

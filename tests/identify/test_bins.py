@@ -116,7 +116,7 @@ def test_figures_may_be_off_by_their_tolerance_and_not_by_more(off: float, toler
     known = Slopes((), np.zeros((4000, 0)), by_figure)
     found = within_tolerance(rng.normal(size=4000) + off * by_figure[:, 0], known)
     assert np.std(found.left) == pytest.approx(1.0, abs=0.05)
-    assert (found.p_value > 0.01) is tolerable
+    assert (found.q_value > 0.01) is tolerable
 
 
 @pytest.mark.parametrize(("q", "significant"), [(0.009, True), (0.011, False), (0.5, False)])

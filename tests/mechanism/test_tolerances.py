@@ -13,9 +13,9 @@ from kemba.config import shipped_configs
 from kemba.errors import KembaError
 from kemba.identify.problem.nominal import link_figures
 from kemba.mechanism.pin_model import build_pin_model
+from kemba.mechanism.recursion import link_forces, read_joints
 from kemba.mechanism.robot import link_regressors, robot_mechanism
 from kemba.mechanism.robot_file import load_robot
-from kemba.mechanism.tolerances import link_forces
 from kemba.model import load_model
 
 
@@ -45,7 +45,9 @@ def test_the_shares_add_up_to_the_whole_robot() -> None:
     model = build_pin_model(still)
     tree, rate, acc = np.random.default_rng(1).normal(size=(3, model.nv)) * 0.3
     figures = robot_mechanism(robot).tolerances
-    forces = link_forces(robot, *(ca.SX(x) for x in (tree, rate, acc)), tuple(figures))
+    joints = read_joints(build_pin_model(robot))
+    motion = (ca.SX(tree), ca.SX(rate), ca.SX(acc))
+    forces = link_forces(joints, figures, motion, robot.gravity)
     total = np.array(ca.evalf(sum(forces))).ravel()
     assert total == pytest.approx(pin.rnea(model, model.createData(), tree, rate, acc), abs=1e-9)
 

@@ -15,8 +15,8 @@ from kemba.model import load_model
 from kemba.ocp.continuation.between import completed, model_between, requirements_between
 from kemba.ocp.phases.modes import Phase
 from kemba.ocp.phases.notes import noted_phases, phase_notes
-from kemba.ocp.phases.unilateral import read_constraints
 from kemba.ocp.transcription.symmetry import whole
+from kemba.ocp.transcription.unilateral import read_constraints
 from kemba.report.earlier import origin_of
 from kemba.runs import load_run
 from kemba.trajectory import Trajectory

@@ -31,16 +31,6 @@ def call(*words: str) -> Result:
 
 
 @pytest.fixture(scope="module")
-def jump(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A jump with two noisy logs."""
-    run = tmp_path_factory.mktemp("runs") / "jump-1"
-    words = ["solve", "jump.yaml", "--no-figure", "--out", str(run)]
-    assert call(*words).exit_code == 0
-    assert call("simulate", str(run), "--repeat", "2", "--noise").exit_code == 0
-    return run
-
-
-@pytest.fixture(scope="module")
 def page(jump: Path) -> tuple[dict[str, str], str]:
     """What `review` says of the jump, and its page."""
     logs = [str(path) for path in sorted((jump / "logs").glob("*.csv"))]
@@ -148,7 +138,7 @@ def test_without_anything_the_newest_run_is_taken(
     pages = shutil.ignore_patterns("review*.html")
     shutil.copytree(jump, "runs/jump-1", ignore=pages)
     done = call("review")
-    assert "the newest run: runs/jump-1 with 2 logs" in done.stderr
+    assert "the newest run: runs/jump-1\nwith its 2 newest logs\n" in done.stderr
     assert done.stdout == "runs/jump-1/logs/review.html\n"
     again = call("review")
     assert again.stdout == "runs/jump-1/logs/review-2.html\n"

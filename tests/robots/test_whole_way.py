@@ -14,7 +14,7 @@ from kemba.trajectory import Trajectory
 from kemba_cli.main import app
 
 # robot: how high it jumps [m], how long the plan may last [s]; few nodes, to be quick
-VERDICTS = ("missing", "nothing", "unknown")  # not bad-data
+VERDICTS = ("missing", "partly", "nothing", "unknown")  # not bad-data
 SHIPPED = {"monoped": (0.45, 0.25), "hound": (0.6, 0.45)}
 
 

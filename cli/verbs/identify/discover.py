@@ -31,7 +31,7 @@ def discover(
         str | None, typer.Option("--map", help="Column map YAML for foreign logs.")
     ] = None,
     time_limit: Annotated[float, typer.Option(min=5.0, help="Seconds at most.")] = 300.0,
-    figures: Annotated[bool, typer.Option(help="Draw the figures.")] = True,
+    figures: Annotated[bool, typer.Option("--figure/--no-figure", help="Draw the figures.")] = True,
     force: Force = False,
     own_effects: OwnEffects = None,
     json: Json = False,
@@ -73,6 +73,8 @@ def _tell(answer: Answer, out: Path, json: bool, quiet: bool) -> None:
         print_json(answer.json())
         return
     typer.echo(answer.sentence)
+    if answer.ranking:
+        typer.echo("  How likely each effect is among the missing ones (need not add up to 100 %):")
     for ranked in answer.ranking[:5]:
         values = ", ".join(f"{name} = {value}" for name, value in ranked.parameters.items())
         typer.echo(f"  {100 * ranked.probability:5.1f} %  {ranked.effect:28s} {values}")

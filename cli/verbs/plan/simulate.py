@@ -7,14 +7,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from kemba_cli.common import Force, Json, OwnEffects, Quiet, print_json, say
+from kemba_cli.common import Force, Json, OwnEffects, Quiet, newest, print_json, say
 
 if TYPE_CHECKING:
     from kemba.plant.rig.rigs import Rig
 
 
 def simulate(
-    source: Annotated[str, typer.Argument(help="Run folder, controller.csv, or rig YAML.")],
+    source: Annotated[
+        str | None,
+        typer.Argument(help="Run folder, controller.csv, or rig YAML (the newest run)."),
+    ] = None,
     model: Annotated[
         str | None, typer.Option(help="Model YAML of the plant; else the task's own.")
     ] = None,
@@ -37,6 +40,7 @@ def simulate(
     """
     from kemba.folders import claimed
 
+    source = source or str(newest(quiet, "controller.csv"))
     if Path(source).suffix in (".yaml", ".yml"):
         from kemba.plant.rig.bench import load_rig
 

@@ -7,19 +7,22 @@ from typing import Annotated
 
 import typer
 
-from kemba_cli.common import Force, Json, OwnEffects, Quiet, print_json
+from kemba_cli.common import Force, Json, OwnEffects, Quiet, newest, print_json
 
 
 def plot(
     runs: Annotated[
-        list[Path],
+        list[Path] | None,
         typer.Argument(
-            help="Run folders and CSVs, several over each other; or one folder of bench logs."
+            help="Run folders and CSVs, several over each other; one folder of bench logs "
+            "(the newest run)."
         ),
-    ],
-    save: Annotated[
+    ] = None,
+    out: Annotated[
         Path | None,
-        typer.Option(help="PNG, PDF or SVG (a new one beside the first run)."),
+        typer.Option(
+            "--out", "--save", help="PNG, PDF or SVG to write (a new one beside the first run)."
+        ),
     ] = None,
     animate: Annotated[
         Path | None, typer.Option(help="Also write a GIF, or an MP4, of the first run.")
@@ -47,9 +50,10 @@ def plot(
     from kemba.logs import load_map
     from kemba.plotting.window import open_window, show_windows
 
-    for path, option in ((save, "--save"), (animate, "--animate")):
+    for path, option in ((out, "--out"), (animate, "--animate")):
         if path is not None:
             fresh(path, force, option)
+    runs = runs or [newest(quiet)]
     window = open_window() if show else None
     logs = plotting.bench_logs(runs[0]) if len(runs) == 1 else {}
     if logs and animate:
@@ -61,7 +65,7 @@ def plot(
         sources = plotting.load_sources(runs, load_map(column_map) if column_map else None)
         figure = plotting.draw(sources, model, window)
         names, beside = [source.name for source in sources], plotting.default_path(sources)
-    path = save or (beside if force else next_free(beside))
+    path = out or (beside if force else next_free(beside))
     written = {"figure": plotting.save_figure(figure, path)}
     if animate:
         machine = plotting.machine_of(sources[0], model)
@@ -69,7 +73,7 @@ def plot(
     paths = {kind: str(path) for kind, path in written.items()}
     if json:
         print_json({**paths, "runs": names})
-    elif not quiet:
+    else:
         for path in paths.values():
             typer.echo(path)
     if show:

@@ -7,11 +7,13 @@ from typing import Annotated
 
 import typer
 
-from kemba_cli.common import Force, Json, OwnEffects, Quiet, print_json
+from kemba_cli.common import Force, Json, OwnEffects, Quiet, newest, print_json
 
 
 def report(
-    run: Annotated[Path, typer.Argument(help="Run folder, as solve writes it.")],
+    run: Annotated[
+        Path | None, typer.Argument(help="Run folder, as solve writes it (the newest).")
+    ] = None,
     out: Annotated[
         Path | None, typer.Option(help="HTML to write (a new report.html in RUN).")
     ] = None,
@@ -26,5 +28,6 @@ def report(
     """
     from kemba.report.review.page import report_run
 
+    run = run or newest(quiet, "certificate.json")
     path = report_run(run, out, force)
     print_json({"report": str(path)}) if json else typer.echo(path)

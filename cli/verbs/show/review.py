@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from kemba_cli.common import Force, Json, OwnEffects, Quiet, print_json, say
+from kemba_cli.common import Force, Json, OwnEffects, Quiet, newest, print_json, say
 from kemba_cli.failures import BAD_ANSWER
 
 
@@ -21,7 +21,7 @@ def review(
         str | None, typer.Option(help="Model YAML to judge, not the run's own.")
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="HTML to write (review.html beside the logs).")
+        Path | None, typer.Option(help="HTML to write (a new review.html beside the logs).")
     ] = None,
     column_map: Annotated[
         str | None, typer.Option("--map", help="Column map YAML for foreign logs.")
@@ -42,22 +42,15 @@ def review(
 
     # many small products: more BLAS threads only wait for each other
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    from kemba.folders import fresh, next_free
-    from kemba.report.review.page import default_path
     from kemba.report.review.page import review as write
-    from kemba.runs import newest_run
+    from kemba.runs import newest_logs
 
     logs = list(logs or [])
     if not logs and run is None and answer is None:
-        run = newest_run()
-        logs = sorted((run / "logs").glob("*.csv"))
-        say(f"the newest run: {run}" + (f" with {len(logs)} logs" if logs else ""), quiet)
-    if out is None:
-        out = default_path(logs, run, answer)
-        path = out if force else next_free(out)
-    else:
-        path = fresh(out, force)
-    page, verdict = write(logs, run, answer, model, column_map, path)
+        run = newest(quiet, "certificate.json")
+        logs = newest_logs(run)
+        say(f"with its {len(logs)} newest logs" if logs else "it has no logs yet", quiet)
+    page, verdict = write(logs, run, answer, model, column_map, out, force)
     if json:
         print_json(
             {

@@ -7,11 +7,13 @@ from typing import Annotated
 
 import typer
 
-from kemba_cli.common import Force, Json, OwnEffects, Quiet, print_json
+from kemba_cli.common import Force, Json, OwnEffects, Quiet, newest, print_json
 
 
 def view(
-    run: Annotated[Path, typer.Argument(help="Run folder, or the CSV of a motion.")],
+    run: Annotated[
+        Path | None, typer.Argument(help="Run folder, or the CSV of a motion (the newest run).")
+    ] = None,
     out: Annotated[
         Path | None, typer.Option(help="HTML to write (a new view.html beside it).")
     ] = None,
@@ -30,7 +32,7 @@ def view(
     """
     from kemba.report.stage import view_run
 
-    path = view_run(run, out, model, force)
+    path = view_run(run or newest(quiet), out, model, force)
     print_json({"view": str(path)}) if json else typer.echo(path)
     if show:
         import webbrowser

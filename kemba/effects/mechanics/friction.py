@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, ClassVar, Literal
 
 from kemba.effects.base import At, Contribution, Effect
-from kemba.effects.mechanics.laws import coulomb, direction, one_way, stribeck
+from kemba.effects.mechanics.laws import fading
 from kemba.quantity import Param
 
 V_COULOMB = 0.01  # m.s-1; below it the sign of v is smoothed
@@ -25,8 +25,7 @@ class SealFriction(Effect):
     dissipative: ClassVar[bool] = True
 
     def evaluate(self, at: At) -> Contribution:
-        force = coulomb(self.F_c, at.piston.v, at.sign_speed)
-        return Contribution(effort={"piston": force})
+        return Contribution(effort={"piston": -self.F_c * at.sense})
 
 
 class StribeckFriction(Effect):
@@ -44,8 +43,8 @@ class StribeckFriction(Effect):
     dissipative: ClassVar[bool] = True
 
     def evaluate(self, at: At) -> Contribution:
-        force = stribeck(self.F_s, at.piston.v, self.v_b, at.sign_speed)
-        return Contribution(effort={"piston": force})
+        force = self.F_s * fading(at.piston.v, self.v_b)
+        return Contribution(effort={"piston": -force * at.sense})
 
 
 class PressureFriction(Effect):
@@ -63,7 +62,7 @@ class PressureFriction(Effect):
 
     def evaluate(self, at: At) -> Contribution:
         load = self.mu * (at.F_e + at.F_r)
-        return Contribution(effort={"piston": -load * direction(at.piston.v, at.sign_speed)})
+        return Contribution(effort={"piston": -load * at.sense})
 
 
 class DirectionFriction(Effect):
@@ -85,4 +84,4 @@ class DirectionFriction(Effect):
     own_rigs: ClassVar[bool] = True
 
     def evaluate(self, at: At) -> Contribution:
-        return Contribution(effort={"piston": one_way(self.F_d, at.piston.v, at.sign_speed)})
+        return Contribution(effort={"piston": -self.F_d * at.sense**2})

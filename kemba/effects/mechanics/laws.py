@@ -25,9 +25,9 @@ def viscous(c: Any, v: Any) -> Any:
     return -c * v
 
 
-def stribeck(F: Any, v: Any, fading: Any, width: float) -> Any:
-    """Extra friction near standstill that has faded beyond the rate `fading`."""
-    return -F * ca.exp(-((v / fading) ** 2)) * direction(v, width)
+def fading(v: Any, gone: Any) -> Any:
+    """Share of an extra friction near standstill that is left; little beyond the rate `gone`."""
+    return ca.exp(-((v / gone) ** 2))
 
 
 def one_way(F: Any, v: Any, width: float) -> Any:

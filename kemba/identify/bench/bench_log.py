@@ -32,7 +32,7 @@ class BenchLogSettings(Settings):
     gap: float = setting(
         0.012, "s", "longest gap of the position that is bridged", BY_HAND, decides=True
     )
-    forget: float = setting(
+    memory: float = setting(
         0.12,
         "s",
         "time after which chambers do not depend on the moment of a switching",
@@ -55,9 +55,9 @@ class BenchLogSettings(Settings):
         decides=True,
     )
     creeping: float = setting(
-        200.0, "N.s.m-1", "slope of friction over speed, in addition, at low speed", BY_HAND
+        200.0, "N.s.m-1", "damping that a slow piston has in addition", BY_HAND
     )
-    creep: float = setting(0.08, "m.s-1", "speed up to which this slope holds", BY_HAND)
+    creep: float = setting(0.08, "m.s-1", "speed up to which it has it", BY_HAND)
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class BenchLog:
     keep: dict[str, np.ndarray] = field(default_factory=dict)
 
     @cached_property
-    def blunt(self) -> Array:
+    def velocity_error(self) -> Array:
         """Force error (n,) [N] that the error of the velocity makes, alike for every hypothesis:
         damping, and a friction of usual size where the direction of motion is in doubt."""
         usual = BenchLogSettings.current()
@@ -91,7 +91,7 @@ def prepare(name: str, log: Trajectory) -> BenchLog:
     measured = {c: log[c] for c in ("piston/F", *PRESSURES) if c in log}
     sigma = {c: noise_of(c, y) for c, y in measured.items()}
     on = [(u > 0.5).astype(int).astype(str) for u in sent]
-    seen = ~blind(log.time, np.isfinite(log["piston/x"]), np.stack(sent))
+    seen = ~unpredictable(log.time, np.isfinite(log["piston/x"]), np.stack(sent))
     keep = {c: np.isfinite(y) & seen for c, y in measured.items()}
     commands = (pulses(log.time, sent[0]), pulses(log.time, sent[1]))
     return BenchLog(name, motion, commands, measured, sigma, np.char.add(*on), keep)
@@ -108,7 +108,7 @@ def noise_of(channel: str, y: Array) -> float:
     return max(difference_sigma(y), least + settings.finest_share * spread)
 
 
-def blind(time: Array, good: Flags, sent: Array) -> Flags:
+def unpredictable(time: Array, good: Flags, sent: Array) -> Flags:
     """Rows (n,) that cannot be predicted: in and just after gaps of the position and of the time.
 
     Where a valve switched within a gap, the moment is not known. The rows after such a gap count
@@ -120,6 +120,6 @@ def blind(time: Array, good: Flags, sent: Array) -> Flags:
     hidden = np.zeros(len(time), dtype=bool)
     for begin, end in zip(known[wide], known[wide + 1], strict=True):
         switched = np.any(sent[:, begin] != sent[:, end])
-        after = time[end] + (settings.forget if switched else settings.gap)
+        after = time[end] + (settings.memory if switched else settings.gap)
         hidden |= (time > time[begin]) & (time < after)
     return hidden

@@ -45,10 +45,11 @@ class SmoothedMotion:
 
 
 def smooth_motion(time: Array, x: Array, v: Array | None = None) -> SmoothedMotion:
-    """Local cubics, each of the width that promises the smallest error of the velocity.
+    """Position and velocity from local cubics, each over the window of least expected error.
 
-    At rest the window is wide, so that noise does not look like creeping; in fast motion it is
-    narrow, so that the velocity is not blunted. `v` [m.s-1], when measured, is weighed in.
+    `time`, `x` and `v` are (n,). At rest the window is wide, so that noise does not look like slow
+    motion. In fast motion it is narrow, so that peaks of the velocity are kept. A measured `v`
+    [m.s-1] is averaged with the derived one, by their errors.
     """
     settings, good = MotionSettings.current(), np.isfinite(x)
     step = float(np.median(np.diff(time)))
@@ -68,8 +69,9 @@ def smooth_motion(time: Array, x: Array, v: Array | None = None) -> SmoothedMoti
 def _adaptive(values: Array, sigma: float, step: float) -> tuple[Array, Array, Array, Array]:
     """Position, rate, its error and the half width chosen sample by sample.
 
-    A cubic is too stiff where a quintic in the same window says otherwise: the square of their
-    difference, less what noise makes of it, estimates the square of the cubic's bias.
+    A cubic cannot follow every motion. A quintic in the same window follows more of them. The
+    square of their difference, without the share that noise has in it, estimates the square of the
+    cubic's bias.
     """
     n = len(values)
     best = np.full(n, np.inf)
@@ -124,7 +126,10 @@ def _weights(width: int, order: int) -> tuple[Array, Array]:
 def _weigh_in(
     grid: Array, rate: Array, spread: Array, half: Array, time: Array, v: Array
 ) -> tuple[Array, Array]:
-    """The measured velocity joined to the derived one, unless the two contradict each other."""
+    """The mean of measured and derived velocity, weighted by their errors.
+
+    Where the two contradict each other, the derived one counts alone.
+    """
     settings, good = MotionSettings.current(), np.isfinite(v)
     measured = np.interp(grid, time[good], v[good])
     sigma = max(difference_sigma(v[good]), settings.finest_speed)

@@ -85,7 +85,7 @@ class Predictor:
         time, late = run.motion.time, self.sensors.lateness(theta, "piston/F")
         force = self.sensors.shown(theta, "piston/F", Series(time, p.force)).value
         valve = Series(time, p.valve).late(late).value
-        variance = run.sigma["piston/F"] ** 2 + run.blunt**2
+        variance = run.sigma["piston/F"] ** 2 + run.velocity_error**2
         variance = variance + np.sum(p.by_valve**2 * valve * (1 - valve), axis=1)
         return force, variance
 

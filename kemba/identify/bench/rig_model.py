@@ -53,7 +53,7 @@ class Prediction:
 
 
 class RigModel:
-    """One model compiled with numbers left free: `free` parameters, `scaled` tables."""
+    """One model compiled with some numbers left open: `free` parameters, `scaled` tables."""
 
     def __init__(self, model: Model, free: tuple[str, ...], scaled: tuple[str, ...]) -> None:
         self.model, self.names = model, (*free, *scaled)
@@ -112,13 +112,13 @@ class RigModel:
         s0 += np.array([start.get(name, 0.0) for name in self._state_names])
         n = len(times) - 1
         moved = [np.interp(middle, motion.time, c) for c in (motion.x, motion.v, motion.a)]
-        drive = np.stack([np.diff(times), *moved, *u[:, :-1]])
+        inputs = np.stack([np.diff(times), *moved, *u[:, :-1]])
         chunk = RigModelSettings.current().chunk
-        drive = np.pad(drive, ((0, 0), (0, -n % chunk)))  # steps of no length at the end
+        inputs = np.pad(inputs, ((0, 0), (0, -n % chunk)))  # steps of no length at the end
         fixed = np.repeat(p[:, None], chunk, axis=1)
         step, states = self._mapped("step", chunk), [s0[:, None]]
-        for i in range(0, drive.shape[1], chunk):
-            states.append(step(states[-1][:, -1], drive[:, i : i + chunk], fixed))
+        for i in range(0, inputs.shape[1], chunk):
+            states.append(step(states[-1][:, -1], inputs[:, i : i + chunk], fixed))
         return np.concatenate(states, axis=1)[:, : n + 1]
 
     def _mapped(self, kind: str, n: int) -> _Call:
@@ -150,7 +150,7 @@ class _Call:
 
 
 def _step(node: Node, rate: ca.SX) -> ca.Function:
-    """(s, drive, p) -> s after one step; `drive`: its length, x, v, a in its middle, the valves."""
+    """(s, d, p) -> s after one step; d: its length, x, v and a in its middle, the two valves."""
     d = ca.SX.sym("d", 6)
     inputs = [node.q, node.v, node.a, node.u, node.p]
     given = [d[1], d[2], d[3], d[4:6], node.p]
@@ -159,9 +159,9 @@ def _step(node: Node, rate: ca.SX) -> ca.Function:
 
 
 def _breakpoints(samples: Array, events: Array) -> tuple[Array, Any]:
-    """Samples, switching instants between them and sub-steps; and where the samples stand.
+    """Times of samples, switching instants and sub-steps (m,), and places (n,) of the samples.
 
-    Their number depends on the number of events only, so that compiled maps are reused.
+    m depends on the number of events only, so that compiled functions can be used again.
     """
     inside = np.clip(events, samples[0], samples[-1])
     pieces = np.ceil(np.diff(samples) / RigModelSettings.current().step - 1e-6).astype(int)

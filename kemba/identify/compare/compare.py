@@ -128,7 +128,7 @@ def conditions(problem: Problem, theta: Theta | None = None) -> list[ConditionBi
 def _tolerant(rows: Rows, region: Texts, window: Windows, found: Tolerant) -> tuple[float, bool]:
     """Error ratio of what the figures' tolerance leaves; whether it is within the noise, and the
     figures are not too far off."""
-    if found.p_value < BinSettings.current().false_discoveries:
+    if found.q_value < BinSettings.current().false_discoveries:
         return rms(window.sums(found.left)), False
     sums = window.sums(found.left)
     clean = not any(c.significant for c in condition_bins(rows, region, window.first, sums))
@@ -178,7 +178,7 @@ def phrase(found: Comparison) -> str:
         return f"The model explains the logs to within the noise: its error is {ratio}."
     if not bad:
         return f"The model's error is {ratio}; no single condition stands out."
-    worst = f"worst: {_place(bad[0])} ({bad[0].ratio:.2g} times)"
+    worst = f"worst: {place_of(bad[0])} ({bad[0].ratio:.2g} times)"
     if found.tolerable:
         return (
             f"The nominal model errs by {ratio}; {worst}; but parameters within their usual "
@@ -194,7 +194,8 @@ def phrase(found: Comparison) -> str:
     return "; ".join(parts) + "."
 
 
-def _place(at: ConditionBin) -> str:
+def place_of(at: ConditionBin) -> str:
+    """A condition in plain words."""
     phases = {
         "stance2": "while two feet stand",
         "stance1": "while one foot stands",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.stats import false_discovery_control, norm
 
 from kemba.identify.evidence.spike_slab import SpikeSlabSettings
 from kemba.identify.problem.problem import Array, Candidate, Problem, Theta
@@ -39,22 +39,24 @@ def slopes(problem: Problem, at: Theta) -> Slopes:
 class Tolerant:
     """What is left when the model is as good as models are.
 
-    `left` (n,): the residual. `p_value`: how often figures and absent effects are so far off.
+    `left` (n,): the residual. `q_value`: of the figure or absent effect that is farthest off; it
+    controls false discoveries over all of them.
     """
 
     left: Array
-    p_value: float
+    q_value: float
 
 
 def within_tolerance(residual: Array, known: Slopes) -> Tolerant:
     """The likeliest explanation of a residual (n,) by a model that lacks nothing.
 
-    Each nuisance parameter is off by its prior sigma, and each absent effect is there with a small
-    share of its size, as under every hypothesis of `discover`. The squares of what they would have
-    to be, in units of these sigmas, add up to a chi-square under such a model.
+    Each nuisance parameter is off by about its prior sigma, and each absent effect is there with a
+    small share of its size, as under every hypothesis of `discover`. The likeliest values, in units
+    of these sigmas, are then no larger than standard normal numbers are.
     """
     spike = SpikeSlabSettings.current().spike
     columns = np.hstack([spike * known.by_lead, known.by_nuisance])
     h = columns.T @ columns + np.eye(columns.shape[1])
     off = -np.linalg.solve(h, columns.T @ residual)
-    return Tolerant(residual + columns @ off, float(chi2.sf(off @ off, len(off))))
+    q = false_discovery_control(2.0 * norm.sf(np.abs(off))) if len(off) else np.ones(1)
+    return Tolerant(residual + columns @ off, float(q.min()))

@@ -124,7 +124,10 @@ def is_log(log: Trajectory) -> bool:
 
 
 def kind_of(log: Trajectory, where: str | Path = "") -> Kind:
-    """Robot, bench or a rig of the user's own, by the columns. Raises KembaError for none of them."""
+    """Robot, bench or a rig of the user's own, by the columns.
+
+    Raises KembaError for a log that is none of these.
+    """
     if any(name.startswith("body/") or "/hip/" in name for name in log.names):
         return "robot"
     if "axis/q" in log:

@@ -1,4 +1,4 @@
-"""What may be missing on a rig of the user's own: effects that fit it, and faults of its sensors."""
+"""What may be missing on a rig of the user's own: effects that fit it, sensor faults."""
 
 from __future__ import annotations
 
@@ -15,12 +15,16 @@ from kemba.model.model import Model
 
 def possible_candidates(model: Model, logs: Sequence[RigLog]) -> dict[str, Candidate]:
     """Effects and sensor faults by name, sized as the catalogue has them."""
-    effects = {n: c for n, c in effect_candidates(model).items() if stands(model, n)}
-    return effects | sensor_candidates(_sensor_sigmas(model, logs), model)
+    return standing_candidates(model) | sensor_candidates(_sensor_sigmas(model, logs), model)
+
+
+def standing_candidates(model: Model) -> dict[str, Candidate]:
+    """Effects by name that the model of the rig can have."""
+    return {n: c for n, c in effect_candidates(model).items() if stands(model, n)}
 
 
 def stands(model: Model, kind: str) -> bool:
-    """Whether the model can have the effect: it may read what nothing gives here, such as valves."""
+    """Whether the model can have the effect: some read what is not here, such as valves."""
     try:
         _ = model.with_effects([by_default(kind)]).node
     except KembaError:

@@ -19,10 +19,9 @@ from kemba.settings import BY_HAND, Settings, setting
 
 # noise of value, rate, acceleration behind a Gaussian of s samples: c sigma / (step^k s^(k + 1/2))
 GAIN = (0.5311, 0.3756, 0.4600)
-REACH = 4.0  # widths of the Gaussian beyond which it is cut off
 
 
-class FilterSettings(Settings):
+class RigFilterSettings(Settings):
     """How the channels of a rig's log are filtered."""
 
     widths: tuple[int, ...] = setting(
@@ -39,6 +38,9 @@ class FilterSettings(Settings):
         "1",
         "noise of the inertia's force that is small enough, as a share of the force's spread",
         BY_HAND,
+    )
+    reach: float = setting(
+        4.0, "1", "widths beyond which the Gaussian is cut off", "convention: 6e-5 of it is lost"
     )
     gap: float = setting(5.0, "1", "rows farther apart than so many usual steps are a gap", BY_HAND)
     finest: float = setting(5e-4, "1", "smallest noise, as a share of a channel's range", BY_HAND)
@@ -82,7 +84,7 @@ def filtered(
     the rate] and the force of the inertia `heavy` well against the other channels. `known`: noise
     (1 sigma) by name, "" for the position. Rows with a missing reading are left out.
     """
-    settings, known = FilterSettings.current(), known or {}
+    settings, known = RigFilterSettings.current(), known or {}
     good = np.isfinite(position) & np.all([np.isfinite(y) for y in others.values()], axis=0)
     time, position = time[good], position[good]
     others = {name: y[good] for name, y in others.items()}
@@ -99,15 +101,17 @@ def filtered(
     parts, begins, rows, count = [], [], [], 0
     for first, last in _stretches(time, settings.gap * step):
         n = int((time[last] - time[first]) / step) + 1
-        if n < 2 * REACH * width + 3:
+        if n < 2 * settings.reach * width + 3:
             continue
         grid = time[first] + step * np.arange(n)
         columns = [np.interp(grid, time, y) for y in (position, *others.values())]
-        smooth = [gaussian_filter1d(y, width, truncate=REACH, mode="nearest") for y in columns]
+        smooth = [
+            gaussian_filter1d(y, width, truncate=settings.reach, mode="nearest") for y in columns
+        ]
         v = np.gradient(smooth[0], step)
         parts.append(np.stack([grid, smooth[0], v, np.gradient(v, step), *smooth[1:]]))
         begins.append(count)
-        edge = int(REACH * width) + 2
+        edge = int(settings.reach * width) + 2
         rows.append(count + np.arange(edge, n - edge, width))
         count += n
     if not parts:

@@ -16,6 +16,23 @@ from kemba.identify.rigs.balance import Balance
 from kemba.identify.rigs.filtering import Filtered
 from kemba.identify.rigs.rig_log import ANSWER, PLACE, RigLog
 from kemba.model.model import Model
+from kemba.settings import BY_HAND, Settings, setting
+
+SEALS = "measured_chambers.travel"
+
+
+class SealSettings(Settings):
+    """How well it is known how far seals stretch."""
+
+    travel: float = setting(
+        0.5, "1", "prior sigma of the travel until they slide, as a share of it", BY_HAND
+    )
+
+
+class GainSettings(Settings):
+    """What a motor's scale may be."""
+
+    least: float = setting(0.05, "1", "smallest force of a motor over that of the log", BY_HAND)
 
 
 class Predictor:
@@ -29,6 +46,8 @@ class Predictor:
         rig = model.mechanism.rig
         self.place, self.answer = PLACE[rig], ANSWER[rig]
         self.figures = nominal_figures(model)
+        if rig == "cylinder":
+            self.figures[SEALS] = (1.0, SealSettings.current().travel)
         self.sensors = SensorFaults(model.effects)
         self._known: dict[tuple[str, ...], Balance] = {}
 
@@ -48,9 +67,19 @@ class Predictor:
 
     def gap(self, log: RigLog, theta: Theta) -> Array:
         """Predicted less measured force (k,) at the judged rows."""
-        channels = self.true(log.channels, theta)
+        channels, time = self.true(log.channels, theta), log.time
         expected = self.balance(theta).force(channels, self._values(theta))
-        return np.asarray(expected - channels.others[self.answer][channels.rows])
+        measured = channels.others[self.answer][channels.rows]
+        if self.answer in self.balance(theta).inputs:  # in the unit of what the motor was told
+            return np.asarray((expected - measured) / self._gain(theta))
+        shown = self.sensors.shown(theta, self.answer, Series(time, expected))
+        return np.asarray(shown.value - measured)
+
+    def _gain(self, theta: Theta) -> float:
+        """Force of the motor over the force that the log says."""
+        listed = self.model.parameters.get("axis_scale.k")
+        least = GainSettings.current().least
+        return max(theta.get("axis_scale.k", listed[1] if listed else 1.0), least)
 
     def variance(self, log: RigLog, usual: float) -> Array:
         """Variance (k,) of `gap` under the model as it is; friction of the size `usual` is in doubt
@@ -67,7 +96,7 @@ class Predictor:
         return np.asarray(total)
 
     def true(self, log: Filtered, theta: Theta) -> Filtered:
-        """The channels without the faults of their sensors."""
+        """The channels without the faults of their sensors, but for the one that is predicted."""
         if not self.sensors.listed and not any(is_fault(name) for name in theta):
             return log
         seen = Series(log.time, log.q, (log.v, log.a))
@@ -75,7 +104,9 @@ class Predictor:
         others = {
             name: self.sensors.behind(theta, name, Series(log.time, y)).value
             for name, y in log.others.items()
+            if name != self.answer
         }
+        others[self.answer] = log.others[self.answer]
         v, a = moved.rates
         return replace(log, q=moved.value, v=v, a=a, others=others)
 

@@ -22,7 +22,7 @@ ATMOSPHERE = "1.01325 bar"
 
 
 def guessed_unit(header: str, values: Array) -> str | None:
-    """The unit of a column by its size; None where it is ours or cannot be told."""
+    """The unit of a column (n,) by its size; None where it is ours or cannot be told."""
     unit = header[header.index("[") + 1 : -1]
     table = {"m": STROKE if "piston/" in header else LENGTH, "rad": ANGLE, "Pa": PRESSURE}
     size = float(np.nanmax(np.abs(values), initial=0.0))
@@ -33,24 +33,24 @@ def guessed_unit(header: str, values: Array) -> str | None:
 
 
 def time_unit(values: Array) -> str:
-    """The unit of a time column by the step between its rows."""
+    """The unit of a time column (n,) by the step between its rows."""
     step = float(np.median(np.diff(values))) if len(values) > 1 else 0.0
     return next((unit for unit, largest in STEP if step <= largest), "ns")
 
 
 def is_stamp(values: Array, unit: str) -> bool:
-    """Whether times count from somewhere else than the start of the log."""
+    """Whether times (n,) count from somewhere else than the start of the log."""
     return len(values) > 0 and bool(abs(convert(float(values[0]), unit, "s")) > STAMPED)
 
 
 def gauge(values: Array, unit: str | None) -> dict[str, Any]:
-    """The offset of a pressure that is zero at the atmosphere."""
+    """The offset of a pressure (n,) that is zero at the atmosphere."""
     low = float(np.nanmin(convert(values, unit or "Pa", "Pa"), initial=np.inf))
     return {"offset": ATMOSPHERE} if low < ABSOLUTE else {}
 
 
 def valve_level(values: Array) -> float | None:
-    """Half way between the two levels of a valve; None where they are 0 and 1."""
+    """Half way between the two levels of a valve (n,); None where they are 0 and 1."""
     finite = values[np.isfinite(values)]
     if not len(finite) or set(np.unique(finite)) <= {0.0, 1.0}:
         return None
@@ -58,7 +58,7 @@ def valve_level(values: Array) -> float | None:
 
 
 def two_levels(values: Array) -> bool:
-    """Whether nearly all values lie at the ends of their range, as those of a valve do."""
+    """Whether nearly all values (n,) lie at the ends of their range, as those of a valve do."""
     finite = values[np.isfinite(values)]
     if len(finite) < 2 or np.ptp(finite) == 0:
         return len(finite) > 0

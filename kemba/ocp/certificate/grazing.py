@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,7 +34,7 @@ def grazes(plan: Trajectory) -> list[Graze]:
     for name in (name for name in plan.names if name.endswith("foot/z")):
         down = plan[name] <= TOUCHES
         change = np.flatnonzero(np.diff(down.astype(int)))  # the last row before each change
-        for before, last in zip(change, change[1:], strict=False):
+        for before, last in itertools.pairwise(change):
             lasts = float(plan.time[last] - plan.time[before + 1])
             if down[last] and lasts < LASTS:
                 found.append(Graze(name[:-2], float(plan.time[before + 1]), lasts))

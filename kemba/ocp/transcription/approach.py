@@ -26,9 +26,10 @@ def approach_rows(
 ) -> Rows:
     """Rows of an interval: a gap that closes in it was closing at most at `speed` [m/s].
 
-    rate(y0) + gap(y) / step >= -speed, stops by the length of the leg (`felt`). Where the gap stays open by more than it closes within a
-    `step` [s], the row asks for nothing. `of_state`: an expression of the node in the stage's y.
-    Raises ValueError where a pair is neither a contact nor a stop.
+    rate(y0) + gap(y) / step >= -speed, stops by the length of the leg (`felt`). Where the gap stays
+    open by more than it closes within a `step` [s], the row asks for nothing. `of_state`: an
+    expression of the node in the stage's y. Raises ValueError where a pair is neither a contact nor
+    a stop.
     """
     rows, labels = [], []
     for constraint in read_constraints(model, reduction):

@@ -61,13 +61,14 @@ def execute(
     """Play a controller table (a run folder, `controller.csv`, or its trajectory) on `model`.
 
     The robot starts at rest in the table's first pose, changed by `start`. A robot that starts in
-    the air is held until plan time 0; its motion begins there. After the last row the last commands stay for `extra` [s]. `valves` replace the table's. Raises KembaError when
-    the table lacks a column.
+    the air is held until plan time 0; its motion begins there. After the last row the last commands
+    stay for `extra` [s]. `valves` replace the table's. Raises KembaError when the table lacks a
+    column.
     """
     table = read_controller(controller)
     case = condition_of(table, model, gains, step, extra, start, dead_time, valves, sample)
     condition, begin = case
-    return Execution(_later(simulate_one(condition), begin), table)
+    return Execution(later(simulate_one(condition), begin), table)
 
 
 def execute_many(
@@ -82,7 +83,7 @@ def execute_many(
     ready = [condition_of(table, **case) for case in cases]
     done = run_many((condition for condition, _ in ready), jobs)
     return [
-        d if isinstance(d, KembaError) else Execution(_later(d, begin), table)
+        d if isinstance(d, KembaError) else Execution(later(d, begin), table)
         for d, (_, begin) in zip(done, ready, strict=True)
     ]
 
@@ -122,7 +123,7 @@ def condition_of(
     return Condition(model, pose, commands, duration, step, sample, dead_time), begin
 
 
-def _later(done: Simulated, begin: float) -> Simulated:
+def later(done: Simulated, begin: float) -> Simulated:
     """The simulated motion with its times from `begin` [s] on."""
     if not begin:
         return done

@@ -37,9 +37,9 @@ class Impacts(NamedTuple):
 def advance(
     m: Machine, k: Memory, now: State, spare: State, until: float, pace: Pace, log: Impacts
 ) -> bool:
-    """Carry `now` on to `until` [s], with `spare` as memory.
+    """Simulate from `now` to the time `until` [s]; `now` is changed, `spare` is used as memory.
 
-    False when it stops earlier because `log` is nearly full.
+    Gives False when it stops earlier because `log` is nearly full.
     """
     while until - now.time[0] > NO_TIME:
         if log.number[0] + MOST > len(log.time):
@@ -85,8 +85,11 @@ def collide(m: Machine, k: Memory, now: State, reach: float, log: Impacts) -> No
 def _until_touch(
     m: Machine, k: Memory, now: State, new: State, h: float, reach: float, pace: Pace
 ) -> int:
-    """`now` becomes the state after `h`, or at the first touch of a gap that is open: TOUCHED
-    where something touches. It stays where it is when the step is TOO_LONG."""
+    """One step: `now` becomes the state after `h` [s], or at the first touch of an open gap.
+
+    Gives TOUCHED where something touches, else FREE; TOO_LONG where the step must be shorter, and
+    then `now` does not change.
+    """
     count = touching(m, k, now.gap, reach)
     if not keeps_pace(pace, h, step(m, k, now, h, count, new)):
         return TOO_LONG

@@ -26,22 +26,22 @@ _COMPILING = Lock()
 
 
 def kernel(function: Function) -> Function:
-    """A function of the kernel, which only others of the kernel call."""
+    """A function that only other functions of the kernel call."""
     return cast(Function, njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, **LEAN)(function))
 
 
 def part(function: Function) -> Function:
-    """A function of the kernel that is written into its caller: for those with one caller.
+    """A function of the kernel that is copied into its caller (inlined): for those with one caller.
 
-    Numba compiles all that a function calls together with it. A deep nest of functions would be
-    compiled many times.
+    Numba compiles a function together with all functions that it calls. Without copying, deeply
+    nested functions would be compiled many times.
     """
     return cast(Function, njit(inline="always", **LEAN)(function))
 
 
 def entry(function: Function) -> Function:
-    """A function of the kernel that Python calls: compiled at its first call, or loaded from the
-    cache, with all that it calls. It lets other threads run."""
+    """A function of the kernel that Python calls. At its first call it is compiled, or loaded from
+    the cache, with all that it calls. While it runs, other threads can run."""
     with _settings():
         try:
             made = njit(cache=FOLDER is not None, nogil=True, **LEAN)(function)
@@ -66,7 +66,7 @@ def entry(function: Function) -> Function:
 
 @contextmanager
 def _settings() -> Iterator[None]:
-    """Our own cache, and an optimiser that does without vectors: ours have a dozen entries."""
+    """Our own cache folder, and no vector instructions: our arrays have a dozen entries."""
     level = type(numba.config.OPT)(1)
     wanted = {"CACHE_DIR": FOLDER or "", "OPT": level, "LOOP_VECTORIZE": 0, "SLP_VECTORIZE": 0}
     usual = {name: getattr(numba.config, name) for name in wanted}
@@ -80,10 +80,10 @@ def _settings() -> Iterator[None]:
 
 
 def find_folder() -> str | None:
-    """The folder of this version of the kernel, made if it can be; None where it is not safe.
+    """The cache folder of this version of the kernel; None where it would not be safe.
 
-    Numba itself would look only at the file of the outermost function, and would not see that
-    another file has changed.
+    Its name depends on all files of the kernel. Numba itself looks only at the file of the function
+    that is called, and would not see a change in another file.
     """
     sources = sorted(Path(__file__).parent.rglob("*.py"))
     content = b"".join(path.read_bytes() for path in sources) + numba.__version__.encode()

@@ -1,4 +1,4 @@
-"""How long steps are: as long as the two stages of a step agree."""
+"""How long steps are: as long as the results of both stages of a step agree."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ class Pace(NamedTuple):
 
 @part
 def keeps_pace(pace: Pace, h: float, apart: float) -> bool:
-    """Whether a step of `h` [s] whose stages are `apart` was short enough; sets the next length.
+    """Whether a step of `h` [s] was short enough; sets the length of the next one.
 
-    They differ by the square of the length.
+    `apart`: how far the results of its stages differ. It grows with the square of the length.
     """
     if apart < 1e-9 * pace.tolerance:
         factor = GROWTH

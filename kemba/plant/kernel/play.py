@@ -58,7 +58,7 @@ def play(
 ) -> int:
     """Go through the marks and fill `table` (rows, columns); the answer says why it ends.
 
-    Called again it goes on: after FULL with an emptied log, after ASK with the controller's
+    A second call continues: after FULL with an emptied log, after ASK with the controller's
     inputs in `k.x`. Raises NoSolutionError.
     """
     for mark in range(progress.mark[0], len(plan.time)):
@@ -85,7 +85,7 @@ def play(
 
 @part
 def _start(m: Machine, k: Memory, now: State, log: Impacts) -> bool:
-    """Let what touches stop at the start; False where something starts deep in the ground."""
+    """What touches at the start stops at once; False where something starts deep in the ground."""
     for i in range(len(now.y)):
         k.x[i] = now.y[i]
     evaluate_pairs(m, k)

@@ -26,11 +26,10 @@ PULL_BACK, SHORTEST, FASTEST = _DRIFT.share, _DRIFT.shortest, _DRIFT.fastest
 
 @kernel
 def step(m: Machine, k: Memory, now: State, h: float, count: int, new: State) -> float:
-    """`new` is the state after `h` [s] with the first `count` of the pairs `k.rows` held and the
-    others left alone.
+    """One step of `h` [s] from `now` to `new`; the first `count` of the pairs `k.rows` stay closed.
 
-    Gives how far it is from the result of the first stage, which is of first order: the largest
-    change of a velocity or an effect state in its scale.
+    Gives how far `new` is from the result of the first stage, which is of first order: the largest
+    difference of a velocity or an effect state, divided by its usual size.
     """
     n, apart = m.n, 0.0
     for i in range(len(now.y)):
@@ -124,7 +123,7 @@ def _second_stage(m: Machine, k: Memory, now: State, h: float, count: int) -> No
 
 @part
 def _pull_back(m: Machine, k: Memory, h: float) -> None:
-    """Let held gaps that have drifted return, those that are too deep not too fast."""
+    """Closed gaps that have drifted return to zero; those that are too deep return slowly."""
     for i in range(len(m.gaps)):
         if m.rigid[i]:
             drift = PULL_BACK * k.gap[i] / max(h, SHORTEST)

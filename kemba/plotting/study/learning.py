@@ -28,25 +28,22 @@ def plot_executions(
     executed: Sequence[Trajectory],
     expected: Mapping[str, Trajectory],
     planned: Trajectory,
-    lead: float,
     figure: Figure | None = None,
 ) -> Figure:
-    """Logs over the plan and over what models expect.
+    """Logs over the plan and over what models expect, all by the clock of the plan.
 
-    `expected`: simulations by name, the one before learning first; `lead` [s]: by which logs and
-    simulations begin before the plan.
+    `expected`: simulations by name, the one before learning first.
     """
     figure = paper_figure(3.6, figure=figure)
     rows = figure.subplots(len(SHOWN), 1, sharex=True)
     for axes, (name, label, factor) in zip(rows, SHOWN, strict=True):
         for i, log in enumerate(executed):
-            clock = log.time - log.time[0] - lead
-            axes.plot(clock, factor * log[name], color=BLUE, lw=0.8, label="" if i else "executed")
+            axes.plot(
+                log.time, factor * log[name], color=BLUE, lw=0.8, label="" if i else "executed"
+            )
         for (what, motion), (dashes, hue) in zip(expected.items(), STYLES, strict=False):
-            clock = motion.time - lead
-            axes.plot(clock, factor * motion[name], label=what, ls=dashes, color=hue)
-        clock = planned.time - planned.time[0]
-        axes.plot(clock, factor * planned[name], color="black", lw=0.6, label="planned")
+            axes.plot(motion.time, factor * motion[name], label=what, ls=dashes, color=hue)
+        axes.plot(planned.time, factor * planned[name], color="black", lw=0.6, label="planned")
         axes.set_ylabel(label)
     rows[-1].set_xlabel("time of the plan [s]")
     key_above(rows[0])
@@ -61,7 +58,7 @@ def plot_rounds(
     figure: Figure | None = None,
 ) -> Figure:
     """Apex errors [m] of the executed runs by round, and the one `expected` of the next run."""
-    figure = paper_figure(2.0, 4.2, figure)
+    figure = paper_figure(2.0, figure=figure)
     axes = figure.add_subplot()
     axes.axhline(0.0, color=GREY, lw=0.6)
     axes.plot(rounds, 1e3 * np.asarray(apex), "o-", color=BLUE, label="executed")

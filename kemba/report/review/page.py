@@ -70,26 +70,31 @@ def review(
     model: str | None = None,
     column_map: str | Path | None = None,
     out: str | Path | None = None,
+    force: bool = False,
 ) -> tuple[Path, Verdict]:
     """Write the page to `out`, by default beside what it is about; the path and the verdict.
+
+    Without `force` a page that is there already is kept, and a new one is numbered.
 
     `run`, `answer`: folders of solve and discover. `model`: what the logs are compared with, by
     default that of the run's task. The page needs no other file. Raises KembaError where a file
     cannot be read or written, or nothing is given.
     """
     given = gather_material(logs, run, answer, model, column_map)
+    path = place_for(out, default_path(logs, run, answer), force)
     try:
         title, body, verdict = page_of(given)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         what = f"its certificate or manifest is not as solve writes it ({error!r})"
         raise KembaError(str(run or answer), what, hint="solve the task again") from None
-    return write_page(out or default_path(logs, run, answer), title, body), verdict
+    return write_page(path, title, body), verdict
 
 
 def report_run(run: str | Path, out: str | Path | None = None, force: bool = False) -> Path:
     """The page of a run alone, by default a new `report.html` in it. Raises KembaError."""
     folder = load_run(run).path
-    return review(run=folder, out=place_for(out, folder / "report.html", force))[0]
+    path = place_for(out, folder / "report.html", force)
+    return review(run=folder, out=path, force=True)[0]
 
 
 def default_path(

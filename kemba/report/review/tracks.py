@@ -83,7 +83,7 @@ def grid_of(tracks: Sequence[Track]) -> Array:
 
 
 def on_grid(track: Track, name: str, grid: Array, steps: bool = False) -> Array:
-    """A column at the times of the grid; NaN before it begins and after it ends."""
+    """A column at the times (n,) of the grid; NaN before it begins and after it ends."""
     t = track.t
     values = t[name]
     known = np.isfinite(values)

@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, Literal
 import casadi as ca
 
 from kemba.effects.base import At, Contribution, Effect
-from kemba.effects.mechanics.laws import coulomb, dahl_rate, one_way, stribeck, viscous
+from kemba.effects.mechanics.laws import coulomb, dahl_rate, fading, one_way, viscous
 from kemba.quantity import Param, Quantity
 
 SURVEY = "B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, Automatica 30 (1994)"
@@ -112,18 +112,18 @@ class AxisStribeck(Effect):
     own_rigs: ClassVar[bool] = True
 
     def evaluate(self, at: At) -> Contribution:
-        force = stribeck(self.F_s, at.axis.v, self.v_b, at.sign_speed)
-        return Contribution(effort={"axis": force})
+        extra = self.F_s * fading(at.axis.v, self.v_b)
+        return Contribution(effort={"axis": coulomb(extra, at.axis.v, at.sign_speed)})
 
 
 class GearFriction(Effect):
-    """Friction of gear teeth, which the transmitted force presses together."""
+    """Friction of gear teeth, which the force of inertia and load presses together."""
 
     kind: Literal["gear_friction"] = "gear_friction"
     mu: Annotated[float, Param("1", 0.1, lower=0.0, upper=1.0, doc="share of the force")] = 0.0
 
     family: ClassVar[str] = "drive"
-    equation: ClassVar[str] = "-mu abs(tau) tanh(v/sign_speed)"
+    equation: ClassVar[str] = "-mu abs(J a + load) tanh(v/sign_speed)"
     source: ClassVar[str] = (
         "load-dependent friction of gears: M. Gautier, A. Jubien, A. Janot, ICRA 2012"
     )
@@ -133,7 +133,7 @@ class GearFriction(Effect):
     own_rigs: ClassVar[bool] = True
 
     def evaluate(self, at: At) -> Contribution:
-        pressed = self.mu * ca.fabs(at.tau)
+        pressed = self.mu * ca.fabs(at.carried)
         return Contribution(effort={"axis": coulomb(pressed, at.axis.v, at.sign_speed)})
 
 

@@ -15,12 +15,13 @@ PLATE = Tolerance(0.05, source="assumed: an inertia from data sheets and drawing
 
 class DriveAxis(Effect):
     """Motor, inertia and load of a drive; the rig brings it along. `J`: inertia of all that moves
-    but the load. `m` is lifted (linear), or hangs at `arm` straight below the axis at q = 0."""
+    but the load. `m` hangs at `arm`, straight below the axis at q = 0, or is lifted."""
 
     kind: Literal["drive_axis"] = "drive_axis"
     J: Annotated[float, Param("kg", 1.0, lower=0.0, doc="inertia", rotary="kg.m2")] = 1.0
-    m: Annotated[float, Param("kg", 1.0, lower=0.0, doc="mass of the load")] = 0.0
-    arm: Annotated[float, Param("m", 0.1, lower=0.0, doc="its arm; 0: a linear axis")] = 0.0
+    m: Annotated[float, Param("kg", 1.0, lower=0.0, doc="mass of the load")] = 1.0
+    arm: Annotated[float, Param("m", 0.1, lower=0.0, doc="its arm where it hangs")] = 0.1
+    hangs: bool = True
 
     family: ClassVar[str] = "drive"
     equation: ClassVar[str] = (
@@ -28,6 +29,7 @@ class DriveAxis(Effect):
     )
     source: ClassVar[str] = "rigid bodies"
     ports: ClassVar[tuple[str, ...]] = ("axis",)
+    publishes: ClassVar[tuple[str, ...]] = ("carried",)
     mirror: ClassVar[dict[str, str]] = {"tau": "-tau"}
 
     def tolerances(self) -> dict[str, float]:
@@ -39,8 +41,9 @@ class DriveAxis(Effect):
     def evaluate(self, at: At) -> Contribution:
         q, a = at.axis.x, at.axis.a
         turning = self.arm * (self.arm * a + at.gravity * ca.sin(q))
-        load = self.m * (turning if self.arm else a + at.gravity)
-        return Contribution(effort={"axis": at.tau - self.J * a - load})
+        load = self.m * (turning if self.hangs else a + at.gravity)
+        carried = self.J * a + load
+        return Contribution(effort={"axis": at.tau - carried}, publish={"carried": carried})
 
 
 class ExtraInertia(Effect):
@@ -80,7 +83,7 @@ class AxisLag(MotorLag):
     own_rigs: ClassVar[bool] = True
 
     def states(self) -> dict[str, Quantity]:
-        return {"tau_a": Quantity("axis/tau_a", "N", scale=10.0, doc="what acts on the axis")}
+        return {"tau_a": Quantity("axis/tau_a", "N", -1e6, 1e6, 10.0, doc="what acts on the axis")}
 
 
 class AxisOffset(Effect):

@@ -1,0 +1,23 @@
+"""Which effect is missing.
+
+A machine with seal friction that the plan knows nothing of: three logs, one answer.
+"""
+
+from pathlib import Path
+
+from pictures import save
+
+import kemba
+
+Path("machine.yaml").write_text(
+    "name: machine\nbase: planning\neffects:\n  - {kind: seal_friction, F_c: 12 N}\n",
+    encoding="utf-8",
+)
+logs = []
+for number, height in enumerate(("0.42 m", "0.46 m", "0.5 m")):
+    jump = kemba.plan("jump.yaml", height=height)
+    logs += kemba.simulate(jump, plant="machine.yaml", noise=True, seed=number).logs
+found = kemba.discover(logs)
+print(found.sentence)
+assert found.ranking[0].effect == "seal_friction"
+save(found.figure())

@@ -1,0 +1,50 @@
+"""The error that an answer leaves: where it sits, and what to measure next."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+from kemba.identify.compare.compare import conditions, place_of
+from kemba.identify.compare.force_profiles import force_profiles
+from kemba.identify.compare.hints import lacking
+from kemba.identify.evidence.search import Search
+from kemba.identify.evidence.spike_slab import Hypothesis
+
+BENCH = "run this cylinder alone on a rig: slow strokes, fast strokes, and the rod locked"
+NEXT = {  # by the end of a channel's name
+    "piston": BENCH,
+    "rod": BENCH,
+    "hip": "swing this hip in the air with closed valves, slowly and fast",
+    "pitch": "tilt the body by hand in the air, and let it drop with the legs at rest",
+}
+BODY = "let the robot drop with the legs at rest, and move the boom by hand"
+
+
+@dataclass(frozen=True)
+class Rest:
+    """Where the rest of the error sits, and which measurement would tell more of it."""
+
+    where: str
+    next: str
+
+
+def rest_of(search: Search, best: Hypothesis, unsure: Collection[str]) -> Rest:
+    """What the best hypothesis leaves. `unsure`: effects in it that have rivals."""
+    problem, theta = search.problem, search.points[best].fit.theta
+    profiles = force_profiles(problem, problem.residual(theta))
+    law = [hint.text for hint in lacking(profiles)]
+    bins = sorted(conditions(problem, theta), key=lambda b: -b.ratio)
+    worst = [f"{place_of(b)} ({b.ratio:.2g} times the noise)" for b in bins if b.significant][:1]
+    channel = profiles[0].channel if law else bins[0].channel if worst else ""
+    advice = _advice(channel)
+    if unsure:
+        rivals = " and ".join(unsure)
+        advice = f"'kemba-opt experiment' proposes a test that tells the rivals of {rivals} apart"
+    return Rest("; ".join([*worst, *law]) or "no condition in particular", advice)
+
+
+def _advice(channel: str) -> str:
+    """What to measure to learn more about a channel."""
+    parts = channel.replace(" ", "/").split("/")
+    return next((text for key, text in NEXT.items() if key in parts), BODY)

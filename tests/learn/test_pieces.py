@@ -1,0 +1,157 @@
+"""The pieces of a round: flights, corrections, rounds, aimed tables."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from kemba.config import load_yaml
+from kemba.errors import KembaError
+from kemba.learn.correction import Correction, correction_from, write_correction
+from kemba.learn.flight import Flight, flight_of
+from kemba.learn.round import as_executed
+from kemba.learn.rounds import entry, past_of, sent
+from kemba.model import load_model
+from kemba.ocp import load_task
+from kemba.plotting.robot.machine import load_machine
+from kemba.trajectory import Trajectory
+
+
+def ballistic(noise: float = 0.0, pitch: float = 0.0) -> Trajectory:
+    """A rigid robot that is thrown up from its feet at 2 m/s and ends where it began."""
+    machine = load_machine()
+    stance = dict(machine.mechanism.standing)
+    time = np.arange(0.0, 0.6, 1e-3)
+    rise = np.clip(2.0 * (time - 0.05) - 4.905 * (time - 0.05) ** 2, 0.0, None)
+    rise[time < 0.05] = 0.0
+    rng = np.random.default_rng(0)
+    columns = {"body/z [m]": stance["body/z"] + rise + noise * rng.normal(size=len(time)),
+               "body/pitch [rad]": pitch * time}  # fmt: skip
+    for leg in machine.mechanism.legs:
+        columns[f"{leg}/hip/q [rad]"] = np.full(len(time), stance[f"{leg}/hip/q"])
+        columns[f"{leg}/knee/q [rad]"] = np.full(len(time), stance[f"{leg}/knee/q"])
+    return Trajectory(time, columns)
+
+
+def test_apex_and_touchdown_of_a_throw() -> None:
+    found = flight_of(ballistic(), load_machine())
+    height = load_machine().mechanism.standing["body/z"] + 2.0**2 / (2 * 9.81)
+    assert found.apex == pytest.approx(height, abs=1e-5)
+    assert found.apex_time == pytest.approx(0.05 + 2.0 / 9.81, abs=1e-4)
+    assert found.touchdown == pytest.approx(0.05 + 4.0 / 9.81, abs=2.5e-3)
+    assert found.upright
+
+
+def test_noise_hardly_moves_the_apex() -> None:
+    clean, noisy = (flight_of(ballistic(n), load_machine()) for n in (0.0, 3e-4))
+    assert abs(noisy.apex - clean.apex) < 2e-4
+    assert not flight_of(ballistic(pitch=1.0), load_machine()).upright
+
+
+def flights(errors: list[float]) -> list[Flight]:
+    return [Flight(0.5 + e, 0.3, 0.5, 0.0, True) for e in errors]
+
+
+def test_what_repeats_is_corrected_and_scatter_is_not() -> None:
+    simulated = Flight(0.5, 0.3, 0.5, 0.0, True)
+    assert correction_from(flights([0.02, 0.021, 0.019]), simulated).apex == pytest.approx(
+        0.02, rel=0.01
+    )
+    chance = correction_from(flights([0.004, -0.004, 0.001]), simulated).apex
+    assert abs(chance) < 1e-4
+    one = correction_from(flights([0.003]), simulated).apex
+    assert one == pytest.approx(0.0015, rel=1e-6), "one error as large as the scatter counts half"
+
+
+def test_the_correction_is_bounded() -> None:
+    far = correction_from(flights([0.2, 0.2, 0.2]), Flight(0.5, 0.3, 0.5, 0.0, True))
+    assert far.apex == pytest.approx(0.05) and far.limited == ("apex",)
+
+
+def test_no_touchdown_corrects_none() -> None:
+    up = [Flight(0.5, 0.3, float("nan"), float("nan"), True)]
+    found = correction_from(up, Flight(0.5, 0.3, 0.5, 0.0, True))
+    assert (found.touchdown, found.pitch) == (0.0, 0.0)
+
+
+def test_the_correction_has_a_file_of_its_own(tmp_path: Path) -> None:
+    file = tmp_path / "correction.yaml"
+    write_correction(file, Correction(apex=0.01, logs=3), {"front/valve/extend": [1, -2]}, {})
+    data = load_yaml(file).data
+    assert data["unexplained"]["apex"] == 0.01 and "no physics" in data["note"]
+    assert data["edges_moved_ms"] == {"front/valve/extend": [1, -2]}
+
+
+def made(folder: Path, pulse: float, manifest: dict[str, object] | None = None) -> Path:
+    """A run folder with a table that opens one valve until `pulse` [s]."""
+    folder.mkdir()
+    time = np.arange(-6, 194) / 1000.0
+    columns = {"front/valve/extend [1]": ((time >= 0.0) & (time < pulse)) * 1.0}
+    Trajectory(time, columns, {"lead": 0.006}).write(folder / "controller.csv")
+    (folder / "manifest.json").write_text(json.dumps({"status": "solved", **(manifest or {})}))
+    return folder
+
+
+def logged(run: Path, name: str, begin: float = -0.006) -> Trajectory:
+    """A log whose first row has the time `begin` [s]."""
+    table = Trajectory.read(run / "controller.csv")
+    time = np.arange(-0.006, 0.189, 1.03e-3)
+    valve = sent(table, time, "front/valve/extend")
+    log = Trajectory(time - time[0] + begin, {"front/valve/extend [1]": valve})
+    log.write(run / name)
+    log.meta["path"] = str(run / name)
+    return log
+
+
+def test_rounds_are_counted_from_the_run_folders(tmp_path: Path) -> None:
+    first = made(tmp_path / "first", 0.05)
+    past = past_of([first], [logged(first, "a.csv")])
+    assert (past.round, past.last, past.history) == (1, 0, [])
+    facts = entry(past, {"executed_apex_error_m": 0.01})
+    second = made(tmp_path / "second", 0.10, facts)
+    logs = [logged(second, "b.csv"), logged(first, "c.csv")]
+    past = past_of([second, first], logs)
+    assert past.round == 2
+    assert [run.path.name for run in past.runs] == ["first", "second"]
+    assert past.last == 1 and [len(past.executed[i]) for i in (0, 1)] == [1, 1]
+    assert {p.name for p in past.logs} == {"a.csv", "b.csv", "c.csv"}, "earlier logs join in"
+    assert [e["round"] for e in past.history] == [1]
+
+
+@pytest.mark.parametrize("begin", [-0.006, 0.0])
+def test_logs_are_put_on_the_clock_of_the_plan(tmp_path: Path, begin: float) -> None:
+    first = made(tmp_path / "first", 0.05)
+    (log,) = past_of([first], [logged(first, "a.csv", begin)]).executed[0]
+    assert log.time[0] == pytest.approx(-0.006)
+
+
+def test_a_log_of_no_run_is_refused(tmp_path: Path) -> None:
+    first, other = made(tmp_path / "first", 0.05), made(tmp_path / "other", 0.15)
+    with pytest.raises(KembaError, match="valve commands differ"):
+        past_of([first], [logged(other, "a.csv")])
+
+
+def test_what_was_learnt_from_judges_nothing(tmp_path: Path) -> None:
+    first = made(tmp_path / "first", 0.05)
+    log = logged(first, "a.csv")
+    with pytest.raises(KembaError, match="already learnt from"):
+        past_of([first], [log], [first / "a.csv"])
+    facts = entry(past_of([first], [log]), {})
+    second = made(tmp_path / "second", 0.10, facts)
+    copy = tmp_path / "renamed.csv"
+    copy.write_bytes((first / "a.csv").read_bytes())
+    with pytest.raises(KembaError, match="already learnt from"):
+        past_of([second], [logged(second, "b.csv")], [copy])
+
+
+def test_models_have_the_supply_and_payload_of_the_run(tmp_path: Path) -> None:
+    task, _ = load_task("jump", ["supply=0.65 MPa", "payload=0.3 kg"])
+    name = as_executed("planning", task, tmp_path / "run.yaml")
+    built = load_model(name)
+    assert built.supply == pytest.approx(0.65e6)
+    assert built.effect("payload").value("m") == pytest.approx(0.3)
+    plain, _ = load_task("jump", [])
+    assert as_executed("planning", plain, tmp_path / "no.yaml") == "planning"

@@ -1,0 +1,82 @@
+"""Whole rounds on machines that differ from the model: the error falls, round by round."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from kemba.identify import workflow
+from kemba.identify.robot.problem import robot_problem
+from kemba.runs import load_run
+from kemba_cli.main import app
+
+WEAK = "name: weak\nbase: planning\neffects:\n  - {kind: supply_scale, k: 0.9}\n"
+TIRED = WEAK + "  - {kind: seal_friction, F_c: 9 N}\n  - {kind: payload, m: 0.2 kg}\n"
+SUSPECTS = ("supply_scale", "valve_delay", "boom_force")
+
+
+def run(*words: str | Path) -> dict[str, Any]:
+    done = CliRunner().invoke(app, [*map(str, words), "--json"])
+    assert done.exit_code in (0, 1) and done.stdout, done.output
+    return dict(json.loads(done.stdout))
+
+
+def executed(folder: Path, machine: Path, logs: Path) -> list[float]:
+    """Apex errors [m] of three noisy executions of a run on a hidden machine."""
+    told = run("simulate", folder, "--model", machine, "--repeat", "3", "--noise", "--out", logs)
+    assert all(repeat["landed"] for repeat in told["runs"])
+    return [repeat["apex_error_m"] for repeat in told["runs"]]
+
+
+@pytest.fixture(scope="module")
+def planned(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("learn") / "run-0"
+    run("solve", "jump.yaml", "--set", "height=0.45 m", "--no-figure", "--out", folder)
+    return folder
+
+
+def test_one_round(planned: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A weak supply is found, and the next run is expected to and does come nearer."""
+    monkeypatch.setattr(
+        workflow, "make_problem", lambda logs, model: robot_problem(logs, model, SUSPECTS)
+    )
+    machine = tmp_path / "weak.yaml"
+    machine.write_text(WEAK)
+    before = executed(planned, machine, tmp_path / "logs")
+    found = run("learn", planned, "--logs", tmp_path / "logs", "--out", tmp_path / "run-1")
+    assert (found["round"], found["verdict"], found["added"]) == (1, "missing", ["supply_scale"])
+    assert found["good"] and found["compare_after"] < 0.8 * found["compare_before"]
+    assert found["executed_apex_error_m"] == pytest.approx(sum(before) / 3, abs=5e-4)
+    assert abs(found["expected_apex_error_m"]) < 2e-3
+    after = executed(tmp_path / "run-1", machine, tmp_path / "again")
+    assert max(map(abs, after)) < 0.5 * min(map(abs, before)) and max(map(abs, after)) < 5e-3
+    new = load_run(tmp_path / "run-1")
+    assert new.manifest["learn"]["round"] == 1 and len(new.manifest["learn"]["logs"]) == 3
+    assert new.certificate["continued"] is True
+    page = (tmp_path / "run-1" / "learning.html").read_text("utf-8")
+    assert (
+        "supply_scale" in page and page.count("<svg") == 2 and "http" not in page.split("<svg")[0]
+    )
+    assert "correction" not in (tmp_path / "run-1" / "answer" / "model.yaml").read_text("utf-8")
+
+
+@pytest.mark.slow
+def test_three_rounds(planned: Path, tmp_path: Path) -> None:
+    """Three effects at once: by the third round the apex is within 5 mm, every landing kept."""
+    machine = tmp_path / "tired.yaml"
+    machine.write_text(TIRED)
+    folder, errors = planned, []
+    for number in (1, 2, 3):
+        logs = tmp_path / f"logs-{number}"
+        errors.append(max(map(abs, executed(folder, machine, logs))))
+        found = run("learn", folder, "--logs", logs, "--out", tmp_path / f"run-{number}")
+        assert found["round"] == number and found["good"], found["sentence"]
+        folder = tmp_path / f"run-{number}"
+    errors.append(max(map(abs, executed(folder, machine, tmp_path / "last"))))
+    assert errors[-1] < 5e-3 and errors[-1] < errors[0], errors
+    history = load_run(folder).manifest["learnt_before"]
+    assert [e["round"] for e in history] == [1, 2]
