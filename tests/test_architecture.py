@@ -29,6 +29,7 @@ LEVELS = [
     {"effects"},
     {"model"},
     {"ocp", "plant"},
+    {"policy"},
     {"contract", "identify"},
     {"runs"},
     {"sweep"},

@@ -110,7 +110,8 @@ def _believed(
             continue
         smaller = [h for h in search.points if len(h) == len(best) - 1 and set(h) < set(best)]
         against = max(smaller, key=lambda h: search.points[h].log_evidence, default=NULL)
-        if not left_out(search, best, against).refuted:
+        gain = left_out(search, best, against)
+        if not gain.refuted and (len(best) == 1 or gain.pays):
             return best, p_value, dismissed
         dismissed.add(best)
         best = against

@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from itertools import combinations
+from math import comb
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
-from scipy.special import logsumexp
+from scipy.special import log_ndtr, logsumexp
 from scipy.stats import norm
 
 from kemba.identify.evidence.linear import Linear
+from kemba.identify.evidence.neighbours import Neighbours
 from kemba.identify.problem.problem import Array, Candidate
 from kemba.settings import BY_HAND, Settings, setting
 
@@ -51,6 +53,13 @@ class SpikeSlabSettings(Settings):
     )
     triple: float = setting(
         0.001, "1", "prior probability of three, shared by all triples", BY_HAND, decides=True
+    )
+    further: float = setting(
+        0.1,
+        "1",
+        "each further effect makes an answer this much less likely",
+        "tuned: by hand on the twin of tests/twin, no benchmark; as from two to three",
+        decides=True,
     )
 
 
@@ -147,23 +156,39 @@ class Ranker:
         """Log evidence of every set of the wanted sizes that contains `given`."""
         names = sorted(self.candidates if among is None else among)
         others = [n for n in names if n not in given]
-        found = {}
-        for size in sizes:
-            for extra in combinations(others, size - len(given)):
-                key = tuple(sorted((*given, *extra)))
-                found[key] = self.score(key).log_evidence
+        extras = [e for size in sizes for e in combinations(others, size - len(given))]
+        parts = [self._beside(given, extras, t) for t in self._prior.tolerances]
+        total = logsumexp(parts, axis=0) - np.log(len(parts))
+        keys = (tuple(sorted((*given, *extra))) for extra in extras)
+        return dict(zip(keys, total.tolist(), strict=True))
+
+    def _beside(self, given: Hypothesis, extras: list[Hypothesis], tolerance: float) -> list[float]:
+        """Log evidence of `given` with each of the `extras`, from one factor."""
+        linear, base = self.linear, self.widths(given, tolerance)
+        wide = self.widths(tuple(self.candidates), tolerance)
+        shift = linear.mean - linear.at
+        near = Neighbours.of(self._gram, self._slope, self._power, shift, base)
+        found = []
+        for extra in extras:
+            names = [*given, *extra]
+            i, j = ([self.lead[e] for e in own] for own in (extra, names))
+            evidence, step, sd = near.with_widths(i, wide[i], np.array(j, dtype=int))
+            signed = (self.candidates[e].lead.signed for e in names)
+            for a, free in enumerate(signed):
+                if not free:
+                    z = linear.at[j[a]] + step[a] - self.candidates[names[a]].lead.off
+                    evidence += float(np.log(2.0) + log_ndtr(z / sd[a]))
+            found.append(evidence)
         return found
 
 
 def log_prior(hypothesis: Hypothesis, count: int) -> float:
     """Log prior probability of a hypothesis among `count` effects: all effects are equally likely,
     and each further one makes a hypothesis less likely."""
-    prior = SpikeSlabSettings.current()
-    share = (prior.nothing, prior.single, prior.pair, prior.triple)[min(len(hypothesis), 3)]
-    ways = {0: 1.0, 1: count, 2: count * (count - 1) / 2}.get(
-        len(hypothesis), count * (count - 1) * (count - 2) / 6
-    )
-    return float(np.log(share / max(ways, 1.0)))
+    prior, size = SpikeSlabSettings.current(), len(hypothesis)
+    share = (prior.nothing, prior.single, prior.pair, prior.triple)[min(size, 3)]
+    share *= prior.further ** max(size - 3, 0)
+    return float(np.log(share / max(comb(count, size), 1)))
 
 
 def probabilities(evidence: Mapping[Hypothesis, float], count: int) -> dict[Hypothesis, float]:

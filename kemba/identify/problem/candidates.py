@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from kemba.effects import BY_KIND
 from kemba.effects.base import Effect
@@ -59,6 +59,18 @@ def where_field(kind: str) -> str:
     the `part` of a length, else the leg that it is `on`."""
     fields = BY_KIND[kind].model_fields
     return next((name for name, field in fields.items() if field.is_required()), "on")
+
+
+def leg_candidates(model: Model, kinds: Iterable[str]) -> dict[str, Candidate]:
+    """Each of these kinds of effects on one leg only, as `seal_friction:front`, beside one value
+    for all legs.
+
+    Effects with a state of their own are left out: a leg cannot have the same state twice.
+    """
+    legs = model.mechanism.legs
+    own = [k for k in kinds if BY_KIND[k].place == "leg" and not by_default(k).states()]
+    names = {f"{kind}:{leg}": BY_KIND[kind] for kind in own for leg in legs if len(legs) > 1}
+    return {name: _candidate(name, effect, effect.declared()) for name, effect in names.items()}
 
 
 def geometry_candidates(model: Model) -> dict[str, Candidate]:
