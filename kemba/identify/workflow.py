@@ -107,6 +107,10 @@ def make_problem(logs: Sequence[Trajectory], model: Model) -> Problem:
         from kemba.identify.bench.problem import bench_problem
 
         return bench_problem(logs, model)
+    if model.mechanism.rig == "vessel":
+        from kemba.identify.rigs.vessel import vessel_problem
+
+        return vessel_problem(logs, model)
     if model.mechanism.rig:
         from kemba.identify.rigs.problem import rig_problem
 

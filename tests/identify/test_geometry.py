@@ -7,6 +7,7 @@ import pytest
 pytest.importorskip("numba")
 
 from robot_logs import hops
+from twin.catalogue import hidden
 
 from kemba.effects.mechanics.geometry import Geometry
 from kemba.identify.adopt import item
@@ -34,6 +35,15 @@ def test_standing_feet_show_a_wrong_length(part: str) -> None:
     found = problem.lengths.get(f"geometry:{part}.d", 0.0)
     assert found == pytest.approx(SHORT[part], abs=1.5e-3), problem.lengths
     problem.validate()  # a wrong length is to be found; it is not bad data
+
+
+def test_friction_of_one_leg_is_named_with_its_leg() -> None:
+    logs, _ = hops(hidden("seal_friction", 1.2, "front"), runs=2, seed=3, figures_off=0.01)
+    problem = robot_problem(logs, load_model("planning"))
+    answer = discover(problem).answer
+    assert answer.added == ("seal_friction:front",), answer.sentence
+    row = item(answer.ranking[0].effect, {"F_c": {"value": 12.0}})
+    assert row == {"kind": "seal_friction", "on": "front", "F_c": 12.0}
 
 
 def test_right_lengths_are_left_alone() -> None:

@@ -26,7 +26,10 @@ class RefitSettings(Settings):
     farthest: float = setting(3.0, "1", "largest start of a switch, in sizes", BY_HAND)
     nearest: float = setting(0.1, "1", "smallest start of a switch, in sizes", BY_HAND)
     factor: float = setting(
-        3.0, "1", "a shape also starts at its default times and over this", BY_HAND
+        3.0,
+        "1",
+        "a shape also starts at its default times and over this, if within two prior widths",
+        BY_HAND,
     )
     absurd: float = setting(
         1e6, "1", "residuals are clipped at so many sigmas", "convention: finite, beyond all data"
@@ -84,7 +87,8 @@ def _starts(
                 theta[key] = _inside(start.get(key, parameter.off), parameter)
             else:
                 theta[key] = start.get(key, parameter.typical)
-                if key not in start:
+                likely = settings.factor < np.exp(2.0 * parameter.size)
+                if key not in start and likely:
                     shapes.append((key, parameter))
     yield theta
     for key, parameter in shapes:
@@ -138,7 +142,15 @@ class _LeastSquares:
             ftol=self.settings.cost,
             xtol=self.settings.change,
         )
-        return Fit(self._theta(found.x), float(found.cost), self._columns(found.jac))
+        theta, columns = self._theta(found.x), self._columns(found.jac)
+        if self.problem.bends:
+            columns = self._anew(theta) | columns
+        return Fit(theta, float(found.cost), columns)
+
+    def _anew(self, theta: Mapping[str, float]) -> dict[str, Array]:
+        """Slopes at theta along everything that no part of the hypothesis is."""
+        names = [*self.problem.nuisance, *(c.key for c in self.problem.candidates.values())]
+        return dict(zip(names, self.problem.jacobian(theta, names).T, strict=True))
 
     def _columns(self, jacobian: Array) -> dict[str, Array]:
         """Slopes of the residual per unit of each own parameter, from those per prior width."""
@@ -202,7 +214,10 @@ class _LeastSquares:
         sigmas = np.array([self.problem.nuisance[name][1] for name in self.nuisance])
         jacobian = np.zeros((len(base), len(x)))
         rows = len(base) - len(x)
-        jacobian[:rows, :n] = self.frozen.jacobian * sigmas
+        slopes = self.frozen.jacobian
+        if self.problem.bends:
+            slopes = self.problem.jacobian(self._theta(x), self.nuisance)
+        jacobian[:rows, :n] = slopes * sigmas
         jacobian[rows:] = np.eye(len(x))
         for i in range(n, len(x)):
             h = self.settings.step

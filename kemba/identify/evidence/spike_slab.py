@@ -9,10 +9,11 @@ from math import comb
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
-from scipy.special import logsumexp
+from scipy.special import log_ndtr, logsumexp
 from scipy.stats import norm
 
 from kemba.identify.evidence.linear import Linear
+from kemba.identify.evidence.neighbours import Neighbours
 from kemba.identify.problem.problem import Array, Candidate
 from kemba.settings import BY_HAND, Settings, setting
 
@@ -155,11 +156,29 @@ class Ranker:
         """Log evidence of every set of the wanted sizes that contains `given`."""
         names = sorted(self.candidates if among is None else among)
         others = [n for n in names if n not in given]
-        found = {}
-        for size in sizes:
-            for extra in combinations(others, size - len(given)):
-                key = tuple(sorted((*given, *extra)))
-                found[key] = self.score(key).log_evidence
+        extras = [e for size in sizes for e in combinations(others, size - len(given))]
+        parts = [self._beside(given, extras, t) for t in self._prior.tolerances]
+        total = logsumexp(parts, axis=0) - np.log(len(parts))
+        keys = (tuple(sorted((*given, *extra))) for extra in extras)
+        return dict(zip(keys, total.tolist(), strict=True))
+
+    def _beside(self, given: Hypothesis, extras: list[Hypothesis], tolerance: float) -> list[float]:
+        """Log evidence of `given` with each of the `extras`, from one factor."""
+        linear, base = self.linear, self.widths(given, tolerance)
+        wide = self.widths(tuple(self.candidates), tolerance)
+        shift = linear.mean - linear.at
+        near = Neighbours.of(self._gram, self._slope, self._power, shift, base)
+        found = []
+        for extra in extras:
+            names = [*given, *extra]
+            i, j = ([self.lead[e] for e in own] for own in (extra, names))
+            evidence, step, sd = near.with_widths(i, wide[i], np.array(j, dtype=int))
+            signed = (self.candidates[e].lead.signed for e in names)
+            for a, free in enumerate(signed):
+                if not free:
+                    z = linear.at[j[a]] + step[a] - self.candidates[names[a]].lead.off
+                    evidence += float(np.log(2.0) + log_ndtr(z / sd[a]))
+            found.append(evidence)
         return found
 
 

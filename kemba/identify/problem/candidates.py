@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from kemba.effects import BY_KIND
 from kemba.effects.base import Effect
 from kemba.effects.mechanics.geometry import SIZES, Geometry
 from kemba.identify.problem.problem import Candidate, Parameter
 from kemba.identify.problem.sensor_faults import possible_faults
+from kemba.identify.problem.structure import ORIFICE, OrificeShare
 from kemba.model.model import Model
 from kemba.model.scene import port_name
 from kemba.quantity import Param
@@ -49,6 +50,8 @@ def effect_candidates(model: Model) -> dict[str, Candidate]:
 
 def by_default(name: str) -> Effect:
     """The effect of a name as its defaults have it: absent."""
+    if name == ORIFICE:
+        return OrificeShare()
     kind, _, place = name.partition(":")
     where = {where_field(kind): place} if place else {}
     return BY_KIND[kind].model_validate({"kind": kind, **where})
@@ -59,6 +62,18 @@ def where_field(kind: str) -> str:
     the `part` of a length, else the leg that it is `on`."""
     fields = BY_KIND[kind].model_fields
     return next((name for name, field in fields.items() if field.is_required()), "on")
+
+
+def leg_candidates(model: Model, kinds: Iterable[str]) -> dict[str, Candidate]:
+    """Each of these kinds of effects on one leg only, as `seal_friction:front`, beside one value
+    for all legs.
+
+    Effects with a state of their own are left out: a leg cannot have the same state twice.
+    """
+    legs = model.mechanism.legs
+    own = [k for k in kinds if BY_KIND[k].place == "leg" and not by_default(k).states()]
+    names = {f"{kind}:{leg}": BY_KIND[kind] for kind in own for leg in legs if len(legs) > 1}
+    return {name: _candidate(name, effect, effect.declared()) for name, effect in names.items()}
 
 
 def geometry_candidates(model: Model) -> dict[str, Candidate]:

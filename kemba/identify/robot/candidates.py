@@ -7,12 +7,15 @@ from kemba.identify.problem.candidates import (
     by_default,
     effect_candidates,
     geometry_candidates,
+    leg_candidates,
 )
 from kemba.identify.problem.problem import Candidate, Parameter
+from kemba.identify.problem.structure import structure_candidates
 from kemba.model.model import Model
 from kemba.settings import BY_HAND, Settings, setting
 
 GROUND = ("ground_compliance", "ground_friction", "contact")
+SHARED = ("supply_scale",)  # one supply feeds all legs
 SOFTNESS = "ground_compliance.softness"
 GRIP = "ground_friction.mu"
 LAGS = ("hose_lag.T", "motor_lag.T")
@@ -27,8 +30,13 @@ class RobotCandidateSettings(Settings):
 
 
 def robot_candidates(model: Model) -> dict[str, Candidate]:
-    """The effects that `model` lacks; a soft ground is searched by its softness 1/k."""
-    found = {**effect_candidates(model), **geometry_candidates(model)}
+    """The effects that `model` lacks, also on one leg only, and its lengths.
+
+    A soft ground is searched by its softness 1/k.
+    """
+    found = effect_candidates(model)
+    apart = leg_candidates(model, [n for n in found if n not in (*GROUND, *SHARED)])
+    found = {**found, **apart, **geometry_candidates(model), **structure_candidates(model)}
     settings = RobotCandidateSettings.current()
     if "ground_compliance" in found:
         found["ground_compliance"] = Candidate(

@@ -45,17 +45,17 @@ class MixUpSettings(Settings):
     )
 
 
-def mixed_up(physics: Physics, log: ResampledLog) -> Iterator[KembaError]:
+def mixed_up(physics: Physics, log: ResampledLog, p: Array) -> Iterator[KembaError]:
     """The mistake in the columns of a log, if its feet stand much better without it."""
     limits = MixUpSettings.current()
     rows = _rows(log)
     if len(rows) < limits.fewest:
         return
-    error = _restless(physics, log, rows, {})
+    error = _restless(physics, log, rows, {}, p)
     if error < limits.small:
         return
     trials = [
-        (_restless(physics, log, rows, change), text, change)
+        (_restless(physics, log, rows, change, p), text, change)
         for text, change in mix_ups(physics.legs, physics.mechanism.stroke)
     ]
     best, text, _ = min(trials, key=lambda t: t[0])
@@ -117,7 +117,7 @@ def _rows(log: ResampledLog) -> Indices:
 
 
 def _restless(
-    physics: Physics, log: ResampledLog, rows: Indices, change: dict[str, Change]
+    physics: Physics, log: ResampledLog, rows: Indices, change: dict[str, Change], p: Array
 ) -> float:
     """How far [m] feet are from the ground and from their place one window before.
 
@@ -125,16 +125,17 @@ def _restless(
     largest of these quantiles."""
     step = float(np.median(np.diff(log.time)))
     half = max(1, round(0.5 * MixUpSettings.current().window / step))
-    before, now, after = (_feet(physics, log.y[rows + k], change) for k in (-half, 0, half))
+    before, now, after = (_feet(physics, log.y[rows + k], change, p) for k in (-half, 0, half))
     far = np.hypot(now[:, :, 1], np.linalg.norm(after - before, axis=2))
     lowest = np.take_along_axis(far, np.argmin(now[:, :, 1], axis=1)[:, None], axis=1)
     return float(max(np.median(lowest), np.quantile(far, 0.25, axis=0).max()))
 
 
-def _feet(physics: Physics, y: Array, change: dict[str, Change]) -> Array:
-    """Places (n, legs, 2) of the feet [m] at measured channels y (n, m), changed."""
+def _feet(physics: Physics, y: Array, change: dict[str, Change], p: Array) -> Array:
+    """Places (n, legs, 2) of the feet [m] at measured channels y (n, m), changed; `p` (k,) gives
+    the lengths of the legs."""
     count, same = len(physics.legs), np.positive
     columns = [change.get(name, same)(y[:, i]) for i, name in enumerate(physics.channels)]
     known = np.stack(columns, axis=1)
-    q = np.hstack([known[:, : 3 + count], physics.knees(known[:, 3 + count :], physics.nominal)])
-    return physics.call("feet", q, 0 * q, p=physics.nominal)[0].reshape(len(y), count, 2)
+    q = np.hstack([known[:, : 3 + count], physics.knees(known[:, 3 + count :], p)])
+    return physics.call("feet", q, 0 * q, p=p)[0].reshape(len(y), count, 2)
