@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from contextvars import ContextVar
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -39,7 +40,11 @@ OwnEffects = Annotated[
 ]
 Force = Annotated[bool, typer.Option("--force", help="Replace results that are there already.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")]
+Verbose = Annotated[
+    bool, typer.Option("--verbose", "-v", help="Say more: iterations, time taken, tracebacks.")
+]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing but the result.")]
+loud: ContextVar[bool] = ContextVar("loud", default=False)  # whether `-v` was given
 
 
 @lru_cache(maxsize=1)

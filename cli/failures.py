@@ -14,6 +14,7 @@ from typing import Any
 import typer
 
 from kemba.errors import KembaError
+from kemba_cli.common import loud
 from kemba_cli.memory import shortage, used_up
 
 OF_THE_DISK = (
@@ -75,7 +76,7 @@ def _disk(error: OSError) -> str:
 def _crash(error: Exception) -> str:
     """The message on an unexpected exception: short, or the traceback with KEMBA_DEBUG."""
     whole = "".join(traceback.format_exception(error))
-    if os.environ.get("KEMBA_DEBUG"):
+    if os.environ.get("KEMBA_DEBUG") or loud.get():
         return whole
     try:
         with tempfile.NamedTemporaryFile(

@@ -14,6 +14,7 @@ import typer
 
 import kemba
 from kemba_cli.failures import guarded
+from kemba_cli.verbose import with_verbose
 from kemba_cli.verbs.identify.adopt import adopt
 from kemba_cli.verbs.identify.characterise import characterise
 from kemba_cli.verbs.identify.compare import compare
@@ -59,8 +60,8 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 for verb in VERBS:
-    app.command()(guarded(verb))
-app.command("map")(guarded(draft_map))  # `map` is a word of Python
+    app.command()(with_verbose(guarded(verb)))
+app.command("map")(with_verbose(guarded(draft_map)))  # `map` is a word of Python
 
 
 def _version(wanted: bool) -> None:

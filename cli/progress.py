@@ -5,7 +5,9 @@ from __future__ import annotations
 import time
 from typing import Any
 
-from kemba_cli.common import say, talk
+from kemba_cli.common import loud, say, talk
+
+EVERY = 10  # iterations between the lines of -v
 
 
 class Progress:
@@ -44,3 +46,6 @@ class Progress:
                 f"{self.stage}: iteration {iteration}, objective {objective:.3g}, "
                 f"violation {violation:.1e}, {seconds:.0f} s"
             )
+        elif loud.get() and iteration % EVERY == 0:
+            numbers = f"objective {objective:.3g}, violation {violation:.1e}"
+            say(f"          iteration {iteration}, {numbers}", self.quiet)

@@ -23,6 +23,11 @@ __all__ = ["Run", "RunFolder", "load_run", "write_json"]
 
 MANIFEST = "manifest.json"
 PLANT_RUN = "plant.csv"  # the motion of the simulated robot, in the plan's clock
+TABLES = ("trajectory", "controller", "plant")
+REPLACED = (  # what a run consists of, and pages about it
+    *("task.yaml", "certificate.json", "solver.log", "figure.png", "report.html", "view.html"),
+    *(f"{name}.{kind}" for name in TABLES for kind in ("csv", "meta.yaml")),
+)
 LIBRARIES = ("casadi", "pin", "numpy")
 
 
@@ -44,21 +49,26 @@ class RunFolder:
         task: str,
         inputs: Iterable[str | Path] = (),
         command: Sequence[str] | None = None,
+        force: bool = False,
     ) -> RunFolder:
         """Make the folder `out`, or the next free `runs/<task>-<n>`, and note what goes in.
 
         `inputs` are the task and model files, of which hashes are kept. A folder left by a run
-        that never finished is used again. Raises KembaError when `out` holds a finished run or
-        other files, cannot be made or written, or is being filled by another process.
+        that never finished is used again. With `force` a finished run is replaced, unless it has
+        logs. Raises KembaError when `out` holds a finished run or other files, cannot be made or
+        written, or is being filled by another process.
         """
         if out is None:
             path = _next_free(task)
         else:
             path = Path(out)
-            _check_usable(path)
+            _check_usable(path, force)
         try_writing(path)
         folder = cls(path, lock=lock_folder(path))
-        _check_usable(path)  # another process may have finished since
+        _check_usable(path, force)  # another process may have finished since
+        if force:
+            for old in (path / name for name in REPLACED):
+                old.unlink(missing_ok=True)
         folder.manifest = {
             "status": "running",
             "task": task,
@@ -195,16 +205,22 @@ def _next_free(task: str) -> Path:
             return path
 
 
-def _check_usable(path: Path) -> None:
-    """Raise KembaError unless the folder is new, or left over from an unfinished run."""
+def _check_usable(path: Path, force: bool = False) -> None:
+    """Raise KembaError unless the folder is new, or left over from an unfinished run, or may be
+    replaced by `force`."""
     if path.exists() and not path.is_dir():
         raise KembaError(f"--out {path}", "is a file", "a new folder was expected")
     if path.is_dir() and any(item.name != LOCK for item in path.iterdir()):
         if not (path / MANIFEST).is_file():
             raise KembaError(f"--out {path}", "holds other files", "a new folder was expected")
-        if read_manifest(path).get("status") != "running":
-            hint = "give another --out, or delete it first"
+        if read_manifest(path).get("status") == "running":
+            return
+        if not force:
+            hint = "give another --out, or --force to replace it"
             raise KembaError(f"--out {path}", "holds a finished run already", hint=hint)
+        if newest_logs(path):
+            hint = "they belong to the run that is there; give another --out"
+            raise KembaError(f"--out {path}", "holds logs", hint=hint)
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:

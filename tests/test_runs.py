@@ -75,6 +75,25 @@ def test_missing_runs_and_results() -> None:
         _ = load_run("runs/jump-1").trajectory
 
 
+def test_a_finished_run_is_replaced_only_by_force_and_never_its_logs() -> None:
+    old = RunFolder.create("mine", "jump")
+    (old / "plant.csv").write_text("of the old plan")
+    old.finish("solved")
+    with pytest.raises(KembaError, match="or --force to replace it"):
+        RunFolder.create("mine", "jump")
+    new = RunFolder.create("mine", "jump", force=True)
+    assert [path.name for path in sorted(new.path.iterdir())] == [".lock", "manifest.json"]
+    new.finish("solved")
+    (new / "logs").mkdir()
+    (new / "logs" / "log-1.csv").write_text("measured")
+    with pytest.raises(KembaError, match="they belong to the run that is there"):
+        RunFolder.create("mine", "jump", force=True)
+    Path("other").mkdir()
+    Path("other", "thesis.tex").write_text("mine")
+    with pytest.raises(KembaError, match="holds other files"):
+        RunFolder.create("other", "jump", force=True)
+
+
 def test_json_takes_numpy_and_refuses_nothing() -> None:
     data = {"a": np.float32(0.5), "b": np.arange(2), "c": np.nan, "d": [np.inf], "e": Path("x")}
     write_json("x.json", data | {"f": np.bool_(True)})

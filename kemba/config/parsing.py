@@ -22,6 +22,7 @@ __all__ = [
     "beside",
     "dump_yaml",
     "find_config",
+    "is_file",
     "load_yaml",
     "locate",
     "parse",
@@ -85,7 +86,7 @@ def find_config(name: str | Path, folder: str) -> Path:
 def beside(name: str, folder: Path) -> str:
     """The whole path of the file `name` in `folder` or else in the current folder; where there is
     neither, `name` as given, which may be that of a shipped file."""
-    near = (path for path in (folder / name, Path(name)) if _is_file(path))
+    near = (path for path in (folder / name, Path(name)) if is_file(path))
     found = next(near, None)
     return name if found is None else str(found.resolve())
 
@@ -96,7 +97,7 @@ def locate(name: str | Path, folders: Collection[str]) -> Path:
     Raises KembaError where there is no such file, with the nearest shipped name, or where the name
     does not end in .yaml.
     """
-    if _is_file(Path(name)):
+    if is_file(Path(name)):
         if Path(name).suffix not in (".yaml", ".yml"):
             raise KembaError(str(name), "is no YAML file", "a name ending in .yaml was expected")
         return Path(name)
@@ -118,8 +119,9 @@ def shipped_configs(folder: str) -> dict[str, Path]:
     return {path.name: path for path in sorted((root / folder).glob("*.yaml"))}
 
 
-def _is_file(path: Path) -> bool:
-    """Whether there is such a file; False for names that no file can have."""
+def is_file(path: Path) -> bool:
+    """Whether there is such a file; False for names that no file can have, where `Path.is_file`
+    raises OSError or ValueError."""
     try:
         return path.is_file()
     except (OSError, ValueError):  # too long, or with a zero in it

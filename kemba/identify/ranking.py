@@ -37,9 +37,8 @@ def ranked(
     found = []
     before = error(search, NULL, holdout)
     for effect in order[: RankingSettings.current().shown]:
-        hypothesis = best if effect in best else (effect,)
-        point = search.points.get(hypothesis)
-        if point is None:
+        hypothesis = best if effect in best else _likeliest_with(search, effect)
+        if not hypothesis:
             continue
         found.append(
             Ranked(
@@ -53,6 +52,14 @@ def ranked(
             )
         )
     return found
+
+
+def _likeliest_with(search: Search, effect: str) -> Hypothesis:
+    """This effect alone, if it was refitted; else the likeliest hypothesis that has it."""
+    if (effect,) in search.points:
+        return (effect,)
+    having = [h for h in search.points if effect in h]
+    return max(having, key=lambda h: search.points[h].log_evidence, default=NULL)
 
 
 def _doubted(probability: Mapping[Hypothesis, float]) -> dict[Hypothesis, float]:

@@ -14,6 +14,7 @@ from kemba.identify.answer import Answer
 from kemba.identify.discover import Discovery, discover
 from kemba.identify.logs.excerpt import excerpts
 from kemba.identify.logs.gate import BadData, check_logs, sentence
+from kemba.identify.logs.limits import limits_of
 from kemba.identify.logs.reading import read_logs, taken_on
 from kemba.identify.problem.problem import Problem
 from kemba.logs import load_map
@@ -44,7 +45,7 @@ def discover_logs(
     try:
         _apart(fitted, kept)
         built = model_of(fitted, model)
-        checked = check_all([*fitted, *kept], built)
+        checked = [*check_all([*fitted, *kept], built), *limits_of(fitted)]
         say("preparing the logs")
         problem, remarks = admitted(fitted, built)
         remarks = [*built.remarks, *checked, *remarks]
@@ -106,6 +107,10 @@ def make_problem(logs: Sequence[Trajectory], model: Model) -> Problem:
         from kemba.identify.bench.problem import bench_problem
 
         return bench_problem(logs, model)
+    if model.mechanism.rig == "vessel":
+        from kemba.identify.rigs.vessel import vessel_problem
+
+        return vessel_problem(logs, model)
     if model.mechanism.rig:
         from kemba.identify.rigs.problem import rig_problem
 

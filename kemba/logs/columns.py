@@ -107,9 +107,12 @@ def check_map(found: ColumnMap, where: str) -> None:
     if TIME not in found.columns:
         raise KembaError(where, f"columns: '{TIME}' is not mapped", "every log needs its time")
     for header, source in found.columns.items():
-        unit = "s" if header == TIME else Quantity.from_header(header).unit
         try:
+            unit = "s" if header == TIME else Quantity.from_header(header).unit
             source.offset_in(unit)
             source.level()
+        except KembaError as error:
+            what = f"columns: {error.what}"
+            raise KembaError(where, what, error.expected, error.hint) from None
         except ValueError as error:
             raise KembaError(where, f"columns: '{header}': {error}") from None

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from kemba.config import Document, load_yaml, parse, shipped_configs
+from kemba.config import Document, is_file, load_yaml, parse, shipped_configs
 from kemba.errors import KembaError, suggest
 from kemba.mechanism.cylinder import Cylinder, CylinderTable, scaled
 from kemba.mechanism.knee import flexion
 from kemba.mechanism.links import Robot, RobotFile
 
+ENDINGS = (".yaml", ".yml")  # other files are never read: messages may show lines of them
 KNOWN_CYLINDER = "dsnu-25-70"  # whose figures are scaled when a robot names no other
 
 
@@ -24,7 +25,7 @@ def find_file(name: str | Path, kind: str, beside: Path | None = None) -> Path:
     ours = {path.parent.parent for path in shipped.values()}
     folders = [*([beside] if beside else []), Path()]
     near = [folder / f"{name}{end}" for folder in folders for end in ("", ".yaml")]
-    own = [path.resolve() for path in near if path.is_file()]
+    own = [path.resolve() for path in near if path.suffix in ENDINGS and is_file(path)]
     known = [shipped[key] for key in (str(name), f"{name}.yaml") if key in shipped]
     found = [*known, *own] if beside and beside.resolve().parent in ours else [*own, *known]
     if found:

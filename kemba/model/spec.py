@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from kemba.config import Document, find_config, load_yaml, parse, shipped_configs
+from kemba.config import Document, find_config, is_file, load_yaml, parse, shipped_configs
 from kemba.effects import AnyEffect, Effect
 from kemba.effects.catalogue import CHAMBERS
 from kemba.effects.pneumatics.constants import ATMOSPHERE
@@ -61,9 +61,8 @@ def model_chain(name: str | Path) -> list[tuple[Path, ModelSpec]]:
     """Files and specs of the model YAML `name`, its base, the base of that, ...; every `robot` is
     a whole path. Raises KembaError with every mistake of a file, and where bases form a circle."""
     chain: list[tuple[Path, ModelSpec]] = []
-    near: str | Path = name
+    path = find_config(str(name), "models").resolve()
     while True:
-        path = find_config(str(near), "models").resolve()
         document = load_yaml(path)
         spec = parse(document, ModelSpec)
         if path in [file for file, _ in chain]:
@@ -73,7 +72,7 @@ def model_chain(name: str | Path) -> list[tuple[Path, ModelSpec]]:
         chain.append((path, spec))
         if spec.base is None:
             return chain
-        near = _near(path, spec.base)
+        path = _base(spec.base, path, document)
 
 
 def model_files(name: str | Path) -> list[Path]:
@@ -96,9 +95,15 @@ def _robot(name: str, path: Path, document: Document) -> str:
         raise document.error(("robot",), what, error.expected, error.hint) from None
 
 
-def _near(path: Path, base: str) -> str | Path:
-    beside = path.parent / (base if base.endswith(".yaml") else f"{base}.yaml")
-    return beside if beside.exists() and beside.resolve() != path else base
+def _base(name: str, path: Path, document: Document) -> Path:
+    """The file of a base: beside the file that names it, then as given, then shipped."""
+    beside = path.parent / (name if name.endswith(".yaml") else f"{name}.yaml")
+    near = beside if is_file(beside) and beside.resolve() != path else name
+    try:
+        return find_config(near, "models").resolve()
+    except KembaError as error:
+        what = f"base: '{name}': {error.what}"
+        raise document.error(("base",), what, error.expected, error.hint) from None
 
 
 def build_model(
@@ -143,11 +148,14 @@ def load_model(
 
 
 def _at_its_line(error: KembaError, name: str | Path) -> KembaError:
-    """An error about `effects.NAME` at the line of the file that lists this effect."""
+    """An error about `effects.NAME` at the line of the file that lists this effect, one about the
+    whole model at its file."""
     for path, spec in model_chain(name):
         for i, effect in enumerate(spec.effects):
             if error.where == f"effects.{effect.name}":
                 what = f"effects.{effect.name}: {error.what}"
                 document = load_yaml(path)
                 return document.error(("effects", i), what, error.expected, error.hint)
+    if error.where == f"model {load_spec(name).name}":
+        return KembaError(str(name), error.what, error.expected, error.hint)
     return error

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from kemba.config import Document
+from kemba.config import Document, find_config
 from kemba.effects.mechanics.load import Payload
 from kemba.errors import KembaError
 from kemba.model import Model, load_model
@@ -80,9 +80,21 @@ def task_model(
 ) -> Model:
     """The model of a task: its own unless `name` is given, with the task's supply, payload and
     changed effects. `document` gives the places of mistakes. Raises KembaError."""
+    if name is None and document is not None:
+        look_up(task, document)
     extra = changed_effects(name or task.model, task.effects, document)
     extra += [Payload(m=task.payload)] if task.payload else []
     return load_model(name or task.model, extra, task.supply)
+
+
+def look_up(task: Task, document: Document) -> None:
+    """Raise KembaError, at the line of the task, where it names a model that there is not."""
+    for key, name in (("model", task.model), ("plant", task.plant)):
+        try:
+            find_config(name, "models")
+        except KembaError as error:
+            what = f"{key}: '{name}' {error.what}"
+            raise document.error((key,), what, error.expected, error.hint) from None
 
 
 def check_feasible(

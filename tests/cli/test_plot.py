@@ -40,10 +40,19 @@ def test_no_figure_is_replaced_without_force() -> None:
         assert run("runs/jump-1").stdout == f"runs/jump-1/{name}.png\n"
     Path("a.png").write_text("mine")
     done = run("log.csv", "--save", "a.png")
-    assert done.exit_code == 2 and "--save a.png: exists already" in done.stderr
+    assert done.exit_code == 2 and "--out a.png: exists already" in done.stderr
     assert Path("a.png").read_text() == "mine"
     assert run("log.csv", "--save", "a.png", "--force").exit_code == 0
     assert Path("a.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_bare_plot_draws_the_newest_run() -> None:
+    done = run()
+    assert (done.stdout, done.stderr) == (
+        "runs/jump-1/figure.png\n",
+        "the newest run: runs/jump-1\n",
+    )
+    assert (run("-q").stdout, run("-q").stderr) == ("runs/jump-1/figure-2.png\n", "")
 
 
 def test_json_names_every_file() -> None:
@@ -60,8 +69,7 @@ def test_mistakes_are_wrong_usage() -> None:
     done = run("nope")
     assert (done.exit_code, done.stdout) == (2, "")
     assert done.stderr == (
-        "nope: no such file or folder; a run folder or a CSV in the log format was expected; "
-        "runs here: runs/jump-1\n"
+        "nope: no such file or folder; a run folder or a log was expected; runs here: runs/jump-1\n"
     )
     assert run("log.csv", "--save", "a.doc").exit_code == 2
 

@@ -16,7 +16,7 @@ from kemba.identify.evidence.spike_slab import SpikeSlabSettings, probabilities
 from kemba.identify.problem.problem import Array, Candidate, Parameter, Problem, Rows, Theta
 from kemba.identify.ranking import values
 
-EFFECTS = ("bend", "drag", "kick", "twin", "wave")
+EFFECTS = ("bend", "drag", "hum", "kick", "ramp", "twin", "wave")
 
 
 class Toy(Problem):
@@ -38,7 +38,8 @@ class Toy(Problem):
         u = np.sign(np.sin(31 * self._time))
         self._shapes = {
             "bend": v**3, "drag": np.tanh(5 * v), "twin": np.tanh(5.0001 * v),
-            "kick": u * v, "wave": np.sin(50 * self._time),
+            "kick": u * v, "wave": np.sin(50 * self._time), "hum": np.cos(90 * self._time),
+            "ramp": self._time * v,
         }  # fmt: skip
         self._u = 100.0 * u
         self.measured = np.zeros(len(v))
@@ -80,6 +81,25 @@ def test_twins_are_named_together() -> None:
 def test_two_effects_are_both_found() -> None:
     answer = discover(Toy({"kick.a": -9.0, "wave.a": 7.0})).answer
     assert set(answer.added) == {"kick", "wave"}
+
+
+def test_as_many_effects_are_found_as_the_data_carry() -> None:
+    hidden = {"kick": -9.0, "wave": 7.0, "bend": 12.0, "hum": 6.0, "ramp": 8.0}
+    answer = discover(Toy({f"{name}.a": size for name, size in hidden.items()})).answer
+    assert answer.verdict == "missing" and set(answer.added) == set(hidden)
+    for row in answer.ranking[:5]:
+        value = row.parameters["a"]
+        assert value.low < hidden[row.effect] < value.high
+    assert answer.excess_after < 0.2 * answer.excess_before
+
+
+def test_an_effect_beside_others_must_pay_on_left_out_data() -> None:
+    """A hum in one half of one run: fitted to all it helps a little, and elsewhere it does harm."""
+    problem = Toy({"kick.a": 9.0})
+    first = problem.rows().run == 0
+    first[np.flatnonzero(first)[400:]] = False
+    problem.measured = problem.measured + 5.0 * problem._shapes["hum"] * first
+    assert discover(problem).answer.added == ("kick",)
 
 
 def test_nothing_is_found_when_nothing_is_missing() -> None:

@@ -20,7 +20,8 @@ def characterise(
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Model YAML to write.")] = None,
     figures: Annotated[
-        Path | None, typer.Option(help="Folder for the paper's figure of each rig.")
+        Path | None,
+        typer.Option("--figure", "--figures", help="Folder for the paper's figure of each rig."),
     ] = None,
     model: Annotated[
         str, typer.Option(help="Model YAML whose robot has the cylinder that was tested.")
@@ -44,6 +45,10 @@ def characterise(
         raise typer.BadParameter("logs are missing: give CSV files, or --paper", param_hint="LOGS")
     from kemba.folders import fresh
     from kemba.model import load_model
+
+    if load_model(model, rig=True).mechanism.rig:
+        _own_rig(logs, model, out, force, json, quiet)
+        return
     from kemba.plant.rig.characterise import characterise as fit
     from kemba.plant.rig.tables import as_json
     from kemba.trajectory import Trajectory
@@ -64,6 +69,34 @@ def characterise(
     _print(found)
     for path in drawn:
         say(f"wrote {path}", quiet)
+    say(f"wrote {out}" if out else "write a model with --out MODEL.yaml", quiet)
+
+
+def _own_rig(
+    logs: list[Path], model: str, out: Path | None, force: bool, json: bool, quiet: bool
+) -> None:
+    """The figures of a rig of the user's own, and of the effects that its model lists."""
+    from rich.table import Table
+
+    from kemba.folders import fresh
+    from kemba.identify.adopt import reference
+    from kemba.identify.rigs.files import characterise_logs
+
+    if out:
+        fresh(out, force)
+    found = characterise_logs(logs, model)
+    if out:
+        found.write_model(out, reference(model))
+    if json:
+        print_json({"logs": len(logs), **found.json(), "model": out and str(out)})
+        return
+    table = Table("figure", "given", "fitted", "95 %", "unit", box=None)
+    for f in found.figures:
+        interval = f"{f.low:.4g} to {f.high:.4g}"
+        table.add_row(f.name, f"{f.given:.4g}", f"{f.value:.4g}", interval, f.unit)
+    results().print(table)
+    error = f"{found.error_before:.3g} to {found.error_after:.3g} times the noise of the sensors"
+    typer.echo(f"The error falls from {error}. Intervals are those of one mounting.")
     say(f"wrote {out}" if out else "write a model with --out MODEL.yaml", quiet)
 
 

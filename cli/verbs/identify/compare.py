@@ -19,7 +19,7 @@ def compare(
     logs: Annotated[list[Path], typer.Argument(help="Logs (CSV) of one machine, any order.")],
     model: Annotated[str, typer.Option(help="Model YAML to judge.")] = "planning",
     run: Annotated[Path | None, typer.Option(help="Run folder that was executed.")] = None,
-    figure: Annotated[Path | None, typer.Option(help="Where to save the figure.")] = None,
+    figure: Annotated[Path | None, typer.Option(help="Also save the figure here.")] = None,
     column_map: Annotated[
         str | None, typer.Option("--map", help="Column map YAML for foreign logs.")
     ] = None,

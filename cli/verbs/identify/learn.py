@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from kemba_cli.common import Json, OwnEffects, Quiet, print_json, say
+from kemba_cli.common import Force, Json, OwnEffects, Quiet, print_json, say
 
 
 def learn(
@@ -36,6 +36,7 @@ def learn(
     correct: Annotated[
         bool, typer.Option(help="Correct what the model does not explain, by valve edges.")
     ] = True,
+    force: Force = False,
     own_effects: OwnEffects = None,
     json: Json = False,
     quiet: Quiet = False,
@@ -71,7 +72,7 @@ def learn(
         folders, listed, task, overrides or [], holdout or [], column_map, time_limit, correct
     )
     name = load_task(task, list(overrides or []))[0].name  # mistakes first, before minutes of work
-    folder = RunFolder.create(out, name, [find_config(task, "tasks"), *listed])
+    folder = RunFolder.create(out, name, [find_config(task, "tasks"), *listed], force=force)
     try:
         with Progress(quiet or json) as progress:
             found = learn_once(asked, folder, Listener(progress.tell, progress.watch))

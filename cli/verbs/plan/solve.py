@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from kemba_cli.common import Json, OwnEffects, Quiet, print_json, say
+from kemba_cli.common import Force, Json, OwnEffects, Quiet, print_json, say
 
 if TYPE_CHECKING:
     from kemba.ocp import Task
@@ -39,9 +39,14 @@ def solve(
         bool, typer.Option("--dry-run", help="Check the task and say its size; solve nothing.")
     ] = False,
     starts: Annotated[int, typer.Option(min=1, help="Guesses to try; the best is kept.")] = 1,
+    robust: Annotated[
+        int | None,
+        typer.Option(min=1, help="Scenarios; of several plans, the one that lands in most."),
+    ] = None,
     jobs: Annotated[int | None, typer.Option(min=1, help="Starts at a time.")] = None,
     replay: Annotated[bool, typer.Option(help="Execute the plan in simulation.")] = True,
     figure: Annotated[bool, typer.Option(help="Draw the plan.")] = True,
+    force: Force = False,
     own_effects: OwnEffects = None,
     json: Json = False,
     quiet: Quiet = False,
@@ -78,6 +83,8 @@ def solve(
     options = list(overrides or [])
     if time_limit is not None:
         options.append(f"solver.time_limit={time_limit}")
+    if robust is not None:
+        options.append(f"robust={robust}")
     resolved, document = load_task(task, options)
     if dry_run:
         _dry_run(resolved, document, model, json)
@@ -91,7 +98,7 @@ def solve(
         say(remark, quiet)
     models = [path for name in (resolved.model, resolved.plant) for path in model_files(name)]
     inputs = [find_config(task, "tasks"), *dict.fromkeys(models), *BY_KIND.files]
-    folder = RunFolder.create(out, resolved.name, inputs)
+    folder = RunFolder.create(out, resolved.name, inputs, force=force)
     with Progress(quiet or json) as progress, Interrupt(lambda text: say(text, quiet)) as stop:
         listener = Listener(progress.tell, progress.watch, stop)
         answer = solve_into(

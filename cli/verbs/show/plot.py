@@ -18,9 +18,11 @@ def plot(
             "(the newest run)."
         ),
     ] = None,
-    save: Annotated[
+    out: Annotated[
         Path | None,
-        typer.Option(help="PNG, PDF or SVG (a new one beside the first run)."),
+        typer.Option(
+            "--out", "--save", help="PNG, PDF or SVG to write (a new one beside the first run)."
+        ),
     ] = None,
     animate: Annotated[
         Path | None, typer.Option(help="Also write a GIF, or an MP4, of the first run.")
@@ -48,7 +50,7 @@ def plot(
     from kemba.logs import load_map
     from kemba.plotting.window import open_window, show_windows
 
-    for path, option in ((save, "--save"), (animate, "--animate")):
+    for path, option in ((out, "--out"), (animate, "--animate")):
         if path is not None:
             fresh(path, force, option)
     runs = runs or [newest(quiet)]
@@ -63,7 +65,7 @@ def plot(
         sources = plotting.load_sources(runs, load_map(column_map) if column_map else None)
         figure = plotting.draw(sources, model, window)
         names, beside = [source.name for source in sources], plotting.default_path(sources)
-    path = save or (beside if force else next_free(beside))
+    path = out or (beside if force else next_free(beside))
     written = {"figure": plotting.save_figure(figure, path)}
     if animate:
         machine = plotting.machine_of(sources[0], model)

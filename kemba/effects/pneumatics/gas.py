@@ -11,9 +11,11 @@ from typing import Annotated, Any, ClassVar, Literal
 import casadi as ca
 
 from kemba.effects.base import At, Contribution, Effect
-from kemba.effects.pneumatics.constants import GAS, KAPPA, TEMPERATURE
+from kemba.effects.pneumatics.constants import ATMOSPHERE, GAS, KAPPA, TEMPERATURE
 from kemba.effects.pneumatics.flow import phi
 from kemba.quantity import Param, Quantity, Tolerance
+
+ROUND = 0.1  # K; the cube root of a difference of temperatures has an infinite slope at 0
 
 
 @dataclass(frozen=True)
@@ -83,20 +85,25 @@ class GasTemperature(Effect):
 
 
 class WallHeat(Effect):
-    """Heat that walls give to the air in them. Needs air with a temperature of its own:
-    `gas_temperature` beside orifice chambers, or the vessel of a rig."""
+    """Heat that walls give to the air in them by free convection, more to denser air.
+
+    h is its coefficient for air of the atmosphere that is 10 K colder than the wall. Needs air with
+    a temperature of its own: `gas_temperature` beside orifice chambers, or the vessel of a rig.
+    """
 
     kind: Literal["wall_heat"] = "wall_heat"
-    h: Annotated[
-        float, Param("W.m-2.K-1", 30.0, lower=0.0, doc="heat transfer coefficient of the wall")
-    ] = 0.0
+    h: Annotated[float, Param("W.m-2.K-1", 5.0, lower=0.0, doc="coefficient at 1 atm and 10 K")] = (
+        0.0
+    )
 
     family: ClassVar[str] = "air"
     equation: ClassVar[str] = (
-        "Q = h A_w (T_w - T); dP/dt + (kappa - 1) Q/V, dT/dt + (kappa - 1) Q T/(P V)"
+        "Q = h A_w (rho/rho_atm)^(2/3) (abs(dT)/10)^(1/3) dT, dT = T_w - T; "
+        "dP/dt + (kappa - 1) Q/V, dT/dt + (kappa - 1) Q T/(P V)"
     )
     source: ClassVar[str] = (
-        "P. Beater, Pneumatic Drives, Springer 2007; free convection of air: 5 to 100 W.m-2.K-1"
+        "W. H. McAdams, Heat Transmission, 1954: Nu = 0.13 (Gr Pr)^(1/3); for blow-downs "
+        "M. A. Haque et al., Trans. IChemE 70 B, 1992"
     )
     off: ClassVar[dict[str, float]] = {"h": 0.0}
     needs: ClassVar[tuple[str, ...]] = ("gas",)
@@ -104,7 +111,10 @@ class WallHeat(Effect):
     def evaluate(self, at: At) -> Contribution:
         add = {}
         for gas in at.gas:
-            warming = (KAPPA - 1) * self.h * gas.wall * (gas.ambient - gas.T) / gas.V
+            colder = gas.ambient - gas.T
+            density = gas.P / ATMOSPHERE * TEMPERATURE / gas.T
+            stirred = density ** (2 / 3) * ((colder**2 + ROUND**2) / 100.0) ** (1 / 6)
+            warming = (KAPPA - 1) * self.h * stirred * gas.wall * colder / gas.V
             add[gas.pressure] = warming
             add[gas.temperature] = warming * gas.T / gas.P
         return Contribution(add_rate=add)

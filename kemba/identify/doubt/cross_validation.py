@@ -52,6 +52,11 @@ class Gain:
         """Whether left-out data speak against it, by more than their scatter."""
         return self.nats + self.error < -CrossValidationSettings.current().refuted
 
+    @property
+    def pays(self) -> bool:
+        """Whether left-out data speak for it, by more than their scatter."""
+        return self.nats > self.error
+
 
 def left_out(search: Search, hypothesis: Hypothesis, against: Hypothesis = NULL) -> Gain:
     """Gain of one hypothesis over another, each block predicted from all others."""

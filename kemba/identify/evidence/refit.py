@@ -142,7 +142,15 @@ class _LeastSquares:
             ftol=self.settings.cost,
             xtol=self.settings.change,
         )
-        return Fit(self._theta(found.x), float(found.cost), self._columns(found.jac))
+        theta, columns = self._theta(found.x), self._columns(found.jac)
+        if self.problem.bends:
+            columns = self._anew(theta) | columns
+        return Fit(theta, float(found.cost), columns)
+
+    def _anew(self, theta: Mapping[str, float]) -> dict[str, Array]:
+        """Slopes at theta along everything that no part of the hypothesis is."""
+        names = [*self.problem.nuisance, *(c.key for c in self.problem.candidates.values())]
+        return dict(zip(names, self.problem.jacobian(theta, names).T, strict=True))
 
     def _columns(self, jacobian: Array) -> dict[str, Array]:
         """Slopes of the residual per unit of each own parameter, from those per prior width."""
@@ -206,7 +214,10 @@ class _LeastSquares:
         sigmas = np.array([self.problem.nuisance[name][1] for name in self.nuisance])
         jacobian = np.zeros((len(base), len(x)))
         rows = len(base) - len(x)
-        jacobian[:rows, :n] = self.frozen.jacobian * sigmas
+        slopes = self.frozen.jacobian
+        if self.problem.bends:
+            slopes = self.problem.jacobian(self._theta(x), self.nuisance)
+        jacobian[:rows, :n] = slopes * sigmas
         jacobian[rows:] = np.eye(len(x))
         for i in range(n, len(x)):
             h = self.settings.step

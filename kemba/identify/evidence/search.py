@@ -13,53 +13,9 @@ from kemba.identify.evidence.linear import Linear, estimate, names_of
 from kemba.identify.evidence.null_model import Baseline
 from kemba.identify.evidence.point import LinearisationPoint
 from kemba.identify.evidence.refit import Fit, refit
+from kemba.identify.evidence.search_settings import SearchSettings
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis, log_prior, probabilities
 from kemba.identify.problem.problem import Problem
-from kemba.settings import BY_HAND, Settings, setting
-
-
-class SearchSettings(Settings):
-    """Which hypotheses are refitted."""
-
-    leaders: int = setting(6, "1", "effects that are refitted in a round", BY_HAND, decides=True)
-    sure: int = setting(
-        3, "1", "leaders that are refitted however far behind they are", BY_HAND, decides=True
-    )
-    far: float = setting(
-        40.0, "nats", "other leaders are refitted when not farther behind", BY_HAND, decides=True
-    )
-    far_share: float = setting(
-        0.7, "1", "or no farther behind than this share of the gain", BY_HAND, decides=True
-    )
-    promising: float = setting(
-        0.5,
-        "1",
-        "share of the best gain with which an effect is tried again",
-        BY_HAND,
-        decides=True,
-    )
-    followed: int = setting(
-        2, "1", "times that the motion is found again with the best guess", BY_HAND, decides=True
-    )
-    largest: int = setting(
-        3, "1", "effects in one answer", "convention: more need another experiment", decides=True
-    )
-    leaders_grown: int = setting(
-        3, "1", "effects that are refitted beside the best answer", BY_HAND, decides=True
-    )
-    leaders_swapped: int = setting(
-        2, "1", "effects that are refitted in place of one of the answer", BY_HAND, decides=True
-    )
-    gain: float = setting(
-        3.0, "nats", "gain from which a pair recommends its members", BY_HAND, decides=True
-    )
-    least: float = setting(
-        0.1,
-        "1",
-        "size of an effect from which its secant replaces its slope",
-        BY_HAND,
-        decides=True,
-    )
 
 
 @dataclass
@@ -96,7 +52,7 @@ class Search:
             for hypothesis in promising:
                 self.visit(hypothesis)
             best = self._round(NULL, leaders)
-            best = self._grow(best)
+            best = self._swap(self._grow(best))
         return best
 
     def _follow(self, best: Hypothesis) -> Hypothesis:
@@ -120,7 +76,25 @@ class Search:
             best = self._round(NULL, settings.leaders)
             if best in (guess, NULL):
                 break
-        return self._grow(best) if best else best
+        return self._swap(self._regrow(self._grow(best))) if best else best
+
+    def _regrow(self, best: Hypothesis) -> Hypothesis:
+        """Find the motion again with an answer of several effects, and let it grow from there.
+
+        Each effect that joins changes the motion, and with it what the others seem to be.
+        """
+        for _ in range(SearchSettings.current().regrown):
+            if len(best) < 2 or time.monotonic() > self.deadline:
+                break
+            theta, before = self.points[best].fit.theta, best
+            self.say(f"looking again as if {' + '.join(best)} were there")
+            self.problem = self.problem.relinearise(theta)
+            self.start(frozenset(), theta)
+            self.visit(best)
+            best = self._grow(best)
+            if best == before:
+                break
+        return best
 
     def _contenders(self) -> frozenset[Hypothesis]:
         """Single effects that were refitted, or whose linear evidence gains a good share of the
@@ -152,20 +126,21 @@ class Search:
         self.problem = self.base.problem
         self.points = {NULL: self.base.point}
 
-    def _round(self, given: Hypothesis, leaders: int) -> Hypothesis:
-        """Refit `given` with one more effect, the likeliest ones; the best of all points so far."""
+    def _round(self, given: Hypothesis, leaders: int, least: float = -np.inf) -> Hypothesis:
+        """Refit `given` with one more effect, the likeliest ones whose linear evidence is `least`
+        or more; the best of all points so far."""
         settings = SearchSettings.current()
         table = self._extensions(given)
         order = sorted(table, key=lambda h: -table[h])[:leaders]
         gain = table[order[0]] - self.points[given].log_evidence
         reach = max(settings.far, settings.far_share * gain)
+        sure = settings.sure_grown if given else settings.sure
         for hypothesis in order:
+            if table[hypothesis] < least:
+                break
             if given and table[hypothesis] < self.points[given].log_evidence:
                 break  # even the linear evidence gains nothing
-            if (
-                table[hypothesis] < table[order[0]] - reach
-                and hypothesis not in order[: settings.sure]
-            ):
+            if table[hypothesis] < table[order[0]] - reach and hypothesis not in order[:sure]:
                 break
             if time.monotonic() > self.deadline:
                 break
@@ -259,18 +234,30 @@ class Search:
         return max(self.points, key=lambda h: self.points[h].log_evidence + log_prior(h, count))
 
     def _grow(self, best: Hypothesis) -> Hypothesis:
-        """Add effects while the evidence grows; then try to swap each for another."""
+        """Add effects, one by one, while the evidence grows."""
         settings = SearchSettings.current()
         while len(best) < settings.largest and time.monotonic() < self.deadline:
             grown = self._round(best, settings.leaders_grown)
             if grown == best or len(grown) <= len(best):
                 break
             best = grown
-        for member in best if len(best) > 1 else ():
-            rest = tuple(h for h in best if h != member)
-            self.visit(rest)
-            self._round(rest, settings.leaders_swapped)
-        return self.best()
+        return best
+
+    def _swap(self, best: Hypothesis) -> Hypothesis:
+        """Take each effect away, or swap it for another; what was swapped may grow again."""
+        settings = SearchSettings.current()
+        for _ in range(settings.swapped):
+            before = best
+            for member in best if len(best) > 1 else ():
+                rest = tuple(h for h in best if h != member)
+                self.visit(rest)
+                least = self.points[best].log_evidence - settings.far
+                self._round(rest, settings.leaders_swapped, least)
+            best = self.best()
+            if best == before or time.monotonic() > self.deadline:
+                break
+            best = self._grow(best)
+        return best
 
     def _promising(self) -> list[Hypothesis]:
         """Refitted hypotheses that gained a good share of what the best one gained."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from itertools import combinations
+from math import comb
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
@@ -52,6 +53,13 @@ class SpikeSlabSettings(Settings):
     )
     triple: float = setting(
         0.001, "1", "prior probability of three, shared by all triples", BY_HAND, decides=True
+    )
+    further: float = setting(
+        0.1,
+        "1",
+        "each further effect makes an answer this much less likely",
+        "tuned: by hand on the twin of tests/twin, no benchmark; as from two to three",
+        decides=True,
     )
 
 
@@ -177,12 +185,10 @@ class Ranker:
 def log_prior(hypothesis: Hypothesis, count: int) -> float:
     """Log prior probability of a hypothesis among `count` effects: all effects are equally likely,
     and each further one makes a hypothesis less likely."""
-    prior = SpikeSlabSettings.current()
-    share = (prior.nothing, prior.single, prior.pair, prior.triple)[min(len(hypothesis), 3)]
-    ways = {0: 1.0, 1: count, 2: count * (count - 1) / 2}.get(
-        len(hypothesis), count * (count - 1) * (count - 2) / 6
-    )
-    return float(np.log(share / max(ways, 1.0)))
+    prior, size = SpikeSlabSettings.current(), len(hypothesis)
+    share = (prior.nothing, prior.single, prior.pair, prior.triple)[min(size, 3)]
+    share *= prior.further ** max(size - 3, 0)
+    return float(np.log(share / max(comb(count, size), 1)))
 
 
 def probabilities(evidence: Mapping[Hypothesis, float], count: int) -> dict[Hypothesis, float]:

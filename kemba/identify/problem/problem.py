@@ -176,6 +176,8 @@ class Problem(ABC):
         Its rows may differ from those of the old one."""
         return self
 
+    bends: bool = False  # whether slopes differ so much from point to point that each needs its own
+
     def is_straight(self, name: str) -> bool:
         """Whether the residual is linear in this parameter, so that its slope tells everything."""
         return False

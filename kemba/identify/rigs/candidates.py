@@ -15,8 +15,12 @@ from kemba.model.model import Model
 
 def possible_candidates(model: Model, logs: Sequence[RigLog]) -> dict[str, Candidate]:
     """Effects and sensor faults by name, sized as the catalogue has them."""
-    effects = {n: c for n, c in effect_candidates(model).items() if stands(model, n)}
-    return effects | sensor_candidates(_sensor_sigmas(model, logs), model)
+    return standing_candidates(model) | sensor_candidates(_sensor_sigmas(model, logs), model)
+
+
+def standing_candidates(model: Model) -> dict[str, Candidate]:
+    """Effects by name that the model of the rig can have."""
+    return {n: c for n, c in effect_candidates(model).items() if stands(model, n)}
 
 
 def stands(model: Model, kind: str) -> bool:

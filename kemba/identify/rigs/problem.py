@@ -42,15 +42,19 @@ class RigProblemSettings(Settings):
 
 class RigProblem(Problem):
     """`Problem` for logs of a cylinder or a drive. One row per judged row of a log: predicted less
-    measured force, over its noise; `colour` of the noise by run."""
+    measured force, over its noise; `colour` of the noise by run. `figures`: more numbers of the
+    model that theta may scale, with 1 sigma of the factor."""
 
     learns_colour = True
 
-    def __init__(self, logs: Sequence[RigLog], model: Model) -> None:
+    def __init__(
+        self, logs: Sequence[RigLog], model: Model, figures: Mapping[str, float] | None = None
+    ) -> None:
         self.model, self.logs = model, tuple(logs)
         self.runs = tuple(log.name for log in self.logs)
         possible = possible_candidates(model, self.logs)
         predictor = Predictor(model, possible)
+        predictor.figures |= {name: (1.0, sigma) for name, sigma in (figures or {}).items()}
         self.candidates = sized(predictor, self.logs, possible)
         self.usual = usual_force(predictor, self.logs)
         self.predictor = predictor
@@ -189,6 +193,8 @@ class RigProblem(Problem):
         return found
 
 
-def rig_problem(logs: Sequence[Trajectory], model: Model) -> RigProblem:
+def rig_problem(
+    logs: Sequence[Trajectory], model: Model, figures: Mapping[str, float] | None = None
+) -> RigProblem:
     """The problem of explaining logs of a cylinder or a drive with `model` and its candidates."""
-    return RigProblem([prepare(log, model) for log in logs], model)
+    return RigProblem([prepare(log, model) for log in logs], model, figures)

@@ -11,10 +11,23 @@ from kemba.identify.logs.gate import BadData
 from kemba.identify.problem.types import Array
 from kemba.identify.rigs.filtering import Filtered, filtered
 from kemba.model.model import Model
+from kemba.settings import Settings, setting
 from kemba.trajectory import Trajectory
 
 ANSWER = {"cylinder": "piston/F", "drive": "axis/tau"}
 PLACE = {"cylinder": "piston/x", "drive": "axis/q"}
+
+
+class RigLogSettings(Settings):
+    """Which rows of a rig's log a friction is known in."""
+
+    doubted: float = setting(
+        2.0,
+        "1",
+        "travel after a turn within which friction is in doubt, over that in which seals stretch",
+        "convention: that travel is taken to be known to a factor of two",
+        decides=True,
+    )
 
 
 @dataclass(frozen=True)
@@ -56,7 +69,28 @@ def prepare(log: Trajectory, model: Model) -> RigLog:
     v, a = found.v[found.rows], found.a[found.rows]
     blur = 2.0 * np.hypot(found.v_sigma, a * found.width)
     high, low = (np.tanh((v + side * blur) / mechanism.sign_speed) for side in (1.0, -1.0))
-    return RigLog(name, found, 0.5 * (high - low))
+    doubt = 0.5 * (high - low)
+    if "measured_chambers.travel" in model.parameters:
+        travel = model.parameters["measured_chambers.travel"][1]
+        slid = np.abs(_stretch(found, RigLogSettings.current().doubted * travel))
+        doubt = np.maximum(doubt, 1.0 - slid[found.rows])
+    return RigLog(name, found, doubt)
+
+
+def _stretch(log: Filtered, travel: float) -> Array:
+    """Stretch (n,) of contacts that slide after some travel; 0 at the begin of every stretch of the
+    log, for what was before is not known."""
+    z, found = 0.0, np.zeros(len(log.q))
+    begins = set(log.begins.tolist())
+    way = np.append(0.0, np.diff(log.q))
+    for i, step in enumerate(way.tolist()):
+        if i in begins:
+            z = 0.0
+            continue
+        side = 1.0 if step > 0 else -1.0
+        z = side + (z - side) * float(np.exp(-abs(step) / travel))
+        found[i] = z
+    return found
 
 
 def _inertia(model: Model) -> float:

@@ -23,10 +23,11 @@ class RigSizeSettings(Settings):
     """What matters on a rig of the user's own."""
 
     seal: float = setting(
-        400.0,
+        200.0,
         "N.m-1",
         "usual friction of a cylinder over its bore",
-        "derived: 10 N at 25 mm, as for the cylinder of the robot (paper Table II: 6 to 8 N)",
+        "derived: cylinders of 25 mm break away at about 0.1 bar, which is 5 N",
+        decides=True,
     )
     drive: float = setting(
         0.05, "1", "usual friction of a drive over its largest force", BY_HAND, decides=True

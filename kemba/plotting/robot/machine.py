@@ -20,8 +20,8 @@ from kemba.trajectory import Array, Trajectory
 OVERTRAVEL = 0.004  # m; a sensor may read this far beyond the stops
 ON_GROUND = 0.01  # m; a foot below this height counts as standing when its force is not known
 PRESSED = 0.02  # of the weight; more than this on a foot means it stands
-CLEAR = 5.0  # times its noise: what a measured force must exceed
-MOMENT = 5e-3  # s, over which a measured contact is decided
+CLEAR = 4.0  # times its noise: what a measured force must exceed
+MOMENT = 7e-3  # s, over which a measured force is averaged
 EXACT = ("plan", "simulation")  # kinds of trajectory without noise
 
 
@@ -71,28 +71,27 @@ class Machine:
     def stance(self, trajectory: Trajectory, leg: str) -> Mask:
         """In which rows (n,) the leg's foot stands: by its force, else by its height.
 
-        A measured force is noisy: there it must stand out, for most of a few milliseconds.
+        A measured force is noisy: its mean over a few milliseconds must stand out.
         """
         if f"{leg}/foot/Fz" in trajectory:
             force, least = trajectory[f"{leg}/foot/Fz"], PRESSED * self.mechanism.weight
             if trajectory.meta.get("kind") in EXACT:
                 return np.asarray(force > least)
-            clear = np.nan_to_num(force) > max(least, CLEAR * difference_sigma(force))
-            return _mostly(trajectory.time, clear)
+            calm, rows = _averaged(trajectory.time, np.nan_to_num(force))
+            noise = difference_sigma(force) / np.sqrt(rows)
+            return np.asarray(calm > max(least, CLEAR * noise))
         coordinates = self.coordinates(trajectory) if leg in self.mechanism.legs else None
         if coordinates is None:
             return np.zeros(len(trajectory), dtype=bool)
         return np.asarray(self.points(coordinates)[f"{leg}/foot"][:, 1] < ON_GROUND)
 
 
-def _mostly(time: Array, flags: Mask) -> Mask:
-    """Flags (n,) that hold for most of the moment around each row."""
+def _averaged(time: Array, values: Array) -> tuple[Array, int]:
+    """Values (n,) averaged over the moment around each row, and over how many rows."""
     reach = round(0.5 * MOMENT / float(np.median(np.diff(time)))) if len(time) > 1 else 0
-    if not reach:
-        return flags
     width = 2 * reach + 1
-    padded = np.pad(flags.astype(float), reach, mode="edge")
-    return np.asarray(np.convolve(padded, np.full(width, 1.0 / width), mode="valid") > 0.5)
+    padded = np.pad(values, reach, mode="edge")
+    return np.convolve(padded, np.full(width, 1.0 / width), mode="valid"), width
 
 
 @lru_cache(maxsize=4)

@@ -8,7 +8,15 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from kemba.config import Document, apply_overrides, find_config, load_yaml, parse, shipped_configs
+from kemba.config import (
+    Document,
+    apply_overrides,
+    find_config,
+    is_file,
+    load_yaml,
+    parse,
+    shipped_configs,
+)
 from kemba.config.document import Location
 from kemba.effects import BY_KIND
 from kemba.errors import KembaError
@@ -34,7 +42,7 @@ class Expansion:
     def found(self, name: str | Path, folder: str) -> Path:
         """The file `name` beside the sweep, as given, or shipped."""
         near = self.beside / name
-        return near if near.is_file() else find_config(name, folder)
+        return near if is_file(near) else find_config(name, folder)
 
     def task_document(self, name: str) -> Document:
         """The task of a block with what it sets. Raises KembaError where the task cannot be

@@ -43,7 +43,7 @@ class ColourSettings(Settings):
         "rows between two errors whose covariance is compared",
         "convention: denser where colour changes fast",
     )
-    draws: int = setting(8, "1", "simulated logs of each kind of noise", BY_HAND)
+    draws: int = setting(5, "1", "simulated logs of each kind of noise", BY_HAND)
     fewest: int = setting(200, "1", "rows of a channel below which no colour is learnt", BY_HAND)
     least: float = setting(
         0.6,
@@ -92,16 +92,20 @@ def learnt_noise(
     known = counts[:channels, 0] >= settings.fewest
     if not known.any():
         return tuple(ChannelNoise() for _ in range(channels))
-    kinds, columns = [], []
+    kinds: list[_Kind] = []
+    columns: list[Array] = []
+    memories = (0.0, *settings.memories, *(settings.drifts if drifts else ()))
+    draws, j, m = settings.draws, system.G.shape[-1], system.H.shape[2]
     for channel in range(channels):
-        memories = (0.0, *settings.memories, *(settings.drifts if drifts else ()))
-        for memory in memories:
-            y = _channel_noise(memory, channel, sigma, h, system.H.shape[2])
-            columns.append(_through(system, gain, errors, y, None))
-            kinds.append(_Kind(channel, memory))
+        y = np.concatenate([_channel_noise(t, channel, sigma, h, m) for t in memories], axis=-1)
+        seen = _through(system, gain, y, np.zeros((*h.shape, j, y.shape[-1])))
+        parts = np.split(seen, len(memories), axis=-1)
+        columns += [_covariances(part, errors)[0] for part in parts]
+        kinds += [_Kind(channel, memory) for memory in memories]
     for i, push in enumerate(pushes):
-        g = _force_noise(settings.force, push, h, system.G.shape[-1])
-        columns.append(_through(system, gain, errors, None, g))
+        g = _force_noise(settings.force, push, h, j)
+        seen = _through(system, gain, np.zeros((*h.shape, m, draws)), g)
+        columns.append(_covariances(seen, errors)[0])
         kinds.append(_Kind(channels + i, settings.force))
     weight = np.sqrt(counts) / np.maximum(measured[:, :1], 1e-9)  # chi2 of every covariance
     a = np.stack([(c * weight).ravel() for c in columns], axis=1)
@@ -188,14 +192,11 @@ def _lag(memory: float, h: Array, draws: int, rng: np.random.Generator) -> Array
     return np.asarray(out)
 
 
-def _through(system: System, gain: Gains, errors: Array, y: Array | None, g: Array | None) -> Array:
-    """Autocovariances (m, lags) of the whitened errors that one kind of noise makes."""
-    n, runs, m, _ = system.H.shape
-    draws = (y if y is not None else g).shape[-1]  # type: ignore[union-attr]
-    y = np.zeros((n, runs, m, draws)) if y is None else y
-    g = np.zeros((n, runs, system.G.shape[-1], draws)) if g is None else g
+def _through(system: System, gain: Gains, y: Array, g: Array) -> Array:
+    """Whitened errors (n, L, m, c) that noise of the sensors `y` (n, L, m, c) and accelerations `g`
+    (n, L, j, c) make."""
     _, found = innovations(system, gain, y, g)
-    return _covariances(gain.whitener @ found, errors)[0]
+    return np.asarray(gain.whitener @ found)
 
 
 def _covariances(columns: Array, errors: Array) -> tuple[Array, Array]:

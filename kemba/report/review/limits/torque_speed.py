@@ -13,7 +13,7 @@ from kemba.report.review.limits.use import Use, envelope
 from kemba.report.review.tracks import Track
 from kemba.trajectory import Array
 
-WIDE, HIGH, LEFT, BOTTOM = 320.0, 170.0, 34.0, 26.0
+WIDE, HIGH, LEFT, BOTTOM = 420.0, 200.0, 34.0, 26.0
 POINTS = 300  # of each curve
 DASHED = ' stroke-dasharray="5 3"'
 

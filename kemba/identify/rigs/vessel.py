@@ -1,0 +1,180 @@
+"""Logs of a vessel that blows down: pressure and temperature predicted from the start."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kemba.effects.series import Series
+from kemba.identify.problem.candidates import by_default, sensor_candidates
+from kemba.identify.problem.nominal import nominal_figures
+from kemba.identify.problem.problem import Problem
+from kemba.identify.problem.sensor_faults import SensorFaults
+from kemba.identify.problem.types import Array, Rows, Theta
+from kemba.identify.rigs.blow_down import BlowDown
+from kemba.identify.rigs.candidates import standing_candidates
+from kemba.model.model import Model
+from kemba.settings import BY_HAND, Settings, setting
+from kemba.trajectory import Trajectory
+
+CHANNELS = ("vessel/P", "vessel/T")
+
+
+class VesselSettings(Settings):
+    """How well a vessel's readings and its start are known."""
+
+    noise: float = setting(
+        0.01, "1", "noise of a reading over the range of its channel", BY_HAND, decides=True
+    )
+    warmth: float = setting(
+        0.5, "K", "smallest noise of a temperature", "literature: IEC 60584 class 1 allows 1.5 K"
+    )
+    late: float = setting(
+        0.02, "1", "usual delay of a sensor, such as a thermometer's, over a log's length", BY_HAND
+    )
+    start_pressure: float = setting(
+        0.02, "1", "prior sigma of the pressure at the start, as a share", BY_HAND
+    )
+    start_temperature: float = setting(
+        3.0, "K", "prior sigma of the temperature at the start", BY_HAND
+    )
+
+
+@dataclass(frozen=True)
+class VesselLog:
+    """Readings of one log: channel -> times (k,) [s] and values (k,); `start`: P [Pa], T [K]."""
+
+    name: str
+    readings: Mapping[str, tuple[Array, Array]]
+    sigma: Mapping[str, float]
+    start: tuple[float, float]
+
+    @property
+    def begin(self) -> float:
+        """Time [s] of the first reading."""
+        return min(float(time[0]) for time, _ in self.readings.values())
+
+    @property
+    def duration(self) -> float:
+        """Time [s] from the first to the last reading."""
+        return max(float(time[-1]) for time, _ in self.readings.values()) - self.begin
+
+
+def prepare(log: Trajectory, ambient: float) -> VesselLog:
+    """The readings of a log; a vessel without a temperature at its first row is at `ambient`."""
+    settings, known = VesselSettings.current(), log.meta.get("noise", {})
+    readings, sigma = {}, {}
+    for name in CHANNELS:
+        if name in log:
+            good = np.isfinite(log[name])
+            readings[name] = (log.time[good], log[name][good])
+            spread = settings.noise * float(np.ptp(readings[name][1]))
+            spread = max(spread, settings.warmth) if name == "vessel/T" else spread
+            sigma[name] = float(known.get(name, spread))
+    first = {n: (float(t[0]), float(y[0])) for n, (t, y) in readings.items()}
+    begin = min(t for t, _ in first.values())
+    pressure = first["vessel/P"][1] if "vessel/P" in first else float("nan")
+    warm = first.get("vessel/T", (np.inf, ambient))
+    temperature = warm[1] if warm[0] == begin else ambient
+    return VesselLog(str(log.meta.get("name", "log")), readings, sigma, (pressure, temperature))
+
+
+class VesselProblem(Problem):
+    """`Problem` for blow-downs. One row per reading; the start of every log is free.
+
+    `figures`: more numbers of the model that theta may scale, with 1 sigma of the factor.
+    """
+
+    bends = True
+
+    def __init__(
+        self, logs: Sequence[VesselLog], model: Model, figures: Mapping[str, float] | None = None
+    ) -> None:
+        self.model, self.logs = model, tuple(logs)
+        settings = VesselSettings.current()
+        self.runs = tuple(log.name for log in self.logs)
+        sigmas = {n: float(np.median([g.sigma[n] for g in self.logs if n in g.sigma]))
+                  for n in CHANNELS if any(n in g.sigma for g in self.logs)}  # fmt: skip
+        self.candidates = standing_candidates(model)
+        longest = max(log.duration for log in self.logs)
+        for name, fault in sensor_candidates(sigmas, model).items():
+            if fault.lead.unit == "s":
+                size = settings.late * longest
+                fault = replace(fault, lead=replace(fault.lead, size=size))
+            self.candidates[name] = fault
+        self.sensors, self.figures = SensorFaults(model.effects), nominal_figures(model)
+        self.figures |= {name: (1.0, sigma) for name, sigma in (figures or {}).items()}
+        self._known: dict[tuple[str, ...], BlowDown] = {}
+        starts = {}
+        for i, log in enumerate(self.logs):
+            starts[f"start:vessel/P[{i}]"] = (0.0, settings.start_pressure * log.start[0])
+            starts[f"start:vessel/T[{i}]"] = (0.0, settings.start_temperature)
+        self.nuisance = self.figures | self.sensors.nuisance | starts
+
+    def residual(self, theta: Theta, runs: Collection[int] | None = None) -> Array:
+        parts = []
+        for i in self._all(runs):
+            log, expected = self.logs[i], self.expected(theta, i)
+            parts += [
+                (expected[name] - y) / log.sigma[name] for name, (_, y) in log.readings.items()
+            ]
+        return np.concatenate(parts)
+
+    def expected(self, theta: Theta, index: int) -> dict[str, Array]:
+        """Channel -> what should have been read (k,), in its unit."""
+        log = self.logs[index]
+        blow, values = self._blow_down(theta), self._values(theta)
+        shift = [theta.get(f"start:{name}[{index}]", 0.0) for name in CHANNELS]
+        start = np.array(log.start) + shift
+        time, states = blow.run(log.begin, log.begin + log.duration, start, values)
+        found = {}
+        for name, (at, _) in log.readings.items():
+            true = Series(time, states[CHANNELS.index(name)])
+            shown = self.sensors.shown(theta, name, true).value
+            found[name] = np.interp(at, time, shown)
+        return found
+
+    def rows(self, runs: Collection[int] | None = None) -> Rows:
+        names = tuple(n for n in CHANNELS if any(n in g.readings for g in self.logs))
+        parts = []
+        for i in self._all(runs):
+            log = self.logs[i]
+            for name, (time, _) in log.readings.items():
+                n = len(time)
+                one = (np.full(n, i), np.full(n, names.index(name)), time)
+                parts.append((*one, np.full(n, log.sigma[name])))
+        run, channel, time, sigma = (np.concatenate(p) for p in zip(*parts, strict=True))
+        label = np.full(len(run), "blow-down", dtype=object)
+        nothing = np.full(len(run), "", dtype=object)
+        units = {"vessel/P": "Pa", "vessel/T": "K"}
+        return Rows(run, channel, time, label, nothing, names, sigma, units)
+
+    def _all(self, runs: Collection[int] | None) -> Collection[int]:
+        return range(len(self.logs)) if runs is None else runs
+
+    def _blow_down(self, theta: Theta) -> BlowDown:
+        active = tuple(
+            name
+            for name, c in sorted(self.candidates.items())
+            if not c.sensor and theta.get(c.key, c.lead.off) != c.lead.off
+        )
+        if active not in self._known:
+            model = self.model.with_effects(by_default(name) for name in active)
+            keys = [key for name in active for key in tuple(self.candidates[name].keys())]
+            self._known[active] = BlowDown(model, tuple(keys), tuple(self.figures))
+        return self._known[active]
+
+    def _values(self, theta: Theta) -> dict[str, float]:
+        nominal = {name: factor for name, (factor, _) in self.figures.items()}
+        names = self._blow_down(theta).names
+        return {name: theta.get(name, nominal.get(name, 0.0)) for name in names}
+
+
+def vessel_problem(
+    logs: Sequence[Trajectory], model: Model, figures: Mapping[str, float] | None = None
+) -> VesselProblem:
+    """The problem of explaining blow-downs with `model` and what may be added to it."""
+    ambient = float(model.effect("vessel_chamber").value("ambient"))
+    return VesselProblem([prepare(log, ambient) for log in logs], model, figures)

@@ -1,0 +1,36 @@
+"""What the way in which logs were taken costs is said."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from kemba.identify.logs.limits import limits_of
+from kemba.trajectory import Trajectory
+
+
+def log(step: float, jitter: float = 0.0, kind: str = "robot", *more: str) -> Trajectory:
+    rng = np.random.default_rng(0)
+    time = step * np.arange(400) + jitter * rng.uniform(-0.5, 0.5, 400)
+    return Trajectory(time, {h: np.zeros(400) for h in ("body/z [m]", *more)}, {"kind": kind})
+
+
+@pytest.mark.parametrize(("step", "said"), [(2e-3, "500 Hz"), (5e-3, "200 Hz")])
+def test_a_slow_log_blurs_valve_edges(step: float, said: str) -> None:
+    (remark,) = limits_of([log(1e-3), log(step)])
+    assert remark.startswith(f"{said} blurs valve edges to {1e3 * step:.0f} ms")
+
+
+def test_uneven_rows_are_told() -> None:
+    (remark,) = limits_of([log(1e-3, 0.6e-3)])
+    assert "unevenly" in remark
+
+
+def test_pressures_of_a_robot_are_told_not_to_be_used() -> None:
+    (remark,) = limits_of([log(1e-3, 0.0, "robot", "front/chamber/extend/P [Pa]")])
+    assert "pressures" in remark and "not used" in remark
+    assert not limits_of([log(1e-3, 0.0, "bench", "chamber/extend/P [Pa]")])
+
+
+def test_a_usual_log_needs_no_remark() -> None:
+    assert not limits_of([log(1e-3, 2e-5)])
