@@ -31,6 +31,7 @@ LEVELS = [
     {"ocp", "plant"},
     {"contract", "identify"},
     {"runs"},
+    {"policy"},
     {"sweep"},
     {"plotting", "report"},
     {"learn"},

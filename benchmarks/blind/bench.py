@@ -66,7 +66,8 @@ def cases() -> list[dict[str, Any]]:
     """Settings of all cases; each kind is spread evenly over the whole order."""
     rng = np.random.default_rng(SEED)
     turns = study.spread(REPEATS, rng)
-    return [_setting(effect, turn, SEED + i, rng) for i, (effect, turn) in enumerate(turns)]
+    found = [_setting(effect, turn, SEED + i, rng) for i, (effect, turn) in enumerate(turns)]
+    return [{**setting, "colour": study.colour(i)} for i, setting in enumerate(found)]
 
 
 def _setting(effect: Any, turn: int, seed: int, rng: np.random.Generator) -> dict[str, Any]:
@@ -89,8 +90,10 @@ def _setting(effect: Any, turn: int, seed: int, rng: np.random.Generator) -> dic
 
 def logs_of(setting: dict[str, Any], folder: Path) -> tuple[list[Path], dict[str, Any]]:
     """Logs of one case, written to `folder`, and the truth about them."""
-    options = {k: v for k, v in setting.items() if k not in ("effect", "noise", "pressures")}
-    sensors = Sensors(noise=setting["noise"], pressures=setting["pressures"])
+    other = ("effect", "noise", "pressures", "colour")
+    options = {k: v for k, v in setting.items() if k not in other}
+    colour = setting["colour"]
+    sensors = Sensors(noise=setting["noise"], pressures=setting["pressures"], **colour)
     return bench_case(folder, setting["effect"], sensors=sensors, **options)
 
 

@@ -57,7 +57,8 @@ def cases() -> list[dict[str, Any]]:
     """Settings of all cases; each kind is spread evenly over the whole order."""
     rng = np.random.default_rng(SEED)
     turns = study.spread(REPEATS, rng)
-    return [_setting(effect, turn, SEED + i, rng) for i, (effect, turn) in enumerate(turns)]
+    found = [_setting(effect, turn, SEED + i, rng) for i, (effect, turn) in enumerate(turns)]
+    return [{**setting, "colour": study.colour(i)} for i, setting in enumerate(found)]
 
 
 def _setting(effect: Any, turn: int, seed: int, rng: np.random.Generator) -> dict[str, Any]:
@@ -76,8 +77,8 @@ def _setting(effect: Any, turn: int, seed: int, rng: np.random.Generator) -> dic
 
 def logs_of(setting: dict[str, Any], folder: Path) -> tuple[list[Path], dict[str, Any]]:
     """Logs of one case, written to `folder`, and the truth about them."""
-    options = {k: v for k, v in setting.items() if k not in ("effect", "noise")}
-    sensors = Sensors(noise=setting["noise"])
+    options = {k: v for k, v in setting.items() if k not in ("effect", "noise", "colour")}
+    sensors = Sensors(noise=setting["noise"], **setting["colour"])
     return _standing(folder, setting["effect"], sensors=sensors, **options)
 
 

@@ -22,6 +22,24 @@ Setting = dict[str, Any]
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "discovery.md"
 
 
+# noise of the sensors: white, or AR(1) with so much left after 1 ms, with wider steps, or drifting
+COLOURS: tuple[Setting, ...] = (
+    {},
+    {"keep": 0.9},
+    {},
+    {"keep": 0.7, "drift": 1.0},
+    {},
+    {"keep": 0.95},
+    {},
+    {"keep": 0.5, "steps": 3.0},
+)
+
+
+def colour(index: int) -> Setting:
+    """How the noise of a case's sensors is coloured: every second case has white noise."""
+    return COLOURS[index % len(COLOURS)]
+
+
 def spread(
     repeats: Sequence[tuple[Sequence[Any], int]], rng: np.random.Generator
 ) -> list[tuple[Any, int]]:

@@ -9,6 +9,8 @@ import numpy as np
 
 from kemba.mechanism.links import Leg
 
+REACH = 1.0 - 1e-9  # largest cosine of an angle whose slope is still finite
+
 
 def pivot_to_pin(leg: Leg, flexion: ca.SX) -> tuple[ca.SX, ca.SX]:
     """Vector from the cylinder's pivot to the rod's pin in leg axes [m]: along the femur from
@@ -45,7 +47,7 @@ def flexion(leg: Leg, x: float) -> float:
 def flexion_of(leg: Leg, x: ca.SX) -> ca.SX:
     """The same as an expression; where the linkage cannot reach, the knee ends at its limit."""
     cosine, phase = _triangle(leg, x)
-    bend: ca.SX = ca.acos(ca.fmax(-1.0, ca.fmin(1.0, cosine))) - ca.atan2(*phase)
+    bend: ca.SX = ca.acos(ca.fmax(-REACH, ca.fmin(REACH, cosine))) - ca.atan2(*phase)
     return bend
 
 

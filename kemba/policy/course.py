@@ -21,7 +21,9 @@ from kemba.policy.modes import Array, Hybrid, Point
 from kemba.trajectory import Trajectory
 
 CLOSING = 1e-6  # m/s; a gap that closes more slowly touches without an impact
+SAME = 1e-8  # s; switches nearer than this are one
 BESIDE = 2e-5  # s; states just before and after an impact are read this far from it
+FINER = 20  # rows within a step in which a foot leaves the ground or begins to slide
 PASSES = 3  # simulations in which the marks beside impacts find their place
 
 
@@ -113,13 +115,20 @@ def course_of(model: Model, table: Trajectory, extra: float = 0.0) -> Course:
     commands, last = condition.commands, condition.duration
     assert commands is not None and isinstance(commands.feedback, JointControl)
     acting = delayed(model, dict(commands.profiles))
-    switches = np.concatenate([p.times[1:] for p in acting.values()])
+    switches = np.concatenate([_switches(p) for p in acting.values()])
     clock = np.arange(round((last - 1e-9) / PERIOD) + 1) * PERIOD
-    done = simulate_one(condition)
-    for _ in range(PASSES):  # marks near an impact move it by some microseconds
-        hits = np.array([time for time, _ in _clusters(done.impacts, last)])
-        marks = merged(clock, switches[switches > 0.0], hits - BESIDE, hits + BESIDE)
+    done, finer = simulate_one(condition), np.zeros(0)
+    for number in range(PASSES):  # marks near an impact move it by some microseconds
+        hits = np.array([time[:2] for time in _clusters(done.impacts, last)]).reshape(-1, 2)
+        beside = np.concatenate([hits[:, 0] - BESIDE, hits[:, 1] + BESIDE])
+        marks = merged(clock, switches[switches > 0.0], beside, finer)
+        inside = (
+            (marks[:, None] > hits[:, 0] - BESIDE) & (marks[:, None] < hits[:, 1] + BESIDE)
+        ).any(1)
+        marks = marks[~inside]
         done = simulate_one(replace(condition, sample=marks[marks < last - 1e-9]))
+        if number == 0:
+            finer = _changes(hybrid, done.trajectory)
     motion, impacts = done.trajectory, _clusters(done.impacts, last)
     builder = Builder(hybrid, motion, dict(commands.profiles), acting, commands.feedback, begin)
     events = tuple(builder.events(clock, impacts))
@@ -129,14 +138,29 @@ def course_of(model: Model, table: Trajectory, extra: float = 0.0) -> Course:
     return Course(hybrid, table, shown_motion, builder.x[rows], events, commands.feedback.joints)
 
 
-def _clusters(impacts: Sequence[Hit], last: float) -> list[tuple[float, set[str]]]:
-    """Impacts that happen at once as one: when [s], and at which pairs."""
-    found: list[tuple[float, set[str]]] = []
+def _switches(profile: Profile) -> Array:
+    """When [s] a valve that is closed at first opens, closes, opens ..."""
+    changes = np.diff(np.round(profile.values), prepend=0.0) != 0.0
+    return np.asarray(profile.times[changes])
+
+
+def _changes(hybrid: Hybrid, motion: Trajectory) -> Array:
+    """Times [s] within every step in which a contact changes, so that the change is found."""
+    modes = [hybrid.modes(motion, i) for i in range(len(motion))]
+    steps = [i for i in range(len(modes) - 1) if modes[i] != modes[i + 1]]
+    inner = [np.linspace(motion.time[i], motion.time[i + 1], FINER + 1)[1:-1] for i in steps]
+    return np.concatenate([np.zeros(0), *inner])
+
+
+def _clusters(impacts: Sequence[Hit], last: float) -> list[tuple[float, float, set[str]]]:
+    """Impacts that happen at once as one: from when to when [s], and at which pairs."""
+    found: list[tuple[float, float, set[str]]] = []
     for impact in (i for i in impacts if BESIDE < i.time < last - BESIDE):
-        if found and impact.time - found[-1][0] < 4 * BESIDE:
-            found[-1][1].update(impact.labels)
+        if found and impact.time - found[-1][1] < 4 * BESIDE:
+            begin, _, labels = found.pop()
+            found.append((begin, impact.time, labels | set(impact.labels)))
         else:
-            found.append((impact.time, set(impact.labels)))
+            found.append((impact.time, impact.time, set(impact.labels)))
     return found
 
 
@@ -161,10 +185,12 @@ class Builder:
         self.x = np.column_stack([motion[name] for name in self.names])
         self.torques = [self.inputs.index(f"{joint}/tau") for joint in control.joints]
 
-    def events(self, clock: Array, impacts: Sequence[tuple[float, set[str]]]) -> Iterator[Event]:
+    def events(
+        self, clock: np.ndarray, impacts: Sequence[tuple[float, float, set[str]]]
+    ) -> Iterator[Event]:
         """All events in order of time, by the clock of the plan."""
         time, ticks = self.motion.time, among(self.motion.time, clock)
-        hits = {int(np.searchsorted(time, t)) - 1: labels for t, labels in impacts}
+        hits = {int(np.searchsorted(time, t)) - 1: labels for t, _, labels in impacts}
         yield Impact(float(time[0]) + self.begin, self._start())
         for i in range(len(time) - 1):
             now = float(time[i]) + self.begin
@@ -180,7 +206,9 @@ class Builder:
         u = np.array([self.motion[name][i] for name in self.inputs])
         for name, profile in self.acting.items():
             u[self.inputs.index(name)] = profile(valves_at)
-        return Point(self.x[i], u, self.hybrid.modes(self.motion, i if modes_of is None else modes_of))
+        return Point(
+            self.x[i], u, self.hybrid.modes(self.motion, i if modes_of is None else modes_of)
+        )
 
     def _start(self) -> Array:
         """What touches at the start stops at once: the slope of that."""
@@ -209,22 +237,26 @@ class Builder:
         for j, joint in enumerate(self.control.joints):
             q, w = (self.names.index(f"{joint}/{s}") for s in ("q", "w"))
             q_d, w_d, ahead = wanted[j]
-            asked = self.control.K_p * (q_d - self.x[i, q]) + self.control.K_d * (w_d - self.x[i, w])
+            K_p, K_d, x = self.control.K_p, self.control.K_d, self.x[i]
+            asked = K_p * (q_d - x[q]) + K_d * (w_d - x[w])
             if abs(asked + ahead - self.motion[f"{joint}/tau"][i]) < 1e-6:
-                hold[j, [q, w]] = -self.control.K_p, -self.control.K_d
+                hold[j, [q, w]] = -K_p, -K_d
         return hold
 
     def _edges(self, i: int, now: float) -> Iterator[Edge]:
         """The valves that switch at row i."""
         time = float(self.motion.time[i])
         for name, profile in self.acting.items():
-            at = np.flatnonzero(np.abs(profile.times - time) < 1e-8)
-            if not len(at) or at[0] == 0 or len(profile.times) != len(self.sent[name].times):
+            acts, sent = _switches(profile), _switches(self.sent[name])
+            at = np.flatnonzero(np.abs(acts - time) < SAME)
+            if not len(at) or len(acts) != len(sent):  # pulses that merged cannot be told apart
                 continue
-            rates = [self.hybrid.flow(self.point(i, time + s * 1e-7, max(i - 1, 0)))[0] for s in (-1, 1)]
-            k = int(at[0])
-            sent = round((float(self.sent[name].times[k]) + self.begin) / PERIOD)
-            yield Edge(now, name, k - 1, sent, rates[0] - rates[1])
+            modes_of, k = max(i - 1, 0), int(at[0])
+            after = self.point(i, time + 2 * SAME, modes_of)
+            before = replace(after, u=after.u.copy())
+            before.u[self.inputs.index(name)] = profile(time - 2 * SAME)
+            late = self.hybrid.flow(before)[0] - self.hybrid.flow(after)[0]
+            yield Edge(now, name, k, round((float(sent[k]) + self.begin) / PERIOD), late)
 
     def _saltation(self, i: int, labels: set[str]) -> Array:
         """The slope (n, n) of the state after an impact, between rows i and i + 1.
@@ -240,7 +272,9 @@ class Builder:
             if c.label in labels and before.modes[k] == OPEN and rates[k] < -CLOSING
         ]  # fmt: skip
         orders = list(permutations(new)) if 1 < len(new) <= 3 else [tuple(new)]
-        return np.asarray(np.mean([self._in_order(before, after, order, labels) for order in orders], axis=0))
+        return np.asarray(
+            np.mean([self._in_order(before, after, order, labels) for order in orders], axis=0)
+        )
 
     def _in_order(
         self, before: Point, after: Point, order: Sequence[int], labels: set[str]
@@ -255,7 +289,8 @@ class Builder:
                 m if a != OPEN or c.label in labels else OPEN  # what opens bears no impulse
                 for m, a, c in zip(here.modes, after.modes, self.hybrid.constraints, strict=True)
             ]
-            modes[k] = HELD if after.modes[k] in (OPEN, HELD) else after.modes[k]
+            modes[k] = HELD
+            modes = list(self.hybrid.landing(here.x, tuple(modes), k))
             v, slope = self.hybrid.jump(here.x, tuple(modes))
             reset = np.eye(size)
             reset[n : 2 * n, : 2 * n] = slope

@@ -56,7 +56,7 @@ class Hybrid:
         a, lam = node.a, node.lam
         zero = ca.SX.zeros(self.ns)
         speed = -ca.substitute(node.rate, node.sd, zero)
-        rows, self._places = [node.dynamics], []
+        rows = [node.dynamics]
         for c in self.constraints:
             rows += [_second(node, c.rate, a), lam[c.force]]
             if c.friction is not None:
@@ -89,12 +89,12 @@ class Hybrid:
         hit = mass @ (after - node.v) + force
         both = ca.vertcat(after, push)
         spread = _spread(lam, self.constraints, push)
+        frictions = [c.friction for c in self.constraints]
         cones = [
-            ca.substitute(ca.vertcat(c.friction.cone_forward, c.friction.cone_backward), lam, spread)
-            if c.friction else ca.SX.zeros(2)
-            for c in self.constraints
-        ]  # fmt: skip
-        self._cones = np.array(ca.Function("cones", [push], [ca.jacobian(ca.vertcat(*cones), push)])(0))
+            ca.vertcat(f.cone_forward, f.cone_backward) if f else ca.SX.zeros(2) for f in frictions
+        ]
+        by_push = ca.jacobian(ca.substitute(ca.vertcat(*cones), lam, spread), push)
+        self._cones = np.array(ca.Function("cones", [push], [by_push])(0))
         self._hit = ca.Function(
             "hit", [node.q, both, node.v],
             [hit, ca.jacobian(hit, both), ca.jacobian(hit, node.q), J, T,
@@ -144,12 +144,36 @@ class Hybrid:
                 first += 4
         return keep
 
+    def landing(self, x: Array, modes: Modes, hit: int) -> Modes:
+        """The modes of an impact of constraint `hit`: feet whose friction does not hold them slide,
+        and others that would be pulled open."""
+        for _ in range(2 * len(modes)):
+            push = self._impact(x, modes)[1]
+            changed = list(modes)
+            for i, (c, mode) in enumerate(zip(self.constraints, modes, strict=True)):
+                forward, backward = self._cones[2 * i : 2 * i + 2] @ push
+                if mode == HELD and c.friction is not None and min(forward, backward) < 0.0:
+                    changed[i] = BACK if forward < backward else AHEAD
+                elif mode != OPEN and push[2 * i] < 0.0 and i != hit:
+                    changed[i] = OPEN
+            if tuple(changed) == modes:
+                break
+            modes = tuple(changed)
+        return modes
+
     def jump(self, x: Array, modes: Modes) -> tuple[Array, Array]:
         """The velocities (n,) after an inelastic impact into `modes`, and d(v+)/d(q, v)."""
+        v, _, slope = self._impact(x, modes)
+        return v, slope
+
+    def _impact(self, x: Array, modes: Modes) -> tuple[Array, Array, Array]:
+        """Velocities (n,) after an impact, impulses (2 c,), and d(v+)/d(q, v)."""
         n, count = self.n, len(self.constraints)
         q, v = x[:n], x[n : 2 * n]
         both = np.zeros(n + 2 * count)
-        for _ in range(2):  # affine in the unknowns: the first pass solves, the second differentiates
+        for _ in range(
+            2
+        ):  # affine in the unknowns: the first pass solves, the second differentiates
             hit, K, Q, J, T, Jq, Tq = (np.array(m) for m in self._hit(q, both, v))
             rows, slope, right = [K], [np.hstack([Q, K[:, :n] * -1.0])], [hit.ravel()]
             for i, (c, mode) in enumerate(zip(self.constraints, modes, strict=True)):
@@ -166,7 +190,8 @@ class Hybrid:
                     right.append(np.array([line @ both]))
             whole_K = np.vstack(rows)
             both = both - np.linalg.solve(whole_K, np.concatenate(right))
-        return both[:n], -np.linalg.solve(whole_K, np.vstack(slope))[:n]
+        by_state = -np.linalg.solve(whole_K, np.vstack(slope))[:n]
+        return both[:n], both[n:], np.asarray(by_state, dtype=float)
 
     def gaps(self, x: Array) -> tuple[Array, Array]:
         """Gaps (c,) and their slopes by q (c, n)."""

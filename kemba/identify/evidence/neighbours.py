@@ -1,4 +1,4 @@
-"""Evidence of many hypotheses that differ from one in a few effects: small updates of one factor."""
+"""Evidence of many hypotheses that differ from one in a few effects, from one factor."""
 
 from __future__ import annotations
 

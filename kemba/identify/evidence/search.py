@@ -126,20 +126,21 @@ class Search:
         self.problem = self.base.problem
         self.points = {NULL: self.base.point}
 
-    def _round(self, given: Hypothesis, leaders: int) -> Hypothesis:
-        """Refit `given` with one more effect, the likeliest ones; the best of all points so far."""
+    def _round(self, given: Hypothesis, leaders: int, least: float = -np.inf) -> Hypothesis:
+        """Refit `given` with one more effect, the likeliest ones whose linear evidence is `least`
+        or more; the best of all points so far."""
         settings = SearchSettings.current()
         table = self._extensions(given)
         order = sorted(table, key=lambda h: -table[h])[:leaders]
         gain = table[order[0]] - self.points[given].log_evidence
         reach = max(settings.far, settings.far_share * gain)
+        sure = settings.sure_grown if given else settings.sure
         for hypothesis in order:
+            if table[hypothesis] < least:
+                break
             if given and table[hypothesis] < self.points[given].log_evidence:
                 break  # even the linear evidence gains nothing
-            if (
-                table[hypothesis] < table[order[0]] - reach
-                and hypothesis not in order[: settings.sure]
-            ):
+            if table[hypothesis] < table[order[0]] - reach and hypothesis not in order[:sure]:
                 break
             if time.monotonic() > self.deadline:
                 break
@@ -244,12 +245,14 @@ class Search:
 
     def _swap(self, best: Hypothesis) -> Hypothesis:
         """Take each effect away, or swap it for another; what was swapped may grow again."""
-        for _ in range(SearchSettings.current().swapped):
+        settings = SearchSettings.current()
+        for _ in range(settings.swapped):
             before = best
             for member in best if len(best) > 1 else ():
                 rest = tuple(h for h in best if h != member)
                 self.visit(rest)
-                self._round(rest, SearchSettings.current().leaders_swapped)
+                least = self.points[best].log_evidence - settings.far
+                self._round(rest, settings.leaders_swapped, least)
             best = self.best()
             if best == before or time.monotonic() > self.deadline:
                 break

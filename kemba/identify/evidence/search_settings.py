@@ -12,6 +12,9 @@ class SearchSettings(Settings):
     sure: int = setting(
         3, "1", "leaders that are refitted however far behind they are", BY_HAND, decides=True
     )
+    sure_grown: int = setting(
+        2, "1", "the same beside effects that are found already", BY_HAND, decides=True
+    )
     far: float = setting(
         40.0, "nats", "other leaders are refitted when not farther behind", BY_HAND, decides=True
     )

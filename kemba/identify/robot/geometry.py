@@ -48,9 +48,14 @@ class StandingSettings(Settings):
         4.0, "1", "samples that err together, so that they count as one", BY_HAND
     )
     prior: float = setting(2.0, "1", "prior width of a length, in sizes", BY_HAND)
+    reach: float = setting(2.5, "1", "largest value of each, in prior widths", BY_HAND)
     body: float = setting(3e-3, "m", "prior sigma of the zero of the body's height", BY_HAND)
     angle: float = setting(4e-3, "rad", "prior sigma of the zeros of pitch and hips", BY_HAND)
     piston: float = setting(6e-4, "m", "prior sigma of the zero of a piston", BY_HAND)
+    deep: float = setting(0.02, "m", "depth below the ground at which no foot can be", BY_HAND)
+    often: float = setting(
+        0.01, "1", "share of samples so deep from which lengths are not believed", BY_HAND
+    )
     gain: float = setting(
         6.0, "nats", "gain over faults of sensors alone from which lengths are believed", BY_HAND
     )
@@ -132,6 +137,8 @@ def standing_lengths(
     singles = [_only(standing, (i,), x, width, rows) for i in range(len(sizes))]
     one, alone, _ = min(singles, key=lambda fit: fit[1])
     x = one if alone - cost < settings.gain else x
+    if np.mean(standing.heights(x)[0] < -settings.deep) > settings.often:
+        return {}  # feet in the ground: columns are wrong, not lengths
     return {n: float(d) for n, d in zip(sizes, x, strict=False) if abs(d) > 0.01 * sizes[n]}
 
 
@@ -188,5 +195,9 @@ def _fit(
     def slopes(z: Array) -> Array:
         return np.vstack([weight * standing.heights(z * width)[1][rows] * width, np.eye(len(z))])
 
-    found = least_squares(residual, x / width, slopes, loss="soft_l1", f_scale=2.0, max_nfev=10)
+    reach = StandingSettings.current().reach
+    start = np.clip(x / width, -0.99 * reach, 0.99 * reach)
+    found = least_squares(
+        residual, start, slopes, (-reach, reach), loss="soft_l1", f_scale=2.0, max_nfev=10
+    )
     return found.x * width, float(found.cost)

@@ -10,12 +10,27 @@ from kemba.logs.draft.ranges import two_levels
 from kemba.logs.draft.targets import Target
 from kemba.logs.draft.words import Meaning, Names
 from kemba.quantity import convert
+from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Array
 
-ENOUGH = 0.6  # share of what a name must say: two of three, or one of two that is unambiguous
-SAID_TOO = 0.1  # preference for a name that also says what it may
-UNRELATED = 0.3  # doubt by a word that is about something else, such as the `a` of `valve_a`
-NOTHING = -1.0
+NOTHING = -1.0  # of a name that says something else
+
+
+class MatchingSettings(Settings):
+    """How far the words of a foreign name must agree with one of our columns."""
+
+    enough: float = setting(
+        0.6,
+        "1",
+        "share of what a name must say",
+        "derived: two of three words are enough, half not",
+    )
+    said_too: float = setting(
+        0.1, "1", "preference for a name that also says what it may", "convention: breaks ties only"
+    )
+    unrelated: float = setting(
+        0.3, "1", "doubt by a word about something else, as the `a` of `valve_a`", CHOSEN
+    )
 
 
 def assigned(
@@ -35,7 +50,11 @@ def assigned(
                 scores[i, j] = agreement(names.says(name), target)
     rows, chosen = linear_sum_assignment(scores, maximize=True)
     pairs = zip(rows.tolist(), chosen.tolist(), strict=True)
-    return {targets[i].header: columns[j] for i, j in pairs if scores[i, j] >= ENOUGH}
+    return {
+        targets[i].header: columns[j]
+        for i, j in pairs
+        if scores[i, j] >= MatchingSettings.current().enough
+    }
 
 
 def fits(target: Target, unit: str | None, values: Array) -> bool:
@@ -53,7 +72,7 @@ def fits(target: Target, unit: str | None, values: Array) -> bool:
 
 def agreement(says: Meaning, target: Target) -> float:
     """How well a name fits a target: at most about 1, `NOTHING` where it says something else."""
-    score = 0.0
+    score, limits = 0.0, MatchingSettings.current()
     for group, wanted in target.means.items():
         if group in says and wanted not in says[group]:
             return NOTHING
@@ -63,7 +82,7 @@ def agreement(says: Meaning, target: Target) -> float:
         if group in target.may:
             if target.may[group] not in found:
                 return NOTHING
-            score += SAID_TOO
+            score += limits.said_too
         elif group not in target.means:
-            score -= UNRELATED * (group in ("kind", "leg", "part"))
+            score -= limits.unrelated * (group in ("kind", "leg", "part"))
     return score

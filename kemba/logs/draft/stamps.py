@@ -11,10 +11,18 @@ import numpy as np
 from kemba.logs.draft import ranges
 from kemba.logs.draft.words import meaning, named_unit
 from kemba.logs.text import Raw, as_numbers
+from kemba.settings import Settings, setting
 from kemba.trajectory import Array
 
 FIELDS = ("position", "velocity", "effort")
-GAPS = 0.99  # share of steps that must rise: a few repeated stamps are the gate's business
+
+
+class StampSettings(Settings):
+    """What a time column looks like."""
+
+    rising: float = setting(
+        0.99, "1", "share of steps that must rise", "convention: a few repeats are the gate's case"
+    )
 
 
 @dataclass(frozen=True)
@@ -101,4 +109,4 @@ def _is_text(cell: Any) -> bool:
 def _rises(values: Array, strictly: bool = True) -> bool:
     steps = np.diff(values)
     rising = steps > 0 if strictly else steps >= 0
-    return len(steps) > 0 and bool(np.mean(rising) > GAPS)
+    return len(steps) > 0 and bool(np.mean(rising) > StampSettings.current().rising)

@@ -68,7 +68,7 @@ def execute(
     table = read_controller(controller)
     case = condition_of(table, model, gains, step, extra, start, dead_time, valves, sample)
     condition, begin = case
-    return Execution(_later(simulate_one(condition), begin), table)
+    return Execution(later(simulate_one(condition), begin), table)
 
 
 def execute_many(
@@ -83,7 +83,7 @@ def execute_many(
     ready = [condition_of(table, **case) for case in cases]
     done = run_many((condition for condition, _ in ready), jobs)
     return [
-        d if isinstance(d, KembaError) else Execution(_later(d, begin), table)
+        d if isinstance(d, KembaError) else Execution(later(d, begin), table)
         for d, (_, begin) in zip(done, ready, strict=True)
     ]
 
@@ -123,7 +123,7 @@ def condition_of(
     return Condition(model, pose, commands, duration, step, sample, dead_time), begin
 
 
-def _later(done: Simulated, begin: float) -> Simulated:
+def later(done: Simulated, begin: float) -> Simulated:
     """The simulated motion with its times from `begin` [s] on."""
     if not begin:
         return done

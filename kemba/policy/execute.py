@@ -1,0 +1,145 @@
+"""Playing a policy on a simulated robot."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from kemba.model import Model
+from kemba.ocp import load_task, task_model
+from kemba.plant.execution.controller import PERIOD, Execution, condition_of, later, read_controller
+from kemba.plant.execution.repeat import VALVE_SCATTER, Play
+from kemba.plant.execution.sensors import Sensors
+from kemba.plant.simulation.commands import Commands
+from kemba.plant.simulation.simulate import simulate_one
+from kemba.policy.modes import Array
+from kemba.policy.player import Policy
+from kemba.policy.write import FILE, measured, write_policy
+from kemba.runs import load_run
+from kemba.trajectory import Trajectory
+
+FINE = 4  # actuations a tick: valves act so many times finer than they are commanded
+
+
+@dataclass
+class Driver:
+    """Feeds a policy with what sensors measure, and valves with what it sends, late."""
+
+    policy: Policy
+    model: Model
+    knees: dict[str, tuple[Array, Array]]  # by piston column: knee angles and extensions
+    noise: dict[str, float]
+    rng: np.random.Generator
+    scatter: float = 0.0
+    wait: int = 0  # ticks before the simulation begins, of a robot that is held
+
+    def __post_init__(self) -> None:
+        self.count, self.torques = 0, np.zeros(len(self.policy.data["joints"]))
+        self.sent = [[(-np.inf, 0.0)] for _ in self.policy.valves]
+        self.names = measured(self.model)
+        self.commands: list[Array] = []
+
+    def __call__(self, time: float, sense: Mapping[str, float]) -> dict[str, float]:
+        while self.count % FINE == 0 and self.policy.tick <= self.wait + self.count // FINE:
+            self._tick(time, sense)
+        self.count += 1
+        joints = [str(j) for j in self.policy.data["joints"]]
+        asked = {f"{j}/tau": float(t) for j, t in zip(joints, self.torques, strict=True)}
+        for name, history in zip(self.policy.valves, self.sent, strict=True):
+            asked[name] = next(value for at, value in reversed(history) if at <= time + 1e-9)
+        return asked
+
+    def _tick(self, time: float, sense: Mapping[str, float]) -> None:
+        y = np.array([self._read(name, sense) for name in self.names])
+        joints = [str(j) for j in self.policy.data["joints"]]
+        rates = np.array([sense[f"{j}/w"] for j in joints])
+        self.torques, valves = self.policy.step(y, rates)
+        self.commands.append(valves)
+        for name, history, value in zip(self.policy.valves, self.sent, valves, strict=True):
+            if value != history[-1][1]:
+                on, off = self.model.timing(name.split("/")[0])
+                late = (on if value else off) + self.scatter * self.rng.standard_normal()
+                history.append((max(time + late, history[-1][0]), float(value)))
+
+    def _read(self, name: str, sense: Mapping[str, float]) -> float:
+        value = sense.get(name, np.nan)
+        if name in self.knees:
+            knee, extension = self.knees[name]
+            value = float(np.interp(sense[f"{name.split('/')[0]}/knee/q"], knee, extension))
+        sigma = self.noise.get(name.split("/")[-1], 0.0)
+        return float(value + sigma * self.rng.standard_normal())
+
+
+def execute_policy(
+    run: str | Path | Trajectory,
+    policy: Policy,
+    model: Model,
+    extra: float = 0.0,
+    start: dict[str, float] | None = None,
+    sample: float | Array = 1e-3,
+    noise: bool = False,
+    scatter: float = 0.0,
+    seed: int | list[int] = 0,
+) -> Execution:
+    """Play a policy around a controller table on `model`; arguments as those of `execute`.
+
+    `noise`: of the sensors that the policy reads; `scatter` [s] (1 sigma) of every switching.
+    Raises KembaError when the table lacks a column.
+    """
+    table = read_controller(run)
+    condition, begin = condition_of(table, model, extra=extra, start=start, sample=sample)
+    usual = Sensors.usual().noise if noise else {}
+    rng = np.random.default_rng(seed)
+    held = round((begin - table.time[0]) / PERIOD)
+    driver = Driver(policy, model, _knees(model), usual, rng, scatter, held)
+    commands = Commands({}, driver, PERIOD / FINE)
+    done = simulate_one(replace(condition, commands=commands))
+    return Execution(later(done, begin), _sent(table, policy, driver.commands))
+
+
+def _sent(table: Trajectory, policy: Policy, commands: list[Array]) -> Trajectory:
+    """The table with the valve commands that were sent."""
+    rows = np.array(commands + [commands[-1]] * len(table))[: len(table)]
+    headers = {n: h for h, n in zip(table.headers, table.names, strict=True)}
+    return table.with_columns({headers[n]: rows[:, i] for i, n in enumerate(policy.valves)})
+
+
+def player_of(run: str | Path) -> Play:
+    """How `repeat_run` executes a run with its policy, which is made where it is missing.
+
+    The policy is made with the model of the run's task. Raises KembaError where the run has no
+    task, or no policy can be made.
+    """
+    folder = Path(run) if Path(run).is_dir() else Path(run).parent
+    file, table = folder / FILE, read_controller(run)
+    if not file.is_file() or file.stat().st_mtime < (folder / "controller.csv").stat().st_mtime:
+        task = load_task(load_run(folder).task)[0]
+        write_policy(task_model(task), table, file)
+
+    def play(model: Model, sample: Array, seed: list[int], noise: bool) -> Execution:
+        scatter = VALVE_SCATTER if noise else 0.0
+        return execute_policy(table, Policy(file), model, 0.0, None, sample, noise, scatter, seed)
+
+    return play
+
+
+def _knees(model: Model) -> dict[str, tuple[Array, Array]]:
+    """Piston extensions over knee angles, by piston column, knee angles ascending."""
+    import casadi as ca
+
+    mechanism, found = model.mechanism, {}
+    names = [c.name for c in mechanism.coordinates]
+    for leg in mechanism.legs:
+        i = names.index(f"{leg}/knee/q")
+        phi = mechanism.port(f"{leg}/piston/x").phi
+        f = ca.Function("x", [mechanism.q[i]], [phi])
+        span = np.linspace(-np.pi, np.pi, 4001)
+        x = np.array(f.map(len(span))(span)).ravel()
+        good = np.isfinite(x) & (x > -0.01) & (x < mechanism.stroke + 0.01)
+        side = np.sign(mechanism.standing[f"{leg}/knee/q"])
+        keep = good & (np.sign(span) == side)
+        found[f"{leg}/piston/x"] = (span[keep], x[keep])
+    return found
