@@ -252,7 +252,9 @@ class Builder:
             if not len(at) or len(acts) != len(sent):  # pulses that merged cannot be told apart
                 continue
             modes_of, k = max(i - 1, 0), int(at[0])
-            before, after = (self.point(i, time + s * 2 * SAME, modes_of) for s in (-1, 1))
+            after = self.point(i, time + 2 * SAME, modes_of)
+            before = replace(after, u=after.u.copy())
+            before.u[self.inputs.index(name)] = profile(time - 2 * SAME)
             late = self.hybrid.flow(before)[0] - self.hybrid.flow(after)[0]
             yield Edge(now, name, k, round((float(sent[k]) + self.begin) / PERIOD), late)
 
