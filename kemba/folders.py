@@ -10,12 +10,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from kemba.errors import KembaError
-from kemba.files import write_error
+from kemba.files import atomic_text, write_error
 
 if TYPE_CHECKING:
     from filelock import BaseFileLock
 
 LOCK = ".lock"
+UNFINISHED = "UNFINISHED"  # a file that stands in a folder until all results are in it
+WHY = "kemba-opt writes here, or was stopped before the end: run the same command again.\n"
 PROBE = 1_000_000  # bytes: about what a run folder takes, its solver's log included
 
 
@@ -60,19 +62,27 @@ def claimed(
 
     `out`, or the first free one of `default`, `default-2`, ... Raises KembaError when `out` holds
     a finished answer (a file that matches `results`) and not `force`, when it cannot be written,
-    or when another process writes to it. A folder that stays empty is removed at the end.
+    or when another process writes to it. A folder that was left unfinished is used again: it holds
+    a file `UNFINISHED` until the block has ended without an error. A folder that stays empty is
+    removed at the end.
     """
     path = next_free(Path(default)) if out is None else Path(out)
     made = not path.exists()
     try_writing(path)
     lock = lock_folder(path)
+    old, unfinished = _written(path, results), (path / UNFINISHED).exists()
     try:
-        old = sorted(path.glob(results))
-        if old and not force:
+        if old and not force and not unfinished:
             hint = "give another --out, or --force to replace it"
-            raise KembaError(f"--out {path}", f"holds results already ({old[0].name})", hint=hint)
+            raise KembaError(f"--out {path}", f"holds results already ({min(old).name})", hint=hint)
+        with atomic_text(path / UNFINISHED) as stream:
+            stream.write(WHY)
         yield path
+        (path / UNFINISHED).unlink(missing_ok=True)
     finally:
+        if not unfinished and _written(path, results) == old:  # nothing has been written
+            with suppress(OSError):
+                (path / UNFINISHED).unlink(missing_ok=True)
         unlock(lock, path)
         if made and _is_empty(path):
             with suppress(OSError):
@@ -136,5 +146,10 @@ def try_writing(folder: str | Path) -> None:
         raise write_error(folder, error) from None
 
 
+def _written(folder: Path, results: str) -> dict[Path, int]:
+    """The files that match `results`, and when each was written [ns]."""
+    return {path: path.stat().st_mtime_ns for path in folder.glob(results)}
+
+
 def _is_empty(path: Path) -> bool:
-    return path.is_dir() and all(item.name == LOCK for item in path.iterdir())
+    return path.is_dir() and all(item.name in (LOCK, UNFINISHED) for item in path.iterdir())

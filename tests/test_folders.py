@@ -12,7 +12,7 @@ import pytest
 
 from kemba.errors import KembaError
 from kemba.files import DiskFull, WriteError, atomic_path, atomic_text
-from kemba.folders import LOCK, claimed, fresh, held, next_free, try_writing
+from kemba.folders import LOCK, UNFINISHED, claimed, fresh, held, next_free, try_writing
 from kemba.runs import RunFolder
 
 AS_ROOT = os.name == "posix" and os.geteuid() == 0
@@ -72,6 +72,29 @@ def test_a_failure_leaves_no_empty_folder() -> None:
     with pytest.raises(ZeroDivisionError), claimed(None, "answer", "*.json"):
         raise ZeroDivisionError
     assert not Path("answer").exists()
+
+
+def test_an_unfinished_answer_is_marked_and_written_again() -> None:
+    def begin(force: bool = False) -> None:
+        with claimed("answer", "answer", "*.json", force) as folder:
+            (folder / "a.json").touch()
+            raise ZeroDivisionError
+
+    for _ in range(2):
+        with pytest.raises(ZeroDivisionError):
+            begin()
+        assert (Path("answer") / UNFINISHED).read_text().startswith("kemba-opt writes here, or was")
+    with pytest.raises(ZeroDivisionError), claimed("answer", "answer", "*.json"):
+        raise ZeroDivisionError  # before anything was written: it is as unfinished as it was
+    assert (Path("answer") / UNFINISHED).exists()
+    with claimed("answer", "answer", "*.json"):
+        pass
+    assert not (Path("answer") / UNFINISHED).exists()
+    with pytest.raises(ZeroDivisionError), claimed("answer", "answer", "*.json", force=True):
+        raise ZeroDivisionError  # before anything was written: what is there is still whole
+    assert not (Path("answer") / UNFINISHED).exists()
+    with pytest.raises(KembaError), claimed("answer", "answer", "*.json"):
+        pass
 
 
 def test_two_cannot_write_one_answer() -> None:

@@ -18,7 +18,7 @@ from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
 from kemba.identify.problem.problem import Problem
 from kemba.identify.ranking import error, ladder, ranked, strength
-from kemba.identify.rest import rest_of
+from kemba.identify.rest import pattern_left, rest_of
 from kemba.identify.settings import DiscoverSettings, VerdictSettings
 
 Talk = Callable[[str], None]
@@ -142,6 +142,8 @@ def doubts_about(
         reasons.append(str(drift))
     elif unfinished(search, best):
         reasons.append("the error that is left repeats itself with motion and valves")
+    elif pattern := pattern_left(search, best):
+        reasons.append(f"the error that is left has a pattern: {pattern}")
     before, after = (error(search, h, holdout) for h in (NULL, best))
     least = settings.part_of_structure if reasons else settings.part
     if best and after > settings.whole and excess(after) > settings.whole_share * excess(before):

@@ -44,6 +44,7 @@ def answer(plan: Plan, run: str) -> dict[str, Any]:
         "table_replay": None,
         "plant_replay": None,
         "impacts": None,
+        "robust": None,
         "good": plan.status is Status.SOLVED,
         "continued": plan.continued,
         "ignored": plan.model.ignored,

@@ -23,6 +23,7 @@ from kemba.plant.execution.certificate import executions, plant_run, summaries
 from kemba.plant.execution.counterpart import another_robot, counterpart
 from kemba.plant.execution.replay import ends_standing
 from kemba.plant.execution.retiming import retimed
+from kemba.report.robust import Candidate, most_robust
 from kemba.report.verdict import verdicts
 from kemba.runs import PLANT_RUN, RunFolder, write_json
 from kemba.trajectory import Trajectory
@@ -68,21 +69,31 @@ def solve_into(
     dump_yaml(task.model_dump(exclude_none=True), folder / "task.yaml")
     log = folder / "solver.log"
     try:
-        if starts > 1 and start is None and origin is None:
-            found = plan_best(task, document, starts, jobs, log, listener.tell)
-        else:
+
+        def solved(task: Task) -> Plan:
+            if starts > 1 and start is None and origin is None:
+                return plan_best(task, document, starts, jobs, log, listener.tell)
             how = {"tell": listener.tell, "watch": listener.watch, "stop": listener.stop}
-            found = plan(task, document, log=log, start=start, origin=origin, **how)  # type: ignore[arg-type]
+            return plan(task, document, log=log, start=start, origin=origin, **how)  # type: ignore[arg-type]
+
+        robust = replay and task.robust > 0
+        chosen = most_robust(task, solved, listener.tell) if robust else Candidate(solved(task))
+        found, table = chosen.plan, chosen.table
+        if found.task != task:
+            dump_yaml(found.task.model_dump(exclude_none=True), folder / "task.yaml")
         result = answer(found, str(folder.path))
-        table = (
-            controller_table(found.model, found.trajectory, task.hold) if found.attempts else None
-        )
+        if table is None and found.attempts:
+            table = controller_table(found.model, found.trajectory, found.task.hold)
         plant: Trajectory | None = None
         if replay and table is not None and found.status.plan:
             listener.tell("replay")
-            table = retimed(found.model, found.trajectory, table)
+            if chosen.share is None:
+                table = retimed(found.model, found.trajectory, table)
             replayed, plant = _replayed(found, table)
             result |= replayed
+            if chosen.share is not None:
+                result |= {"robust": chosen.share.summary()}
+                result["sentence"] += f"; {chosen.share.sentence}"
         _keep(found, result, Motions(table, plant), folder, figure)
     except BaseException:
         with suppress(WriteError):  # the first error says more
@@ -109,7 +120,7 @@ def _replayed(found: Plan, table: Trajectory) -> tuple[dict[str, Any], Trajector
     motion = plant_run(there) if there else None
     lands = bool(ends_standing(found.model, found.trajectory))
     names = [f"the plant is another robot, {other}, which {task.plant} names"] if other else []
-    judged = verdicts(executed, task.tolerances, lands).values()
+    judged = verdicts(executed, task.tolerances, lands, task.landing.impact_speed).values()
     if all(verdict.good for verdict in judged):
         parts = [sentence_of(found), *names, *(verdict.sentence for verdict in judged)]
         return {**executed, "sentence": "; ".join(parts)}, motion

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from typing import Any
 
 from hypothesis import strategies as st
@@ -22,7 +23,7 @@ numbers = st.one_of(
     st.integers(-1000, 1000),
 )
 texts = st.one_of(st.sampled_from(TEXTS), st.text(max_size=12))
-odd: st.SearchStrategy[Any] = st.sampled_from(ODD)
+odd: st.SearchStrategy[Any] = st.sampled_from(ODD).map(copy.deepcopy)
 anything: st.SearchStrategy[Any] = st.one_of(
     numbers, texts, odd, st.lists(st.one_of(numbers, texts), max_size=4)
 )

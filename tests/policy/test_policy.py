@@ -12,8 +12,10 @@ from typer.testing import CliRunner
 
 from kemba.model import Model, load_model
 from kemba.plant import execute
+from kemba.plant.simulation.commands import Profile
 from kemba.policy import player
-from kemba.policy.course import Course, Impact, course_of
+from kemba.policy.course import course_of
+from kemba.policy.events import Course, Edge, Impact
 from kemba.policy.execute import execute_policy
 from kemba.policy.gains import gains_of
 from kemba.policy.player import Policy
@@ -88,9 +90,6 @@ def test_impacts_change_the_map(course: Course) -> None:
 def test_an_edge_that_comes_late_acts_as_in_the_plant(
     model: Model, table: Trajectory, course: Course
 ) -> None:
-    from kemba.plant.simulation.commands import Profile
-    from kemba.policy.course import Edge
-
     edge = next(e for e in course.events if isinstance(e, Edge) and e.valve.startswith("front"))
     n = len(states(model))
     predicted = course.map(edge.time, 0.09) @ edge.late

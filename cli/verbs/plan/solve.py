@@ -39,6 +39,10 @@ def solve(
         bool, typer.Option("--dry-run", help="Check the task and say its size; solve nothing.")
     ] = False,
     starts: Annotated[int, typer.Option(min=1, help="Guesses to try; the best is kept.")] = 1,
+    robust: Annotated[
+        int | None,
+        typer.Option(min=1, help="Scenarios; of several plans, the one that lands in most."),
+    ] = None,
     jobs: Annotated[int | None, typer.Option(min=1, help="Starts at a time.")] = None,
     replay: Annotated[bool, typer.Option(help="Execute the plan in simulation.")] = True,
     figure: Annotated[bool, typer.Option(help="Draw the plan.")] = True,
@@ -79,6 +83,8 @@ def solve(
     options = list(overrides or [])
     if time_limit is not None:
         options.append(f"solver.time_limit={time_limit}")
+    if robust is not None:
+        options.append(f"robust={robust}")
     resolved, document = load_task(task, options)
     if dry_run:
         _dry_run(resolved, document, model, json)

@@ -126,6 +126,7 @@ class Task(Section):
     before the plan the controller keeps the first pose, valves closed, so that the robot settles.
     `effects` changes parameters of the model's effects, by name or by place in its list:
     `{contact: {mu: 0.6}}`.
+    `robust`: by how many scenarios, drawn from the file `uncertainties`, plans are chosen.
     """
 
     name: FileName = "task"
@@ -148,6 +149,8 @@ class Task(Section):
     bounds: dict[str, Bound] = Field(default_factory=dict)
     goals: dict[str, Goal] = Field(default_factory=dict)
     cost: dict[str, float] = Field(default_factory=lambda: {"torque_squared": 1.0})
+    robust: Annotated[int, Field(ge=0, le=10_000)] = 0
+    uncertainties: str = "usual"
     guess: Literal["automatic", "standing"] = "automatic"
     guess_noise: Annotated[float, Param("1", lower=0.0, upper=1.0)] = 0.0
     seed: int = 0
@@ -178,5 +181,6 @@ def parse_task(document: Document) -> Task:
     if not document.source:
         return task
     folder = Path(document.source).parent
-    models = {key: beside(getattr(task, key), folder) for key in ("model", "plant")}
+    named = ("model", "plant", "uncertainties")
+    models = {key: beside(getattr(task, key), folder) for key in named}
     return task.model_copy(update=models)

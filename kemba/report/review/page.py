@@ -243,7 +243,7 @@ def _title(given: Material) -> str:
         count = len(given.logs)
         parts.append(given.logs[0].meta["name"] if count == 1 else f"{count} logs")
     if given.answer:
-        parts.append(f"answer {given.answer_folder.resolve().name}")
+        parts.append(given.answer_folder.resolve().name)
     return " · ".join(parts)
 
 

@@ -1,0 +1,1 @@
+"""Scenarios: one plan under what may differ from one execution to the next."""

@@ -1,0 +1,119 @@
+"""Long-running verbs as small commands, what each must leave behind, and how it goes on."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from fuzz.logs import cells, text
+from fuzz.sound import bench
+
+from kemba.config import load_yaml
+from kemba.errors import KembaError
+from kemba.trajectory import Trajectory
+
+# what differs between two runs of one command: times, and versions of nothing that counts
+VARIES = {"started", "finished", "command", "runtime_s", "solve_s", "solve_cpu_s", "build_s"}
+SWEEP = """\
+name: small
+seed: 1
+blocks:
+  a: {kind: solve, task: task.yaml, grid: {height: [0.34 m, 0.35 m]}}
+"""
+TASK = """\
+name: quick
+height: 0.35 m
+nodes: 12
+duration: 0.5 s
+refine: none
+start: {rest: true, body/x: 0 m, body/pitch: 0 deg, '*/foot/z': 0 m}
+goals: {apex: {quantity: body/z, at: middle, equals: height}}
+"""
+
+
+@dataclass(frozen=True)
+class Verb:
+    """`words`: the command; `out`: its folder; `results`: files that are the same after each run;
+    `begin` makes its inputs."""
+
+    words: tuple[str, ...]
+    out: str
+    results: tuple[str, ...]
+    begin: Callable[[Path], None]
+
+
+def _task(folder: Path) -> None:
+    (folder / "task.yaml").write_text(TASK, encoding="utf-8")
+
+
+def _sweep(folder: Path) -> None:
+    _task(folder)
+    (folder / "sweep.yaml").write_text(SWEEP, encoding="utf-8")
+
+
+def _log(folder: Path) -> None:
+    (folder / "log.csv").write_text(text(cells(bench())), encoding="utf-8")
+
+
+VERBS = {
+    "solve": Verb(
+        ("solve", "task.yaml", "--out", "out", "--no-replay", "--no-figure"),
+        "out",
+        ("trajectory.csv", "controller.csv", "task.yaml", "certificate.json"),
+        _task,
+    ),
+    "simulate": Verb(
+        ("simulate", "locked.yaml", "--out", "out", "--noise"), "out", ("*.csv",), lambda _: None
+    ),
+    "discover": Verb(
+        ("discover", "log.csv", "--out", "out", "--no-figures"), "out", ("answer.json",), _log
+    ),
+    "sweep": Verb(
+        ("sweep", "sweep.yaml", "--out", "out", "--jobs", "1"), "out", ("cases/*.json",), _sweep
+    ),
+}
+
+
+def contents(folder: Path, patterns: tuple[str, ...]) -> dict[str, Any]:
+    """What the result files of a folder say, without what varies from run to run."""
+    found: dict[str, Any] = {}
+    for file in (file for pattern in patterns for file in sorted(folder.glob(pattern))):
+        name = str(file.relative_to(folder))
+        if file.suffix == ".json":
+            found[name] = _lasting(json.loads(file.read_text(encoding="utf-8")))
+        else:
+            found[name] = file.read_bytes()
+    return found
+
+
+def _lasting(data: Any) -> Any:
+    if isinstance(data, dict):
+        return {k: _lasting(v) for k, v in data.items() if k not in VARIES}
+    return [_lasting(item) for item in data] if isinstance(data, list) else data
+
+
+def half_written(folder: Path) -> list[str]:
+    """Files under a final name that cannot be read to their end."""
+    broken = []
+    for file in (f for f in folder.rglob("*") if f.is_file() and not f.name.startswith(".")):
+        try:
+            if file.suffix == ".json":
+                json.loads(file.read_text(encoding="utf-8"))
+            elif file.suffix == ".yaml":
+                load_yaml(file)
+            elif file.name != "results.csv" and file.suffix == ".csv":
+                Trajectory.read(file)
+        except (KembaError, ValueError) as error:
+            broken.append(f"{file}: {error}")
+    return broken
+
+
+def emptied(folder: Path) -> Path:
+    """A folder without anything in it."""
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    return folder

@@ -1,0 +1,95 @@
+"""Broken inputs are answered in words and in time: a short run, and all that was ever found.
+
+`benchmarks/fuzz.py` is the long run. What it finds is written to `corpus` by hand, as small as it
+can be made, under a name that says what happened.
+"""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from fuzz.rule import outcome
+from fuzz.trial import TRIALS
+
+CORPUS = sorted((Path(__file__).parent / "corpus").glob("[!.]*"))
+EXAMPLES = {"bench logs": 12, "mapped logs": 6, "sidecars": 6}  # of files 10 each
+SLOW = {"robot logs": 20, "compare": 20, "discover": 6}
+
+
+def tried(name: str, examples: int, folder: Path) -> None:
+    """Try so many inputs, the same ones every time."""
+    inputs, run = TRIALS[name]
+
+    @settings(
+        max_examples=examples,
+        deadline=None,
+        derandomize=True,
+        database=None,
+        suppress_health_check=list(HealthCheck),
+    )
+    @given(inputs())
+    def keeps_the_rule(content: str) -> None:
+        assert run(content, folder).broken == ""
+
+    keeps_the_rule()
+
+
+@pytest.mark.parametrize("name", [name for name in TRIALS if name not in SLOW])
+def test_broken_inputs_are_answered(name: str, tmp_path: Path) -> None:
+    tried(name, EXAMPLES.get(name, 10), tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SLOW)
+def test_broken_logs_are_answered(name: str, tmp_path: Path) -> None:
+    tried(name, SLOW[name], tmp_path)
+
+
+@pytest.mark.parametrize("file", CORPUS, ids=lambda path: path.name)
+def test_past_findings_stay_mended(file: Path, tmp_path: Path) -> None:
+    copied = Path(shutil.copy(file, tmp_path / f"input{file.suffix}"))
+    found = outcome("check", copied)
+    assert found.broken == "" and found.exit_code == 2, found.said
+
+
+def test_the_rule_sees_what_breaks_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Else the tests above could not fail."""
+    file = tmp_path / "input.yaml"
+    file.write_text("rig: 1\n")
+
+    def crash(*_: object) -> None:
+        raise ZeroDivisionError
+
+    def hang(*_: object) -> None:
+        while True:
+            pass
+
+    def silent(*_: object) -> None:
+        from kemba.errors import KembaError
+
+        raise KembaError("elsewhere", "is wrong")
+
+    words = {crash: "crash: ", hang: "hang: more than 0.2 CPU s", silent: "no place: elsewhere"}
+    monkeypatch.setitem(__import__("fuzz.rule", fromlist=["x"]).LONGEST, "check", 0.2)
+    for broken, said in words.items():
+        monkeypatch.setattr("kemba.config.locate", broken)
+        assert outcome("check", file).broken.startswith(said)
+
+
+def test_values_reach_the_inner_checks(tmp_path: Path) -> None:
+    """Of files with small damage some must still be good, or only the outermost check is tried."""
+    seen: set[int | None] = set()
+    inputs, run = TRIALS["tasks"]
+
+    @settings(max_examples=40, deadline=None, derandomize=True, database=None)
+    @given(inputs(), st.none())
+    def look(content: str, _: None) -> None:
+        seen.add(run(content, tmp_path).exit_code)
+
+    look()
+    assert {0, 2} <= seen

@@ -1,0 +1,74 @@
+"""One trial: an input is drawn, written to a file, and held against the rule."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from hypothesis import strategies as st
+
+from fuzz import sound
+from fuzz.files import KINDS, yaml_text
+from fuzz.logs import cells, damaged_log, sidecar, text
+from fuzz.rule import Outcome, outcome
+
+MAP = """\
+kind: bench
+columns:
+  time [s]: {source: "time [s]"}
+  piston/x [m]: {source: "piston/x [m]"}
+  piston/F [N]: {source: "piston/F [N]"}
+  valve/extend [1]: {source: "valve/extend [1]"}
+  valve/retract [1]: {source: "valve/retract [1]"}
+"""
+Trial = tuple[Callable[[], st.SearchStrategy[str]], Callable[[str, Path], Outcome]]
+
+
+def _yaml(content: str, folder: Path) -> Outcome:
+    file = folder / "input.yaml"
+    file.write_text(content, encoding="utf-8")
+    return outcome("check", file)
+
+
+def _log(verb: str) -> Callable[[str, Path], Outcome]:
+    def run(content: str, folder: Path) -> Outcome:
+        file = folder / "input.csv"
+        file.write_text(content, encoding="utf-8")
+        options = {"discover": ["--out", str(folder / "answer"), "--force", "--no-figures"]}
+        return outcome(verb, file, *options.get(verb, []))
+
+    return run
+
+
+def _foreign(content: str, folder: Path) -> Outcome:
+    (folder / "map.yaml").write_text(MAP, encoding="utf-8")
+    file = folder / "input.csv"
+    file.write_text(content, encoding="utf-8")
+    return outcome("check", file, "--map", str(folder / "map.yaml"))
+
+
+def _sidecar(content: str, folder: Path) -> Outcome:
+    file = folder / "input.csv"
+    file.write_text(text(cells(sound.bench())), encoding="utf-8")
+    (folder / "input.meta.yaml").write_text(content, encoding="utf-8")
+    return outcome("check", file)
+
+
+def _bench() -> st.SearchStrategy[str]:
+    return damaged_log(cells(sound.bench()))
+
+
+def _robot() -> st.SearchStrategy[str]:
+    return damaged_log(cells(sound.robot()))
+
+
+# what is tried: where its inputs come from, and what is done with one
+TRIALS: dict[str, Trial] = {
+    **{kind: (lambda kind=kind: yaml_text(kind), _yaml) for kind in KINDS},  # type: ignore[misc]
+    "sidecars": (lambda: sidecar(sound.bench().headers), _sidecar),
+    "bench logs": (_bench, _log("check")),
+    "mapped logs": (_bench, _foreign),
+    "robot logs": (_robot, _log("check")),
+    "compare": (_bench, _log("compare")),
+    "discover": (_bench, _log("discover")),
+}
