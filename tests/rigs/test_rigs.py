@@ -74,6 +74,7 @@ def logs_of_a_cylinder(folder: Path, **friction: float) -> list[Path]:
     ]
 
 
+@pytest.mark.slow
 def test_constant_and_growing_friction_of_a_cylinder_are_told_apart(tmp_path: Path) -> None:
     logs = logs_of_a_cylinder(tmp_path, coulomb=4.0, mu=0.02)
     effects = {"kind": "seal_friction"}, {"kind": "pressure_friction"}
@@ -99,6 +100,7 @@ def test_nothing_is_missing_from_a_complete_cylinder(tmp_path: Path) -> None:
     assert answer.verdict == "nothing", answer.sentence
 
 
+@pytest.mark.slow
 def test_heat_of_the_wall_is_found(tmp_path: Path) -> None:
     answer, _ = discover_logs([vessel_log(tmp_path / "a.csv")], (), model_file(tmp_path, VESSEL))
     assert answer.ranking[0].effect == "wall_heat", answer.sentence
@@ -146,6 +148,7 @@ def test_rigs_that_cannot_be_are_refused(tmp_path: Path, rig: dict, words: str) 
         load_model(model_file(tmp_path, rig))
 
 
+@pytest.mark.slow
 def test_published_figures_of_emps_are_within_the_intervals(tmp_path: Path) -> None:
     real("emps/DATA_EMPS.mat")
     reader().emps().write(tmp_path / "emps.csv")
@@ -158,6 +161,7 @@ def test_published_figures_of_emps_are_within_the_intervals(tmp_path: Path) -> N
     assert figures["drive_axis.J"].value == pytest.approx(95.11, rel=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seal, constant, growing", [("O-ring", 3.4, 0.0133), ("KDN", 5.3, 0.004)])
 def test_real_seals_are_told_apart(
     tmp_path: Path, seal: str, constant: float, growing: float
