@@ -26,6 +26,9 @@ class PolicySettings(Settings):
         10, "ticks", "before and after touchdown in which no torque is added: feet that touch a "
         "little sooner or later have quite other velocities", CHOSEN,
     )  # fmt: skip
+    fine: int = setting(
+        4, "1", "instants a tick at which valves of the simulated robot may act", CHOSEN
+    )
 
 
 class CourseSettings(Settings):
