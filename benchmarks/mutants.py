@@ -23,6 +23,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from program import load, put
+
 from kemba.config import load_yaml
 from kemba.sweep.table.summary import wilson
 
@@ -138,10 +140,19 @@ def chosen(part: str, only: str) -> list[Mutant]:
     return found[(number - 1) * size // parts : number * size // parts]
 
 
+def _record(mutant: Mutant, outcome: str) -> None:
+    """Keep an outcome in program.json; those of bugs that are no longer listed are dropped."""
+    known = {str(m) for m in listed()}
+    old = load().get("mutants", {}).get("all", {}).get("outcomes", {})
+    outcomes = {name: said for name, said in {**old, str(mutant): outcome}.items() if name in known}
+    put("mutants", "all", {"listed": len(known), "outcomes": outcomes})
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--part", default="1/1", help="such as 2/4: the second of four")
     parser.add_argument("--only", default="", help="bugs whose file or words contain this")
+    parser.add_argument("--record", action="store_true", help="keep outcomes for the page")
     parser.add_argument("--list", action="store_true", help="run no tests")
     arguments = parser.parse_args()
     mutants = chosen(arguments.part, arguments.only)
@@ -154,6 +165,8 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as folder:
         for mutant, outcome in outcomes(mutants, Copy(Path(folder))):
             count[outcome] += 1
+            if arguments.record:
+                _record(mutant, outcome)
             print(f"{outcome:14}  {mutant}", flush=True)
     tried = count["killed"] + count["survived"]
     if tried:

@@ -38,6 +38,7 @@ CONSTANTS = {  # file -> names, why
         "nothing switches before its command",
     ),
     "effects/mechanics/boom_faults.py": ("V_BOOM W_PITCH", "smoothing widths of formulas"),
+    "effects/pneumatics/gas.py": ("ROUND", "rounds a root, as SOFT does"),
     "effects/mechanics/friction.py": ("V_COULOMB", "smoothing width of a formula"),
     "effects/mechanics/ground.py": ("SMOOTH", "smoothing width of a formula"),
     "effects/mechanics/hip.py": ("W_COULOMB", "smoothing width of a formula"),

@@ -11,6 +11,7 @@ from kemba.effects import BY_KIND
 from kemba.errors import KembaError, suggest
 from kemba.files import read_json
 from kemba.identify.problem.candidates import where_field
+from kemba.identify.problem.structure import ORIFICE, orifice_item
 from kemba.model.spec import ModelSpec, load_spec
 
 
@@ -24,6 +25,7 @@ def write_model(
     data = {
         "name": f"{Path(base).stem}_{'_'.join(w.split(':')[0] for w in wanted)}"[:60],
         "base": reference(base),
+        **({"chambers": "orifice"} if ORIFICE in wanted else {}),
         "effects": listed,
         "notes": "found by kemba-opt discover",
     }
@@ -40,6 +42,8 @@ def item(name: str, parameters: Mapping[str, Mapping[str, Any]]) -> dict[str, An
     """
     kind, _, place = name.partition(":")
     values = {p: float(f"{v['value']:.6g}") for p, v in parameters.items()}
+    if name == ORIFICE:
+        return orifice_item(values)
     if kind not in BY_KIND:
         raise KembaError(name, "is no effect of the catalogue", hint=suggest(kind, BY_KIND))
     where = {where_field(kind): place} if place else {}

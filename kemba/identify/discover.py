@@ -18,7 +18,7 @@ from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
 from kemba.identify.problem.problem import Problem
 from kemba.identify.ranking import error, ladder, ranked, strength
-from kemba.identify.rest import rest_of
+from kemba.identify.rest import pattern_left, rest_of
 from kemba.identify.settings import DiscoverSettings, VerdictSettings
 
 Talk = Callable[[str], None]
@@ -63,10 +63,12 @@ def discover(
 def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> Discovery:
     """What the finished `search` with its `best` hypothesis allows to say."""
     search.say("asking whether nothing would look like this")
-    test = null_test(search)
-    best, p_value, dismissed = _believed(search, best, test)
+    test, likeliest = null_test(search), best
+    best, p_value, dismissed = _believed(search, likeliest, test)
     holdout = holdout.heard_as(search.problem) if holdout else None
-    formula = look(search, best)
+    # what is too small to be reported still explains: a formula must do better than with it
+    slight = best and material(search, likeliest) == best
+    formula = look(search, likeliest if slight else best)
     drift = drifting(search, best)
     if drift is not None and formula is not None and drift.nats > formula.gain:
         formula = None
@@ -142,6 +144,8 @@ def doubts_about(
         reasons.append(str(drift))
     elif unfinished(search, best):
         reasons.append("the error that is left repeats itself with motion and valves")
+    elif pattern := pattern_left(search, best):
+        reasons.append(f"the error that is left has a pattern: {pattern}")
     before, after = (error(search, h, holdout) for h in (NULL, best))
     least = settings.part_of_structure if reasons else settings.part
     if best and after > settings.whole and excess(after) > settings.whole_share * excess(before):

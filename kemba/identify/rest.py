@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass
 
+from kemba.identify.compare.bins import BinSettings
 from kemba.identify.compare.compare import conditions, place_of
-from kemba.identify.compare.force_profiles import force_profiles
+from kemba.identify.compare.force_profiles import ForceProfileSettings, force_profiles
 from kemba.identify.compare.hints import lacking
+from kemba.identify.doubt.unexplained import UnexplainedSettings
 from kemba.identify.evidence.search import Search
-from kemba.identify.evidence.spike_slab import Hypothesis
+from kemba.identify.evidence.spike_slab import NULL, Hypothesis
 from kemba.units import short
 
 BENCH = "run this cylinder alone on a rig: slow strokes, fast strokes, and the rod locked"
@@ -28,6 +30,20 @@ class Rest:
 
     where: str
     next: str
+
+
+def pattern_left(search: Search, best: Hypothesis) -> str:
+    """A force that the best hypothesis leaves and that goes with speed, place, load or a command,
+    in words; empty where none explains a fair share of what the hypothesis itself explains."""
+    point = search.points[best]
+    if not best or point.fitted_error < BinSettings.current().tolerated:
+        return ""
+    problem = search.problem
+    profiles = force_profiles(problem, problem.residual(point.fit.theta))
+    first = max(profiles, key=lambda profile: profile.gain, default=None)
+    gained = point.log_evidence - search.points[NULL].log_evidence
+    least = max(ForceProfileSettings.current().plain, UnexplainedSettings.current().left * gained)
+    return str(first) if first is not None and first.gain > least else ""
 
 
 def rest_of(search: Search, best: Hypothesis, unsure: Collection[str]) -> Rest:

@@ -35,9 +35,10 @@ class Source:
 
     @property
     def bench(self) -> bool:
-        """Whether it comes from one piston on the bench rather than from a robot."""
+        """Whether it comes from a rig rather than from a robot."""
         kind = self.trajectory.meta.get("kind")
-        return kind == "bench" or (kind is None and "piston/x" in self.trajectory)
+        known = any(name in self.trajectory for name in ("piston/x", "axis/q", "vessel/P"))
+        return kind in ("bench", "cylinder", "drive", "vessel") or (kind is None and known)
 
     def held(self, name: str) -> Array:
         """The column (n,) of a command, in its unit, as it is drawn.

@@ -9,13 +9,16 @@ from pathlib import Path
 import numpy as np
 
 from kemba.model import Model
+from kemba.ocp import load_task, task_model
 from kemba.plant.execution.controller import PERIOD, Execution, condition_of, later, read_controller
+from kemba.plant.execution.repeat import VALVE_SCATTER, Play
 from kemba.plant.execution.sensors import Sensors
 from kemba.plant.simulation.commands import Commands
 from kemba.plant.simulation.simulate import simulate_one
 from kemba.policy.modes import Array
 from kemba.policy.player import Policy
-from kemba.policy.write import measured
+from kemba.policy.write import FILE, measured, write_policy
+from kemba.runs import load_run
 from kemba.trajectory import Trajectory
 
 FINE = 4  # actuations a tick: valves act so many times finer than they are commanded
@@ -94,7 +97,33 @@ def execute_policy(
     driver = Driver(policy, model, _knees(model), usual, rng, scatter, held)
     commands = Commands({}, driver, PERIOD / FINE)
     done = simulate_one(replace(condition, commands=commands))
-    return Execution(later(done, begin), table)
+    return Execution(later(done, begin), _sent(table, policy, driver.commands))
+
+
+def _sent(table: Trajectory, policy: Policy, commands: list[Array]) -> Trajectory:
+    """The table with the valve commands that were sent."""
+    rows = np.array(commands + [commands[-1]] * len(table))[: len(table)]
+    headers = {n: h for h, n in zip(table.headers, table.names, strict=True)}
+    return table.with_columns({headers[n]: rows[:, i] for i, n in enumerate(policy.valves)})
+
+
+def player_of(run: str | Path) -> Play:
+    """How `repeat_run` executes a run with its policy, which is made where it is missing.
+
+    The policy is made with the model of the run's task. Raises KembaError where the run has no
+    task, or no policy can be made.
+    """
+    folder = Path(run) if Path(run).is_dir() else Path(run).parent
+    file, table = folder / FILE, read_controller(run)
+    if not file.is_file() or file.stat().st_mtime < (folder / "controller.csv").stat().st_mtime:
+        task = load_task(load_run(folder).task)[0]
+        write_policy(task_model(task), table, file)
+
+    def play(model: Model, sample: Array, seed: list[int], noise: bool) -> Execution:
+        scatter = VALVE_SCATTER if noise else 0.0
+        return execute_policy(table, Policy(file), model, 0.0, None, sample, noise, scatter, seed)
+
+    return play
 
 
 def _knees(model: Model) -> dict[str, tuple[Array, Array]]:

@@ -5,10 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
+from kemba.model import Model
 from kemba.ocp import Plan, Task, controller_table
 from kemba.ocp.certificate.status import Status
+from kemba.plant.execution.certificate import executions, summaries
 from kemba.plant.execution.counterpart import counterpart
+from kemba.plant.execution.replay import ends_standing
 from kemba.plant.execution.retiming import retimed
+from kemba.report.verdict import verdicts
 from kemba.settings import Settings, setting
 from kemba.sweep.scenarios.draw import scenarios
 from kemba.sweep.scenarios.share import Share, share
@@ -33,24 +37,27 @@ class RobustSettings(Settings):
 @dataclass(frozen=True)
 class Candidate:
     """A plan; with its controller table and the share of scenarios in which it succeeds, if it was
-    executed."""
+    executed. `good`: its executions keep to the task's tolerances."""
 
     plan: Plan
     table: Trajectory | None = None
     share: Share | None = None
+    good: bool = False
 
     @property
-    def rank(self) -> tuple[bool, int, float]:
-        """Better candidates are greater: solved, then by share, then by cost."""
+    def rank(self) -> tuple[bool, bool, int, float]:
+        """Better candidates are greater: solved, good on the plant, then by share, by cost."""
         solved = self.plan.status is Status.SOLVED
         landed = self.share.landed if self.share else 0
-        return solved, landed, -self.plan.cost["torque_squared_integral"]
+        return solved, self.good, landed, -self.plan.cost["torque_squared_integral"]
 
     @property
     def enough(self) -> bool:
         """Whether it succeeds so often that no other plan is tried."""
         least = RobustSettings.current().enough
-        return self.share is not None and self.share.landed >= least * self.share.n
+        if self.share is None or not self.rank[0] or not self.good:
+            return False
+        return self.share.landed >= least * self.share.n
 
 
 def variants(task: Task) -> Iterator[tuple[str, Task]]:
@@ -91,7 +98,7 @@ def most_robust(
             table = retimed(held.model, held.trajectory, table)
             landed = share(held.model, held.trajectory, table, cases)
             tell(f"{name}, hold {hold:g} s: {landed.sentence}")
-            one = Candidate(held, table, landed)
+            one = Candidate(held, table, landed, _good(held, table, plant))
             if best is None or one.rank > best.rank:
                 best = one
             if best.enough:
@@ -100,3 +107,12 @@ def most_robust(
         return best
     assert failed is not None
     return Candidate(failed)
+
+
+def _good(found: Plan, table: Trajectory, plant: Model) -> bool:
+    """Whether all executions of a plan keep to its task's tolerances."""
+    done = executions(found.model, found.trajectory, table, plant)
+    lands, t = bool(ends_standing(found.model, found.trajectory)), found.task
+    facts = summaries(found.model, done)
+    judged = verdicts(facts, t.tolerances, lands, t.landing.impact_speed)
+    return all(verdict.good for verdict in judged.values())

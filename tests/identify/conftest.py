@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from real_data import real
 
 from kemba.effects.pneumatics.switching import pulses
 from kemba.identify.bench.motion import SmoothedMotion
@@ -62,4 +63,30 @@ def log_file(tmp_path: Path, bench_log: BenchLog) -> Path:
     Trajectory(log.time, {h: log[n] for h, n in zip(log.headers, log.names, strict=True)}).write(
         path
     )
+    return path
+
+
+NOISE = """\
+kind: robot
+notes: a plan and no measurement; an implicit Euler step of 7 ms is good to half its square times
+  the acceleration, which is what stands here as noise
+noise:
+  body/x [m]: 3.0e-4
+  body/z [m]: 3.0e-4
+  body/pitch [rad]: 1.0e-3
+  front/hip/q [rad]: 5.0e-3
+  rear/hip/q [rad]: 5.0e-3
+  front/piston/x [m]: 2.0e-3
+  rear/piston/x [m]: 2.0e-3
+"""
+
+
+@pytest.fixture
+def authors_plan(tmp_path: Path) -> Path:
+    """The last 0.77 s of the plan of the paper's authors, every second row, with its sidecar."""
+    lines = real("reference/authors_jump_land_0.5m.csv").read_text().splitlines()
+    rows = [line for line in lines[1:] if float(line.split(",")[0]) >= 9.95 - 1e-9][::2]
+    path = tmp_path / "authors_jump_land.csv"
+    path.write_text("\n".join([lines[0], *rows]) + "\n")
+    path.with_suffix(".meta.yaml").write_text(NOISE)
     return path

@@ -18,7 +18,6 @@ from kemba.identify.workflow import discover_logs
 from kemba.logs import load_map
 from kemba.trajectory import Trajectory
 
-DATA = Path(__file__).parent / "data"
 Damage = Callable[[list[str]], list[str]]
 
 
@@ -135,8 +134,10 @@ MIXED_UP: dict[str, Callable[[str, np.ndarray], tuple[str, np.ndarray]]] = {
 
 
 @pytest.mark.parametrize("kind", MIXED_UP)
-def test_mixed_up_columns_of_a_robot_are_refused(kind: str, tmp_path: Path) -> None:
-    log = read_log(DATA / "authors_jump_land.csv", load_map("authors"))
+def test_mixed_up_columns_of_a_robot_are_refused(
+    kind: str, tmp_path: Path, authors_plan: Path
+) -> None:
+    log = read_log(authors_plan, load_map("authors"))
     columns = [MIXED_UP[kind](h, log[n]) for h, n in zip(log.headers, log.names, strict=True)]
     meta = {"kind": "robot", "noise": log.meta["noise"]}
     Trajectory(log.time, dict(columns), meta).write(tmp_path / "jump.csv")

@@ -13,7 +13,6 @@ from kemba.identify.logs.reading import read_log, read_logs
 from kemba.logs import ColumnMap, Source, load_map
 from kemba.trajectory import Trajectory
 
-DATA = Path(__file__).parent / "data"
 FOREIGN = """\
 t_ms,pos_mm,loadcell,valve_1,valve_2
 0,20,5,0,5
@@ -22,8 +21,8 @@ t_ms,pos_mm,loadcell,valve_1,valve_2
 """
 
 
-def test_the_authors_plan_is_read_through_its_map() -> None:
-    log = read_log(DATA / "authors_jump_land.csv", load_map("authors"))
+def test_the_authors_plan_is_read_through_its_map(authors_plan: Path) -> None:
+    log = read_log(authors_plan, load_map("authors"))
     assert log.meta["kind"] == "robot"
     assert check_logs([log]) == []
     assert log["body/z"].max() == pytest.approx(0.5, abs=0.002)

@@ -25,6 +25,9 @@ def simulate(
     noise: Annotated[
         bool, typer.Option("--noise", help="Noisy sensors, scattering valves.")
     ] = False,
+    policy: Annotated[
+        bool, typer.Option("--policy", help="With feedback: the run's policy.npz, made if missing.")
+    ] = False,
     seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same logs.")] = 0,
     out: Annotated[
         Path | None, typer.Option(help="Folder for the logs (a new one in the run).")
@@ -50,7 +53,7 @@ def simulate(
     else:
         default = (Path(source) if Path(source).is_dir() else Path(source).parent) / "logs"
         with claimed(out, default, "*.csv", force) as folder:
-            answer = _run(source, model, folder, seed, noise, repeat)
+            answer = _run(source, model, folder, seed, noise, repeat, policy)
     if json:
         print_json(answer)
     else:
@@ -59,12 +62,23 @@ def simulate(
 
 
 def _run(
-    source: str, model: str | None, out: Path, seed: int, noise: bool, repeat: int
+    source: str,
+    model: str | None,
+    out: Path,
+    seed: int,
+    noise: bool,
+    repeat: int,
+    policy: bool,
 ) -> dict[str, Any]:
     from kemba.plant.execution.repeat import plant_of, repeat_run
 
     plant = plant_of(source, model)
-    repeats = repeat_run(source, plant, out, repeat, noise, seed)
+    play = None
+    if policy:
+        from kemba.policy.execute import player_of
+
+        play = player_of(source)
+    repeats = repeat_run(source, plant, out, repeat, noise, seed, play=play)
     runs = [r.summary for r in repeats]
     apex = ", ".join(f"{r['apex_m']:.3f}" for r in runs)
     sentence = f"reached {apex} m on {plant.name}"

@@ -36,6 +36,7 @@ class ModeDamping(Effect):
     equation: ClassVar[str] = "-c_d(u_e, u_r) v, c_d = c0 + u_e c1 + u_r c2 + u_e u_r c3"
     source: ClassVar[str] = "paper eq. 6, 7, Table II"
     ports: ClassVar[tuple[str, ...]] = ("piston",)
+    publishes: ClassVar[tuple[str, ...]] = ("F_mode",)
     dissipative: ClassVar[bool] = True
     nominal: ClassVar[dict[str, Tolerance]] = dict.fromkeys(
         ("c_extend", "c_retract", "c_both", "c_none"),
@@ -56,4 +57,5 @@ class ModeDamping(Effect):
         return c0 + u_e * c1 + u_r * c2 + u_e * u_r * c3
 
     def evaluate(self, at: At) -> Contribution:
-        return Contribution(effort={"piston": -self.c_d(at.u_e, at.u_r, at.supply) * at.piston.v})
+        force = -self.c_d(at.u_e, at.u_r, at.supply) * at.piston.v
+        return Contribution(effort={"piston": force}, publish={"F_mode": force})

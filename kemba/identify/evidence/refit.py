@@ -26,7 +26,10 @@ class RefitSettings(Settings):
     farthest: float = setting(3.0, "1", "largest start of a switch, in sizes", BY_HAND)
     nearest: float = setting(0.1, "1", "smallest start of a switch, in sizes", BY_HAND)
     factor: float = setting(
-        3.0, "1", "a shape also starts at its default times and over this", BY_HAND
+        3.0,
+        "1",
+        "a shape also starts at its default times and over this, if within two prior widths",
+        BY_HAND,
     )
     absurd: float = setting(
         1e6, "1", "residuals are clipped at so many sigmas", "convention: finite, beyond all data"
@@ -84,7 +87,8 @@ def _starts(
                 theta[key] = _inside(start.get(key, parameter.off), parameter)
             else:
                 theta[key] = start.get(key, parameter.typical)
-                if key not in start:
+                likely = settings.factor < np.exp(2.0 * parameter.size)
+                if key not in start and likely:
                     shapes.append((key, parameter))
     yield theta
     for key, parameter in shapes:

@@ -9,6 +9,7 @@ from kemba.effects.base import Effect
 from kemba.effects.mechanics.geometry import SIZES, Geometry
 from kemba.identify.problem.problem import Candidate, Parameter
 from kemba.identify.problem.sensor_faults import possible_faults
+from kemba.identify.problem.structure import ORIFICE, OrificeShare
 from kemba.model.model import Model
 from kemba.model.scene import port_name
 from kemba.quantity import Param
@@ -49,6 +50,8 @@ def effect_candidates(model: Model) -> dict[str, Candidate]:
 
 def by_default(name: str) -> Effect:
     """The effect of a name as its defaults have it: absent."""
+    if name == ORIFICE:
+        return OrificeShare()
     kind, _, place = name.partition(":")
     where = {where_field(kind): place} if place else {}
     return BY_KIND[kind].model_validate({"kind": kind, **where})

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d
 
 from kemba.errors import KembaError
 from kemba.identify.logs.gate import BadData
@@ -27,6 +28,12 @@ class RigLogSettings(Settings):
         "travel after a turn within which friction is in doubt, over that in which seals stretch",
         "convention: that travel is taken to be known to a factor of two",
         decides=True,
+    )
+    blurred: float = setting(
+        3.0,
+        "1",
+        "time around a turn that the filter mixes into a row, over the filter's width",
+        "convention: three sigmas of the Gaussian",
     )
 
 
@@ -72,8 +79,10 @@ def prepare(log: Trajectory, model: Model) -> RigLog:
     doubt = 0.5 * (high - low)
     if "measured_chambers.travel" in model.parameters:
         travel = model.parameters["measured_chambers.travel"][1]
-        slid = np.abs(_stretch(found, RigLogSettings.current().doubted * travel))
-        doubt = np.maximum(doubt, 1.0 - slid[found.rows])
+        settings, step = RigLogSettings.current(), float(np.median(np.diff(found.time)))
+        held = 1.0 - np.abs(_stretch(found, settings.doubted * travel))
+        reach = 2 * int(np.ceil(settings.blurred * found.width / step)) + 1
+        doubt = np.maximum(doubt, maximum_filter1d(held, reach)[found.rows])
     return RigLog(name, found, doubt)
 
 

@@ -62,6 +62,8 @@ def sized(
     base = np.concatenate([predictor.gap(log, {}) for log in logs])
     percent = RigSizeSettings.current().large
     for name, candidate in candidates.items():
+        if candidate.sensor and candidate.lead.unit == "s" and _hidden(predictor, logs, candidate):
+            continue
         if candidate.sensor:
             trial = _with_units(candidate, predictor)
         else:
@@ -77,6 +79,16 @@ def sized(
             trial = replace(trial, lead=lead)
         found[name] = trial
     return found
+
+
+def _hidden(predictor: Predictor, logs: tuple[RigLog, ...], candidate: Candidate) -> bool:
+    """Whether a delay looks like seals that stretch: the rod moves less meanwhile than they do."""
+    stretch = predictor.model.parameters.get("measured_chambers.travel")
+    if stretch is None:
+        return False
+    speed = np.concatenate([np.abs(log.speed) for log in logs])
+    fast = float(np.percentile(speed, RigSizeSettings.current().large))
+    return fast * candidate.lead.size < stretch[1]
 
 
 def _shaped(candidate: Candidate, typical: Mapping[str, float]) -> Candidate:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kemba.effects.series import Series
+from kemba.identify.evidence.refit import RefitSettings
 from kemba.identify.problem.candidates import by_default, sensor_candidates
 from kemba.identify.problem.nominal import nominal_figures
 from kemba.identify.problem.problem import Problem
@@ -31,6 +32,7 @@ class VesselSettings(Settings):
     warmth: float = setting(
         0.5, "K", "smallest noise of a temperature", "literature: IEC 60584 class 1 allows 1.5 K"
     )
+    farthest: float = setting(3.0, "1", "largest factor by which a figure is tried off", BY_HAND)
     late: float = setting(
         0.02, "1", "usual delay of a sensor, such as a thermometer's, over a log's length", BY_HAND
     )
@@ -120,14 +122,16 @@ class VesselProblem(Problem):
             parts += [
                 (expected[name] - y) / log.sigma[name] for name, (_, y) in log.readings.items()
             ]
-        return np.concatenate(parts)
+        absurd = RefitSettings.current().absurd
+        return np.clip(np.nan_to_num(np.concatenate(parts), nan=absurd), -absurd, absurd)
 
     def expected(self, theta: Theta, index: int) -> dict[str, Array]:
         """Channel -> what should have been read (k,), in its unit."""
         log = self.logs[index]
         blow, values = self._blow_down(theta), self._values(theta)
         shift = [theta.get(f"start:{name}[{index}]", 0.0) for name in CHANNELS]
-        start = np.array(log.start) + shift
+        far = VesselSettings.current().farthest
+        start = np.array(log.start) * np.clip(1.0 + np.array(shift) / log.start, 1.0 / far, far)
         time, states = blow.run(log.begin, log.begin + log.duration, start, values)
         found = {}
         for name, (at, _) in log.readings.items():
@@ -168,8 +172,11 @@ class VesselProblem(Problem):
 
     def _values(self, theta: Theta) -> dict[str, float]:
         nominal = {name: factor for name, (factor, _) in self.figures.items()}
-        names = self._blow_down(theta).names
-        return {name: theta.get(name, nominal.get(name, 0.0)) for name in names}
+        values = {n: theta.get(n, nominal.get(n, 0.0)) for n in self._blow_down(theta).names}
+        far = VesselSettings.current().farthest  # beyond, nothing can be predicted
+        return {
+            n: float(np.clip(v, 1.0 / far, far)) if n in nominal else v for n, v in values.items()
+        }
 
 
 def vessel_problem(

@@ -10,6 +10,7 @@ from kemba.identify.problem.candidates import (
     leg_candidates,
 )
 from kemba.identify.problem.problem import Candidate, Parameter
+from kemba.identify.problem.structure import structure_candidates
 from kemba.model.model import Model
 from kemba.settings import BY_HAND, Settings, setting
 
@@ -35,7 +36,7 @@ def robot_candidates(model: Model) -> dict[str, Candidate]:
     """
     found = effect_candidates(model)
     apart = leg_candidates(model, [n for n in found if n not in (*GROUND, *SHARED)])
-    found = {**found, **apart, **geometry_candidates(model)}
+    found = {**found, **apart, **geometry_candidates(model), **structure_candidates(model)}
     settings = RobotCandidateSettings.current()
     if "ground_compliance" in found:
         found["ground_compliance"] = Candidate(

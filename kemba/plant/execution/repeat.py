@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,9 +18,11 @@ from kemba.plant.execution.counterpart import PLAIN, counterpart
 from kemba.plant.execution.replay import Replay
 from kemba.plant.execution.sensors import Sensors, take_log
 from kemba.plant.simulation.valves import scattered
+from kemba.plant.stepping.arrays import Array
 from kemba.quantity import to_si
 from kemba.trajectory import Trajectory
 
+Play = Callable[[Model, Array, list[int], bool], Execution]
 VALVE_SCATTER = 1e-4  # s, 1 sigma of every switching on hardware; Fig. 3 shows less than 1 ms
 
 
@@ -48,11 +51,14 @@ def repeat_run(
     noise: bool = False,
     seed: int = 0,
     gains: Gains | None = None,
+    play: Play | None = None,
 ) -> list[Repeat]:
     """Execute the controller of a run `count` times on `model` and write `log-1.csv`, ... to `out`.
 
     With `noise`, sensors are noisy and the valves scatter; the same `seed` gives the same logs.
-    Raises KembaError when `run` has no controller table.
+    `play` executes the table in another way than eq. 10 alone; it gets the model, the times of the
+    samples and the numbers that seed it, and whether there is noise. Raises KembaError when `run`
+    has no controller table.
     """
     folder = Path(run)
     controller = folder / "controller.csv" if folder.is_dir() else folder
@@ -68,8 +74,11 @@ def repeat_run(
         valves = scattered(model, table, VALVE_SCATTER, rng) if noise else None
         begin = float(table.time[0])
         sample = begin + sensors.times(float(table.time[-1]) - begin, rng)
-        done = execute(table, model, gains, valves=valves, sample=sample)
-        log = _as_sent(take_log(done.trajectory, sensors, rng, model.effects), table)
+        if play is None:
+            done = execute(table, model, gains, valves=valves, sample=sample)
+        else:
+            done = play(model, sample, [seed, number, 1], noise)
+        log = _as_sent(take_log(done.trajectory, sensors, rng, model.effects), done.table)
         log.meta |= {"run": number, "repeat_of": controller.parent.name, "plant": model.name}
         path = Path(out) / f"log-{number}.csv"
         log.write(path)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -33,6 +34,10 @@ PANELS = (
         1e-3,
         height=1.2,
     ),
+    Panel("axis q [m or rad]", (Trace("axis/q"),)),
+    Panel("axis tau [N or N.m]", (Trace("axis/tau"),), height=1.7),
+    Panel("vessel P [kPa]", (Trace("vessel/P"),), 1e-3, height=1.2),
+    Panel("vessel T [K]", (Trace("vessel/T"),), height=1.2),
     Panel(
         "valve",
         (
@@ -54,10 +59,11 @@ LOOKS = {
 
 @paper_style
 def plot_bench(sources: Sequence[Source], figure: Figure | None = None) -> Figure:
-    """One or several bench logs over each other, or a log and what models say of it (Fig. 7).
+    """One or several logs of a rig over each other, or a log and what models say of it (Fig. 7).
 
     Columns that a source lacks drop their trace. Raises KembaError with nothing to draw.
     """
+    sources = [_joined(source) for source in sources]
     panels = [panel for panel in PANELS if any(panel.found_in(source) for source in sources)]
     if not panels:
         expected = "columns of the bench log format, such as 'piston/F [N]', were expected"
@@ -77,6 +83,16 @@ def plot_bench(sources: Sequence[Source], figure: Figure | None = None) -> Figur
     if len(sources) > 1:
         name_sources(figure, sources)
     return figure
+
+
+def _joined(source: Source) -> Source:
+    """The source with a vessel's readings joined by lines: its channels are read by turns."""
+    log, joined = source.trajectory, {}
+    for header, name in zip(log.headers, log.names, strict=True):
+        good = np.isfinite(log[name])
+        if name.startswith("vessel/") and good.any():
+            joined[header] = np.interp(log.time, log.time[good], log[name][good])
+    return replace(source, trajectory=log.with_columns(joined)) if joined else source
 
 
 def valve_modes(trajectory: Trajectory, leg: str = "") -> dict[str, Mask]:

@@ -1,0 +1,171 @@
+"""Write docs/reliability-of-the-program.md from what was really run.
+
+    python benchmarks/program_page.py
+
+Reads benchmarks/program.json (kept by fuzz.py, faults.py, calibration.py and mutants.py) and
+benchmarks/program_points.yaml (24 defects that were found once, and the tests that watch them).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from program import load
+from scipy.stats import kstest
+
+from kemba.config import load_yaml
+from kemba.sweep.table.summary import wilson
+
+ROOT = Path(__file__).parents[1]
+PAGE = ROOT / "docs" / "reliability-of-the-program.md"
+POINTS = Path(__file__).with_name("program_points.yaml")
+LOGS = ("sidecars", "bench logs", "mapped logs", "robot logs", "compare", "discover")
+HEAD = """# Reliability of the program
+
+Does the program answer every input, lose nothing when it is stopped, and claim only what is so?
+This page says what was tried and what came out. It is written by `benchmarks/program_page.py` from
+records of what was really run; numbers that are still small are shown as they are.
+"""
+Counts = dict[str, dict[str, int]]
+
+
+def table(head: list[str], rows: list[list[Any]]) -> str:
+    """A table of the page."""
+    lines = [head, ["---", *["---:"] * (len(head) - 1)], *rows]
+    return "\n".join("| " + " | ".join(str(cell) for cell in line) + " |" for line in lines)
+
+
+def fuzz(found: Counts) -> str:
+    """Broken inputs: how many, and how many broke the rule."""
+    rows = []
+    for names, title in ((set(found) - set(LOGS), "YAML files"), (set(found) & set(LOGS), "logs")):
+        parts = [found[name] for name in sorted(names)]
+        keys = ("inputs", "crash", "hang", "no place")
+        totals = [sum(part.get(key, 0) for part in parts) for key in keys]
+        slowest = max((part.get("slowest_ms", 0) for part in parts), default=0)
+        rows.append([title, *totals, f"{slowest / 1e3:.1f} s"])
+    text = table(["broken inputs", "tried", "crashes", "hangs", "no place", "slowest"], rows)
+    return f"""## Broken inputs
+
+Files made from the JSON Schemas, shipped files with damage, and sound logs with damage, drawn by
+hypothesis (`tests/fuzz`). The rule: exit code 2 with the place of the mistake, or 1 with a reason,
+never "failed unexpectedly", never more than 10 s of CPU time. What is found is mended and kept in
+`tests/fuzz/corpus`.
+
+{text}
+
+More: `python benchmarks/fuzz.py --examples 1000 --seed 7`.
+"""
+
+
+def faults(found: Counts) -> str:
+    """Faults in the middle of work."""
+    keys = ("faults", "killed", "ended", "interrupted", "disk full", "clock back", "wrong")
+    rows = [[f"`{name}`", *(part.get(key, 0) for key in keys)] for name, part in found.items()]
+    rows.append(["all", *(sum(part.get(key, 0) for part in found.values()) for key in keys)])
+    head = ["verb", "faults", "SIGKILL", "SIGTERM", "SIGINT", "disk full", "clock back", "wrong"]
+    return f"""## Faults in the middle of work
+
+Signals at random moments, disks that fill up at random sizes, and a clock that goes back
+(`tests/faults`). After each: no half-written file under a final name; results whole, or clearly
+partial and completed by the same command; the same results as without the fault. *wrong* counts the
+faults after which one of these did not hold.
+
+{table(head, rows)}
+
+More: `python benchmarks/faults.py --faults 50 --seed 3`.
+"""
+
+
+def calibration(found: dict[str, dict[str, Any]]) -> str:
+    """False alarms, p-values and intervals."""
+    clean = list(found.get("clean", {}).values())
+    hidden = list(found.get("missing", {}).values())
+    lines = []
+    if clean:
+        alarms = sum(c["verdict"] not in ("nothing",) for c in clean)
+        low, high = (100 * x for x in wilson(alarms, len(clean)))
+        p = [c["p"] for c in clean if isinstance(c["p"], float)]
+        lines.append(
+            f"- {len(clean)} machines in which nothing is missing: {alarms} false alarms "
+            f"(95 %: {low:.0f} to {high:.0f} %); the p-values are uniform with p = "
+            f"{kstest(p, 'uniform').pvalue:.2g} (Kolmogorov-Smirnov; below 0.05 they are not)."
+        )
+    if hidden:
+        named = [h for h in hidden if h["named"]]
+        inside = sum(bool(h["inside"]) for h in named)
+        sure = sum(h["verdict"] == "missing" and not h["named"] for h in hidden)
+        lines.append(
+            f"- {len(hidden)} machines in which one effect is missing: {len(named)} times it was "
+            f"named alone, {sure} times another one or more were named; {inside} of {len(named)} "
+            "intervals hold the truth."
+        )
+    return "\n".join(
+        [
+            "## Are p-values and intervals what they say?\n",
+            "Machines whose figures differ by 1 %, with disturbances and noise of their own, two "
+            "bench\nlogs each (`benchmarks/calibration.py`). The aim is 200 machines.\n",
+            *(lines or ["Not yet run."]),
+            "",
+        ]
+    )
+
+
+def mutants(found: dict[str, Any]) -> str:
+    """How many one-line bugs the tests notice."""
+    done: dict[str, str] = found.get("outcomes", {})
+    killed, tried = sum(v == "killed" for v in done.values()), len(done)
+    text = f"{found.get('listed', 0)} bugs are listed; none was tried."
+    if tried:
+        low, high = (100 * x for x in wilson(killed, tried))
+        text = (
+            f"{found.get('listed', 0)} bugs are listed; of the {tried} that were tried, the tests\n"
+            f"noticed {killed}: {100 * killed / tried:.0f} % "
+            f"(95 %: {low:.0f} to {high:.0f} %)."
+        )
+    alive = "\n".join(f"- survived: {name}" for name, v in sorted(done.items()) if v != "killed")
+    return f"""## Would the tests notice?
+
+One-line bugs are put into the code, one by one, and the tests nearest to them must fail
+(`benchmarks/mutants.py`, `benchmarks/mutants.yaml`). {text}
+
+{alive}
+"""
+
+
+def points() -> str:
+    """The defects that were found once, each with its tests."""
+    rows = []
+    for point in load_yaml(POINTS).data:
+        tests = ", ".join(f"`{test}`" for test in point["tests"])
+        rows.append([point["number"], point["defect"], tests or point["open"]])
+    lines = [["", "defect", "watched by"], ["---:", "---", "---"], *rows]
+    text = "\n".join("| " + " | ".join(str(cell) for cell in line) + " |" for line in lines)
+    return f"""## What was found once
+
+Fuzzing, fault injection and a security read of an early version found these. Each has tests that
+failed before it was mended.
+
+{text}
+"""
+
+
+def main() -> None:
+    whole = load()
+    parts = [
+        HEAD,
+        fuzz(whole.get("fuzz", {})),
+        faults(whole.get("faults", {})),
+        calibration(whole.get("calibration", {})),
+        mutants(whole.get("mutants", {}).get("all", {})),
+        points(),
+    ]
+    text = "\n".join(parts)
+    while "\n\n\n" in text:
+        text = text.replace("\n\n\n", "\n\n")
+    PAGE.write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""Real measured data of others: what the tool says of them, untuned."""

@@ -1,0 +1,111 @@
+"""Another structure as a candidate: orifice chambers in place of the first-order ones.
+
+The share `a` of the rod's force comes from orifice chambers and 1 - a from the chambers of the
+model: 0 is the model as it is, 1 the other structure. So it competes with every other effect.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Annotated, Any, ClassVar
+
+from kemba.effects.base import At, Contribution
+from kemba.effects.pneumatics.orifice import OrificeChamber
+from kemba.identify.problem.types import Candidate, Parameter
+from kemba.model.model import Model
+from kemba.quantity import Param, Quantity, Tolerance
+from kemba.settings import BY_HAND, Settings, setting
+
+ORIFICE = "chambers:orifice"
+OWN = {"P_e": "P_e_orifice", "P_r": "P_r_orifice"}  # states beside those of the model's chambers
+
+
+class StructureSettings(Settings):
+    """How far the figures of orifice chambers may be from the usual ones: 1 sigma of their
+    logarithm."""
+
+    area: float = setting(0.2, "1", "of an orifice's area", BY_HAND)
+    volume: float = setting(0.3, "1", "of a dead volume", BY_HAND)
+    level: float = setting(0.04, "1", "of the pressure that reaches the valves", BY_HAND)
+    reach: float = setting(4.0, "1", "largest error of a figure, in these sigmas", BY_HAND)
+    exponent: float = setting(0.08, "1", "of the polytropic exponent", BY_HAND)
+
+
+class OrificeShare(OrificeChamber):
+    """A share of the rod's force that comes from orifice chambers instead of the model's own.
+
+    `level` scales the pressure that reaches the valves.
+    """
+
+    a: Annotated[float, Param("1", 1.0, lower=0.0, upper=1.0, doc="share")] = 0.0
+    level: Annotated[float, Param("1", 0.04, lower=0.0, doc="scale of the gauge pressure")] = 1.0
+
+    off: ClassVar[dict[str, float]] = {"a": 0.0}
+    publishes: ClassVar[tuple[str, ...]] = ()
+    carried_by: ClassVar[Mapping[str, str]] = {}
+    replaces: ClassVar[tuple[str, ...]] = ()
+    nominal: ClassVar[Mapping[str, Tolerance]] = {}
+
+    @property
+    def name(self) -> str:
+        return ORIFICE
+
+    def states(self) -> dict[str, Quantity]:
+        named = super().states()
+        return {
+            own: replace(named[symbol], name=f"{named[symbol].name}_orifice")
+            for symbol, own in OWN.items()
+        }
+
+    def evaluate(self, at: At) -> Contribution:
+        scaled = self.bind({"gauge": tuple(self.level * g for g in self.gauge)})
+        other = OrificeChamber.evaluate(scaled, _Apart(at))  # type: ignore[arg-type]
+        own = at.F_e - at.F_r + at.F_mode
+        return Contribution(
+            effort={"piston": self.a * (other.effort["piston"] - own)},
+            rate={OWN[symbol]: rate for symbol, rate in other.rate.items()},
+        )
+
+
+class _Apart:
+    """`At` in which the chambers' pressures are those of the share."""
+
+    def __init__(self, at: At) -> None:
+        self._at = at
+
+    def __getattr__(self, symbol: str) -> Any:
+        return getattr(self._at, OWN.get(symbol, symbol))
+
+
+def structure_candidates(model: Model) -> dict[str, Candidate]:
+    """Orifice chambers, where the model has first-order ones, with their figures free."""
+    kinds = {effect.kind for effect in model.effects}
+    if not {"chamber", "mode_damping"} <= kinds:
+        return {}
+    share = OrificeShare().of_cylinder(model.mechanism.need_cylinder())
+    settings = StructureSettings.current()
+    declared = share.declared()
+    shapes = []
+    for name, width in _widths(settings).items():
+        param, usual = declared[name], float(share.value(name))
+        reach = math.exp(settings.reach * width)
+        low, high = max(param.lower, usual / reach), min(param.upper, usual * reach)
+        shapes.append(Parameter(name, param.unit, usual, width, low, high, usual))
+    lead = Parameter("a", "1", 0.0, 1.0, 0.0, 1.0)
+    return {ORIFICE: Candidate(ORIFICE, lead, tuple(shapes))}
+
+
+def _widths(settings: StructureSettings) -> dict[str, float]:
+    """1 sigma of each figure's logarithm."""
+    areas = dict.fromkeys(("a_fill", "a_vent"), settings.area)
+    volumes = dict.fromkeys(("V_e", "V_r"), settings.volume)
+    return {**areas, **volumes, "level": settings.level, "n": settings.exponent}
+
+
+def orifice_item(values: Mapping[str, float]) -> dict[str, Any]:
+    """The effect of a model's list with the figures found (by name, SI units)."""
+    figures = {k: v for k, v in values.items() if k not in ("a", "level")}
+    gauge = [float(f"{values.get('level', 1.0) * g:.6g}") for g in OrificeChamber().gauge]
+    return {"kind": "orifice_chamber", **figures, "gauge": gauge}

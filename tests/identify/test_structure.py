@@ -1,0 +1,86 @@
+"""Orifice chambers as a candidate: what their share means, and the model that is written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("numba")
+
+from robot_logs import hop
+from twin import figures, measure, run
+
+from kemba.effects.pneumatics.orifice import OrificeChamber
+from kemba.identify.adopt import write_model
+from kemba.identify.discover import discover
+from kemba.identify.problem.candidates import by_default
+from kemba.identify.problem.structure import ORIFICE, structure_candidates
+from kemba.identify.robot.problem import robot_problem
+from kemba.model import Model, load_model
+from kemba.model.spec import load_spec
+from kemba.trajectory import Trajectory
+
+PLANNING = load_model("planning")
+FIGURES = {"a_fill": 4.2e-6, "a_vent": 3.5e-6, "V_e": 1.2e-5, "V_r": 1.6e-5, "n": 1.35}
+
+
+def forces(model: Model, free: tuple[str, ...] = (), p: tuple[float, ...] = ()) -> np.ndarray:
+    """Dynamics and the rates of the chambers at a moving pose, by the states' names."""
+    node, rng = model.build(free), np.random.default_rng(2)
+    q = np.array([0.1, 0.4, 0.05, -0.4, 0.5, 1.4, -1.3])
+    pressure = {"extend": 4e5, "retract": 2e5}
+    names = [quantity.name for quantity in model.states.values()]
+    s = np.array([pressure[n.split("/")[2]] if "/P" in n else 90.0 for n in names])
+    u = np.array([1.0, 0.0] * 2 + [0.0] * (node.u.numel() - 4))
+    given = (q, rng.standard_normal(7), np.zeros(7), s, 0 * s, np.zeros(node.lam.numel()), u, p)
+    dynamics, rate, *_ = node.residual(*given)
+    rates = dict(zip(names, np.ravel(rate.full()), strict=True))
+    own = [rates[n] for n in sorted(names) if "/P" in n]
+    return np.append(np.ravel(dynamics.full()), own)
+
+
+def test_a_share_of_one_is_the_other_structure() -> None:
+    mixed = PLANNING.with_effects([by_default(ORIFICE)])
+    free = tuple(f"{ORIFICE}.{name}" for name in ("a", *FIGURES))
+    whole = forces(mixed, free, (1.0, *FIGURES.values()))
+    orifice = PLANNING.with_effects([OrificeChamber(**FIGURES)])
+    np.testing.assert_allclose(whole, forces(orifice), rtol=1e-9)
+    none = forces(mixed, free, (0.0, *FIGURES.values()))
+    np.testing.assert_allclose(none[:7], forces(PLANNING)[:7], rtol=1e-9)
+    assert np.abs(whole[:7] - none[:7]).max() > 1.0
+
+
+def test_only_first_order_chambers_can_be_replaced() -> None:
+    assert ORIFICE in structure_candidates(PLANNING)
+    assert structure_candidates(load_model("plant")) == {}
+
+
+def test_the_model_that_is_written_has_the_figures(tmp_path: Path) -> None:
+    values = {**FIGURES, "a": 0.98, "level": 1.02}
+    row = {"effect": ORIFICE, "parameters": {k: {"value": v} for k, v in values.items()}}
+    path = write_model(tmp_path / "model.yaml", "planning", [row], [ORIFICE])
+    assert load_spec(path).chambers == "orifice"
+    model = load_model(path)
+    chamber = model.effect("orifice_chamber")
+    assert chamber.value("a_fill") == pytest.approx(FIGURES["a_fill"])
+    usual = OrificeChamber().gauge
+    assert chamber.value("gauge") == pytest.approx([1.02 * g for g in usual], rel=1e-5)
+    assert "chamber" not in [i.effect.kind for i in model.instances]
+
+
+@pytest.mark.slow
+def test_orifice_chambers_are_named_on_robot_logs() -> None:
+    """The twin with physical chambers against the planning model; its rods have some damping."""
+    rng = np.random.default_rng(3)
+    robot, logs = figures.Robot().jittered(rng, 0.01), []
+    for i in range(3):
+        truth = run.simulate(hop(3 + i), [], robot, "orifice")
+        columns = measure.robot_log(truth, measure.Sensors(), (), rng)
+        time = columns.pop("time [s]")
+        logs.append(Trajectory(time, columns, {"kind": "robot", "name": f"hop{i}"}))
+    fitted, held = (robot_problem(some, PLANNING) for some in (logs[:2], logs[2:]))
+    answer = discover(fitted, held).answer
+    assert ORIFICE in answer.added, answer.sentence
+    assert answer.error_after < 1.3 < 5.0 < answer.error_before
