@@ -3,12 +3,9 @@
 `hound` is shipped: longer legs, more mass, legs called left and right, a 32 mm bore.
 """
 
+import kemba
 from pictures import save
 
-import kemba
-from kemba.config import shipped_configs
-
-tasks = [name for name in shipped_configs("tasks") if "hound" in name]
-jump = kemba.plan(tasks[0])
+jump = kemba.plan("jump.yaml", model="hound", height="0.55 m")
 print(jump.sentence)
 save(jump.figure())

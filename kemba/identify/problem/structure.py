@@ -44,9 +44,9 @@ class OrificeShare(OrificeChamber):
 
     off: ClassVar[dict[str, float]] = {"a": 0.0}
     publishes: ClassVar[tuple[str, ...]] = ()
-    carried_by: ClassVar[Mapping[str, str]] = {}
+    carried_by: ClassVar[dict[str, str]] = {}
     replaces: ClassVar[tuple[str, ...]] = ()
-    nominal: ClassVar[Mapping[str, Tolerance]] = {}
+    nominal: ClassVar[dict[str, Tolerance]] = {}
 
     @property
     def name(self) -> str:
