@@ -5,9 +5,9 @@
     python benchmarks/calibration.py --cases 10 --from 30
 
 Every case is a machine of its own (figures off by 1 %, its own disturbances and noise) with two
-bench logs. Where nothing is missing, the p-value of that must be uniform (Kolmogorov-Smirnov). Where
-one effect is missing, the 95 % interval of its size must hold the truth in 93 to 97 %. Records are
-added to benchmarks/program.json; benchmarks/program_page.py writes its page from them.
+bench logs. Where nothing is missing, the p-value of that must be uniform (Kolmogorov-Smirnov).
+Where one effect is missing, the 95 % interval of its size must hold the truth in 93 to 97 %.
+Records are added to benchmarks/program.json; benchmarks/program_page.py writes its page from them.
 """
 
 from __future__ import annotations

@@ -23,8 +23,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from program import load, put
-
 from kemba.config import load_yaml
 from kemba.sweep.table.summary import wilson
 
@@ -142,6 +140,8 @@ def chosen(part: str, only: str) -> list[Mutant]:
 
 def _record(mutant: Mutant, outcome: str) -> None:
     """Keep an outcome in program.json; those of bugs that are no longer listed are dropped."""
+    from program import load, put  # beside this script, which tests import as well
+
     known = {str(m) for m in listed()}
     old = load().get("mutants", {}).get("all", {}).get("outcomes", {})
     outcomes = {name: said for name, said in {**old, str(mutant): outcome}.items() if name in known}

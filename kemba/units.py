@@ -207,3 +207,8 @@ def _called(value: object) -> str:
     """What a YAML author would call a value that is not a number."""
     names = {bool: "true/false", list: "a list", dict: "a group of keys", type(None): "nothing"}
     return names.get(type(value), f"'{value}'")
+
+
+def short(value: float, digits: int = 2) -> str:
+    """A number for a sentence: `160`, where the format `.2g` has `1.6e+02`."""
+    return f"{float(f'{value:.{digits}g}'):.12g}"

@@ -13,6 +13,7 @@ from pydantic import BaseModel, ValidationError
 
 from kemba.errors import KembaError
 from kemba.quantity import Param, Quantity, convert, is_si, to_si
+from kemba.units import short
 
 FINITE = st.floats(-1e9, 1e9, allow_nan=False)
 SEGMENT = st.text("abcdefghijklmnopqrstuvwxyzXYZ_0123456789", min_size=1, max_size=8)
@@ -138,3 +139,14 @@ def test_bare_numbers_cost_no_import() -> None:
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
     assert done.stdout.strip() == "[]", done.stderr
+
+
+def test_numbers_in_sentences_have_no_exponent() -> None:
+    assert [short(v) for v in (160.4, 2.62, 0.0312, 36.0, 1e3)] == [
+        "160",
+        "2.6",
+        "0.031",
+        "36",
+        "1000",
+    ]
+    assert short(1.2345, 3) == "1.23"

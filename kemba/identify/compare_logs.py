@@ -30,15 +30,20 @@ def compare_logs(
     CSV) was missed. Raises KembaError; BadData where the logs cannot be right."""
     columns = load_map(column_map) if column_map else None
     read = read_logs(logs, columns)
-    built = model_of(read, model)
-    check_all(read, built)
-    problem, _ = admitted(read, built)
-    problem = with_learnt_colour(problem, free_starts(problem))
-    found = compare(problem, model, [str(log.meta["path"]) for log in read])
+    found, problem = compare_read(read, model)
     if run is not None:
         plan = Trajectory.read(Path(run) / "trajectory.csv" if Path(run).is_dir() else run)
         found = replace(found, plan=missed(plan, read))
     return found, problem
+
+
+def compare_read(read: Sequence[Trajectory], model: str) -> tuple[Comparison, Problem]:
+    """Where `model` fails on logs that were read. Raises as `compare_logs` does."""
+    built = model_of(read, model)
+    check_all(read, built)
+    problem, _ = admitted(read, built)
+    problem = with_learnt_colour(problem, free_starts(problem))
+    return compare(problem, model, [str(log.meta["path"]) for log in read]), problem
 
 
 def missed(plan: Trajectory, logs: Sequence[Trajectory]) -> Mapping[str, float]:

@@ -63,10 +63,12 @@ def discover(
 def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> Discovery:
     """What the finished `search` with its `best` hypothesis allows to say."""
     search.say("asking whether nothing would look like this")
-    test = null_test(search)
-    best, p_value, dismissed = _believed(search, best, test)
+    test, likeliest = null_test(search), best
+    best, p_value, dismissed = _believed(search, likeliest, test)
     holdout = holdout.heard_as(search.problem) if holdout else None
-    formula = look(search, best)
+    # what is too small to be reported still explains: a formula must do better than with it
+    slight = best and material(search, likeliest) == best
+    formula = look(search, likeliest if slight else best)
     drift = drifting(search, best)
     if drift is not None and formula is not None and drift.nats > formula.gain:
         formula = None

@@ -12,6 +12,7 @@ from kemba.identify.compare.hints import lacking
 from kemba.identify.doubt.unexplained import UnexplainedSettings
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
+from kemba.units import short
 
 BENCH = "run this cylinder alone on a rig: slow strokes, fast strokes, and the rod locked"
 NEXT = {  # by the end of a channel's name
@@ -51,7 +52,7 @@ def rest_of(search: Search, best: Hypothesis, unsure: Collection[str]) -> Rest:
     profiles = force_profiles(problem, problem.residual(theta))
     law = [hint.text for hint in lacking(profiles)]
     bins = sorted(conditions(problem, theta), key=lambda b: -b.ratio)
-    worst = [f"{place_of(b)} ({b.ratio:.2g} times the noise)" for b in bins if b.significant][:1]
+    worst = [f"{place_of(b)} ({short(b.ratio)} times the noise)" for b in bins if b.significant][:1]
     channel = profiles[0].channel if law else bins[0].channel if worst else ""
     advice = _advice(channel)
     if unsure:

@@ -2,106 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from itertools import permutations
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
-from scipy.linalg import expm
 
 from kemba.model import Model
-from kemba.ocp.phases.modes import HELD, OPEN
 from kemba.plant.execution.controller import PERIOD, condition_of, read_controller
-from kemba.plant.simulation.commands import JointControl, Profile
+from kemba.plant.simulation.commands import JointControl
 from kemba.plant.simulation.inputs import among, merged
 from kemba.plant.simulation.record import Impact as Hit
 from kemba.plant.simulation.simulate import simulate_one
 from kemba.plant.simulation.valves import delayed
-from kemba.policy.modes import Array, Hybrid, Point
+from kemba.policy.builder import Builder, switches
+from kemba.policy.events import Course
+from kemba.policy.modes import Array, Hybrid
+from kemba.policy.settings import CourseSettings
 from kemba.trajectory import Trajectory
-
-CLOSING = 1e-6  # m/s; a gap that closes more slowly touches without an impact
-SAME = 1e-8  # s; switches nearer than this are one
-BESIDE = 2e-5  # s; states just before and after an impact are read this far from it
-FINER = 20  # rows within a step in which a foot leaves the ground or begins to slide
-PASSES = 3  # simulations in which the marks beside impacts find their place
-
-
-@dataclass(frozen=True)
-class Flow:
-    """A stretch of time in one mode: when it begins and ends [s], its map of (x, torques)."""
-
-    begin: float
-    end: float
-    map: Array  # (n + m, n + m)
-
-
-@dataclass(frozen=True)
-class Tick:
-    """The controller acts: torques = hold (m, n) x + what a policy adds. `tick`: its row."""
-
-    time: float
-    tick: int
-    hold: Array
-
-
-@dataclass(frozen=True)
-class Edge:
-    """A valve switches: `late` (n,) is the change of x per second by which it comes later.
-
-    `valve`: its column; `index`: which of its edges; `sent`: the tick at which it is sent.
-    """
-
-    time: float
-    valve: str
-    index: int
-    sent: int
-    late: Array
-
-
-@dataclass(frozen=True)
-class Impact:
-    """A touchdown or a stop: the saltation matrix (n, n)."""
-
-    time: float
-    saltation: Array
-
-
-Event = Flow | Tick | Edge | Impact
-
-
-@dataclass(frozen=True)
-class Course:
-    """An executed table and its events in order; `motion` has a row at every tick."""
-
-    hybrid: Hybrid
-    table: Trajectory
-    motion: Trajectory
-    states: Array  # (ticks, n)
-    events: tuple[Event, ...]
-    joints: tuple[str, ...]
-
-    def map(self, begin: float, end: float) -> Array:
-        """The slope (n, n) of the state at `end` [s] by the state at `begin` [s], no policy."""
-        n, m = self.hybrid.size, len(self.joints)
-        found = np.eye(n + m)
-        for event in self.events:
-            time = event.begin if isinstance(event, Flow) else event.time
-            if begin - 1e-9 <= time < end - 1e-9:
-                found = plain(event, n, m) @ found
-        return found[:n, :n]
-
-
-def plain(event: Event, n: int, m: int) -> Array:
-    """The map of (x, torques) through an event without a policy."""
-    whole = np.eye(n + m)
-    if isinstance(event, Flow):
-        return event.map
-    if isinstance(event, Tick):
-        whole[n:, :n], whole[n:, n:] = event.hold, 0.0
-    elif isinstance(event, Impact):
-        whole[:n, :n] = event.saltation
-    return whole
 
 
 def course_of(model: Model, table: Trajectory, extra: float = 0.0) -> Course:
@@ -110,20 +27,21 @@ def course_of(model: Model, table: Trajectory, extra: float = 0.0) -> Course:
     Raises KembaError where the table cannot be simulated, ValueError for a model with other pairs
     than rigid contacts and stops.
     """
-    table, hybrid = read_controller(table), Hybrid(model)
+    table, hybrid, settings = read_controller(table), Hybrid(model), CourseSettings.current()
+    beside_s = settings.beside
     condition, begin = condition_of(table, model, extra=extra)
     commands, last = condition.commands, condition.duration
     assert commands is not None and isinstance(commands.feedback, JointControl)
     acting = delayed(model, dict(commands.profiles))
-    switches = np.concatenate([_switches(p) for p in acting.values()])
+    switched = np.concatenate([switches(p) for p in acting.values()])
     clock = np.arange(round((last - 1e-9) / PERIOD) + 1) * PERIOD
     done, finer = simulate_one(condition), np.zeros(0)
-    for number in range(PASSES):  # marks near an impact move it by some microseconds
+    for number in range(settings.passes):  # marks near an impact move it by some microseconds
         hits = np.array([time[:2] for time in _clusters(done.impacts, last)]).reshape(-1, 2)
-        beside = np.concatenate([hits[:, 0] - BESIDE, hits[:, 1] + BESIDE])
-        marks = merged(clock, switches[switches > 0.0], beside, finer)
+        beside = np.concatenate([hits[:, 0] - beside_s, hits[:, 1] + beside_s])
+        marks = merged(clock, switched[switched > 0.0], beside, finer)
         inside = (
-            (marks[:, None] > hits[:, 0] - BESIDE) & (marks[:, None] < hits[:, 1] + BESIDE)
+            (marks[:, None] > hits[:, 0] - beside_s) & (marks[:, None] < hits[:, 1] + beside_s)
         ).any(1)
         marks = marks[~inside]
         done = simulate_one(replace(condition, sample=marks[marks < last - 1e-9]))
@@ -138,168 +56,24 @@ def course_of(model: Model, table: Trajectory, extra: float = 0.0) -> Course:
     return Course(hybrid, table, shown_motion, builder.x[rows], events, commands.feedback.joints)
 
 
-def _switches(profile: Profile) -> Array:
-    """When [s] a valve that is closed at first opens, closes, opens ..."""
-    changes = np.diff(np.round(profile.values), prepend=0.0) != 0.0
-    return np.asarray(profile.times[changes])
-
-
 def _changes(hybrid: Hybrid, motion: Trajectory) -> Array:
     """Times [s] within every step in which a contact changes, so that the change is found."""
     modes = [hybrid.modes(motion, i) for i in range(len(motion))]
     steps = [i for i in range(len(modes) - 1) if modes[i] != modes[i + 1]]
-    inner = [np.linspace(motion.time[i], motion.time[i + 1], FINER + 1)[1:-1] for i in steps]
+    inner = [
+        np.linspace(motion.time[i], motion.time[i + 1], CourseSettings.current().finer + 1)[1:-1]
+        for i in steps
+    ]
     return np.concatenate([np.zeros(0), *inner])
 
 
 def _clusters(impacts: Sequence[Hit], last: float) -> list[tuple[float, float, set[str]]]:
     """Impacts that happen at once as one: from when to when [s], and at which pairs."""
-    found: list[tuple[float, float, set[str]]] = []
-    for impact in (i for i in impacts if BESIDE < i.time < last - BESIDE):
-        if found and impact.time - found[-1][1] < 4 * BESIDE:
+    beside, found = CourseSettings.current().beside, list[tuple[float, float, set[str]]]()
+    for impact in (i for i in impacts if beside < i.time < last - beside):
+        if found and impact.time - found[-1][1] < 4 * beside:
             begin, _, labels = found.pop()
             found.append((begin, impact.time, labels | set(impact.labels)))
         else:
             found.append((impact.time, impact.time, set(impact.labels)))
     return found
-
-
-class Builder:
-    """The events between the rows of a simulation, whose clock begins at `begin` [s]."""
-
-    def __init__(
-        self,
-        hybrid: Hybrid,
-        motion: Trajectory,
-        sent: Mapping[str, Profile],
-        acting: Mapping[str, Profile],
-        control: JointControl,
-        begin: float,
-    ) -> None:
-        self.hybrid, self.motion, self.begin = hybrid, motion, begin
-        self.sent, self.acting, self.control = sent, acting, control
-        model = hybrid.model
-        names = [q.name for q in (*model.mechanism.coordinates, *model.mechanism.velocities)]
-        self.names = [*names, *(q.name for q in model.states.values())]
-        self.inputs = [q.name for q in model.inputs.values()]
-        self.x = np.column_stack([motion[name] for name in self.names])
-        self.torques = [self.inputs.index(f"{joint}/tau") for joint in control.joints]
-
-    def events(
-        self, clock: np.ndarray, impacts: Sequence[tuple[float, float, set[str]]]
-    ) -> Iterator[Event]:
-        """All events in order of time, by the clock of the plan."""
-        time, ticks = self.motion.time, among(self.motion.time, clock)
-        hits = {int(np.searchsorted(time, t)) - 1: labels for t, _, labels in impacts}
-        yield Impact(float(time[0]) + self.begin, self._start())
-        for i in range(len(time) - 1):
-            now = float(time[i]) + self.begin
-            yield from self._edges(i, now)
-            if ticks[i]:
-                yield Tick(now, round(now / PERIOD), self._hold(i))
-            if i in hits:
-                yield Impact(now, self._saltation(i, hits[i]))
-            yield Flow(now, float(time[i + 1]) + self.begin, self._flow(i, i in hits))
-
-    def point(self, i: int, valves_at: float, modes_of: int | None = None) -> Point:
-        """State, inputs and modes at row i, the valves as they act at a time [s]."""
-        u = np.array([self.motion[name][i] for name in self.inputs])
-        for name, profile in self.acting.items():
-            u[self.inputs.index(name)] = profile(valves_at)
-        return Point(
-            self.x[i], u, self.hybrid.modes(self.motion, i if modes_of is None else modes_of)
-        )
-
-    def _start(self) -> Array:
-        """What touches at the start stops at once: the slope of that."""
-        first, n = self.point(0, 0.0), self.hybrid.n
-        reset = np.eye(self.hybrid.size)
-        reset[n : 2 * n, : 2 * n] = self.hybrid.jump(first.x, first.modes)[1]
-        return reset
-
-    def _flow(self, i: int, after: bool) -> Array:
-        """The map of (x, torques) from row i to the next; `after`: in the mode of the latter."""
-        n, m = self.hybrid.size, len(self.torques)
-        middle = float(self.motion.time[i] + self.motion.time[i + 1]) / 2
-        slope = np.zeros((n + m, n + m))
-        here = self.point(i, middle, i + int(after))
-        there = replace(here, x=self.x[i + 1])
-        for at in (there, there) if after else (here, there):
-            _, A, B = self.hybrid.flow(at)
-            slope[:n, :n] += A / 2
-            slope[:n, n:] += B[:, self.torques] / 2
-        return np.asarray(expm(slope * (self.motion.time[i + 1] - self.motion.time[i])))
-
-    def _hold(self, i: int) -> Array:
-        """The slope of the hip torques by x (eq. 10); zero where a motor gives all it can."""
-        hold = np.zeros((len(self.torques), self.hybrid.size))
-        wanted = self.control.at(self.motion.time[i : i + 1])[0]
-        for j, joint in enumerate(self.control.joints):
-            q, w = (self.names.index(f"{joint}/{s}") for s in ("q", "w"))
-            q_d, w_d, ahead = wanted[j]
-            K_p, K_d, x = self.control.K_p, self.control.K_d, self.x[i]
-            asked = K_p * (q_d - x[q]) + K_d * (w_d - x[w])
-            if abs(asked + ahead - self.motion[f"{joint}/tau"][i]) < 1e-6:
-                hold[j, [q, w]] = -K_p, -K_d
-        return hold
-
-    def _edges(self, i: int, now: float) -> Iterator[Edge]:
-        """The valves that switch at row i."""
-        time = float(self.motion.time[i])
-        for name, profile in self.acting.items():
-            acts, sent = _switches(profile), _switches(self.sent[name])
-            at = np.flatnonzero(np.abs(acts - time) < SAME)
-            if not len(at) or len(acts) != len(sent):  # pulses that merged cannot be told apart
-                continue
-            modes_of, k = max(i - 1, 0), int(at[0])
-            after = self.point(i, time + 2 * SAME, modes_of)
-            before = replace(after, u=after.u.copy())
-            before.u[self.inputs.index(name)] = profile(time - 2 * SAME)
-            late = self.hybrid.flow(before)[0] - self.hybrid.flow(after)[0]
-            yield Edge(now, name, k, round((float(sent[k]) + self.begin) / PERIOD), late)
-
-    def _saltation(self, i: int, labels: set[str]) -> Array:
-        """The slope (n, n) of the state after an impact, between rows i and i + 1.
-
-        Of several at once each order is taken, and the mean of all.
-        """
-        before, after = self.point(i, self.motion.time[i]), self.point(i + 1, self.motion.time[i])
-        _, J = self.hybrid.gaps(before.x)
-        n = self.hybrid.n
-        rates = J @ before.x[n : 2 * n]
-        new = [
-            k for k, c in enumerate(self.hybrid.constraints)
-            if c.label in labels and before.modes[k] == OPEN and rates[k] < -CLOSING
-        ]  # fmt: skip
-        orders = list(permutations(new)) if 1 < len(new) <= 3 else [tuple(new)]
-        return np.asarray(
-            np.mean([self._in_order(before, after, order, labels) for order in orders], axis=0)
-        )
-
-    def _in_order(
-        self, before: Point, after: Point, order: Sequence[int], labels: set[str]
-    ) -> Array:
-        """The saltation of impacts one after the other, at one instant."""
-        n, size = self.hybrid.n, self.hybrid.size
-        found, here = np.eye(size), before
-        for position, k in enumerate(order):
-            _, J = self.hybrid.gaps(here.x)
-            guard = np.r_[J[k], np.zeros(size - n)]
-            modes = [
-                m if a != OPEN or c.label in labels else OPEN  # what opens bears no impulse
-                for m, a, c in zip(here.modes, after.modes, self.hybrid.constraints, strict=True)
-            ]
-            modes[k] = HELD
-            modes = list(self.hybrid.landing(here.x, tuple(modes), k))
-            v, slope = self.hybrid.jump(here.x, tuple(modes))
-            reset = np.eye(size)
-            reset[n : 2 * n, : 2 * n] = slope
-            x = np.concatenate([here.x[:n], v, here.x[2 * n :]])
-            last = position == len(order) - 1
-            there = Point(x, here.u, after.modes if last else tuple(modes))
-            rate = float(guard @ self.hybrid.flow(here)[0])
-            if rate < -CLOSING:
-                jump = self.hybrid.flow(there)[0] - reset @ self.hybrid.flow(here)[0]
-                reset = reset + np.outer(jump, guard) / rate
-            found, here = reset @ found, there
-        return found

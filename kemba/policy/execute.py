@@ -17,11 +17,10 @@ from kemba.plant.simulation.commands import Commands
 from kemba.plant.simulation.simulate import simulate_one
 from kemba.policy.modes import Array
 from kemba.policy.player import Policy
+from kemba.policy.settings import PolicySettings
 from kemba.policy.write import FILE, measured, write_policy
 from kemba.runs import load_run
 from kemba.trajectory import Trajectory
-
-FINE = 4  # actuations a tick: valves act so many times finer than they are commanded
 
 
 @dataclass
@@ -43,7 +42,8 @@ class Driver:
         self.commands: list[Array] = []
 
     def __call__(self, time: float, sense: Mapping[str, float]) -> dict[str, float]:
-        while self.count % FINE == 0 and self.policy.tick <= self.wait + self.count // FINE:
+        fine = PolicySettings.current().fine
+        while self.count % fine == 0 and self.policy.tick <= self.wait + self.count // fine:
             self._tick(time, sense)
         self.count += 1
         joints = [str(j) for j in self.policy.data["joints"]]
@@ -95,7 +95,7 @@ def execute_policy(
     rng = np.random.default_rng(seed)
     held = round((begin - table.time[0]) / PERIOD)
     driver = Driver(policy, model, _knees(model), usual, rng, scatter, held)
-    commands = Commands({}, driver, PERIOD / FINE)
+    commands = Commands({}, driver, PERIOD / PolicySettings.current().fine)
     done = simulate_one(replace(condition, commands=commands))
     return Execution(later(done, begin), _sent(table, policy, driver.commands))
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kemba.policy.course import Course, Edge, Event, Flow, Impact, Tick, plain
+from kemba.policy.events import Course, Edge, Event, Flow, Impact, Tick, plain
 from kemba.policy.modes import Array
 from kemba.policy.settings import PolicySettings
 

@@ -26,3 +26,25 @@ class PolicySettings(Settings):
         10, "ticks", "before and after touchdown in which no torque is added: feet that touch a "
         "little sooner or later have quite other velocities", CHOSEN,
     )  # fmt: skip
+    fine: int = setting(
+        4, "1", "instants a tick at which valves of the simulated robot may act", CHOSEN
+    )
+
+
+class CourseSettings(Settings):
+    """How the events along an executed table are found."""
+
+    closing: float = setting(
+        1e-6, "m.s-1", "a gap that closes more slowly touches without an impact", CHOSEN
+    )
+    same: float = setting(1e-8, "s", "switches nearer than this are one", CHOSEN)
+    beside: float = setting(
+        2e-5, "s", "states before and after an impact are read this far from it",
+        "derived: other samples move an impact by up to 10 us",
+    )  # fmt: skip
+    finer: int = setting(
+        20, "1", "rows within a step in which a foot leaves the ground or begins to slide", CHOSEN
+    )
+    passes: int = setting(
+        3, "1", "simulations in which the samples beside impacts find their place", CHOSEN
+    )

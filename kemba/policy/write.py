@@ -10,7 +10,8 @@ import numpy as np
 from kemba.errors import KembaError
 from kemba.model import Model
 from kemba.plant.execution.controller import PERIOD, Gains, hip_control, read_controller
-from kemba.policy.course import Course, course_of
+from kemba.policy.course import course_of
+from kemba.policy.events import Course
 from kemba.policy.gains import gains_of
 from kemba.policy.modes import Array
 from kemba.policy.settings import PolicySettings

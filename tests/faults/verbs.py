@@ -16,8 +16,9 @@ from kemba.config import load_yaml
 from kemba.errors import KembaError
 from kemba.trajectory import Trajectory
 
-# what differs between two runs of one command: times, and versions of nothing that counts
-VARIES = {"started", "finished", "command", "runtime_s", "solve_s", "solve_cpu_s", "build_s"}
+# what differs between two runs of one command: times
+VARIES = {"started", "finished", "command", "runtime_s", "build_s"}
+VARIES |= {"solve_s", "solve_cpu_s", "wall_s", "cpu_s"}
 SWEEP = """\
 name: small
 seed: 1

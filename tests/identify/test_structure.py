@@ -7,12 +7,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+pytest.importorskip("numba")
+
+from robot_logs import hop
+from twin import figures, measure, run
+
 from kemba.effects.pneumatics.orifice import OrificeChamber
 from kemba.identify.adopt import write_model
+from kemba.identify.discover import discover
 from kemba.identify.problem.candidates import by_default
 from kemba.identify.problem.structure import ORIFICE, structure_candidates
+from kemba.identify.robot.problem import robot_problem
 from kemba.model import Model, load_model
 from kemba.model.spec import load_spec
+from kemba.trajectory import Trajectory
 
 PLANNING = load_model("planning")
 FIGURES = {"a_fill": 4.2e-6, "a_vent": 3.5e-6, "V_e": 1.2e-5, "V_r": 1.6e-5, "n": 1.35}
@@ -60,3 +68,19 @@ def test_the_model_that_is_written_has_the_figures(tmp_path: Path) -> None:
     usual = OrificeChamber().gauge
     assert chamber.value("gauge") == pytest.approx([1.02 * g for g in usual], rel=1e-5)
     assert "chamber" not in [i.effect.kind for i in model.instances]
+
+
+@pytest.mark.slow
+def test_orifice_chambers_are_named_on_robot_logs() -> None:
+    """The twin with physical chambers against the planning model; its rods have some damping."""
+    rng = np.random.default_rng(3)
+    robot, logs = figures.Robot().jittered(rng, 0.01), []
+    for i in range(3):
+        truth = run.simulate(hop(3 + i), [], robot, "orifice")
+        columns = measure.robot_log(truth, measure.Sensors(), (), rng)
+        time = columns.pop("time [s]")
+        logs.append(Trajectory(time, columns, {"kind": "robot", "name": f"hop{i}"}))
+    fitted, held = (robot_problem(some, PLANNING) for some in (logs[:2], logs[2:]))
+    answer = discover(fitted, held).answer
+    assert ORIFICE in answer.added, answer.sentence
+    assert answer.error_after < 1.3 < 5.0 < answer.error_before

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from plain_task import plain_task
 from typer.testing import CliRunner
 
 from kemba.identify import workflow
@@ -35,7 +36,9 @@ def executed(folder: Path, machine: Path, logs: Path) -> list[float]:
 @pytest.fixture(scope="module")
 def planned(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("learn") / "run-0"
-    run("solve", "jump.yaml", "--set", "height=0.45 m", "--no-figure", "--out", folder)
+    task = plain_task(folder.parent)
+    change = ("--set", "height=0.45 m", "--set", "duration=0.7 s")
+    run("solve", task, *change, "--no-figure", "--out", folder)
     return folder
 
 

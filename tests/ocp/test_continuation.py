@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from plain_task import plain_task
 from typer.testing import CliRunner
 
 from kemba.effects.mechanics.friction import SealFriction
@@ -34,7 +35,7 @@ def solve(*words: str | Path) -> tuple[int, dict[str, object]]:
 @pytest.fixture(scope="module")
 def hop(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("earlier") / "run"
-    code, answer = solve("hop.yaml", *SIZE, "--out", folder)
+    code, answer = solve(plain_task(folder.parent), *SIZE, "--out", folder)
     assert code == 0, answer["sentence"]
     assert answer["continued"] is None
     return folder

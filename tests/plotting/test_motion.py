@@ -24,7 +24,7 @@ from kemba.plotting.robot.motion import stance_spans
 from kemba.trajectory import Trajectory
 
 LABELS = {
-    "body x, z [m]",
+    "body centre z, x [m]",
     "pitch θ [deg]",
     "hip q [deg]",
     "piston x [mm]",

@@ -12,8 +12,10 @@ from typer.testing import CliRunner
 
 from kemba.model import Model, load_model
 from kemba.plant import execute
+from kemba.plant.simulation.commands import Profile
 from kemba.policy import player
-from kemba.policy.course import Course, Impact, course_of
+from kemba.policy.course import course_of
+from kemba.policy.events import Course, Edge, Impact
 from kemba.policy.execute import execute_policy
 from kemba.policy.gains import gains_of
 from kemba.policy.player import Policy
@@ -88,18 +90,15 @@ def test_impacts_change_the_map(course: Course) -> None:
 def test_an_edge_that_comes_late_acts_as_in_the_plant(
     model: Model, table: Trajectory, course: Course
 ) -> None:
-    from kemba.plant.simulation.commands import Profile
-    from kemba.policy.course import Edge
-
     edge = next(e for e in course.events if isinstance(e, Edge) and e.valve.startswith("front"))
     n = len(states(model))
     predicted = course.map(edge.time, 0.09) @ edge.late
     ends = []
-    for shift in (5e-4, -5e-4):
+    for shift in (1e-4, -1e-4):
         profile = Profile(np.array([-1.0, 0.01 + shift, 0.1]), np.array([0.0, 1.0, 0.0]))
         done = execute(table, model, valves={"front/valve/extend": profile}).trajectory
         ends.append(np.array([done[name][90] for name in states(model)]))
-    difference = (ends[0] - ends[1]) / 1e-3
+    difference = (ends[0] - ends[1]) / 2e-4
     assert edge.sent == 10 and n == len(predicted)
     assert np.linalg.norm(predicted - difference) < 0.05 * np.linalg.norm(difference)
 

@@ -125,7 +125,7 @@ def test_every_format_holds_the_columns(run: Path, tmp_path: Path, ending: str) 
 
 def test_another_programs_columns_come_back(run: Path, tmp_path: Path) -> None:
     """Written through a map and read through it again, lag and units included."""
-    text = shipped_configs("logs")["authors.yaml"].read_text()
+    text = shipped_configs("maps")["authors.yaml"].read_text()
     text = text.replace("{source: tm_f}", "{source: tm_f, sign: -1, scale: 0.5, unit: N.mm}")
     text = text.replace("{source: r}", "{source: r, delay: 2.0e-3}")
     (tmp_path / "other.yaml").write_text(text)

@@ -236,3 +236,46 @@ def test_air_is_counted_from_what_the_chambers_hold() -> None:
     track = Track("log", "log", Source("log", Trajectory(time, columns)))
     wanted = 6.0 * 101325.0 * cylinder.tube / (287.0 * 293.0)
     assert air_drawn(track, "front", cylinder) == pytest.approx(wanted, rel=1e-6)
+
+
+def test_a_rig_has_its_page_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The paper's bench and a drive of the user's own, with every column they have."""
+    monkeypatch.chdir(tmp_path)
+    assert call("simulate", "random.yaml", "--noise", "--out", "bench").exit_code == 0
+    done = call("review", "bench")
+    assert done.exit_code == 0 and done.stdout == "bench/review.html\n", done.stderr
+    text = Path("bench/review.html").read_text(encoding="utf-8")
+    assert "Force of the piston rod" in text and "Motion in 3-D" not in text
+    Path("own.yaml").write_text(
+        "rig: {kind: drive, motion: linear, inertia: 95 kg}\neffects: []\n", encoding="utf-8"
+    )
+    drive_log(tmp_path / "axis.csv")
+    done = call("review", "axis.csv", "--model", "own.yaml")
+    assert done.exit_code == 0, done.stderr
+    assert "kemba-opt discover axis.csv --model own.yaml" in done.stderr
+    assert "axis/tau" in Path("review.html").read_text(encoding="utf-8")
+
+
+def drive_log(path: Path) -> None:
+    """95 kg on a drive, with friction that the model lacks."""
+    rng, step = np.random.default_rng(0), 0.002
+    time = np.arange(0.0, 3.0, step)
+    force = 150.0 * np.sin(2 * np.pi * time) + 60.0 * np.sin(9.0 * time)
+    place, speed = np.zeros(len(time)), 0.0
+    for i in range(1, len(time)):
+        speed += step * (force[i] - 40.0 * np.tanh(speed / 0.01)) / 95.0
+        place[i] = place[i - 1] + step * speed
+    noisy = place + rng.normal(0.0, 1e-5, len(time))
+    Trajectory(time, {"axis/q [m]": noisy, "axis/tau [N]": force}).write(path)
+
+
+def test_folders_are_taken_for_what_they_hold(jump: Path, tmp_path: Path) -> None:
+    (tmp_path / "answer").mkdir()
+    (tmp_path / "answer" / "answer.json").write_text(json.dumps(ANSWER))
+    out = tmp_path / "all.html"
+    done = call(
+        "review", str(jump), str(jump / "logs"), str(tmp_path / "answer"), "--out", str(out)
+    )
+    assert done.exit_code == 0, done.stderr
+    text = out.read_text(encoding="utf-8")
+    assert "2 logs" in text and "The robot reaches" in text and "lacks seal_friction" in text

@@ -51,7 +51,7 @@ def test_scenarios_of_the_shipped_file() -> None:
     assert supplies == {0.95, 0.975, 1.0, 1.025, 1.05}
     loads = [c.model.effect("payload").value("m") for c in cases]
     assert 0.0 <= min(loads) < 0.05 and 0.45 < max(loads) <= 0.5
-    assert {c.model.mechanism for c in cases} == {planning().mechanism}
+    assert all(c.model.mechanism is planning().mechanism for c in cases), "one machine code"
 
 
 def test_payload_comes_on_top_of_the_tasks(tmp_path: Path) -> None:

@@ -59,6 +59,8 @@ def compare(
 def _print(found: Comparison) -> None:
     from rich.table import Table
 
+    from kemba.units import short
+
     table = Table("channel", "RMS", "largest", "noise", "error / noise")
     for c in found.channels:
         numbers = (f"{x:.3g}" for x in (c.rmse, c.max, c.noise_sigma, c.ratio))
@@ -67,7 +69,7 @@ def _print(found: Comparison) -> None:
     for at in sorted((c for c in found.bins if c.significant), key=lambda c: c.q_value)[:SHOWN]:
         parts = (f"valves {at.mode}" * bool(at.mode), f"piston {at.region}" * bool(at.region))
         where = ", ".join((f"{at.channel} in {at.phase}", *filter(None, parts)))
-        typer.echo(f"  {where}: {at.ratio:.2g} times the noise (q = {at.q_value:.1g})")
+        typer.echo(f"  {where}: {short(at.ratio)} times the noise (q = {at.q_value:.1g})")
     for hint in found.hints[:SHOWN]:
         typer.echo(f"  {hint.text}")
     for peak in found.peaks:

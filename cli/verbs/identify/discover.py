@@ -64,6 +64,7 @@ def discover(
                 draw_discovery(found, folder)
         finally:  # also when the disk is full: it took minutes
             _tell(answer, folder, json, quiet)
+            say(f"see it: kemba-opt review {' '.join(map(str, logs))} --answer {folder}", quiet)
     if answer.verdict == "bad-data":
         raise typer.Exit(BAD_ANSWER)
 

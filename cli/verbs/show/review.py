@@ -13,7 +13,8 @@ from kemba_cli.failures import BAD_ANSWER
 
 def review(
     logs: Annotated[
-        list[Path] | None, typer.Argument(help="Logs (CSV) of one machine, any order.")
+        list[Path] | None,
+        typer.Argument(help="Logs of one machine, or folders of logs, a run, an answer."),
     ] = None,
     run: Annotated[Path | None, typer.Option(help="Run folder that was executed.")] = None,
     answer: Annotated[Path | None, typer.Option(help="Folder that discover wrote.")] = None,
@@ -45,7 +46,7 @@ def review(
     from kemba.report.review.page import review as write
     from kemba.runs import newest_logs
 
-    logs = list(logs or [])
+    logs, run, answer = _told_apart(logs or [], run, answer)
     if not logs and run is None and answer is None:
         run = newest(quiet, "certificate.json")
         logs = newest_logs(run)
@@ -71,3 +72,18 @@ def review(
         webbrowser.open(page.resolve().as_uri())
     if verdict.grade == "bad":
         raise typer.Exit(BAD_ANSWER)
+
+
+def _told_apart(
+    paths: list[Path], run: Path | None, answer: Path | None
+) -> tuple[list[Path], Path | None, Path | None]:
+    """Logs, run and answer: folders among the arguments are taken for what they hold."""
+    logs: list[Path] = []
+    for path in paths:
+        if (path / "manifest.json").is_file() and run is None:
+            run = path
+        elif (path / "answer.json").is_file() and answer is None:
+            answer = path
+        else:
+            logs += sorted(path.glob("*.csv")) if path.is_dir() else [path]
+    return logs, run, answer

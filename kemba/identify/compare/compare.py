@@ -17,6 +17,7 @@ from kemba.identify.compare.tolerance import Tolerant, slopes, within_tolerance
 from kemba.identify.evidence.windows import Windows, aggregation_windows, free_starts, rms
 from kemba.identify.problem.problem import Array, MissingForce, Problem, Rows, Texts, Theta
 from kemba.settings import BY_HAND, Settings, setting
+from kemba.units import short
 
 
 class CompareSettings(Settings):
@@ -172,17 +173,17 @@ def _first(hints: Sequence[Hint], kind: str) -> Sequence[Hint]:
 
 def phrase(found: Comparison) -> str:
     """The answer in plain words."""
-    ratio = f"{found.noise_ratio:.2g} times the noise"
+    ratio = f"{short(found.noise_ratio)} times the noise"
     bad = sorted((c for c in found.bins if c.significant), key=lambda c: -c.ratio)
     if found.good:
         return f"The model explains the logs to within the noise: its error is {ratio}."
     if not bad:
         return f"The model's error is {ratio}; no single condition stands out."
-    worst = f"worst: {place_of(bad[0])} ({bad[0].ratio:.2g} times)"
+    worst = f"worst: {place_of(bad[0])} ({short(bad[0].ratio)} times)"
     if found.tolerable:
         return (
             f"The nominal model errs by {ratio}; {worst}; but parameters within their usual "
-            f"tolerance would explain the logs ({found.tolerant_ratio:.2g} times)."
+            f"tolerance would explain the logs ({short(found.tolerant_ratio)} times)."
         )
     grade = (
         "nearly explains"

@@ -12,6 +12,7 @@ import numpy as np
 
 from kemba.identify.problem.problem import Array, Flags, ForceChannel, Problem
 from kemba.settings import BY_HAND, Settings, setting
+from kemba.units import short
 
 
 class ForceProfileSettings(Settings):
@@ -98,7 +99,7 @@ class ForceProfile:
             force = f"{self.constant:+.2g} {self.unit}"
             return f"a constant force on the {self.channel} is missing ({force})"
         going = "comes" if what.startswith("after ") else "goes with"
-        size = f"up to {self.largest:.2g} {self.unit}"
+        size = f"up to {short(self.largest)} {self.unit}"
         return f"a force on the {self.channel} is missing that {going} {what} ({size})"
 
 

@@ -142,6 +142,17 @@ def standing_lengths(
     return {n: float(d) for n, d in zip(sizes, x, strict=False) if abs(d) > 0.01 * sizes[n]}
 
 
+def remarks(lengths: Mapping[str, float]) -> list[str]:
+    """In words, the lengths [m] at which feet stand."""
+    if not lengths:
+        return []
+    parts = (
+        f"{name.removeprefix(GEOMETRY).removesuffix('.d')} is {1e3 * d:+.1f} mm off"
+        for name, d in lengths.items()
+    )
+    return [f"feet stand on level ground if {' and '.join(parts)}; contacts were read with that"]
+
+
 def _only(
     standing: Standing, free: Sequence[int], x: Array, width: Array, rows: Flags
 ) -> tuple[Array, float, Flags]:

@@ -33,7 +33,7 @@ from kemba.identify.robot.dynamics.reference import first_reference
 from kemba.identify.robot.dynamics.settings import ForceDensity
 from kemba.identify.robot.force_channels import robot_force_channels
 from kemba.identify.robot.formulas import formula_columns
-from kemba.identify.robot.geometry import GEOMETRY, standing_lengths
+from kemba.identify.robot.geometry import GEOMETRY, remarks, standing_lengths
 from kemba.identify.robot.labels import describe
 from kemba.identify.robot.missing import robot_missing
 from kemba.identify.robot.motion.batch import Batch
@@ -228,7 +228,8 @@ class RobotProblem(Problem):
         return robot_force_channels(self.state)
 
     def validate(self) -> list[str]:
-        """No remarks. Raises BadData where a log contradicts itself or any model."""
+        """Which lengths make the feet stand, where they are not the model's. Raises BadData where
+        a log contradicts itself or any model."""
         faults = list(
             contradictions(
                 self.state, self.rows(), self.residual(self.lengths), self._sensor_columns
@@ -236,7 +237,7 @@ class RobotProblem(Problem):
         )
         if faults:
             raise BadData(faults)
-        return []
+        return remarks(self.lengths)
 
     def _sensor_columns(self) -> Array:
         """Columns (n, k) of every sensor fault and every length, per size."""

@@ -18,7 +18,7 @@ from kemba.plotting.source import Source
 from kemba.plotting.style import INK, WIDTH, colour, paper_figure, paper_style
 
 BODY = (
-    Panel("body x, z [m]", (Trace("body/z", "z"), Trace("body/x", "x")), least=0.2),
+    Panel("body centre z, x [m]", (Trace("body/z", "z"), Trace("body/x", "x")), least=0.2),
     Panel("pitch θ [deg]", (Trace("body/pitch"),), DEGREES, least=4.0),
 )
 LEG = (

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kemba.plant.execution.replay import LandingSettings, peak
-from kemba.plotting import Machine
+from kemba.plotting import Machine, Source
 from kemba.plotting.source import Mask
 from kemba.report.review.tracks import Track
 from kemba.settings import CHOSEN, Settings, setting
@@ -59,15 +59,15 @@ def events_of(track: Track, machine: Machine) -> Events | None:
         return None
     known = np.isfinite(t["body/z"])
     time, z = peak(t.time[known], _calm(t.time[known], t["body/z"][known]))
-    flights = {leg: _flight(t, machine.stance(t, leg), time) for leg in machine.mechanism.legs}
+    legs = machine.mechanism.legs
+    flights = {leg: _flight(track.source, machine.stance(t, leg), time) for leg in legs}
     return Events(time, z, _feet(t, machine), flights, _fault(t, z))
 
 
-def _flight(t: Trajectory, stands: Mask, apex: float) -> Flight:
+def _flight(source: Source, stands: Mask, apex: float) -> Flight:
     """The contacts around the apex; one that is shorter than a touchdown grazes."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], stands, [False]]).astype(int)))
-    spans = [(t.time[a], t.time[min(b, len(t) - 1)]) for a, b in edges.reshape(-1, 2)]
-    ends = float(t.time[0]), float(t.time[-1])
+    spans, time = source.spans(stands), source.trajectory.time
+    ends = float(time[0]), float(time[-1])
     lasts = LandingSettings.current().lasts
     firm = [(a, b) for a, b in spans if b - a >= lasts or a <= ends[0] or b >= ends[1]]
     if any(a <= apex <= b for a, b in firm):

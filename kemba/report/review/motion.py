@@ -83,8 +83,15 @@ def leg_charts(book: Book, machine: Machine, listed: Sequence[Shown], valves: bo
 
 
 def rig_charts(book: Book) -> str:
-    """The one piston of a bench rig."""
-    figures = [book.add(*_pair(book, q, q.name, q.title, ())) for q in RIG]
+    """All columns of a rig, whatever it is; valves as bars."""
+    named = dict.fromkeys(f"{n} [{t.t.unit(n)}]" for t in book.tracks for n in t.t.names)
+    known = {q.name: q for q in RIG}
+    figures = []
+    for header in named:
+        name, _, unit = header.rstrip("]").partition(" [")
+        if "valve/" not in name:
+            q = known.get(name, Shown(name, name, unit, error=unit))
+            figures.append(book.add(*_pair(book, q, q.name, q.title, ())))
     figures.append(book.add(*valve_chart(book, "", ())))
     return f'<div class="grid">{"".join(figures)}</div>'
 

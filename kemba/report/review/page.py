@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,7 +14,7 @@ from kemba.folders import place_for
 from kemba.identify.logs.gate import BadData
 from kemba.identify.logs.reading import read_logs
 from kemba.logs import load_map
-from kemba.model import Model, build_model, load_spec
+from kemba.model import build_model, load_spec
 from kemba.plotting import Machine, load_machine
 from kemba.quantity import to_si
 from kemba.report.review.charts import Book
@@ -58,9 +59,9 @@ class Material:
     fault: BadData | None = None
 
     @property
-    def bench(self) -> bool:
-        """Whether the logs are those of a rig."""
-        return bool(self.logs) and self.logs[0].meta["kind"] == "bench"
+    def rig(self) -> bool:
+        """Whether the logs are those of a rig, the paper's or one of the user's own."""
+        return bool(self.logs) and self.logs[0].meta["kind"] != "robot"
 
 
 def review(
@@ -139,15 +140,15 @@ def gather_material(
 
 def page_of(given: Material) -> tuple[str, str, Verdict]:
     """Title, body and verdict of the page."""
-    tracks = gather(given.run, given.logs)
-    machine = load_machine(given.model, given.supply)
-    events = [None if given.bench else events_of(track, machine) for track in tracks]
+    run = None if given.rig else given.run
+    tracks = gather(run, given.logs)
+    machine = None if given.rig else load_machine(given.model, given.supply)
+    events = [events_of(track, machine) if machine else None for track in tracks]
     verdict = _verdict(given, tracks, events)
     parts = [verdict.html()]
     if tracks:
         book = Book(grid_of(tracks), tracks, marks_of(events))
-        model = build_model(load_spec(given.model), supply=given.supply)
-        motion = _rig_parts(book) if given.bench else _robot_parts(given, book, machine, model)
+        motion = _robot_parts(given, book, machine) if machine else _rig_parts(book)
         parts += [section("Events", event_table(tracks, events)), *motion]
         parts.append(_errors(given, book))
     parts.append(_found(given))
@@ -160,7 +161,8 @@ def page_of(given: Material) -> tuple[str, str, Verdict]:
     return _title(given), "\n".join(part for part in parts if part), verdict
 
 
-def _robot_parts(given: Material, book: Book, machine: Machine, model: Model) -> list[str]:
+def _robot_parts(given: Material, book: Book, machine: Machine) -> list[str]:
+    model = build_model(load_spec(given.model), supply=given.supply)
     certificate = given.run.certificate if given.run else {}
     how = (
         '<p class="soft screen">Dashed vertical lines: touchdowns. Grey: a foot stands in the '
@@ -218,8 +220,9 @@ def _found(given: Material) -> str:
 
 
 def _verdict(given: Material, tracks: Sequence[Track], events: Sequence[Events | None]) -> Verdict:
+    own = "" if given.model == PLANNING else f" --model {shlex.quote(given.model)}"
     words = {
-        "logs": names_of([str(log.meta["path"]) for log in given.logs]),
+        "logs": names_of([str(log.meta["path"]) for log in given.logs]) + own,
         "answer": str(given.answer_folder),
         "task": str(given.run.task) if given.run else "jump.yaml",
     }

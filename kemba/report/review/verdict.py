@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 from kemba.identify.compare.compare import Comparison
 from kemba.report.review.events import Events
+from kemba.units import short
 
 Facts = Mapping[str, Any]
 Grade = Literal["good", "fair", "bad"]
@@ -103,7 +104,7 @@ def of_logs(
         return Verdict(said.grade, _joined([*parts, said.sentence]), said.next, said.command)
     if found is None:
         return Verdict("fair", _joined(parts), "compare it with a model:", "kemba-opt compare")
-    ratio = f"{found.noise_ratio:.2g} times the noise"
+    ratio = f"{short(found.noise_ratio)} times the noise"
     if found.good:
         return Verdict(
             "good",

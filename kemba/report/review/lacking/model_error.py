@@ -8,11 +8,10 @@ from html import escape
 
 import numpy as np
 
-from kemba.identify.compare.compare import Comparison, compare
-from kemba.identify.logs.gate import check_logs
-from kemba.identify.logs.reading import taken_on
+from kemba.identify.compare.compare import Comparison
+from kemba.identify.compare_logs import compare_read
 from kemba.identify.problem.types import MissingForce
-from kemba.identify.workflow import make_problem, model_of
+from kemba.identify.workflow import check_all, model_of
 from kemba.report.review.charts import Book, Chart, Line
 from kemba.report.review.html import meter, table
 from kemba.report.review.lacking.heat import heat_table
@@ -33,13 +32,9 @@ class ModelError:
 def model_error(logs: Sequence[Trajectory], model: str) -> ModelError:
     """Compare the first logs with a model. Raises KembaError; BadData for impossible logs."""
     chosen = list(logs[: PageSettings.current().compared])
-    built = model_of(chosen, model)
-    taken_on(logs, built.mechanism)
-    check_logs(logs)
-    problem = make_problem(chosen, built)
-    problem.validate()
-    names = tuple(str(log.meta["name"]) for log in chosen)
-    return ModelError(compare(problem, model, names), names)
+    check_all(logs, model_of(logs, model))
+    found, _ = compare_read(chosen, model)
+    return ModelError(found, tuple(str(log.meta["name"]) for log in chosen))
 
 
 def error_tables(error: ModelError, total: int) -> str:
