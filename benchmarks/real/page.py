@@ -1,6 +1,6 @@
 """Write docs/real-data.md: what the tool says of data that nobody here made.
 
-KEMBA_DATA=folder python -m benchmarks.real.page            about ten minutes
+KEMBA_DATA=folder python -m benchmarks.real.page            four minutes of CPU time
 python -m benchmarks.real.page --download                   into the cache of the user
 """
 
