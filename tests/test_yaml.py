@@ -107,6 +107,7 @@ LINKS = "".join(
         ),
         ("a" * 3_000_000, "is longer than 2000000 characters"),
         ("a: \ud800", "is not valid YAML"),
+        ("supply: 1\n---\nsupply: 2\n", "f.yaml:2:1: a second document begins here"),
     ],
 )
 def test_bombs_and_tricks_are_refused_at_once(text: str, sentence: str) -> None:
