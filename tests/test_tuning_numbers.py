@@ -57,6 +57,7 @@ CONSTANTS = {  # file -> names, why
     "effects/rigs/axis.py": ("PLATE", "tolerance of an effect's figures"),
     "effects/mechanics/geometry.py": ("SIZES", "sizes of an effect's parameters"),
     "mechanism/own_rigs.py": ("GRAVITY", "of the earth"),
+    "mechanism/knee.py": ("REACH", "rounding: the slope of an angle stays finite"),
     # formulas and formats
     "logs/formats/mcap.py": ("NS", "nanoseconds of a second"),
     "logs/draft/ranges.py": (
@@ -68,7 +69,6 @@ CONSTANTS = {  # file -> names, why
     "ocp/task/requirement.py": ("SCALES MOMENTS FLIGHT ROUND", "moments of a task; units"),
     "contract/cases.py": ("OWN_RIGS", "figures of example rigs"),
     # tuning numbers that are to become settings
-    "policy/course.py": ("CLOSING BESIDE PASSES", "how impacts are read"),
     "identify/robot/dynamics/physics.py": ("FOLDED", "how far a knee folds at most"),
     "learn/round.py": ("SUPPLY", "of a model that names none"),
     "identify/rigs/filtering.py": ("GAIN", "a Gaussian's cut"),

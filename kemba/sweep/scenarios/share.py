@@ -12,13 +12,11 @@ from kemba.errors import KembaError
 from kemba.model import Model
 from kemba.plant.execution.certificate import rest_after
 from kemba.plant.execution.controller import execute_many
-from kemba.plant.execution.replay import Replay, ends_standing
+from kemba.plant.execution.replay import LandingSettings, Replay, ends_standing
 from kemba.sweep.cases.execution import standing
 from kemba.sweep.scenarios.draw import Scenario
 from kemba.sweep.table.summary import wilson
 from kemba.trajectory import Trajectory
-
-UPRIGHT = 0.35  # rad; a flight that turns by more has failed
 
 
 @dataclass(frozen=True)
@@ -88,5 +86,5 @@ def _fault(found: Replay, lands: bool) -> str:
     """What goes wrong; "" where nothing does."""
     if lands:
         return found.fault or ""
-    turned = np.abs(found.trajectory["body/pitch"]).max() > UPRIGHT
+    turned = np.abs(found.trajectory["body/pitch"]).max() > LandingSettings.current().upright
     return "tips over" if turned else ""
