@@ -19,7 +19,7 @@ log = kemba.load_log(kemba.simulate(jump, noise=True).logs[0])
 table = {"Stamp [ms]": (1_790_000_000_000 + np.round(log.time * 1e3)).astype(np.int64)}
 scales = {"rad": ("deg", np.degrees(1)), "m": ("mm", 1e3), "1": ("V", 24), "N.m": ("Nm", 1)}
 for name in log.names:
-    unit, scale = scales[log.unit(name)]
+    unit, scale = scales.get(log.unit(name), (log.unit(name), 1))
     table[f"{name.replace('/', ' ')} [{unit}]"] = log[name] * scale
 table["Remark"] = "third attempt"
 pd.DataFrame(table).to_csv("their_log.csv", sep=";", decimal=",", index=False)

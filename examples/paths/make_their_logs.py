@@ -20,7 +20,7 @@ for number, height in enumerate(("0.42 m", "0.46 m", "0.5 m"), start=1):
     stamps = 1_790_000_000_000 + np.round(log.time * 1e3).astype(np.int64)
     table: dict[str, object] = {"Stamp [ms]": stamps, "State": "jump"}
     for name in log.names:
-        unit, scale = SCALES[log.unit(name)]
+        unit, scale = SCALES.get(log.unit(name), (log.unit(name), 1))
         table[f"{name.replace('/', ' ')} [{unit}]"] = log[name] * scale
     table["Remark"] = f"attempt {number}; none"
     frame = pd.DataFrame(table).iloc[::2]

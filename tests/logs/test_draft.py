@@ -79,6 +79,13 @@ def test_a_bench_log_in_volts_and_bar(tmp_path: Path) -> None:
     assert pressure == {"source": "p_ext", "unit": "bar", "offset": "1.01325 bar"}
 
 
+def test_a_valve_that_never_switches_has_the_threshold_of_the_others(tmp_path: Path) -> None:
+    log = foreign_files.robot_log()
+    still = log.with_columns({"rear/valve/retract [1]": np.zeros(len(log))})
+    draft = draft_map(foreign_files.german(still, tmp_path / "log.csv"), LEGS)
+    assert draft.columns["rear/valve/retract [1]"]["threshold"] == 12.0
+
+
 def test_a_drive_is_recognised(tmp_path: Path) -> None:
     t = np.arange(100) * 1e-3
     path = tmp_path / "drive.csv"

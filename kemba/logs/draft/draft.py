@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from kemba.errors import KembaError
 from kemba.logs.columns import ColumnMap
 from kemba.logs.draft import ranges
@@ -65,11 +67,22 @@ def draft_map(path: Path, legs: Sequence[str]) -> Draft:
         if target.header in pairs:
             name = pairs[target.header]
             columns[target.header] = _source(target, name, names.unit(name), rest[name])
+    _share_level(columns, pairs, rest)
     used = {*pairs.values(), *stamp.names}
     missing = tuple(t.header for t in targets if t.needed and t.header not in pairs)
     return Draft(
         kind, layout | _origin(stamp), columns, missing, tuple(n for n in raw if n not in used)
     )
+
+
+def _share_level(
+    columns: dict[str, dict[str, Any]], pairs: Mapping[str, str], values: Mapping[str, Array]
+) -> None:
+    """A valve that never switches in this log has the threshold of the others."""
+    level = next((s["threshold"] for s in columns.values() if "threshold" in s), None)
+    for header, name in pairs.items():
+        if "valve/" in header and level is not None and np.ptp(values[name]) == 0:
+            columns[header]["threshold"] = level
 
 
 def _origin(stamp: Stamp) -> Layout:
