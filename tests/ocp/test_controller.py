@@ -32,20 +32,21 @@ def switches(time: np.ndarray, values: np.ndarray) -> list[tuple[float, float]]:
 def test_one_row_a_millisecond(run: Solved) -> None:
     table, plan = run.run.controller, run.plan
     assert np.diff(table.time) == pytest.approx(0.001)
-    assert table.time[0] == 0.0
-    assert 0.0 <= table.time[-1] - LEAD - plan.time[-1] < 0.001
-    assert table.meta == {"kind": "controller", "lead": LEAD}
+    lead = max(LEAD, run.task.hold)
+    assert table.time[0] == -lead
+    assert 0.0 <= table.time[-1] - plan.time[-1] < 0.001
+    assert table.meta == {"kind": "controller", "lead": lead}
 
 
 def test_valves_are_sent_the_dead_time_early(run: Solved) -> None:
-    """What acts on (t[k-1], t[k]] stands at node k; it is sent 6 ms before t[k-1]. The table's
-    own time runs the lead ahead of the plan's, so a switch at plan time t stands in row t."""
+    """What acts on (t[k-1], t[k]] stands at node k; it is sent 6 ms before t[k-1], by the clock
+    of the plan."""
     table, plan = run.run.controller, run.plan
     for name in VALVES:
         assert set(table[name]) <= {0.0, 1.0}
         starts = np.concatenate([[plan.time[0]], plan.time[:-1]])
         planned = switches(starts[1:], plan[name][1:])
-        sent = [(time - LEAD, value) for time, value in switches(table.time, table[name])]
+        sent = switches(table.time, table[name])
         assert [value for _, value in sent] == [value for _, value in planned]
         early = [begin - LEAD - time for (time, _), (begin, _) in zip(sent, planned, strict=True)]
         assert np.abs(early).max(initial=0.0) < 0.001, "the tick before or the one after"
@@ -53,7 +54,7 @@ def test_valves_are_sent_the_dead_time_early(run: Solved) -> None:
 
 def test_hips_follow_the_plan(run: Solved) -> None:
     table, plan = run.run.controller, run.plan
-    clock = table.time - LEAD
+    clock = table.time
     for leg in ("front", "rear"):
         for name in ("q", "w"):
             expected = np.interp(clock, plan.time, plan[f"{leg}/hip/{name}"])
@@ -91,7 +92,8 @@ def test_a_pulse_by_hand(dead_time: float, lead: float) -> None:
     table = made({"dead_time": dead_time})
     assert table.meta["lead"] == lead
     found = switches(table.time, table["front/valve/extend"])
-    sent = [lead + t - dead_time for t in (0.020, 0.040)]
+    assert table.time[0] == -lead
+    sent = [t - dead_time for t in (0.020, 0.040)]
     assert [value for _, value in found] == [1.0, 0.0]
     assert [time for time, _ in found] == pytest.approx(sent, abs=0.0005 + 1e-9)
 
@@ -99,18 +101,16 @@ def test_a_pulse_by_hand(dead_time: float, lead: float) -> None:
 def test_opening_and_closing_have_leads_of_their_own() -> None:
     """A valve that closes 4 ms later than it opens is told to close 4 ms earlier."""
     table = made({}, ValveCloseDelay(dt=0.004))
-    lead = table.meta["lead"]
-    assert lead == pytest.approx(0.010)
+    assert table.meta["lead"] == -table.time[0] == pytest.approx(0.010)
     (opens, _), (closes, _) = switches(table.time, table["front/valve/extend"])
-    assert opens - lead == pytest.approx(0.020 - 0.006, abs=0.0005 + 1e-9)
-    assert closes - lead == pytest.approx(0.040 - 0.010, abs=0.0005 + 1e-9)
+    assert opens == pytest.approx(0.020 - 0.006, abs=0.0005 + 1e-9)
+    assert closes == pytest.approx(0.040 - 0.010, abs=0.0005 + 1e-9)
 
 
 def test_torques_are_means_over_their_tick() -> None:
     """What is k N.m on (t[k-1], t[k]] has its own angular impulse in the table."""
     table = made({})
-    clock = table.time - LEAD
-    inside = (clock > -1e-9) & (clock < 0.1 - 1e-9)
+    inside = (table.time > -1e-9) & (table.time < 0.1 - 1e-9)
     assert table["front/hip/tau"][inside] == pytest.approx(np.repeat(np.arange(1.0, 11.0), 10))
 
 
