@@ -31,7 +31,10 @@ def discover(
         str | None, typer.Option("--map", help="Column map YAML for foreign logs.")
     ] = None,
     time_limit: Annotated[float, typer.Option(min=5.0, help="Seconds at most.")] = 300.0,
-    figures: Annotated[bool, typer.Option("--figure/--no-figure", help="Draw the figures.")] = True,
+    figures: Annotated[
+        bool,
+        typer.Option("--figure/--no-figure", "--figures/--no-figures", help="Draw the figures."),
+    ] = True,
     force: Force = False,
     own_effects: OwnEffects = None,
     json: Json = False,
