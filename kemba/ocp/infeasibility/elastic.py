@@ -26,7 +26,9 @@ from kemba.ocp.transcription.symmetry import Reduction
 from kemba.ocp.transcription.transcribe import RequirementBlock, Transcription
 
 # What may be violated: goals first; then everything but the start, which is checked before solving.
-TIERS = (("goals",), ("goals", "bounds", "end"))
+# Goals are relaxed without the clearance: it holds in the flight that the goal asks for, and a lower
+# goal has a shorter flight.
+TIERS = (("goals",), ("goals", "bounds", "end", "clearance"))
 
 
 class Elastic(Transcription):
@@ -146,14 +148,17 @@ def elastic(
     limited = replace(session, control=replace(session.control, deadline=deadline))
     sections = {str(w.location[0]) for w in requirements}
     nodes = min(task.nodes, ElasticSolve.current().nodes)
+    found: Outcome | None = None
     for soft in TIERS:
-        if sections & set(soft):
-            with session.building.running():
-                program = Elastic(model, task, requirements, reduction, nodes, soft)
-            outcome = _solve(program, limited)
-            if outcome is not None:
-                return outcome
-    return None
+        if not sections & set(soft):
+            continue
+        asked = [w for w in requirements if w.location[0] != "clearance" or "clearance" in soft]
+        with session.building.running():
+            program = Elastic(model, task, asked, reduction, nodes, soft)
+        found = _solve(program, limited) or found
+        if found is not None and (found.short or len(asked) == len(requirements)):
+            break
+    return found
 
 
 def _solve(program: Elastic, session: Session) -> Outcome | None:
