@@ -61,7 +61,7 @@ CONSTANTS = {  # file -> names, why
     # formulas and formats
     "logs/formats/mcap.py": ("NS", "nanoseconds of a second"),
     "logs/draft/ranges.py": (
-        "LENGTH STROKE ANGLE PRESSURE STEP STAMPED ABSOLUTE",
+        "LENGTH EXTENSION ANGLE PRESSURE STEP STAMPED ABSOLUTE",
         "readings by which units are guessed",
     ),
     "logs/draft/layout.py": ("LINES", "lines of a table that are looked at"),

@@ -60,7 +60,7 @@ def stage(
     who = f"Shown: {name or source.name}."
     if ghost is not None:
         who += f" Pale blue: {'the plan' if ghost.plan else ghost.name}."
-    high = max(centre[1] for centre in shown["robots"][0]["centres"])
+    high = max(centre[1] for centre in shown["motions"][0]["centres"])
     alt = f"{who} The robot in 3-D from the side; its body rises to {high:.2f} m."
     return fill(
         "stage.html", who=escape(who), alt=escape(alt), viewer=page_text("viewer.js"), scene=text
@@ -83,7 +83,7 @@ def scene(source: Source, model: str | None = None, ghost: Source | None = None)
     legs = machine.mechanism.legs
     return {
         "time": [round(float(time), 4) for time in times],
-        "robots": [_robot(robot, legs) for robot in shown if robot],
+        "motions": [_robot(robot, legs) for robot in shown if robot],
         "legs": legs,
         "cylinder": CYLINDER,
         "range": [low[0], high[0]],

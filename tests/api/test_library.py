@@ -23,7 +23,7 @@ def stages() -> list[str]:
 @pytest.fixture(scope="module")
 def jump(tmp_path_factory: pytest.TempPathFactory, stages: list[str]) -> Planned:
     out = tmp_path_factory.mktemp("library") / "jump"
-    return kemba.plan("jump.yaml", out, height="0.42 m", progress=stages.append)
+    return kemba.plan("jump.yaml", out, height="0.5 m", progress=stages.append)
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +33,7 @@ def done(jump: Planned) -> Executed:
 
 def test_a_plan_is_an_object(jump: Planned, stages: list[str]) -> None:
     assert jump.good and jump.sentence.startswith("solved")
-    assert jump.trajectory["body/z"].max() == pytest.approx(0.42, abs=1e-3)
+    assert jump.trajectory["body/z"].max() == pytest.approx(0.5, abs=1e-3)
     assert jump.controller.time[-1] >= jump.trajectory.time[-1]
     assert "replay" in stages and len(stages) > 2
     assert Planned.read(jump.path).certificate == jump.certificate

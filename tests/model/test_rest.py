@@ -41,7 +41,7 @@ def test_without_commands_every_state_rests_at_its_nominal_value(kind: str) -> N
     """Unknown initial states and start guesses begin there: it must be where the machine is."""
     model = Placed(BY_KIND[kind]).model
     standing = model.mechanism.standing
-    q = np.array([standing[c.name] for c in model.mechanism.coordinates])
+    q = np.array([standing.get(c.name, c.value) for c in model.mechanism.coordinates])
     found = at_rest(model, q, np.zeros(len(model.inputs)))
     for value, quantity in zip(found, model.states.values(), strict=True):
         assert value == pytest.approx(quantity.value, abs=1e-4 * quantity.scale), quantity.name

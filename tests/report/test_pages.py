@@ -96,7 +96,7 @@ def test_a_view_needs_nothing_else(run: Path, tmp_path: Path) -> None:
 
 def test_the_scene_is_the_robot(run: Path) -> None:
     shown, plan = scene(load_source(run)), Trajectory.read(run / "trajectory.csv")
-    (robot,) = shown["robots"]
+    (robot,) = shown["motions"]
     hip, knee = (np.array(robot["points"][f"front/{name}"]) for name in ("hip", "knee"))
     assert np.hypot(*(knee - hip).T) == pytest.approx(0.242, abs=2e-4)
     assert np.array(robot["centres"])[-1, 1] == pytest.approx(plan["body/z"][-1], abs=1e-4)

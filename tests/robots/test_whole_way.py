@@ -16,6 +16,8 @@ from kemba_cli.main import app
 # robot: how high it jumps [m], how long the plan may last [s]; few nodes, to be quick
 VERDICTS = ("missing", "partly", "nothing", "unknown")  # not bad-data
 SHIPPED = {"monoped": (0.45, 0.25), "hound": (0.6, 0.45)}
+# this height is asked for, as docs/robots.md does: the robot's highest is more than its plant does
+ASKED = "goals.apex.maximise=false"
 
 
 def run(*arguments: str | Path) -> Any:
@@ -42,7 +44,8 @@ def whole_way(task: str | Path, model: str, home: Path, *settings: str) -> dict[
 @pytest.mark.parametrize("robot", SHIPPED)
 def test_a_shipped_robot_goes_the_whole_way(robot: str, tmp_path: Path) -> None:
     height, duration = SHIPPED[robot]
-    settings = (f"model={robot}", f"height={height} m", f"duration={duration} s", "nodes=30")
+    asked = (f"height={height} m", f"duration={duration} s", ASKED)
+    settings = (f"model={robot}", *asked, "nodes=30")
     assert [f["good"] for f in run("check", f"{robot}.yaml")["files"]] == [True]
     found = whole_way("max_jump.yaml", robot, tmp_path, *settings)
     solved = found["solve"]
@@ -85,7 +88,7 @@ def test_a_strangers_robot_goes_the_whole_way(stranger: Path) -> None:
     names = ("model.yaml", "task.yaml", "myrobot.yaml")
     assert all(f["good"] for f in run("check", *(stranger / n for n in names))["files"])
     model = str(stranger / "model.yaml")
-    settings = ("height=0.6 m", "duration=0.45 s", "nodes=30")
+    settings = ("height=0.6 m", "duration=0.45 s", ASKED, "nodes=30")
     found = whole_way(stranger / "task.yaml", model, stranger, *settings)
     assert found["solve"]["good"]
     inputs = manifest(stranger)

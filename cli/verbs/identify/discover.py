@@ -32,6 +32,10 @@ def discover(
     ] = None,
     time_limit: Annotated[float, typer.Option(min=5.0, help="Seconds at most.")] = 300.0,
     figures: Annotated[bool, typer.Option("--figure/--no-figure", help="Draw the figures.")] = True,
+    figure: Annotated[  # what the option was called before
+        bool,
+        typer.Option("--figures/--no-figures", hidden=True, help="Earlier name of --figure."),
+    ] = True,
     force: Force = False,
     own_effects: OwnEffects = None,
     json: Json = False,
@@ -58,7 +62,7 @@ def discover(
             for old in (file for name in WRITTEN for file in folder.glob(name)):
                 old.unlink()
             write_answer(answer, folder, model)
-            if figures and found is not None:
+            if figures and figure and found is not None:
                 from kemba.plotting.study.discovery import draw_discovery
 
                 draw_discovery(found, folder)

@@ -12,7 +12,7 @@ from kemba.trajectory import Array
 # Per SI unit: (unit, largest magnitude of a typical value in it). The first that fits is taken.
 # Robots of 0.1 to 2 m, strokes below 0.3 m, pressures of 0.5 to 12 bar, 50 Hz to 10 kHz.
 LENGTH = (("m", 3.0), ("cm", 60.0), ("mm", 3e3), ("um", 3e6))
-STROKE = (("m", 0.5), ("mm", 500.0), ("um", 5e5))
+EXTENSION = (("m", 0.5), ("mm", 500.0), ("um", 5e5))
 ANGLE = (("rad", 6.6), ("deg", 400.0), ("mrad", 7e3))
 PRESSURE = (("MPa", 0.05), ("bar", 20.0), ("kPa", 2e3), ("mbar", 2e4), ("Pa", 2e6))
 STEP = (("s", 0.05), ("ms", 50.0), ("us", 5e4), ("ns", 5e7))
@@ -24,7 +24,7 @@ ATMOSPHERE = "1.01325 bar"
 def guessed_unit(header: str, values: Array) -> str | None:
     """The unit of a column (n,) by its size; None where it is ours or cannot be told."""
     unit = header[header.index("[") + 1 : -1]
-    table = {"m": STROKE if "piston/" in header else LENGTH, "rad": ANGLE, "Pa": PRESSURE}
+    table = {"m": EXTENSION if "piston/" in header else LENGTH, "rad": ANGLE, "Pa": PRESSURE}
     size = float(np.nanmax(np.abs(values), initial=0.0))
     for name, largest in table.get(unit, ()):
         if size <= largest:

@@ -49,7 +49,7 @@ function view(stage, scene) {
     const low = Math.floor(scene.range[0] - 1), high = Math.ceil(scene.range[1] + 1);
     for (let x = low; x <= high; x += 0.25) line([[x, -0.75, 0], [x, 0.75, 0]], "#d9d9d9", 1);
     for (let y = -0.75; y <= 0.75; y += 0.25) line([[low, y, 0], [high, y, 0]], "#d9d9d9", 1);
-    scene.robots.forEach((r, i) => line(r.centres.map((c) => [c[0], 0, c[1]]), i ? PALE : "#8c8c8c", 1));
+    scene.motions.forEach((r, i) => line(r.centres.map((c) => [c[0], 0, c[1]]), i ? PALE : "#8c8c8c", 1));
   }
 
   function leg(list, robot, name, at, pale) {
@@ -70,7 +70,7 @@ function view(stage, scene) {
     const box = canvas.getBoundingClientRect(), sharp = window.devicePixelRatio || 1, list = [];
     canvas.width = box.width * sharp; canvas.height = box.height * sharp;
     ground();
-    scene.robots.forEach((robot, i) => {
+    scene.motions.forEach((robot, i) => {
       const at = {};
       for (const name in robot.points) at[name] = robot.points[name][frame];
       const [front, rear] = [scene.legs[0], scene.legs[scene.legs.length - 1]].map((n) => at[`${n}/hip`]);
