@@ -49,7 +49,7 @@ def at_home(authors_plan: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(authors_plan.parent)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.usefixtures("at_home")
 def test_a_foreign_plan_lacks_the_weight_of_the_boom() -> None:
     compare, discover, adopt = commands("example-foreign.md")
