@@ -26,7 +26,7 @@ def test_the_gallery_shows_the_examples_as_they_are() -> None:
         assert (ROOT / f"docs/images/gallery/{name}.png").stat().st_size > 5000
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", make_gallery.ORDER)
 def test_an_example_runs(name: str, tmp_path: Path) -> None:
     make_gallery.run(name, str(tmp_path), tmp_path)
@@ -40,7 +40,7 @@ def test_there_are_three_notebooks_without_outputs() -> None:
         assert not any(cell.get("outputs") for cell in cells), path
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_a_notebook_runs(path: Path, tmp_path: Path) -> None:
     nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
@@ -52,7 +52,7 @@ def test_a_notebook_runs(path: Path, tmp_path: Path) -> None:
     )
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("path", ["planner", "identifier", "extender"])
 def test_a_strangers_path(path: str, tmp_path: Path) -> None:
     """Each from an empty folder, command by command, as a stranger would type it."""

@@ -88,7 +88,7 @@ def explained(found: Plan, why: Explanation) -> Plan:
 
 def clear(found: Plan) -> Plan:
     """The same; not what was asked where a foot grazes the ground in flight."""
-    touches = grazes(found.trajectory)
+    touches = grazes(found.trajectory, euler=not found.refined)
     if not touches:
         return found
     what = f"`clearance` is not kept: {touches[0].sentence}"

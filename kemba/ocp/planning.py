@@ -93,7 +93,7 @@ def look_up(task: Task, document: Document) -> None:
         try:
             find_config(name, "models")
         except KembaError as error:
-            what = f"{key}: '{name}' {error.what}"
+            what = f"{key}: {name}: {error.what}"
             raise document.error((key,), what, error.expected, error.hint) from None
 
 

@@ -50,12 +50,13 @@ def test_names_lead_nowhere_else(name: str) -> None:
 
 
 def test_no_content_of_other_files_is_shown() -> None:
-    Path("secret.txt").write_text("key: [hidden word\n")
+    for name in ("secret.txt", "secret.key"):
+        Path(name).write_text("key: [hidden word\n")
     Path("task.yaml").write_text("name: t\nmodel: secret.txt\nheight: 0.4 m\n")
     Path("model.yaml").write_text("base: secret.txt\n")
     for verb in (
         ["check", "task.yaml"],
-        ["check", "secret.txt"],
+        ["check", "secret.key"],  # a name ending in .txt is checked as a table
         ["solve", "task.yaml", "--dry-run"],
         ["solve", "jump.yaml", "--dry-run", "--model", "secret.txt"],
         ["solve", "jump.yaml", "--dry-run", "--model", "model.yaml"],

@@ -49,7 +49,7 @@ def test_a_fault_loses_nothing(name: str, fault: Fault, usual: Any, tmp_path: Pa
     assert struck(VERBS[name], fault, tmp_path / "work", *usual[name]).wrong == []
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", VERBS)
 def test_many_faults_lose_nothing(name: str, usual: Any, tmp_path: Path) -> None:
     for fault in MANY:
@@ -57,7 +57,7 @@ def test_many_faults_lose_nothing(name: str, usual: Any, tmp_path: Path) -> None
         assert found.wrong == [], f"{name}, {fault.name}: {found}"
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", ["solve", "discover", "simulate"])
 def test_of_two_at_a_time_one_is_refused(name: str, usual: Any, tmp_path: Path) -> None:
     verb, folder = VERBS[name], tmp_path / "work"
@@ -82,7 +82,7 @@ def test_the_comparison_sees_a_lost_file(usual: Any, tmp_path: Path) -> None:
     assert found.exit_code == 0 and found.wrong == ["exit code 0, but other results"]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_user_without_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("HOME", raising=False)
     VERBS["solve"].begin(emptied(tmp_path / "work"))

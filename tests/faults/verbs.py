@@ -71,7 +71,7 @@ VERBS = {
         ("simulate", "locked.yaml", "--out", "out", "--noise"), "out", ("*.csv",), lambda _: None
     ),
     "discover": Verb(
-        ("discover", "log.csv", "--out", "out", "--no-figures"), "out", ("answer.json",), _log
+        ("discover", "log.csv", "--out", "out", "--no-figure"), "out", ("answer.json",), _log
     ),
     "sweep": Verb(
         ("sweep", "sweep.yaml", "--out", "out", "--jobs", "1"), "out", ("cases/*.json",), _sweep

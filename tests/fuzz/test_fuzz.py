@@ -44,7 +44,7 @@ def test_broken_inputs_are_answered(name: str, tmp_path: Path) -> None:
     tried(name, EXAMPLES.get(name, 10), tmp_path)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", SLOW)
 def test_broken_logs_are_answered(name: str, tmp_path: Path) -> None:
     tried(name, SLOW[name], tmp_path)

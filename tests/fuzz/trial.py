@@ -34,7 +34,7 @@ def _log(verb: str) -> Callable[[str, Path], Outcome]:
     def run(content: str, folder: Path) -> Outcome:
         file = folder / "input.csv"
         file.write_text(content, encoding="utf-8")
-        options = {"discover": ["--out", str(folder / "answer"), "--force", "--no-figures"]}
+        options = {"discover": ["--out", str(folder / "answer"), "--force", "--no-figure"]}
         return outcome(verb, file, *options.get(verb, []))
 
     return run

@@ -143,7 +143,7 @@ def test_mixed_up_columns_of_a_robot_are_refused(
     Trajectory(log.time, dict(columns), meta).write(tmp_path / "jump.csv")
     answer, found = discover_logs([tmp_path / "jump.csv"])
     assert answer.verdict == "bad-data" and found is None
-    assert re.search("columns swapped|a sign|in degrees", answer.sentence), answer.sentence
+    assert re.search("columns swapped|reversed sign|in degrees", answer.sentence), answer.sentence
 
 
 def test_binary_is_refused(log_file: Path) -> None:

@@ -44,12 +44,12 @@ def test_the_tables_tell_of_friction_supply_and_tubes() -> None:
 
 
 @pytest.fixture
-def at_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A folder in which the paths of the page lead to the repository's files."""
-    (tmp_path / "tests").symlink_to(ROOT / "tests")
-    monkeypatch.chdir(tmp_path)
+def at_home(authors_plan: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The folder in which the page's file lies, with its sidecar."""
+    monkeypatch.chdir(authors_plan.parent)
 
 
+@pytest.mark.nightly
 @pytest.mark.usefixtures("at_home")
 def test_a_foreign_plan_lacks_the_weight_of_the_boom() -> None:
     compare, discover, adopt = commands("example-foreign.md")

@@ -37,6 +37,7 @@ def test_standing_feet_show_a_wrong_length(part: str) -> None:
     problem.validate()  # a wrong length is to be found; it is not bad data
 
 
+@pytest.mark.slow
 def test_friction_of_one_leg_is_named_with_its_leg() -> None:
     logs, _ = hops(hidden("seal_friction", 1.2, "front"), runs=2, seed=3, figures_off=0.01)
     problem = robot_problem(logs, load_model("planning"))

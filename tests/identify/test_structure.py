@@ -70,7 +70,7 @@ def test_the_model_that_is_written_has_the_figures(tmp_path: Path) -> None:
     assert "chamber" not in [i.effect.kind for i in model.instances]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_orifice_chambers_are_named_on_robot_logs() -> None:
     """The twin with physical chambers against the planning model; its rods have some damping."""
     rng = np.random.default_rng(3)

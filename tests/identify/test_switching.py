@@ -12,6 +12,7 @@ from kemba.plant import Profile
 from kemba.plant.simulation.valves import acting
 
 TIME = np.arange(400) / 1e3
+UNSTATED = (np.full(1, np.nan), np.zeros(1, dtype=bool))  # of the noise
 
 
 def command(seed: int) -> np.ndarray:
@@ -31,7 +32,8 @@ def command(seed: int) -> np.ndarray:
 def test_every_reader_switches_alike(seed: int, late: tuple[float, float]) -> None:
     column = command(seed)
     sent = pulses(TIME, column)
-    log = ResampledLog("run", TIME, column[:, None], column[:, None], (sent,), np.ones(1))
+    commands = column[:, None]
+    log = ResampledLog("run", TIME, commands, commands, (sent,), np.ones(1), *UNSTATED)
     times, valves, _ = substeps(log, np.array([late]))
     middle = 0.5 * (times[1:] + times[:-1])
     simulated = acting(Profile(TIME, column), *late)

@@ -67,7 +67,7 @@ def test_one_round(planned: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     assert "correction" not in (tmp_path / "run-1" / "answer" / "model.yaml").read_text("utf-8")
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_three_rounds(planned: Path, tmp_path: Path) -> None:
     """Three effects at once: by the third round the apex is within 5 mm, every landing kept."""
     machine = tmp_path / "tired.yaml"

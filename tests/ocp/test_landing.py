@@ -128,6 +128,15 @@ def test_grazes_are_short_contacts_in_flight() -> None:
     assert not grazes(flight((0.0, 0.01), (0.095, 0.1)))
 
 
+def test_an_implicit_euler_contact_begins_with_its_step() -> None:
+    """Down at one row only: the ground pushes in the whole step before it."""
+    touch = flight((0.0, 0.01), (0.04, 0.044), (0.08, 0.1))
+    (graze,), (longer,) = grazes(touch), grazes(touch, euler=True)
+    step = float(touch.time[1] - touch.time[0])
+    assert longer.time == pytest.approx(graze.time - step)
+    assert longer.duration == pytest.approx(graze.duration + step)
+
+
 def test_grazes_are_left_out_of_the_modes() -> None:
     time = np.arange(8) * 5e-3
     modes = np.array([OPEN, HELD, OPEN, HELD, HELD, OPEN, HELD, HELD])

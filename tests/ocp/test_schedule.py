@@ -106,7 +106,7 @@ def test_a_guess_flies_where_feet_must_leave_the_ground(lift: str) -> None:
     lifted = f"{goals}, flight: {{quantity: '*/foot/z', at: middle, at_least: {lift}}}"
     spans = []
     for asked in (goals, lifted):
-        task, document = load_task("hop", [f"goals={{{asked}}}"])
+        task, document = load_task("hop", ["clearance=0 m", f"goals={{{asked}}}"])
         requirements = resolve(task, load_model(task.model), document)
         course = body_course(requirements, task.duration, (0.17, 0.42), 9.81)
         assert np.all(np.diff(course.t) > 0.0) and np.all(np.isfinite(course(np.array(course.t))))

@@ -77,6 +77,16 @@ def test_the_controller_holds_a_standing_robot() -> None:
     assert np.abs(done.trajectory["front/hip/tau"]).max() < 1e-6
 
 
+@pytest.mark.parametrize("dead_time", [True, False])
+def test_a_valve_opened_in_the_first_row_was_closed_before(dead_time: bool) -> None:
+    """It acts its dead time of 6 ms after the row, not from the beginning."""
+    table = standing_table()
+    table = table.with_columns({"front/valve/extend [1]": np.ones(len(table))})
+    done = execute(table, planning(), dead_time=dead_time).trajectory
+    acts = done.time[done["front/chamber/extend/F"] > 1.0][0] - 1e-3
+    assert acts == pytest.approx(0.0 if dead_time else -0.006, abs=1e-9)
+
+
 def marked_table(rows: int = 20) -> Trajectory:
     """A standing table in which row k feeds forward k N.m at the front hip, -k at the rear."""
     marks = np.arange(100.0)

@@ -34,6 +34,7 @@ def check(found: Answer, truth: dict) -> None:
     assert found.error_after < min(1.3, found.error_before)
 
 
+@pytest.mark.slow
 def test_friction_is_named_on_two_jumps(tmp_path: Path) -> None:
     check(*answer(tmp_path, "seal_friction", 3, 3))
 

@@ -55,7 +55,7 @@ def test_units_and_order_of_columns_are_no_matter(bench, tmp_path: Path) -> None
     assert same(first, discover_logs(others, column_map=column_map)[0])
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("change", CHANGES)
 @pytest.mark.parametrize("effect", CASES)
 def test_the_answer_stays(effect: str | None, change: str, bench, tmp_path: Path) -> None:
@@ -64,7 +64,7 @@ def test_the_answer_stays(effect: str | None, change: str, bench, tmp_path: Path
     assert same(first, again), f"{first.sentence} -> {again.sentence}"
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("effect", ["seal_friction", None])
 def test_a_robot_is_the_same_from_the_other_side(effect: str | None, tmp_path: Path) -> None:
     logs, _ = hops(*([hidden(effect)] if effect else []), runs=3)

@@ -64,6 +64,7 @@ def test_shipped_jumps_come_true(tmp_path: Path, name: str) -> None:
     assert answer["residuals"]["binary"] == 0.0
 
 
+@pytest.mark.slow
 def test_the_best_of_several_starts_is_kept(tmp_path: Path) -> None:
     task, document = load_task("hop.yaml", OPTIONS)
     told: list[str] = []

@@ -27,7 +27,7 @@ VESSEL = {
 COULOMB = {"axis_friction": "F_c", "presliding": "F_p"}  # the same force while sliding
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_friction_of_a_drive_is_found(tmp_path: Path) -> None:
     model = model_file(tmp_path, DRIVE)
     answer, _ = discover_logs([drive_log(tmp_path / "a.csv")], (), model)
@@ -38,7 +38,7 @@ def test_friction_of_a_drive_is_found(tmp_path: Path) -> None:
     assert found["axis_damping"]["F_v"].value == pytest.approx(8.0, rel=0.1)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("seed", [1, 2])
 def test_nothing_is_missing_from_a_complete_drive(tmp_path: Path, seed: int) -> None:
     effects = {"kind": "axis_friction", "F_c": 3.0}, {"kind": "axis_damping", "F_v": 8.0}
@@ -74,7 +74,7 @@ def logs_of_a_cylinder(folder: Path, **friction: float) -> list[Path]:
     ]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_constant_and_growing_friction_of_a_cylinder_are_told_apart(tmp_path: Path) -> None:
     logs = logs_of_a_cylinder(tmp_path, coulomb=4.0, mu=0.02)
     effects = {"kind": "seal_friction"}, {"kind": "pressure_friction"}
@@ -85,7 +85,7 @@ def test_constant_and_growing_friction_of_a_cylinder_are_told_apart(tmp_path: Pa
     assert figures["measured_chambers.gain"] == pytest.approx(1.0, abs=0.002)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_friction_of_a_cylinder_is_found_in_logs_with_gaps(tmp_path: Path) -> None:
     answer, _ = discover_logs(logs_of_a_cylinder(tmp_path), (), model_file(tmp_path, CYLINDER))
     assert answer.ranking[0].effect == "seal_friction", answer.sentence
@@ -93,14 +93,14 @@ def test_friction_of_a_cylinder_is_found_in_logs_with_gaps(tmp_path: Path) -> No
     assert any("gap" in remark for remark in answer.remarks) or answer.verdict == "missing"
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_nothing_is_missing_from_a_complete_cylinder(tmp_path: Path) -> None:
     model = model_file(tmp_path, CYLINDER, {"kind": "seal_friction", "F_c": 4.0})
     answer, _ = discover_logs(logs_of_a_cylinder(tmp_path), (), model)
     assert answer.verdict == "nothing", answer.sentence
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_heat_of_the_wall_is_found(tmp_path: Path) -> None:
     answer, _ = discover_logs([vessel_log(tmp_path / "a.csv")], (), model_file(tmp_path, VESSEL))
     assert answer.ranking[0].effect == "wall_heat", answer.sentence
@@ -148,7 +148,7 @@ def test_rigs_that_cannot_be_are_refused(tmp_path: Path, rig: dict, words: str) 
         load_model(model_file(tmp_path, rig))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_published_figures_of_emps_are_within_the_intervals(tmp_path: Path) -> None:
     real("emps/DATA_EMPS.mat")
     reader().emps().write(tmp_path / "emps.csv")
@@ -161,7 +161,7 @@ def test_published_figures_of_emps_are_within_the_intervals(tmp_path: Path) -> N
     assert figures["drive_axis.J"].value == pytest.approx(95.11, rel=0.01)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("seal, constant, growing", [("O-ring", 3.4, 0.0133), ("KDN", 5.3, 0.004)])
 def test_real_seals_are_told_apart(
     tmp_path: Path, seal: str, constant: float, growing: float

@@ -28,14 +28,19 @@ class Graze:
         return f"{self.foot} touches the ground for {lasts} at {self.time:.3f} s and leaves again"
 
 
-def grazes(plan: Trajectory) -> list[Graze]:
-    """The short contacts of a plan's feet between two times in the air."""
+def grazes(plan: Trajectory, euler: bool = False) -> list[Graze]:
+    """The short contacts of a plan's feet between two times in the air.
+
+    `euler`: the plan is an implicit Euler one, whose ground pushes in the whole step before the
+    first row at which a foot is down.
+    """
     found = []
     for name in (name for name in plan.names if name.endswith("foot/z")):
         down = plan[name] <= TOUCHES
         change = np.flatnonzero(np.diff(down.astype(int)))  # the last row before each change
         for before, last in itertools.pairwise(change):
-            lasts = float(plan.time[last] - plan.time[before + 1])
+            begin = float(plan.time[before if euler else before + 1])
+            lasts = float(plan.time[last]) - begin
             if down[last] and lasts < LASTS:
-                found.append(Graze(name[:-2], float(plan.time[before + 1]), lasts))
+                found.append(Graze(name[:-2], begin, lasts))
     return found

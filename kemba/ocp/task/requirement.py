@@ -120,7 +120,8 @@ def resolve(task: Task, model: Model, document: Document) -> list[Requirement]:
     try:
         requirements += flight_clearance(task, model, requirements)
     except ValueError as error:
-        errors.append(document.error(("clearance",), f"clearance: {error}"))
+        if not errors:  # else the goal it needs may be the one that could not be read
+            errors.append(document.error(("clearance",), f"clearance: {error}"))
     errors += cost_errors(task.cost, document)
     errors += option_errors(task.solver.options, document)
     if errors:
@@ -182,9 +183,10 @@ def _requirement(
 
 
 def highest(requirements: Sequence[Requirement]) -> Requirement | None:
-    """The goal that asks for the greatest height of the body, or None."""
-    high = (w for w in requirements if w.quantity.name == "body/z" and w.at and w.lower > -math.inf)
-    return max(high, key=lambda w: w.lower, default=None)
+    """The goal, or without one the end, that asks for the greatest height of the body, or None."""
+    high = [w for w in requirements if w.quantity.name == "body/z" and w.at and w.lower > -math.inf]
+    goals = [w for w in high if w.location[0] == "goals"]
+    return max(goals or high, key=lambda w: w.lower, default=None)
 
 
 def apex_node(requirements: Sequence[Requirement], nodes: int) -> int:
@@ -199,7 +201,8 @@ def flight_clearance(
     """Every foot at least as high as the task's clearance in the middle of the flight.
 
     The flight is the ballistic one about the highest goal of the body, from stretched legs; of it
-    the middle part counts. Raises ValueError where no goal says when the robot flies.
+    the middle part counts. A flight that is longer than the motion fills it; that the duration is
+    too short is said by the checks. Raises ValueError where no goal says when the robot flies.
     """
     if not task.clearance:
         return []
@@ -209,8 +212,9 @@ def flight_clearance(
     robot = model.mechanism.need_robot()
     above = apex.lower - robot.leg.femur.length - robot.leg.tibia.length
     rise = math.sqrt(2 * max(above, task.clearance) / model.mechanism.gravity)
-    half = FLIGHT * rise / task.duration
-    during = max(apex.at - half, 0.0), min(apex.at + half, 1.0)
+    rise /= task.duration
+    before, after = min(rise, apex.at), min(rise, 1.0 - apex.at)
+    during = apex.at - FLIGHT * before, apex.at + FLIGHT * after
     known = quantities(model)
     return [
         Requirement(("clearance",), known[f"{leg}/foot/z"], None, task.clearance, math.inf, during)

@@ -170,6 +170,8 @@ class Transcription:
         step = self.task.duration / self.nodes
         rows = approach_rows(self.model, self.reduction, stage, self.of_state, speed, step)
         where = list(range(apex_node(self.requirements, self.nodes) + 1, self.nodes + 1))
+        if not where:  # the motion ends at the apex
+            return []
         both = np.hstack([index[:-1, :n], index[1:, :n]])[np.array(where) - 1]
         return [(Block(ca.vertcat(stage.y0, stage.y), rows.g, ca.SX(0), both), rows, where)]
 
@@ -183,7 +185,8 @@ class Transcription:
     def requirement_expressions(self) -> Iterator[tuple[Requirement, ca.SX, list[int]]]:
         """Every requirement with its expression in the stage's y and the nodes where it holds.
 
-        Those that the symmetry grants or repeats are left out.
+        Those that the symmetry grants or repeats are left out, and those that hold at no node: a
+        short time on a coarse grid.
         """
         node = self.model.node
         seen: set[tuple[object, ...]] = set()
@@ -203,7 +206,9 @@ class Transcription:
             seen.add(key)
             # inputs and forces act on the interval before a node, so the first node has none
             acts = ca.depends_on(expression, ca.vertcat(node.u, node.lam))
-            yield requirement, g, requirement.nodes(self.nodes, int(acts))
+            where = requirement.nodes(self.nodes, int(acts))
+            if where:
+                yield requirement, g, where
 
     def _tighten(
         self, where: list[int], variable: tuple[int, float, float], requirement: Requirement

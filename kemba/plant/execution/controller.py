@@ -105,7 +105,7 @@ def condition_of(
     """
     gains = gains or Gains(*(table.meta.get(k, v) for k, v in vars(Gains()).items()))
     profiles = {
-        quantity.name: Profile.of(table.time, _column(table, quantity.name))
+        quantity.name: Profile.of(table.time, _column(table, quantity.name)).from_closed()
         for quantity in model.inputs.values()
         if quantity.binary
     }

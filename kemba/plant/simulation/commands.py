@@ -43,6 +43,12 @@ class Profile:
         times, values = np.array([r for r in rows if r[0] < np.inf], dtype=float).T
         return cls(times, values)
 
+    def from_closed(self) -> Profile:
+        """The same signal, but 0 before `times[0]`: a valve is closed until its first command."""
+        if not self.values[0]:
+            return self
+        return Profile(np.r_[-np.inf, self.times], np.r_[0.0, self.values])
+
     def __call__(self, time: float) -> float:
         return float(self.at(np.array(time)))
 

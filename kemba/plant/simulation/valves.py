@@ -38,7 +38,7 @@ def scattered(
     moved = {}
     for quantity in model.inputs.values():
         if quantity.binary:
-            profile = Profile.of(table.time, table[quantity.name])
+            profile = Profile.of(table.time, table[quantity.name]).from_closed()
             times = profile.times.copy()
             times[1:] += rng.normal(0.0, sigma, len(times) - 1)
             moved[quantity.name] = replace(profile, times=np.maximum.accumulate(times))

@@ -75,7 +75,7 @@ def test_nothing_is_found_in_a_clean_machine(clean: RobotProblem) -> None:
     assert 0.7 < answer.error_after < 1.2
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("sensors", [SENSORS, measure.Sensors(keep=0.7, drift=1.0, steps=3.0)])
 @pytest.mark.parametrize("name", ["seal_friction", "hip_friction", "boom_force"])
 def test_a_hidden_effect_is_named(name: str, sensors: measure.Sensors) -> None:

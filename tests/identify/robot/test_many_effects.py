@@ -16,7 +16,7 @@ from kemba.model.spec import load_model
 HIDDEN = ("seal_friction", "hip_friction", "boom_force", "valve_delay")
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("keep", [0.0, 0.9])
 def test_four_effects_are_named_together(keep: float) -> None:
     sensors = measure.Sensors(keep=keep)

@@ -17,7 +17,8 @@ FAULTS = {"body/z": [SensorDelay(channel="body/z", dt=LATE)]}
 def track() -> ResampledLog:
     """A run of which only the clock matters."""
     nothing = np.zeros((len(TIME), 1))
-    return ResampledLog("run", TIME, nothing, nothing, (), np.ones(1))
+    unstated = (np.full(1, np.nan), np.zeros(1, dtype=bool))
+    return ResampledLog("run", TIME, nothing, nothing, (), np.ones(1), *unstated)
 
 
 def swing(t: np.ndarray) -> np.ndarray:
