@@ -64,7 +64,7 @@ def test_bench_logs_are_known_by_their_columns() -> None:
 def test_what_cannot_be_loaded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("runs/a").mkdir(parents=True)
-    with pytest.raises(KembaError, match=r"runs/a: has no trajectory.csv; a run folder or a CSV"):
+    with pytest.raises(KembaError, match=r"runs/a: has no trajectory.csv; a run folder or a log"):
         load_source("runs/a")
     Path("runs/a/trajectory.csv").write_text("time [s],body/z [m]\n0,1\n")
     with pytest.raises(KembaError, match=r"none: no such file or folder; .*; runs here: runs/a$"):
