@@ -44,10 +44,8 @@ CASES = [
     ("jump_forward", "distance=0.6 m"),
 ]
 QUICK = [CASES[1], CASES[5]]
-UNSTABLE = pytest.mark.xfail(reason="after touchdown it drifts, to a knee down; docs/refine.md")
 FORWARD = CASES[-1]  # the quickest of those on a whole robot
 MARKS = {case: [] if case in (*QUICK, FORWARD) else [pytest.mark.slow] for case in CASES}
-MARKS["jump_forward", "distance=0.1 m"].append(UNSTABLE)
 EVERY = [pytest.param(*case, marks=marks) for case, marks in MARKS.items()]
 
 
