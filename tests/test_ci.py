@@ -34,12 +34,12 @@ def test_an_unknown_part_is_refused_before_anything_is_installed() -> None:
     command = ["bash", str(ROOT / ".ci" / "run"), "lint", "slwo"]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=20)
     assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr == "no part 'slwo'; one of: lint types smoke quick slow docs\n"
+    assert done.stderr == "no part 'slwo'; one of: lint types smoke quick slow nightly docs\n"
 
 
 @pytest.mark.parametrize(
     ("name", "runs"),
-    [("ci", {".ci/run"}), ("nightly", {".ci/run smoke slow", ".ci/run docs"})],
+    [("ci", {".ci/run"}), ("nightly", {".ci/run smoke slow nightly", ".ci/run docs"})],
 )
 def test_workflows_run_what_stands_here(name: str, runs: set[str]) -> None:
     jobs = load_yaml(ROOT / ".github" / "workflows" / f"{name}.yml").data["jobs"]
