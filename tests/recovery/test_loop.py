@@ -103,7 +103,7 @@ def test_the_next_plan_has_the_effect_in_it(answered: Path) -> None:
     assert model.effect(HIDDEN).F_c == pytest.approx(10.0, rel=0.15)  # type: ignore[attr-defined]
     told = {}
     for name, used in (("drawn", "planning"), ("found", found)):
-        options = ("--set", "nodes=40", "--out", answered / name, "--no-replay", "--json")
+        options = ("--out", answered / name, "--no-replay", "--json")
         told[name] = json.loads(run("solve", "hop.yaml", "--model", used, *options))
         assert told[name]["status"] == "solved"
         assert told[name]["apex_m"] == pytest.approx(0.35, abs=1e-3)
