@@ -114,5 +114,5 @@ def _good(found: Plan, table: Trajectory, plant: Model) -> bool:
     done = executions(found.model, found.trajectory, table, plant)
     lands, t = bool(ends_standing(found.model, found.trajectory)), found.task
     facts = summaries(found.model, done)
-    judged = verdicts(facts, t.tolerances, lands, t.landing.impact_speed)
+    judged = verdicts(facts, t.tolerances, lands)
     return all(verdict.good for verdict in judged.values())

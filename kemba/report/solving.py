@@ -120,7 +120,7 @@ def _replayed(found: Plan, table: Trajectory) -> tuple[dict[str, Any], Trajector
     motion = plant_run(there) if there else None
     lands = bool(ends_standing(found.model, found.trajectory))
     names = [f"the plant is another robot, {other}, which {task.plant} names"] if other else []
-    judged = verdicts(executed, task.tolerances, lands, task.landing.impact_speed).values()
+    judged = verdicts(executed, task.tolerances, lands).values()
     if all(verdict.good for verdict in judged):
         parts = [sentence_of(found), *names, *(verdict.sentence for verdict in judged)]
         return {**executed, "sentence": "; ".join(parts)}, motion

@@ -22,16 +22,13 @@ EXECUTIONS = {
 class Allowed:
     """How far an execution may miss: apex and end [m], touchdown [s]; None is not judged.
 
-    `lands`: whether the plan ends standing, so that the execution must. `feet`: the speed [m/s] at
-    which feet come down, where the task bounds it. From an apex that is lower by a length they
-    are on the ground earlier by that length over this speed, which is no error of its own.
+    `lands`: whether the plan ends standing, so that the execution must.
     """
 
     apex: float
     touchdown: float | None
     final: float | None
     lands: bool
-    feet: float | None = None
 
 
 @dataclass(frozen=True)
@@ -43,20 +40,14 @@ class Verdict:
 
 
 def verdicts(
-    executed: Mapping[str, Facts | None],
-    tolerances: Tolerances,
-    lands: bool,
-    feet: float | None = None,
+    executed: Mapping[str, Facts | None], tolerances: Tolerances, lands: bool
 ) -> dict[str, Verdict]:
-    """The verdict on each execution by its key in the certificate.
-
-    `lands`, `feet`: as in `Allowed`; the latter for the plant.
-    """
+    """The verdict on each execution by its key in the certificate."""
     t = tolerances
     allowed = {
         "replay": Allowed(t.apex, t.touchdown, t.final, lands),
         "table_replay": Allowed(t.table_apex, t.table_touchdown, t.table_final, lands),
-        "plant_replay": Allowed(t.plant_apex, t.plant_touchdown, t.plant_final, lands, feet),
+        "plant_replay": Allowed(t.plant_apex, t.plant_touchdown, t.plant_final, lands),
     }
     keys = [key for key in EXECUTIONS if key in executed]
     return {key: judge(EXECUTIONS[key], executed[key], allowed[key]) for key in keys}
@@ -73,8 +64,7 @@ def judge(who: str, facts: Facts | None, allowed: Allowed) -> Verdict:
         return Verdict(False, f"the {who} cannot be started")
     figures = [_apex(facts["apex_error_m"], allowed.apex)]
     if (late := facts["touchdown_error_s"]) is not None and allowed.touchdown is not None:
-        shift = facts["apex_error_m"] / allowed.feet if allowed.feet else 0.0
-        figures.append(_touchdown(late, allowed.touchdown, shift))
+        figures.append(_touchdown(late, allowed.touchdown))
     if allowed.final is not None:
         figures.append(_end(facts["final_error_m"], allowed.final))
     causes = [figure.miss for figure in figures if figure.share > 1.0]
@@ -105,14 +95,10 @@ def _apex(error: float, allowed: float) -> _Figure:
     )
 
 
-def _touchdown(late: float, allowed: float, shift: float) -> _Figure:
-    """`shift` [s]: by how much the apex's error alone moves the touchdown."""
+def _touchdown(late: float, allowed: float) -> _Figure:
     text = f"{abs(1e3 * late):.1f} ms {'late' if late >= 0 else 'early'}"
     limit = f"{1e3 * allowed:g} ms allowed"
-    own = late - min(max(late, min(shift, 0.0)), max(shift, 0.0))
-    if own != late:
-        limit = f"{1e3 * (allowed + abs(shift)):.0f} ms allowed with this apex"
-    share = _share(own, allowed)
+    share = _share(late, allowed)
     return _Figure(share, f"touchdown {text}, {limit}", f"touches down {text} ({limit})")
 
 
