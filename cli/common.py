@@ -38,6 +38,7 @@ OwnEffects = Annotated[
         help="Python file with effects of your own (its code is run); may be repeated.",
     ),
 ]
+Foreign = Annotated[str | None, typer.Option("--map", help="Column map YAML for foreign logs.")]
 Force = Annotated[bool, typer.Option("--force", help="Replace results that are there already.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")]
 Verbose = Annotated[

@@ -81,6 +81,8 @@ def options(
 
 def main() -> None:
     """Run `kemba-opt`. Exit code 0 good, 1 bad answer, 2 wrong usage or input, 130 interrupted."""
+    # kemba multiplies many small matrices: more BLAS threads only wait for each other
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         app(prog_name="kemba-opt")
     finally:

@@ -7,6 +7,7 @@ from pictures import save
 
 import kemba
 
-jump = kemba.plan("jump.yaml", model="hound", height="0.55 m")
+asked = {"height": "0.6 m", "duration": "0.45 s", "nodes": 30, "goals.apex.maximise": False}
+jump = kemba.plan("max_jump.yaml", model="hound", **asked)
 print(jump.sentence)
 save(jump.figure())

@@ -14,7 +14,7 @@ Path("machine.yaml").write_text(
     encoding="utf-8",
 )
 logs = []
-for number, height in enumerate(("0.42 m", "0.46 m", "0.5 m")):
+for number, height in enumerate(("0.47 m", "0.48 m", "0.5 m")):
     jump = kemba.plan("jump.yaml", height=height)
     logs += kemba.simulate(jump, plant="machine.yaml", noise=True, seed=number).logs
 found = kemba.discover(logs)

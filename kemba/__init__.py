@@ -1,12 +1,13 @@
 """Plan, execute and explain jumps of a legged robot with pneumatic knees.
 
 import kemba
-jump = kemba.plan("jump.yaml", height="0.6 m")      # a run folder with a certified plan
+jump = kemba.plan("jump.yaml", height="0.48 m")     # a run folder with a certified plan
 done = kemba.simulate(jump, repeat=3, noise=True)   # logs, as on hardware
 print(kemba.compare(done.logs).sentence)            # where does the model fail?
 print(kemba.discover(done.logs).sentence)           # which effect does it lack?
 """
 
+import os
 from importlib import import_module
 from typing import Any
 
@@ -17,6 +18,8 @@ __all__ = ["compare", "discover", "load_log", "load_model", "load_task", "plan",
 def __getattr__(name: str) -> Any:
     """The library's functions, imported when first asked for: `--help` must not wait for them."""
     if name in __all__:
+        # many small matrices: more BLAS threads only wait for each other
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
         return getattr(import_module("kemba.api"), name)
     raise AttributeError(f"module 'kemba' has no attribute '{name}'")
 

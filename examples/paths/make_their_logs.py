@@ -13,7 +13,7 @@ SCALES = {"rad": ("deg", np.degrees(1)), "m": ("mm", 1e3), "1": ("V", 24), "N.m"
 
 with open("machine.yaml", "w", encoding="utf-8") as stream:
     stream.write("name: machine\nbase: planning\neffects:\n  - {kind: seal_friction, F_c: 12 N}\n")
-for number, height in enumerate(("0.42 m", "0.46 m", "0.5 m"), start=1):
+for number, height in enumerate(("0.47 m", "0.48 m", "0.5 m"), start=1):
     jump = kemba.plan("jump.yaml", height=height)
     done = kemba.simulate(jump, plant="machine.yaml", noise=True, seed=number)
     log = kemba.load_log(done.logs[0])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -95,7 +94,6 @@ def compare(
 
     `columns`: the file of a column map; `run`: the run that was executed. Raises KembaError.
     """
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # many small products: threads only wait
     from kemba.identify.compare_logs import compare_logs
 
     return Compared(compare_logs(_listed(logs), str(model), columns, run)[0])
@@ -116,7 +114,6 @@ def discover(
     `out`: folder for answer.json and model.yaml; nothing is written without it. `time_limit` in
     s. Raises KembaError for files that cannot be read.
     """
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from kemba.identify.workflow import discover_logs
 
     found = discover_logs(

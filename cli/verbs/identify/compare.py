@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from kemba_cli.common import Force, Json, OwnEffects, Quiet, print_json, results, say
+from kemba_cli.common import Force, Foreign, Json, OwnEffects, Quiet, print_json, results, say
 
 if TYPE_CHECKING:
     from kemba.identify.compare.compare import Comparison
@@ -20,9 +20,7 @@ def compare(
     model: Annotated[str, typer.Option(help="Model YAML to judge.")] = "planning",
     run: Annotated[Path | None, typer.Option(help="Run folder that was executed.")] = None,
     figure: Annotated[Path | None, typer.Option(help="Also save the figure here.")] = None,
-    column_map: Annotated[
-        str | None, typer.Option("--map", help="Column map YAML for foreign logs.")
-    ] = None,
+    column_map: Foreign = None,
     force: Force = False,
     own_effects: OwnEffects = None,
     json: Json = False,
@@ -32,10 +30,6 @@ def compare(
 
     Example: kemba-opt compare jump_1.csv jump_2.csv --figure heat_map.png
     """
-    import os
-
-    # many small products: more BLAS threads only wait for each other
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from kemba.folders import fresh
     from kemba.identify.compare_logs import compare_logs
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from kemba_cli.common import Force, Json, OwnEffects, Quiet, print_json, say
+from kemba_cli.common import Force, Foreign, Json, OwnEffects, Quiet, print_json, say
 from kemba_cli.failures import BAD_ANSWER
 
 if TYPE_CHECKING:
@@ -27,9 +27,7 @@ def discover(
         Path | None,
         typer.Option(help="Folder for answer.json, model.yaml, figures (answer, answer-2, ...)."),
     ] = None,
-    column_map: Annotated[
-        str | None, typer.Option("--map", help="Column map YAML for foreign logs.")
-    ] = None,
+    column_map: Foreign = None,
     time_limit: Annotated[float, typer.Option(min=5.0, help="Seconds at most.")] = 300.0,
     figures: Annotated[bool, typer.Option("--figure/--no-figure", help="Draw the figures.")] = True,
     figure: Annotated[  # what the option was called before
@@ -45,10 +43,6 @@ def discover(
 
     Example: kemba-opt discover bench_1.csv bench_2.csv --holdout bench_3.csv
     """
-    import os
-
-    # a search is many small products: more BLAS threads only wait for each other
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from kemba.folders import claimed
     from kemba.identify.workflow import discover_logs, write_answer
     from kemba_cli.progress import Progress

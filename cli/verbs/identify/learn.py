@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from kemba_cli.common import Force, Json, OwnEffects, Quiet, print_json, say
+from kemba_cli.common import Force, Foreign, Json, OwnEffects, Quiet, print_json, say
 
 
 def learn(
@@ -27,9 +27,7 @@ def learn(
     holdout: Annotated[
         list[Path] | None, typer.Option(help="A log kept for judging only; may be repeated.")
     ] = None,
-    column_map: Annotated[
-        str | None, typer.Option("--map", help="Column map YAML for foreign logs.")
-    ] = None,
+    column_map: Foreign = None,
     time_limit: Annotated[
         float, typer.Option(min=5.0, help="Seconds of discovery at most.")
     ] = 300.0,
@@ -48,10 +46,6 @@ def learn(
 
     Example: kemba-opt learn runs/jump-1 --logs runs/jump-1/logs --target jump.yaml
     """
-    import os
-
-    # a search is many small products: more BLAS threads only wait for each other
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from kemba.config import find_config
     from kemba.learn.page import write_learning
     from kemba.learn.round import Asked

@@ -7,15 +7,13 @@ from typing import Annotated, Any
 
 import typer
 
-from kemba_cli.common import Json, OwnEffects, Quiet, print_json
+from kemba_cli.common import Foreign, Json, OwnEffects, Quiet, print_json
 from kemba_cli.failures import BAD_INPUT
 
 
 def check(
     files: Annotated[list[Path], typer.Argument(help="YAML files, and logs as CSV.")],
-    column_map: Annotated[
-        str | None, typer.Option("--map", help="Column map YAML for foreign logs.")
-    ] = None,
+    column_map: Foreign = None,
     model: Annotated[
         str, typer.Option(help="Model YAML of the machine that the logs are from.")
     ] = "planning",
@@ -57,9 +55,6 @@ def _tell(answers: list[dict[str, Any]], json: bool, quiet: bool) -> None:
 
 def _log(file: Path, column_map: str | None, model: str) -> dict[str, Any]:
     """A log is put through the gate of compare and discover; any other file is a table."""
-    import os
-
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # many small products, as in compare
     from kemba.identify.workflow import check_log
     from kemba.logs import open_log
 

@@ -56,7 +56,7 @@ def solve(
     Exit code 1 when it is not solved, or when its replay or the plant misses the task's
     tolerances.
 
-    Example: kemba-opt solve jump.yaml --set "height=0.6 m"
+    Example: kemba-opt solve jump.yaml --set "height=0.48 m"
     """
     from kemba.config import beside, find_config
     from kemba.effects import BY_KIND

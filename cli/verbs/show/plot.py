@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from kemba_cli.common import Force, Json, OwnEffects, Quiet, newest, print_json
+from kemba_cli.common import Force, Foreign, Json, OwnEffects, Quiet, newest, print_json
 
 
 def plot(
@@ -31,9 +31,7 @@ def plot(
     model: Annotated[
         str | None, typer.Option(help="Model YAML with the robot and limits, not the run's own.")
     ] = None,
-    column_map: Annotated[
-        str | None, typer.Option("--map", help="Column map YAML for foreign logs.")
-    ] = None,
+    column_map: Foreign = None,
     force: Force = False,
     own_effects: OwnEffects = None,
     json: Json = False,

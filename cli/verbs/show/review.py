@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from kemba_cli.common import Force, Json, OwnEffects, Quiet, newest, print_json, say
+from kemba_cli.common import Force, Foreign, Json, OwnEffects, Quiet, newest, print_json, say
 from kemba_cli.failures import BAD_ANSWER
 
 
@@ -24,9 +24,7 @@ def review(
     out: Annotated[
         Path | None, typer.Option(help="HTML to write (a new review.html beside the logs).")
     ] = None,
-    column_map: Annotated[
-        str | None, typer.Option("--map", help="Column map YAML for foreign logs.")
-    ] = None,
+    column_map: Foreign = None,
     show: Annotated[bool, typer.Option("--show", help="Open it in the browser.")] = False,
     force: Force = False,
     own_effects: OwnEffects = None,
@@ -39,10 +37,6 @@ def review(
 
     Example: kemba-opt review log-1.csv log-2.csv --run runs/jump-1
     """
-    import os
-
-    # many small products: more BLAS threads only wait for each other
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from kemba.report.review.page import review as write
     from kemba.runs import newest_logs
 
