@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,9 +14,12 @@ from kemba.config import Document, dump_yaml
 from kemba.errors import KembaError
 from kemba.files import WriteError
 from kemba.ocp import Plan, Task, controller_table, plan
+from kemba.ocp.certificate.objective import objective
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.continuation.between import Origin
+from kemba.ocp.known import compared
 from kemba.ocp.nlp.watcher import Watch
+from kemba.ocp.planning import plans_nearby
 from kemba.ocp.report import answer, sentence_of
 from kemba.ocp.starts import plan_best
 from kemba.plant.execution.certificate import executions, plant_run, summaries
@@ -57,50 +60,99 @@ def solve_into(
     replay: bool = True,
     figure: bool = True,
     origin: Origin | None = None,
+    library: bool = True,
 ) -> dict[str, Any]:
     """Solve `task` and fill its run folder; returns the JSON of `solve`.
 
     `start`: a trajectory to begin from. `starts`, `jobs`: how many start guesses, on how many
-    cores. `origin`: an earlier plan to continue for the changed figures. `replay`: execute the
+    cores. `origin`: an earlier plan to continue for the changed figures. `library`: where none of
+    these is given, begin from the shipped plans that are near. `replay`: execute the
     plan on the same model and on the plant, and compare both with the task's tolerances; a plan
     that misses them is `acceptable`, not `solved`. Raises KembaError where the task or a file is
     wrong; the manifest then says `failed`.
     """
     dump_yaml(task.model_dump(exclude_none=True), folder / "task.yaml")
     log = folder / "solver.log"
+    how = {"tell": listener.tell, "watch": listener.watch, "stop": listener.stop}
+    shelved = library and start is None and origin is None
+
+    def nearby(task: Task) -> Iterator[Plan]:
+        return plans_nearby(task, document, log, **how) if shelved else iter(())  # type: ignore[arg-type]
+
+    def solved(task: Task) -> Plan:
+        if starts > 1 and start is None and origin is None:
+            return plan_best(task, document, starts, jobs, log, listener.tell)
+        return plan(task, document, log=log, start=start, origin=origin, **how)  # type: ignore[arg-type]
+
+    def candidates() -> Iterator[Candidate]:
+        if replay and task.robust > 0:
+            first = lambda task: next(nearby(task), None) or solved(task)  # noqa: E731
+            yield most_robust(task, first, listener.tell)
+            return
+        yield from map(Candidate, nearby(task))
+        yield Candidate(solved(task))
+
     try:
-
-        def solved(task: Task) -> Plan:
-            if starts > 1 and start is None and origin is None:
-                return plan_best(task, document, starts, jobs, log, listener.tell)
-            how = {"tell": listener.tell, "watch": listener.watch, "stop": listener.stop}
-            return plan(task, document, log=log, start=start, origin=origin, **how)  # type: ignore[arg-type]
-
-        robust = replay and task.robust > 0
-        chosen = most_robust(task, solved, listener.tell) if robust else Candidate(solved(task))
-        found, table = chosen.plan, chosen.table
+        made = (_executed(one, replay, listener, folder) for one in candidates())
+        best = next(made)
+        while starts > 1 or not best.good:
+            other = next(made, None)
+            if other is None:
+                break
+            best = max(best, other, key=lambda made: made.rank)
+        found, result = best.plan, best.result
         if found.task != task:
             dump_yaml(found.task.model_dump(exclude_none=True), folder / "task.yaml")
-        result = answer(found, str(folder.path))
-        if table is None and found.attempts:
-            table = controller_table(found.model, found.trajectory, found.task.hold)
-        plant: Trajectory | None = None
-        if replay and table is not None and found.status.plan:
-            listener.tell("replay")
-            if chosen.share is None:
-                table = retimed(found.model, found.trajectory, table)
-            replayed, plant = _replayed(found, table)
-            result |= replayed
-            if chosen.share is not None:
-                result |= {"robust": chosen.share.summary()}
-                result["sentence"] += f"; {chosen.share.sentence}"
-        _keep(found, result, Motions(table, plant), folder, figure)
+        known, remark = compared(found)
+        result |= {"best_known": known, "sentence": result["sentence"] + remark}
+        _keep(found, result, best.motions, folder, figure)
     except BaseException:
         with suppress(WriteError):  # the first error says more
             folder.finish("failed")
         raise
-    folder.finish(result["status"], sentence=result["sentence"], good=result["good"])
+    facts = {key: result[key] for key in ("sentence", "good", "start")}
+    folder.finish(result["status"], **facts)
     return result
+
+
+@dataclass(frozen=True)
+class _Made:
+    """A plan, its entries in the JSON with those of its executions, and what is written."""
+
+    plan: Plan
+    result: dict[str, Any]
+    motions: Motions
+
+    @property
+    def good(self) -> bool:
+        """Whether it is solved and its executions confirm it."""
+        return bool(self.result["good"])
+
+    @property
+    def rank(self) -> tuple[bool, bool, float]:
+        """Better ones are greater: good, a plan at all, by cost."""
+        found = self.plan
+        cost = objective(found.model, found.task, found.requirements, found.trajectory)
+        return self.good, found.status.plan, -cost
+
+
+def _executed(chosen: Candidate, replay: bool, listener: Listener, folder: RunFolder) -> _Made:
+    """A plan with its table and, if `replay`, its executions."""
+    found, table = chosen.plan, chosen.table
+    result = answer(found, str(folder.path))
+    if table is None and found.attempts:
+        table = controller_table(found.model, found.trajectory, found.task.hold)
+    plant: Trajectory | None = None
+    if replay and table is not None and found.status.plan:
+        listener.tell("replay")
+        if chosen.share is None:
+            table = retimed(found.model, found.trajectory, table)
+        replayed, plant = _replayed(found, table)
+        result |= replayed
+        if chosen.share is not None:
+            result |= {"robust": chosen.share.summary()}
+            result["sentence"] += f"; {chosen.share.sentence}"
+    return _Made(found, result, Motions(table, plant))
 
 
 def _replayed(found: Plan, table: Trajectory) -> tuple[dict[str, Any], Trajectory | None]:
