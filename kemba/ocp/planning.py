@@ -101,7 +101,14 @@ def _origin(entry: Entry, task: Task) -> Origin:
     model = task_model(own)
     asked = resolve(own, model, Document(own.model_dump()))
     name, dear = f"the shipped plan {entry.name}", "one from a guess (--cold) may take less"
-    return Origin(entry.plan, model, tuple(asked), name, dear)
+    return Origin(entry.plan, model, tuple(asked), name, dear, once=True)
+
+
+def plan_from(
+    origin: Origin, task: Task, document: Document | None = None
+) -> tuple[Plan | None, str]:
+    """A task's plan from another plan, or None and the reason where that fails."""
+    return continued(_job(task, document, None, Control(_deadline(task))).planner, origin)
 
 
 @dataclass(frozen=True)
@@ -119,7 +126,7 @@ def _job(
     document: Document | None,
     model: str | Path | None,
     control: Control,
-    tell: Callable[[str], None],
+    tell: Callable[[str], None] = lambda text: None,
     start: Trajectory | None = None,
 ) -> _Job:
     document = document or Document(task.model_dump())

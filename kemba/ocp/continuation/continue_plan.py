@@ -88,7 +88,7 @@ class Continuation:
             meshed = self._meshed(start, reduction)
             if meshed is not None:
                 found = self._walk(*meshed, reduction)
-                if found.done:
+                if found.done or self.origin.once:
                     return found
             return self._read_anew(start)
         except KembaError as error:
@@ -115,7 +115,7 @@ class Continuation:
         settings = Continuing.current()
         done, step = 0.0, 1.0
         found = Refined(None, None, Ending.GAVE_UP, 0)
-        for _ in range(settings.solves):
+        for _ in range(1 if self.origin.once else settings.solves):
             share = min(1.0, done + step)
             self.tell(f"from {self.origin.name}: {share:.0%} of the change")
             found = self._solved(share, start, phases, reduction, settings.near)
