@@ -3,7 +3,7 @@
 Walks of `configs/library/walks.yaml` are done on a local Dask cluster, those of one round side by
 side; a walk that is done is not repeated. Of all plans of the same figures the cheapest one is kept
 whose executions keep to the task's tolerances. Writes `configs/library/*.npz` and `plans.csv`,
-and the page `docs/library.md`.
+and the page `docs/shipped-plans.md`.
 """
 
 from __future__ import annotations
@@ -18,13 +18,14 @@ from pathlib import Path
 from typing import Any
 
 from kemba.config import load_yaml, shipped_folder
-from kemba.ocp.library.kind import FIGURES
+from kemba.ocp import load_task, task_model
+from kemba.ocp.library.kind import FIGURES, kind_of
 from kemba.ocp.library.shelf import INDEX
 from kemba.sweep.cases.case import Case
 from kemba.sweep.workers.farm import run_cases
 
 UNITS = {"height": "m", "distance": "m", "supply": "Pa", "payload": "kg", "duration": "s"}
-PAGE = Path(__file__).parents[1] / "docs" / "library.md"
+PAGE = Path(__file__).parents[1] / "docs" / "shipped-plans.md"
 HEAD = """\
 # Shipped plans
 
@@ -63,7 +64,11 @@ def _case(walk: dict[str, Any], folder: Path) -> Case:
 
 
 def _facts(path: Path) -> dict[str, Any]:
-    return {**json.loads(path.read_text(encoding="utf-8")), "path": path}
+    """What a walk noted about a plan, with the kind of its task as that is today."""
+    facts = json.loads(path.read_text(encoding="utf-8"))
+    task, document = load_task(facts["task"], facts["set"])
+    kind = kind_of(task, task_model(task, document=document))
+    return {**facts, "path": path, "kind": kind}
 
 
 def best(found: list[dict[str, Any]]) -> list[dict[str, Any]]:

@@ -14,7 +14,7 @@ FIGURES = ("height", "distance", "supply", "payload", "duration")
 # What says how a plan is made, named or judged, but not what is asked of it.
 APART = (
     *("name", "notes", "model", "plant", "effects", "nodes", "hold", "robust", "uncertainties"),
-    *("guess", "guess_noise", "seed", "start_from", "solver", "tolerances"),
+    *("guess", "guess_noise", "seed", "solver", "tolerances"),
 )
 LETTERS = 12  # of a fingerprint
 
@@ -28,7 +28,11 @@ def kind_of(task: Task, model: Model) -> str:
     robot = model.mechanism.robot
     physics = {
         "robot": robot.model_dump(mode="json") if robot is not None else model.mechanism.name,
-        "effects": sorted(_text(e.listed()) for e in model.effects if e.name != "payload"),
+        "effects": sorted(
+            _text({"kind": e.kind, **e.model_dump(mode="json")})
+            for e in model.effects
+            if e.kind != "payload"
+        ),
     }
     return sha256(_text([asked, physics]).encode()).hexdigest()[:LETTERS]
 

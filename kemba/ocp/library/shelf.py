@@ -17,7 +17,7 @@ from kemba.ocp.library.kind import FIGURES, figures_of, kind_of
 from kemba.ocp.task.task import Task
 from kemba.settings import Settings, setting
 
-TRIED = "tuned: continuation of jump and jump_forward (docs/library.md)"
+TRIED = "tuned: continuation of jump and jump_forward (docs/shipped-plans.md)"
 INDEX = "plans.csv"
 
 
