@@ -1,4 +1,4 @@
-"""The library of plans made anew: python benchmarks/library.py [--jobs N].
+"""The library of plans made anew: python benchmarks/library.py [--jobs N] [--choose].
 
 Walks of `configs/library/walks.yaml` are done on a local Dask cluster, those of one round side by
 side; a walk that is done is not repeated. Of all plans of the same figures the cheapest one is kept
@@ -39,15 +39,18 @@ Written by `benchmarks/library.py` on {machine}.
 """
 
 
-def main(jobs: int | None, folder: Path) -> None:
-    """Walk, choose, write."""
-    shelf = shipped_folder("library")
-    for i, walks in enumerate(load_yaml(shelf / "walks.yaml").data["rounds"]):
+def walked(jobs: int | None, folder: Path) -> None:
+    """Every walk that is not done yet, round by round."""
+    for walks in load_yaml(shipped_folder("library") / "walks.yaml").data["rounds"]:
         cases = [_case(walk, folder) for walk in walks]
         run_cases(cases, folder, jobs=jobs, tell=lambda case, record: print(
             case.values["name"], record["sentence"], f"{record['cpu_s']:.0f} s", flush=True
         ))  # fmt: skip
-        print(f"round {i + 1} done", flush=True)
+
+
+def choose(folder: Path) -> None:
+    """The best plans to the shelf, its index and its page."""
+    shelf = shipped_folder("library")
     found = [_facts(path) for path in sorted((folder / "plans").glob("*.json"))]
     chosen = best(found)
     for old in shelf.glob("*.npz"):
@@ -119,5 +122,8 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--jobs", type=int, help="workers; by default the cores")
     parser.add_argument("--folder", type=Path, default=Path("runs/library"), help="kept results")
+    parser.add_argument("--choose", action="store_true", help="walk no further")
     words = parser.parse_args()
-    main(words.jobs, words.folder)
+    if not words.choose:
+        walked(words.jobs, words.folder)
+    choose(words.folder)
