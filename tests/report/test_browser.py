@@ -13,6 +13,8 @@ from typer.testing import CliRunner
 
 from kemba_cli.main import app
 
+pytestmark = pytest.mark.slow
+
 SIZES = {"desk": {"width": 1200, "height": 900}, "phone": {"width": 390, "height": 844}}
 KINDS = ("review", "report", "view", "answer")
 AA = 4.5  # least contrast of text (WCAG 2.1, 1.4.3)
