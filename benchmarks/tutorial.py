@@ -31,9 +31,9 @@ MACHINES = {
     "nothing": "",
 }
 RUNS = {
-    "low": 'jump.yaml --set "height=0.45 m"',
+    "low": 'jump.yaml --set "height=0.48 m"',
     "mid": 'jump.yaml --set "height=0.5 m"',
-    "high": 'jump.yaml --set "height=0.55 m"',
+    "high": 'jump.yaml --set "height=0.51 m"',
     "hop": "hop.yaml",
     "drop": "drop.yaml",
 }
