@@ -26,6 +26,7 @@ from kemba.plant.execution.retiming import retimed
 from kemba.report.robust import Candidate, most_robust
 from kemba.report.verdict import verdicts
 from kemba.runs import PLANT_RUN, RunFolder, write_json
+from kemba.stopwatch import Tell, silent
 from kemba.trajectory import Trajectory
 
 
@@ -33,7 +34,7 @@ from kemba.trajectory import Trajectory
 class Listener:
     """What is called at each stage and iteration, and what may ask to stop."""
 
-    tell: Callable[[str], None] = lambda text: None
+    tell: Tell = silent
     watch: Watch | None = None
     stop: Callable[[], bool] | None = None
 
@@ -86,14 +87,16 @@ def solve_into(
             table = controller_table(found.model, found.trajectory, found.task.hold)
         plant: Trajectory | None = None
         if replay and table is not None and found.status.plan:
-            listener.tell("replay")
+            listener.tell("replay: the times of controller.csv")
             if chosen.share is None:
                 table = retimed(found.model, found.trajectory, table)
-            replayed, plant = _replayed(found, table)
+            replayed, plant = _replayed(found, table, listener.tell)
             result |= replayed
             if chosen.share is not None:
                 result |= {"robust": chosen.share.summary()}
                 result["sentence"] += f"; {chosen.share.sentence}"
+        if figure and table is not None:
+            listener.tell("drawing")
         _keep(found, result, Motions(table, plant), folder, figure)
     except BaseException:
         with suppress(WriteError):  # the first error says more
@@ -103,7 +106,9 @@ def solve_into(
     return result
 
 
-def _replayed(found: Plan, table: Trajectory) -> tuple[dict[str, Any], Trajectory | None]:
+def _replayed(
+    found: Plan, table: Trajectory, tell: Tell
+) -> tuple[dict[str, Any], Trajectory | None]:
     """The executions of a plan with the verdict, and the motion of the plant.
 
     The plan stays solved only if all executions come near enough.
@@ -112,7 +117,7 @@ def _replayed(found: Plan, table: Trajectory) -> tuple[dict[str, Any], Trajector
     try:
         plant = counterpart(task.model, task.payload, task.supply, task.plant, changes=task.effects)
         other = another_robot(task.model, task.plant)
-        done = executions(found.model, found.trajectory, table, plant)
+        done = executions(found.model, found.trajectory, table, plant, tell)
     except KembaError as error:  # a model that the simulator cannot execute still has its plan
         return _unconfirmed(found, f"it cannot be simulated: {error}"), None
     executed = summaries(found.model, done)

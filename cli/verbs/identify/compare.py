@@ -32,10 +32,13 @@ def compare(
     """
     from kemba.folders import fresh
     from kemba.identify.compare_logs import compare_logs
+    from kemba_cli.course import COMPARE
+    from kemba_cli.progress import Progress
 
     if figure is not None:
         fresh(figure, force, "--figure")
-    found, _ = compare_logs(logs, model, column_map, run)
+    with Progress(quiet or json, COMPARE) as progress:
+        found, _ = compare_logs(logs, model, column_map, run, progress.tell)
     if figure is not None:
         from kemba.plotting.study.comparison import plot_comparison
         from kemba.plotting.style import save_figure

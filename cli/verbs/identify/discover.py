@@ -45,10 +45,11 @@ def discover(
     """
     from kemba.folders import claimed
     from kemba.identify.workflow import discover_logs, write_answer
+    from kemba_cli.course import DISCOVER
     from kemba_cli.progress import Progress
 
     with claimed(out, "answer", "answer.json", force) as folder:
-        with Progress(quiet or json) as progress:
+        with Progress(quiet or json, DISCOVER, time_limit) as progress:
             answer, found = discover_logs(
                 logs, holdout or [], model, column_map, time_limit, progress.tell
             )

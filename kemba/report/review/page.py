@@ -40,6 +40,7 @@ from kemba.report.review.tracks import Track, gather, grid_of, plan_of
 from kemba.report.review.verdict import Verdict, names_of, of_answer, of_bad_data, of_logs, of_plan
 from kemba.report.stage import page_text, stage, write_page
 from kemba.runs import Run, load_run
+from kemba.stopwatch import Tell, silent
 from kemba.trajectory import Trajectory
 
 PLANNING = "planning"
@@ -72,6 +73,7 @@ def review(
     column_map: str | Path | None = None,
     out: str | Path | None = None,
     force: bool = False,
+    tell: Tell = silent,
 ) -> tuple[Path, Verdict]:
     """Write the page to `out`, by default beside what it is about; the path and the verdict.
 
@@ -81,7 +83,8 @@ def review(
     default that of the run's task. The page needs no other file. Raises KembaError where a file
     cannot be read or written, or nothing is given.
     """
-    given = gather_material(logs, run, answer, model, column_map)
+    given = gather_material(logs, run, answer, model, column_map, tell)
+    tell("drawing")
     path = place_for(out, default_path(logs, run, answer), force)
     try:
         title, body, verdict = page_of(given)
@@ -115,6 +118,7 @@ def gather_material(
     answer: str | Path | None,
     model: str | None,
     column_map: str | Path | None,
+    tell: Tell = silent,
 ) -> Material:
     """Read everything; the comparison of the logs included."""
     if not logs and run is None and answer is None:
@@ -125,11 +129,12 @@ def gather_material(
     judged = str(model or asked.get("model") or PLANNING)
     supply = to_si(asked["supply"], "Pa") if asked.get("supply") is not None else None
     columns = load_map(column_map) if column_map else None
+    tell("reading")
     read = read_logs(logs, columns) if logs else []
     error, fault = None, None
     if read:
         try:
-            error = model_error(read, judged)
+            error = model_error(read, judged, tell)
         except BadData as bad:
             fault = bad
     facts = read_answer(answer) if answer is not None else {}
