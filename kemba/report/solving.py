@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from kemba.config import Document, dump_yaml
 from kemba.errors import KembaError
@@ -23,11 +23,14 @@ from kemba.plant.execution.certificate import executions, plant_run, summaries
 from kemba.plant.execution.counterpart import another_robot, counterpart
 from kemba.plant.execution.replay import ends_standing
 from kemba.plant.execution.retiming import retimed
-from kemba.report.robust import Candidate, most_robust
+from kemba.report.drawing import Drawer, Here
 from kemba.report.verdict import verdicts
 from kemba.runs import PLANT_RUN, RunFolder, write_json
 from kemba.stopwatch import Tell, silent
 from kemba.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from kemba.sweep.scenarios.share import Share
 
 
 @dataclass(frozen=True)
@@ -58,13 +61,15 @@ def solve_into(
     replay: bool = True,
     figure: bool = True,
     origin: Origin | None = None,
+    drawer: Drawer | None = None,
 ) -> dict[str, Any]:
     """Solve `task` and fill its run folder; returns the JSON of `solve`.
 
     `start`: a trajectory to begin from. `starts`, `jobs`: how many start guesses, on how many
     cores. `origin`: an earlier plan to continue for the changed figures. `replay`: execute the
     plan on the same model and on the plant, and compare both with the task's tolerances; a plan
-    that misses them is `acceptable`, not `solved`. Raises KembaError where the task or a file is
+    that misses them is `acceptable`, not `solved`. `drawer`: what draws the figure, this process
+    when it is None. Raises KembaError where the task or a file is
     wrong; the manifest then says `failed`.
     """
     dump_yaml(task.model_dump(exclude_none=True), folder / "task.yaml")
@@ -77,33 +82,47 @@ def solve_into(
             how = {"tell": listener.tell, "watch": listener.watch, "stop": listener.stop}
             return plan(task, document, log=log, start=start, origin=origin, **how)  # type: ignore[arg-type]
 
-        robust = replay and task.robust > 0
-        chosen = most_robust(task, solved, listener.tell) if robust else Candidate(solved(task))
-        found, table = chosen.plan, chosen.table
+        found, table, share = _chosen(task, solved, replay, listener)
         if found.task != task:
             dump_yaml(found.task.model_dump(exclude_none=True), folder / "task.yaml")
         result = answer(found, str(folder.path))
         if table is None and found.attempts:
             table = controller_table(found.model, found.trajectory, found.task.hold)
+        drawer = drawer or Here()
+        if figure and table is not None:
+            drawer.begin(found.trajectory, folder.path)
         plant: Trajectory | None = None
         if replay and table is not None and found.status.plan:
             listener.tell("replay: the times of controller.csv")
-            if chosen.share is None:
+            if share is None:
                 table = retimed(found.model, found.trajectory, table)
             replayed, plant = _replayed(found, table, listener.tell)
             result |= replayed
-            if chosen.share is not None:
-                result |= {"robust": chosen.share.summary()}
-                result["sentence"] += f"; {chosen.share.sentence}"
+            if share is not None:
+                result |= {"robust": share.summary()}
+                result["sentence"] += f"; {share.sentence}"
+        _keep(found, result, Motions(table, plant), folder)
         if figure and table is not None:
             listener.tell("drawing")
-        _keep(found, result, Motions(table, plant), folder, figure)
+            drawer.finish()
     except BaseException:
         with suppress(WriteError):  # the first error says more
             folder.finish("failed")
         raise
     folder.finish(result["status"], sentence=result["sentence"], good=result["good"])
     return result
+
+
+def _chosen(
+    task: Task, solved: Callable[[Task], Plan], replay: bool, listener: Listener
+) -> tuple[Plan, Trajectory | None, Share | None]:
+    """The plan; where a robust one is asked for, with its table and its share of scenarios."""
+    if not replay or task.robust == 0:
+        return solved(task), None, None
+    from kemba.report.robust import most_robust  # Dask and SciPy take half a second to import
+
+    chosen = most_robust(task, solved, listener.tell)
+    return chosen.plan, chosen.table, chosen.share
 
 
 def _replayed(
@@ -145,16 +164,14 @@ def _unconfirmed(found: Plan, cause: str, remarks: Sequence[str] = ()) -> dict[s
     return {"status": Status.ACCEPTABLE, "good": False, "sentence": "; ".join(parts)}
 
 
-def _keep(
-    found: Plan, result: dict[str, Any], motions: Motions, folder: RunFolder, figure: bool
-) -> None:
+def _keep(found: Plan, result: dict[str, Any], motions: Motions, folder: RunFolder) -> None:
     """Write the run folder; when that fails, write the plan elsewhere and say where."""
     try:
-        _write(found, result, motions, folder.path, figure)
+        _write(found, result, motions, folder.path)
     except WriteError as error:
         elsewhere = Path(tempfile.mkdtemp(prefix="kemba-kept-"))
         try:
-            _write(found, result, motions, elsewhere, figure=False)
+            _write(found, result, motions, elsewhere)
         except WriteError:
             shutil.rmtree(elsewhere, ignore_errors=True)
             raise error from None
@@ -162,9 +179,7 @@ def _keep(
         raise type(error)(error.where, error.what, hint=hint) from None
 
 
-def _write(
-    found: Plan, result: dict[str, Any], motions: Motions, folder: Path, figure: bool
-) -> None:
+def _write(found: Plan, result: dict[str, Any], motions: Motions, folder: Path) -> None:
     write_json(folder / "certificate.json", result)
     if motions.table is None:
         return  # refused before solving: there is no motion to write
@@ -172,8 +187,3 @@ def _write(
     motions.table.write(folder / "controller.csv")
     if motions.plant is not None:
         motions.plant.write(folder / PLANT_RUN)
-    if figure:
-        from kemba import plotting
-
-        sources = plotting.load_sources([folder])
-        plotting.save_figure(plotting.draw(sources), folder / "figure.png")
