@@ -120,7 +120,7 @@ STORIES: dict[str, Story] = {
         ends={"learn": PLANNED, "solve --from": PLANNED, "--from": PLANNED},
     ),
     "library.md": Story(),
-    "logs.md": Story((their_log,)),
+    "logs.md": Story((their_log,), ends={"review": (0, 1)}),
     "missing.md": Story(
         (logs("logs/log-1.csv", "logs/log-2.csv", "logs/log-3.csv"),), ends={"solve": PLANNED}
     ),
