@@ -30,7 +30,7 @@ def compare(
 
     Example: kemba-opt compare jump_1.csv jump_2.csv --figure heat_map.png
     """
-    from kemba.folders import fresh
+    from kemba.folders import fresh, typed
     from kemba.identify.compare_logs import compare_logs
     from kemba_cli.course import COMPARE
     from kemba_cli.progress import Progress
@@ -51,6 +51,9 @@ def compare(
     typer.echo(found.sentence)
     if not quiet:
         _print(found)
+    if not found.good and not found.tolerable:
+        own = None if model == "planning" else model
+        say(f"next: kemba-opt discover {typed(logs, column_map, own)} --out answer", quiet)
 
 
 def _print(found: Comparison) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import Any
 
 from kemba.config import load_yaml
 from kemba.errors import KembaError
-from kemba.folders import place_for
+from kemba.folders import place_for, typed
 from kemba.identify.logs.gate import BadData
 from kemba.identify.logs.reading import read_logs
 from kemba.logs import load_map
@@ -37,7 +36,7 @@ from kemba.report.review.motion import (
     rig_charts,
 )
 from kemba.report.review.tracks import Track, gather, grid_of, plan_of
-from kemba.report.review.verdict import Verdict, names_of, of_answer, of_bad_data, of_logs, of_plan
+from kemba.report.review.verdict import Verdict, of_answer, of_bad_data, of_logs, of_plan
 from kemba.report.stage import page_text, stage, write_page
 from kemba.runs import Run, load_run
 from kemba.stopwatch import Tell, silent
@@ -55,6 +54,7 @@ class Material:
     answer: Facts = field(default_factory=dict)
     answer_folder: Path = Path()
     model: str = PLANNING
+    column_map: str | Path | None = None
     supply: float | None = None
     error: ModelError | None = None
     fault: BadData | None = None
@@ -140,7 +140,7 @@ def gather_material(
     facts = read_answer(answer) if answer is not None else {}
     folder = Path(answer) if answer is not None else Path()
     folder = folder if folder.is_dir() else folder.parent
-    return Material(found, read, facts, folder, judged, supply, error, fault)
+    return Material(found, read, facts, folder, judged, column_map, supply, error, fault)
 
 
 def page_of(given: Material) -> tuple[str, str, Verdict]:
@@ -225,9 +225,9 @@ def _found(given: Material) -> str:
 
 
 def _verdict(given: Material, tracks: Sequence[Track], events: Sequence[Events | None]) -> Verdict:
-    own = "" if given.model == PLANNING else f" --model {shlex.quote(given.model)}"
+    own = None if given.model == PLANNING else given.model
     words = {
-        "logs": names_of([str(log.meta["path"]) for log in given.logs]) + own,
+        "logs": typed([log.meta["path"] for log in given.logs], given.column_map, own),
         "answer": str(given.answer_folder),
         "task": str(given.run.task) if given.run else "jump.yaml",
     }
