@@ -18,7 +18,7 @@ NEXT = {
     "reliability-of-the-program.md": "[what is trusted](security.md), or [install](start.md)",
     "robustness.md": "[feedback around a plan](policy.md), or [sweeps](sweeps.md) of your own",
     "security.md": "[how files are written](files.md), or [sweeps on a cluster](sweeps.md)",
-    "sensitivity.md": "[how discovery works](discovery.md), or [what makes it converge](solving.md)",
+    "sensitivity.md": "[how discovery works](discovery.md), or [how plans are found](solving.md)",
 }
 
 
