@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from kemba.stopwatch import Stage
 
 EARLY = 0.08  # share of the work before which nothing can be said of the rest
+SOON = 1.0  # s, before which nothing can be said either
 
 Course = Mapping[str, float]  # first words of a stage -> share of the time before it
 
@@ -32,10 +33,10 @@ SOLVE: Course = {
     "drawing": 0.94,
 }
 COMPARE: Course = {
-    "reading": 0.05,
-    "finding the motion": 0.15,
-    "learning the noise": 0.6,
-    "comparing": 0.8,
+    "reading": 0.0,
+    "finding the motion": 0.01,
+    "learning the noise": 0.21,
+    "comparing": 0.57,
 }
 DISCOVER: Course = {
     "reading": 0.01,
@@ -61,7 +62,7 @@ LEARN: Course = {
     **within(SOLVE, 0.75, 0.95),
     "correction": 0.95,
 }
-REVIEW: Course = {**within(COMPARE, 0.05, 0.8), "drawing": 0.8}
+REVIEW: Course = {**within(COMPARE, 0.0, 0.9), "drawing": 0.9}
 SIMULATE: Course = {"executing": 0.0}
 
 
@@ -97,11 +98,16 @@ class Left:
             self.share, self.until, self.entered = begins, ends, time.monotonic()
 
     @property
+    def known(self) -> bool:
+        """Whether more than the limit is known."""
+        return self.share >= EARLY and self.entered - self.began >= SOON
+
+    @property
     def seconds(self) -> float | None:
         """About how many seconds are left; None while nothing can be said."""
         now = time.monotonic()
         found = None
-        if self.share >= EARLY:
+        if self.known:
             whole = (self.entered - self.began) / self.share
             least = (1.0 - self.until) * whole  # what follows this stage
             found = max(whole - (now - self.began), least)
@@ -116,8 +122,7 @@ class Left:
         seconds = self.seconds
         if seconds is None:
             return ""
-        most = self.share < EARLY  # only the limit is known
-        return f"{'at most' if most else 'about'} {duration(seconds)} left"
+        return f"{'about' if self.known else 'at most'} {duration(seconds)} left"
 
 
 def duration(seconds: float) -> str:
