@@ -30,7 +30,7 @@ from kemba.ocp.task.requirement import Requirement, resolve
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.symmetry import whole
 from kemba.ocp.transcription.transcribe import Transcription
-from kemba.stopwatch import Stopwatch
+from kemba.stopwatch import Stopwatch, Tell, silent
 from kemba.trajectory import Trajectory
 
 
@@ -39,7 +39,7 @@ def plan(
     document: Document | None = None,
     model: str | Path | None = None,
     log: Path | None = None,
-    tell: Callable[[str], None] = lambda text: None,
+    tell: Tell = silent,
     watch: Watch | None = None,
     start: Trajectory | None = None,
     stop: Callable[[], bool] | None = None,
@@ -75,7 +75,7 @@ def plans_nearby(
     task: Task,
     document: Document | None = None,
     log: Path | None = None,
-    tell: Callable[[str], None] = lambda text: None,
+    tell: Tell = silent,
     watch: Watch | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> Iterator[Plan]:
@@ -126,7 +126,7 @@ def _job(
     document: Document | None,
     model: str | Path | None,
     control: Control,
-    tell: Callable[[str], None] = lambda text: None,
+    tell: Tell = silent,
     start: Trajectory | None = None,
 ) -> _Job:
     document = document or Document(task.model_dump())

@@ -68,7 +68,9 @@ def solve(
     from kemba.ocp.nlp.interrupt import Interrupt
     from kemba.ocp.task.requirement import resolve
     from kemba.report import Listener, solve_into
+    from kemba.report.drawing import drawer
     from kemba.runs import RunFolder
+    from kemba_cli.course import SOLVE
     from kemba_cli.progress import Progress
 
     start, origin = None, None
@@ -102,21 +104,16 @@ def solve(
     models = [path for name in (resolved.model, resolved.plant) for path in model_files(name)]
     inputs = [find_config(task, "tasks"), *dict.fromkeys(models), *BY_KIND.files]
     folder = RunFolder.create(out, resolved.name, inputs, force=force)
-    with Progress(quiet or json) as progress, Interrupt(lambda text: say(text, quiet)) as stop:
+    with (
+        drawer(figure) as drawing,
+        Progress(quiet or json, SOLVE) as progress,
+        Interrupt(lambda text: say(text, quiet)) as stop,
+    ):
         listener = Listener(progress.tell, progress.watch, stop)
         answer = solve_into(
-            folder,
-            resolved,
-            document,
-            listener,
-            start,
-            starts,
-            jobs,
-            replay,
-            figure,
-            origin,
-            library=not cold,
-        )
+            folder, resolved, document, listener, start, starts, jobs, replay, figure, origin,
+            drawing, library=not cold,
+        )  # fmt: skip
     if json:
         print_json(answer)
     else:
