@@ -10,6 +10,7 @@ the machine does.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import os
 import platform
@@ -26,11 +27,10 @@ TASKS = ("jump.yaml", "jump_forward.yaml")
 STAGES = {
     "plan": ("kemba.report.solving", "plan"),
     "refinement": ("kemba.ocp.refined", "on_phases"),
-    "derivatives": ("kemba.report.solving", "sensitivity_of"),
     "table": ("kemba.report.solving", "retimed"),
     "replays": ("kemba.report.solving", "_replayed"),
     "files": ("kemba.report.solving", "_write"),
-    "figure": ("kemba.report.solving", "_figure"),
+    "figure": ("kemba.report.drawing", "draw_plan"),
 }
 
 
@@ -77,10 +77,8 @@ def staged(arguments: list[str]) -> None:
         found = importlib.import_module(module)
         if hasattr(found, function):
             setattr(found, function, clock.timed(name, getattr(found, function)))
-    try:
+    with contextlib.suppress(SystemExit):
         app(arguments, standalone_mode=False)
-    except SystemExit:
-        pass
     stages = dict(clock.own)
     total = [time.process_time(), time.perf_counter() - begin]
     counted = [sum(stage[i] for stage in stages.values()) for i in (0, 1)]

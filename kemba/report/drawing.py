@@ -10,7 +10,7 @@ import os
 import signal
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -65,10 +65,8 @@ class Beside(Here):
     def begin(self, plan: Trajectory, folder: Path) -> None:
         """See `Drawer`."""
         super().begin(plan, folder)
-        try:
+        with suppress(OSError):  # it is dead: `finish` notices
             self.pipe.send(self.order)
-        except OSError:
-            pass  # it is dead: `finish` notices
 
     def finish(self) -> None:
         """See `Drawer`. Raises KembaError where the figure cannot be written."""

@@ -1,0 +1,23 @@
+"""The sensitivities of a run folder."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from kemba.ocp import load_task, task_model
+from kemba.runs import load_run
+from kemba.sensitivity import Sensitivity, sensitivity
+
+
+def sensitivity_of_run(
+    run: str | Path, tell: Callable[[str], None] = lambda text: None
+) -> Sensitivity:
+    """What small changes do to the plan of a run folder.
+
+    Raises KembaError where the folder is no run, has no plan, or its model is gone.
+    """
+    found = load_run(run)
+    task, document = load_task(found.task)
+    return sensitivity(task, task_model(task, document=document), found.trajectory,
+                       found.controller, tell)  # fmt: skip

@@ -1,0 +1,91 @@
+"""The figures of a task and its model that are changed a little, one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+from kemba.effects import Effect
+from kemba.effects.mechanics.load import Payload
+from kemba.model import Model
+from kemba.ocp.task.task import Task
+
+Problem = tuple[Task, Model]
+
+# steps that people know: 1 cm, 10 kPa, 100 g; other figures change by a tenth
+LENGTH, PRESSURE, MASS, SHARE = 0.01, 10e3, 0.1, 0.1
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One figure: its value and the `step` by which it changes, in its unit.
+
+    A whole table of an effect has the value 1: it is multiplied by a factor. `machine`: whether it
+    is a figure of the machine, so that the same commands give another motion. `at`: task and model
+    with another value.
+    """
+
+    name: str
+    unit: str
+    value: float
+    step: float
+    machine: bool
+    at: Callable[[float], Problem]
+
+    def sides(self, share: float = 1.0) -> tuple[Problem, Problem]:
+        """Task and model half a step below and half a step above, or a `share` of that."""
+        half = 0.5 * share * self.step
+        return self.at(self.value - half), self.at(self.value + half)
+
+
+def figures(task: Task, model: Model) -> list[Figure]:
+    """Height, distance, supply, payload, and every number of the model's effects."""
+    return [*_asked(task, model), *_air_and_load(task, model), *_effects(task, model)]
+
+
+def _asked(task: Task, model: Model) -> Iterator[Figure]:
+    for name in ("height", "distance"):
+        value = getattr(task, name)
+        if value is not None:
+            yield Figure(name, "m", float(value), LENGTH, False, _task_with(task, model, name))
+
+
+def _task_with(task: Task, model: Model, name: str) -> Callable[[float], Problem]:
+    return lambda value: (task.model_copy(update={name: value}), model)
+
+
+def _air_and_load(task: Task, model: Model) -> Iterator[Figure]:
+    def fed(pressure: float) -> Problem:
+        return task, Model(model.mechanism, model.effects, pressure, model.name)
+
+    def loaded(mass: float) -> Problem:
+        return task, model.with_effects([Payload.model_construct(kind="payload", m=mass)])
+
+    yield Figure("supply", "Pa", model.supply, PRESSURE, True, fed)
+    yield Figure("payload", "kg", task.payload, MASS, True, loaded)
+
+
+def _effects(task: Task, model: Model) -> Iterator[Figure]:
+    """Numbers by themselves; a table as a factor on all of it."""
+    for effect in model.effects:
+        if not effect.moves or effect.kind == "payload":
+            continue
+        numbers = effect.parameters()
+        for name in dict.fromkeys([*numbers, *(n.split("[")[0] for n in effect.tolerances())]):
+            value, label = effect.value(name), f"{effect.name}.{name}"
+            change = _effect_with(task, model, effect, name)
+            if isinstance(value, tuple):
+                yield Figure(label, "1", 1.0, SHARE, True, change)
+            elif value:
+                step = SHARE * abs(float(value))
+                yield Figure(label, numbers[name].unit, float(value), step, True, change)
+
+
+def _effect_with(task: Task, model: Model, effect: Effect, name: str) -> Callable[[float], Problem]:
+    old = effect.value(name)
+
+    def change(value: float) -> Problem:
+        new = tuple(value * x for x in old) if isinstance(old, tuple) else value
+        return task, model.with_effects([effect.bind({name: new})])
+
+    return change
