@@ -30,7 +30,7 @@ COMMON = "m mm cm s ms min kg g N kN Pa kPa MPa bar psi rad deg K degC J W Hz rp
 # SI unit and size of the units that most files have; pint gives the same numbers to the last bit
 USUAL = {
     "mm": ("m", 1e-3), "cm": ("m", 1e-2), "mm2": ("m2", 1e-6), "cm2": ("m2", 1e-4),
-    "cm3": ("m3", 1e-6), "mL": ("m3", 1e-6), "L": ("m3", 1e-3), "ms": ("s", 1e-3),
+    "cm3": ("m3", 1e-2**3), "mL": ("m3", 1e-6), "L": ("m3", 1e-3), "ms": ("s", 1e-3),
     "m/s": ("m.s-1", 1.0), "g": ("kg", 1e-3), "kN": ("N", 1e3), "kPa": ("Pa", 1e3),
     "MPa": ("Pa", 1e6), "bar": ("Pa", 1e5), "%": ("1", 1e-2), "deg": ("rad", math.pi / 180),
 }  # fmt: skip

@@ -9,11 +9,18 @@ from kemba.effects import Effect
 from kemba.effects.mechanics.load import Payload
 from kemba.model import Model
 from kemba.ocp.task.task import Task
+from kemba.settings import Settings, setting
 
 Problem = tuple[Task, Model]
 
-# steps that people know: 1 cm, 10 kPa, 100 g; other figures change by a tenth
-LENGTH, PRESSURE, MASS, SHARE = 0.01, 10e3, 0.1, 0.1
+
+class Steps(Settings):
+    """By how much figures change."""
+
+    length: float = setting(0.01, "m", "of height and distance", "convention: a centimetre")
+    pressure: float = setting(10e3, "Pa", "of the supply", "convention: as regulators are read")
+    mass: float = setting(0.1, "kg", "of the payload", "convention: what a sensor weighs")
+    share: float = setting(0.1, "1", "of the numbers of effects", "convention: a tenth")
 
 
 @dataclass(frozen=True)
@@ -47,7 +54,14 @@ def _asked(task: Task, model: Model) -> Iterator[Figure]:
     for name in ("height", "distance"):
         value = getattr(task, name)
         if value is not None:
-            yield Figure(name, "m", float(value), LENGTH, False, _task_with(task, model, name))
+            yield Figure(
+                name,
+                "m",
+                float(value),
+                Steps.current().length,
+                False,
+                _task_with(task, model, name),
+            )
 
 
 def _task_with(task: Task, model: Model, name: str) -> Callable[[float], Problem]:
@@ -55,18 +69,21 @@ def _task_with(task: Task, model: Model, name: str) -> Callable[[float], Problem
 
 
 def _air_and_load(task: Task, model: Model) -> Iterator[Figure]:
+    steps = Steps.current()
+
     def fed(pressure: float) -> Problem:
         return task, Model(model.mechanism, model.effects, pressure, model.name)
 
     def loaded(mass: float) -> Problem:
         return task, model.with_effects([Payload.model_construct(kind="payload", m=mass)])
 
-    yield Figure("supply", "Pa", model.supply, PRESSURE, True, fed)
-    yield Figure("payload", "kg", task.payload, MASS, True, loaded)
+    yield Figure("supply", "Pa", model.supply, steps.pressure, True, fed)
+    yield Figure("payload", "kg", task.payload, steps.mass, True, loaded)
 
 
 def _effects(task: Task, model: Model) -> Iterator[Figure]:
     """Numbers by themselves; a table as a factor on all of it."""
+    share = Steps.current().share
     for effect in model.effects:
         if not effect.moves or effect.kind == "payload":
             continue
@@ -75,9 +92,9 @@ def _effects(task: Task, model: Model) -> Iterator[Figure]:
             value, label = effect.value(name), f"{effect.name}.{name}"
             change = _effect_with(task, model, effect, name)
             if isinstance(value, tuple):
-                yield Figure(label, "1", 1.0, SHARE, True, change)
+                yield Figure(label, "1", 1.0, share, True, change)
             elif value:
-                step = SHARE * abs(float(value))
+                step = share * abs(float(value))
                 yield Figure(label, numbers[name].unit, float(value), step, True, change)
 
 

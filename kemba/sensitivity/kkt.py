@@ -20,11 +20,26 @@ import numpy as np
 
 from kemba.ocp.nlp.ipopt import Iterate
 from kemba.ocp.phases.program import Part, PhaseProgram
+from kemba.settings import Settings, setting
 
 Vector = np.ndarray
-NEAR = 1e-10  # scaled; a bound that is nearer is touched
-OFF = 1e-9  # a multiplier below belongs to a row that is not active
-SOFT = 1e-9  # on the diagonal, against rows that say the same
+
+
+class KktSettings(Settings):
+    """What keeps the matrix regular."""
+
+    near: float = setting(
+        1e-10, "1", "scaled distance from a bound below which it counts as touched",
+        "convention: far below IPOPT's distance from an active bound, 1e-8",
+    )  # fmt: skip
+    off: float = setting(
+        1e-9, "1", "least multiplier of a row, by which distances are divided",
+        "convention: such a row is not active",
+    )  # fmt: skip
+    soft: float = setting(
+        1e-9, "1", "on the diagonal, against rows that say the same",
+        "convention: far below the entries, about one",
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -86,7 +101,7 @@ def _evaluated(part: Part, repeats: int) -> ca.Function:
 def _less(high: Vector, low: Vector) -> Vector:
     """The difference; of equal infinite bounds it is 0."""
     with np.errstate(invalid="ignore"):
-        return np.nan_to_num(high - low)
+        return np.asarray(np.nan_to_num(high - low))
 
 
 @dataclass(frozen=True)
@@ -113,21 +128,21 @@ class Kkt:
 
         assert point.lam_g is not None
         assert point.lam_x is not None
-        x, lam, mu = point.Y, point.lam_g, point.lam_x
+        x, lam, mu, s = point.Y, point.lam_g, point.lam_x, KktSettings.current()
         problem = program.problem
         half = _sparse(problem.hess_lag(x, [], 1.0, lam))
         g, jacobian = problem.jac_g(x, [])
         g, J = np.array(g).ravel(), _sparse(jacobian)
         W = half + sparse.triu(half, 1).T
         free = program.lower < program.upper
-        pull = np.abs(mu) / np.maximum(_distance(x, mu, program.lower, program.upper), NEAR)
+        pull = np.abs(mu) / np.maximum(_distance(x, mu, program.lower, program.upper), s.near)
         away = _distance(g, lam, program.g_lower, program.g_upper)
         equal = program.g_lower == program.g_upper
-        loose = np.where(equal, SOFT, away / np.maximum(np.abs(lam), OFF) + SOFT)
+        loose = np.where(equal, s.soft, away / np.maximum(np.abs(lam), s.off) + s.soft)
         both = sparse.vstack([W, J]).tocsc()
         matrix = sparse.bmat(
             [
-                [W[free][:, free] + sparse.diags(pull[free] + SOFT), J[:, free].T],
+                [W[free][:, free] + sparse.diags(pull[free] + s.soft), J[:, free].T],
                 [J[:, free], -sparse.diags(loose)],
             ]
         )
@@ -147,7 +162,7 @@ class Kkt:
         )
         given = self.fixed @ moved[~self.free]
         right -= np.concatenate([given[:n][self.free], given[n:]])
-        dx = moved.copy()
+        dx: Vector = moved.copy()
         dx[self.free] = self.solver.solve(right)[: self.free.sum()]
         return dx
 
@@ -159,7 +174,7 @@ def _padded(values: Vector, size: int) -> Vector:
 
 def _distance(values: Vector, multiplier: Vector, lower: Vector, upper: Vector) -> Vector:
     """How far values are from the bound that their multiplier is about."""
-    return np.abs(np.where(multiplier > 0, upper - values, values - lower))
+    return np.asarray(np.abs(np.where(multiplier > 0, upper - values, values - lower)))
 
 
 def _sparse(matrix: ca.DM) -> Any:

@@ -79,10 +79,10 @@ def write_sensitivity(found: Sensitivity, path: Path) -> None:
 
 
 def _cells(figure: Figure, executed: Executed | None, new: Replanned | None) -> list[str]:
-    e, r = executed, new
-    numbers = [figure.value, figure.step]
-    numbers += [e.apex, e.touchdown, e.end_x, e.end_z, float(e.lands)] if e else [None] * 5  # type: ignore[list-item]
-    numbers += [r.cost, r.duration, r.touchdown, r.apex] if r else [None] * 4  # type: ignore[list-item]
+    e, r = executed or Executed(), new or Replanned()
+    lands = float(e.lands) if executed else None
+    numbers = [figure.value, figure.step, e.apex, e.touchdown, e.end_x, e.end_z, lands]
+    numbers += [r.cost, r.duration, r.touchdown, r.apex]
     return [figure.name, figure.unit, *map(_text, numbers)]
 
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from kemba.config import dump_yaml
 from kemba.effects.base import Effect
@@ -151,7 +151,7 @@ def _fit(
     pieces = np.stack([j[blocks == b].T @ r[blocks == b] for b in np.unique(blocks)])
     count = len(pieces)
     covariance = h @ (pieces.T @ pieces) @ h * count / max(count - 1, 1)
-    sd = np.sqrt(np.diag(covariance)) * student.ppf(0.975, max(count - 1, 1))
+    sd = np.sqrt(np.diag(covariance)) * stdtrit(max(count - 1, 1), 0.975)
     figures = []
     for i, name in enumerate(names):
         factor, spread = 1.0 + found.x[i], sd[i]
