@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from kemba.effects import Effect
 from kemba.effects.mechanics.load import Payload
+from kemba.errors import KembaError, suggest
 from kemba.model import Model
 from kemba.ocp.task.task import Task
 from kemba.settings import Settings, setting
@@ -45,9 +46,17 @@ class Figure:
         return self.at(self.value - half), self.at(self.value + half)
 
 
-def figures(task: Task, model: Model) -> list[Figure]:
-    """Height, distance, supply, payload, and every number of the model's effects."""
-    return [*_asked(task, model), *_air_and_load(task, model), *_effects(task, model)]
+def figures(task: Task, model: Model, only: Sequence[str] = ()) -> list[Figure]:
+    """Height, distance, supply, payload, and every number of the model's effects.
+
+    `only`: the names of those that are wanted. Raises KembaError where there is no such figure.
+    """
+    found = [*_asked(task, model), *_air_and_load(task, model), *_effects(task, model)]
+    names = [figure.name for figure in found]
+    for name in only:
+        if name not in names:
+            raise KembaError(task.name, f"no figure '{name}'", hint=suggest(name, names))
+    return [figure for figure in found if not only or figure.name in only]
 
 
 def _asked(task: Task, model: Model) -> Iterator[Figure]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -47,12 +47,14 @@ def sensitivity(
     table: Trajectory,
     tell: Callable[[str], None] = lambda text: None,
     control: Control | None = None,
+    only: Sequence[str] = (),
 ) -> Sensitivity:
-    """Both kinds for all figures of a task and its `model`.
+    """Both kinds for the figures of a task and its `model`; `only`: the names of those wanted.
 
-    `table`: the controller's table of the `plan`. Raises KembaError where it cannot be executed.
+    `table`: the controller's table of the `plan`. Raises KembaError where it cannot be executed,
+    and where there is no such figure.
     """
-    listed = figures(task, model)
+    listed = figures(task, model, only)
     machine = [figure for figure in listed if figure.machine]
     tell(f"the same commands, {len(machine)} figures")
     executed = iter(of_commands(model, plan, table, machine))

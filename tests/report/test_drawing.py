@@ -43,7 +43,8 @@ def test_a_dead_process_is_replaced_and_errors_are_told(plan: Trajectory, tmp_pa
     beside.begin(plan, tmp_path)
     beside.finish()
     assert (tmp_path / FIGURE).is_file()
-    beside.begin(plan, tmp_path / "missing")
+    (tmp_path / "taken").write_text("not a folder", encoding="utf-8")
+    beside.begin(plan, tmp_path / "taken")
     with pytest.raises(KembaError, match=r"cannot be written"):
         beside.finish()
     beside.close()

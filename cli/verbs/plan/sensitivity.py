@@ -17,6 +17,9 @@ def sensitivity(
     out: Annotated[
         Path | None, typer.Option(help="CSV to write (a new sensitivity.csv in RUN).")
     ] = None,
+    only: Annotated[
+        list[str] | None, typer.Option(help="A figure such as supply or contact.mu; else all.")
+    ] = None,
     force: Force = False,
     own_effects: OwnEffects = None,
     json: Json = False,
@@ -37,7 +40,7 @@ def sensitivity(
     run = run or newest(quiet, "certificate.json")
     path = place_for(out, run / "sensitivity.csv", force)
     with Progress(quiet or json) as progress:
-        found = sensitivity_of_run(run, progress.tell)
+        found = sensitivity_of_run(run, progress.tell, only or ())
     write_sensitivity(found, path)
     if found.unsolved:
         say(f"no columns replanned/...: {found.unsolved}", quiet)
