@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kemba.api.loading import settings
-from kemba.api.result import Progress, Result, silent
+from kemba.api.result import Result
 from kemba.config import Document, beside, find_config
 from kemba.effects import BY_KIND
 from kemba.files import read_json
@@ -16,6 +16,7 @@ from kemba.model.spec import model_files
 from kemba.ocp import Task, load_task
 from kemba.report import Listener, solve_into
 from kemba.runs import Run, RunFolder, load_run
+from kemba.stopwatch import Tell, silent
 from kemba.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -73,7 +74,7 @@ def plan(
     model: str | Path | None = None,
     starts: int = 1,
     replay: bool = True,
-    progress: Progress = silent,
+    progress: Tell = silent,
     **changes: Any,
 ) -> Planned:
     """Plan a motion and certify it, as `kemba-opt solve` does.

@@ -22,6 +22,9 @@ class DiscoverSettings(Settings):
         BY_HAND,
         decides=True,
     )
+    apart: float = setting(
+        1.96, "1", "sigmas by which an effect differs from none", "convention: its 95 % interval"
+    )
     matters_too: float = setting(
         0.3, "1", "the same for an effect beside a stronger one", BY_HAND, decides=True
     )

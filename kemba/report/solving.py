@@ -26,6 +26,7 @@ from kemba.plant.execution.retiming import retimed
 from kemba.report.drawing import Drawer, Here
 from kemba.report.verdict import verdicts
 from kemba.runs import PLANT_RUN, RunFolder, write_json
+from kemba.stopwatch import Tell, silent
 from kemba.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ if TYPE_CHECKING:
 class Listener:
     """What is called at each stage and iteration, and what may ask to stop."""
 
-    tell: Callable[[str], None] = lambda text: None
+    tell: Tell = silent
     watch: Watch | None = None
     stop: Callable[[], bool] | None = None
 
@@ -92,16 +93,17 @@ def solve_into(
             drawer.begin(found.trajectory, folder.path)
         plant: Trajectory | None = None
         if replay and table is not None and found.status.plan:
-            listener.tell("replay")
+            listener.tell("replay: the times of controller.csv")
             if share is None:
                 table = retimed(found.model, found.trajectory, table)
-            replayed, plant = _replayed(found, table)
+            replayed, plant = _replayed(found, table, listener.tell)
             result |= replayed
             if share is not None:
                 result |= {"robust": share.summary()}
                 result["sentence"] += f"; {share.sentence}"
         _keep(found, result, Motions(table, plant), folder)
         if figure and table is not None:
+            listener.tell("drawing")
             drawer.finish()
     except BaseException:
         with suppress(WriteError):  # the first error says more
@@ -123,7 +125,9 @@ def _chosen(
     return chosen.plan, chosen.table, chosen.share
 
 
-def _replayed(found: Plan, table: Trajectory) -> tuple[dict[str, Any], Trajectory | None]:
+def _replayed(
+    found: Plan, table: Trajectory, tell: Tell
+) -> tuple[dict[str, Any], Trajectory | None]:
     """The executions of a plan with the verdict, and the motion of the plant.
 
     The plan stays solved only if all executions come near enough.
@@ -132,7 +136,7 @@ def _replayed(found: Plan, table: Trajectory) -> tuple[dict[str, Any], Trajector
     try:
         plant = counterpart(task.model, task.payload, task.supply, task.plant, changes=task.effects)
         other = another_robot(task.model, task.plant)
-        done = executions(found.model, found.trajectory, table, plant)
+        done = executions(found.model, found.trajectory, table, plant, tell)
     except KembaError as error:  # a model that the simulator cannot execute still has its plan
         return _unconfirmed(found, f"it cannot be simulated: {error}"), None
     executed = summaries(found.model, done)

@@ -14,6 +14,7 @@ import kemba
 from kemba.errors import KembaError
 from kemba.files import atomic_text, plain
 from kemba.folders import place_for
+from kemba.logs import load_map
 from kemba.plotting.draw import machine_of
 from kemba.plotting.robot.sticks import CYLINDER, Pose, poses
 from kemba.plotting.source import Source, load_source
@@ -37,12 +38,14 @@ def view_run(
     out: str | Path | None = None,
     model: str | None = None,
     force: bool = False,
+    column_map: str | Path | None = None,
 ) -> Path:
     """The page of a run folder or a CSV; written to `out` or as a new file beside the motion.
 
-    Raises KembaError where columns are missing or the page cannot be written.
+    `column_map`: for the log of another program. Raises KembaError where columns are missing or the
+    page cannot be written.
     """
-    source = load_source(run)
+    source = load_source(run, load_map(column_map) if column_map else None)
     assert source.path is not None
     return write_view(source, place_for(out, source.path.with_name("view.html"), force), model)
 

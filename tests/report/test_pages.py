@@ -142,6 +142,9 @@ def test_another_programs_columns_come_back(run: Path, tmp_path: Path) -> None:
     figure = tmp_path / "foreign.png"
     drawn = ("plot", str(out), "--map", str(tmp_path / "other.yaml"), "--save", str(figure))
     assert call(*drawn).exit_code == 0 and figure.is_file()
+    page = tmp_path / "foreign.html"
+    seen = call("view", str(out), "--map", str(tmp_path / "other.yaml"), "--out", str(page))
+    assert seen.exit_code == 0 and "<canvas" in page.read_text(), seen.output
 
 
 def test_wrong_endings_are_told(run: Path, tmp_path: Path) -> None:

@@ -67,6 +67,7 @@ def solve(
     from kemba.report import Listener, solve_into
     from kemba.report.drawing import drawer
     from kemba.runs import RunFolder
+    from kemba_cli.course import SOLVE
     from kemba_cli.progress import Progress
 
     start, origin = None, None
@@ -102,7 +103,7 @@ def solve(
     folder = RunFolder.create(out, resolved.name, inputs, force=force)
     with (
         drawer(figure) as drawing,
-        Progress(quiet or json) as progress,
+        Progress(quiet or json, SOLVE) as progress,
         Interrupt(lambda text: say(text, quiet)) as stop,
     ):
         listener = Listener(progress.tell, progress.watch, stop)

@@ -154,7 +154,9 @@ class Continuation:
 
     def _read_anew(self, start: Trajectory) -> Refined:
         self.tell("from the earlier plan: its phases read anew")
-        found = refine(self.model, self.task, self.requirements, start, control=self.control)
+        found = refine(
+            self.model, self.task, self.requirements, start, control=self.control, tell=self.tell
+        )
         self.steps.append(Attempt("phases read anew", found.ending, found.iterations))
         return found
 
