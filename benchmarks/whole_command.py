@@ -74,8 +74,8 @@ def staged(arguments: list[str]) -> None:
 
     clock = Clock()
     for name, (module, function) in STAGES.items():
-        found = importlib.import_module(module)
-        if hasattr(found, function):
+        with contextlib.suppress(ModuleNotFoundError, AttributeError):  # an older kemba
+            found = importlib.import_module(module)
             setattr(found, function, clock.timed(name, getattr(found, function)))
     with contextlib.suppress(SystemExit):
         app(arguments, standalone_mode=False)

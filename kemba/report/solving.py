@@ -69,8 +69,8 @@ def solve_into(
     cores. `origin`: an earlier plan to continue for the changed figures. `replay`: execute the
     plan on the same model and on the plant, and compare both with the task's tolerances; a plan
     that misses them is `acceptable`, not `solved`. `drawer`: what draws the figure, this process
-    when it is None. Raises KembaError where the task or a file is
-    wrong; the manifest then says `failed`.
+    when it is None. Raises KembaError where the task or a file is wrong; the manifest then says
+    `failed`.
     """
     dump_yaml(task.model_dump(exclude_none=True), folder / "task.yaml")
     log = folder / "solver.log"
@@ -101,10 +101,10 @@ def solve_into(
             if share is not None:
                 result |= {"robust": share.summary()}
                 result["sentence"] += f"; {share.sentence}"
-        _keep(found, result, Motions(table, plant), folder)
-        if figure and table is not None:
+        drawn = figure and table is not None
+        if drawn:
             listener.tell("drawing")
-            drawer.finish()
+        _keep(found, result, Motions(table, plant), folder, drawer if drawn else None)
     except BaseException:
         with suppress(WriteError):  # the first error says more
             folder.finish("failed")
@@ -164,10 +164,18 @@ def _unconfirmed(found: Plan, cause: str, remarks: Sequence[str] = ()) -> dict[s
     return {"status": Status.ACCEPTABLE, "good": False, "sentence": "; ".join(parts)}
 
 
-def _keep(found: Plan, result: dict[str, Any], motions: Motions, folder: RunFolder) -> None:
+def _keep(
+    found: Plan,
+    result: dict[str, Any],
+    motions: Motions,
+    folder: RunFolder,
+    drawer: Drawer | None,
+) -> None:
     """Write the run folder; when that fails, write the plan elsewhere and say where."""
     try:
         _write(found, result, motions, folder.path)
+        if drawer is not None:
+            drawer.finish()
     except WriteError as error:
         elsewhere = Path(tempfile.mkdtemp(prefix="kemba-kept-"))
         try:

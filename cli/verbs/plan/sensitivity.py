@@ -35,11 +35,12 @@ def sensitivity(
     from kemba.folders import place_for
     from kemba.report.sensitivity import sensitivity_of_run
     from kemba.sensitivity import write_sensitivity
+    from kemba_cli.course import SENSITIVITY
     from kemba_cli.progress import Progress
 
     run = run or newest(quiet, "certificate.json")
     path = place_for(out, run / "sensitivity.csv", force)
-    with Progress(quiet or json) as progress:
+    with Progress(quiet or json, SENSITIVITY) as progress:
         found = sensitivity_of_run(run, progress.tell, only or ())
     write_sensitivity(found, path)
     if found.unsolved:

@@ -177,4 +177,4 @@ def _agreement(information: Array, pull: Array) -> float:
     certainty = np.linalg.inv(spread + imperfect**2 * np.eye(len(a)))
     ones = np.ones(len(a))
     apart = a - ones @ certainty @ a / (ones @ certainty @ ones)
-    return chi2_above(apart @ certainty @ apart, len(a) - 1)
+    return chi2_above(float(apart @ certainty @ apart), len(a) - 1)
