@@ -64,6 +64,7 @@ LEARN: Course = {
 }
 REVIEW: Course = {**within(COMPARE, 0.0, 0.9), "drawing": 0.9}
 SIMULATE: Course = {"executing": 0.0}
+SENSITIVITY: Course = {"the same commands": 0.02, "the plan made anew": 0.35}
 
 
 def span(course: Course, stage: str) -> tuple[float, float]:

@@ -35,7 +35,7 @@ def test_a_stage_is_a_text_and_a_count() -> None:
     assert (stage.name, stage.part, stage.parts) == ("refitting valve_delay", 2, 8)
 
 
-@pytest.mark.parametrize("course", [SOLVE, COMPARE, DISCOVER, LEARN, REVIEW])
+@pytest.mark.parametrize("course", [SOLVE, COMPARE, DISCOVER, LEARN, REVIEW, courses.SENSITIVITY])
 def test_every_course_goes_forward(course: courses.Course) -> None:
     assert list(course.values()) == sorted(course.values())
     assert all(0.0 <= share < 1.0 for share in course.values())
