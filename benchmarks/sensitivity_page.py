@@ -83,11 +83,13 @@ class Change:
 
     @property
     def value(self) -> Any:
-        """What the setting becomes; whole numbers stay whole and at least one."""
-        old = self.about.default
+        """What the setting becomes; whole numbers stay whole and at least one, and no value leaves
+        the range in which it has a meaning."""
+        old, most = self.about.default, self.about.metadata["at_most"]
         if isinstance(old, tuple):
             return tuple(v * self.factor for v in old)
-        return max(1, round(old * self.factor)) if isinstance(old, int) else old * self.factor
+        new = max(1, round(old * self.factor)) if isinstance(old, int) else old * self.factor
+        return min(new, most)
 
 
 def read(path: Path) -> list[Record]:

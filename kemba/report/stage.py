@@ -58,16 +58,24 @@ def stage(
     Raises KembaError when columns are missing.
     """
     shown = scene(source, model, ghost)
-    text = json.dumps(plain(shown), separators=(",", ":"), allow_nan=False)
-    text = text.replace("<", "\\u003c")  # no name of a leg can end the script
     who = f"Shown: {name or source.name}."
     if ghost is not None:
         who += f" Pale blue: {'the plan' if ghost.plan else ghost.name}."
     high = max(centre[1] for centre in shown["motions"][0]["centres"])
     alt = f"{who} The robot in 3-D from the side; its body rises to {high:.2f} m."
     return fill(
-        "stage.html", who=escape(who), alt=escape(alt), viewer=page_text("viewer.js"), scene=text
+        "stage.html",
+        who=escape(who),
+        alt=escape(alt),
+        viewer=page_text("viewer.js"),
+        scene=script_text(shown),
     )
+
+
+def script_text(data: dict[str, Any]) -> str:
+    """Data as JSON that can stand within a script: no name in it can end the script."""
+    text = json.dumps(plain(data), separators=(",", ":"), allow_nan=False)
+    return text.replace("<", "\\u003c")
 
 
 def scene(source: Source, model: str | None = None, ghost: Source | None = None) -> dict[str, Any]:

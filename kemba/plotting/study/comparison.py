@@ -58,7 +58,7 @@ def columns_of(listed: Sequence[ConditionBin]) -> list[list[Column]]:
 def in_words(columns: Sequence[Column]) -> list[tuple[str, ...]]:
     """The labels of columns: phase on up to two lines, open valves, place in the stroke."""
     modes = {m: w[:3] if len(columns) > CLOSE else w for m, w in MODES.items()}
-    found = []
+    found: list[tuple[str, ...]] = []
     for phase, mode, region in columns:
         words = PHASES.get(phase, phase)
         head, _, last = words.rpartition(" ")

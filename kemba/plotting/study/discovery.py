@@ -84,7 +84,9 @@ def plot_steps(found: Discovery) -> Figure:
     """Errors of fitted and held-out data as effects are added: the numbers of the answer."""
     names = [name for name, _ in found.answer.ladder]
     fitted = [found.search.points[step].fitted_error for step in rungs(found.search, found.best)]
-    return plot_ladder(names, fitted, [error for _, error in found.answer.ladder])
+    return plot_ladder(
+        names, [*found.earlier, *fitted], [error for _, error in found.answer.ladder]
+    )
 
 
 def _residuals(found: Discovery) -> tuple[Rows, dict[str, Array]]:
