@@ -119,9 +119,10 @@ def _built_anew(search: Search, best: Hypothesis, holdout: Problem | None) -> Di
 
 def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> Discovery:
     """What the finished `search` with its `best` hypothesis allows to say."""
-    search.say("asking whether nothing would look like this")
+    search.say("asking how often logs in which nothing is missing look like these")
     test, likeliest = null_test(search), best
     best, p_value, dismissed = _believed(search, likeliest, test)
+    search.say("asking whether the answer is complete")
     holdout = holdout.heard_as(search.problem) if holdout else None
     # what is too small to be reported still explains: a formula must do better than with it
     slight = best and material(search, likeliest) == best
@@ -130,6 +131,7 @@ def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> 
     if drift is not None and formula is not None and drift.nats > formula.gain:
         formula = None
     doubts = Doubts() if formula else doubts_about(search, best, drift, holdout)
+    search.say("ranking the effects")
     ranking = ranked(search, best, dismissed, holdout)
     answer = _answer(search, best, p_value, test, ranking, formula, holdout, doubts)
     return Discovery(answer, search, best, holdout)

@@ -61,8 +61,9 @@ class VerdictSettings(Settings):
         0.5, "1", "the same where what is left repeats itself", BY_HAND, decides=True
     )
     sure: float = setting(
-        0.95, "1", "probability from which an effect is sure", "convention: 95 %", decides=True
-    )
+        0.95, "1", "probability from which an effect is sure", "convention: 95 %", decides=True,
+        at_most=0.999,
+    )  # fmt: skip
 
 
 class RankingSettings(Settings):

@@ -33,8 +33,8 @@ def half() -> Transcription:
 
 @pytest.mark.parametrize("points", [1, Functions.current().few, POINTS])
 def test_abreast_is_the_same_to_the_last_bit(half: Transcription, points: int) -> None:
-    block, p, rng = half.problem.blocks[0], half.problem.p, np.random.default_rng(0)
-    at = [block.z, ca.vertcat(p, block.constants)]
+    block, rng = half.problem.blocks[0].code, np.random.default_rng(0)
+    at = [block.z, block.given]
     lam_f, lam_g = block.multipliers
     f = ca.Function("f", [*at, lam_f, lam_g], [block.g, ca.SX(block.hessian.nz[:])])
     z = rng.uniform(0.2, 0.9, (block.z.numel(), points))

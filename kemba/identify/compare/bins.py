@@ -16,6 +16,16 @@ from kemba.settings import BY_HAND, Settings, setting
 
 ASSUMED = ("/foot/x", "/foot/z", "/stop")  # channels that no sensor measures
 STEADY = ("rest", "stance2")  # phases in which they can be relied on
+# phases of motion and open valves (extend, retract) in words, in the order in which they are shown
+PHASES = {
+    "rest": "at rest",
+    "stance2": "two feet stand",
+    "stance1": "one foot stands",
+    "impact": "touchdown",
+    "flight": "in the air",
+    "moving": "moving",
+}
+MODES = {"00": "closed", "10": "extend", "01": "retract", "11": "both"}
 
 
 class BinSettings(Settings):

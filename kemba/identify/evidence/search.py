@@ -16,6 +16,7 @@ from kemba.identify.evidence.refit import Fit, refit
 from kemba.identify.evidence.search_settings import SearchSettings
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis, log_prior, probabilities
 from kemba.identify.problem.problem import Problem
+from kemba.stopwatch import Stage
 
 
 @dataclass
@@ -38,7 +39,7 @@ class Search:
     def run(self) -> Hypothesis:
         """The likeliest hypothesis; everything that was refitted stays in `points`."""
         leaders = SearchSettings.current().leaders
-        self.say("fitting the model as it is")
+        self.say("fitting the model as it is, and a slope for every effect")
         self.start()
         best = self._round(NULL, leaders)
         self.say(f"first guess: {' + '.join(best) or 'nothing'}")
@@ -49,8 +50,8 @@ class Search:
             self.base.seen_from(self.points[best].fit.theta)
             self.problem = self.base.problem
             self.points = {NULL: self.base.point}
-            for hypothesis in promising:
-                self.visit(hypothesis)
+            for number, hypothesis in enumerate(promising, start=1):
+                self.visit(hypothesis, number, len(promising))
             best = self._round(NULL, leaders)
             best = self._swap(self._grow(best))
         return best
@@ -143,7 +144,7 @@ class Search:
         gain = table[order[0]] - self.points[given].log_evidence
         reach = max(settings.far, settings.far_share * gain)
         sure = settings.sure_grown if given else settings.sure
-        for hypothesis in order:
+        for number, hypothesis in enumerate(order, start=1):
             if table[hypothesis] < least:
                 break
             if given and table[hypothesis] < self.points[given].log_evidence:
@@ -152,7 +153,7 @@ class Search:
                 break
             if time.monotonic() > self.deadline:
                 break
-            self.visit(hypothesis)
+            self.visit(hypothesis, number, len(order))
         if given == NULL and self.points[NULL].fitted_error > settings.structural:
             for structure in sorted(self.problem.structures):
                 self.visit((structure,))
@@ -173,10 +174,11 @@ class Search:
                 single[(name,)] = max(single[(name,)], base)
         return single
 
-    def visit(self, hypothesis: Hypothesis) -> LinearisationPoint:
-        """Refit a hypothesis, once, and score it there."""
+    def visit(self, hypothesis: Hypothesis, number: int = 1, of: int = 1) -> LinearisationPoint:
+        """Refit a hypothesis, once, and score it there; `number` `of` so many, for who waits."""
         if hypothesis not in self.points:
-            self.say(f"refitting {' + '.join(hypothesis)}")
+            name = f"refitting {' + '.join(hypothesis)}"
+            self.say(Stage(name, number, of) if of > 1 else name)
             fit = refit(self.problem, hypothesis, self._guess(hypothesis), self.base.frozen)
             self._learn_secant(hypothesis, fit)
             self.points[hypothesis] = self._point(hypothesis, fit)

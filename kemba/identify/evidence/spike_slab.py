@@ -43,8 +43,10 @@ class SpikeSlabSettings(Settings):
         decides=True,
     )
     nothing: float = setting(
-        0.5, "1", "prior probability that nothing is missing", "convention: even odds", decides=True
-    )
+        0.5, "1", "prior probability that nothing is missing", "convention: even odds",
+        decides=True,
+        at_most=0.9,
+    )  # fmt: skip
     single: float = setting(
         0.4, "1", "prior probability of one effect, shared by all", BY_HAND, decides=True
     )
