@@ -18,18 +18,21 @@ def experiment(
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Write the rig test that best separates the rivals of an answer.
+    """Design the test that best separates the rivals of an answer, and write it as a rig YAML.
 
     Example: kemba-opt experiment answer --out next.yaml
     """
     from kemba.folders import fresh
     from kemba.identify.experiment import propose
+    from kemba_cli.progress import Progress
 
     path = fresh(out or answer / "experiment.yaml", force)
-    found = propose(answer, path)
+    with Progress(quiet or json) as progress:
+        found = propose(answer, path, progress.tell)
+    following = f"kemba-opt simulate {path} --noise"
     if json:
-        facts = {"nats": found.nats, "rivals": found.rivals, "sentence": found.sentence}
-        print_json({"experiment": str(path), "rig": found.rig.name, **facts})
+        print_json({"experiment": str(path), **found.json(), "next": following})
         return
     typer.echo(path)
     say(found.sentence, quiet)
+    say(f"rehearse it on the simulated plant, then run it on the rig: {following}", quiet)
