@@ -44,6 +44,7 @@ PAIRS = (  # what is there, and what it is taken for
     ("stribeck_friction", "seal_friction"),
 )
 SEED = 9000
+HALF = 0.501  # half, up to rows
 LONGEST = 5.0  # s; standard tests with longer logs are judged by what is expected of them only
 
 
@@ -110,6 +111,11 @@ def table(records: list[dict[str, Any]]) -> str:
         f"second of log than the best standard test was expected in {faster} of {count}. One "
         f"design took {seconds:.0f} s of processor time (median)."
     )
+
+
+def _share(record: dict[str, Any]) -> float:
+    """Log time of the designed test as a share of that of the best standard test."""
+    return float(record["designed"]["log_s"] / record["standard"]["log_s"])
 
 
 def _pace(side: dict[str, Any]) -> float:

@@ -71,7 +71,7 @@ def fitted(problem: BenchProblem, names: Sequence[str]) -> Rivals:
     found = {}
     for name in names:
         theta = best_fit(problem, typical, name)
-        found[name] = {k: theta[k] for k in problem.candidates[name].keys()}
+        found[name] = {key: theta[key] for key in problem.candidates[name].keys()}  # noqa: SIM118
     return Rivals(found, {})
 
 

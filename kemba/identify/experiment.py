@@ -14,6 +14,7 @@ from kemba.identify.design.menu import Judged
 from kemba.identify.design.rig import RigDesign, design_rig_test
 from kemba.identify.design.rivals import contenders
 from kemba.identify.design.settings import ExperimentSettings
+from kemba.identify.design.words import strength
 from kemba.model.spec import load_model
 from kemba.plant.rig.rigs import Rig
 
@@ -67,7 +68,7 @@ class Proposal:
         return f"{text}, {chosen.pace / standard.pace:.2g} times as much per second as {other}."
 
     def json(self) -> dict[str, Any]:
-        """The figures behind the sentence; those of `designed` and `standard` have the same keys."""
+        """The figures behind the sentence; `designed` and `standard` have the same keys."""
         design = self.design
         return {
             "rig": self.rig.name,
@@ -80,12 +81,6 @@ class Proposal:
             "standard": _figures(design.standard),
             "tried": design.tried,
         }
-
-
-def strength(nats: float) -> str:
-    """Evidence in words after Kass and Raftery 1995: 1, 3 and 5 nats are their steps."""
-    steps = {5.0: "decisive", 3.0: "strong", 1.0: "weak"}
-    return next((word for least, word in steps.items() if nats >= least), "almost no")
 
 
 def propose(

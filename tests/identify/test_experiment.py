@@ -14,7 +14,7 @@ from kemba.errors import KembaError
 from kemba.identify.design.rig import design_rig_test
 from kemba.identify.design.rivals import contenders
 from kemba.identify.design.separation import distance
-from kemba.identify.design.settings import SearchSettings
+from kemba.identify.design.settings import CourseSettings, ExperimentSettings, SearchSettings
 from kemba.identify.experiment import propose
 from kemba.model.spec import load_model
 from kemba.plant.rig.bench import load_rig
@@ -23,8 +23,9 @@ from kemba.settings import changed
 
 @pytest.fixture
 def short_search() -> Iterator[None]:
-    """A search that tries few tests."""
-    with changed(SearchSettings, members=6, generations=1):
+    """A search that tries few short tests, and looks at one test of each rig only."""
+    few = changed(SearchSettings, members=6, generations=1)
+    with few, changed(ExperimentSettings, tests=1), changed(CourseSettings, longest=0.8):
         yield
 
 

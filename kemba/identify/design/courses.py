@@ -37,7 +37,7 @@ def course(point: Array, duration: float, stroke: float) -> CourseRig:
 
 def _reachable(places: Array, reach: float) -> Array:
     """Places (k,), each within `reach` of the one before."""
-    found = places.copy()
+    found: Array = places.copy()
     for i in range(1, len(found)):
         found[i] = np.clip(found[i], found[i - 1] - reach, found[i - 1] + reach)
     return found
@@ -65,7 +65,7 @@ def beginnings(count: int, seed: int) -> Array:
     plain = np.array(list(_plain(settings.places, settings.pulses)))
     more = max(count - len(plain), 1)
     even = qmc.Sobol(dimensions(), rng=seed).random_base2(int(np.ceil(np.log2(more))))
-    return np.vstack([plain, even])[:count]
+    return np.asarray(np.vstack([plain, even])[:count])
 
 
 def _plain(places: int, pulses: int) -> Iterator[Array]:

@@ -29,7 +29,7 @@ def menu(stroke: float) -> list[Rig]:
     """Standard tests of one piston of this stroke [m]."""
     modes = ("extend", "retract", "both", "none")
     slow = DynamometerRig.model_validate(
-        {"name": "slow_stroke", "speeds": {m: [0.01, 0.02, 0.05] for m in modes}}
+        {"name": "slow_stroke", "speeds": {m: [0.02, 0.05] for m in modes}}
     )
     fast = DynamometerRig.model_validate(
         {"name": "dynamometer", "speeds": {m: [0.1, 0.3, 0.6, 1.0] for m in modes}}
@@ -46,8 +46,9 @@ def menu(stroke: float) -> list[Rig]:
 
 
 def judged_menu(bench: VirtualBench, rivals: Rivals) -> Iterator[Judged]:
-    """Every standard test that can show two of the rivals."""
+    """Every standard test; none where a rig cannot show two of the rivals."""
     for rig in menu(bench.stroke):
         found = separation(bench.problem(rig), rivals)
-        if found is not None:
-            yield Judged(rig, found, log_time(rig, bench.stroke))
+        if found is None:
+            return
+        yield Judged(rig, found, log_time(rig, bench.stroke))

@@ -69,8 +69,8 @@ def design_rig_test(
     best = best_point(worth, beginnings(search.members, search.seed), say, bounded)
     rig = course(best.point, duration, bench.stroke)
     say("fitting the rivals to what the tests would measure")
-    judged = (_confirmed(bench, r, rivals) for r in (standard.rig, rig))
-    return RigDesign(*judged, tried=best.tried)
+    before, after = (_confirmed(bench, r, rivals) for r in (standard.rig, rig))
+    return RigDesign(before, after, best.tried)
 
 
 def _confirmed(bench: VirtualBench, rig: Rig, rivals: Rivals) -> Judged:

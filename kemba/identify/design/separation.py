@@ -15,7 +15,7 @@ import numpy as np
 
 from kemba.identify.design.rivals import Rivals
 from kemba.identify.design.settings import ExperimentSettings
-from kemba.identify.evidence.linear import priors
+from kemba.identify.evidence.linear import is_shape, priors
 from kemba.identify.problem.problem import Array, Problem, Theta
 
 
@@ -72,9 +72,11 @@ def _columns(problem: Problem, theta: Theta, names: Collection[str]) -> Array:
     """Slopes (n, k) of the residual along these parameters, per prior width."""
     names = tuple(names)
     _, _, width = priors(problem, theta, names)
-    shapes = {k for c in problem.candidates.values() for k in c.keys() if k != c.key}
-    scale = [w * theta[name] if name in shapes else w for name, w in zip(names, width, strict=True)]
-    return problem.jacobian(theta, names) * np.array(scale)
+    scale = [
+        w * theta[name] if is_shape(problem, name) else w
+        for name, w in zip(names, width, strict=True)
+    ]
+    return np.asarray(problem.jacobian(theta, names) * np.array(scale))
 
 
 def distance(gap: Array, columns: Array) -> float:

@@ -32,6 +32,7 @@ class ExperimentSettings(Settings):
         "evidence that settles a question",
         "literature: Kass and Raftery 1995, 'very strong' evidence begins at 5 nats",
     )
+    repeats: int = setting(10, "1", "most runs of one motion", "convention: an afternoon")
     rivals: int = setting(4, "1", "effects that are to be told apart", "convention: few")
 
 
@@ -70,3 +71,32 @@ class SearchSettings(Settings):
     budget: float = setting(
         60.0, "s", "time after which no new test is tried", "convention: a user waits one minute"
     )
+
+
+class SwaySettings(Settings):
+    """What a robot may do in a designed motion."""
+
+    least: float = setting(0.03, "rad", "smallest lean of the hips", BY_HAND)
+    most: float = setting(0.25, "rad", "largest lean of the hips", "convention: 4 cm of the body")
+    leans: int = setting(6, "1", "most leans", BY_HAND)
+    shortest: float = setting(0.5, "s", "shortest sway", BY_HAND)
+    longest: float = setting(
+        1.2, "s", "longest sway", "derived: a plan falls over within 0.2 s; 1.2 s of it replay"
+    )
+    pace: float = setting(1.5, "1", "most by which a lean is longer than the one before", BY_HAND)
+    hold: float = setting(0.3, "s", "rest before the motion", "convention: as the shipped tasks")
+    nodes: int = setting(50, "1", "nodes of the task per second", "convention: steps of 20 ms")
+    fewest: int = setting(30, "1", "fewest nodes of the task", BY_HAND)
+    knee: float = setting(0.02, "m", "least height of the knees", "convention: as the hop")
+    slip: float = setting(
+        2e-3, "m", "way of a foot that counts as slipping", "convention: boom noise, 6 sigma"
+    )
+    load: float = setting(
+        0.15, "1", "least load of a foot, as a share of half the weight", "convention: margin"
+    )
+    effort: float = setting(
+        0.8, "1", "largest torque of a hip, as a share of its peak", "convention: margin"
+    )
+    tried: int = setting(12, "1", "motions that are tried", "convention: a minute")
+    least_tried: int = setting(6, "1", "motions that are tried on the slowest machine", BY_HAND)
+    rows: float = setting(500.0, "Hz", "rows per second of the simulated logs", BY_HAND)

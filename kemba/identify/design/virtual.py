@@ -76,7 +76,7 @@ def log_time(rig: Rig, stroke: float) -> float:
 
 
 def virtual_log(test: Test, rows: float, seed: int = 0) -> Trajectory:
-    """A test as a log with so many rows per second; in place of a force there is the noise of its sensor."""
+    """A test as a log with so many rows per second. Its force is the noise of the sensor alone."""
     settings, rng = ExperimentSettings.current(), np.random.default_rng(seed)
     step = float(test.times[1] - test.times[0])
     times = test.times[:: max(1, round(1.0 / (step * rows)))]
