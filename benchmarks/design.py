@@ -132,10 +132,13 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("design.jsonl"))
     parser.add_argument("--cases", type=int, default=2 * len(PAIRS), help="so many only")
     parser.add_argument("--write", action="store_true", help="put the table into the docs")
+    parser.add_argument("--part", default="1/1", help="i/n: every n-th case, from the i-th on")
+    parser.add_argument("--report", action="store_true", help="run nothing, only report the file")
     options = parser.parse_args()
+    part, parts = (int(p) for p in options.part.split("/"))
     done = [r["case"] for r in report.read(options.out)]
-    cases = [*PAIRS, *((b, a) for a, b in PAIRS)][: options.cases]
-    for number, (truth, other) in enumerate(cases):
+    cases = [*PAIRS, *((b, a) for a, b in PAIRS)][: 0 if options.report else options.cases]
+    for number, (truth, other) in list(enumerate(cases))[part - 1 :: parts]:
         if {"truth": truth, "rival": other, "seed": SEED + number} not in done:
             record = run(truth, other, SEED + number)
             report.append(options.out, record)

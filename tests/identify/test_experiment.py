@@ -6,14 +6,12 @@ import json
 from collections.abc import Iterator
 from pathlib import Path
 
-import numpy as np
 import pytest
 from rehearsal import FIRST, Machine, fitted, measured_evidence, problem_of
 
 from kemba.errors import KembaError
 from kemba.identify.design.rig import design_rig_test
 from kemba.identify.design.rivals import contenders
-from kemba.identify.design.separation import distance
 from kemba.identify.design.settings import CourseSettings, ExperimentSettings, SearchSettings
 from kemba.identify.experiment import propose
 from kemba.model.spec import load_model
@@ -78,14 +76,6 @@ def test_without_rivals_there_is_nothing_to_separate(tmp_path: Path) -> None:
         propose(folder, tmp_path / "next.yaml")
     with pytest.raises(KembaError, match="no ranking"):
         contenders({"ranking": []})
-
-
-def test_a_gap_counts_as_far_as_nothing_else_can_close_it() -> None:
-    """A column along the gap closes it within its prior; a column across it does not."""
-    gap = np.array([3.0, 0.0])
-    assert distance(gap, np.zeros((2, 1))) == pytest.approx(4.5)
-    assert distance(gap, np.array([[0.0], [9.0]])) == pytest.approx(4.5)
-    assert distance(gap, np.array([[2.0], [0.0]])) == pytest.approx(4.5 / 5.0)
 
 
 @pytest.mark.slow

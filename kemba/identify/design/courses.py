@@ -14,18 +14,20 @@ STEEPEST = 1.5  # highest speed of a monotone cubic piece that begins and ends a
 
 
 def dimensions() -> int:
-    """Numbers that a course is made of: its places, then twice the pulses of each valve."""
+    """Numbers that a course is made of: its places, twice the pulses of each valve, its laps."""
     settings = CourseSettings.current()
-    return settings.places + 4 * settings.pulses
+    return settings.places + 4 * settings.pulses + 1
 
 
 def course(point: Array, duration: float, stroke: float) -> CourseRig:
     """The course of a point (k,) of the unit cube, which lasts `duration` [s]."""
     settings = CourseSettings.current()
     count, pulses = settings.places, settings.pulses
-    every = duration / (count - 1)
-    first, second = np.split(point[count:], 2)
-    places = _reachable(point[:count] * stroke, settings.fastest * every / STEEPEST)
+    laps = 1 + min(int(point[-1] * settings.most_laps), settings.most_laps - 1)
+    every = duration / (laps * (count - 1))
+    first, second = np.split(point[count:-1], 2)
+    way = np.append(np.tile(point[: count - 1], laps), point[count - 1]) * stroke
+    places = _reachable(way, settings.fastest * every / STEEPEST)
     return CourseRig(
         name="designed",
         places=tuple(round(float(x), 5) for x in places),
@@ -37,10 +39,10 @@ def course(point: Array, duration: float, stroke: float) -> CourseRig:
 
 def _reachable(places: Array, reach: float) -> Array:
     """Places (k,), each within `reach` of the one before."""
-    found: Array = places.copy()
-    for i in range(1, len(found)):
-        found[i] = np.clip(found[i], found[i - 1] - reach, found[i - 1] + reach)
-    return found
+    found = [float(places[0])]
+    for x in places[1:]:
+        found.append(float(np.clip(x, found[-1] - reach, found[-1] + reach)))
+    return np.array(found)
 
 
 def _spans(
@@ -70,7 +72,8 @@ def beginnings(count: int, seed: int) -> Array:
 
 def _plain(places: int, pulses: int) -> Iterator[Array]:
     """Courses that a person would think of: a rod at rest, one slow stroke, strokes to and fro;
-    each with the valves in turn, and with both of them together."""
+    each with the valves in turn, and
+    several times with both of them together."""
     ways = [
         np.full(places, 0.5),
         np.linspace(0.05, 0.95, places),
@@ -78,5 +81,5 @@ def _plain(places: int, pulses: int) -> Iterator[Array]:
     ]
     early, late = np.tile([0.2, 0.5], pulses), np.tile([0.5, 0.2], pulses)
     for way in ways:
-        yield np.concatenate([way, early, late])
-        yield np.concatenate([way, early, early])
+        yield np.concatenate([way, early, late, [0.0]])
+        yield np.concatenate([way, early, early, [1.0]])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +23,7 @@ from kemba.plant.execution.sensors import Sensors, take_log
 from kemba.trajectory import Trajectory
 
 # a slow lean to both sides: what one would do without a design
-STANDARD = Sway(angle=0.1, leans=2, duration=1.2, pace=1.0)
+STANDARD = Sway(angle=0.1, leans=2, duration=0.9, pace=1.0)
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,8 @@ def design_motion(
     started, count = time.monotonic(), 0
     found: list[Tried] = []
     standard: Tried | None = None
-    for sway in _sways(settings.tried, search.seed, lambda: found):
+    height = float(model.mechanism.standing["body/z"])
+    for sway in _sways(settings.tried, search.seed, height, lambda: found):
         if bounded and count >= settings.least_tried and time.monotonic() - started > search.budget:
             break
         count += 1
@@ -131,7 +132,7 @@ def safe(model: Model, done: Trajectory) -> bool:
     return True
 
 
-def _sways(count: int, seed: int, best: Callable[[], list[Tried]]) -> Iterator[Sway]:
+def _sways(count: int, seed: int, height: float, best: Callable[[], list[Tried]]) -> Iterator[Sway]:
     """The standard sway, then some that fill the range evenly, then some near the best."""
     from scipy.stats import qmc
 
@@ -140,22 +141,27 @@ def _sways(count: int, seed: int, best: Callable[[], list[Tried]]) -> Iterator[S
     points = qmc.Sobol(4, rng=seed).random_base2(int(np.ceil(np.log2(even))))
     yield STANDARD
     for point in points[:even]:
-        yield _sway(point)
+        yield _sway(point, height)
     for _ in range(count - even - 1):
         found = best()
         near = _point(found[0].sway) if found else np.full(4, 0.5)
-        yield _sway(np.clip(near + 0.15 * rng.standard_normal(4), 0.0, 1.0))
+        yield _sway(np.clip(near + 0.15 * rng.standard_normal(4), 0.0, 1.0), height)
 
 
-def _sway(point: Array) -> Sway:
-    """The sway of a point (4,) of the unit cube."""
+def _sway(point: Array, height: float) -> Sway:
+    """The sway of a point (4,) of the unit cube, of hips at this height [m]; its angle is as large
+    as the acceleration allows, where that is less."""
     s = SwaySettings.current()
-    return Sway(
-        angle=round(s.least * (s.most / s.least) ** float(point[0]), 4),
+    plain = Sway(
+        angle=1.0,
         leans=1 + min(int(point[1] * s.leans), s.leans - 1),
         duration=round(s.shortest + (s.longest - s.shortest) * float(point[2]), 3),
         pace=round(s.pace ** (2.0 * float(point[3]) - 1.0), 4),
     )
+    _, rate = plain.lean(np.linspace(0.0, plain.duration, 500))
+    fastest = float(np.abs(np.gradient(rate, plain.duration / 499)).max())
+    angle = s.least * (s.most / s.least) ** float(point[0])
+    return replace(plain, angle=round(min(angle, s.acceleration / (height * fastest)), 4))
 
 
 def _point(sway: Sway) -> Array:

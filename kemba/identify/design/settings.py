@@ -36,6 +36,12 @@ class ExperimentSettings(Settings):
     rivals: int = setting(4, "1", "effects that are to be told apart", "convention: few")
 
 
+class SeparationSettings(Settings):
+    """How evidence between rivals is predicted."""
+
+    steps: int = setting(3, "1", "steps of the fit of a rival", BY_HAND)
+
+
 class CourseSettings(Settings):
     """What a designed test of a rig may do."""
 
@@ -50,6 +56,7 @@ class CourseSettings(Settings):
         0.5, "1", "its log time as a share of that of the best standard test", "convention: half"
     )
     places: int = setting(9, "1", "places that the rod goes through", BY_HAND)
+    most_laps: int = setting(3, "1", "most times that it goes through them", BY_HAND)
     pulses: int = setting(3, "1", "pulses of each valve", BY_HAND)
     dwell: float = setting(
         0.02,
@@ -66,7 +73,7 @@ class SearchSettings(Settings):
     """The search for the best test: differential evolution."""
 
     members: int = setting(16, "1", "tests of each generation", BY_HAND)
-    generations: int = setting(4, "1", "generations after the first", BY_HAND)
+    generations: int = setting(3, "1", "generations after the first", BY_HAND)
     seed: int = setting(1, "1", "seed of the search", "convention: the same answer every time")
     budget: float = setting(
         60.0, "s", "time after which no new test is tried", "convention: a user waits one minute"
@@ -78,10 +85,16 @@ class SwaySettings(Settings):
 
     least: float = setting(0.03, "rad", "smallest lean of the hips", BY_HAND)
     most: float = setting(0.25, "rad", "largest lean of the hips", "convention: 4 cm of the body")
+    acceleration: float = setting(
+        8.0,
+        "m.s-2",
+        "largest acceleration of the body",
+        "tuned: feet of the shipped robot slip at about 10",
+    )
     leans: int = setting(6, "1", "most leans", BY_HAND)
     shortest: float = setting(0.5, "s", "shortest sway", BY_HAND)
     longest: float = setting(
-        1.2, "s", "longest sway", "derived: a plan falls over within 0.2 s; 1.2 s of it replay"
+        0.9, "s", "longest sway", "tuned: plans of up to so long replay without feedback"
     )
     pace: float = setting(1.5, "1", "most by which a lean is longer than the one before", BY_HAND)
     hold: float = setting(0.3, "s", "rest before the motion", "convention: as the shipped tasks")
