@@ -53,13 +53,13 @@ def main() -> int:
             usual = reference(VERBS[name], Path(folder) / "usual")
             for _ in range(arguments.faults):
                 found = struck(VERBS[name], drawn(rng), Path(folder) / "work", *usual)
-                count["faults"] += 1
-                count[found.fault.name] += 1
-                count["before the end"] += found.exit_code != 0
-                count["wrong"] += bool(found.wrong)
+                one = Counter({"faults": 1, found.fault.name: 1})
+                one["before the end"] = int(found.exit_code != 0)
+                one["wrong"] = int(bool(found.wrong))
+                add("faults", name, one)  # at once: a run may be interrupted
+                count.update(one)
                 if found.wrong:
                     print(f"  {found.fault}: exit {found.exit_code}: {found.wrong}", flush=True)
-        add("faults", name, count)
         bad += count["wrong"]
         print(f"{name}: {', '.join(f'{k} {n}' for k, n in count.items())}", flush=True)
     return int(bad > 0)

@@ -28,6 +28,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from fuzz.trial import TRIALS
 
+OFTEN = 25  # inputs after which counts are recorded; a run may be interrupted
+
 
 def tried(
     name: str, examples: int, number: int, folder: Path
@@ -36,6 +38,12 @@ def tried(
     inputs, run = TRIALS[name]
     count: Counter[str] = Counter()
     broken: dict[str, str] = {}
+    recorded: Counter[str] = Counter()
+
+    def keep() -> None:
+        new = {k: n if k.startswith("slowest") else n - recorded[k] for k, n in count.items()}
+        recorded.update(new)
+        add("fuzz", name, new)
 
     @seed(number)
     @settings(
@@ -54,9 +62,12 @@ def tried(
             key = found.broken[:150]
             if len(content) < len(broken.get(key, content + " ")):
                 broken[key] = content
+        if count["inputs"] % OFTEN == 0:
+            keep()
 
     with contextlib.suppress(KeyboardInterrupt):
         once()
+    keep()
     return count, broken
 
 
@@ -73,7 +84,6 @@ def main() -> int:
         began = time.process_time()
         with tempfile.TemporaryDirectory() as folder:
             count, broken = tried(name, arguments.examples, arguments.seed, Path(folder))
-        add("fuzz", name, count)
         said = ", ".join(f"{key} {n}" for key, n in count.items())
         print(f"{name}: {said}, {time.process_time() - began:.0f} CPU s", flush=True)
         for number, (words, content) in enumerate(broken.items()):

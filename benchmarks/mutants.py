@@ -1,6 +1,6 @@
 """Do the tests notice? One-line bugs, put into a copy of the tree one by one, and tests run on it.
 
-    python benchmarks/mutants.py                     # all of them, about ten seconds each
+    python benchmarks/mutants.py                     # all of them, about three seconds of CPU each
     python benchmarks/mutants.py --part 2/4          # the second quarter
     python benchmarks/mutants.py --only certificate  # those whose file or words contain this
     python benchmarks/mutants.py --list              # only whether each still applies
@@ -14,12 +14,13 @@ apply. Needs the test dependencies: pip install '.[test]'.
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -31,6 +32,7 @@ LIST = Path(__file__).with_suffix(".yaml")
 COPIED = ("kemba", "cli", "configs", "tests", "docs", "benchmarks", "pyproject.toml", "README.md")
 PACKAGES = {"kemba": "kemba", "kemba_cli": "cli", "kemba_configs": "configs"}
 LONGEST = 900.0  # s; a bug that makes the tests hang for so long is noticed
+HANGS = -1  # exit code of such a run
 
 
 @dataclass(frozen=True)
@@ -78,54 +80,66 @@ class Copy:
         self.links.mkdir()
         for package, name in PACKAGES.items():
             (self.links / package).symlink_to(self.root / name)
+        self.server = self._server()
 
-    def passes(self, tests: tuple[str, ...]) -> bool:
-        """Whether the quick tests among `tests` pass in the copy."""
-        command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *tests]
+    def _server(self) -> subprocess.Popen[str]:
         path = os.pathsep.join(filter(None, [str(self.links), os.environ.get("PYTHONPATH")]))
         # files change within a second, which compiled Python does not see; solvers' code is not
         # compiled and the plant's is kept here, for every bug would leave code of its own in the
         # user's cache
         setting = {"PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1", "KEMBA_COMPILE": "0"}
         setting["KEMBA_CACHE"] = str(self.root.parent / "cache")
-        try:
-            done = subprocess.run(
-                command,
-                cwd=self.root,
-                env={**os.environ, **setting},
-                stdout=subprocess.DEVNULL,
-                timeout=LONGEST,
-            )
-        except subprocess.TimeoutExpired:
-            return False
-        if done.returncode not in (0, 1, 2):
-            raise SystemExit(f"pytest ended with {done.returncode}: {' '.join(command)}")
-        return done.returncode == 0
+        return subprocess.Popen(
+            [sys.executable, str(LIST.with_name("mutants_server.py"))],
+            cwd=self.root,
+            env={**os.environ, **setting},
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
 
-    def notices(self, mutant: Mutant, text: str) -> bool:
-        """Whether a test fails with the bug in it."""
+    def failing(self, tests: Sequence[str]) -> str | None:
+        """The first of the quick `tests` that fails in the copy; None where all pass."""
+        assert self.server.stdin and self.server.stdout
+        print(json.dumps({"tests": list(tests), "longest": LONGEST}), file=self.server.stdin)
+        self.server.stdin.flush()
+        code, failed = json.loads(self.server.stdout.readline())
+        if code not in (HANGS, 0, 1, 2):
+            raise SystemExit(f"pytest ended with {code}: pytest {' '.join(tests)}")
+        return None if code == 0 else failed or "a run without end"
+
+    def noticed_by(self, mutant: Mutant, text: str) -> str | None:
+        """The test that fails with the bug in it."""
         path = self.root / mutant.file
         whole = path.read_text(encoding="utf-8")
         path.write_text(text, encoding="utf-8")
         try:
-            return not self.passes(mutant.tests)
+            return self.failing(mutant.tests)
         finally:
             path.write_text(whole, encoding="utf-8")
 
 
 def outcomes(mutants: list[Mutant], copy: Copy) -> Iterator[tuple[Mutant, str]]:
-    """What became of each bug: killed, survived, or does not apply."""
-    sound: dict[tuple[str, ...], bool] = {}
+    """What became of each bug: killed, survived, or does not apply.
+
+    A test that fails with a bug must pass without it; each such test is tried once.
+    """
+    sound: set[str | tuple[str, ...]] = set()
     for mutant in mutants:
         text = mutant.mutated(copy.root)
         if text is None:
             yield mutant, "does not apply"
             continue
-        if mutant.tests not in sound:
-            sound[mutant.tests] = copy.passes(mutant.tests)
-        if not sound[mutant.tests]:
-            raise SystemExit(f"fails without any bug: pytest {' '.join(mutant.tests)}")
-        yield mutant, "killed" if copy.notices(mutant, text) else "survived"
+        test = copy.noticed_by(mutant, text)
+        if test and "::" in test and test not in sound:
+            if copy.failing([test]):
+                raise SystemExit(f"fails without any bug: pytest '{test}'")
+            sound.add(test)
+        elif test and "::" not in test and mutant.tests not in sound:
+            if copy.failing(mutant.tests):  # the file could not be loaded, or the run had no end
+                raise SystemExit(f"fails without any bug: pytest {' '.join(mutant.tests)}")
+            sound.add(mutant.tests)
+        yield mutant, "killed" if test else "survived"
 
 
 def chosen(part: str, only: str) -> list[Mutant]:
@@ -138,13 +152,20 @@ def chosen(part: str, only: str) -> list[Mutant]:
     return found[(number - 1) * size // parts : number * size // parts]
 
 
+def _kept() -> dict[str, str]:
+    """Outcomes in program.json, by bug."""
+    from program import load  # beside this script, which tests import as well
+
+    return dict(load().get("mutants", {}).get("all", {}).get("outcomes", {}))
+
+
 def _record(mutant: Mutant, outcome: str) -> None:
     """Keep an outcome in program.json; those of bugs that are no longer listed are dropped."""
-    from program import load, put  # beside this script, which tests import as well
+    from program import put
 
     known = {str(m) for m in listed()}
-    old = load().get("mutants", {}).get("all", {}).get("outcomes", {})
-    outcomes = {name: said for name, said in {**old, str(mutant): outcome}.items() if name in known}
+    both = {**_kept(), str(mutant): outcome}
+    outcomes = {name: said for name, said in both.items() if name in known}
     put("mutants", "all", {"listed": len(known), "outcomes": outcomes})
 
 
@@ -153,9 +174,13 @@ def main() -> int:
     parser.add_argument("--part", default="1/1", help="such as 2/4: the second of four")
     parser.add_argument("--only", default="", help="bugs whose file or words contain this")
     parser.add_argument("--record", action="store_true", help="keep outcomes for the page")
+    parser.add_argument("--new", action="store_true", help="only bugs without a kept outcome")
     parser.add_argument("--list", action="store_true", help="run no tests")
     arguments = parser.parse_args()
     mutants = chosen(arguments.part, arguments.only)
+    if arguments.new:
+        known = _kept()
+        mutants = [m for m in mutants if str(m) not in known]
     if arguments.list:
         lost = [m for m in mutants if m.mutated(ROOT) is None]
         print(*(f"does not apply  {m}" for m in lost), sep="\n")

@@ -47,7 +47,8 @@ FOUND = """## What was found
 - **Plans**: in `stand`, several settings of the stages lead to another local optimum (costs of up
   to 8.4 instead of 3.3), and one to a plan that misses its tolerances. No threshold can be derived
   that avoids this: the program has many local optima, and each change may lead to another one.
-  What helps is to plan from several starts (`kemba-opt solve --starts`) and take the cheapest plan.
+  What helps is to plan from several starts (`kemba-opt solve TASK --starts 4`) and take the
+  cheapest plan.
 - **`compare`**: the largest error ratio of a good model (1.15) and the largest error of a figure
   (two sigmas) flipped cases in which nothing is missing. Both are gone. Figures take their
   likeliest values, given their declared tolerances, and absent effects the spike of `discover`.
@@ -82,11 +83,13 @@ class Change:
 
     @property
     def value(self) -> Any:
-        """What the setting becomes; whole numbers stay whole and at least one."""
-        old = self.about.default
+        """What the setting becomes; whole numbers stay whole and at least one, and no value leaves
+        the range in which it has a meaning."""
+        old, most = self.about.default, self.about.metadata["at_most"]
         if isinstance(old, tuple):
             return tuple(v * self.factor for v in old)
-        return max(1, round(old * self.factor)) if isinstance(old, int) else old * self.factor
+        new = max(1, round(old * self.factor)) if isinstance(old, int) else old * self.factor
+        return min(new, most)
 
 
 def read(path: Path) -> list[Record]:
