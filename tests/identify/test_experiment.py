@@ -12,7 +12,11 @@ from rehearsal import FIRST, Machine, fitted, measured_evidence, problem_of
 from kemba.errors import KembaError
 from kemba.identify.design.rig import design_rig_test
 from kemba.identify.design.rivals import contenders
-from kemba.identify.design.settings import CourseSettings, ExperimentSettings, SearchSettings
+from kemba.identify.design.settings import (
+    DesignSearchSettings,
+    ExperimentSettings,
+    RigCourseSettings,
+)
 from kemba.identify.experiment import propose
 from kemba.model.spec import load_model
 from kemba.plant.rig.bench import load_rig
@@ -22,8 +26,8 @@ from kemba.settings import changed
 @pytest.fixture
 def short_search() -> Iterator[None]:
     """A search that tries few short tests, and looks at one test of each rig only."""
-    few = changed(SearchSettings, members=6, generations=1)
-    with few, changed(ExperimentSettings, tests=1), changed(CourseSettings, longest=0.8):
+    few = changed(DesignSearchSettings, members=6, generations=1)
+    with few, changed(ExperimentSettings, tests=1), changed(RigCourseSettings, longest=0.8):
         yield
 
 
