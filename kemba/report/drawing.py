@@ -120,9 +120,12 @@ def _serve(pipe: Connection, effects: dict[str, str]) -> None:
         order = pipe.recv()
     except EOFError:
         return  # there is nothing to draw
+    error: KembaError | None = None
     try:
         draw_plan(*order)
-    except KembaError as error:
+    except KembaError as found:
+        error = found
+    except Exception:  # the first process tries once more, and tells what is wrong
+        return
+    with suppress(OSError):  # nobody waits any more
         pipe.send(error)
-    else:
-        pipe.send(None)
