@@ -74,13 +74,15 @@ def plan(
     model: str | Path | None = None,
     starts: int = 1,
     replay: bool = True,
+    cold: bool = False,
     progress: Tell = silent,
     **changes: Any,
 ) -> Planned:
     """Plan a motion and certify it, as `kemba-opt solve` does.
 
     `task`: a path, a shipped name, or a loaded task; `out`: its run folder, `runs/TASK-N` without.
-    `changes` are those of `--set`. `progress` gets the name of every stage. Raises KembaError for
+    `changes` are those of `--set`. `cold`: begin from a guess, also where a shipped
+    plan is near. `progress` gets the name of every stage. Raises KembaError for
     mistakes; a task that cannot be met is no mistake, the certificate says why.
     """
     if isinstance(task, Task):
@@ -95,6 +97,13 @@ def plan(
     files = [*dict.fromkeys(models), *BY_KIND.files]
     folder = RunFolder.create(out, resolved.name, files, ["kemba.plan"])
     answer = solve_into(
-        folder, resolved, document, Listener(progress), starts=starts, replay=replay, figure=False
+        folder,
+        resolved,
+        document,
+        Listener(progress),
+        starts=starts,
+        replay=replay,
+        figure=False,
+        library=not cold,
     )
     return Planned(folder.path, answer)

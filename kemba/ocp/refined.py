@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from kemba.ocp.certificate.certify import costs
+from kemba.ocp.certificate.objective import costs
 from kemba.ocp.certificate.status import Status, verdict
 from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.phases.settings import Refining

@@ -28,16 +28,27 @@ class Drawer(Protocol):
     """What draws the figure of a plan."""
 
     def begin(self, plan: Trajectory, folder: Path) -> None:
-        """The plan is known; its figure is for `folder`, which has a `task.yaml`."""
+        """A plan is known; its figure is for `folder`, which has a `task.yaml`. The last one of
+        several stays."""
 
     def finish(self) -> None:
         """Return when the figure is written. Raises KembaError where it cannot be."""
 
 
+class Nowhere:
+    """Draws nothing."""
+
+    def begin(self, plan: Trajectory, folder: Path) -> None:
+        """See `Drawer`."""
+
+    def finish(self) -> None:
+        """See `Drawer`."""
+
+
 class Here:
     """Draws in this process, when the figure is asked for."""
 
-    order: Order
+    order: Order | None = None
 
     def begin(self, plan: Trajectory, folder: Path) -> None:
         """See `Drawer`."""
@@ -45,13 +56,15 @@ class Here:
 
     def finish(self) -> None:
         """See `Drawer`. Raises KembaError where the figure cannot be written."""
-        draw_plan(*self.order)
+        if self.order is not None:
+            draw_plan(*self.order)
 
 
 class Beside(Here):
     """Draws in a process of its own, which loads matplotlib while the plan is still sought."""
 
     def __init__(self) -> None:
+        self.begun = 0
         context = get_context("spawn")
         self.pipe, theirs = context.Pipe()
         self.process = context.Process(target=_serve, args=(theirs, BY_KIND.files), daemon=True)
@@ -65,13 +78,16 @@ class Beside(Here):
     def begin(self, plan: Trajectory, folder: Path) -> None:
         """See `Drawer`."""
         super().begin(plan, folder)
+        self.begun += 1
         with suppress(OSError):  # it is dead: `finish` notices
             self.pipe.send(self.order)
 
     def finish(self) -> None:
         """See `Drawer`. Raises KembaError where the figure cannot be written."""
+        error: KembaError | None = None
         try:
-            error = self.pipe.recv()
+            for _ in range(self.begun):
+                error = self.pipe.recv()
         except (EOFError, OSError):
             super().finish()  # it died, as it may where memory is short
             return
@@ -112,20 +128,18 @@ def draw_plan(plan: Trajectory, folder: Path) -> None:
 
 
 def _serve(pipe: Connection, effects: dict[str, str]) -> None:
-    """Wait for one plan, draw it, and answer with None or the error."""
+    """Draw the plans that come; answer each with None or the error."""
     import kemba.plotting.draw  # noqa: F401  now, while there is time
 
     load_effects(effects)
-    try:
-        order = pipe.recv()
-    except EOFError:
-        return  # there is nothing to draw
-    error: KembaError | None = None
-    try:
-        draw_plan(*order)
-    except KembaError as found:
-        error = found
-    except Exception:  # the first process tries once more, and tells what is wrong
-        return
-    with suppress(OSError):  # nobody waits any more
-        pipe.send(error)
+    with suppress(EOFError, OSError):  # no more plans, or nobody waits any more
+        while True:
+            order = pipe.recv()
+            error: KembaError | None = None
+            try:
+                draw_plan(*order)
+            except KembaError as found:
+                error = found
+            except Exception:  # the first process tries once more, and tells what is wrong
+                return
+            pipe.send(error)

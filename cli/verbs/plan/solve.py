@@ -34,6 +34,9 @@ def solve(
             "--from", help="Change the plan of this run (other height, supply, payload, model)."
         ),
     ] = None,
+    cold: Annotated[
+        bool, typer.Option("--cold", help="Begin from a guess, not from a near shipped plan.")
+    ] = False,
     time_limit: Annotated[float | None, typer.Option(help="Seconds of solving at most.")] = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Check the task and say its size; solve nothing.")
@@ -109,7 +112,7 @@ def solve(
         listener = Listener(progress.tell, progress.watch, stop)
         answer = solve_into(
             folder, resolved, document, listener, start, starts, jobs, replay, figure, origin,
-            drawing,
+            drawing, library=not cold,
         )  # fmt: skip
     if json:
         print_json(answer)
