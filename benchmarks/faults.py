@@ -54,10 +54,8 @@ def main() -> int:
             for _ in range(arguments.faults):
                 found = struck(VERBS[name], drawn(rng), Path(folder) / "work", *usual)
                 one = Counter({"faults": 1, found.fault.name: 1})
-                one |= {
-                    "before the end": int(found.exit_code != 0),
-                    "wrong": int(bool(found.wrong)),
-                }
+                one["before the end"] = int(found.exit_code != 0)
+                one["wrong"] = int(bool(found.wrong))
                 add("faults", name, one)  # at once: a run may be interrupted
                 count.update(one)
                 if found.wrong:

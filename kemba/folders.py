@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import errno
+import shlex
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 LOCK = ".lock"
 UNFINISHED = "UNFINISHED"  # a file that stands in a folder until all results are in it
 WHY = "kemba-opt writes here, or was stopped before the end: run the same command again.\n"
+MANY = 4  # log names that a command still lists one by one
 PROBE = 1_000_000  # bytes: about what a run folder takes, its solver's log included
 
 
@@ -153,3 +155,19 @@ def _written(folder: Path, results: str) -> dict[Path, int]:
 
 def _is_empty(path: Path) -> bool:
     return path.is_dir() and all(item.name in (LOCK, UNFINISHED) for item in path.iterdir())
+
+
+def typed(
+    logs: Sequence[str | Path], column_map: str | Path | None = None, model: str | None = None
+) -> str:
+    """Logs as they are typed behind a verb, of many in one folder `folder/*.csv`, with the options
+    that they need."""
+    paths = [str(log) for log in logs]
+    if len(paths) < MANY:
+        words = [shlex.quote(path) for path in paths]
+    else:
+        folders = dict.fromkeys(path.rpartition("/")[0] for path in paths)
+        words = [f"{shlex.quote(folder) + '/' if folder else ''}*.csv" for folder in folders]
+    options = {"--map": column_map, "--model": model}
+    words += [f"{name} {shlex.quote(str(value))}" for name, value in options.items() if value]
+    return " ".join(words)

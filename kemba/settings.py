@@ -13,6 +13,7 @@ with `changed`, without touching the algorithm:
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -29,16 +30,24 @@ CHOSEN = "convention: chosen by hand, no comparison kept"
 S = TypeVar("S", bound="Settings")
 
 
-def setting(value: Any, unit: str, doc: str, origin: str, decides: bool = False) -> Any:
+def setting(
+    value: Any,
+    unit: str,
+    doc: str,
+    origin: str,
+    decides: bool = False,
+    at_most: float = math.inf,
+) -> Any:
     """A field of `Settings`.
 
     `unit` as in columns ("1" for none). `origin` begins with one of `ORIGINS`, such as `literature:
     Higham 2002` or `tuned: benchmarks/sensitivity.py`. `decides`: a verdict depends on this
-    threshold, so the sensitivity study halves and doubles it. Raises ValueError for another origin.
+    threshold, so the sensitivity study halves and doubles it. `at_most`: the largest value that has
+    a meaning, such as 1 for a share. Raises ValueError for another origin.
     """
     if origin.partition(":")[0] not in ORIGINS:
         raise ValueError(f"origin {origin!r} must begin with one of {', '.join(ORIGINS)}")
-    meta = {"unit": unit, "doc": doc, "origin": origin, "decides": decides}
+    meta = {"unit": unit, "doc": doc, "origin": origin, "decides": decides, "at_most": at_most}
     return dataclasses.field(default=value, metadata=meta)
 
 
@@ -67,11 +76,16 @@ _CHANGED: ContextVar[dict[type[Settings], Settings]] = ContextVar("changed setti
 
 @contextmanager
 def changed(cls: type[Settings], **values: Any) -> Iterator[None]:
-    """Within this block `cls.current()` has other `values`. Raises KembaError for unknown names."""
-    known = [f.name for f in dataclasses.fields(cls)]  # type: ignore[arg-type]
-    for name in values:
+    """Within this block `cls.current()` has other `values`.
+
+    Raises KembaError for unknown names and values that have no meaning.
+    """
+    known = {f.name: f for f in dataclasses.fields(cls)}  # type: ignore[arg-type]
+    for name, value in values.items():
         if name not in known:
             raise KembaError(cls.__name__, f"no setting '{name}'", hint=suggest(name, known))
+        if (most := known[name].metadata["at_most"]) < math.inf and value > most:
+            raise KembaError(f"{cls.__name__}.{name}", f"is {value:g}", f"at most {most:g}")
     new = dataclasses.replace(cls.current(), **values)  # type: ignore[type-var]
     token = _CHANGED.set({**_CHANGED.get(), cls: new})
     try:

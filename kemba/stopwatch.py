@@ -1,11 +1,33 @@
-"""Seconds spent on something that is done in several places."""
+"""Time of long work: seconds spent, and the stages that are told to whoever waits."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+
+Tell = Callable[[str], None]  # gets the name of every stage of long work as it begins
+
+
+def silent(text: str) -> None:
+    """Tells nobody."""
+
+
+class Stage(str):
+    """The name of a stage that is one of several alike: part `part` of `parts`.
+
+    As text it says so: `refitting valve_delay (2 of 8)`.
+    """
+
+    name: str
+    part: int
+    parts: int
+
+    def __new__(cls, name: str, part: int, parts: int) -> Stage:
+        stage = super().__new__(cls, f"{name} ({part} of {parts})")
+        stage.name, stage.part, stage.parts = name, part, parts
+        return stage
 
 
 @dataclass

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import runpy
 import shlex
 import subprocess
 import sys
@@ -85,6 +86,19 @@ def test_files_that_are_named_exist(page: Path) -> None:
 def test_links_lead_somewhere(page: Path) -> None:
     for link in re.findall(r"\]\(([^)#:]+)(?:#[\w-]+)?\)", page.read_text("utf-8")):
         assert (page.parent / link).exists(), f"{page.name}: {link}"
+
+
+def test_every_page_has_a_way_onwards() -> None:
+    """Its last line says where to go next; of pages that scripts write the site adds it."""
+    added = runpy.run_path(str(ROOT / "docs/hooks.py"))["NEXT"]
+    own = {p.name for p in ROOT.glob("docs/*.md") if p.name not in (*added, "index.md")}
+    for name in own:
+        last = (ROOT / "docs" / name).read_text(encoding="utf-8").rstrip().split("\n\n")[-1]
+        assert last.startswith("Next: ") and re.search(r"\]\([\w-]+\.md", last), name
+    for name, line in added.items():
+        links = re.findall(r"\]\(([\w-]+\.md)\)", line)
+        assert links and all((ROOT / "docs" / link).is_file() for link in links), name
+        assert name == "cli.md" or (ROOT / "docs" / name).is_file()
 
 
 def test_every_page_stands_in_the_navigation() -> None:

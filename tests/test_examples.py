@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from PIL import Image
 
 ROOT = Path(__file__).parent.parent
 sys.path.insert(0, str(ROOT / "examples"))
@@ -20,7 +22,7 @@ NOTEBOOKS = sorted((ROOT / "examples/notebooks").glob("*.ipynb"))
 def test_the_gallery_shows_the_examples_as_they_are() -> None:
     assert (ROOT / "docs/gallery.md").read_text(encoding="utf-8") == make_gallery.page()
     scripts = {path.stem for path in (ROOT / "examples").glob("*.py")}
-    assert scripts - {"make_gallery", "pictures"} == set(make_gallery.ORDER)
+    assert scripts - {"make_gallery", "pictures", "readme_picture"} == set(make_gallery.ORDER)
     assert len(make_gallery.ORDER) >= 12
     for name in make_gallery.ORDER:
         assert (ROOT / f"docs/images/gallery/{name}.png").stat().st_size > 5000
@@ -31,6 +33,20 @@ def test_the_gallery_shows_the_examples_as_they_are() -> None:
 def test_an_example_runs(name: str, tmp_path: Path) -> None:
     make_gallery.run(name, str(tmp_path), tmp_path)
     assert (tmp_path / f"{name}.png").stat().st_size > 5000
+
+
+def test_the_readme_has_one_small_animated_picture() -> None:
+    shown = re.findall(r"!\[.+\]\((.+\.gif)\)", (ROOT / "README.md").read_text(encoding="utf-8"))
+    assert shown == ["docs/images/jump.gif"]
+    assert (ROOT / shown[0]).stat().st_size < 1_000_000
+    with Image.open(ROOT / shown[0]) as picture:
+        assert picture.n_frames > 20
+
+
+@pytest.mark.nightly
+def test_the_picture_of_the_readme_is_made(tmp_path: Path) -> None:
+    make_gallery.run("readme_picture", str(tmp_path), tmp_path)
+    assert 20_000 < (tmp_path / "jump.gif").stat().st_size < 1_000_000
 
 
 def test_there_are_three_notebooks_without_outputs() -> None:

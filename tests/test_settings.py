@@ -13,6 +13,7 @@ class Toy(Settings):
 
     gap: float = setting(0.1, "s", "longest pause", "derived: two samples at 20 Hz")
     rounds: int = setting(2, "1", "rounds", "tuned: by hand")
+    share: float = setting(0.7, "1", "a share", "convention: most", at_most=1.0)
 
 
 def test_settings_are_changed_for_a_while_only() -> None:
@@ -31,6 +32,14 @@ def test_settings_cannot_be_assigned() -> None:
 def test_a_wrong_name_is_told() -> None:
     with pytest.raises(KembaError, match="no setting 'gep'"), changed(Toy, gep=0.2):
         pass
+
+
+def test_a_value_without_a_meaning_is_told() -> None:
+    with changed(Toy, share=1.0):
+        assert Toy.current().share == 1.0
+    with pytest.raises(KembaError, match=r"Toy\.share: is 1\.4; at most 1"):  # noqa: SIM117
+        with changed(Toy, share=1.4):
+            pass
 
 
 def test_an_origin_must_be_of_a_kind() -> None:

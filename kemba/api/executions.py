@@ -10,6 +10,7 @@ from kemba.api.planning import Planned
 from kemba.api.result import Result
 from kemba.folders import claimed
 from kemba.plant.execution.repeat import Repeat, plant_of, repeat_run
+from kemba.stopwatch import Tell, silent
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -60,15 +61,17 @@ def simulate(
     noise: bool = False,
     seed: int = 0,
     force: bool = False,
+    progress: Tell = silent,
 ) -> Executed:
     """Execute a run's controller on the plant and write logs, as `kemba-opt simulate` does.
 
     `out`: folder for the logs, a new one in the run without it. The same `seed` gives the same
-    logs. Raises KembaError where the run has no controller table.
+    logs. `progress` gets the name of every execution. Raises KembaError where the run has no
+    controller table.
     """
     path = run.path if isinstance(run, Planned) else Path(run)
     default = (path if path.is_dir() else path.parent) / "logs"
     model = plant_of(path, plant)
     with claimed(None if out is None else Path(out), default, "*.csv", force) as folder:
-        repeats = repeat_run(path, model, folder, repeat, noise, seed)
+        repeats = repeat_run(path, model, folder, repeat, noise, seed, tell=progress)
     return Executed(path, model.name, tuple(repeats))

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from kemba.api.result import Progress, Result, silent
+from kemba.api.result import Result
 from kemba.errors import KembaError
 from kemba.identify.answer import Answer, Ranked
 from kemba.identify.compare.compare import Comparison
 from kemba.identify.discover import Discovery
+from kemba.stopwatch import Tell, silent
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -89,14 +90,16 @@ def compare(
     *,
     columns: str | Path | None = None,
     run: str | Path | None = None,
+    progress: Tell = silent,
 ) -> Compared:
     """Where `model` fails on logs of one machine, as `kemba-opt compare` says it.
 
-    `columns`: the file of a column map; `run`: the run that was executed. Raises KembaError.
+    `columns`: the file of a column map; `run`: the run that was executed. `progress` gets the
+    name of every stage. Raises KembaError.
     """
     from kemba.identify.compare_logs import compare_logs
 
-    return Compared(compare_logs(_listed(logs), str(model), columns, run)[0])
+    return Compared(compare_logs(_listed(logs), str(model), columns, run, progress)[0])
 
 
 def discover(
@@ -107,7 +110,7 @@ def discover(
     columns: str | Path | None = None,
     out: str | Path | None = None,
     time_limit: float = 300.0,
-    progress: Progress = silent,
+    progress: Tell = silent,
 ) -> Discovered:
     """Which physical effect `model` lacks, as `kemba-opt discover` answers it.
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kemba.api.loading import settings
-from kemba.api.result import Progress, Result, silent
+from kemba.api.result import Result
 from kemba.config import Document, beside, find_config
 from kemba.effects import BY_KIND
 from kemba.files import read_json
@@ -16,6 +16,7 @@ from kemba.model.spec import model_files
 from kemba.ocp import Task, load_task
 from kemba.report import Listener, solve_into
 from kemba.runs import Run, RunFolder, load_run
+from kemba.stopwatch import Tell, silent
 from kemba.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -73,13 +74,15 @@ def plan(
     model: str | Path | None = None,
     starts: int = 1,
     replay: bool = True,
-    progress: Progress = silent,
+    cold: bool = False,
+    progress: Tell = silent,
     **changes: Any,
 ) -> Planned:
     """Plan a motion and certify it, as `kemba-opt solve` does.
 
     `task`: a path, a shipped name, or a loaded task; `out`: its run folder, `runs/TASK-N` without.
-    `changes` are those of `--set`. `progress` gets the name of every stage. Raises KembaError for
+    `changes` are those of `--set`. `cold`: begin from a guess, also where a shipped
+    plan is near. `progress` gets the name of every stage. Raises KembaError for
     mistakes; a task that cannot be met is no mistake, the certificate says why.
     """
     if isinstance(task, Task):
@@ -94,6 +97,13 @@ def plan(
     files = [*dict.fromkeys(models), *BY_KIND.files]
     folder = RunFolder.create(out, resolved.name, files, ["kemba.plan"])
     answer = solve_into(
-        folder, resolved, document, Listener(progress), starts=starts, replay=replay, figure=False
+        folder,
+        resolved,
+        document,
+        Listener(progress),
+        starts=starts,
+        replay=replay,
+        figure=False,
+        library=not cold,
     )
     return Planned(folder.path, answer)

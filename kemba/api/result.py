@@ -6,19 +6,12 @@ import base64
 import html
 import io
 from abc import ABC, abstractmethod
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from kemba.errors import KembaError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-Progress = Callable[[str], None]
-
-
-def silent(text: str) -> None:
-    """A progress callback that says nothing."""
 
 
 class Result(ABC):

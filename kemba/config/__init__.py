@@ -10,6 +10,7 @@ from kemba.config.parsing import (
     locate,
     parse,
     shipped_configs,
+    shipped_folder,
 )
 
 __all__ = [
@@ -26,5 +27,6 @@ __all__ = [
     "locate",
     "parse",
     "shipped_configs",
+    "shipped_folder",
     "written",
 ]

@@ -27,6 +27,7 @@ __all__ = [
     "locate",
     "parse",
     "shipped_configs",
+    "shipped_folder",
 ]
 
 
@@ -113,10 +114,14 @@ def locate(name: str | Path, folders: Collection[str]) -> Path:
 
 def shipped_configs(folder: str) -> dict[str, Path]:
     """The files shipped in configs/`folder` by name."""
+    return {path.name: path for path in sorted(shipped_folder(folder).glob("*.yaml"))}
+
+
+def shipped_folder(name: str) -> Path:
+    """The folder configs/`name` of the checkout or of the installed package."""
     above = Path(__file__).resolve().parents[2]
     checkout = (above / "pyproject.toml").is_file()
-    root = above / ("configs" if checkout else "kemba_configs")
-    return {path.name: path for path in sorted((root / folder).glob("*.yaml"))}
+    return above / ("configs" if checkout else "kemba_configs") / name
 
 
 def is_file(path: Path) -> bool:

@@ -66,4 +66,7 @@ def adopt_effect(folder: str | Path, effect: str, out: Path) -> Path:
         raise KembaError(
             str(file), f"'{effect}' is not in the ranking", hint=suggest(effect, names)
         )
-    return write_model(out, str(answer.get("base") or "planning"), answer["ranking"], [effect])
+    # what was found beside another structure has a meaning beside that structure only
+    structure = [name for name in answer["added"] if name == ORIFICE and name != effect]
+    base = str(answer.get("base") or "planning")
+    return write_model(out, base, answer["ranking"], [*structure, effect])

@@ -15,6 +15,7 @@ from kemba.identify.logs.reading import read_logs
 from kemba.identify.problem.problem import Problem
 from kemba.identify.workflow import admitted, check_all, model_of
 from kemba.logs import load_map
+from kemba.stopwatch import Tell, silent
 from kemba.trajectory import Trajectory
 
 PLANNED = ("body/x", "body/z", "body/pitch", "hip/q", "piston/x")
@@ -25,24 +26,32 @@ def compare_logs(
     model: str = "planning",
     column_map: str | Path | None = None,
     run: str | Path | None = None,
+    tell: Tell = silent,
 ) -> tuple[Comparison, Problem]:
     """Where `model` fails on these logs, and how far a planned `run` (a folder or a trajectory
-    CSV) was missed. Raises KembaError; BadData where the logs cannot be right."""
+    CSV) was missed. `tell` gets the name of every stage. Raises KembaError; BadData where the logs
+    cannot be right."""
     columns = load_map(column_map) if column_map else None
+    tell("reading the logs")
     read = read_logs(logs, columns)
-    found, problem = compare_read(read, model)
+    found, problem = compare_read(read, model, tell)
     if run is not None:
         plan = Trajectory.read(Path(run) / "trajectory.csv" if Path(run).is_dir() else run)
         found = replace(found, plan=missed(plan, read))
     return found, problem
 
 
-def compare_read(read: Sequence[Trajectory], model: str) -> tuple[Comparison, Problem]:
+def compare_read(
+    read: Sequence[Trajectory], model: str, tell: Tell = silent
+) -> tuple[Comparison, Problem]:
     """Where `model` fails on logs that were read. Raises as `compare_logs` does."""
     built = model_of(read, model)
     check_all(read, built)
+    tell("finding the motion in the logs")
     problem, _ = admitted(read, built)
+    tell("learning the noise of the sensors")
     problem = with_learnt_colour(problem, free_starts(problem))
+    tell("comparing with the model")
     return compare(problem, model, [str(log.meta["path"]) for log in read]), problem
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,22 +17,29 @@ from kemba.identify.evidence.bootstrap import NullTest, bootstrap, smallest_dete
 from kemba.identify.evidence.linear import time_blocks
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
+from kemba.identify.evidence.windows import error_ratio
 from kemba.identify.problem.problem import Problem
 from kemba.identify.ranking import error, ladder, ranked, strength
 from kemba.identify.rest import pattern_left, rest_of
 from kemba.identify.settings import DiscoverSettings, VerdictSettings
+from kemba.identify.stages import joined, structure_row
 
 Talk = Callable[[str], None]
 
 
 @dataclass(frozen=True)
 class Discovery:
-    """A finished search and what was made of it."""
+    """A finished search and what was made of it.
+
+    `earlier`: errors on the fitted logs of the model as it was, where `search` is that of a model
+    built anew with another structure.
+    """
 
     answer: Answer
     search: Search
     best: Hypothesis
     holdout: Problem | None = None
+    earlier: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -55,16 +63,70 @@ def discover(
     started = time.monotonic()
     share = DiscoverSettings.current().searching
     search = Search(problem, started + share * time_limit, say)
-    found = judged(search, search.run(), holdout)
+    best = search.run()
+    if problem.structures & set(best):
+        found = _of_structures(search, best, holdout)
+    else:
+        found = judged(search, best, holdout)
     found.answer.runtime_s = time.monotonic() - started
     return found
 
 
+def _of_structures(search: Search, best: Hypothesis, holdout: Problem | None) -> Discovery:
+    """Where another structure was named: built anew with it, unless effects of the model as it is
+    explain left-out data better."""
+    if search.structure(best):
+        anew = _built_anew(search, best, holdout)
+        if anew.answer.verdict == "missing":
+            return anew
+        search.say("trying the model without another structure")
+        plain = Search(_without(search.problem), search.deadline, search.say)
+        other = judged(plain, plain.run(), holdout)
+    else:
+        other = judged(search, best, holdout)
+        if not search.problem.structures & set(other.best):
+            return other
+        anew = _built_anew(search, other.best, holdout)
+    # one noise for both, or the model that takes more of its error for noise would look better
+    judge = (holdout or other.search.problem).heard_as(anew.search.problem)
+    left = error_ratio(judge, other.search.points[other.best].fit.theta)
+    return anew if anew.answer.error_after <= left else other
+
+
+def _without(problem: Problem) -> Problem:
+    """The problem without other structures among its candidates."""
+    found = copy(problem)
+    found.candidates = {k: c for k, c in problem.candidates.items() if k not in problem.structures}
+    return found
+
+
+def _built_anew(search: Search, best: Hypothesis, holdout: Problem | None) -> Discovery:
+    """The structure that `best` names, and what the model with that structure lacks."""
+    structure = min(search.problem.structures & set(best))
+    search.say(f"building the model anew with {structure}")
+    theta = search.points[best].fit.theta
+    second = Search(search.problem.rebuilt(theta), search.deadline, search.say)
+    kept = holdout.rebuilt(theta) if holdout else None
+    found = judged(second, second.run(), kept)
+    # one noise for all rungs: that of the model that explains more of the data
+    judge = (holdout or search.problem).heard_as(second.problem)
+    before = error_ratio(judge, search.points[NULL].fit.theta)
+    alone = error(second, NULL, found.holdout)
+    row = structure_row(search, structure, (before, alone), second, found.best)
+    singles = [p.log_evidence for h, p in search.points.items() if h]
+    gain = max(singles) - search.points[NULL].log_evidence
+    answer = joined(row, null_test(search).p_value(gain), found.answer, second, found.best)
+    first_error = search.points[NULL].fitted_error
+    search.say(f"built anew, the error is {answer.error_after:.2f} times the noise")
+    return Discovery(answer, second, found.best, found.holdout, (first_error,))
+
+
 def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> Discovery:
     """What the finished `search` with its `best` hypothesis allows to say."""
-    search.say("asking whether nothing would look like this")
+    search.say("asking how often logs in which nothing is missing look like these")
     test, likeliest = null_test(search), best
     best, p_value, dismissed = _believed(search, likeliest, test)
+    search.say("asking whether the answer is complete")
     holdout = holdout.heard_as(search.problem) if holdout else None
     # what is too small to be reported still explains: a formula must do better than with it
     slight = best and material(search, likeliest) == best
@@ -73,6 +135,7 @@ def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> 
     if drift is not None and formula is not None and drift.nats > formula.gain:
         formula = None
     doubts = Doubts() if formula else doubts_about(search, best, drift, holdout)
+    search.say("ranking the effects")
     ranking = ranked(search, best, dismissed, holdout)
     answer = _answer(search, best, p_value, test, ranking, formula, holdout, doubts)
     return Discovery(answer, search, best, holdout)
@@ -121,14 +184,17 @@ def _believed(
 
 
 def material(search: Search, hypothesis: Hypothesis) -> Hypothesis:
-    """Those effects of a hypothesis that are larger than a model's usual imperfection."""
+    """Those effects of a hypothesis that are larger than a model's usual imperfection, and whose
+    intervals exclude that they are absent."""
     score, linear = search.points[hypothesis].score, search.points[hypothesis].linear
     settings = DiscoverSettings.current()
     least = settings.matters if len(hypothesis) == 1 else settings.matters_too
 
     def share(effect: str) -> float:
         c = search.problem.candidates[effect]
-        return float(abs(score.z[linear.index(c.key)] - c.lead.off) / c.lead.size)
+        i = linear.index(c.key)
+        step, sd = abs(score.z[i] - c.lead.off), np.sqrt(score.covariance[i, i])
+        return float(step / c.lead.size) if step > settings.apart * sd else 0.0
 
     strongest = max(hypothesis, key=lambda e: strength(search, e, hypothesis))
     wanted = {e: settings.matters if e == strongest else least for e in hypothesis}

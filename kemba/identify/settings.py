@@ -22,6 +22,9 @@ class DiscoverSettings(Settings):
         BY_HAND,
         decides=True,
     )
+    apart: float = setting(
+        1.96, "1", "sigmas by which an effect differs from none", "convention: its 95 % interval"
+    )
     matters_too: float = setting(
         0.3, "1", "the same for an effect beside a stronger one", BY_HAND, decides=True
     )
@@ -58,8 +61,9 @@ class VerdictSettings(Settings):
         0.5, "1", "the same where what is left repeats itself", BY_HAND, decides=True
     )
     sure: float = setting(
-        0.95, "1", "probability from which an effect is sure", "convention: 95 %", decides=True
-    )
+        0.95, "1", "probability from which an effect is sure", "convention: 95 %", decides=True,
+        at_most=0.999,
+    )  # fmt: skip
 
 
 class RankingSettings(Settings):

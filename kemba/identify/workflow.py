@@ -40,13 +40,14 @@ def discover_logs(
     """
     started = time.monotonic()
     columns = load_map(column_map) if column_map else None
+    say("reading the logs")
     fitted, kept = read_logs(logs, columns), read_logs(holdout, columns) if holdout else []
     found: Discovery | None = None
     try:
         _apart(fitted, kept)
         built = model_of(fitted, model)
         checked = [*check_all([*fitted, *kept], built), *limits_of(fitted)]
-        say("preparing the logs")
+        say("finding the motion in the logs")
         problem, remarks = admitted(fitted, built)
         remarks = [*built.remarks, *checked, *remarks]
         judge = make_problem(excerpts(kept)[0], built) if kept else None

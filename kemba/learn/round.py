@@ -148,9 +148,8 @@ def _learnt(
     """Compare with the run's model, discover, compare with the model found."""
     kept, out = [*asked.holdout] or [*past.logs], folder / "answer"
     out.mkdir()
-    tell("compare")
     here = as_executed(old.model, old, out / "model_of_the_run.yaml")
-    before, _ = compare_logs(kept, here, asked.column_map)
+    before, _ = compare_logs(kept, here, asked.column_map, tell=tell)
     answer, discovery = discover_logs(
         past.logs, asked.holdout, here, asked.column_map, asked.time_limit, tell, out
     )
@@ -158,7 +157,7 @@ def _learnt(
         raise KembaError("--logs", answer.sentence, hint="see kemba-opt check LOG")
     model, after = old.model, before.noise_ratio
     if answer.verdict in LEARNT and answer.added:
-        tell("compare with what was learnt")
+        tell("comparing with what was learnt")
         found = write_model(out / "model.yaml", old.model, answer.json()["ranking"], answer.added)
         model = str(found.resolve())
         here = as_executed(model, old, out / "model_learnt_of_the_run.yaml")
@@ -215,7 +214,7 @@ def _planned(
     result = {**result, "confirmed": _confirmed(result, task, folder / "trajectory.csv")}
     found = replace(found, result=result)
     if (folder / "controller.csv").is_file() and result["status"] != "infeasible":
-        listener.tell("correction")
+        listener.tell("correction of the valve edges")
         found = _corrected(found, task, folder)
     write_json(folder / "learning.json", found.json())
     return found

@@ -79,7 +79,8 @@ class Model:
 
         `values`: parameters that differ from the model's, by their names in `parameters`.
         """
-        effects = [i.effect for i in self.instances if i.leg in (leg, None)]
+        late = [i for i in self.instances if type(i.effect).timing is not Effect.timing]
+        effects = [i.effect for i in late if i.leg in (leg, None)]
         here = [_with(effect, values or {}).timing() for effect in effects]
         on = sum(t.get("on", 0.0) for t in here)
         return on, sum(t.get("off", 0.0) for t in here)
@@ -109,26 +110,39 @@ class Model:
 
         Every number named in `scaled` is multiplied by a symbol; it may be a whole table
         (`chamber.F_extend`) or one entry of it (`chamber.fill[0]`). In the parameters p these
-        factors follow the free parameters. Raises KembaError where the model has no such parameter.
+        factors follow the free parameters. Where effects stand once per leg, the name of their kind
+        stands for all of them. Raises KembaError where the model has no such parameter.
         """
         free, scaled = list(free), list(scaled)
         for name in free:
-            if name not in self.parameters:
+            if any(f"{e}.{_field(name)}" not in self.parameters for e in self._meant(name)):
                 hint = suggest(name, self.parameters)
                 raise KembaError(self.name, f"no parameter '{name}'", hint=hint)
         p = ca.SX.sym("p", len(free) + len(scaled))
         bound: dict[str, dict[str, Any]] = {}
         for i, name in enumerate(free):
-            effect, field = name.rsplit(".", 1)
-            bound.setdefault(effect, {})[field] = p[i]
+            for effect in self._meant(name):
+                bound.setdefault(effect, {})[_field(name)] = p[i]
         for i, name in enumerate(scaled, start=len(free)):
-            _scale(self, bound, name, p[i])
+            for effect in self._meant(name):
+                _scale(self, bound, f"{effect}.{_field(name)}", p[i])
         instances = [
             Instance(i.effect.bind(bound.get(i.effect.name, {})), i.leg) for i in self.instances
         ]
         free_lengths = lengths(i.effect for i in instances if i.effect.name in bound)
         mechanism = reshaped(self.mechanism, self.mechanism.offsets, free_lengths)
         return _assemble(self, mechanism, instances, p)
+
+    def _meant(self, name: str) -> list[str]:
+        """Names of the effects that `effect.field` is about: that effect, or all of that kind."""
+        effect = name.rsplit(".", 1)[0]
+        kind = [e.name for e in self.effects if e.kind == effect]
+        return [effect] if effect in [e.name for e in self.effects] or not kind else kind
+
+
+def _field(name: str) -> str:
+    """The field of `effect.field`."""
+    return name.rsplit(".", 1)[1]
 
 
 def lengths(effects: Iterable[Effect]) -> dict[str, Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from kemba.ocp.certificate.certify import costs
+from kemba.ocp.certificate.objective import costs
 from kemba.ocp.certificate.status import Status, verdict
 from kemba.ocp.continuation.between import Origin
 from kemba.ocp.continuation.continue_plan import Continuation, Continuing
@@ -35,11 +35,11 @@ def continued(planner: Planner, origin: Origin) -> tuple[Plan | None, str]:
     if not certificate.within(task.tolerances):
         return None, "its result misses the task's tolerances"
     status, sentence = verdict(task, certificate, new, answer.ending)
-    facts = f"{sentence}, refined on {len(answer.phases)} phases from the earlier plan"
+    facts = f"{sentence}, refined on {len(answer.phases)} phases from {origin.name}"
     cost, before = costs(model, new), costs(origin.model, origin.plan)
     if cost[TORQUE] > Continuing.current().dear * before[TORQUE]:
         times = f"{cost[TORQUE] / before[TORQUE]:.0f} times the squared torque"
-        facts += f"; it takes {times} of the earlier plan, one without --from may take less"
+        facts += f"; it takes {times} of {origin.name}, {origin.dear}"
     found = Plan(
         task=task,
         model=model,

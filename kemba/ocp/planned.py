@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from kemba.model import Model
-from kemba.ocp.certificate.certify import Certificate, certify, costs
+from kemba.ocp.certificate.certify import Certificate, certify
 from kemba.ocp.certificate.grazing import grazes
+from kemba.ocp.certificate.objective import costs
 from kemba.ocp.certificate.status import Status, verdict
 from kemba.ocp.infeasibility.diagnostic import Relax
 from kemba.ocp.infeasibility.explain import Explanation
@@ -41,6 +42,7 @@ class Plan:
     relax: tuple[Relax, ...] = ()
     refined: bool = False
     continued: bool | None = None  # whether it comes from an earlier plan, where one was given
+    start: str = "guess"  # or the plan of the library from which it begins
 
     @property
     def iterations(self) -> int:

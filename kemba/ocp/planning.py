@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from kemba.config import Document, find_config
@@ -15,7 +16,10 @@ from kemba.ocp.certificate.status import Status
 from kemba.ocp.continuation.between import Origin
 from kemba.ocp.continued import continued, from_scratch
 from kemba.ocp.infeasibility.checks import check_task
-from kemba.ocp.infeasibility.explain import explanation, refusal
+from kemba.ocp.infeasibility.diagnostic import Diagnostic
+from kemba.ocp.infeasibility.explain import Explanation, explanation, refusal
+from kemba.ocp.library.entry import Entry
+from kemba.ocp.library.shelf import Near, neighbours
 from kemba.ocp.nlp.ipopt import Control
 from kemba.ocp.nlp.watcher import Watch
 from kemba.ocp.planned import Plan, clear, explained
@@ -26,7 +30,7 @@ from kemba.ocp.task.requirement import Requirement, resolve
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.symmetry import whole
 from kemba.ocp.transcription.transcribe import Transcription
-from kemba.stopwatch import Stopwatch
+from kemba.stopwatch import Stopwatch, Tell, silent
 from kemba.trajectory import Trajectory
 
 
@@ -35,7 +39,7 @@ def plan(
     document: Document | None = None,
     model: str | Path | None = None,
     log: Path | None = None,
-    tell: Callable[[str], None] = lambda text: None,
+    tell: Tell = silent,
     watch: Watch | None = None,
     start: Trajectory | None = None,
     stop: Callable[[], bool] | None = None,
@@ -49,17 +53,8 @@ def plan(
     earlier plan that is solved again for the changed figures; where that fails, the plan is made
     from scratch, and `Plan.continued` is False.
     """
-    document = document or Document(task.model_dump())
-    building = Stopwatch()
-    with building.running():
-        built = task_model(task, model, document)
-        requirements = resolve(task, built, document)
-        diagnostics = check_task(task, built, requirements, document)
-        refused = refusal(diagnostics)
-    deadline = time.monotonic() + task.solver.time_limit
-    session = Session(Control(deadline, log, watch, stop), tell, building=building)
-    planner = Planner(task, built, requirements, session, start)
-    failed = ""
+    job = _job(task, document, model, Control(_deadline(task), log, watch, stop), tell, start)
+    planner, refused, failed = job.planner, job.refused, ""
     if origin is not None and refused is None:
         near, failed = continued(planner, origin)
         if near is not None:
@@ -70,9 +65,83 @@ def plan(
     if found.status is Status.SOLVED and task.clearance:
         found = clear(found)
     if not found.status.plan and found.status is not Status.INTERRUPTED:
-        why = refused or explanation(task, built, planner.outcome, diagnostics, document)
+        own = task, planner.model, planner.outcome, job.diagnostics, job.document
+        why = refused or explanation(*own)
         found = found if why is None else explained(found, why)
     return from_scratch(found, failed) if failed else found
+
+
+def plans_nearby(
+    task: Task,
+    document: Document | None = None,
+    log: Path | None = None,
+    tell: Tell = silent,
+    watch: Watch | None = None,
+    stop: Callable[[], bool] | None = None,
+) -> Iterator[Plan]:
+    """Plans of a task that begin from near plans of the library, the nearest one first.
+
+    Only solved ones; none where the library has none that is near, or the task cannot be met.
+    Raises ConfigErrors as `plan` does.
+    """
+    job = _job(task, document, None, Control(_deadline(task), log, watch, stop), tell)
+    if job.refused is not None:
+        return
+    for near in neighbours(task, job.planner.model)[: Near.current().tried]:
+        found, _ = continued(job.planner, _origin(near.entry, task))
+        if found is not None and found.status is Status.SOLVED:
+            yield replace(found, continued=None, start=f"library: {near.entry.name}")
+        if job.planner.session.control.ended() is not None:
+            return
+
+
+def _origin(entry: Entry, task: Task) -> Origin:
+    """A plan of the library with its model and what was asked of it: the task with its figures."""
+    own = task.model_copy(update=entry.figures)
+    model = task_model(own)
+    asked = resolve(own, model, Document(own.model_dump()))
+    name, dear = f"the shipped plan {entry.name}", "one from a guess (--cold) may take less"
+    return Origin(entry.plan, model, tuple(asked), name, dear, once=True)
+
+
+def plan_from(
+    origin: Origin, task: Task, document: Document | None = None
+) -> tuple[Plan | None, str]:
+    """A task's plan from another plan, or None and the reason where that fails."""
+    return continued(_job(task, document, None, Control(_deadline(task))).planner, origin)
+
+
+@dataclass(frozen=True)
+class _Job:
+    """A task that was checked, and what solves it."""
+
+    document: Document
+    planner: Planner
+    diagnostics: Sequence[Diagnostic]
+    refused: Explanation | None
+
+
+def _job(
+    task: Task,
+    document: Document | None,
+    model: str | Path | None,
+    control: Control,
+    tell: Tell = silent,
+    start: Trajectory | None = None,
+) -> _Job:
+    document = document or Document(task.model_dump())
+    building = Stopwatch()
+    with building.running():
+        built = task_model(task, model, document)
+        requirements = resolve(task, built, document)
+        diagnostics = check_task(task, built, requirements, document)
+    session = Session(control, tell, building=building)
+    planner = Planner(task, built, requirements, session, start)
+    return _Job(document, planner, diagnostics, refusal(diagnostics))
+
+
+def _deadline(task: Task) -> float:
+    return time.monotonic() + task.solver.time_limit
 
 
 def task_model(

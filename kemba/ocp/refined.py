@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from kemba.ocp.certificate.certify import costs
+from kemba.ocp.certificate.objective import costs
 from kemba.ocp.certificate.status import Status, verdict
 from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.phases.settings import Refining
@@ -57,10 +57,12 @@ def on_phases(planner: Planner, found: Plan) -> Plan:
     """The plan solved again on its own phases; where that fails, the same with the reason."""
     refining = Stopwatch()
     task, model = found.task, found.model
-    planner.session.tell("phases")
     with refining.running():
         control = planner.session.control
-        answer = refine(model, task, found.requirements, found.trajectory, control=control)
+        tell = planner.session.tell
+        answer = refine(
+            model, task, found.requirements, found.trajectory, control=control, tell=tell
+        )
     planner.session.attempts.append(Attempt("phases", answer.ending, answer.iterations))
     found = replace(
         found,

@@ -47,6 +47,8 @@ def answer(plan: Plan, run: str) -> dict[str, Any]:
         "robust": None,
         "good": plan.status is Status.SOLVED,
         "continued": plan.continued,
+        "start": plan.start,
+        "best_known": None,
         "ignored": plan.model.ignored,
         "remarks": plan.model.remarks,
         "relax": [

@@ -48,7 +48,8 @@ def plot_heat_map(
 
 def heat_height(channels: int, conditions: Sequence[Condition]) -> float:
     """Inches that one table needs."""
-    levels = max(1 if isinstance(c, str) else len(c) for c in conditions)
+    names = [(c,) if isinstance(c, str) else c for c in conditions]
+    levels = max(len(c) + sum(name.count("\n") for name in c) for c in names)
     return ROW * channels + LEVEL * levels + 0.3
 
 

@@ -15,6 +15,7 @@ from kemba.errors import KembaError
 from kemba.files import atomic_path
 
 WIDTH = 7.0  # in, both columns of a paper
+DPI = 200  # of a PNG
 
 # Okabe and Ito's palette without its yellow, which is lost on white
 BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK = (
@@ -82,8 +83,20 @@ def save_figure(figure: Figure, path: str | Path) -> Path:
         what = f"no figure format '{path.suffix}'" if path.suffix else "has no ending"
         raise KembaError(str(path), what, "a name ending in .png, .pdf or .svg was expected")
     with atomic_path(path) as temporary, matplotlib.rc_context(RC):
-        figure.savefig(temporary, dpi=200, facecolor="white")
+        if path.suffix.lower() == ".png":
+            _lay_out(figure)
+        figure.savefig(temporary, dpi=DPI, facecolor="white")
     return path
+
+
+def _lay_out(figure: Figure) -> None:
+    """Arrange the panels now and for good: `savefig` draws everything twice to do so."""
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        before, figure.dpi = figure.dpi, DPI
+        engine.execute(figure)
+        figure.set_layout_engine("none")
+        figure.dpi = before
 
 
 def svg_text(figure: Figure) -> str:

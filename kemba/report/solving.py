@@ -4,46 +4,37 @@ from __future__ import annotations
 
 import shutil
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from kemba.config import Document, dump_yaml
-from kemba.errors import KembaError
 from kemba.files import WriteError
-from kemba.ocp import Plan, Task, controller_table, plan
-from kemba.ocp.certificate.status import Status
+from kemba.ocp import Plan, Task, plan
 from kemba.ocp.continuation.between import Origin
+from kemba.ocp.known import compared
 from kemba.ocp.nlp.watcher import Watch
-from kemba.ocp.report import answer, sentence_of
+from kemba.ocp.planning import plans_nearby
 from kemba.ocp.starts import plan_best
-from kemba.plant.execution.certificate import executions, plant_run, summaries
-from kemba.plant.execution.counterpart import another_robot, counterpart
-from kemba.plant.execution.replay import ends_standing
-from kemba.plant.execution.retiming import retimed
-from kemba.report.robust import Candidate, most_robust
-from kemba.report.verdict import verdicts
+from kemba.report.drawing import Drawer, Here, Nowhere
+from kemba.report.executed import Motions, executed
 from kemba.runs import PLANT_RUN, RunFolder, write_json
+from kemba.stopwatch import Tell, silent
 from kemba.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from kemba.report.executed import Candidate
 
 
 @dataclass(frozen=True)
 class Listener:
     """What is called at each stage and iteration, and what may ask to stop."""
 
-    tell: Callable[[str], None] = lambda text: None
+    tell: Tell = silent
     watch: Watch | None = None
     stop: Callable[[], bool] | None = None
-
-
-@dataclass(frozen=True)
-class Motions:
-    """What is written beside the plan: the controller's table, and the motion of the plant."""
-
-    table: Trajectory | None = None
-    plant: Trajectory | None = None
 
 
 def solve_into(
@@ -57,99 +48,82 @@ def solve_into(
     replay: bool = True,
     figure: bool = True,
     origin: Origin | None = None,
+    drawer: Drawer | None = None,
+    library: bool = True,
 ) -> dict[str, Any]:
     """Solve `task` and fill its run folder; returns the JSON of `solve`.
 
     `start`: a trajectory to begin from. `starts`, `jobs`: how many start guesses, on how many
-    cores. `origin`: an earlier plan to continue for the changed figures. `replay`: execute the
-    plan on the same model and on the plant, and compare both with the task's tolerances; a plan
-    that misses them is `acceptable`, not `solved`. Raises KembaError where the task or a file is
-    wrong; the manifest then says `failed`.
+    cores. `origin`: an earlier plan to continue for the changed figures. `library`: where none of
+    these is given, begin from the shipped plans that are near. `replay`: execute the plan on the
+    same model and on the plant, and compare both with the task's tolerances; a plan that misses
+    them is `acceptable`, not `solved`. `drawer`: what draws the figure, this process when it is
+    None. Raises KembaError where the task or a file is wrong; the manifest then says `failed`.
     """
     dump_yaml(task.model_dump(exclude_none=True), folder / "task.yaml")
     log = folder / "solver.log"
+    how = {"tell": listener.tell, "watch": listener.watch, "stop": listener.stop}
+    shelved = library and start is None and origin is None
+
+    def nearby(task: Task) -> Iterator[Plan]:
+        return plans_nearby(task, document, log, **how) if shelved else iter(())  # type: ignore[arg-type]
+
+    def solved(task: Task) -> Plan:
+        if starts > 1 and start is None and origin is None:
+            return plan_best(task, document, starts, jobs, log, listener.tell)
+        return plan(task, document, log=log, start=start, origin=origin, **how)  # type: ignore[arg-type]
+
+    def candidates() -> Iterator[Candidate]:
+        if replay and task.robust > 0:
+            from kemba.report.robust import most_robust  # Dask and SciPy load for half a second
+
+            found = most_robust(
+                task, lambda task: next(nearby(task), None) or solved(task), listener.tell
+            )
+            yield found.plan, found.table, found.share
+            return
+        yield from ((near, None, None) for near in nearby(task))
+        yield solved(task), None, None
+
+    drawing = (drawer or Here()) if figure else Nowhere()
     try:
-
-        def solved(task: Task) -> Plan:
-            if starts > 1 and start is None and origin is None:
-                return plan_best(task, document, starts, jobs, log, listener.tell)
-            how = {"tell": listener.tell, "watch": listener.watch, "stop": listener.stop}
-            return plan(task, document, log=log, start=start, origin=origin, **how)  # type: ignore[arg-type]
-
-        robust = replay and task.robust > 0
-        chosen = most_robust(task, solved, listener.tell) if robust else Candidate(solved(task))
-        found, table = chosen.plan, chosen.table
+        made = (executed(*one, replay, listener.tell, folder, drawing) for one in candidates())
+        best = last = next(made)
+        while starts > 1 or not best.good:
+            other = next(made, None)
+            if other is None:
+                break
+            best, last = max(best, other, key=lambda made: made.rank), other
+        if best is not last and best.motions.table is not None:
+            drawing.begin(best.plan.trajectory, folder.path)
+        found, result = best.plan, best.result
         if found.task != task:
             dump_yaml(found.task.model_dump(exclude_none=True), folder / "task.yaml")
-        result = answer(found, str(folder.path))
-        if table is None and found.attempts:
-            table = controller_table(found.model, found.trajectory, found.task.hold)
-        plant: Trajectory | None = None
-        if replay and table is not None and found.status.plan:
-            listener.tell("replay")
-            if chosen.share is None:
-                table = retimed(found.model, found.trajectory, table)
-            replayed, plant = _replayed(found, table)
-            result |= replayed
-            if chosen.share is not None:
-                result |= {"robust": chosen.share.summary()}
-                result["sentence"] += f"; {chosen.share.sentence}"
-        _keep(found, result, Motions(table, plant), folder, figure)
+        known, remark = compared(found)
+        result |= {"best_known": known, "sentence": result["sentence"] + remark}
+        if figure:
+            listener.tell("drawing")
+        _keep(found, result, best.motions, folder, drawing)
     except BaseException:
         with suppress(WriteError):  # the first error says more
             folder.finish("failed")
         raise
-    folder.finish(result["status"], sentence=result["sentence"], good=result["good"])
+    facts = {key: result[key] for key in ("sentence", "good", "start")}
+    folder.finish(result["status"], **facts)
     return result
 
 
-def _replayed(found: Plan, table: Trajectory) -> tuple[dict[str, Any], Trajectory | None]:
-    """The executions of a plan with the verdict, and the motion of the plant.
-
-    The plan stays solved only if all executions come near enough.
-    """
-    task = found.task
-    try:
-        plant = counterpart(task.model, task.payload, task.supply, task.plant, changes=task.effects)
-        other = another_robot(task.model, task.plant)
-        done = executions(found.model, found.trajectory, table, plant)
-    except KembaError as error:  # a model that the simulator cannot execute still has its plan
-        return _unconfirmed(found, f"it cannot be simulated: {error}"), None
-    executed = summaries(found.model, done)
-    there = done["plant_replay"]
-    motion = plant_run(there) if there else None
-    lands = bool(ends_standing(found.model, found.trajectory))
-    names = [f"the plant is another robot, {other}, which {task.plant} names"] if other else []
-    judged = verdicts(executed, task.tolerances, lands).values()
-    if all(verdict.good for verdict in judged):
-        parts = [sentence_of(found), *names, *(verdict.sentence for verdict in judged)]
-        return {**executed, "sentence": "; ".join(parts)}, motion
-    causes = [verdict.sentence for verdict in judged if not verdict.good]
-    matches = [verdict.sentence for verdict in judged if verdict.good]
-    return {**executed, **_unconfirmed(found, " and ".join(causes), [*names, *matches])}, motion
-
-
-def _unconfirmed(found: Plan, cause: str, remarks: Sequence[str] = ()) -> dict[str, Any]:
-    """Status and sentence of a plan that its executions do not confirm: it is not solved, even
-    where it fulfils its own equations."""
-    if found.status is Status.SOLVED:
-        what = found.sentence.removeprefix("solved: ")
-        parts = [f"FAILED: a plan was found, but {cause}", *remarks, f"the plan: {what}"]
-    else:
-        parts = [sentence_of(found), cause, *remarks]
-    return {"status": Status.ACCEPTABLE, "good": False, "sentence": "; ".join(parts)}
-
-
 def _keep(
-    found: Plan, result: dict[str, Any], motions: Motions, folder: RunFolder, figure: bool
+    found: Plan, result: dict[str, Any], motions: Motions, folder: RunFolder, drawing: Drawer
 ) -> None:
     """Write the run folder; when that fails, write the plan elsewhere and say where."""
     try:
-        _write(found, result, motions, folder.path, figure)
+        _write(found, result, motions, folder.path)
+        drawing.finish()
     except WriteError as error:
         elsewhere = Path(tempfile.mkdtemp(prefix="kemba-kept-"))
         try:
-            _write(found, result, motions, elsewhere, figure=False)
+            _write(found, result, motions, elsewhere)
         except WriteError:
             shutil.rmtree(elsewhere, ignore_errors=True)
             raise error from None
@@ -157,9 +131,7 @@ def _keep(
         raise type(error)(error.where, error.what, hint=hint) from None
 
 
-def _write(
-    found: Plan, result: dict[str, Any], motions: Motions, folder: Path, figure: bool
-) -> None:
+def _write(found: Plan, result: dict[str, Any], motions: Motions, folder: Path) -> None:
     write_json(folder / "certificate.json", result)
     if motions.table is None:
         return  # refused before solving: there is no motion to write
@@ -167,8 +139,3 @@ def _write(
     motions.table.write(folder / "controller.csv")
     if motions.plant is not None:
         motions.plant.write(folder / PLANT_RUN)
-    if figure:
-        from kemba import plotting
-
-        sources = plotting.load_sources([folder])
-        plotting.save_figure(plotting.draw(sources), folder / "figure.png")

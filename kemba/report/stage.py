@@ -14,6 +14,7 @@ import kemba
 from kemba.errors import KembaError
 from kemba.files import atomic_text, plain
 from kemba.folders import place_for
+from kemba.logs import load_map
 from kemba.plotting.draw import machine_of
 from kemba.plotting.robot.sticks import CYLINDER, Pose, poses
 from kemba.plotting.source import Source, load_source
@@ -37,12 +38,14 @@ def view_run(
     out: str | Path | None = None,
     model: str | None = None,
     force: bool = False,
+    column_map: str | Path | None = None,
 ) -> Path:
     """The page of a run folder or a CSV; written to `out` or as a new file beside the motion.
 
-    Raises KembaError where columns are missing or the page cannot be written.
+    `column_map`: for the log of another program. Raises KembaError where columns are missing or the
+    page cannot be written.
     """
-    source = load_source(run)
+    source = load_source(run, load_map(column_map) if column_map else None)
     assert source.path is not None
     return write_view(source, place_for(out, source.path.with_name("view.html"), force), model)
 
@@ -55,16 +58,24 @@ def stage(
     Raises KembaError when columns are missing.
     """
     shown = scene(source, model, ghost)
-    text = json.dumps(plain(shown), separators=(",", ":"), allow_nan=False)
-    text = text.replace("<", "\\u003c")  # no name of a leg can end the script
     who = f"Shown: {name or source.name}."
     if ghost is not None:
         who += f" Pale blue: {'the plan' if ghost.plan else ghost.name}."
     high = max(centre[1] for centre in shown["motions"][0]["centres"])
     alt = f"{who} The robot in 3-D from the side; its body rises to {high:.2f} m."
     return fill(
-        "stage.html", who=escape(who), alt=escape(alt), viewer=page_text("viewer.js"), scene=text
+        "stage.html",
+        who=escape(who),
+        alt=escape(alt),
+        viewer=page_text("viewer.js"),
+        scene=script_text(shown),
     )
+
+
+def script_text(data: dict[str, Any]) -> str:
+    """Data as JSON that can stand within a script: no name in it can end the script."""
+    text = json.dumps(plain(data), separators=(",", ":"), allow_nan=False)
+    return text.replace("<", "\\u003c")
 
 
 def scene(source: Source, model: str | None = None, ghost: Source | None = None) -> dict[str, Any]:

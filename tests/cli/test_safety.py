@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import csv
-import errno
 import json
 import os
 import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Any
 
 import pytest
 from typer.testing import CliRunner, Result
 
 from kemba.config import Document
-from kemba.files import DiskFull, write_json
-from kemba.report import solving
+from kemba.files import write_json
 from kemba.sweep import Case, Sweep, open_folder, write_results
 from kemba_cli.main import app
 
@@ -102,36 +99,6 @@ def test_a_full_output_is_told() -> None:
     assert done.returncode == 1
     assert "the output" in done.stderr and "No space left" in done.stderr
     assert "Traceback" not in done.stderr and "unexpectedly" not in done.stderr
-
-
-def test_a_plan_survives_a_disk_that_fills_up(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    kept: list[Path] = []
-
-    def write(found: Any, result: Any, table: Any, folder: Path, figure: bool) -> None:
-        if folder == tmp_path / "run":
-            raise DiskFull(str(folder), "cannot be written: No space left", hint="free some space")
-        (folder / "trajectory.csv").write_text("kept")
-        kept.append(folder)
-
-    class Folder:
-        path = tmp_path / "run"
-
-    monkeypatch.setattr(solving, "_write", write)
-    with pytest.raises(DiskFull, match=r"the plan is kept in .*kemba-kept-.*; free some space"):
-        solving._keep(None, {}, None, Folder(), True)  # type: ignore[arg-type]
-    assert (kept[0] / "trajectory.csv").read_text() == "kept"
-
-
-def test_a_full_disk_is_no_fault_of_kemba(monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(*_: object) -> None:
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "solver.log")
-
-    monkeypatch.setattr("kemba.report.solve_into", full)
-    done = kemba("solve", "jump.yaml", "--set", "nodes=20")
-    assert done.exit_code == 1
-    assert "solver.log: cannot be written: No space left on device; free some" in done.stderr
 
 
 def test_a_user_without_home_or_name_can_work() -> None:

@@ -1,13 +1,19 @@
-"""`kemba-opt sweep`: exit codes and answers. Cases are faked but in one real sweep."""
+"""`kemba-opt sweep`: exit codes and answers; results of earlier runs are continued."""
 
 import json
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 from typing import Any
 
+import psutil
 import pytest
 from typer.testing import CliRunner, Result
 
-from kemba.sweep import Case
+from kemba.files import write_json
+from kemba.sweep import expand, load_sweep, open_folder
 from kemba_cli.main import app
 
 SWEEP = """\
@@ -19,21 +25,14 @@ blocks:
     cases: 4
     vary: {height: {low: 0.4 m, high: 0.5 m}}
 """
+GOOD = {"status": "solved", "good": True, "sentence": "solved", "solve_s": 1.0, "cost": {}}
+FOLDER = Path("sweeps/test")
 
-
-@pytest.fixture
-def answers(monkeypatch: pytest.MonkeyPatch) -> dict[int, Any]:
-    """What the fake cluster answers by the case's number; numbers taken out get no answer."""
-    good = {"status": "solved", "good": True, "sentence": "solved", "solve_s": 1.0, "cost": {}}
-    found: dict[int, Any] = {index: dict(good) for index in range(4)}
-
-    def run_cases(cases: list[Case], *_: Any) -> dict[str, Any]:
-        if isinstance(found.get(0), BaseException):
-            raise found[0]
-        return {case.key: found[case.index] for case in cases if case.index in found}
-
-    monkeypatch.setattr("kemba.sweep.run_cases", run_cases)
-    return found
+# dask's own clean-up of a cluster that was just closed
+pytestmark = [
+    pytest.mark.filterwarnings("ignore:unclosed:ResourceWarning"),
+    pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
+]
 
 
 @pytest.fixture
@@ -42,12 +41,22 @@ def sweep(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     Path("s.yaml").write_text(SWEEP)
 
     def run(*more: str) -> Result:
-        return CliRunner().invoke(app, ["sweep", "s.yaml", *more])
+        return CliRunner().invoke(app, ["sweep", "s.yaml", "--jobs", "1", *more])
 
     return run
 
 
-def test_all_well(sweep: Any, answers: dict[int, Any]) -> None:
+@pytest.fixture
+def done_before(sweep: Any) -> list[Path]:
+    """The files of four cases that an earlier run of the same sweep has solved."""
+    asked, document = load_sweep("s.yaml")
+    cases = expand(asked, document, open_folder(None, asked, document))
+    for case in cases:
+        write_json(case.path(FOLDER), GOOD)
+    return [case.path(FOLDER) for case in cases]
+
+
+def test_all_well(sweep: Any, done_before: list[Path]) -> None:
     done = sweep()
     assert done.exit_code == 0
     folder, line = done.stdout.splitlines()
@@ -55,26 +64,42 @@ def test_all_well(sweep: Any, answers: dict[int, Any]) -> None:
     assert {p.name for p in Path(folder).iterdir()} >= {"results.csv", "results.json", "sweep.yaml"}
 
 
-def test_json(sweep: Any, answers: dict[int, Any]) -> None:
+def test_json(sweep: Any, done_before: list[Path]) -> None:
     done = sweep("--json")
     answer = json.loads(done.stdout)
     assert (done.exit_code, done.stderr) == (0, "")
     assert answer["status"] == "finished" and answer["blocks"]["a"]["rate"] == 1.0
 
 
-def test_failures_and_missing_cases_are_a_bad_answer(sweep: Any, answers: dict[int, Any]) -> None:
-    answers[2] |= {"status": "stalled", "good": False}
+def test_failures_are_a_bad_answer(sweep: Any, done_before: list[Path]) -> None:
+    write_json(done_before[2], {**GOOD, "status": "stalled", "good": False})
     assert sweep().exit_code == 1
     assert sweep("--set", "blocks.a.expect=70 %").exit_code == 0
-    del answers[1]
-    limited = sweep("--set", "blocks.a.expect=0", "--json")
+
+
+def test_missing_cases_are_a_bad_answer(sweep: Any, done_before: list[Path]) -> None:
+    done_before[1].unlink()
+    limited = sweep("--time-limit", "0.1", "--set", "blocks.a.expect=0", "--json")
     assert limited.exit_code == 1 and json.loads(limited.stdout)["status"] == "limit"
 
 
-def test_interruption_leaves_a_table(sweep: Any, answers: dict[int, Any]) -> None:
-    answers[0] = KeyboardInterrupt()
-    assert sweep().exit_code == 130
-    assert "missing" in Path("sweeps/test/results.csv").read_text()
+def test_interruption_leaves_a_table(sweep: Any, done_before: list[Path]) -> None:
+    done_before[1].unlink()
+    command = [sys.executable, "-c", "from kemba_cli.main import main; main()"]
+    with subprocess.Popen([*command, "sweep", "s.yaml", "--jobs", "1", "-q"]) as client:
+        deadline = time.monotonic() + 60
+        while not _workers(client.pid):
+            assert client.poll() is None and time.monotonic() < deadline
+            time.sleep(0.05)
+        client.send_signal(signal.SIGINT)
+        assert client.wait(30) == 130
+    rows = (FOLDER / "results.csv").read_text().splitlines()
+    assert sum("missing" in row for row in rows) == 1 and sum("solved" in row for row in rows) == 3
+
+
+def _workers(pid: int) -> list[psutil.Process]:
+    """Dask's worker processes below a client."""
+    return [p for p in psutil.Process(pid).children(True) if "spawn_main" in " ".join(p.cmdline())]
 
 
 def test_bad_input(sweep: Any) -> None:
@@ -84,8 +109,6 @@ def test_bad_input(sweep: Any) -> None:
     assert sweep("--out", "notes.txt").exit_code == 2
 
 
-@pytest.mark.filterwarnings("ignore:unclosed:ResourceWarning")  # dask's clean-up
-@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 def test_a_real_sweep_is_solved_and_not_repeated(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

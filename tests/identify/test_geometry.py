@@ -52,6 +52,7 @@ def test_right_lengths_are_left_alone() -> None:
     assert robot_problem(logs, load_model("planning")).lengths == {}
 
 
+@pytest.mark.slow
 def test_a_long_femur_is_named_and_nothing_else() -> None:
     answer = discover(unlisted("femur/length", 3)).answer
     assert answer.added == ("geometry:femur/length",), answer.sentence

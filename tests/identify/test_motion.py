@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from kemba.identify.bench.motion import smooth_motion
+from kemba.identify.bench.quiet import position_noise
 from kemba.identify.problem.noise import caution, difference_sigma, learn, whiten
+from kemba.identify.problem.sensor_noise import ChannelNoise
 
 
 @pytest.mark.parametrize("step", [0.0, 5e-5, 2e-4, 5e-4])
@@ -63,3 +66,26 @@ def test_spikes_are_silenced_but_not_what_lasts() -> None:
     assert weight[1001] < 0.3
     assert weight[2100:2400].min() == 1.0
     assert np.mean(weight < 1) < 0.05
+
+
+@pytest.mark.parametrize(("keep", "white"), [(0.0, True), (0.9, False), (0.95, False)])
+def test_coloured_noise_of_a_position_is_learnt_at_rest(keep: float, white: bool) -> None:
+    """AR(1) noise looks four times too small in differences of rows, and so does its effect on the
+    velocity."""
+    rng, t = np.random.default_rng(0), np.arange(8000) / 1e3
+    drive = 1e-4 * np.sqrt(1.0 - keep**2) * rng.standard_normal((2, len(t)))
+    still, sweep = lfilter([1.0], [1.0, -keep], drive, axis=1)
+    sweep = sweep + 0.035 + 0.02 * np.sin(7.0 * t)
+    noise = position_noise([(t, still), (t, sweep)])
+    assert (not noise.lags) == white
+    found = smooth_motion(t, still, noise=noise)
+    assert found.x_sigma == pytest.approx(1e-4, rel=0.2)
+    error, claimed = np.sqrt(np.mean(found.v**2)), np.sqrt(np.mean(found.v_sigma**2))
+    assert error < 1.6 * claimed
+    assert white or smooth_motion(t, still).x_sigma < 0.4e-4
+
+
+def test_a_piston_that_never_rests_tells_no_colour() -> None:
+    t = np.arange(3000) / 1e3
+    x = 0.035 + 0.02 * np.sin(7.0 * t) + 1e-4 * np.random.default_rng(0).standard_normal(3000)
+    assert position_noise([(t, x)]) == ChannelNoise()

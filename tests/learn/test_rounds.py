@@ -43,7 +43,10 @@ def planned(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_one_round(planned: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A weak supply is found, and the next run is expected to and does come nearer."""
+    """A weak supply is found, and the next run is expected to and does come nearer.
+
+    Three candidates instead of all make it quick; `test_three_rounds` has them all.
+    """
     monkeypatch.setattr(
         workflow, "make_problem", lambda logs, model: robot_problem(logs, model, SUSPECTS)
     )

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from kemba.ocp import load_task
-from kemba.ocp.functions.blocks import Block
+from kemba.ocp.functions.code import Code
 from kemba.ocp.functions.compiled import cache_folder, compiled, is_whole
 from kemba.ocp.functions.constants import parameterised
 from kemba.ocp.planning import task_model
@@ -26,12 +26,12 @@ compiler = pytest.mark.skipif(
 )
 
 
-def step(*options: str) -> tuple[Block, ca.SX]:
-    """One step of the jump as the program has it, and its parameters."""
+def step(*options: str) -> Code:
+    """One step of the jump as the program has it."""
     task, document = load_task("jump", ["nodes=24", *options])
     model = task_model(task)
     program = Transcription(model, task, resolve(task, model, document), whole(model.node), 24)
-    return program.problem.blocks[0], program.problem.p
+    return program.problem.blocks[0].code
 
 
 def test_lifting_keeps_the_numbers() -> None:
@@ -47,8 +47,8 @@ def test_lifting_keeps_the_numbers() -> None:
 def test_tasks_that_differ_in_numbers_share_their_code() -> None:
     texts = []
     for supply, payload in (("0.65 MPa", "0.2 kg"), ("0.75 MPa", "0.7 kg")):
-        block, p = step(f"supply={supply}", f"payload={payload}")
-        f = ca.Function("f", [block.z, ca.vertcat(p, block.constants)], [block.f, block.g])
+        block = step(f"supply={supply}", f"payload={payload}")
+        f = ca.Function("f", [block.z, block.given], [block.f, block.g])
         texts.append(f.serialize())
     assert texts[0] == texts[1]
 
@@ -59,8 +59,8 @@ def test_compiled_is_the_same_to_the_last_bit(
 ) -> None:
     monkeypatch.setenv("KEMBA_CACHE", str(tmp_path))
     monkeypatch.delenv("KEMBA_COMPILE", raising=False)
-    block, p = step()
-    at = ca.vertcat(p, block.constants)
+    block = step()
+    at = block.given
     plain = ca.Function("g", [block.z, at], [ca.densify(block.g)])
     (fast,) = compiled([plain], wait=True)
     assert sorted(path.suffix for path in tmp_path.iterdir()) == [".json", ".so"]

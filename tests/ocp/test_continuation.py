@@ -41,6 +41,11 @@ def hop(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+def modes(run: Path) -> list[str]:
+    """The phases of a plan without their nodes, which are shared anew by how long phases last."""
+    return [text.split(" ", 1)[1] for text in load_run(run).trajectory.meta["phases"]]
+
+
 @pytest.mark.parametrize("change", ["height=0.37 m", "supply=0.67 MPa", "payload=0.3 kg"])
 def test_a_near_task_is_continued(hop: Path, tmp_path: Path, change: str) -> None:
     _, answer = solve("--from", hop, "--set", change, "--no-figure", "--json",
@@ -51,8 +56,7 @@ def test_a_near_task_is_continued(hop: Path, tmp_path: Path, change: str) -> Non
     assert isinstance(replay, dict) and replay["landed"]
     assert abs(replay["apex_error_m"]) < 1e-4
     assert answer["apex_m"] == pytest.approx(0.37 if "height" in change else 0.35, abs=1e-5)
-    kept = load_run(hop).trajectory.meta["phases"]
-    assert load_run(tmp_path / "run").trajectory.meta["phases"] == kept
+    assert modes(tmp_path / "run") == modes(hop)
 
 
 def test_a_learnt_model_is_continued(hop: Path, tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from kemba.model.impact import felt
 from kemba.ocp import Task, load_task, task_model
 from kemba.ocp.certificate.grazing import grazes
 from kemba.ocp.phases.modes import HELD, OPEN, drop_grazes
-from kemba.ocp.task.requirement import Requirement, apex_node, resolve
+from kemba.ocp.task.requirement import Requirement, apex_node, longest_leg, resolve
 from kemba.trajectory import Trajectory
 
 
@@ -70,6 +70,19 @@ def test_the_feet_are_clear_in_the_middle_of_the_flight() -> None:
     rows = found[0].nodes(len(run.plan) - 1)
     for leg in ("front", "rear"):
         assert run.plan[f"{leg}/foot/z"][rows].min() >= 0.03 - 1e-6
+
+
+def test_a_low_jump_has_the_clearance_of_stretched_legs() -> None:
+    def least(*options: str) -> list[float]:
+        found = required("jump.yaml", *options)
+        return sorted({r.lower for r in found if r.location == ("clearance",)})
+
+    assert least() == [0.03]
+    drop = 0.48 - longest_leg(load_model().mechanism.need_robot())
+    assert 0.03 < drop < 0.05
+    assert least("height=0.48 m") == [pytest.approx(0.51 * drop)]
+    assert least("height=0.43 m") == []
+    assert least("height=0.43 m", "folding=true") == [0.03]
 
 
 def test_clearance_needs_a_flight() -> None:

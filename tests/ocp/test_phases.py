@@ -43,9 +43,8 @@ CASES = [
     ("jump_forward", "distance=0.3 m"),
     ("jump_forward", "distance=0.6 m"),
 ]
-QUICK = [CASES[1], CASES[5]]
-FORWARD = CASES[-1]  # the quickest of those on a whole robot
-MARKS = {case: [] if case in (*QUICK, FORWARD) else [pytest.mark.slow] for case in CASES}
+QUICK = [CASES[1]]
+MARKS = {case: [] if case in QUICK else [pytest.mark.slow] for case in CASES}
 EVERY = [pytest.param(*case, marks=marks) for case, marks in MARKS.items()]
 
 
@@ -149,6 +148,7 @@ def test_the_half_robot_has_one_foot_and_two_stops() -> None:
     assert [c.friction is not None for c in constraints] == [True, False, False]
 
 
+@pytest.mark.slow
 def test_the_task_key_makes_the_refined_plan_the_plan() -> None:
     task, document = load_task("jump", ["refine=radau"])
     found = plan(task, document)

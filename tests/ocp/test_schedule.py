@@ -47,6 +47,7 @@ def test_without_symmetry_it_starts_from_the_guess() -> None:
     assert solves[0] == "relax (whole robot, 25 nodes)"
 
 
+@pytest.mark.slow
 def test_what_does_not_grow_starts_from_the_guess(monkeypatch: pytest.MonkeyPatch) -> None:
     def wither(schedule: object, half: object, point: Iterate, guess: Iterate) -> Iterate:
         return replace(guess, ending=Ending.INFEASIBLE)

@@ -1,41 +1,33 @@
-"""Plans that could not be refined, and what refined ones say of impacts."""
+"""What a plan is called that could not be refined."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from types import SimpleNamespace
-from typing import Any
-
 import pytest
+from plain_task import plain_task
 
-from kemba.ocp import refined as rooms
+from kemba.ocp import Plan, load_task, plan
 from kemba.ocp.certificate.status import Status
-from kemba.ocp.nlp.ending import Ending
-from kemba.ocp.refinement.refine import Refined
+from kemba.ocp.phases.settings import Refining
+from kemba.settings import changed
 
 
-@dataclass(frozen=True)
-class Found:
-    """What `on_phases` reads of a plan."""
-
-    task: Any = None
-    model: Any = None
-    requirements: tuple[Any, ...] = ()
-    trajectory: Any = None
-    attempts: tuple[Any, ...] = ()
-    solve_s: float = 0.0
-    solve_cpu_s: float = 0.0
-    status: Status = Status.SOLVED
-    sentence: str = "solved: apex 0.500 m, 0.7 s"
-    refined: bool = False
-    cost: dict[str, float] = field(default_factory=dict)
+@pytest.fixture(scope="module")
+def unrefined(tmp_path_factory: pytest.TempPathFactory) -> Plan:
+    """A plan whose refinement is given three iterations."""
+    task, document = load_task(plain_task(tmp_path_factory.mktemp("plain")), ["nodes=24"])
+    few = dict.fromkeys(("iterations_half", "nearest_half", "rough_iterations"), 3)
+    with changed(Refining, elastic_iterations=3, rounds=1, **few):
+        return plan(task, document)
 
 
-def test_a_plan_that_cannot_be_refined_is_not_solved(monkeypatch: pytest.MonkeyPatch) -> None:
-    failed = Refined(None, None, Ending.UNSUITABLE, 3, reason="the model is not made for it")
-    monkeypatch.setattr(rooms, "refine", lambda *_, **__: failed)
-    session = SimpleNamespace(tell=lambda text: None, control=None, attempts=[])
-    kept = rooms.on_phases(SimpleNamespace(session=session), Found())  # type: ignore[arg-type]
-    assert kept.status is Status.ACCEPTABLE
-    assert kept.sentence.startswith("acceptable: apex 0.500 m, 0.7 s; not refined (the model is")
-    assert "refine=none" in kept.sentence and "solved" not in kept.sentence
+def test_a_plan_that_cannot_be_refined_is_not_solved(unrefined: Plan) -> None:
+    assert unrefined.status is Status.ACCEPTABLE and not unrefined.refined
+    assert unrefined.sentence.startswith("acceptable: apex 0.350 m, ")
+    assert "not refined (the limit of iterations was reached)" in unrefined.sentence
+    assert "whose air forces are inexact" in unrefined.sentence
+    assert "refine=none" in unrefined.sentence and "solved" not in unrefined.sentence
+
+
+def test_its_implicit_euler_plan_is_kept(unrefined: Plan) -> None:
+    assert unrefined.certificate.within(unrefined.task.tolerances)
+    assert len(unrefined.trajectory.time) == 25

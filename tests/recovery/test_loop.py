@@ -32,6 +32,7 @@ def run(*arguments: str | Path) -> str:
     return shown.stdout
 
 
+@pytest.mark.slow
 def test_the_error_falls_on_a_hop_that_was_kept(tmp_path: Path) -> None:
     """Compare, discover, adopt, compare again: two hops of a machine whose supply is 15 % weak are
     fitted, the third is kept."""

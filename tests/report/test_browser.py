@@ -13,6 +13,8 @@ from typer.testing import CliRunner
 
 from kemba_cli.main import app
 
+pytestmark = pytest.mark.slow
+
 SIZES = {"desk": {"width": 1200, "height": 900}, "phone": {"width": 390, "height": 844}}
 KINDS = ("review", "report", "view", "answer")
 AA = 4.5  # least contrast of text (WCAG 2.1, 1.4.3)
@@ -186,15 +188,14 @@ def test_wheel_and_space_scroll_the_page(browser: Any, pages: dict[str, Path], k
     for seen in opened(browser, pages[kind], {"width": 800, "height": 350}):
         page = seen.page
         page.keyboard.press("Space")
-        page.wait_for_timeout(400)
-        moved = page.evaluate("scrollY")
-        assert moved > 0
+        page.wait_for_function("scrollY > 0")
+        page.wait_for_timeout(400)  # Space scrolls smoothly, until it is done
         page.evaluate("scrollTo(0, 0)")
+        page.wait_for_function("scrollY == 0")
         box = page.locator(".stage canvas").bounding_box()
         page.mouse.move(box["x"] + 100, box["y"] + 20)
         page.mouse.wheel(0, 100)
-        page.wait_for_timeout(300)
-        assert page.evaluate("scrollY") > 0
+        page.wait_for_function("scrollY > 0")
 
 
 def test_the_viewer_has_its_controls(browser: Any, pages: dict[str, Path]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -15,7 +16,7 @@ from kemba.config import shipped_configs
 from kemba.identify.logs.reading import read_log
 from kemba.logs import load_map
 from kemba.plotting import load_source
-from kemba.report.stage import scene
+from kemba.report.stage import scene, script_text, stage
 from kemba.trajectory import Trajectory
 from kemba_cli.main import app
 
@@ -141,6 +142,9 @@ def test_another_programs_columns_come_back(run: Path, tmp_path: Path) -> None:
     figure = tmp_path / "foreign.png"
     drawn = ("plot", str(out), "--map", str(tmp_path / "other.yaml"), "--save", str(figure))
     assert call(*drawn).exit_code == 0 and figure.is_file()
+    page = tmp_path / "foreign.html"
+    seen = call("view", str(out), "--map", str(tmp_path / "other.yaml"), "--out", str(page))
+    assert seen.exit_code == 0 and "<canvas" in page.read_text(), seen.output
 
 
 def test_wrong_endings_are_told(run: Path, tmp_path: Path) -> None:
@@ -154,11 +158,10 @@ def test_wrong_endings_are_told(run: Path, tmp_path: Path) -> None:
     assert done.exit_code == 2 and "goes with .csv only" in done.stderr
 
 
-def test_no_name_ends_the_script(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from kemba.report import stage as room
-
-    shown = scene(load_source(run))
-    monkeypatch.setattr(room, "scene", lambda *_: {**shown, "legs": ["a</script><script>alert(1)"]})
-    page = room.stage(load_source(run))
-    assert page.count("<script") == page.count("</script") == 1
-    assert "a\\u003c/script>\\u003cscript>alert(1)" in page
+def test_no_name_ends_the_script(run: Path, tmp_path: Path) -> None:
+    text = script_text({"legs": ["a</script><script>alert(1)"]})
+    assert text == '{"legs":["a\\u003c/script>\\u003cscript>alert(1)"]}'
+    motion = tmp_path / "a<script>alert(1)<!--.csv"
+    shutil.copy(run / "trajectory.csv", motion)
+    page = stage(load_source(motion), "planning")
+    assert page.count("<script") == page.count("</script") == 1 and "<!--" not in page

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import pytest
+from plain_task import plain_task
 from typer.testing import CliRunner
 
+from kemba.files import WriteError
 from kemba.ocp import load_task, task_model
 from kemba.plant import execute, replay
 from kemba.plant.execution.counterpart import counterpart
@@ -92,3 +95,16 @@ def test_a_refined_plan_tells_the_impulses_on_its_feet(tmp_path: Path) -> None:
     touched = int((plan["front/foot/z"] <= 1e-6).argmax())
     assert hits[0] == touched and impulse[touched] > 0.1
     assert plan.unit("front/foot/impulse_x") == "N.s"
+
+
+def test_a_plan_survives_a_folder_that_cannot_be_written(tmp_path: Path) -> None:
+    """Something else holds the name of the plan's file, so the plan is written elsewhere."""
+    task, document = load_task(plain_task(tmp_path), ["nodes=16", "refine=none"])
+    folder = RunFolder.create(tmp_path / "run", task.name)
+    (folder / "trajectory.csv").mkdir()
+    with pytest.raises(WriteError, match=r"the plan is kept in .*; give a place") as told:
+        solve_into(folder, task, document, Listener(), replay=False, figure=False)
+    kept = Path(str(told.value).partition("kept in ")[2].partition(";")[0])
+    assert len(Trajectory.read(kept / "trajectory.csv").time) == 17
+    assert json.loads((tmp_path / "run" / "manifest.json").read_text())["status"] == "failed"
+    shutil.rmtree(kept)

@@ -111,3 +111,20 @@ def vessel_log(path: Path, h: float = 4.0, seed: int = 0) -> Path:
     }
     Trajectory(time, columns, {"kind": "vessel"}).write(path)
     return path
+
+
+def cogging_log(path: Path, seed: int) -> Path:
+    """An axis of 2 kg with friction 3 N, 8 N.s/m and cogging of 0.6 N every 11 mm, driven through
+    the same motion twelve times."""
+    rng, t = np.random.default_rng(seed), np.arange(0.0, 10.0, 2e-3)
+    size, rate = np.array([0.08, 0.03, 0.012]), 2 * np.pi * 1.2 * np.arange(1, 4)
+    angle = rate[:, None] * t + rng.uniform(0, 2 * np.pi, (3, 1))
+    q, v, a = size @ np.sin(angle), (size * rate) @ np.cos(angle), -(size * rate**2) @ np.sin(angle)
+    cogging = 0.6 * np.sin(2 * np.pi * q / 0.011 + rng.uniform(0, 2 * np.pi))
+    force = 2.0 * a + 3.0 * np.tanh(v / 1e-3) + 8.0 * v + cogging
+    columns = {
+        "axis/q [m]": q + 1e-7 * rng.standard_normal(len(t)),
+        "axis/tau [N]": force + 0.1 * rng.standard_normal(len(t)),
+    }
+    Trajectory(t, columns, {"kind": "drive"}).write(path)
+    return path

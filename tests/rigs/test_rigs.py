@@ -9,7 +9,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from machines import cylinder_log, drive_log, model_file, vessel_log
+from machines import cogging_log, cylinder_log, drive_log, model_file, vessel_log
 from real_data import reader, real
 
 from kemba.errors import KembaError
@@ -177,3 +177,15 @@ def test_real_seals_are_told_apart(
     # by hand, from half the difference of the two directions; mountings differ by 12 %
     assert figures["seal_friction.F_c"] == pytest.approx(constant, rel=0.12)
     assert figures["pressure_friction.mu"] == pytest.approx(growing, abs=0.002)
+
+
+def test_intervals_know_of_errors_that_every_repeat_repeats(tmp_path: Path) -> None:
+    """A drive with cogging that its model lacks, in a motion that repeats twelve times: blocks of
+    time as long as a repeat show no scatter at all."""
+    truth = {"drive_axis.J": 2.0, "axis_friction.F_c": 3.0, "axis_damping.F_v": 8.0}
+    effects = {"kind": "axis_friction"}, {"kind": "axis_damping"}
+    model, inside = model_file(tmp_path, DRIVE, *effects), 0
+    for seed in range(4):
+        found = characterise_logs([cogging_log(tmp_path / "a.csv", seed)], model)
+        inside += sum(f.low < truth[f.name] < f.high for f in found.figures)
+    assert inside >= 11

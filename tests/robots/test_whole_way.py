@@ -85,6 +85,7 @@ def stranger(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return home
 
 
+@pytest.mark.slow
 def test_a_strangers_robot_goes_the_whole_way(stranger: Path) -> None:
     names = ("model.yaml", "task.yaml", "myrobot.yaml")
     assert all(f["good"] for f in run("check", *(stranger / n for n in names))["files"])

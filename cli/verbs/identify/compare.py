@@ -30,12 +30,15 @@ def compare(
 
     Example: kemba-opt compare jump_1.csv jump_2.csv --figure heat_map.png
     """
-    from kemba.folders import fresh
+    from kemba.folders import fresh, typed
     from kemba.identify.compare_logs import compare_logs
+    from kemba_cli.course import COMPARE
+    from kemba_cli.progress import Progress
 
     if figure is not None:
         fresh(figure, force, "--figure")
-    found, _ = compare_logs(logs, model, column_map, run)
+    with Progress(quiet or json, COMPARE) as progress:
+        found, _ = compare_logs(logs, model, column_map, run, progress.tell)
     if figure is not None:
         from kemba.plotting.study.comparison import plot_comparison
         from kemba.plotting.style import save_figure
@@ -48,6 +51,9 @@ def compare(
     typer.echo(found.sentence)
     if not quiet:
         _print(found)
+    if not found.good and not found.tolerable:
+        own = None if model == "planning" else model
+        say(f"next: kemba-opt discover {typed(logs, column_map, own)} --out answer", quiet)
 
 
 def _print(found: Comparison) -> None:

@@ -43,12 +43,13 @@ def discover(
 
     Example: kemba-opt discover bench_1.csv bench_2.csv --holdout bench_3.csv
     """
-    from kemba.folders import claimed
+    from kemba.folders import claimed, typed
     from kemba.identify.workflow import discover_logs, write_answer
+    from kemba_cli.course import DISCOVER
     from kemba_cli.progress import Progress
 
     with claimed(out, "answer", "answer.json", force) as folder:
-        with Progress(quiet or json) as progress:
+        with Progress(quiet or json, DISCOVER, time_limit) as progress:
             answer, found = discover_logs(
                 logs, holdout or [], model, column_map, time_limit, progress.tell
             )
@@ -62,7 +63,8 @@ def discover(
                 draw_discovery(found, folder)
         finally:  # also when the disk is full: it took minutes
             _tell(answer, folder, json, quiet)
-            say(f"see it: kemba-opt review {' '.join(map(str, logs))} --answer {folder}", quiet)
+            own = None if model == "planning" else model
+            say(f"next: kemba-opt review {typed(logs, column_map, own)} --answer {folder}", quiet)
     if answer.verdict == "bad-data":
         raise typer.Exit(BAD_ANSWER)
 

@@ -7,15 +7,17 @@ from typing import Annotated
 
 import typer
 
-from kemba_cli.common import Force, Foreign, Json, OwnEffects, Quiet, print_json, say
+from kemba_cli.common import Force, Foreign, Json, OwnEffects, Quiet, newest, print_json, say
 
 
 def learn(
     runs: Annotated[
-        list[Path], typer.Argument(help="Runs that were executed; their logs (CSV) may follow.")
-    ],
+        list[Path] | None,
+        typer.Argument(help="Runs that were executed; their logs may follow (the newest run)."),
+    ] = None,
     logs: Annotated[
-        list[Path] | None, typer.Option(help="A log, or a folder of logs; may be repeated.")
+        list[Path] | None,
+        typer.Option(help="A log, or a folder of logs; may be repeated (the run's newest)."),
     ] = None,
     target: Annotated[
         str | None, typer.Option(help="Task YAML to plan next; else that of the last run.")
@@ -44,6 +46,8 @@ def learn(
     The new run folder holds the model (answer/), the plan, a controller table with the correction
     (correction.yaml), and the page learning.html. Exit code 1 when the new plan is not confirmed.
 
+    With nothing given it takes the newest run and its newest logs.
+
     Example: kemba-opt learn runs/jump-1 --logs runs/jump-1/logs --target jump.yaml
     """
     from kemba.config import find_config
@@ -53,14 +57,12 @@ def learn(
     from kemba.ocp import load_task
     from kemba.report import Listener
     from kemba.runs import RunFolder, load_run
+    from kemba_cli.course import LEARN
     from kemba_cli.progress import Progress
 
-    folders = [path for path in runs if path.is_dir() or path.suffix != ".csv"]
-    listed = _files([*(logs or []), *(path for path in runs if path not in folders)])
-    if not folders:
-        raise typer.BadParameter("a run folder was expected", param_hint="RUN")
-    if not listed:
-        raise typer.BadParameter("logs were expected, such as --logs RUN/logs", param_hint="--logs")
+    folders, listed = _told_apart(runs or [], logs or [])
+    folders = folders or [newest(quiet or json, "controller.csv")]
+    listed = listed or _logs_of(folders[-1], quiet or json)
     task = target or str(load_run(folders[-1]).task)
     asked = Asked(
         folders, listed, task, overrides or [], holdout or [], column_map, time_limit, correct
@@ -68,7 +70,7 @@ def learn(
     name = load_task(task, list(overrides or []))[0].name  # mistakes first, before minutes of work
     folder = RunFolder.create(out, name, [find_config(task, "tasks"), *listed], force=force)
     try:
-        with Progress(quiet or json) as progress:
+        with Progress(quiet or json, LEARN) as progress:
             found = learn_once(asked, folder, Listener(progress.tell, progress.watch))
     except BaseException:
         if folder.lock is not None:
@@ -85,9 +87,23 @@ def learn(
         raise typer.Exit(1)
 
 
-def _files(paths: list[Path]) -> list[Path]:
-    """The logs in folders, and the others."""
-    found: list[Path] = []
-    for path in paths:
-        found += sorted(path.glob("*.csv")) if path.is_dir() else [path]
+def _told_apart(runs: list[Path], logs: list[Path]) -> tuple[list[Path], list[Path]]:
+    """The runs and the logs among the arguments; a folder of logs stands for what it holds."""
+    folders = [path for path in runs if path.is_dir() or path.suffix != ".csv"]
+    listed: list[Path] = []
+    for path in [*logs, *(path for path in runs if path not in folders)]:
+        listed += sorted(path.glob("*.csv")) if path.is_dir() else [path]
+    return folders, listed
+
+
+def _logs_of(run: Path, quiet: bool) -> list[Path]:
+    """The newest logs of a run; says which. Raises KembaError where it has none."""
+    from kemba.errors import KembaError
+    from kemba.runs import newest_logs
+
+    found = newest_logs(run)
+    if not found:
+        hint = f"execute it: kemba-opt simulate {run} --repeat 3 --noise"
+        raise KembaError(str(run), "has no logs", "its logs, or --logs, were expected", hint)
+    say(f"with its newest logs: {len(found)} in {found[0].parent}", quiet)
     return found

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -42,6 +43,8 @@ def simulate(
     Example: kemba-opt simulate runs/jump-1 --repeat 3 --noise
     """
     from kemba.folders import claimed
+    from kemba_cli.course import SIMULATE
+    from kemba_cli.progress import Progress
 
     source = source or str(newest(quiet, "controller.csv"))
     if Path(source).suffix in (".yaml", ".yml"):
@@ -52,8 +55,9 @@ def simulate(
             answer = _rig(rig, model or "plant", folder, seed, noise)
     else:
         default = (Path(source) if Path(source).is_dir() else Path(source).parent) / "logs"
-        with claimed(out, default, "*.csv", force) as folder:
-            answer = _run(source, model, folder, seed, noise, repeat, policy)
+        progress = Progress(quiet or json, SIMULATE)
+        with claimed(out, default, "*.csv", force) as folder, progress:
+            answer = _run(source, model, folder, seed, noise, repeat, policy, progress.tell)
     if json:
         print_json(answer)
     else:
@@ -69,6 +73,7 @@ def _run(
     noise: bool,
     repeat: int,
     policy: bool,
+    tell: Callable[[str], None],
 ) -> dict[str, Any]:
     from kemba.plant.execution.repeat import plant_of, repeat_run
 
@@ -78,7 +83,7 @@ def _run(
         from kemba.policy.execute import player_of
 
         play = player_of(source)
-    repeats = repeat_run(source, plant, out, repeat, noise, seed, play=play)
+    repeats = repeat_run(source, plant, out, repeat, noise, seed, play=play, tell=tell)
     runs = [r.summary for r in repeats]
     apex = ", ".join(f"{r['apex_m']:.3f}" for r in runs)
     sentence = f"reached {apex} m on {plant.name}"

@@ -34,6 +34,9 @@ def solve(
             "--from", help="Change the plan of this run (other height, supply, payload, model)."
         ),
     ] = None,
+    cold: Annotated[
+        bool, typer.Option("--cold", help="Begin from a guess, not from a near shipped plan.")
+    ] = False,
     time_limit: Annotated[float | None, typer.Option(help="Seconds of solving at most.")] = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Check the task and say its size; solve nothing.")
@@ -65,7 +68,9 @@ def solve(
     from kemba.ocp.nlp.interrupt import Interrupt
     from kemba.ocp.task.requirement import resolve
     from kemba.report import Listener, solve_into
+    from kemba.report.drawing import drawer
     from kemba.runs import RunFolder
+    from kemba_cli.course import SOLVE
     from kemba_cli.progress import Progress
 
     start, origin = None, None
@@ -99,11 +104,16 @@ def solve(
     models = [path for name in (resolved.model, resolved.plant) for path in model_files(name)]
     inputs = [find_config(task, "tasks"), *dict.fromkeys(models), *BY_KIND.files]
     folder = RunFolder.create(out, resolved.name, inputs, force=force)
-    with Progress(quiet or json) as progress, Interrupt(lambda text: say(text, quiet)) as stop:
+    with (
+        drawer(figure) as drawing,
+        Progress(quiet or json, SOLVE) as progress,
+        Interrupt(lambda text: say(text, quiet)) as stop,
+    ):
         listener = Listener(progress.tell, progress.watch, stop)
         answer = solve_into(
-            folder, resolved, document, listener, start, starts, jobs, replay, figure, origin
-        )
+            folder, resolved, document, listener, start, starts, jobs, replay, figure, origin,
+            drawing, library=not cold,
+        )  # fmt: skip
     if json:
         print_json(answer)
     else:

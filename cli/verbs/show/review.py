@@ -39,13 +39,16 @@ def review(
     """
     from kemba.report.review.page import review as write
     from kemba.runs import newest_logs
+    from kemba_cli.course import REVIEW
+    from kemba_cli.progress import Progress
 
     logs, run, answer = _told_apart(logs or [], run, answer)
     if not logs and run is None and answer is None:
         run = newest(quiet, "certificate.json")
         logs = newest_logs(run)
         say(f"with its {len(logs)} newest logs" if logs else "it has no logs yet", quiet)
-    page, verdict = write(logs, run, answer, model, column_map, out, force)
+    with Progress(quiet or json, REVIEW) as progress:
+        page, verdict = write(logs, run, answer, model, column_map, out, force, progress.tell)
     if json:
         print_json(
             {

@@ -7,12 +7,12 @@ from typing import Annotated
 
 import typer
 
-from kemba_cli.common import Force, Json, OwnEffects, Quiet, newest, print_json
+from kemba_cli.common import Force, Foreign, Json, OwnEffects, Quiet, newest, print_json
 
 
 def view(
     run: Annotated[
-        Path | None, typer.Argument(help="Run folder, or the CSV of a motion (the newest run).")
+        Path | None, typer.Argument(help="Run folder, or the log of a motion (the newest run).")
     ] = None,
     out: Annotated[
         Path | None, typer.Option(help="HTML to write (a new view.html beside it).")
@@ -20,6 +20,7 @@ def view(
     model: Annotated[
         str | None, typer.Option(help="Model YAML with the robot, not the run's own.")
     ] = None,
+    column_map: Foreign = None,
     show: Annotated[bool, typer.Option("--show", help="Open it in the browser.")] = False,
     force: Force = False,
     own_effects: OwnEffects = None,
@@ -32,7 +33,7 @@ def view(
     """
     from kemba.report.stage import view_run
 
-    path = view_run(run or newest(quiet), out, model, force)
+    path = view_run(run or newest(quiet), out, model, force, column_map)
     print_json({"view": str(path)}) if json else typer.echo(path)
     if show:
         import webbrowser

@@ -17,6 +17,7 @@ from kemba.identify.logs.limits import LimitSettings
 from kemba.identify.problem.noise import difference_sigma
 from kemba.identify.problem.problem import Array, Flags
 from kemba.identify.problem.quantisation import telling
+from kemba.identify.problem.sensor_noise import ChannelNoise
 from kemba.settings import BY_HAND, Settings, setting
 from kemba.trajectory import Trajectory
 
@@ -101,10 +102,13 @@ class BenchLog:
         return np.asarray(slope * self.motion.v_sigma + 0.5 * usual.friction * (high - low))
 
 
-def prepare(name: str, log: Trajectory) -> BenchLog:
-    """Smooth the motion and learn each channel's white noise from its fastest differences."""
-    speeds = [log[name] for name in ("piston/v",) if name in log]
-    motion = smooth_motion(log.time, log["piston/x"], *speeds)
+def prepare(name: str, log: Trajectory, noise: ChannelNoise | None = None) -> BenchLog:
+    """Smooth the motion and learn each channel's white noise from its fastest differences.
+
+    `noise` of the position sensor, in sigmas of its white noise; None: white.
+    """
+    speed = {"v": log["piston/v"]} if "piston/v" in log else {}
+    motion = smooth_motion(log.time, log["piston/x"], noise=noise, **speed)
     sent = [held(log[f"valve/{c}"]) for c in ("extend", "retract")]
     measured = {c: log[c] for c in ("piston/F", *PRESSURES) if c in log}
     sigma = {c: noise_of(c, y) for c, y in measured.items()}

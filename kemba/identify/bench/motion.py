@@ -6,9 +6,11 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from scipy.linalg import toeplitz
 
 from kemba.identify.problem.noise import difference_sigma
 from kemba.identify.problem.problem import Array
+from kemba.identify.problem.sensor_noise import ChannelNoise
 from kemba.settings import BY_HAND, Settings, setting
 
 
@@ -44,29 +46,41 @@ class SmoothedMotion:
     x_sigma: float
 
 
-def smooth_motion(time: Array, x: Array, v: Array | None = None) -> SmoothedMotion:
+def smooth_motion(
+    time: Array, x: Array, v: Array | None = None, noise: ChannelNoise | None = None
+) -> SmoothedMotion:
     """Position and velocity from local cubics, each over the window of least expected error.
 
     `time`, `x` and `v` are (n,). At rest the window is wide, so that noise does not look like slow
     motion. In fast motion it is narrow, so that peaks of the velocity are kept. A measured `v`
-    [m.s-1] is averaged with the derived one, by their errors.
+    [m.s-1] is averaged with the derived one, by their errors. `noise` of the position sensor, in
+    `difference_sigma` of x; None: white.
     """
     settings, good = MotionSettings.current(), np.isfinite(x)
-    step = float(np.median(np.diff(time)))
-    count = max(int(np.ceil((time[-1] - time[0]) / step)) + 1, 8)
-    grid = np.linspace(time[0], time[-1], count)
-    step = float(grid[1] - grid[0])
-    values = np.interp(grid, time[good], x[good])
+    noise = noise or ChannelNoise()
+    grid, values, step = even_grid(time, x)
     sigma = max(difference_sigma(x[good]), settings.finest)
-    position, rate, spread, half = _adaptive(values, sigma, step)
+    position, rate, spread, half = _adaptive(values, sigma, step, noise)
     if v is not None and np.isfinite(v).sum() > settings.measured * len(v):
         rate, spread = _weigh_in(grid, rate, spread, half, time, v)
     a = np.gradient(_mean(rate, 3), step)
     x, v, a, spread = (np.interp(time, grid, c) for c in (position, rate, a, spread))
-    return SmoothedMotion(time, x, v, a, spread, sigma)
+    return SmoothedMotion(time, x, v, a, spread, sigma * noise.spread)
 
 
-def _adaptive(values: Array, sigma: float, step: float) -> tuple[Array, Array, Array, Array]:
+def even_grid(time: Array, x: Array) -> tuple[Array, Array, float]:
+    """Even times (m,) [s] of about the same step, x (m,) there, and the step [s]; rows without a
+    value are bridged."""
+    good = np.isfinite(x)
+    step = float(np.median(np.diff(time)))
+    count = max(int(np.ceil((time[-1] - time[0]) / step)) + 1, 8)
+    grid = np.linspace(time[0], time[-1], count)
+    return grid, np.interp(grid, time[good], x[good]), float(grid[1] - grid[0])
+
+
+def _adaptive(
+    values: Array, sigma: float, step: float, colour: ChannelNoise
+) -> tuple[Array, Array, Array, Array]:
     """Position, rate, its error and the half width chosen sample by sample.
 
     A cubic cannot follow every motion. A quintic in the same window follows more of them. The
@@ -79,8 +93,9 @@ def _adaptive(values: Array, sigma: float, step: float) -> tuple[Array, Array, A
     for width in MotionSettings.current().half_widths:
         if 2 * width + 1 > n:
             break
-        x, v, gain = _local_fit(values, width, step, 3)
-        _, finer, finer_gain = _local_fit(values, width, step, 5)
+        x, v = local_fit(values, width, step, 3)
+        _, finer = local_fit(values, width, step, 5)
+        gain, finer_gain = (_gains(n, width, step, order, colour) for order in (3, 5))
         noise = (sigma * gain) ** 2
         bias = _mean((finer - v) ** 2, max(width // 2, 2)) - (sigma * finer_gain) ** 2 + noise
         risk = noise + np.maximum(bias, 0.0)
@@ -90,16 +105,15 @@ def _adaptive(values: Array, sigma: float, step: float) -> tuple[Array, Array, A
     return position, _mean(rate, 1), np.sqrt(best), half
 
 
-def _local_fit(values: Array, width: int, step: float, order: int) -> tuple[Array, Array, Array]:
-    """Value and slope of the polynomial through 2 width + 1 samples, and the slope's noise gain.
+def local_fit(values: Array, width: int, step: float, order: int) -> tuple[Array, Array]:
+    """Value and slope (n,) of the polynomial through 2 width + 1 samples of values (n,).
 
-    All (n,). At the ends the window stays inside and is read off its centre.
+    At the ends the window stays inside and is read off its centre.
     """
     n = len(values)
     smooth, slope = _weights(width, order)
     x = np.convolve(values, smooth[::-1, width], mode="valid")
     v = np.convolve(values, slope[::-1, width], mode="valid") / step
-    gain = np.full(n, float(np.linalg.norm(slope[:, width])) / step)
     x, v = np.pad(x, width), np.pad(v, width)
     head, tail = values[: 2 * width + 1], values[n - 2 * width - 1 :]
     x[:width], v[:width] = head @ smooth[:, :width], head @ slope[:, :width] / step
@@ -107,9 +121,23 @@ def _local_fit(values: Array, width: int, step: float, order: int) -> tuple[Arra
         tail @ smooth[:, width + 1 :],
         tail @ slope[:, width + 1 :] / step,
     )
-    gain[:width] = np.linalg.norm(slope[:, :width], axis=0) / step
-    gain[n - width :] = np.linalg.norm(slope[:, width + 1 :], axis=0) / step
-    return x, v, gain
+    return x, v
+
+
+def _gains(n: int, width: int, step: float, order: int, colour: ChannelNoise) -> Array:
+    """1 sigma (n,) [s-1] of the slope of `local_fit` per stated sigma of the values."""
+    gain = _slope_sigma(width, step, order, colour)
+    return np.concatenate([gain[:width], np.full(n - 2 * width, gain[width]), gain[width + 1 :]])
+
+
+@lru_cache(maxsize=256)
+def _slope_sigma(width: int, step: float, order: int, colour: ChannelNoise) -> Array:
+    """The same (2 width + 1,) at each place of the window."""
+    _, slope = _weights(width, order)
+    if not colour.lags:
+        return np.asarray(colour.white * np.linalg.norm(slope, axis=0) / step)
+    covariance = toeplitz(colour.covariance(step * np.arange(2.0 * width + 1.0)))
+    return np.asarray(np.sqrt(np.einsum("ij,ij->j", slope, covariance @ slope)) / step)
 
 
 @lru_cache(maxsize=64)

@@ -14,7 +14,7 @@ from kemba.identify.bench.bench_log import PRESSURES, BenchLog
 from kemba.identify.bench.motion import SmoothedMotion
 from kemba.identify.bench.pressure import absolute_pressure
 from kemba.identify.bench.rig_model import Prediction, RigModel, share
-from kemba.identify.problem.candidates import by_default
+from kemba.identify.problem.candidates import by_default, switched_on
 from kemba.identify.problem.nominal import nominal_figures
 from kemba.identify.problem.problem import Array, Candidate, Theta
 from kemba.identify.problem.sensor_faults import SensorFaults
@@ -37,11 +37,7 @@ class Predictor:
 
     def rig(self, theta: Theta) -> RigModel:
         """The rig with the effects on its list that theta switches on."""
-        active = tuple(
-            name
-            for name, c in sorted(self.candidates.items())
-            if not c.sensor and theta.get(c.key, c.lead.off) != c.lead.off
-        )
+        active = switched_on(self.candidates, theta)
         if active not in self._rigs:
             extra = [by_default(self.candidates[name].effect) for name in active]
             model = self.model.with_effects(_unlike(self.model, extra))

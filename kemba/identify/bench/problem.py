@@ -19,6 +19,7 @@ from kemba.identify.bench.operating_point import (
 )
 from kemba.identify.bench.predicted import PredictedLogs, settle_starts
 from kemba.identify.bench.prediction import SENT_LATE, Predictor
+from kemba.identify.bench.quiet import position_noise
 from kemba.identify.bench.validate import contradictions
 from kemba.identify.logs.gate import BadData
 from kemba.identify.problem.candidates import effect_candidates, sensor_candidates
@@ -236,9 +237,10 @@ class BenchProblem(Problem):
 
 def bench_problem(logs: Sequence[Trajectory], model: Model) -> BenchProblem:
     """The problem of explaining bench logs with `model` and what may be added to it."""
-    return BenchProblem(
-        [prepare(str(log.meta.get("name", i)), log) for i, log in enumerate(logs)], model
-    )
+    noise = position_noise([(log.time, log["piston/x"]) for log in logs])
+    names = [str(log.meta.get("name", i)) for i, log in enumerate(logs)]
+    pairs = zip(names, logs, strict=True)
+    return BenchProblem([prepare(name, log, noise) for name, log in pairs], model)
 
 
 def _within(candidate: Candidate, row: float) -> bool:

@@ -16,6 +16,7 @@ from kemba.identify.evidence.refit import Fit, refit
 from kemba.identify.evidence.search_settings import SearchSettings
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis, log_prior, probabilities
 from kemba.identify.problem.problem import Problem
+from kemba.stopwatch import Stage
 
 
 @dataclass
@@ -38,7 +39,7 @@ class Search:
     def run(self) -> Hypothesis:
         """The likeliest hypothesis; everything that was refitted stays in `points`."""
         leaders = SearchSettings.current().leaders
-        self.say("fitting the model as it is")
+        self.say("fitting the model as it is, and a slope for every effect")
         self.start()
         best = self._round(NULL, leaders)
         self.say(f"first guess: {' + '.join(best) or 'nothing'}")
@@ -49,8 +50,8 @@ class Search:
             self.base.seen_from(self.points[best].fit.theta)
             self.problem = self.base.problem
             self.points = {NULL: self.base.point}
-            for hypothesis in promising:
-                self.visit(hypothesis)
+            for number, hypothesis in enumerate(promising, start=1):
+                self.visit(hypothesis, number, len(promising))
             best = self._round(NULL, leaders)
             best = self._swap(self._grow(best))
         return best
@@ -63,7 +64,7 @@ class Search:
         refit is better than nothing, the linear evidence may choose the hypothesis to follow.
         """
         settings = SearchSettings.current()
-        for _ in range(settings.followed):
+        for _ in range(0 if self.structure(best) else settings.followed):
             guess = best or self._first_of_table()
             if guess == NULL or time.monotonic() > self.deadline:
                 return best
@@ -74,9 +75,17 @@ class Search:
             self.start(among, point.fit.theta)
             self.visit(guess)
             best = self._round(NULL, settings.leaders)
-            if best in (guess, NULL):
+            if best in (guess, NULL) or self.structure(best):
                 break
         return self._swap(self._regrow(self._grow(best))) if best else best
+
+    def structure(self, best: Hypothesis) -> str:
+        """The other structure that `best` names, where everything without it is far behind: then
+        the model is to be built anew before anything else is looked for. Else an empty text."""
+        named = self.problem.structures & set(best)
+        without = [p.log_evidence for h, p in self.points.items() if not named & set(h)]
+        ahead = self.points[best].log_evidence - max(without, default=-np.inf)
+        return min(named) if named and ahead > SearchSettings.current().far else ""
 
     def _regrow(self, best: Hypothesis) -> Hypothesis:
         """Find the motion again with an answer of several effects, and let it grow from there.
@@ -84,7 +93,7 @@ class Search:
         Each effect that joins changes the motion, and with it what the others seem to be.
         """
         for _ in range(SearchSettings.current().regrown):
-            if len(best) < 2 or time.monotonic() > self.deadline:
+            if len(best) < 2 or time.monotonic() > self.deadline or self.structure(best):
                 break
             theta, before = self.points[best].fit.theta, best
             self.say(f"looking again as if {' + '.join(best)} were there")
@@ -135,7 +144,7 @@ class Search:
         gain = table[order[0]] - self.points[given].log_evidence
         reach = max(settings.far, settings.far_share * gain)
         sure = settings.sure_grown if given else settings.sure
-        for hypothesis in order:
+        for number, hypothesis in enumerate(order, start=1):
             if table[hypothesis] < least:
                 break
             if given and table[hypothesis] < self.points[given].log_evidence:
@@ -144,7 +153,10 @@ class Search:
                 break
             if time.monotonic() > self.deadline:
                 break
-            self.visit(hypothesis)
+            self.visit(hypothesis, number, len(order))
+        if given == NULL and self.points[NULL].fitted_error > settings.structural:
+            for structure in sorted(self.problem.structures):
+                self.visit((structure,))
         return self.best()
 
     def _extensions(self, given: Hypothesis) -> dict[Hypothesis, float]:
@@ -162,10 +174,11 @@ class Search:
                 single[(name,)] = max(single[(name,)], base)
         return single
 
-    def visit(self, hypothesis: Hypothesis) -> LinearisationPoint:
-        """Refit a hypothesis, once, and score it there."""
+    def visit(self, hypothesis: Hypothesis, number: int = 1, of: int = 1) -> LinearisationPoint:
+        """Refit a hypothesis, once, and score it there; `number` `of` so many, for who waits."""
         if hypothesis not in self.points:
-            self.say(f"refitting {' + '.join(hypothesis)}")
+            name = f"refitting {' + '.join(hypothesis)}"
+            self.say(Stage(name, number, of) if of > 1 else name)
             fit = refit(self.problem, hypothesis, self._guess(hypothesis), self.base.frozen)
             self._learn_secant(hypothesis, fit)
             self.points[hypothesis] = self._point(hypothesis, fit)
@@ -237,6 +250,8 @@ class Search:
         """Add effects, one by one, while the evidence grows."""
         settings = SearchSettings.current()
         while len(best) < settings.largest and time.monotonic() < self.deadline:
+            if self.structure(best):
+                break
             grown = self._round(best, settings.leaders_grown)
             if grown == best or len(grown) <= len(best):
                 break
@@ -246,7 +261,7 @@ class Search:
     def _swap(self, best: Hypothesis) -> Hypothesis:
         """Take each effect away, or swap it for another; what was swapped may grow again."""
         settings = SearchSettings.current()
-        for _ in range(settings.swapped):
+        for _ in range(0 if self.structure(best) else settings.swapped):
             before = best
             for member in best if len(best) > 1 else ():
                 rest = tuple(h for h in best if h != member)

@@ -16,7 +16,18 @@ class SearchSettings(Settings):
         2, "1", "the same beside effects that are found already", BY_HAND, decides=True
     )
     far: float = setting(
-        40.0, "nats", "other leaders are refitted when not farther behind", BY_HAND, decides=True
+        40.0,
+        "nats",
+        "leaders are refitted, and structures not believed, when others are not farther behind",
+        BY_HAND,
+        decides=True,
+    )
+    structural: float = setting(
+        1.3,
+        "1",
+        "error of the model as it is, in noise units, from which another structure is refitted "
+        "whatever its linear evidence is",
+        BY_HAND,
     )
     far_share: float = setting(
         0.7, "1", "or no farther behind than this share of the gain", BY_HAND, decides=True

@@ -182,6 +182,20 @@ class Problem(ABC):
         """Whether the residual is linear in this parameter, so that its slope tells everything."""
         return False
 
+    # Another structure of the model
+
+    @property
+    def structures(self) -> frozenset[str]:
+        """Candidates that stand for another structure."""
+        return frozenset()
+
+    own_figures: Mapping[str, str] = {}  # of such a structure: nuisance parameter -> its own name
+
+    def rebuilt(self, theta: Theta) -> Self:
+        """The same logs under the model with the structure that theta has switched on; its
+        figures are nuisance parameters about the values of theta."""
+        raise NotImplementedError("these logs have no other structure")
+
     # Where each row was taken, and which forces may be missing
 
     def operating_point(self) -> OperatingPoint:

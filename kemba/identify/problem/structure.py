@@ -19,6 +19,13 @@ from kemba.quantity import Param, Quantity, Tolerance
 from kemba.settings import BY_HAND, Settings, setting
 
 ORIFICE = "chambers:orifice"
+LEVEL = "level"
+FIGURES = {  # as a model that has orifice chambers calls them: as the candidate does
+    **{f"orifice_chamber.{k}": k for k in ("a_fill", "a_vent", "V_e", "V_r", "n")},
+    "orifice_chamber.gauge": LEVEL,
+}
+# effects that those figures stand for, once they are free
+FREE_THEN = ("supply_scale", "rise_time_scale")
 OWN = {"P_e": "P_e_orifice", "P_r": "P_r_orifice"}  # states beside those of the model's chambers
 
 
@@ -28,7 +35,12 @@ class StructureSettings(Settings):
 
     area: float = setting(0.2, "1", "of an orifice's area", BY_HAND)
     volume: float = setting(0.3, "1", "of a dead volume", BY_HAND)
-    level: float = setting(0.04, "1", "of the pressure that reaches the valves", BY_HAND)
+    level: float = setting(
+        0.1,
+        "1",
+        "of the pressure that reaches the valves",
+        "convention: the size of `supply_scale`, which it stands for",
+    )
     reach: float = setting(4.0, "1", "largest error of a figure, in these sigmas", BY_HAND)
     exponent: float = setting(0.08, "1", "of the polytropic exponent", BY_HAND)
 
@@ -102,6 +114,22 @@ def _widths(settings: StructureSettings) -> dict[str, float]:
     areas = dict.fromkeys(("a_fill", "a_vent"), settings.area)
     volumes = dict.fromkeys(("V_e", "V_r"), settings.volume)
     return {**areas, **volumes, "level": settings.level, "n": settings.exponent}
+
+
+def with_orifices(model: Model, values: Mapping[str, float]) -> Model:
+    """The model with orifice chambers in the place of its own, their figures those of `values`;
+    the pressure at the valves is left as it is usual."""
+    kept = [e for e in model.effects if e.kind not in OrificeChamber.replaces]
+    figures = {k: values[k] for k in FIGURES.values() if k in values and k != LEVEL}
+    return Model(model.mechanism, [*kept, OrificeChamber(**figures)], model.supply, model.name)
+
+
+def free_figures(values: Mapping[str, float]) -> dict[str, tuple[float, float]]:
+    """The figures of orifice chambers of all legs as nuisance parameters of a model that has them:
+    value and 1 sigma by name; `gauge` is the scale of its table."""
+    widths = _widths(StructureSettings.current())
+    usual = {LEVEL: 1.0, **values}
+    return {n: (usual[k], widths[k] * usual[k]) for n, k in FIGURES.items() if k in usual}
 
 
 def orifice_item(values: Mapping[str, float]) -> dict[str, Any]:

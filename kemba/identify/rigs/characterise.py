@@ -1,7 +1,8 @@
 """The figures of a rig and of its effects, fitted to logs, with honest intervals.
 
 Least squares on the residuals. What a model lacks is no white noise: it lasts. So the intervals
-come from blocks of time ("sandwich"), and they are those of one mounting of one machine.
+come from blocks of time ("sandwich"), of several lengths, as long as the motion or shorter; the
+widest interval counts. They are those of one mounting of one machine.
 """
 
 from __future__ import annotations
@@ -13,15 +14,15 @@ from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from kemba.config import dump_yaml
 from kemba.effects.base import Effect
 from kemba.errors import KembaError
 from kemba.identify.evidence.linear import time_blocks
 from kemba.identify.evidence.windows import rms
-from kemba.identify.problem.problem import Array, Problem
-from kemba.identify.rigs.problem import rig_problem
+from kemba.identify.problem.problem import Array, Labels, Problem
+from kemba.identify.rigs.problem import RigProblem, rig_problem
 from kemba.identify.rigs.vessel import vessel_problem
 from kemba.model.model import Model
 from kemba.settings import BY_HAND, Settings, setting
@@ -34,8 +35,12 @@ TOLD = ("measured_chambers.gain", "drive_axis.J", "vessel_chamber.a")
 class RigFitSettings(Settings):
     """How the figures of a rig are fitted."""
 
-    blocks: int = setting(
-        12, "1", "blocks of time from which intervals come, at least", BY_HAND, decides=True
+    blocks: tuple[int, ...] = setting(
+        (12, 24, 48),
+        "1",
+        "numbers of blocks of time, at least, from which intervals come: the widest counts",
+        "derived: errors that a repeated motion repeats cancel within a block as long as a repeat, "
+        "so one length can be blind; with fewer than 12 blocks the spread itself is not known",
     )
     loose: float = setting(
         10.0, "1", "prior sigma of a factor that is fitted", "convention: as good as none"
@@ -147,20 +152,40 @@ def _fit(
         hint = "fix one of them: leave it out of the model, or log another motion"
         raise KembaError(worst, "cannot be told from the other figures by these logs", hint=hint)
     h = np.linalg.inv(j.T @ j + np.diag(known))
-    blocks = time_blocks(problem, wanted=settings.blocks)
-    pieces = np.stack([j[blocks == b].T @ r[blocks == b] for b in np.unique(blocks)])
-    count = len(pieces)
-    covariance = h @ (pieces.T @ pieces) @ h * count / max(count - 1, 1)
-    sd = np.sqrt(np.diag(covariance)) * student.ppf(0.975, max(count - 1, 1))
+    divisions = [d for n in settings.blocks for d in _divisions(problem, n)]
+    half_widths = np.max([_half_widths(d, j, r, h) for d in divisions], axis=0)
     figures = []
     for i, name in enumerate(names):
-        factor, spread = 1.0 + found.x[i], sd[i]
+        factor, spread = 1.0 + found.x[i], half_widths[i]
         value, half = factor * values[name], abs(spread * values[name])
         effect, field = name.rsplit(".", 1)
         given = float(model.effect(effect).value(field))
         unit = _unit(model, name)
         figures.append(Figure(name, unit, value, value - half, value + half, given))
     return RigFit(model, tuple(figures), before, rms(r), rows)
+
+
+def _divisions(problem: Problem, wanted: int) -> list[Labels]:
+    """Labels (n,) of the rows in so many blocks of time, and in so many stretches of the way, each
+    with two directions: what a model lacks at one place it lacks in every repeat."""
+    found = [time_blocks(problem, wanted=wanted)]
+    if isinstance(problem, RigProblem):
+        place, forward = problem.way()
+        edges = np.linspace(place.min(), place.max(), wanted + 1)[1:-1]
+        found.append(2 * np.searchsorted(edges, place) + forward)
+    return found
+
+
+def _half_widths(labels: Labels, j: Array, r: Array, h: Array) -> Array:
+    """Half the 95 % interval (k,) of each parameter, from the scatter of blocks of rows.
+
+    `labels` (n,) of the blocks; `j` (n, k) and `r` (n,): slopes and residual of the fit; `h`
+    (k, k): inverse of j'j.
+    """
+    pieces = np.stack([j[labels == b].T @ r[labels == b] for b in np.unique(labels)])
+    freedom = max(len(pieces) - 1, 1)
+    covariance = h @ (pieces.T @ pieces) @ h * len(pieces) / freedom
+    return np.asarray(np.sqrt(np.diag(covariance)) * stdtrit(freedom, 0.975))
 
 
 def _unit(model: Model, name: str) -> str:

@@ -14,6 +14,7 @@ from kemba.identify.problem.problem import Problem
 from kemba.identify.problem.sensor_faults import is_straight
 from kemba.identify.problem.types import (
     Array,
+    Flags,
     ForceChannel,
     MissingForce,
     OperatingPoint,
@@ -180,6 +181,11 @@ class RigProblem(Problem):
         """Measured less predicted force (n,)."""
         gaps = [-self.predictor.gap(log, theta) for log in self.logs]
         return {self.answer: np.concatenate(gaps)}
+
+    def way(self) -> tuple[Array, Flags]:
+        """Position (n,) of every row, and whether it moves forward (n,)."""
+        place, speed, _ = (np.concatenate(p) for p in zip(*self._seen(), strict=True))
+        return place, speed > 0.0
 
     def _all(self, runs: Collection[int] | None) -> Collection[int]:
         return range(len(self.logs)) if runs is None else runs

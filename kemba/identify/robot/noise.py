@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from kemba.identify.problem.sensor_noise import ChannelNoise, ColourSettings
 from kemba.identify.problem.types import Array
 from kemba.identify.robot.motion.batch import Batch
-from kemba.identify.robot.motion.colour import ChannelNoise
-from kemba.identify.robot.motion.learnt import ColourSettings, learnt_noise
+from kemba.identify.robot.motion.learnt import learnt_noise
 from kemba.identify.robot.state import LinearisedState
 from kemba.settings import BY_HAND, Settings, setting
 

@@ -12,6 +12,13 @@ from kemba.identify.logs.gate import BadData
 from kemba.identify.problem.candidates import sensor_candidates
 from kemba.identify.problem.problem import Problem
 from kemba.identify.problem.sensor_faults import SensorFaults, is_fault, is_straight
+from kemba.identify.problem.structure import (
+    FIGURES,
+    FREE_THEN,
+    ORIFICE,
+    free_figures,
+    with_orifices,
+)
 from kemba.identify.problem.types import (
     Array,
     Candidate,
@@ -65,7 +72,8 @@ class RobotProblem(Problem):
 
     `state`: the logs with the model linearised along their motion. `lengths`: those at which feet
     stand, where they are not the model's; contacts are read with them. `unknown`: density of the
-    forces that no model explains.
+    forces that no model explains. `figures`: nuisance parameters of the model's chambers that are
+    known less well than its nominal ones.
     """
 
     moves = True
@@ -73,15 +81,21 @@ class RobotProblem(Problem):
     state: LinearisedState
 
     def __init__(
-        self, logs: Sequence[Trajectory], model: Model, unknown: ForceDensity | None = None
+        self,
+        logs: Sequence[Trajectory],
+        model: Model,
+        unknown: ForceDensity | None = None,
+        figures: Mapping[str, tuple[float, float]] | None = None,
     ) -> None:
+        self.logs = tuple(logs)
         self.window = RobotProblemSettings.current().window  # innovations are one-step errors
         self.model, self.unknown = model, unknown or ForceDensity.current()
         found = robot_candidates(model)
         effects = in_the_air(found)
         grip, ground = ground_of(model)
         free = tuple(key for c in effects for key, _ in c.keys().items())
-        physics = Physics(extended(model, effects), free, grip)
+        physics = Physics(extended(model, effects), free, grip, figures)
+        self.own_figures = {name: FIGURES[name] for name in figures or {}}
         self.runs = tuple(str(log.meta.get("name", i)) for i, log in enumerate(logs))
         batch = Batch(
             tuple(
@@ -118,6 +132,22 @@ class RobotProblem(Problem):
         found.state = linearise_at(
             old.physics, old.batch, old.sensors, base, old.ground, self.unknown, old.noise
         )
+        return found
+
+    @property
+    def structures(self) -> frozenset[str]:
+        """Orifice chambers, where the model has others."""
+        return frozenset({ORIFICE} & set(self.candidates))
+
+    def rebuilt(self, theta: Theta) -> Self:
+        """The same logs under the model with orifice chambers, their figures free."""
+        own = self.candidates[ORIFICE].keys()
+        values = {p.name: theta.get(key, p.typical) for key, p in own.items()}
+        model = with_orifices(self.model, values)
+        found = type(self)(self.logs, model, self.unknown, free_figures(values))
+        dropped = {*FREE_THEN, *(set(robot_candidates(self.model)) - set(self.candidates))}
+        left = found.candidates.items()
+        found.candidates = {k: c for k, c in left if not {k, k.split(":")[0]} & dropped}
         return found
 
     def recolour(self, residual: Array | None, careful: bool = False) -> Self:

@@ -221,5 +221,6 @@ def values_at(physics: Physics, theta: Theta) -> tuple[Array, Array]:
     on and off, at theta."""
     names = zip(physics.names, physics.nominal, strict=True)
     p = np.array([without_delay(n, theta.get(n, value)) for n, value in names])
+    p = np.clip(p, *physics.bounds)
     valves = [leg for leg in physics.legs for _ in range(2)]
     return p, np.array([physics.base.timing(leg, theta) for leg in valves])

@@ -9,7 +9,6 @@ import casadi as ca
 import numpy as np
 
 from kemba.model import Model
-from kemba.ocp.task.costs import COSTS
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task, Tolerances
 from kemba.ocp.transcription.first_node import state_rows
@@ -215,14 +214,3 @@ def first_state(model: Model, q: np.ndarray, v: np.ndarray, s: np.ndarray) -> np
     scaled = ca.vertcat(*(row.expression / row.scale for row in rows))
     evaluate = ca.Function("state", [node.q, node.v, node.s], [ca.densify(scaled)])
     return np.array(evaluate(q, v, s)).ravel()
-
-
-def costs(model: Model, trajectory: Trajectory) -> dict[str, float]:
-    """Time integrals of the plan: squared hip torque [N2.m2.s], open valve time [s]."""
-    u, h = arrays(model, trajectory)["u"][1:], np.diff(trajectory.time)
-    symbol, step = ca.SX.sym("u", u.shape[1]), ca.SX.sym("h")
-    totals = {}
-    for name, key in (("torque_squared", "torque_squared_integral"), ("air", "valve_open_s")):
-        f = ca.Function(name, [symbol, step], [COSTS[name](model, symbol, step)])
-        totals[key] = float(ca.sum2(f.map(len(h))(u.T, h[None, :])))
-    return totals

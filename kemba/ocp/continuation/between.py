@@ -17,11 +17,18 @@ from kemba.trajectory import Trajectory
 
 @dataclass(frozen=True)
 class Origin:
-    """An earlier plan, the model it was made with, and what was asked of it."""
+    """An earlier plan, the model it was made with, and what was asked of it.
+
+    `name`: what sentences call it; `dear`: what to do where the new plan costs much more. `once`:
+    where the whole change fails in one step, nothing else is tried.
+    """
 
     plan: Trajectory
     model: Model
     requirements: tuple[Requirement, ...]
+    name: str = "the earlier plan"
+    dear: str = "one without --from may take less"
+    once: bool = False
 
 
 def model_between(old: Model, new: Model, share: float) -> Model:

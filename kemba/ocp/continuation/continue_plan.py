@@ -9,12 +9,14 @@ import numpy as np
 
 from kemba.errors import KembaError
 from kemba.model import Model
+from kemba.ocp.certificate.objective import objective
 from kemba.ocp.continuation.between import (
     Origin,
     completed,
     model_between,
     requirements_between,
 )
+from kemba.ocp.continuation.renoded import renoded
 from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.nlp.ipopt import Control
 from kemba.ocp.phases.modes import Phase
@@ -83,10 +85,10 @@ class Continuation:
         try:
             start = completed(self.origin.plan, self.model)
             reduction = reduction_of(self.model, self.task, self.requirements, start)
-            phases = self._phases(reduction)
-            if phases is not None:
-                found = self._walk(start, phases, reduction)
-                if found.done:
+            meshed = self._meshed(start, reduction)
+            if meshed is not None:
+                found = self._walk(*meshed, reduction)
+                if found.done or self.origin.once:
                     return found
             return self._read_anew(start)
         except KembaError as error:
@@ -95,19 +97,27 @@ class Continuation:
         except ValueError as error:
             return Refined(None, None, Ending.UNSUITABLE, 0, reason=f"the model {error}")
 
-    def _phases(self, reduction: Reduction) -> list[Phase] | None:
+    def _meshed(
+        self, start: Trajectory, reduction: Reduction
+    ) -> tuple[Trajectory, list[Phase]] | None:
+        """The earlier plan on the task's nodes, shared among its phases by how long they last;
+        None where its notes do not fit."""
         constraints = read_constraints(self.model, reduction)
-        plan, valves = self.origin.plan, len(valve_columns(self.model, reduction))
-        return noted_phases(plan.meta, constraints, valves, len(plan) - 1)
+        valves = len(valve_columns(self.model, reduction))
+        phases = noted_phases(start.meta, constraints, valves, len(start) - 1)
+        if phases is None:
+            return None
+        marks = [r.at for r in self.requirements if r.at is not None]
+        return renoded(start, phases, self.task.nodes, marks)
 
     def _walk(self, start: Trajectory, phases: list[Phase], reduction: Reduction) -> Refined:
         """In one step if it converges, else in halves; then the best plan for what is asked."""
         settings = Continuing.current()
         done, step = 0.0, 1.0
         found = Refined(None, None, Ending.GAVE_UP, 0)
-        for _ in range(settings.solves):
+        for _ in range(1 if self.origin.once else settings.solves):
             share = min(1.0, done + step)
-            self.tell(f"from the earlier plan: {share:.0%} of the change")
+            self.tell(f"from {self.origin.name}: {share:.0%} of the change")
             found = self._solved(share, start, phases, reduction, settings.near)
             if found.trajectory is not None:
                 start, done = found.trajectory, share
@@ -120,14 +130,19 @@ class Continuation:
         return replace(found, trajectory=None, certificate=None)
 
     def _best(self, near: Refined, phases: list[Phase], reduction: Reduction) -> Refined:
-        """The cheapest plan from the near one, which is kept where that does not converge."""
+        """The cheapest plan from the near one, which is kept where that does not converge, or
+        where it ends in a plan that costs more."""
         assert near.trajectory is not None
-        self.tell("from the earlier plan: the best one")
+        self.tell(f"from {self.origin.name}: the best one")
         for weight in (0.0, Continuing.current().close):
             best = self._solved(1.0, near.trajectory, phases, reduction, weight)
-            if best.done:
+            if best.ending.cut_short or (best.done and self._cost(best) <= self._cost(near)):
                 return best
         return near
+
+    def _cost(self, found: Refined) -> float:
+        assert found.trajectory is not None
+        return objective(self.model, self.task, self.requirements, found.trajectory)
 
     def _solved(
         self,
@@ -145,7 +160,8 @@ class Continuation:
         program.keep_short(x, Elements.current().fair)
         if weight:
             x = program.proximal(x, weight)
-        found = solve(program, x, warm(Continuing.current().iterations), self.control)
+        most = min(Continuing.current().iterations, self.task.solver.max_iterations)
+        found = solve(program, x, warm(most), self.control)
         assert found.ending is not None
         name = f"near the earlier plan, {share:.0%}" if weight else "from the earlier plan"
         self.steps.append(Attempt(name, found.ending, found.iterations))
@@ -153,8 +169,10 @@ class Continuation:
         return _ended(program, found.Y, found.ending, found.iterations)
 
     def _read_anew(self, start: Trajectory) -> Refined:
-        self.tell("from the earlier plan: its phases read anew")
-        found = refine(self.model, self.task, self.requirements, start, control=self.control)
+        self.tell(f"from {self.origin.name}: its phases read anew")
+        found = refine(
+            self.model, self.task, self.requirements, start, control=self.control, tell=self.tell
+        )
         self.steps.append(Attempt("phases read anew", found.ending, found.iterations))
         return found
 

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import casadi as ca
 import numpy as np
 
-from kemba.ocp.functions.compiled import compiled
-from kemba.ocp.functions.constants import parameterised
-from kemba.ocp.functions.settings import Functions
-from kemba.ocp.functions.signs import canonical_signs
-from kemba.ocp.functions.vectorised import vectorised
+from kemba.ocp.functions.code import Code, code_of
 
 Entries = tuple[ca.MX, np.ndarray, np.ndarray]  # nonzeros, their rows, their columns
 
@@ -23,41 +19,25 @@ class Block:
     """Rows `g` (m,) and cost `f` of the local variables `z`, repeated over `columns`.
 
     `columns` (repeats, len(z)): where each repeat's local variables stand in the full vector.
-    `constants` (k,): symbols in g and f that stand for `numbers` (k,).
     """
 
     z: ca.SX
     g: ca.SX
     f: ca.SX
     columns: np.ndarray
-    constants: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
-    numbers: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
-    def parameterised(self, p: ca.SX) -> Block:
-        """The same block with its numbers as constants (k,), so that equal blocks can share one
-        code.
 
-        `p`: vector of the problem's parameters. Parts that differ only in sign are written once.
-        """
-        (f, g), constants, numbers = parameterised([self.z, p], [self.f, ca.densify(self.g)])
-        f, g = canonical_signs([self.z, p, constants], [f, g])
-        return replace(self, g=g, f=f, constants=constants, numbers=numbers)
+@dataclass(frozen=True)
+class Placed:
+    """The code of a block, and the `columns` (repeats, n) at which it is repeated."""
 
-    @cached_property
-    def multipliers(self) -> tuple[ca.SX, ca.SX]:
-        """Symbols of the Lagrangian's multipliers: of f a scalar, of g a vector (m,)."""
-        return ca.SX.sym("lam_f"), ca.SX.sym("lam_g", self.g.numel())
+    code: Code
+    columns: np.ndarray
 
-    @cached_property
-    def jacobian(self) -> ca.SX:
-        """Jacobian matrix (m, n) of g, n = len(z), by z."""
-        return ca.jacobian(self.g, self.z)
-
-    @cached_property
-    def hessian(self) -> ca.SX:
-        """Upper triangle, a matrix (n, n) for n = len(z), of the Lagrangian's Hessian by z."""
-        lam_f, lam_g = self.multipliers
-        return ca.triu(ca.hessian(lam_f * self.f + ca.dot(lam_g, ca.densify(self.g)), self.z)[0])
+    @property
+    def functions(self) -> list[ca.Function]:
+        """Cost, rows, slope, Jacobian and Hessian over all repeats."""
+        return self.code.at(len(self.columns))
 
 
 class BlockProblem:
@@ -70,15 +50,16 @@ class BlockProblem:
     def __init__(
         self, blocks: Sequence[Block], size: int, p: ca.SX, worth_compiling: bool = False
     ) -> None:
-        self.blocks = [b.parameterised(p) for b in blocks] if worth_compiling else list(blocks)
-        self.size, self.p, self.worth_compiling = size, p, worth_compiling
+        codes = [code_of(b.z, p, b.f, b.g, worth_compiling) for b in blocks]
+        self.blocks = [Placed(c, b.columns) for c, b in zip(codes, blocks, strict=True)]
+        self.size = size
         self.rows = sum(len(b.columns) * b.g.numel() for b in blocks)
         self.x, self.parameter = ca.MX.sym("x", size), ca.MX.sym("p", p.numel())
 
     @cached_property
     def g(self) -> ca.Function:
         """(x, p) -> every row."""
-        rows = [_repeated(b, _value(b, self.p))(*self._local(b)) for b in self.blocks]
+        rows = [b.code.rows_at(len(b.columns))(*self._local(b)) for b in self.blocks]
         at = [self.x, self.parameter]
         return ca.Function("g", at, [ca.vertcat(*map(ca.vec, rows))], ["x", "p"], ["g"])
 
@@ -86,7 +67,7 @@ class BlockProblem:
     def nlp(self) -> dict[str, ca.MX]:
         """x, p, f and g as expressions."""
         f, g = ca.MX(0), []
-        for block, (cost, value, *_) in zip(self.blocks, self._functions, strict=True):
+        for block, (cost, value, *_) in self._each:
             here = self._local(block)
             f += ca.sum2(cost(*here))
             g.append(ca.vec(value(*here)))
@@ -96,7 +77,7 @@ class BlockProblem:
     def grad_f(self) -> ca.Function:
         """(x, p) -> f and its gradient."""
         f, gradients = ca.MX(0), []
-        for block, (_, _, slope, _, _) in zip(self.blocks, self._functions, strict=True):
+        for block, (_, _, slope, _, _) in self._each:
             cost, gradient = slope(*self._local(block))
             f += ca.sum2(cost)
             gradients.append((ca.vec(gradient), block.columns.ravel()))
@@ -106,7 +87,7 @@ class BlockProblem:
     def jac_g(self) -> ca.Function:
         """(x, p) -> g and its Jacobian."""
         g, parts, row = [], [], 0
-        for block, (_, _, _, first, _) in zip(self.blocks, self._functions, strict=True):
+        for block, (_, _, _, first, _) in self._each:
             values, nonzeros = first(*self._local(block))
             g.append(ca.vec(values))
             parts.append(_place_jacobian(block, nonzeros, row))
@@ -119,8 +100,8 @@ class BlockProblem:
         """(x, p, lam_f, lam_g) -> upper triangle of the Lagrangian's Hessian."""
         lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", self.rows)
         parts, row = [], 0
-        for block, (*_, second) in zip(self.blocks, self._functions, strict=True):
-            m, n = block.g.numel(), len(block.columns)
+        for block, (*_, second) in self._each:
+            m, n = block.code.g.numel(), len(block.columns)
             multipliers = ca.reshape(lam_g[row : row + m * n], m, n)
             nonzeros = second(*self._local(block), lam_f, multipliers)
             parts.append(_place_hessian(block, nonzeros))
@@ -133,16 +114,15 @@ class BlockProblem:
     def _named(self, name: str, results: list[ca.MX], *names: str) -> ca.Function:
         return ca.Function(name, [self.x, self.parameter], results, ["x", "p"], list(names))
 
-    def _local(self, block: Block) -> tuple[ca.MX, ca.MX]:
+    def _local(self, block: Placed) -> tuple[ca.MX, ca.MX]:
         """Local variables of every repeat, side by side; parameters and constants of all."""
-        given = ca.vertcat(self.parameter, ca.DM(block.numbers))
+        given = ca.vertcat(self.parameter, ca.DM(block.code.numbers))
         return _gather(self.x, block.columns), given
 
     @cached_property
-    def _functions(self) -> list[list[ca.Function]]:
-        """Of every block, over its repeats: see `_functions`."""
-        made = [_functions(b, self.p, self.worth_compiling) for b in self.blocks]
-        return [[_repeated(b, f) for f in fs] for b, fs in zip(self.blocks, made, strict=True)]
+    def _each(self) -> list[tuple[Placed, list[ca.Function]]]:
+        """Every block with its functions over its repeats."""
+        return [(block, block.functions) for block in self.blocks]
 
 
 def _gather(x: ca.MX, columns: np.ndarray) -> ca.MX:
@@ -150,50 +130,20 @@ def _gather(x: ca.MX, columns: np.ndarray) -> ca.MX:
     return ca.reshape(x[index], columns.shape[1], columns.shape[0])
 
 
-def _value(block: Block, p: ca.SX) -> ca.Function:
-    rows = ca.cse(ca.densify(block.g))
-    return ca.Function("value", [block.z, ca.vertcat(p, block.constants)], [rows])
-
-
-def _functions(block: Block, p: ca.SX, worth_compiling: bool) -> list[ca.Function]:
-    """Of one repeat: cost, rows, the cost's slope, the rows' Jacobian, the Lagrangian's Hessian."""
-    z, f, g = block.z, block.f, ca.densify(block.g)
-    at = [z, ca.vertcat(p, block.constants)]
-    plain = [ca.Function("cost", at, [ca.cse(f)]), _value(block, p)]
-    functions = [
-        ca.Function("slope", at, ca.cse([f, ca.densify(ca.gradient(f, z))])),
-        ca.Function("first", at, ca.cse([g, _column(block.jacobian)])),
-        ca.Function("second", [*at, *block.multipliers], ca.cse([_column(block.hessian)])),
-    ]
-    large = functions[-1].n_instructions() > Functions.current().large
-    return plain + (compiled(functions) if worth_compiling and large else functions)
-
-
-def _repeated(block: Block, function: ca.Function) -> ca.Function:
-    """(z side by side, parameters and constants; lam_f, lam_g side by side) -> results alike."""
-    shared = [1, 2] if function.n_in() > 2 else [1]
-    return vectorised(function, len(block.columns), shared)
-
-
 def _gather_gradient(parts: list[tuple[ca.MX, np.ndarray]], size: int) -> ca.MX:
     where = np.concatenate([at for _, at in parts])
     return ca.densify(ca.mtimes(_adding(where, size), ca.vertcat(*(nz for nz, _ in parts))))
 
 
-def _column(matrix: ca.SX) -> ca.SX:
-    """Nonzeros as a dense column, so that mapped outputs line up."""
-    return ca.SX(matrix.nz[:]) if matrix.nnz() else ca.SX(0, 1)
-
-
-def _place_jacobian(block: Block, nonzeros: ca.MX, row: int) -> Entries:
-    rows, columns = (np.array(t, dtype=int) for t in block.jacobian.sparsity().get_triplet())
+def _place_jacobian(block: Placed, nonzeros: ca.MX, row: int) -> Entries:
+    rows, columns = (np.array(t, dtype=int) for t in block.code.jacobian.sparsity().get_triplet())
     repeats = np.arange(len(block.columns))[:, None]
-    at_rows = (row + repeats * block.g.numel() + rows).ravel()
+    at_rows = (row + repeats * block.code.g.numel() + rows).ravel()
     return ca.vec(nonzeros), at_rows, block.columns[:, columns].ravel()
 
 
-def _place_hessian(block: Block, nonzeros: ca.MX) -> Entries:
-    rows, columns = (np.array(t, dtype=int) for t in block.hessian.sparsity().get_triplet())
+def _place_hessian(block: Placed, nonzeros: ca.MX) -> Entries:
+    rows, columns = (np.array(t, dtype=int) for t in block.code.hessian.sparsity().get_triplet())
     first, second = block.columns[:, rows].ravel(), block.columns[:, columns].ravel()
     return ca.vec(nonzeros), np.minimum(first, second), np.maximum(first, second)
 

@@ -43,3 +43,7 @@ class Functions(Settings):
         600.0, "s", "age of an unfinished compilation that is thought dead",
         "convention: ten minutes",
     )  # fmt: skip
+    kept: int = setting(
+        400, "1", "blocks whose functions are kept for the next program of the process",
+        "convention: twice the blocks of all programs of a jump",
+    )  # fmt: skip

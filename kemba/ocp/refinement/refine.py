@@ -34,7 +34,10 @@ from kemba.ocp.transcription.symmetry import (
     whole,
 )
 from kemba.ocp.transcription.unilateral import read_constraints
+from kemba.stopwatch import Stage, Tell, silent
 from kemba.trajectory import Trajectory
+
+SOLVES = 3  # of a plan whose phases fit: the nearest, the best, and that more exactly
 
 
 @dataclass(frozen=True)
@@ -75,13 +78,15 @@ def refine(
     plan: Trajectory,
     reduction: Reduction | None = None,
     control: Control | None = None,
+    tell: Tell = silent,
 ) -> Refined:
     """The plan solved again with its modes kept and the durations of its phases free.
 
-    `reduction`: half or whole robot; by default the half where plan and task allow it.
+    `reduction`: half or whole robot; by default the half where plan and task allow it. `tell` gets
+    the name of every solve.
     """
     reduction = reduction or reduction_of(model, task, requirements, plan)
-    refiner = Refiner(model, task, requirements, plan, reduction, control or Control())
+    refiner = Refiner(model, task, requirements, plan, reduction, control or Control(), tell)
     try:
         return refiner.run()
     except ValueError as error:
@@ -98,6 +103,7 @@ class Refiner:
     plan: Trajectory
     reduction: Reduction
     control: Control
+    tell: Tell = silent
     iterations: int = 0
     seen: list[list[Phase]] = field(default_factory=list)  # phases that were tried
 
@@ -139,6 +145,7 @@ class Refiner:
             if phases in self.seen or self.left <= 0:
                 break
             self.seen.append(phases)
+            self.tell("phases: changing the order of contacts and valves")
             program, near = self.rough(phases, start)
             ended = self._ended(program, near)
             if ended.done:
@@ -156,6 +163,7 @@ class Refiner:
     def exact(self, phases: Sequence[Phase], start: Trajectory) -> Refined:
         """The solution nearest to the plan by the coarser scheme, then the best one by both."""
         program, x = self.build(phases, start, RADAU3)
+        self.tell(Stage("phases: near the plan", 1, SOLVES))
         settings = Refining.current()
         half = self.reduction.symmetric
         iterations = settings.nearest_half if half else settings.rough_iterations
@@ -176,6 +184,7 @@ class Refiner:
     def finish(self, near: PhaseProgram, x: np.ndarray) -> Refined:
         """An exact solution, from the nearest solution `x` (size,) with the coarser scheme
         first."""
+        self.tell(Stage("phases: the best plan", 2, SOLVES))
         program, start = self.build(near.phases, self.plan, RADAU3)
         program.keep_short(x, Elements.current().fair)
         best = self._solve(program, x[: len(start)], rough(Refining.current().rough_iterations))
@@ -201,6 +210,7 @@ class Refiner:
     def fine(self, coarser: PhaseProgram, x: np.ndarray) -> Refined:
         """The exact program with the finer scheme, from a solution `x` (size,) with the coarser
         one."""
+        self.tell(Stage("phases: the best plan, more exactly", 3, SOLVES))
         settings = Refining.current()
         program, _ = self.build(coarser.phases, self.plan, RADAU5)
         start = program.proximal(carried(program, coarser, x), settings.near_fine)

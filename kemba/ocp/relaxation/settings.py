@@ -22,7 +22,7 @@ class Relaxation(Settings):
     )
     margin: float = setting(
         0.8, "1", "the last relaxation, as a part of what the certificate asks",
-        "convention: room for IPOPT's own tolerance on the rows", decides=True,
+        "convention: room for IPOPT's own tolerance on the rows", decides=True, at_most=1.0,
     )  # fmt: skip
     valve: float = setting(
         0.1, "1", "weight of u(1 - u), per valve and node of the grid's mean", CHOSEN, decides=True
@@ -48,8 +48,8 @@ class Starts(Settings):
     """Where each solve starts: barrier parameters and distances from the bounds."""
 
     interior_push: float = setting(
-        0.3, "1", "bound_push and bound_frac of the first solve: far inside the bounds",
-        TRIALS, decides=True,
+        0.3, "1", "bound_push and bound_frac of the first solve: far inside the bounds; 0.5 is the "
+        "middle", TRIALS, decides=True, at_most=0.5,
     )  # fmt: skip
     interior_mu: float = setting(
         0.1, "1", "barrier parameter of the first solve",

@@ -13,6 +13,8 @@ import casadi as ca
 from kemba.config import Document
 from kemba.config.document import Location, written
 from kemba.errors import ConfigErrors, KembaError, suggest
+from kemba.mechanism.knee import flexion
+from kemba.mechanism.links import Robot
 from kemba.model import Model
 from kemba.ocp.task.options import cost_errors, option_errors
 from kemba.ocp.task.task import Bound, Goal, Task
@@ -202,7 +204,9 @@ def flight_clearance(
 
     The flight is the ballistic one about the highest goal of the body, from stretched legs; of it
     the middle part counts. A flight that is longer than the motion fills it; that the duration is
-    too short is said by the checks. Raises ValueError where no goal says when the robot flies.
+    too short is said by the checks. Without `folding`, a jump too low for the clearance has what
+    stretched legs leave: nothing where they reach the ground. Raises ValueError where no goal says
+    when the robot flies.
     """
     if not task.clearance:
         return []
@@ -215,11 +219,21 @@ def flight_clearance(
     rise /= task.duration
     before, after = min(rise, apex.at), min(rise, 1.0 - apex.at)
     during = apex.at - FLIGHT * before, apex.at + FLIGHT * after
+    least = task.clearance
+    if not task.folding:  # stretched legs have this at the first and last moment that counts
+        least = min(least, (1.0 - FLIGHT**2) * (apex.lower - longest_leg(robot)))
     known = quantities(model)
     return [
-        Requirement(("clearance",), known[f"{leg}/foot/z"], None, task.clearance, math.inf, during)
-        for leg in model.mechanism.legs
+        Requirement(("clearance",), known[f"{leg}/foot/z"], None, least, math.inf, during)
+        for leg in (model.mechanism.legs if least > 0.0 else ())
     ]
+
+
+def longest_leg(robot: Robot) -> float:
+    """Distance [m] from hip to foot with the piston out."""
+    femur, tibia = robot.leg.femur.length, robot.leg.tibia.length
+    bend = math.cos(flexion(robot.leg, robot.stroke))
+    return math.sqrt(femur**2 + tibia**2 + 2 * femur * tibia * bend)
 
 
 def _number(task: Task, value: float | str, quantity: Quantity) -> float:

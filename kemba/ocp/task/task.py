@@ -124,6 +124,8 @@ class Task(Section):
     quantities to values; `rest: true` there means that all rates are zero,
     `settled: true` that every state of an effect is at its value at rest. `hold`: for so long
     before the plan the controller keeps the first pose, valves closed, so that the robot settles.
+    `folding`: whether legs may have to fold for `clearance`; if not, a low jump has what stretched
+    legs leave.
     `effects` changes parameters of the model's effects, by name or by place in its list:
     `{contact: {mu: 0.6}}`.
     `robust`: by how many scenarios, drawn from the file `uncertainties`, plans are chosen.
@@ -139,6 +141,7 @@ class Task(Section):
     effects: dict[str, dict[str, Any]] = Field(default_factory=dict)
     payload: Annotated[float, Param("kg", lower=0.0, doc="at the body's centre")] = 0.0
     clearance: Annotated[float, Param("m", lower=0.0, doc="of the feet in flight")] | None = None
+    folding: bool = True
     landing: Landing = Field(default_factory=Landing)
     hold: Annotated[float, Param("s", lower=0.0, upper=10.0, doc="before plan time 0")] = 0.0
     duration: Annotated[float, Param("s", lower=0.01, upper=20.0, doc="nominal")] = 0.5

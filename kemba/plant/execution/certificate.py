@@ -13,6 +13,7 @@ from kemba.model import Model, load_model
 from kemba.plant.execution.controller import execute
 from kemba.plant.execution.impacts import told
 from kemba.plant.execution.replay import LandingSettings, Replay, ends_standing, replay
+from kemba.stopwatch import Stage, Tell, silent
 from kemba.trajectory import Array, Trajectory
 
 PLANT = "plant"
@@ -36,17 +37,25 @@ def replays(
 
 
 def executions(
-    model: Model, plan: Trajectory, controller: Trajectory, plant: str | Model | None = PLANT
+    model: Model,
+    plan: Trajectory,
+    controller: Trajectory,
+    plant: str | Model | None = PLANT,
+    tell: Tell = silent,
 ) -> dict[str, Replay | None]:
-    """What `replays` sums up, with the motions."""
+    """What `replays` sums up, with the motions. `tell` gets the name of each execution."""
     full = load_model(plant) if isinstance(plant, str) else plant
     rest = rest_after(model, plan, controller)
-    there = full and _tried(lambda: execute(controller, full, extra=rest).against(full, plan))
-    return {
-        "replay": _tried(lambda: replay(model, plan)),
-        "table_replay": _tried(lambda: execute(controller, model, extra=rest).against(model, plan)),
-        "plant_replay": there or None,
-    }
+
+    def on(machine: Model) -> Replay | None:
+        return _tried(lambda: execute(controller, machine, extra=rest).against(machine, plan))
+
+    tell(Stage("replay: the plan's inputs", 1, 3))
+    own = _tried(lambda: replay(model, plan))
+    tell(Stage("replay: controller.csv", 2, 3))
+    table = on(model)
+    tell(Stage("replay: controller.csv on the simulated robot", 3, 3))
+    return {"replay": own, "table_replay": table, "plant_replay": on(full) if full else None}
 
 
 def summaries(model: Model, done: Mapping[str, Replay | None]) -> dict[str, Any]:

@@ -20,6 +20,7 @@ from kemba.plant.execution.sensors import Sensors, take_log
 from kemba.plant.simulation.valves import scattered
 from kemba.plant.stepping.arrays import Array
 from kemba.quantity import to_si
+from kemba.stopwatch import Stage, Tell, silent
 from kemba.trajectory import Trajectory
 
 Play = Callable[[Model, Array, list[int], bool], Execution]
@@ -52,13 +53,14 @@ def repeat_run(
     seed: int = 0,
     gains: Gains | None = None,
     play: Play | None = None,
+    tell: Tell = silent,
 ) -> list[Repeat]:
     """Execute the controller of a run `count` times on `model` and write `log-1.csv`, ... to `out`.
 
     With `noise`, sensors are noisy and the valves scatter; the same `seed` gives the same logs.
     `play` executes the table in another way than eq. 10 alone; it gets the model, the times of the
-    samples and the numbers that seed it, and whether there is noise. Raises KembaError when `run`
-    has no controller table.
+    samples and the numbers that seed it, and whether there is noise. `tell` gets the name of
+    each execution. Raises KembaError when `run` has no controller table.
     """
     folder = Path(run)
     controller = folder / "controller.csv" if folder.is_dir() else folder
@@ -69,6 +71,7 @@ def repeat_run(
     plan = Trajectory.read(plan_file) if plan_file.is_file() else None
     repeats = []
     for number in range(1, count + 1):
+        tell(Stage("executing", number, count))
         rng = np.random.default_rng([seed, number])
         sensors = Sensors.usual() if noise else Sensors()
         valves = scattered(model, table, VALVE_SCATTER, rng) if noise else None

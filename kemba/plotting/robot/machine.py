@@ -11,7 +11,6 @@ import numpy as np
 
 from kemba.effects.pneumatics.chamber import STEADY, Chamber
 from kemba.effects.pneumatics.tables import at_supply
-from kemba.identify.problem.noise import difference_sigma
 from kemba.mechanism import Mechanism, Robot, knee
 from kemba.model import Model, build_model, load_spec
 from kemba.plotting.source import Mask
@@ -77,6 +76,8 @@ class Machine:
             force, least = trajectory[f"{leg}/foot/Fz"], PRESSED * self.mechanism.weight
             if trajectory.meta.get("kind") in EXACT:
                 return np.asarray(force > least)
+            from kemba.identify.problem.noise import difference_sigma  # of logs only: SciPy
+
             calm, rows = _averaged(trajectory.time, np.nan_to_num(force))
             noise = difference_sigma(force) / np.sqrt(rows)
             return np.asarray(calm > max(least, CLEAR * noise))

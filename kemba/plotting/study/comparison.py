@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
-from kemba.identify.compare.bins import ConditionBin
+from kemba.identify.compare.bins import MODES, PHASES, ConditionBin
 from kemba.identify.compare.compare import Comparison
 from kemba.identify.compare.force_profiles import ForceProfile
 from kemba.identify.problem.types import MissingForce
@@ -18,9 +18,9 @@ from kemba.plotting.heat import LEVEL, ROW, add_bar, draw_heat, name_conditions
 from kemba.plotting.style import BLUE, GREY, key_above, paper_figure, paper_style
 from kemba.trajectory import Array
 
-PHASES = ("rest", "stance2", "stance1", "impact", "flight", "moving")
 REGIONS = ("", "in", "mid", "out")
 WIDEST = 26  # columns of one heat map; more are shown in two, one below the other
+CLOSE = 14  # columns above which there is room for the first letters of words only
 BANDS = 3
 Column = tuple[str, str, str]  # phase, mode, region
 
@@ -33,7 +33,7 @@ def plot_comparison(found: Comparison, figure: Figure | None = None) -> Figure:
     bands = bands_of(found.missing)
     panels = panels_of(found.force_profiles)
     channels = list(dict.fromkeys(c.channel for c in found.bins))
-    heights = [len(channels) * ROW + 3 * LEVEL + 0.3] * len(tables)
+    heights = [len(channels) * ROW + 4 * LEVEL + 0.3] * len(tables)
     parts = [sum(heights), 0.85 * len(bands) + 0.35, 1.75 if panels else 0.0]
     figure = paper_figure(sum(parts), figure=figure)
     rooms = figure.subfigures(3, 1, height_ratios=[max(p, 0.01) for p in parts], squeeze=False)
@@ -55,10 +55,26 @@ def columns_of(listed: Sequence[ConditionBin]) -> list[list[Column]]:
     return [order[:cut], order[cut:]]
 
 
+def in_words(columns: Sequence[Column]) -> list[tuple[str, ...]]:
+    """The labels of columns: phase on up to two lines, open valves, place in the stroke."""
+    modes = {m: w[:3] if len(columns) > CLOSE else w for m, w in MODES.items()}
+    found: list[tuple[str, ...]] = []
+    for phase, mode, region in columns:
+        words = PHASES.get(phase, phase)
+        head, _, last = words.rpartition(" ")
+        labels = (f"{head}\n{last}" if len(head) > 2 else words, modes.get(mode, mode), region)
+        found.append(labels if any(column[2] for column in columns) else labels[:2])
+    return found
+
+
 def place_of(column: Column) -> tuple[int, str, int]:
     """Sort key of a column: place of its phase, valve mode, place of its region."""
     phase, mode, region = column
-    return PHASES.index(phase) if phase in PHASES else len(PHASES), mode, REGIONS.index(region)
+    return (
+        list(PHASES).index(phase) if phase in PHASES else len(PHASES),
+        mode,
+        REGIONS.index(region),
+    )
 
 
 def _heat(
@@ -78,7 +94,7 @@ def _heat(
                 ratios[at], bold[at] = one.ratio, one.significant
         image = draw_heat(axes, ratios, bold)
         axes.set_yticks(range(len(channels)), channels)
-        name_conditions(axes, [c if c[2] else c[:2] for c in columns])
+        name_conditions(axes, in_words(columns))
     grid[0].set_title("error / noise (bold: significant)", loc="left")
     if len(channels) * len(tables) > 3:  # there is no room for a scale beside one row
         add_bar(room, image, list(grid), "")

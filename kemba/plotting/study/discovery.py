@@ -17,7 +17,7 @@ from kemba.identify.problem.problem import Array, Rows
 from kemba.identify.ranking import rungs
 from kemba.plotting.bands import plot_bands, plot_ladder
 from kemba.plotting.heat import plot_heat_map
-from kemba.plotting.study.comparison import bands_of, place_of
+from kemba.plotting.study.comparison import bands_of, in_words, place_of
 from kemba.plotting.style import (
     BLUE,
     GREY,
@@ -66,7 +66,7 @@ def plot_cells(found: Discovery) -> Figure:
         for c in group:
             at = channels.index(c.channel), columns.index((c.phase, c.mode, c.region))
             tables[title][at], bold[title][at] = c.ratio, c.significant
-    return plot_heat_map(tables, channels, [c[:2] for c in columns], bold)
+    return plot_heat_map(tables, channels, in_words([(c[0], c[1], "") for c in columns]), bold)
 
 
 def plot_explained(found: Discovery) -> Figure:
@@ -84,7 +84,9 @@ def plot_steps(found: Discovery) -> Figure:
     """Errors of fitted and held-out data as effects are added: the numbers of the answer."""
     names = [name for name, _ in found.answer.ladder]
     fitted = [found.search.points[step].fitted_error for step in rungs(found.search, found.best)]
-    return plot_ladder(names, fitted, [error for _, error in found.answer.ladder])
+    return plot_ladder(
+        names, [*found.earlier, *fitted], [error for _, error in found.answer.ladder]
+    )
 
 
 def _residuals(found: Discovery) -> tuple[Rows, dict[str, Array]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import Any
 
 from kemba.config import load_yaml
 from kemba.errors import KembaError
-from kemba.folders import place_for
+from kemba.folders import place_for, typed
 from kemba.identify.logs.gate import BadData
 from kemba.identify.logs.reading import read_logs
 from kemba.logs import load_map
@@ -37,9 +36,10 @@ from kemba.report.review.motion import (
     rig_charts,
 )
 from kemba.report.review.tracks import Track, gather, grid_of, plan_of
-from kemba.report.review.verdict import Verdict, names_of, of_answer, of_bad_data, of_logs, of_plan
+from kemba.report.review.verdict import Verdict, of_answer, of_bad_data, of_logs, of_plan
 from kemba.report.stage import page_text, stage, write_page
 from kemba.runs import Run, load_run
+from kemba.stopwatch import Tell, silent
 from kemba.trajectory import Trajectory
 
 PLANNING = "planning"
@@ -54,6 +54,7 @@ class Material:
     answer: Facts = field(default_factory=dict)
     answer_folder: Path = Path()
     model: str = PLANNING
+    column_map: str | Path | None = None
     supply: float | None = None
     error: ModelError | None = None
     fault: BadData | None = None
@@ -72,6 +73,7 @@ def review(
     column_map: str | Path | None = None,
     out: str | Path | None = None,
     force: bool = False,
+    tell: Tell = silent,
 ) -> tuple[Path, Verdict]:
     """Write the page to `out`, by default beside what it is about; the path and the verdict.
 
@@ -81,7 +83,8 @@ def review(
     default that of the run's task. The page needs no other file. Raises KembaError where a file
     cannot be read or written, or nothing is given.
     """
-    given = gather_material(logs, run, answer, model, column_map)
+    given = gather_material(logs, run, answer, model, column_map, tell)
+    tell("drawing")
     path = place_for(out, default_path(logs, run, answer), force)
     try:
         title, body, verdict = page_of(given)
@@ -115,6 +118,7 @@ def gather_material(
     answer: str | Path | None,
     model: str | None,
     column_map: str | Path | None,
+    tell: Tell = silent,
 ) -> Material:
     """Read everything; the comparison of the logs included."""
     if not logs and run is None and answer is None:
@@ -125,17 +129,18 @@ def gather_material(
     judged = str(model or asked.get("model") or PLANNING)
     supply = to_si(asked["supply"], "Pa") if asked.get("supply") is not None else None
     columns = load_map(column_map) if column_map else None
+    tell("reading")
     read = read_logs(logs, columns) if logs else []
     error, fault = None, None
     if read:
         try:
-            error = model_error(read, judged)
+            error = model_error(read, judged, tell)
         except BadData as bad:
             fault = bad
     facts = read_answer(answer) if answer is not None else {}
     folder = Path(answer) if answer is not None else Path()
     folder = folder if folder.is_dir() else folder.parent
-    return Material(found, read, facts, folder, judged, supply, error, fault)
+    return Material(found, read, facts, folder, judged, column_map, supply, error, fault)
 
 
 def page_of(given: Material) -> tuple[str, str, Verdict]:
@@ -220,9 +225,9 @@ def _found(given: Material) -> str:
 
 
 def _verdict(given: Material, tracks: Sequence[Track], events: Sequence[Events | None]) -> Verdict:
-    own = "" if given.model == PLANNING else f" --model {shlex.quote(given.model)}"
+    own = None if given.model == PLANNING else given.model
     words = {
-        "logs": names_of([str(log.meta["path"]) for log in given.logs]) + own,
+        "logs": typed([log.meta["path"] for log in given.logs], given.column_map, own),
         "answer": str(given.answer_folder),
         "task": str(given.run.task) if given.run else "jump.yaml",
     }

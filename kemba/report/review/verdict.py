@@ -14,7 +14,6 @@ from kemba.units import short
 
 Facts = Mapping[str, Any]
 Grade = Literal["good", "fair", "bad"]
-MANY = 4  # log names that a command still lists one by one
 
 
 @dataclass(frozen=True)
@@ -189,11 +188,3 @@ def _joined(parts: Sequence[str]) -> str:
 
 def _stop(text: str) -> str:
     return text if text.endswith((".", "!", "?")) else f"{text}."
-
-
-def names_of(paths: Sequence[str]) -> str:
-    """Log files for a command; of many in one folder `folder/*.csv`."""
-    if len(paths) < MANY:
-        return " ".join(shlex.quote(path) for path in paths)
-    folders = dict.fromkeys(path.rpartition("/")[0] for path in paths)
-    return " ".join(f"{shlex.quote(folder) + '/' if folder else ''}*.csv" for folder in folders)

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import itertools
 import math
+from statistics import NormalDist
 from zlib import crc32
 
 import numpy as np
-from scipy.special import ndtri
-from scipy.stats import qmc
 
 from kemba.sweep.cases.schema import Block, Spread, Value
 from kemba.units import read_si
@@ -30,6 +29,8 @@ def _draws(block: Block, rng: np.random.Generator) -> list[Values]:
     if not width:
         return [{}]
     if block.sampling == "latin_hypercube":
+        from scipy.stats import qmc  # half a second, and most callers draw nothing
+
         table = qmc.LatinHypercube(width, seed=rng).random(block.cases)
     else:
         table = rng.random((block.cases, width))
@@ -48,7 +49,7 @@ def drawn(spread: Spread, u: float) -> Value:
     if spread.whole:
         return min(math.floor(a + (b - a + 1) * u), math.floor(b))
     if spread.mean is not None:
-        number = a + b * float(ndtri(min(max(u, 1e-9), 1 - 1e-9)))
+        number = a + b * NormalDist().inv_cdf(min(max(u, 1e-9), 1 - 1e-9))
     else:
         number = a + (b - a) * u
     short = float(f"{number:.6g}")

@@ -13,7 +13,8 @@ from twin import catalogue, measure
 from kemba.identify.compare.compare import compare
 from kemba.identify.discover import discover
 from kemba.identify.evidence.colour import with_learnt_colour
-from kemba.identify.robot.motion.colour import ChannelNoise, coloured, simulated
+from kemba.identify.problem.sensor_noise import ChannelNoise
+from kemba.identify.robot.motion.colour import coloured, simulated
 from kemba.identify.robot.problem import RobotProblem, robot_problem
 from kemba.model.spec import load_model
 from kemba.trajectory import Trajectory

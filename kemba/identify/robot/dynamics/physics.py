@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cached_property
 from typing import Any
 
@@ -13,6 +14,7 @@ from kemba.identify.robot.dynamics.air import StateRunner
 from kemba.mechanism.robot import link_regressors
 from kemba.model.model import Model
 from kemba.model.rest import rate_of
+from kemba.settings import BY_HAND, Settings, setting
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 FOLDED = 2.9  # rad; a knee folds less far, whatever the lengths of its leg
@@ -20,24 +22,43 @@ FOLDED = 2.9  # rad; a knee folds less far, whatever the lengths of its leg
 Flags = np.ndarray[Any, np.dtype[np.bool_]]
 
 
+class FigureSettings(Settings):
+    """Figures of another structure that are free."""
+
+    reach: float = setting(4.0, "1", "largest error, in sigmas", "convention: beyond chance")
+    least: float = setting(0.2, "1", "smallest value, as a share of the nominal one", BY_HAND)
+
+
 class Physics:
     """Residual forces, state rates and kinematics of `model`, vectorised over samples.
 
     Contact and end stops are left out: where they act is read from the data. `names` are the free
-    parameters in the order of every `p`, those of `free` first, then the nuisance ones. `links`:
-    figures of links that may be off, as `Problem.nuisance`; they are no part of `p`.
+    parameters in the order of every `p`, those of `free` first, then the nuisance ones. `figures`:
+    nuisance parameters that are known less well, with value and 1 sigma: of every leg alike; a
+    table is scaled. `links`: figures of links that may be off, as `Problem.nuisance`; they are no
+    part of `p`.
     """
 
-    def __init__(self, model: Model, free: tuple[str, ...], grip: float = 1.0) -> None:
+    def __init__(
+        self,
+        model: Model,
+        free: tuple[str, ...],
+        grip: float = 1.0,
+        figures: Mapping[str, tuple[float, float]] | None = None,
+    ) -> None:
         self.base = model
         self.model = leg_by_leg(model)
-        self.nuisance = nominal_figures(self.model, free)
+        plain = {n: v for n, v in (figures or {}).items() if n in model.parameters}
+        tables = {n: v for n, v in (figures or {}).items() if n not in plain}
+        scaled = {**tables, **nominal_figures(self.model, free)}
+        self.nuisance = {**plain, **scaled}
         self.links = link_figures(model)
         self.names = (*free, *self.nuisance)
         self.nominal = np.array(
             [model.parameters[n][1] for n in free] + [v for v, _ in self.nuisance.values()]
         )
-        self.node = node = self.model.build(free, self.nuisance)
+        self.bounds = self._bounds(figures or {})
+        self.node = node = self.model.build((*free, *plain), scaled)
         self.p = node.p
         self.mechanism, self.legs = model.mechanism, model.mechanism.legs
         self.inputs = tuple(q.name for q in self.model.inputs.values())
@@ -50,6 +71,18 @@ class Physics:
         self.lengths = np.array([n.startswith("geometry:") for n in self.names])
         self.grip = grip
         self._maps: dict[tuple[str, int], ca.Function] = {}
+
+    def _bounds(self, figures: Mapping[str, tuple[float, float]]) -> tuple[Array, Array]:
+        """Smallest and largest value (k,) of every parameter; of `figures` what a linear estimate
+        may not leave: a negative area has no flow."""
+        settings = FigureSettings.current()
+        lower, upper = np.full(len(self.names), -np.inf), np.full(len(self.names), np.inf)
+        for name, (value, sigma) in figures.items():
+            i, reach = self.names.index(name), settings.reach * sigma
+            declared = self.base.parameters[name][0] if name in self.base.parameters else None
+            lower[i] = max(value - reach, settings.least * value)
+            upper[i] = min(value + reach, declared.upper if declared else np.inf)
+        return lower, upper
 
     @property
     def channels(self) -> tuple[str, ...]:

@@ -8,28 +8,15 @@ missing or nodes are not evenly spaced, which an AR model of rows does not.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from kemba.identify.problem.sensor_noise import ChannelNoise
 from kemba.identify.robot.motion.filter import System
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
-
-
-@dataclass(frozen=True)
-class ChannelNoise:
-    """Noise of one channel, in its stated sigma: `white` (1 sigma), and `lags`: sigma and memory
-    [s] of every first-order lag."""
-
-    white: float = 1.0
-    lags: tuple[tuple[float, float], ...] = ()
-
-    @property
-    def spread(self) -> float:
-        """Standard deviation of the whole noise."""
-        return float(np.sqrt(self.white**2 + sum(sigma**2 for sigma, _ in self.lags)))
 
 
 Noise = Sequence[ChannelNoise]  # one per channel; empty: all are white

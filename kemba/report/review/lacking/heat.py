@@ -6,21 +6,11 @@ import math
 from collections.abc import Sequence
 from html import escape
 
-from kemba.identify.compare.bins import ConditionBin
+from kemba.identify.compare.bins import MODES, PHASES, ConditionBin
 
 SCALE = ("#fffbe6", "#fee9a6", "#fdc766", "#f79a3e", "#b34a06", "#7a2f04")  # light to dark
 LIGHT = 4  # from this colour on the numbers are white
 CEILING = 30.0  # error ratio of the darkest colour
-PHASES = ("rest", "stance2", "stance1", "impact", "flight", "moving")
-WORDS = {
-    "rest": "at rest",
-    "stance2": "two feet stand",
-    "stance1": "one foot stands",
-    "impact": "touchdown",
-    "flight": "in the air",
-    "moving": "moving",
-}
-MODES = {"00": "closed", "10": "extend", "01": "retract", "11": "both"}
 
 
 def heat_table(bins: Sequence[ConditionBin]) -> str:
@@ -36,7 +26,7 @@ def heat_table(bins: Sequence[ConditionBin]) -> str:
     phases = list(dict.fromkeys(phase for phase, _ in columns))
     top = "".join(
         f'<th scope="col" colspan="{sum(p == phase for p, _ in columns)}">'
-        f"{escape(WORDS.get(phase, phase))}</th>"
+        f"{escape(PHASES.get(phase, phase))}</th>"
         for phase in phases
     )
     head = "".join(f'<th scope="col">{MODES.get(mode, escape(mode))}</th>' for _, mode in columns)
@@ -56,7 +46,7 @@ def heat_table(bins: Sequence[ConditionBin]) -> str:
 
 def _place(column: tuple[str, str]) -> tuple[int, str]:
     phase, mode = column
-    return PHASES.index(phase) if phase in PHASES else len(PHASES), mode
+    return [*PHASES, phase].index(phase), mode
 
 
 def _cell(one: ConditionBin | None) -> str:

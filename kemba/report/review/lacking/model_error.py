@@ -16,6 +16,7 @@ from kemba.report.review.charts import Book, Chart, Line
 from kemba.report.review.html import meter, table
 from kemba.report.review.lacking.heat import heat_table
 from kemba.report.review.tracks import PageSettings
+from kemba.stopwatch import Tell, silent
 from kemba.trajectory import Array, Trajectory
 
 BANDS = 4  # channels of the missing force that are shown
@@ -29,11 +30,11 @@ class ModelError:
     logs: tuple[str, ...]
 
 
-def model_error(logs: Sequence[Trajectory], model: str) -> ModelError:
+def model_error(logs: Sequence[Trajectory], model: str, tell: Tell = silent) -> ModelError:
     """Compare the first logs with a model. Raises KembaError; BadData for impossible logs."""
     chosen = list(logs[: PageSettings.current().compared])
     check_all(logs, model_of(logs, model))
-    found, _ = compare_read(chosen, model)
+    found, _ = compare_read(chosen, model, tell)
     return ModelError(found, tuple(str(log.meta["name"]) for log in chosen))
 
 

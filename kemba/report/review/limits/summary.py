@@ -48,7 +48,9 @@ def _touchdown(flight: Flight | None) -> str:
         return "-"
     text = _or_dash(flight.landed, 1, "s", 3)
     if flight.grazes:
-        text += f" (grazes at {', '.join(f'{time:.3f}' for time in flight.grazes)} s)"
+        first = ", ".join(f"{time:.3f}" for time in flight.grazes[:2])
+        more = f" and {len(flight.grazes) - 2} times more" if len(flight.grazes) > 2 else ""
+        text += f" (grazes at {first} s{more})"
     return text
 
 

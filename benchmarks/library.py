@@ -1,0 +1,134 @@
+"""The library of plans made anew: python benchmarks/library.py [--jobs N] [--choose].
+
+Walks of `configs/library/walks.yaml` are done on a local Dask cluster, those of one round side by
+side; a walk that is done is not repeated. Of all plans of the same figures the cheapest one is kept
+whose executions keep to the task's tolerances. Writes `configs/library/*.npz` and `plans.csv`,
+and the page `docs/shipped-plans.md`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+import platform
+import shutil
+from collections import defaultdict
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from kemba.config import load_yaml, shipped_folder
+from kemba.ocp import load_task, task_model
+from kemba.ocp.library.kind import FIGURES, kind_of
+from kemba.ocp.library.shelf import INDEX
+from kemba.sweep.cases.case import Case
+from kemba.sweep.workers.farm import run_cases
+
+UNITS = {"height": "m", "distance": "m", "supply": "Pa", "payload": "kg", "duration": "s"}
+PAGE = Path(__file__).parents[1] / "docs" / "shipped-plans.md"
+HEAD = """\
+# Shipped plans
+
+`kemba-opt solve` begins from these plans where its task differs from one of them only by the
+figures of this table, and only a little (`kemba/ocp/library/shelf.py` says how much). See
+[solving](solving.md#from-a-shipped-plan). They were continued from plans that were found from a
+guess. Of {tried} plans, the cheapest of each row was kept whose executions keep to the task's
+tolerances, also on the full plant. `of`: among how many. Errors are those on the plant.
+Written by `benchmarks/library.py` on {machine}.
+
+"""
+
+
+def walked(jobs: int | None, folder: Path) -> None:
+    """Every walk that is not done yet, round by round."""
+    for walks in load_yaml(shipped_folder("library") / "walks.yaml").data["rounds"]:
+        cases = [_case(walk, folder) for walk in walks]
+        run_cases(cases, folder, jobs=jobs, tell=lambda case, record: print(
+            case.values["name"], record["sentence"], f"{record['cpu_s']:.0f} s", flush=True
+        ))  # fmt: skip
+
+
+def choose(folder: Path) -> None:
+    """The best plans to the shelf, its index and its page."""
+    shelf = shipped_folder("library")
+    found = [_facts(path) for path in sorted((folder / "plans").glob("*.json"))]
+    chosen = best(found)
+    for old in shelf.glob("*.npz"):
+        old.unlink()
+    for row in chosen:
+        shutil.copy(row["path"].with_suffix(".npz"), shelf / f"{row['path'].stem}.npz")
+    write_index(shelf / INDEX, chosen)
+    PAGE.write_text(page(chosen, len(found)), encoding="utf-8")
+
+
+def _case(walk: dict[str, Any], folder: Path) -> Case:
+    work = {"set": [], "first": "", **walk, "folder": str(folder / "plans")}
+    return Case("walks", 0, {"name": walk["name"]}, "kemba.report.walks:walk", work)
+
+
+def _facts(path: Path) -> dict[str, Any]:
+    """What a walk noted about a plan, with the kind of its task as that is today."""
+    facts = json.loads(path.read_text(encoding="utf-8"))
+    return {**facts, "path": path, "kind": _kind(facts["task"], tuple(facts["set"]))}
+
+
+@cache
+def _kind(name: str, overrides: tuple[str, ...]) -> str:
+    task, document = load_task(name, list(overrides))
+    return kind_of(task, task_model(task, document=document))
+
+
+def best(found: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The cheapest good plan of each kind and figures, with `of`: among how many plans."""
+    same = defaultdict(list)
+    for facts in found:
+        figures = tuple(sorted((k, round(v, 6)) for k, v in facts["figures"].items()))
+        same[facts["kind"], figures].append(facts)
+    chosen = []
+    for plans in same.values():
+        good = [facts for facts in plans if facts["good"]]
+        if good:
+            chosen.append({**min(good, key=lambda facts: facts["cost"]), "of": len(plans)})
+    return sorted(chosen, key=lambda c: (c["task"], *(c["figures"].get(k, 0.0) for k in FIGURES)))
+
+
+def write_index(path: Path, chosen: list[dict[str, Any]]) -> None:
+    """The table that `kemba.ocp.library.shelf` reads."""
+    with path.open("w", encoding="utf-8", newline="") as stream:
+        rows = csv.writer(stream, lineterminator="\n")
+        rows.writerow(["file", "kind", *FIGURES, "cost", "of"])
+        for row in chosen:
+            figures = [f"{row['figures'][k]:.9g}" if k in row["figures"] else "" for k in FIGURES]
+            name = f"{row['path'].stem}.npz"
+            rows.writerow([name, row["kind"], *figures, f"{row['cost']:.6g}", row["of"]])
+
+
+def page(chosen: list[dict[str, Any]], tried: int) -> str:
+    """The page for people."""
+    text = HEAD.format(tried=tried, machine=f"{platform.processor() or platform.machine()}")
+    columns = ["task", *(f"{k} [{UNITS[k]}]" for k in FIGURES)]
+    columns += ["torque² [N².m².s]", "valves [s]", "cost", "of", "apex [mm]", "touchdown [ms]",
+                "end [mm]"]  # fmt: skip
+    lines = ["| " + " | ".join(columns) + " |", "|---" * len(columns) + "|"]
+    for row in chosen:
+        figures = [f"{row['figures'][k]:g}" if k in row["figures"] else "" for k in FIGURES]
+        plant = row["plant"]
+        late = plant["touchdown_error_s"]
+        errors = [f"{1e3 * plant['apex_error_m']:+.1f}", f"{1e3 * plant['final_error_m']:.1f}"]
+        errors.insert(1, "" if late is None else f"{1e3 * late:+.1f}")
+        cost = [f"{row['torque_squared_integral']:.3g}", f"{row['valve_open_s']:.2f}"]
+        cells = [row["task"], *figures, *cost, f"{row['cost']:.3g}", str(row["of"]), *errors]
+        lines.append("| " + " | ".join(cells) + " |")
+    return text + "\n".join(lines) + "\n"
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--jobs", type=int, help="workers; by default the cores")
+    parser.add_argument("--folder", type=Path, default=Path("runs/library"), help="kept results")
+    parser.add_argument("--choose", action="store_true", help="walk no further")
+    words = parser.parse_args()
+    if not words.choose:
+        walked(words.jobs, words.folder)
+    choose(words.folder)

@@ -1,0 +1,173 @@
+"""Noise of a sensor as white noise and first-order lags, told from autocovariances.
+
+A first-order lag of white noise is AR(1) noise: an exponential memory. What a flexible model leaves
+over has the noise of the sensors in it, seen through a filter. Each kind of noise (white, or a lag
+of some memory, at some channel) would make its own autocovariances behind that filter; a simulation
+through the same filter tells which. The measured autocovariances are a sum of them with positive
+weights: the variances of the kinds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.optimize import nnls
+
+from kemba.settings import BY_HAND, Settings, setting
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+Flags = np.ndarray[Any, np.dtype[np.bool_]]
+
+
+@dataclass(frozen=True)
+class ChannelNoise:
+    """Noise of one channel, in its stated sigma: `white` (1 sigma), and `lags`: sigma and memory
+    [s] of every first-order lag."""
+
+    white: float = 1.0
+    lags: tuple[tuple[float, float], ...] = ()
+
+    @property
+    def spread(self) -> float:
+        """Standard deviation of the whole noise."""
+        return float(np.sqrt(self.white**2 + sum(sigma**2 for sigma, _ in self.lags)))
+
+    def covariance(self, apart: Array) -> Array:
+        """Covariance (n,) of two readings `apart` (n,) [s], in stated sigmas squared."""
+        lags = sum(s**2 * np.exp(-np.abs(apart) / memory) for s, memory in self.lags)
+        return np.asarray(np.where(apart == 0.0, self.white**2, 0.0) + lags)
+
+
+class ColourSettings(Settings):
+    """How the colour of sensors is learnt."""
+
+    memories: tuple[float, ...] = setting(
+        (2e-3, 4e-3, 8e-3, 16e-3, 32e-3, 64e-3),
+        "s",
+        "memories of coloured noise that are tried",
+        "convention: each twice the one before, from two rows to the time of a stride's phase",
+    )
+    drifts: tuple[float, ...] = setting(
+        (0.25, 1.0), "s", "memories of a drift that are tried", "convention: as long as a log"
+    )
+    force: float = setting(0.025, "s", "memory of the forces that may be missing", BY_HAND)
+    lags: tuple[int, ...] = setting(
+        (0, 1, 2, 3, 4, 5, 6, 8, 10, 13, 16, 20, 26, 32, 40, 50, 64, 80, 100),
+        "1",
+        "rows between two errors whose covariance is compared",
+        "convention: denser where colour changes fast",
+    )
+    draws: int = setting(5, "1", "simulated logs of each kind of noise", BY_HAND)
+    fewest: int = setting(200, "1", "rows of a channel below which no colour is learnt", BY_HAND)
+    least: float = setting(
+        0.6,
+        "1",
+        "smallest noise that is believed, in stated sigmas",
+        "convention: as on the bench",
+    )
+    sharpest: float = setting(
+        0.1, "1", "smallest share of the noise's sigma that is white", "convention: a sound filter"
+    )
+    slight: float = setting(
+        0.5, "1", "sigma of a lag, as a share of the noise's, below which it is left out", BY_HAND
+    )
+    plain: float = setting(
+        10.0, "1", "gain in chi2 per lag from which a channel is coloured", BY_HAND, decides=True
+    )
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One kind of noise: of which channel (or force), and with which memory [s] (0: white)."""
+
+    channel: int
+    memory: float
+
+
+def chosen_noise(
+    a: Array, b: Array, kinds: Sequence[Kind], most: Array, known: Flags
+) -> tuple[ChannelNoise, ...]:
+    """The noise of each channel: white, unless lags explain `b` (rows,) clearly better."""
+    settings = ColourSettings.current()
+    scale = np.maximum(np.linalg.norm(a, axis=0), 1e-12)
+    drift = min(settings.drifts)
+
+    def fit(allowed: Array) -> tuple[Array, float]:
+        x, left = nnls(np.where(allowed, a / scale, 0.0), b)
+        return np.where(allowed, x / scale, 0.0), float(left) ** 2
+
+    allowed = np.ones(len(kinds), dtype=bool)
+    x, chi2 = fit(allowed)
+    channel = np.array([k.channel for k in kinds])
+    memory = np.array([k.memory for k in kinds])
+    groups = [(0.0, drift), (drift, np.inf)]  # colour, drift
+    for i in range(len(most)):
+        for low, high in groups:
+            own = (channel == i) & (memory > 0) & (memory >= low) & (memory < high)
+            if not (x[own] > 0).any():
+                allowed &= ~own
+                continue
+            trial_x, trial = fit(allowed & ~own)
+            if trial - chi2 < settings.plain:
+                allowed, x, chi2 = allowed & ~own, trial_x, trial
+    found = []
+    for i in range(len(most)):
+        white = float(x[(channel == i) & (memory == 0.0)].sum())
+        lags = []
+        for low, high in groups:
+            own = (channel == i) & (memory > 0) & (memory >= low) & (memory < high)
+            if x[own].sum() > 0.0:
+                mean = float(np.exp(np.average(np.log(memory[own]), weights=x[own])))
+                lags.append((float(np.sqrt(x[own].sum())), mean))
+        found.append(_sound(np.sqrt(white), lags, float(most[i])) if known[i] else ChannelNoise())
+    return tuple(found)
+
+
+def _sound(white: float, lags: Sequence[tuple[float, float]], most: float) -> ChannelNoise:
+    """A channel's noise within what is believed; without lags it is as stated."""
+    settings = ColourSettings.current()
+    whole = ChannelNoise(white, tuple(lags)).spread
+    kept = [(s, memory) for s, memory in lags if s > settings.slight * max(whole, settings.least)]
+    if not kept:
+        return ChannelNoise()
+    scale = min(max(whole, settings.least), most) / max(whole, 1e-9)
+    white = max(white, settings.sharpest * whole)
+    return ChannelNoise(scale * white, tuple((scale * s, memory) for s, memory in kept))
+
+
+def weighted(columns: Sequence[Array], measured: Array, counts: Array) -> tuple[Array, Array]:
+    """Autocovariances (m, lags) that each kind makes, and the `measured` ones, as rows of a least
+    squares problem in which each row has unit sigma; `counts` (m, lags): pairs of rows."""
+    weight = np.sqrt(counts) / np.maximum(measured[:, :1], 1e-9)  # chi2 of every covariance
+    a = np.stack([(c * weight).ravel() for c in columns], axis=1)
+    return a, (measured * weight).ravel()
+
+
+def lag_noise(memory: float, h: Array, draws: int, rng: np.random.Generator) -> Array:
+    """(n, L, draws): a first-order lag of white noise, of unit sigma."""
+    out = rng.standard_normal((*h.shape, draws))
+    if memory:
+        keep = np.exp(-h / memory)[..., None]
+        drive = np.sqrt(1.0 - keep**2)
+        for k in range(1, len(out)):
+            out[k] = keep[k - 1] * out[k - 1] + drive[k - 1] * out[k]
+    return np.asarray(out)
+
+
+def covariances(columns: Array, errors: Array) -> tuple[Array, Array]:
+    """Mean product (m, lags) of rows so many apart, of columns (n, L, m, c), where `errors`
+    (n, L, m) are known; and how many such pairs of rows there are (m, lags)."""
+    lags = ColourSettings.current().lags
+    good = np.isfinite(errors)
+    z = np.where(good[..., None], columns, 0.0)
+    total, count = [], []
+    for lag in lags:
+        end = len(z) - lag
+        pairs = (good[:end] & good[lag:]).sum(axis=(0, 1))
+        product = np.einsum("nlmc,nlmc->m", z[:end], z[lag:]) / z.shape[-1]
+        total.append(product / np.maximum(pairs, 1))
+        count.append(pairs)
+    return np.stack(total, axis=1), np.stack(count, axis=1).astype(float)

@@ -1,0 +1,87 @@
+"""Answers in two stages: another structure first, then what the model with that structure lacks.
+
+With another structure every effect reads other states, and the motion that is found in the logs
+changes. So the problem is built anew on the model with the new structure, and searched again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from kemba.identify.answer import Answer, Ranked, Value, Verdict, excess, phrase
+from kemba.identify.doubt.cross_validation import left_out
+from kemba.identify.evidence.search import Search, share_of
+from kemba.identify.evidence.spike_slab import Hypothesis, SpikeSlabSettings
+from kemba.identify.rest import rest_of
+from kemba.identify.settings import VerdictSettings
+
+
+def structure_row(
+    first: Search, structure: str, errors: tuple[float, float], second: Search, best: Hypothesis
+) -> Ranked:
+    """The structure in the ranking, with its figures as the second search found them.
+
+    `errors`: of the model as it is, and with the structure alone.
+    """
+    candidate = first.problem.candidates[structure]
+    units = {p.name: p for p in candidate.shapes}
+    point, imperfection = second.points[best], SpikeSlabSettings.current().spike
+    values = {}
+    for key, name in second.problem.own_figures.items():
+        i, p = point.linear.index(key), units[name]
+        centre = float(point.score.z[i])
+        sd = float(np.hypot(np.sqrt(point.score.covariance[i, i]), imperfection * abs(centre)))
+        ends = (centre, centre - 1.96 * sd, centre + 1.96 * sd)
+        value, low, high = np.clip(ends, p.lower, p.upper).tolist()
+        values[name] = Value(value, low, high, p.unit)
+    share = share_of(first.probabilities(), [structure])[structure]
+    gain = left_out(first, _likeliest_with(first, structure)).nats
+    return Ranked(structure, share, values, (), *errors, gain)
+
+
+def _likeliest_with(search: Search, effect: str) -> Hypothesis:
+    """The likeliest hypothesis that has this effect."""
+    having = [h for h in search.points if effect in h]
+    return max(having, key=lambda h: search.points[h].log_evidence)
+
+
+def joined(row: Ranked, p_value: float, answer: Answer, second: Search, best: Hypothesis) -> Answer:
+    """The answer of the second search as one about the model as it was.
+
+    `row`: the structure in the ranking; `p_value` of nothing, of the first search.
+    """
+    before, after = row.error_before, answer.error_after
+    verdict = _verdict(answer.verdict, before, after)
+    named = verdict in ("missing", "partly")
+    names, rungs = [n for n, _ in answer.ladder[1:]], [e for _, e in answer.ladder]
+    steps = ["model as it is", row.effect, *names]
+    found = replace(
+        answer,
+        verdict=verdict,
+        p_value_nothing=p_value,
+        ranking=[row, *answer.ranking],
+        added=(row.effect, *answer.added) if named else (),
+        found=(row.effect, *(answer.found or best)) if named else (),
+        error_before=before,
+        ladder=list(zip(steps, [before, *rungs], strict=True)),
+    )
+    found.remarks = [f"built anew with {row.effect}; its figures were left free", *answer.remarks]
+    if verdict == "partly" and not answer.rest:
+        left = rest_of(second, best, [])
+        found.rest, found.next = left.where, left.next
+    found.sentence = phrase(found)
+    return found
+
+
+def _verdict(second: Verdict, before: float, after: float) -> Verdict:
+    """What the verdict on the second model says of the first, from the errors before and after."""
+    settings = VerdictSettings.current()
+    share = excess(after) / max(excess(before), 1e-9)
+    whole = after <= settings.whole or share <= settings.whole_share
+    if second in ("missing", "nothing"):
+        return "missing" if whole else "partly"
+    if second == "unknown" and share <= 1.0 - settings.part_of_structure:
+        return "partly"
+    return second

@@ -1,0 +1,1 @@
+"""Shipped plans of the shipped robot, from which near tasks begin."""

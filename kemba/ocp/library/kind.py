@@ -1,0 +1,47 @@
+"""What tasks must have in common so that a plan of one can begin the other."""
+
+from __future__ import annotations
+
+import json
+from hashlib import sha256
+from typing import Any
+
+from kemba.model import Model
+from kemba.ocp.task.task import Task
+
+# Numbers by which tasks of one kind differ.
+FIGURES = ("height", "distance", "supply", "payload", "duration")
+# What says how a plan is made, named or judged, but not what is asked of it.
+APART = (
+    *("name", "notes", "model", "plant", "effects", "nodes", "hold", "robust", "uncertainties"),
+    *("guess", "guess_noise", "seed", "solver", "tolerances"),
+)
+LETTERS = 12  # of a fingerprint
+
+
+def kind_of(task: Task, model: Model) -> str:
+    """A fingerprint of everything but the figures: what is asked, of which robot and effects.
+
+    Payload and supply pressure are figures; any other parameter of an effect is part of the kind.
+    """
+    asked = task.model_dump(mode="json", exclude=set(FIGURES) | set(APART), exclude_none=True)
+    robot = model.mechanism.robot
+    physics = {
+        "robot": robot.model_dump(mode="json") if robot is not None else model.mechanism.name,
+        "effects": sorted(
+            _text({"kind": e.kind, **e.model_dump(mode="json")})
+            for e in model.effects
+            if e.kind != "payload"
+        ),
+    }
+    return sha256(_text([asked, physics]).encode()).hexdigest()[:LETTERS]
+
+
+def figures_of(task: Task, model: Model) -> dict[str, float]:
+    """The figures of a task; those that it does not have are left out."""
+    values = {**{name: getattr(task, name) for name in FIGURES}, "supply": model.supply}
+    return {name: float(value) for name, value in values.items() if value is not None}
+
+
+def _text(data: Any) -> str:
+    return json.dumps(data, sort_keys=True, default=str)

@@ -1,0 +1,85 @@
+"""The plans that are shipped, and which of them are near a task."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from kemba.config import shipped_folder
+from kemba.model import Model
+from kemba.ocp.library.entry import Entry
+from kemba.ocp.library.kind import FIGURES, figures_of, kind_of
+from kemba.ocp.task.task import Task
+from kemba.settings import Settings, setting
+
+TRIED = "tuned: continuation of jump and jump_forward (docs/shipped-plans.md)"
+INDEX = "plans.csv"
+
+
+class Near(Settings):
+    """How far a plan may be from a task, figure by figure, so that the task begins from it."""
+
+    height: float = setting(0.06, "m", "of the body's centre", TRIED)
+    distance: float = setting(0.1, "m", "forward", TRIED)
+    supply: float = setting(0.1e6, "Pa", "supply pressure", TRIED)
+    payload: float = setting(0.5, "kg", "at the body's centre", TRIED)
+    duration: float = setting(0.15, "s", "nominal", TRIED)
+    tried: int = setting(2, "1", "plans of the library from which a task is begun, at most",
+                         "convention: a plan from a guess costs about as much")  # fmt: skip
+
+    dear: float = setting(
+        1.5, "1", "times the cost of the plans nearby beyond which the user is told",
+        "convention: neighbours on the shelf differ by less",
+    )  # fmt: skip
+
+    def away(self, asked: Mapping[str, float], there: Mapping[str, float]) -> float:
+        """The largest difference of two tasks' figures, in units of these settings; infinite where
+        one task lacks a figure of the other."""
+        if asked.keys() != there.keys():
+            return np.inf
+        away = (abs(asked[name] - there[name]) / float(getattr(self, name)) for name in asked)
+        return max(away, default=0.0)
+
+
+@dataclass(frozen=True)
+class Neighbour:
+    """A plan near a task; `away`: how far, 1 at most."""
+
+    entry: Entry
+    away: float
+
+
+def neighbours(task: Task, model: Model, folder: Path | None = None) -> list[Neighbour]:
+    """The shipped plans near a task, the nearest first; none for another robot or kind of task.
+
+    A task that asks for its own start (`guess_noise`, `seed`), another method or no refinement
+    has none. `folder`: another library.
+    """
+    own = task.method == "relaxation" and task.refine == "radau"
+    if not own or task.guess_noise or task.seed or task.guess != "automatic":
+        return []
+    kept = shelf(folder or shipped_folder("library"))
+    kind = kind_of(task, model) if kept else ""
+    asked, near = figures_of(task, model), Near.current()
+    found = [Neighbour(e, near.away(asked, e.figures)) for e in kept if e.kind == kind]
+    return sorted((n for n in found if n.away <= 1.0), key=lambda n: (n.away, n.entry.name))
+
+
+@cache
+def shelf(folder: Path) -> Sequence[Entry]:
+    """The plans of a library's folder, by its index; none where there is no library."""
+    index = folder / INDEX
+    if not index.is_file():
+        return ()
+    with index.open(encoding="utf-8", newline="") as rows:
+        return tuple(_entry(folder, row) for row in csv.DictReader(rows))
+
+
+def _entry(folder: Path, row: Mapping[str, str]) -> Entry:
+    figures = {name: float(row[name]) for name in FIGURES if row[name]}
+    return Entry(folder / row["file"], row["kind"], figures, float(row["cost"]), int(row["of"]))

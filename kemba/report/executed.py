@@ -1,0 +1,124 @@
+"""A plan with its controller table, executed on its own model and on the plant, and judged."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from kemba.errors import KembaError
+from kemba.ocp import Plan, controller_table
+from kemba.ocp.certificate.objective import objective
+from kemba.ocp.certificate.status import Status
+from kemba.ocp.report import answer, sentence_of
+from kemba.plant.execution.certificate import executions, plant_run, summaries
+from kemba.plant.execution.counterpart import another_robot, counterpart
+from kemba.plant.execution.replay import ends_standing
+from kemba.plant.execution.retiming import retimed
+from kemba.report.drawing import Drawer
+from kemba.report.verdict import verdicts
+from kemba.runs import RunFolder
+from kemba.stopwatch import Tell
+from kemba.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from kemba.sweep.scenarios.share import Share
+
+    # a plan; where it was executed in scenarios, with its table and its share of successes
+    Candidate = tuple[Plan, Trajectory | None, Share | None]
+
+
+@dataclass(frozen=True)
+class Motions:
+    """What is written beside the plan: the controller's table, and the motion of the plant."""
+
+    table: Trajectory | None = None
+    plant: Trajectory | None = None
+
+
+@dataclass(frozen=True)
+class Executed:
+    """A plan, its entries in the JSON with those of its executions, and what is written."""
+
+    plan: Plan
+    result: dict[str, Any]
+    motions: Motions
+
+    @property
+    def good(self) -> bool:
+        """Whether it is solved and its executions confirm it."""
+        return bool(self.result["good"])
+
+    @property
+    def rank(self) -> tuple[bool, bool, float]:
+        """Better ones are greater: good, a plan at all, by cost."""
+        found = self.plan
+        cost = objective(found.model, found.task, found.requirements, found.trajectory)
+        return self.good, found.status.plan, -cost
+
+
+def executed(
+    found: Plan,
+    table: Trajectory | None,
+    share: Share | None,
+    replay: bool,
+    tell: Tell,
+    folder: RunFolder,
+    drawing: Drawer,
+) -> Executed:
+    """A plan with its table and, if `replay`, its executions; meanwhile its figure is drawn."""
+    result = answer(found, str(folder.path))
+    if table is None and found.attempts:
+        table = controller_table(found.model, found.trajectory, found.task.hold)
+    if table is not None:
+        drawing.begin(found.trajectory, folder.path)
+    plant: Trajectory | None = None
+    if replay and table is not None and found.status.plan:
+        tell("replay: the times of controller.csv")
+        if share is None:
+            table = retimed(found.model, found.trajectory, table)
+        replayed, plant = _replayed(found, table, tell)
+        result |= replayed
+        if share is not None:
+            result |= {"robust": share.summary()}
+            result["sentence"] += f"; {share.sentence}"
+    return Executed(found, result, Motions(table, plant))
+
+
+def _replayed(
+    found: Plan, table: Trajectory, tell: Tell
+) -> tuple[dict[str, Any], Trajectory | None]:
+    """The executions of a plan with the verdict, and the motion of the plant.
+
+    The plan stays solved only if all executions come near enough.
+    """
+    task = found.task
+    try:
+        plant = counterpart(task.model, task.payload, task.supply, task.plant, changes=task.effects)
+        other = another_robot(task.model, task.plant)
+        done = executions(found.model, found.trajectory, table, plant, tell)
+    except KembaError as error:  # a model that the simulator cannot execute still has its plan
+        return _unconfirmed(found, f"it cannot be simulated: {error}"), None
+    executed = summaries(found.model, done)
+    there = done["plant_replay"]
+    motion = plant_run(there) if there else None
+    lands = bool(ends_standing(found.model, found.trajectory))
+    names = [f"the plant is another robot, {other}, which {task.plant} names"] if other else []
+    judged = verdicts(executed, task.tolerances, lands).values()
+    if all(verdict.good for verdict in judged):
+        parts = [sentence_of(found), *names, *(verdict.sentence for verdict in judged)]
+        return {**executed, "sentence": "; ".join(parts)}, motion
+    causes = [verdict.sentence for verdict in judged if not verdict.good]
+    matches = [verdict.sentence for verdict in judged if verdict.good]
+    return {**executed, **_unconfirmed(found, " and ".join(causes), [*names, *matches])}, motion
+
+
+def _unconfirmed(found: Plan, cause: str, remarks: Sequence[str] = ()) -> dict[str, Any]:
+    """Status and sentence of a plan that its executions do not confirm: it is not solved, even
+    where it fulfils its own equations."""
+    if found.status is Status.SOLVED:
+        what = found.sentence.removeprefix("solved: ")
+        parts = [f"FAILED: a plan was found, but {cause}", *remarks, f"the plan: {what}"]
+    else:
+        parts = [sentence_of(found), cause, *remarks]
+    return {"status": Status.ACCEPTABLE, "good": False, "sentence": "; ".join(parts)}

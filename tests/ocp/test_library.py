@@ -1,0 +1,120 @@
+"""Shipped plans: which are near a task, what is kept of them, and plans that begin from them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from kemba.config import shipped_folder
+from kemba.ocp import load_task, task_model
+from kemba.ocp.continuation.renoded import renoded
+from kemba.ocp.library.entry import read_plan, write_plan
+from kemba.ocp.library.kind import kind_of
+from kemba.ocp.library.shelf import Near, Neighbour, neighbours, shelf
+from kemba.ocp.phases.modes import Phase
+from kemba.ocp.phases.notes import noted_phases
+from kemba.ocp.transcription.symmetry import find_symmetry
+from kemba.ocp.transcription.unilateral import read_constraints
+from kemba.trajectory import Trajectory
+from kemba_cli.main import app
+
+SHELF = shipped_folder("library")
+STALE = "made for another robot or task: python benchmarks/library.py"
+
+
+def near(name: str, *options: str) -> list[Neighbour]:
+    task, document = load_task(name, list(options))
+    return neighbours(task, task_model(task, document=document))
+
+
+def test_the_shelf_is_small_and_fits_what_is_shipped() -> None:
+    listed = shelf(SHELF)
+    assert {e.file for e in listed} == set(SHELF.glob("*.npz"))
+    assert sum(path.stat().st_size for path in SHELF.iterdir()) < 2e6
+    tasks = [load_task(name)[0] for name in ("jump", "jump_forward")]
+    kinds = {kind_of(task, task_model(task)) for task in tasks}
+    assert {e.kind for e in listed} == kinds, STALE
+    assert all(e.cost > 0.0 and e.of >= 1 for e in listed)
+
+
+@pytest.mark.parametrize("entry", shelf(SHELF), ids=lambda e: e.name)
+def test_shipped_plans_can_be_read(entry: object) -> None:
+    plan = entry.plan  # type: ignore[attr-defined]
+    model = task_model(load_task("jump")[0])
+    half = find_symmetry(model)
+    labels = plan.meta["phase_constraints"]
+    assert half is not None and len(plan) == 101
+    if len(labels) == len(read_constraints(model, half)):
+        phases = noted_phases(plan.meta, read_constraints(model, half), 2, 100)
+        assert phases is not None and any(p.first == 50 for p in phases)
+    assert set(np.unique(plan["front/valve/extend"])) <= {0.0, 1.0}
+    assert np.all(np.diff(plan.time) > 0.0)
+
+
+def test_near_tasks_have_neighbours() -> None:
+    found = near("jump.yaml", "height=0.51 m", "supply=0.68 MPa", "nodes=60", "hold=0 s")
+    assert found and found[0].away == max(
+        abs(0.51 - found[0].entry.figures["height"]) / Near.current().height,
+        0.02e6 / Near.current().supply,
+    )
+    assert [n.away for n in found] == sorted(n.away for n in found)
+    assert near("jump_forward.yaml", "distance=0.32 m")
+
+
+@pytest.mark.parametrize(
+    "option",
+    [
+        "height=1.2 m", "payload=3 kg", "seed=1", "guess_noise=0.1", "refine=none",
+        "method=penalty", "cost.air=0.1", "clearance=1 cm", "bounds.body/pitch={at_most: 5 deg}",
+        "effects.contact.mu=0.5",
+    ],
+)  # fmt: skip
+def test_other_tasks_have_none(option: str) -> None:
+    assert not near("jump.yaml", option)
+
+
+def test_other_robots_have_none() -> None:
+    assert not near("jump.yaml", "model=hound")
+
+
+def test_what_is_kept_of_a_plan(tmp_path: Path) -> None:
+    entry = shelf(SHELF)[0]
+    model = task_model(load_task("jump")[0])
+    write_plan(tmp_path / "again.npz", entry.plan, model)
+    assert (tmp_path / "again.npz").read_bytes() == entry.file.read_bytes()
+    assert read_plan(tmp_path / "again.npz").meta == entry.plan.meta
+
+
+def test_nodes_are_shared_by_how_long_phases_last() -> None:
+    time = np.array([0.0, 0.1, 0.2, 0.3, 0.6, 0.9, 1.0])
+    plan = Trajectory(time, {"body/z [m]": time, "body/vz [m.s-1]": [0, 0, 0, 0, 1, 1, 2]})
+    phases = [Phase(0, 3, (1,), ()), Phase(3, 5, (0,), ()), Phase(5, 6, (1,), ())]
+    made = renoded(plan, phases, 10, [0.0])
+    assert made is not None
+    found, shared = made
+    assert [(p.first, p.last) for p in shared] == [(0, 3), (3, 9), (9, 10)]
+    assert np.allclose(found["body/z"], found.time) and np.allclose(np.diff(found.time), 0.1)
+    assert list(found["body/vz"]) == [0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 2], "jumps stay jumps"
+    marked = renoded(plan, phases, 10, [0.5])
+    assert marked is not None and [p.first for p in marked[1]] == [0, 5, 9]
+    assert renoded(plan, phases, 2, []) is None, "a phase without an interval"
+    assert renoded(plan, phases, 10, [0.25]) is None, "nothing ends there"
+
+
+def test_a_near_task_begins_from_a_shipped_plan(tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    words = ["solve", "jump.yaml", "--set", "height=0.51 m", "--set", "nodes=80"]
+    done = CliRunner().invoke(app, [*words, "--no-figure", "--json", "--out", str(run)])
+    answer = json.loads(done.stdout)
+    assert done.exit_code == 0, answer["sentence"]
+    start = answer["start"]
+    assert start.startswith("library: ") and start.removeprefix("library: ") in answer["sentence"]
+    assert answer["best_known"]["plan"] in start and answer["best_known"]["cost"] > 0.0
+    assert json.loads((run / "manifest.json").read_text())["start"] == start
+    assert answer["iterations"] < 150
+    rows = (run / "trajectory.csv").read_text().splitlines()
+    assert len(rows) == 82
