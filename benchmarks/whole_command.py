@@ -27,11 +27,10 @@ TASKS = ("jump.yaml", "jump_forward.yaml")
 STAGES = {
     "plan": ("kemba.report.solving", "plan"),
     "refinement": ("kemba.ocp.refined", "on_phases"),
-    "derivatives": ("kemba.report.solving", "sensitivity_of"),
     "table": ("kemba.report.solving", "retimed"),
     "replays": ("kemba.report.solving", "_replayed"),
     "files": ("kemba.report.solving", "_write"),
-    "figure": ("kemba.report.solving", "_figure"),
+    "figure": ("kemba.report.drawing", "draw_plan"),
 }
 
 
@@ -75,8 +74,8 @@ def staged(arguments: list[str]) -> None:
 
     clock = Clock()
     for name, (module, function) in STAGES.items():
-        found = importlib.import_module(module)
-        if hasattr(found, function):
+        with contextlib.suppress(ModuleNotFoundError, AttributeError):  # an older kemba
+            found = importlib.import_module(module)
             setattr(found, function, clock.timed(name, getattr(found, function)))
     with contextlib.suppress(SystemExit):
         app(arguments, standalone_mode=False)

@@ -27,6 +27,46 @@ Errors of `discover` are held-out and whitened: 1 is what the most flexible mode
 leaves. Errors of `characterise` are in units of the noise of the sensors.
 """
 
+CHANGED = """## What was changed after a look at these data
+
+Rules of the program that were changed once these data had been seen. So these data do not judge
+them; data that nobody has looked at would.
+
+| rule | before | now | seen in |
+|---|---|---|---|"""
+RULES = (
+    (
+        "usual friction of a seal (`RigSizeSettings.seal`, at a bore of 25 mm)",
+        *("10 N", "5 N", "cylinder"),
+    ),
+    (
+        "friction just after a turn, where a seal stretches or the filter mixes both directions",
+        *("judged like all rows", "in doubt", "cylinder"),
+    ),
+    (
+        "delays of sensors as candidates",
+        *("on every rig", "not on cylinders that are slow", "cylinder"),
+    ),
+    ("heat transfer at the wall", "one constant h", "free convection (McAdams)", "vessel"),
+    (
+        "noise of the vessel's sensors, where the log states none",
+        *("0.5 % of the range", "1 %, and at least 0.5 K", "vessel"),
+    ),
+    (
+        "size of a delay of the vessel's sensors",
+        *("that of other rigs", "2 % of the log's length", "vessel"),
+    ),
+    (
+        "blocks from which the intervals of `characterise` come",
+        *("12 of time", "12, 24 and 48, of time and of the way", "drive (M)"),
+    ),
+)
+CHECKED = """
+The last one was checked on drives that were simulated. With coloured noise alone, 31 of 32
+intervals hold the truth, before and after. With cogging that every repeat of the motion repeats, 8
+of 32 did with blocks of time alone, and 32 do now.
+"""
+
 
 def main() -> None:
     """Write the page from what is there."""
@@ -40,6 +80,7 @@ def main() -> None:
                 lines += part.section(Path(folder), download)
             except Absent as missing:
                 raise SystemExit(f"{missing}; the page stays as it is") from None
+    lines += [CHANGED, *(f"| {' | '.join(rule)} |" for rule in RULES), CHECKED]
     PAGE.write_text("\n".join(lines).rstrip() + "\n", encoding="utf-8")
     print(PAGE)
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kemba.plant.execution.replay import LandingSettings
 from kemba.plotting.robot.machine import Machine
 from kemba.settings import Settings, setting
 from kemba.trajectory import Array, Trajectory
@@ -20,9 +21,6 @@ class FlightSettings(Settings):
     )  # fmt: skip
     down: float = setting(
         3e-3, "m", "a lower foot stands", "derived: ten times the noise of the body's height"
-    )
-    upright: float = setting(
-        0.35, "rad", "a landing with more pitch failed", "convention: as in replays"
     )
 
 
@@ -49,7 +47,7 @@ def flight_of(motion: Trajectory, machine: Machine) -> Flight:
     touchdown = _touchdown(clock, _lowest_foot(motion, machine), apex_time, settings.down)
     last = float(pitch[np.isfinite(pitch)][-1])
     at = float(np.interp(touchdown, clock, pitch)) if np.isfinite(touchdown) else np.nan
-    return Flight(apex, apex_time, touchdown, at, abs(last) <= settings.upright)
+    return Flight(apex, apex_time, touchdown, at, abs(last) <= LandingSettings.current().upright)
 
 
 def _peak(time: Array, z: Array, around: float) -> tuple[float, float]:

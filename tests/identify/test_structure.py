@@ -9,15 +9,18 @@ import pytest
 
 pytest.importorskip("numba")
 
-from robot_logs import hop
+from robot_logs import hop, hops, plant_hops
 from twin import figures, measure, run
 
 from kemba.effects.pneumatics.orifice import OrificeChamber
 from kemba.identify.adopt import write_model
+from kemba.identify.answer import Answer, Ranked, Value
 from kemba.identify.discover import discover
+from kemba.identify.logs.reading import read_logs
 from kemba.identify.problem.candidates import by_default
 from kemba.identify.problem.structure import ORIFICE, structure_candidates
 from kemba.identify.robot.problem import robot_problem
+from kemba.identify.stages import joined
 from kemba.model import Model, load_model
 from kemba.model.spec import load_spec
 from kemba.trajectory import Trajectory
@@ -68,6 +71,65 @@ def test_the_model_that_is_written_has_the_figures(tmp_path: Path) -> None:
     usual = OrificeChamber().gauge
     assert chamber.value("gauge") == pytest.approx([1.02 * g for g in usual], rel=1e-5)
     assert "chamber" not in [i.effect.kind for i in model.instances]
+
+
+@pytest.mark.slow
+def test_the_problem_is_built_anew_with_its_figures_free() -> None:
+    logs, _ = hops(runs=1)
+    problem = robot_problem(logs, PLANNING)
+    assert problem.structures == {ORIFICE}
+    found = {f"{ORIFICE}.{k}": v for k, v in {**FIGURES, "a": 0.9, "level": 1.02}.items()}
+    anew = problem.rebuilt(found)
+    assert set(anew.own_figures.values()) == {*FIGURES, "level"}
+    assert anew.structures == frozenset() and "supply_scale" not in anew.candidates
+    for name, own in anew.own_figures.items():
+        assert anew.nuisance[name][0] == pytest.approx(found[f"{ORIFICE}.{own}"])
+        assert np.linalg.norm(anew.jacobian({}, [name])) > 1.0
+    # where a linear estimate points to a negative area, there is still a prediction
+    assert np.isfinite(anew.residual({"orifice_chamber.a_fill": -1e-6})).all()
+
+
+def second(verdict: str, after: float) -> Answer:
+    """An answer of the second search, which found friction."""
+    value = {"F_c": Value(5.0, 4.0, 6.0, "N")}
+    friction = Ranked("seal_friction", 1.0, value, (), 2.0, after)
+    ladder = [("model as it is", 2.0), ("seal_friction", after)]
+    named = () if verdict == "unknown" else ("seal_friction",)
+    return Answer(
+        verdict, 0.1, "", [friction], named, 2.0, after, found=named, ladder=ladder, rest="rods"
+    )
+
+
+@pytest.mark.parametrize(
+    ("verdict", "after", "said"),
+    [
+        ("missing", 1.1, "missing"),
+        ("partly", 1.8, "partly"),
+        ("unknown", 1.8, "partly"),
+        ("unknown", 4.5, "unknown"),
+    ],
+)
+def test_two_stages_are_one_answer(verdict: str, after: float, said: str) -> None:
+    row = Ranked(ORIFICE, 1.0, {"n": Value(1.3, 1.2, 1.4, "1")}, (), 5.0, 2.0)
+    whole = joined(row, 0.002, second(verdict, after), None, ("seal_friction",))  # type: ignore[arg-type]
+    assert whole.verdict == said
+    assert [error for _, error in whole.ladder] == [5.0, 2.0, after]
+    assert whole.error_before == 5.0 and whole.p_value_nothing == 0.002
+    if said != "unknown":
+        assert whole.found == (ORIFICE, "seal_friction")
+        assert ORIFICE in whole.sentence
+
+
+@pytest.mark.nightly
+def test_the_full_plant_is_explained_by_a_model_that_one_recognises(tmp_path: Path) -> None:
+    """Our own plant, whose chambers, supply line, valves, friction, leak and cushion the planning
+    model lacks, on hops; judged on a hop that was not fitted."""
+    *two, last = plant_hops(tmp_path, 3)
+    fitted, held = (robot_problem(read_logs(paths), PLANNING) for paths in (two, [last]))
+    answer = discover(fitted, held).answer
+    assert ORIFICE in answer.added, answer.sentence
+    assert answer.verdict in ("missing", "partly")
+    assert answer.error_after <= 1.5 < 2.0 < answer.error_before
 
 
 @pytest.mark.nightly

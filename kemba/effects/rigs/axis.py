@@ -8,6 +8,7 @@ import casadi as ca
 
 from kemba.effects.base import At, Contribution, Effect
 from kemba.effects.mechanics.hip import MotorLag, TorqueScale
+from kemba.effects.rigs.on_axis import AxisEffect
 from kemba.quantity import Param, Quantity, Tolerance
 
 PLATE = Tolerance(0.05, source="assumed: an inertia from data sheets and drawings, 5 %")
@@ -46,18 +47,15 @@ class DriveAxis(Effect):
         return Contribution(effort={"axis": at.tau - carried}, publish={"carried": carried})
 
 
-class ExtraInertia(Effect):
+class ExtraInertia(AxisEffect):
     """Inertia that the rig's figure leaves out: rotor, gear, screw."""
 
     kind: Literal["extra_inertia"] = "extra_inertia"
     J: Annotated[float, Param("kg", 1.0, doc="inertia at the axis", rotary="kg.m2")] = 0.0
 
-    family: ClassVar[str] = "drive"
     equation: ClassVar[str] = "-J a"
     source: ClassVar[str] = "rotor inertia times the gear ratio squared"
-    ports: ClassVar[tuple[str, ...]] = ("axis",)
     off: ClassVar[dict[str, float]] = {"J": 0.0}
-    own_rigs: ClassVar[bool] = True
 
     def evaluate(self, at: At) -> Contribution:
         return Contribution(effort={"axis": -self.J * at.axis.a})
@@ -86,26 +84,23 @@ class AxisLag(MotorLag):
         return {"tau_a": Quantity("axis/tau_a", "N", -1e6, 1e6, 10.0, doc="what acts on the axis")}
 
 
-class AxisOffset(Effect):
+class AxisOffset(AxisEffect):
     """A constant force or torque: a zero that is off, a slope, a drift of the amplifier."""
 
     kind: Literal["axis_offset"] = "axis_offset"
     F_0: Annotated[float, Param("N", 5.0, doc="force", rotary="N.m")] = 0.0
 
-    family: ClassVar[str] = "drive"
     equation: ClassVar[str] = "F_0"
     source: ClassVar[str] = (
         "A. Janot, M. Gautier, M. Brunot, EMPS benchmark, 2019 (offset of the drive chain)"
     )
-    ports: ClassVar[tuple[str, ...]] = ("axis",)
     off: ClassVar[dict[str, float]] = {"F_0": 0.0}
-    own_rigs: ClassVar[bool] = True
 
     def evaluate(self, at: At) -> Contribution:
         return Contribution(effort={"axis": self.F_0})
 
 
-class Cogging(Effect):
+class Cogging(AxisEffect):
     """Force that repeats with the position: magnets against slots, a screw that is not true."""
 
     kind: Literal["cogging"] = "cogging"
@@ -115,14 +110,11 @@ class Cogging(Effect):
     ] = 0.02
     phase: Annotated[float, Param("1", 1.0, lower=1e-3, upper=6.29, doc="angle at q = 0")] = 1.0
 
-    family: ClassVar[str] = "drive"
     equation: ClassVar[str] = "F_g sin(2 pi q/period + phase)"
     source: ClassVar[str] = (
         "J. R. Hendershot, T. J. E. Miller, Design of Brushless Permanent-Magnet Motors"
     )
-    ports: ClassVar[tuple[str, ...]] = ("axis",)
     off: ClassVar[dict[str, float]] = {"F_g": 0.0}
-    own_rigs: ClassVar[bool] = True
 
     def evaluate(self, at: At) -> Contribution:
         angle = 2 * ca.pi * at.axis.x / self.period + self.phase

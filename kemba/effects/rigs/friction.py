@@ -6,32 +6,30 @@ from typing import Annotated, ClassVar, Literal
 
 import casadi as ca
 
-from kemba.effects.base import At, Contribution, Effect
+from kemba.effects.base import At, Contribution
 from kemba.effects.mechanics.laws import coulomb, dahl_rate, fading, one_way, viscous
+from kemba.effects.rigs.on_axis import AxisEffect
 from kemba.quantity import Param, Quantity
 
 SURVEY = "B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, Automatica 30 (1994)"
 
 
-class AxisFriction(Effect):
+class AxisFriction(AxisEffect):
     """Coulomb friction of bearings, screw and guides."""
 
     kind: Literal["axis_friction"] = "axis_friction"
     F_c: Annotated[float, Param("N", 10.0, lower=0.0, doc="Coulomb force", rotary="N.m")] = 0.0
 
-    family: ClassVar[str] = "drive"
     equation: ClassVar[str] = "-F_c tanh(v/sign_speed)"
     source: ClassVar[str] = SURVEY
-    ports: ClassVar[tuple[str, ...]] = ("axis",)
     off: ClassVar[dict[str, float]] = {"F_c": 0.0}
     dissipative: ClassVar[bool] = True
-    own_rigs: ClassVar[bool] = True
 
     def evaluate(self, at: At) -> Contribution:
         return Contribution(effort={"axis": coulomb(self.F_c, at.axis.v, at.sign_speed)})
 
 
-class AxisDamping(Effect):
+class AxisDamping(AxisEffect):
     """Viscous friction: grease, and currents that the motion induces."""
 
     kind: Literal["axis_damping"] = "axis_damping"
@@ -39,19 +37,16 @@ class AxisDamping(Effect):
         float, Param("N.s.m-1", 50.0, lower=0.0, doc="damping", rotary="N.m.s.rad-1")
     ] = 0.0
 
-    family: ClassVar[str] = "drive"
     equation: ClassVar[str] = "-F_v v"
     source: ClassVar[str] = SURVEY
-    ports: ClassVar[tuple[str, ...]] = ("axis",)
     off: ClassVar[dict[str, float]] = {"F_v": 0.0}
     dissipative: ClassVar[bool] = True
-    own_rigs: ClassVar[bool] = True
 
     def evaluate(self, at: At) -> Contribution:
         return Contribution(effort={"axis": viscous(self.F_v, at.axis.v)})
 
 
-class AxisDirection(Effect):
+class AxisDirection(AxisEffect):
     """Viscous friction that differs by direction: by d more forward, by d less back."""
 
     kind: Literal["axis_direction"] = "axis_direction"
@@ -59,20 +54,17 @@ class AxisDirection(Effect):
         0.0
     )
 
-    family: ClassVar[str] = "drive"
     equation: ClassVar[str] = "-d abs(v)"
     source: ClassVar[str] = (
         "A. Janot, M. Gautier, M. Brunot, EMPS benchmark, 2019 (asymmetric friction)"
     )
-    ports: ClassVar[tuple[str, ...]] = ("axis",)
     off: ClassVar[dict[str, float]] = {"d": 0.0}
-    own_rigs: ClassVar[bool] = True
 
     def evaluate(self, at: At) -> Contribution:
         return Contribution(effort={"axis": -self.d * ca.fabs(at.axis.v)})
 
 
-class AxisOneWay(Effect):
+class AxisOneWay(AxisEffect):
     """Coulomb friction that differs by direction: by F_d more forward, by F_d less back.
 
     While the axis moves it looks like `axis_offset`; only at rest do the two differ.
@@ -81,18 +73,15 @@ class AxisOneWay(Effect):
     kind: Literal["axis_one_way"] = "axis_one_way"
     F_d: Annotated[float, Param("N", 5.0, doc="half the difference", rotary="N.m")] = 0.0
 
-    family: ClassVar[str] = "drive"
     equation: ClassVar[str] = "-F_d tanh(v/sign_speed)^2"
     source: ClassVar[str] = SURVEY
-    ports: ClassVar[tuple[str, ...]] = ("axis",)
     off: ClassVar[dict[str, float]] = {"F_d": 0.0}
-    own_rigs: ClassVar[bool] = True
 
     def evaluate(self, at: At) -> Contribution:
         return Contribution(effort={"axis": one_way(self.F_d, at.axis.v, at.sign_speed)})
 
 
-class AxisStribeck(Effect):
+class AxisStribeck(AxisEffect):
     """Extra friction near standstill that fades as lubricant is drawn in."""
 
     kind: Literal["axis_stribeck"] = "axis_stribeck"
@@ -103,41 +92,35 @@ class AxisStribeck(Effect):
         float, Param("m.s-1", 0.02, lower=1e-5, doc="rate at which it fades", rotary="rad.s-1")
     ] = 0.02
 
-    family: ClassVar[str] = "drive"
     equation: ClassVar[str] = "-F_s exp(-(v/v_b)^2) tanh(v/sign_speed)"
     source: ClassVar[str] = SURVEY
-    ports: ClassVar[tuple[str, ...]] = ("axis",)
     off: ClassVar[dict[str, float]] = {"F_s": 0.0}
     dissipative: ClassVar[bool] = True
-    own_rigs: ClassVar[bool] = True
 
     def evaluate(self, at: At) -> Contribution:
         extra = self.F_s * fading(at.axis.v, self.v_b)
         return Contribution(effort={"axis": coulomb(extra, at.axis.v, at.sign_speed)})
 
 
-class GearFriction(Effect):
+class GearFriction(AxisEffect):
     """Friction of gear teeth, which the force of inertia and load presses together."""
 
     kind: Literal["gear_friction"] = "gear_friction"
     mu: Annotated[float, Param("1", 0.1, lower=0.0, upper=1.0, doc="share of the force")] = 0.0
 
-    family: ClassVar[str] = "drive"
     equation: ClassVar[str] = "-mu abs(J a + load) tanh(v/sign_speed)"
     source: ClassVar[str] = (
         "load-dependent friction of gears: M. Gautier, A. Jubien, A. Janot, ICRA 2012"
     )
-    ports: ClassVar[tuple[str, ...]] = ("axis",)
     off: ClassVar[dict[str, float]] = {"mu": 0.0}
     dissipative: ClassVar[bool] = True
-    own_rigs: ClassVar[bool] = True
 
     def evaluate(self, at: At) -> Contribution:
         pressed = self.mu * ca.fabs(at.carried)
         return Contribution(effort={"axis": coulomb(pressed, at.axis.v, at.sign_speed)})
 
 
-class Presliding(Effect):
+class Presliding(AxisEffect):
     """Contacts that stretch before they slide; z is the stretch, 1 when sliding (Dahl's law).
 
     With a short travel it is Coulomb friction.
@@ -149,12 +132,9 @@ class Presliding(Effect):
         float, Param("m", 1e-4, lower=1e-7, doc="travel until it slides", rotary="rad")
     ] = 2e-4
 
-    family: ClassVar[str] = "drive"
     equation: ClassVar[str] = "-F_p z, travel dz/dt = v - abs(v) z"
     source: ClassVar[str] = "P. R. Dahl, A solid friction model, Aerospace Corporation, 1968"
-    ports: ClassVar[tuple[str, ...]] = ("axis",)
     off: ClassVar[dict[str, float]] = {"F_p": 0.0}
-    own_rigs: ClassVar[bool] = True
     mirror: ClassVar[dict[str, str]] = {"z": "-z"}
 
     def states(self) -> dict[str, Quantity]:

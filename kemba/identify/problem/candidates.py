@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from kemba.effects import BY_KIND
 from kemba.effects.base import Effect
 from kemba.effects.mechanics.geometry import SIZES, Geometry
-from kemba.identify.problem.problem import Candidate, Parameter
+from kemba.identify.problem.problem import Candidate, Parameter, Theta
 from kemba.identify.problem.sensor_faults import possible_faults
 from kemba.identify.problem.structure import ORIFICE, OrificeShare
 from kemba.model.model import Model
@@ -55,6 +55,15 @@ def by_default(name: str) -> Effect:
     kind, _, place = name.partition(":")
     where = {where_field(kind): place} if place else {}
     return BY_KIND[kind].model_validate({"kind": kind, **where})
+
+
+def switched_on(candidates: Mapping[str, Candidate], theta: Theta) -> tuple[str, ...]:
+    """Names of the candidates, sensors left out, that theta switches on."""
+    return tuple(
+        name
+        for name, c in sorted(candidates.items())
+        if not c.sensor and theta.get(c.key, c.lead.off) != c.lead.off
+    )
 
 
 def where_field(kind: str) -> str:

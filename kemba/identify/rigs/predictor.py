@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from kemba.effects.series import Series
-from kemba.identify.problem.candidates import by_default
+from kemba.identify.problem.candidates import by_default, switched_on
 from kemba.identify.problem.nominal import nominal_figures
 from kemba.identify.problem.sensor_faults import SensorFaults, is_fault
 from kemba.identify.problem.types import Array, Candidate, Theta
@@ -53,11 +53,7 @@ class Predictor:
 
     def balance(self, theta: Theta) -> Balance:
         """The balance with the effects on its list that theta switches on."""
-        active = tuple(
-            name
-            for name, c in sorted(self.candidates.items())
-            if not c.sensor and theta.get(c.key, c.lead.off) != c.lead.off
-        )
+        active = switched_on(self.candidates, theta)
         if active not in self._known:
             model = self.model.with_effects(by_default(name) for name in active)
             keys = (key for name in active for key in tuple(self.candidates[name].keys()))

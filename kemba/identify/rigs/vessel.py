@@ -9,7 +9,7 @@ import numpy as np
 
 from kemba.effects.series import Series
 from kemba.identify.evidence.refit import RefitSettings
-from kemba.identify.problem.candidates import by_default, sensor_candidates
+from kemba.identify.problem.candidates import by_default, sensor_candidates, switched_on
 from kemba.identify.problem.nominal import nominal_figures
 from kemba.identify.problem.problem import Problem
 from kemba.identify.problem.sensor_faults import SensorFaults
@@ -159,11 +159,7 @@ class VesselProblem(Problem):
         return range(len(self.logs)) if runs is None else runs
 
     def _blow_down(self, theta: Theta) -> BlowDown:
-        active = tuple(
-            name
-            for name, c in sorted(self.candidates.items())
-            if not c.sensor and theta.get(c.key, c.lead.off) != c.lead.off
-        )
+        active = switched_on(self.candidates, theta)
         if active not in self._known:
             model = self.model.with_effects(by_default(name) for name in active)
             keys = [key for name in active for key in tuple(self.candidates[name].keys())]
