@@ -98,6 +98,8 @@ CONSTANTS = {  # file -> names, why
     "config/document.py": ("WIDE", "length of messages"),
     "config/names.py": ("LONGEST NAME", "longest name"),
     "config/scalars.py": ("LONGEST_NUMBER", "longest text that is read"),
+    "identify/design/courses.py": ("STEEPEST", "the shape of a cubic"),
+    "identify/design/robot.py": ("STANDARD", "the motion that others are compared with"),
     "config/writer.py": ("WIDTH", "width of lines"),
     "errors.py": ("LISTED", "length of messages"),
     "folders.py": ("PROBE MANY", "free space that a run takes; length of messages"),

@@ -77,7 +77,7 @@ def _of_structures(search: Search, best: Hypothesis, holdout: Problem | None) ->
     explain left-out data better."""
     if search.structure(best):
         anew = _built_anew(search, best, holdout)
-        if anew.answer.error_after <= VerdictSettings.current().whole:
+        if anew.answer.verdict == "missing":
             return anew
         search.say("trying the model without another structure")
         plain = Search(_without(search.problem), search.deadline, search.say)
@@ -87,7 +87,10 @@ def _of_structures(search: Search, best: Hypothesis, holdout: Problem | None) ->
         if not search.problem.structures & set(other.best):
             return other
         anew = _built_anew(search, other.best, holdout)
-    return anew if anew.answer.error_after <= other.answer.error_after else other
+    # one noise for both, or the model that takes more of its error for noise would look better
+    judge = (holdout or other.search.problem).heard_as(anew.search.problem)
+    left = error_ratio(judge, other.search.points[other.best].fit.theta)
+    return anew if anew.answer.error_after <= left else other
 
 
 def _without(problem: Problem) -> Problem:
@@ -114,6 +117,7 @@ def _built_anew(search: Search, best: Hypothesis, holdout: Problem | None) -> Di
     gain = max(singles) - search.points[NULL].log_evidence
     answer = joined(row, null_test(search).p_value(gain), found.answer, second, found.best)
     first_error = search.points[NULL].fitted_error
+    search.say(f"built anew, the error is {answer.error_after:.2f} times the noise")
     return Discovery(answer, second, found.best, found.holdout, (first_error,))
 
 

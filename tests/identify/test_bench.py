@@ -16,7 +16,7 @@ from kemba.identify.adopt import adopt_effect
 from kemba.identify.bench.motion import SmoothedMotion
 from kemba.identify.bench.problem import bench_problem
 from kemba.identify.bench.rig_model import RigModel
-from kemba.identify.design.settings import ExperimentSettings, SearchSettings
+from kemba.identify.design.settings import DesignSearchSettings, ExperimentSettings
 from kemba.identify.experiment import propose
 from kemba.identify.published import published
 from kemba.identify.workflow import discover_logs
@@ -143,7 +143,10 @@ def test_from_logs_to_a_model_and_the_next_test(bench_log: BenchLog, tmp_path: P
 
     other = written["ranking"][1]["effect"]
     assert adopt_effect(out, other, tmp_path / "other.yaml").is_file()
-    with changed(SearchSettings, members=5, generations=0), changed(ExperimentSettings, tests=1):
+    with (
+        changed(DesignSearchSettings, members=5, generations=0),
+        changed(ExperimentSettings, tests=1),
+    ):
         proposal = propose(out, tmp_path / "next.yaml")
     assert proposal.nats > 0 and (tmp_path / "next.yaml").is_file()
 

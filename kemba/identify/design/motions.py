@@ -16,9 +16,8 @@ import numpy as np
 from kemba.identify.design.settings import SwaySettings
 from kemba.identify.problem.problem import Array
 from kemba.model.model import Model
+from kemba.plant.execution.controller import PERIOD
 from kemba.trajectory import Trajectory
-
-RATE = 1000.0  # Hz, rows of a controller's table
 
 
 @dataclass(frozen=True)
@@ -56,7 +55,7 @@ class Sway:
 def controller(model: Model, sway: Sway) -> Trajectory:
     """The controller's table that sways a robot from its standing pose by its hip gains alone."""
     settle = SwaySettings.current().hold
-    times = np.arange(round((settle + sway.duration) * RATE) + 1) / RATE - settle
+    times = np.arange(round((settle + sway.duration) / PERIOD) + 1) * PERIOD - settle
     angle, rate = sway.lean(np.clip(times, 0.0, None))
     columns: dict[str, Array] = {}
     for leg in model.mechanism.legs:

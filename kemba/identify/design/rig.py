@@ -13,7 +13,11 @@ from kemba.identify.design.menu import Judged, judged_menu
 from kemba.identify.design.rivals import Rivals
 from kemba.identify.design.search import best_point
 from kemba.identify.design.separation import Separation, separation
-from kemba.identify.design.settings import CourseSettings, ExperimentSettings, SearchSettings
+from kemba.identify.design.settings import (
+    DesignSearchSettings,
+    ExperimentSettings,
+    RigCourseSettings,
+)
 from kemba.identify.design.virtual import VirtualBench, as_predicted, log_time
 from kemba.identify.problem.problem import Array
 from kemba.model.model import Model
@@ -49,7 +53,7 @@ def design_rig_test(
     """
     bench, settings = (
         VirtualBench(model, ExperimentSettings.current().rows),
-        CourseSettings.current(),
+        RigCourseSettings.current(),
     )
     coarse = VirtualBench(model, ExperimentSettings.current().coarse)
     say("judging the standard tests")
@@ -64,7 +68,7 @@ def design_rig_test(
         found = separation(coarse.problem(course(point, duration, bench.stroke)), rivals)
         return found.worth if found is not None else 0.0
 
-    search = SearchSettings.current()
+    search = DesignSearchSettings.current()
     say(f"designing a test of {duration:.1f} s")
     best = best_point(worth, beginnings(search.members, search.seed), say, bounded)
     rig = course(best.point, duration, bench.stroke)

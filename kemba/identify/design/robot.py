@@ -14,7 +14,7 @@ from kemba.errors import KembaError
 from kemba.identify.design.motions import Sway, controller
 from kemba.identify.design.rivals import Rivals
 from kemba.identify.design.separation import Separation, separation
-from kemba.identify.design.settings import SearchSettings, SwaySettings
+from kemba.identify.design.settings import DesignSearchSettings, SwaySettings
 from kemba.identify.problem.problem import Array
 from kemba.identify.robot.problem import robot_problem
 from kemba.model.model import Model
@@ -67,7 +67,7 @@ def design_motion(
     """
     if len(model.mechanism.legs) < 2:
         raise KembaError(model.name, "stands on one leg; no safe motion is known for it")
-    settings, search = SwaySettings.current(), SearchSettings.current()
+    settings, search = SwaySettings.current(), DesignSearchSettings.current()
     started, count = time.monotonic(), 0
     found: list[Tried] = []
     standard: Tried | None = None

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kemba.identify.design.settings import SearchSettings
+from kemba.identify.design.settings import DesignSearchSettings
 from kemba.identify.problem.problem import Array
 
 
@@ -34,7 +34,7 @@ def best_point(
     """
     from scipy.optimize import differential_evolution
 
-    settings, started = SearchSettings.current(), time.monotonic()
+    settings, started = DesignSearchSettings.current(), time.monotonic()
     seen: list[tuple[float, Array]] = []
 
     def cost(point: Array) -> float:

@@ -23,6 +23,7 @@ class ExperimentSettings(Settings):
     memory: float = setting(
         0.03, "s", "time in which that force changes", "convention: that of the fastest rise times"
     )
+    sample: int = setting(20000, "1", "rows of noise from which its colour is learnt", BY_HAND)
     rows: float = setting(1000.0, "Hz", "rows per second of the simulated logs", BY_HAND)
     coarse: float = setting(500.0, "Hz", "the same while the best test is looked for", BY_HAND)
     tests: int = setting(12, "1", "most tests of one rig that are simulated to judge it", BY_HAND)
@@ -42,7 +43,7 @@ class SeparationSettings(Settings):
     steps: int = setting(3, "1", "steps of the fit of a rival", BY_HAND)
 
 
-class CourseSettings(Settings):
+class RigCourseSettings(Settings):
     """What a designed test of a rig may do."""
 
     longest: float = setting(2.0, "s", "longest log of a designed test", "convention: short")
@@ -69,7 +70,7 @@ class CourseSettings(Settings):
     )
 
 
-class SearchSettings(Settings):
+class DesignSearchSettings(Settings):
     """The search for the best test: differential evolution."""
 
     members: int = setting(16, "1", "tests of each generation", BY_HAND)

@@ -19,8 +19,6 @@ from kemba.model.model import Model
 from kemba.plant.rig.rigs import Rig, Test
 from kemba.trajectory import Trajectory
 
-SAMPLE = 20000  # rows of noise from which its colour is learnt
-
 
 class VirtualBench:
     """Problems that the logs of tests would pose, if this model were nearly right.
@@ -97,6 +95,6 @@ def _colour(rows: float) -> Colour:
     former."""
     settings, rng = ExperimentSettings.current(), np.random.default_rng(0)
     keep = float(np.exp(-1.0 / (rows * settings.memory)))
-    slow = lfilter([np.sqrt(1.0 - keep**2)], [1.0, -keep], rng.standard_normal(SAMPLE))
+    slow = lfilter([np.sqrt(1.0 - keep**2)], [1.0, -keep], rng.standard_normal(settings.sample))
     share = settings.unexplained / settings.force_noise
-    return learn(rng.standard_normal(SAMPLE) + share * slow)
+    return learn(rng.standard_normal(settings.sample) + share * slow)
