@@ -27,7 +27,17 @@ FIGURES = ("height", "supply", "payload", "chamber.vent")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     """A quick refined jump."""
     folder = tmp_path_factory.mktemp("runs") / "jump"
-    words = ["solve", "jump.yaml", "--set", "nodes=40", "--no-figure", "-q", "--out", str(folder)]
+    words = [
+        "solve",
+        "jump.yaml",
+        "--set",
+        "nodes=40",
+        "--cold",
+        "--no-figure",
+        "-q",
+        "--out",
+        str(folder),
+    ]
     assert CliRunner().invoke(app, words).exit_code == 0
     return load_run(folder)
 
