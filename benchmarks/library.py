@@ -14,6 +14,7 @@ import json
 import platform
 import shutil
 from collections import defaultdict
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -69,9 +70,13 @@ def _case(walk: dict[str, Any], folder: Path) -> Case:
 def _facts(path: Path) -> dict[str, Any]:
     """What a walk noted about a plan, with the kind of its task as that is today."""
     facts = json.loads(path.read_text(encoding="utf-8"))
-    task, document = load_task(facts["task"], facts["set"])
-    kind = kind_of(task, task_model(task, document=document))
-    return {**facts, "path": path, "kind": kind}
+    return {**facts, "path": path, "kind": _kind(facts["task"], tuple(facts["set"]))}
+
+
+@cache
+def _kind(name: str, overrides: tuple[str, ...]) -> str:
+    task, document = load_task(name, list(overrides))
+    return kind_of(task, task_model(task, document=document))
 
 
 def best(found: list[dict[str, Any]]) -> list[dict[str, Any]]:

@@ -152,13 +152,20 @@ def chosen(part: str, only: str) -> list[Mutant]:
     return found[(number - 1) * size // parts : number * size // parts]
 
 
+def _kept() -> dict[str, str]:
+    """Outcomes in program.json, by bug."""
+    from program import load  # beside this script, which tests import as well
+
+    return dict(load().get("mutants", {}).get("all", {}).get("outcomes", {}))
+
+
 def _record(mutant: Mutant, outcome: str) -> None:
     """Keep an outcome in program.json; those of bugs that are no longer listed are dropped."""
-    from program import load, put  # beside this script, which tests import as well
+    from program import put
 
     known = {str(m) for m in listed()}
-    old = load().get("mutants", {}).get("all", {}).get("outcomes", {})
-    outcomes = {name: said for name, said in {**old, str(mutant): outcome}.items() if name in known}
+    both = {**_kept(), str(mutant): outcome}
+    outcomes = {name: said for name, said in both.items() if name in known}
     put("mutants", "all", {"listed": len(known), "outcomes": outcomes})
 
 
@@ -167,9 +174,13 @@ def main() -> int:
     parser.add_argument("--part", default="1/1", help="such as 2/4: the second of four")
     parser.add_argument("--only", default="", help="bugs whose file or words contain this")
     parser.add_argument("--record", action="store_true", help="keep outcomes for the page")
+    parser.add_argument("--new", action="store_true", help="only bugs without a kept outcome")
     parser.add_argument("--list", action="store_true", help="run no tests")
     arguments = parser.parse_args()
     mutants = chosen(arguments.part, arguments.only)
+    if arguments.new:
+        known = _kept()
+        mutants = [m for m in mutants if str(m) not in known]
     if arguments.list:
         lost = [m for m in mutants if m.mutated(ROOT) is None]
         print(*(f"does not apply  {m}" for m in lost), sep="\n")

@@ -26,6 +26,7 @@ from kemba_cli.verbs.inspect.effects import effects
 from kemba_cli.verbs.inspect.map import draft_map
 from kemba_cli.verbs.inspect.schema import schema
 from kemba_cli.verbs.plan.export import export
+from kemba_cli.verbs.plan.sensitivity import sensitivity
 from kemba_cli.verbs.plan.simulate import simulate
 from kemba_cli.verbs.plan.solve import solve
 from kemba_cli.verbs.plan.sweep import sweep
@@ -37,6 +38,7 @@ from kemba_cli.verbs.show.view import view
 VERBS = (
     solve,
     sweep,
+    sensitivity,
     simulate,
     characterise,
     compare,

@@ -31,7 +31,7 @@ LEVELS = [
     {"ocp", "plant"},
     {"contract", "identify"},
     {"runs"},
-    {"policy"},
+    {"policy", "sensitivity"},
     {"sweep"},
     {"plotting", "report"},
     {"learn"},

@@ -12,7 +12,7 @@ import pytest
 
 from kemba.errors import KembaError
 from kemba.files import DiskFull, WriteError, atomic_path, atomic_text
-from kemba.folders import LOCK, UNFINISHED, claimed, fresh, held, next_free, try_writing
+from kemba.folders import LOCK, UNFINISHED, claimed, fresh, held, next_free, try_writing, typed
 from kemba.runs import RunFolder
 
 AS_ROOT = os.name == "posix" and os.geteuid() == 0
@@ -151,3 +151,10 @@ def test_a_full_disk_is_told_and_leaves_nothing(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr("tempfile.TemporaryFile", full)
     with pytest.raises(DiskFull, match="out: cannot be written: No space left"):
         RunFolder.create("out", "jump")
+
+
+def test_logs_are_named_as_they_are_typed() -> None:
+    assert typed(["a b.csv", Path("c.csv")]) == "'a b.csv' c.csv"
+    assert typed(["a.csv"], "map.yaml", "mine.yaml") == "a.csv --map map.yaml --model mine.yaml"
+    many = [f"logs/log-{number}.csv" for number in range(6)]
+    assert typed(many, "m.yaml") == "logs/*.csv --map m.yaml"

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ValidationError
 
 from kemba.errors import KembaError
 from kemba.quantity import Param, Quantity, convert, is_si, to_si
-from kemba.units import short
+from kemba.units import USUAL, parse_unit, read_si, registry, short
 
 FINITE = st.floats(-1e9, 1e9, allow_nan=False)
 SEGMENT = st.text("abcdefghijklmnopqrstuvwxyzXYZ_0123456789", min_size=1, max_size=8)
@@ -150,3 +150,13 @@ def test_numbers_in_sentences_have_no_exponent() -> None:
         "1000",
     ]
     assert short(1.2345, 3) == "1.23"
+
+
+@pytest.mark.parametrize("name", USUAL)
+def test_usual_units_are_those_of_pint_to_the_last_bit(name: str) -> None:
+    si, size = USUAL[name]
+    for number in (1.0, 0.7, 3.3, 412.9):
+        exact = registry().Quantity(number, parse_unit(name)).to(parse_unit(si)).magnitude
+        assert number * size == exact
+        assert convert(number, name, si) == exact
+        assert read_si(f"{number} {name}") == (exact, si)

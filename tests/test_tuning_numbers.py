@@ -54,6 +54,7 @@ CONSTANTS = {  # file -> names, why
     "plant/execution/repeat.py": ("VALVE_SCATTER", "scatter of the robot's valves"),
     "plant/execution/controller.py": ("PERIOD", "rate of the robot's controller"),
     "ocp/controller.py": ("PERIOD", "rate of the robot's controller"),
+    "ocp/library/kind.py": ("LETTERS", "length of a fingerprint"),
     "effects/rigs/axis.py": ("PLATE", "tolerance of an effect's figures"),
     "effects/mechanics/geometry.py": ("SIZES", "sizes of an effect's parameters"),
     "mechanism/own_rigs.py": ("GRAVITY", "of the earth"),
@@ -97,13 +98,15 @@ CONSTANTS = {  # file -> names, why
     "config/document.py": ("WIDE", "length of messages"),
     "config/names.py": ("LONGEST NAME", "longest name"),
     "config/scalars.py": ("LONGEST_NUMBER", "longest text that is read"),
+    "identify/design/courses.py": ("STEEPEST", "the shape of a cubic"),
+    "identify/design/robot.py": ("STANDARD", "the motion that others are compared with"),
     "config/writer.py": ("WIDTH", "width of lines"),
     "errors.py": ("LISTED", "length of messages"),
     "folders.py": ("PROBE MANY", "free space that a run takes; length of messages"),
     "ocp/refinement/refine.py": ("SOLVES", "a count that progress shows"),
     "ocp/refinement/sample.py": ("WORST", "violations that a report lists"),
     "sweep/workers/farm.py": ("ENVIRONMENT", "environment of workers"),
-    "units.py": ("ALIASES", "powers of units"),
+    "units.py": ("ALIASES USUAL", "powers and sizes of units"),
 }
 
 

@@ -79,7 +79,8 @@ class Model:
 
         `values`: parameters that differ from the model's, by their names in `parameters`.
         """
-        effects = [i.effect for i in self.instances if i.leg in (leg, None)]
+        late = [i for i in self.instances if type(i.effect).timing is not Effect.timing]
+        effects = [i.effect for i in late if i.leg in (leg, None)]
         here = [_with(effect, values or {}).timing() for effect in effects]
         on = sum(t.get("on", 0.0) for t in here)
         return on, sum(t.get("off", 0.0) for t in here)

@@ -101,10 +101,9 @@ def solve_into(
             dump_yaml(found.task.model_dump(exclude_none=True), folder / "task.yaml")
         known, remark = compared(found)
         result |= {"best_known": known, "sentence": result["sentence"] + remark}
-        _keep(found, result, best.motions, folder)
         if figure:
             listener.tell("drawing")
-        drawing.finish()
+        _keep(found, result, best.motions, folder, drawing)
     except BaseException:
         with suppress(WriteError):  # the first error says more
             folder.finish("failed")
@@ -114,10 +113,13 @@ def solve_into(
     return result
 
 
-def _keep(found: Plan, result: dict[str, Any], motions: Motions, folder: RunFolder) -> None:
+def _keep(
+    found: Plan, result: dict[str, Any], motions: Motions, folder: RunFolder, drawing: Drawer
+) -> None:
     """Write the run folder; when that fails, write the plan elsewhere and say where."""
     try:
         _write(found, result, motions, folder.path)
+        drawing.finish()
     except WriteError as error:
         elsewhere = Path(tempfile.mkdtemp(prefix="kemba-kept-"))
         try:

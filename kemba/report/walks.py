@@ -22,6 +22,8 @@ from kemba.plant.execution.replay import ends_standing
 from kemba.plant.execution.retiming import retimed
 from kemba.report.verdict import verdicts
 
+PATIENT = "solver.time_limit=3600 s"
+
 
 def walk(work: Mapping[str, Any]) -> dict[str, Any]:
     """Plans of one task along one figure, each begun from the one before; a record of a sweep.
@@ -36,7 +38,8 @@ def walk(work: Mapping[str, Any]) -> dict[str, Any]:
     origin = _kept(folder / f"{work['first']}.npz", work) if work["first"] else None
     told = []
     for value in work["values"]:
-        task, document = load_task(work["task"], [*work["set"], f"{work['figure']}={value}"])
+        own = [f"{work['figure']}={value}", PATIENT]  # the same plans on a slow machine
+        task, document = load_task(work["task"], [*work["set"], *own])
         if origin is None:
             found: Plan | None = plan(task, document)
         else:

@@ -54,6 +54,14 @@ def write_log(path: Path, seed: int, bias: float) -> None:
     path.write_text("\n".join([header, *lines]) + "\n")
 
 
+def test_check_names_the_next_command(folder: Path) -> None:
+    logs = [str(folder / f"run_{number}.csv") for number in range(2)]
+    done = run("check", *logs)
+    assert done.exit_code == 0
+    assert done.stderr == f"next: kemba-opt discover {' '.join(logs)} --out answer\n"
+    assert run("check", *logs, "-q").stderr == ""
+
+
 def test_json_has_every_field_and_files_are_written(folder: Path, tmp_path: Path) -> None:
     out = tmp_path / "answer"
     shown = run("discover", folder / "run_0.csv", folder / "run_1.csv", "--out", out, "--json")

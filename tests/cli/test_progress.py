@@ -8,7 +8,7 @@ import pytest
 
 from kemba.stopwatch import Stage
 from kemba_cli import course as courses
-from kemba_cli.course import COMPARE, DISCOVER, LEARN, REVIEW, SOLVE, Left, duration, span
+from kemba_cli.course import COMPARE, DISCOVER, LEARN, NEAR, REVIEW, SOLVE, Left, duration, span
 from kemba_cli.progress import Progress
 
 
@@ -35,7 +35,10 @@ def test_a_stage_is_a_text_and_a_count() -> None:
     assert (stage.name, stage.part, stage.parts) == ("refitting valve_delay", 2, 8)
 
 
-@pytest.mark.parametrize("course", [SOLVE, COMPARE, DISCOVER, LEARN, REVIEW])
+COURSES = [SOLVE, NEAR, COMPARE, DISCOVER, LEARN, REVIEW, courses.SENSITIVITY]
+
+
+@pytest.mark.parametrize("course", COURSES)
 def test_every_course_goes_forward(course: courses.Course) -> None:
     assert list(course.values()) == sorted(course.values())
     assert all(0.0 <= share < 1.0 for share in course.values())
@@ -62,6 +65,16 @@ def test_the_time_left_follows_the_stages(clock: Clock) -> None:
     assert left.seconds == pytest.approx(10.0)  # the third stage is still to come
     left.enter("first")  # again: nothing is undone
     assert left.share == 0.25
+
+
+def test_a_plan_from_another_one_takes_its_own_time(clock: Clock) -> None:
+    """Until that fails and the plan is made from a guess."""
+    left = Left(SOLVE)
+    clock.now += 2.0
+    left.enter("from the shipped plan up-0500: the best one")
+    assert left.share == NEAR["from the"] and left.seconds == pytest.approx(18.0)
+    left.enter("relax (half robot, 50 nodes)")
+    assert left.words == ""
 
 
 def test_a_limit_bounds_the_time_left(clock: Clock) -> None:

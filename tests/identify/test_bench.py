@@ -16,12 +16,14 @@ from kemba.identify.adopt import adopt_effect
 from kemba.identify.bench.motion import SmoothedMotion
 from kemba.identify.bench.problem import bench_problem
 from kemba.identify.bench.rig_model import RigModel
+from kemba.identify.design.settings import DesignSearchSettings, ExperimentSettings
 from kemba.identify.experiment import propose
 from kemba.identify.published import published
 from kemba.identify.workflow import discover_logs
 from kemba.model.spec import load_model, load_spec
 from kemba.plant import Profile
 from kemba.plant.rig.imposed import drive, hermite
+from kemba.settings import changed
 from kemba.trajectory import Trajectory
 
 BenchLog = Callable[..., Trajectory]
@@ -141,7 +143,11 @@ def test_from_logs_to_a_model_and_the_next_test(bench_log: BenchLog, tmp_path: P
 
     other = written["ranking"][1]["effect"]
     assert adopt_effect(out, other, tmp_path / "other.yaml").is_file()
-    proposal = propose(out, tmp_path / "next.yaml")
+    with (
+        changed(DesignSearchSettings, members=5, generations=0),
+        changed(ExperimentSettings, tests=1),
+    ):
+        proposal = propose(out, tmp_path / "next.yaml")
     assert proposal.nats > 0 and (tmp_path / "next.yaml").is_file()
 
 

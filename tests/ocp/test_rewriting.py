@@ -9,6 +9,7 @@ import pytest
 from kemba.model import load_model
 from kemba.ocp import load_task
 from kemba.ocp.functions.blocks import Block, BlockProblem
+from kemba.ocp.functions.code import Code, code_of
 from kemba.ocp.functions.proximal import Proximal
 from kemba.ocp.functions.regularised import regularised_hessian
 from kemba.ocp.functions.settings import Functions, Newton
@@ -17,6 +18,7 @@ from kemba.ocp.functions.vectorised import vectorised
 from kemba.ocp.task.requirement import resolve
 from kemba.ocp.transcription.symmetry import find_symmetry
 from kemba.ocp.transcription.transcribe import Transcription
+from kemba.settings import changed
 
 POINTS = 12
 
@@ -107,3 +109,25 @@ def test_damping_adds_the_same_curvature_everywhere() -> None:
     at = (np.random.default_rng(0).normal(size=3), [], 1.5, [0.3, -2.0])
     added = np.array(regularised_hessian(plain)(*at) - plain(*at))
     assert added == pytest.approx(Newton.current().regularisation * np.eye(3), abs=1e-15)
+
+
+def test_equal_blocks_share_their_functions_and_others_do_not() -> None:
+    def code(factor: float) -> Code:
+        z, p = ca.SX.sym("z", 2), ca.SX.sym("p")
+        return code_of(z, p, p * z[0] ** 2, ca.sin(factor * z[1]), worth_compiling=True)
+
+    first, same, other = code(3.7), code(3.7), code(3.8)
+    assert same is first
+    assert other is not first
+    assert first.at(9)[0] is same.at(9)[0]
+    values = [float(c.rows_at(1)([0.0, 0.5], [1.0, *c.numbers])) for c in (first, other)]
+    assert values == [np.sin(3.7 * 0.5), np.sin(3.8 * 0.5)]
+
+
+def test_only_so_many_blocks_are_kept() -> None:
+    z, p = ca.SX.sym("z"), ca.SX.sym("p", 0)
+    with changed(Functions, kept=2):
+        first = code_of(z, p, z, z + 1.5, worth_compiling=True)
+        for k in range(3):
+            code_of(z, p, z, z + 2.5 + k, worth_compiling=True)
+        assert code_of(z, p, z, z + 1.5, worth_compiling=True) is not first

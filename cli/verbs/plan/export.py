@@ -1,4 +1,4 @@
-"""`kemba-opt export`: trajectories in other formats."""
+"""`kemba-opt export`: trajectories in other formats, and programs for other solvers."""
 
 from __future__ import annotations
 
@@ -11,14 +11,20 @@ from kemba_cli.common import Force, Json, OwnEffects, Quiet, print_json
 
 
 def export(
-    run: Annotated[Path, typer.Argument(help="Run folder (its plan), or any log.")],
+    run: Annotated[Path, typer.Argument(help="Run folder (its plan), any log; --nlp: or a task.")],
     out: Annotated[
-        Path, typer.Option(help="File to write: .csv, .parquet, .mcap, .mat, .npz or .json.")
-    ],
+        Path | None,
+        typer.Option(
+            help="File to write: .csv, .parquet, .mcap, .mat, .npz or .json. --nlp: a folder (nlp)."
+        ),
+    ] = None,
     column_map: Annotated[
         str | None,
         typer.Option("--map", help="Column map YAML of the program that is to read the .csv."),
     ] = None,
+    nlp: Annotated[
+        bool, typer.Option("--nlp", help="Write the optimisation programs as CasADi functions.")
+    ] = False,
     force: Force = False,
     own_effects: OwnEffects = None,
     json: Json = False,
@@ -29,6 +35,18 @@ def export(
     Example: kemba-opt export runs/jump-1 --out jump.mat
     """
     from kemba.folders import fresh
+
+    if nlp:
+        from kemba.report.programs import export_nlp
+
+        if column_map is not None:
+            raise typer.BadParameter("a map goes with logs and plans", param_hint="--map")
+        paths = export_nlp(run, out or Path("nlp"), force)
+        names = [str(path) for path in paths]
+        print_json({"export": names}) if json else typer.echo("\n".join(names))
+        return
+    if out is None:
+        raise typer.BadParameter("a file was expected, such as jump.mat", param_hint="--out")
     from kemba.logs import load_map
     from kemba.plotting import load_source
     from kemba.report.export import export as write

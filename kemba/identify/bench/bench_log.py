@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -13,8 +13,10 @@ from kemba.effects.pneumatics.switching import pulses
 from kemba.identify.bench.motion import SmoothedMotion, smooth_motion
 from kemba.identify.bench.rig_model import Pulses
 from kemba.identify.logs.excerpt import held
+from kemba.identify.logs.limits import LimitSettings
 from kemba.identify.problem.noise import difference_sigma
 from kemba.identify.problem.problem import Array, Flags
+from kemba.identify.problem.quantisation import telling
 from kemba.identify.problem.sensor_noise import ChannelNoise
 from kemba.settings import BY_HAND, Settings, setting
 from kemba.trajectory import Trajectory
@@ -63,7 +65,11 @@ class BenchLogSettings(Settings):
 
 @dataclass(frozen=True)
 class BenchLog:
-    """One bench log, prepared: motion, commands, and the measured channels."""
+    """One bench log, prepared: motion, commands, and the measured channels.
+
+    `seen_within` [s]: time between the rows of a slow log, within which the moment of a command is
+    not known; 0 for a usual log. `by_timing`: variance (n,) that this makes, by channel.
+    """
 
     name: str
     motion: SmoothedMotion
@@ -72,6 +78,18 @@ class BenchLog:
     sigma: dict[str, float]
     mode: np.ndarray
     keep: dict[str, np.ndarray] = field(default_factory=dict)
+    seen_within: float = 0.0
+    by_timing: dict[str, Array] = field(default_factory=dict)
+
+    def variance(self, channel: str) -> Array:
+        """Variance (n,) of a channel's readings: white noise, and that of the switching times."""
+        white = np.full(len(self.motion.time), self.sigma[channel] ** 2)
+        return white + self.by_timing.get(channel, 0.0)
+
+    def sent(self, late: float) -> BenchLog:
+        """The same log with commands that were sent `late` [s] against what is known of them."""
+        extend, retract = ([(a + late, b + late) for a, b in c] for c in self.commands)
+        return replace(self, commands=(extend, retract))
 
     @cached_property
     def velocity_error(self) -> Array:
@@ -95,10 +113,20 @@ def prepare(name: str, log: Trajectory, noise: ChannelNoise | None = None) -> Be
     measured = {c: log[c] for c in ("piston/F", *PRESSURES) if c in log}
     sigma = {c: noise_of(c, y) for c, y in measured.items()}
     on = [(u > 0.5).astype(int).astype(str) for u in sent]
-    seen = ~unpredictable(log.time, np.isfinite(log["piston/x"]), np.stack(sent))
-    keep = {c: np.isfinite(y) & seen for c, y in measured.items()}
-    commands = (pulses(log.time, sent[0]), pulses(log.time, sent[1]))
-    return BenchLog(name, motion, commands, measured, sigma, np.char.add(*on), keep)
+    known = ~unpredictable(log.time, np.isfinite(log["piston/x"]), np.stack(sent))
+    keep = {c: np.isfinite(y) & known & telling(y, sigma[c]) for c, y in measured.items()}
+    within = _seen_within(log.time)
+    # a change that a row shows happened since the row before
+    seen = np.concatenate([log.time[:1], 0.5 * (log.time[1:] + log.time[:-1])])
+    extend, retract = (pulses(seen if within else log.time, u) for u in sent)
+    modes = np.char.add(*on)
+    return BenchLog(name, motion, (extend, retract), measured, sigma, modes, keep, within)
+
+
+def _seen_within(time: Array) -> float:
+    """Time [s] between rows where it is so long that valve edges are blurred, else 0."""
+    step = float(np.median(np.diff(time)))
+    return step if step > LimitSettings.current().row else 0.0
 
 
 def noise_of(channel: str, y: Array) -> float:

@@ -78,7 +78,20 @@ def settle_starts(logs: Iterable[BenchLog], predictor: Predictor) -> tuple[Bench
     A valve that is on in the first row may have been on for long, or may just have been switched.
     The force in the first moments decides.
     """
-    return tuple(_settled(log, predictor) for log in logs)
+    return tuple(_timed(_settled(log, predictor), predictor) for log in logs)
+
+
+def _timed(log: BenchLog, predictor: Predictor) -> BenchLog:
+    """A slow log with the variance that the unknown moments of its switchings make.
+
+    Each command was sent at any time between two rows. So its moment has the standard deviation of
+    a row over sqrt(12), and a reading that of the change between the first and the last moment.
+    """
+    if not log.seen_within:
+        return log
+    early, late = (predictor.readings(log.sent(by * log.seen_within), {}, {}) for by in (-0.5, 0.5))
+    changes = {c: late[c][0] - early[c][0] for c in log.measured}
+    return replace(log, by_timing={c: change**2 / 12.0 for c, change in changes.items()})
 
 
 def _settled(log: BenchLog, predictor: Predictor) -> BenchLog:

@@ -20,6 +20,8 @@ from kemba.identify.problem.problem import Array, Candidate, Theta
 from kemba.identify.problem.sensor_faults import SensorFaults
 from kemba.model.model import Model
 
+SENT_LATE = "sent:late"  # nuisance of slow logs [s]: by how much all commands were sent later
+
 
 class Predictor:
     """Rigs of one model, each compiled once with the effects that theta switches on.
@@ -52,7 +54,13 @@ class Predictor:
         rig = self.rig(theta)
         nominal = {name: factor for name, (factor, _) in self.figures.items()}
         values = {name: theta.get(name, nominal.get(name, 0.0)) for name in rig.names}
-        return rig.predict(self.true_motion(run, theta), run.commands, values, start or {})
+        sent = self.sent(run, theta)
+        return rig.predict(self.true_motion(run, theta), sent.commands, values, start or {})
+
+    def sent(self, run: BenchLog, theta: Theta) -> BenchLog:
+        """A run with its commands at the time when they were sent, at theta."""
+        late = theta.get(SENT_LATE, 0.0) if run.seen_within else 0.0
+        return run.sent(late) if late else run
 
     def true_motion(self, run: BenchLog, theta: Theta) -> SmoothedMotion:
         """The motion that made the position sensor say what it said."""
@@ -73,7 +81,7 @@ class Predictor:
             if channel in run.measured:
                 true = Series(run.motion.time, absolute_pressure(channel, p.states, cylinder))
                 value = self.sensors.shown(theta, channel, true).value
-                out[channel] = (value, np.full(len(value), run.sigma[channel] ** 2))
+                out[channel] = (value, run.variance(channel))
         return out
 
     def _force(self, p: Prediction, run: BenchLog, theta: Theta) -> tuple[Array, Array]:
@@ -81,7 +89,7 @@ class Predictor:
         time, late = run.motion.time, self.sensors.lateness(theta, "piston/F")
         force = self.sensors.shown(theta, "piston/F", Series(time, p.force)).value
         valve = Series(time, p.valve).late(late).value
-        variance = run.sigma["piston/F"] ** 2 + run.velocity_error**2
+        variance = run.variance("piston/F") + run.velocity_error**2
         variance = variance + np.sum(p.by_valve**2 * valve * (1 - valve), axis=1)
         return force, variance
 
@@ -89,7 +97,8 @@ class Predictor:
         """Share of each sample's neighbourhood in which the valves act (n, 2)."""
         delays = self.rig(theta).timing(theta)
         times = run.motion.time
-        return np.stack([share(delayed(c, *delays), times) for c in run.commands], axis=1)
+        sent = self.sent(run, theta).commands
+        return np.stack([share(delayed(c, *delays), times) for c in sent], axis=1)
 
 
 def _unlike(model: Model, extra: list[Effect]) -> list[Effect]:

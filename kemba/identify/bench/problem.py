@@ -18,7 +18,7 @@ from kemba.identify.bench.operating_point import (
     switchings,
 )
 from kemba.identify.bench.predicted import PredictedLogs, settle_starts
-from kemba.identify.bench.prediction import Predictor
+from kemba.identify.bench.prediction import SENT_LATE, Predictor
 from kemba.identify.bench.quiet import position_noise
 from kemba.identify.bench.validate import contradictions
 from kemba.identify.logs.gate import BadData
@@ -27,6 +27,7 @@ from kemba.identify.problem.noise import Colour, learn, whiten
 from kemba.identify.problem.problem import Problem
 from kemba.identify.problem.types import (
     Array,
+    Candidate,
     Changes,
     ForceChannel,
     Leftover,
@@ -77,11 +78,17 @@ class BenchProblem(Problem):
         self.candidates = effect_candidates(model)
         if sensors:
             self.candidates |= sensor_candidates(_sensor_sigmas(logs), model)
+        row = max(log.seen_within for log in logs)
+        hidden = {n: c for n, c in self.candidates.items() if _within(c, row)}
+        self.candidates = {n: c for n, c in self.candidates.items() if n not in hidden}
         predictor = Predictor(model, self.candidates)
         states = predictor.rig({}).state_names
         starts = {f"start:{name}[{i}]": (i, name) for i in range(len(logs)) for name in states}
         self.predicted = PredictedLogs(settle_starts(logs, predictor), predictor, starts)
         self.nuisance = predictor.figures | predictor.sensors.nuisance
+        if row:  # of slow logs: times within a row are not known, and not looked for
+            late = [SENT_LATE, *(c.key for c in hidden.values() if c.sensor)]
+            self.nuisance |= dict.fromkeys(late, (0.0, row / np.sqrt(12.0)))
         self._state_scale = {q.name: q.scale for q in model.states.values()}
         for key, (_, name) in starts.items():
             self.nuisance[key] = (0.0, self._state_scale[name])
@@ -173,7 +180,12 @@ class BenchProblem(Problem):
         return bench_missing(self.predicted, theta or {}, strength)
 
     def formulas(self, theta: Theta) -> Mapping[str, Array]:
-        """Simple force terms of position, speed and valves: formula -> column (n,)."""
+        """Simple force terms of position, speed and valves: formula -> column (n,).
+
+        None of slow logs: what a valve does between two rows looks like any formula.
+        """
+        if any(log.seen_within for log in self.logs):
+            return {}
         names, columns = formula_columns(self.predicted, theta)
         return dict(zip(names, self.whiten(columns).T, strict=True))
 
@@ -229,6 +241,11 @@ def bench_problem(logs: Sequence[Trajectory], model: Model) -> BenchProblem:
     names = [str(log.meta.get("name", i)) for i, log in enumerate(logs)]
     pairs = zip(names, logs, strict=True)
     return BenchProblem([prepare(name, log, noise) for name, log in pairs], model)
+
+
+def _within(candidate: Candidate, row: float) -> bool:
+    """Whether an effect is a time that does not show in logs with a row every `row` [s]."""
+    return candidate.lead.unit == "s" and candidate.lead.size < row
 
 
 def _sensor_sigmas(logs: Sequence[BenchLog]) -> dict[str, float]:

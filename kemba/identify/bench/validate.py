@@ -125,7 +125,10 @@ def _clock(run: BenchLog, predict: Predict) -> list[KembaError]:
     both /= len(grid) * measured.std() * expected.std()
     middle = len(grid) // 2
     near = both[middle - far : middle + far + 1]
-    lag = (int(np.argmax(near)) - far) * limits.resolution
+    place = int(np.argmax(near))
+    if place in (0, 2 * far):  # the correlation still rises there: this is no lag
+        return []
+    lag = (place - far) * limits.resolution
     if abs(lag) <= limits.latest or near.max() < limits.alike:
         return []
     if near.max() < limits.more_alike * both[middle]:

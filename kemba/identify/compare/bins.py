@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.stats import chi2, false_discovery_control
 
 from kemba.identify.evidence.windows import codes, rms
 from kemba.identify.problem.problem import Array, Labels, Rows, Texts
+from kemba.identify.tails import chi2_above, false_discoveries
 from kemba.settings import BY_HAND, Settings, setting
 
 ASSUMED = ("/foot/x", "/foot/z", "/stop")  # channels that no sensor measures
@@ -84,7 +84,7 @@ def condition_bins(rows: Rows, region: Texts, first: Labels, sums: Array) -> Ite
     groups = [sums[sound][own.ravel() == i] for i in range(len(kinds))]
     fewest = BinSettings.current().fewest
     known = [i for i, z in enumerate(groups) if len(z) >= fewest]
-    q = false_discovery_control([excess(groups[i]) for i in known]) if known else ()
+    q = false_discoveries([excess(groups[i]) for i in known]) if known else ()
     for i, q_value in zip(known, q, strict=True):
         channel, *place = kinds[i]
         labels = [str(n[k]) for n, k in zip(names, place, strict=True)]
@@ -112,7 +112,7 @@ def excess(z: Array) -> float:
     if len(z) > 1:
         z = np.delete(z, np.argmax(np.abs(z)))
     count = len(z) / correlation_length(z**2)
-    return float(chi2.sf(np.mean(z**2) / BinSettings.current().tolerated ** 2 * count, count))
+    return chi2_above(np.mean(z**2) / BinSettings.current().tolerated ** 2 * count, count)
 
 
 def correlation_length(y: Array) -> float:

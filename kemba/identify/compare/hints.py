@@ -7,7 +7,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2, norm
 
 from kemba.identify.compare.force_profiles import (
     ForceProfile,
@@ -20,6 +19,7 @@ from kemba.identify.compare.tolerance import Slopes
 from kemba.identify.evidence.spike_slab import SpikeSlabSettings
 from kemba.identify.evidence.windows import codes
 from kemba.identify.problem.problem import Array, Changes, Labels, Problem, Rows
+from kemba.identify.tails import chi2_above, normal_at
 from kemba.settings import BY_HAND, Settings, setting
 
 
@@ -74,7 +74,7 @@ class Response:
     @property
     def certain(self) -> bool:
         certain = HintSettings.current().certain
-        return bool(np.abs(self.z[self.peak]) > norm.isf(certain / (2 * self.tests)))
+        return bool(np.abs(self.z[self.peak]) > normal_at(certain / (2 * self.tests)))
 
     @property
     def hint(self) -> Hint:
@@ -177,4 +177,4 @@ def _agreement(information: Array, pull: Array) -> float:
     certainty = np.linalg.inv(spread + imperfect**2 * np.eye(len(a)))
     ones = np.ones(len(a))
     apart = a - ones @ certainty @ a / (ones @ certainty @ ones)
-    return float(chi2.sf(apart @ certainty @ apart, len(a) - 1))
+    return chi2_above(float(apart @ certainty @ apart), len(a) - 1)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import false_discovery_control, norm
 
 from kemba.identify.evidence.spike_slab import SpikeSlabSettings
 from kemba.identify.problem.problem import Array, Candidate, Problem, Theta
+from kemba.identify.tails import false_discoveries, normal_above
 
 
 @dataclass(frozen=True)
@@ -58,5 +58,5 @@ def within_tolerance(residual: Array, known: Slopes) -> Tolerant:
     columns = np.hstack([spike * known.by_lead, known.by_nuisance])
     h = columns.T @ columns + np.eye(columns.shape[1])
     off = -np.linalg.solve(h, columns.T @ residual)
-    q = false_discovery_control(2.0 * norm.sf(np.abs(off))) if len(off) else np.ones(1)
+    q = false_discoveries(2.0 * normal_above(np.abs(off))) if len(off) else np.ones(1)
     return Tolerant(residual + columns @ off, float(q.min()))

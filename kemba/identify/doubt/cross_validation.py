@@ -11,6 +11,7 @@ from kemba.identify.evidence.linear import Linear
 from kemba.identify.evidence.point import LinearisationPoint
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
+from kemba.identify.evidence.windows import START
 from kemba.identify.problem.problem import Array
 from kemba.settings import BY_HAND, Settings, setting
 
@@ -76,12 +77,14 @@ def _powers(search: Search, point: LinearisationPoint, judged: Linear) -> Array:
     """Sum of squares (b,) that `judged` has of each block under the fit to all others.
 
     A left-out block judges the hypothesis alone: all other effects are absent, and no nominal
-    figure may leave its tolerance to imitate an effect.
+    figure may leave its tolerance to imitate an effect. How a log begins is taken from all blocks:
+    only the first ones show it.
     """
     linear, found = point.linear, []
     for block in range(len(linear.count)):
         mask = np.arange(len(linear.count)) == block
-        step = within_tolerance(search, linear.without(mask), point.hypothesis) - linear.at
+        fit = within_tolerance(search, linear.without(mask), point.hypothesis)
+        step = begun(linear, fit) - linear.at
         one = judged.only(mask)
         found.append(one.power[0] + 2 * one.slope[0] @ step + step @ one.gram[0] @ step)
     return np.array(found)
@@ -100,6 +103,20 @@ def within_tolerance(search: Search, linear: Linear, hypothesis: Hypothesis) -> 
     reach = np.where(ranker.nuisance, settings.tolerated, settings.free)
     found = lsq_linear(lower.T, target, bounds=(shift - reach, shift + reach), method="bvls")
     return np.asarray(linear.at + width * found.x)
+
+
+def begun(linear: Linear, z: Array) -> Array:
+    """z (k,) with the beginnings of the logs at their best for all rows; the others stay."""
+    own = np.array([name.startswith(START) for name in linear.names])
+    if not own.any():
+        return z
+    gram, slope, _ = linear.total
+    weight = np.diag(linear.width[own] ** -2.0)
+    there = slope[own] + gram[np.ix_(own, ~own)] @ (z - linear.at)[~own]
+    pull = weight @ (linear.at - linear.mean)[own]
+    found = z.copy()
+    found[own] = linear.at[own] - np.linalg.solve(gram[np.ix_(own, own)] + weight, there + pull)
+    return np.asarray(found)
 
 
 def left_out_error(search: Search, hypothesis: Hypothesis) -> float:

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
-from scipy.special import logsumexp
-from scipy.stats import norm
+from scipy.special import log_ndtr, logsumexp
 
 from kemba.identify.evidence.spike_slab import Hypothesis, Ranker, SpikeSlabSettings
 from kemba.identify.problem.problem import Array
@@ -117,7 +116,7 @@ def _sign_terms(
             unit = np.zeros(len(width))
             unit[i] = 1.0
             sd = np.sqrt(cho_solve(factor, unit)[i])
-            total += np.log(2.0) + norm.logcdf(step[i] / sd)
+            total += np.log(2.0) + log_ndtr(step[i] / sd)
     return total
 
 

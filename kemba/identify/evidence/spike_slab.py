@@ -10,7 +10,6 @@ from math import comb
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 from scipy.special import log_ndtr, logsumexp
-from scipy.stats import norm
 
 from kemba.identify.evidence.linear import Linear
 from kemba.identify.evidence.neighbours import Neighbours
@@ -146,7 +145,7 @@ class Ranker:
             lead, i = self.candidates[effect].lead, self.lead[effect]
             if not lead.signed:
                 sd = float(np.sqrt(covariance[i, i]))
-                total += float(np.log(2.0) + norm.logcdf((z[i] - lead.off) / sd))
+                total += float(np.log(2.0) + log_ndtr((z[i] - lead.off) / sd))
         return total
 
     def table(

@@ -11,6 +11,7 @@ from scipy.ndimage import maximum_filter1d, uniform_filter1d
 from scipy.signal import lfilter
 
 from kemba.identify.problem.problem import Array
+from kemba.identify.problem.quantisation import step_of
 from kemba.settings import BY_HAND, Settings, setting
 
 
@@ -62,8 +63,7 @@ def difference_sigma(values: Array) -> float:
     rough = np.sort(np.abs(np.diff(known, n=3)))[: int(settings.kept * (len(known) - 3))]
     noise = float(np.sqrt(np.mean(rough**2) / 20.0))  # 20 = 1 + 9 + 9 + 1
     noise /= _spread_of_smallest(settings.kept)
-    steps = np.diff(np.unique(known))
-    return max(noise, float(steps.min() / np.sqrt(12.0)) if len(steps) else 0.0)
+    return max(noise, step_of(known) / float(np.sqrt(12.0)))
 
 
 def _spread_of_smallest(share: float) -> float:

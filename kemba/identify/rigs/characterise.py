@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from kemba.config import dump_yaml
 from kemba.effects.base import Effect
@@ -185,7 +185,7 @@ def _half_widths(labels: Labels, j: Array, r: Array, h: Array) -> Array:
     pieces = np.stack([j[labels == b].T @ r[labels == b] for b in np.unique(labels)])
     freedom = max(len(pieces) - 1, 1)
     covariance = h @ (pieces.T @ pieces) @ h * len(pieces) / freedom
-    return np.asarray(np.sqrt(np.diag(covariance)) * student.ppf(0.975, freedom))
+    return np.asarray(np.sqrt(np.diag(covariance)) * stdtrit(freedom, 0.975))
 
 
 def _unit(model: Model, name: str) -> str:

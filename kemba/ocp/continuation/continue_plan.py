@@ -160,7 +160,8 @@ class Continuation:
         program.keep_short(x, Elements.current().fair)
         if weight:
             x = program.proximal(x, weight)
-        found = solve(program, x, warm(Continuing.current().iterations), self.control)
+        most = min(Continuing.current().iterations, self.task.solver.max_iterations)
+        found = solve(program, x, warm(most), self.control)
         assert found.ending is not None
         name = f"near the earlier plan, {share:.0%}" if weight else "from the earlier plan"
         self.steps.append(Attempt(name, found.ending, found.iterations))

@@ -110,10 +110,10 @@ def code_of(z: ca.SX, p: ca.SX, f: ca.SX, g: ca.SX, worth_compiling: bool) -> Co
         return _kept[text]
     (f, g), constants, numbers = parameterised([z, p], [f, g])
     f, g = canonical_signs([z, p, constants], [f, g])
-    _kept[text] = Code(z, ca.vertcat(p, constants), f, g, numbers, True)
-    if len(_kept) > Functions.current().kept:
+    code = _kept[text] = Code(z, ca.vertcat(p, constants), f, g, numbers, True)
+    while len(_kept) > Functions.current().kept:
         _kept.popitem(last=False)
-    return _kept[text]
+    return code
 
 
 def _column(matrix: ca.SX) -> ca.SX:

@@ -28,7 +28,7 @@ class Near(Settings):
     distance: float = setting(0.1, "m", "forward", TRIED)
     supply: float = setting(0.1e6, "Pa", "supply pressure", TRIED)
     payload: float = setting(0.5, "kg", "at the body's centre", TRIED)
-    duration: float = setting(0.1, "s", "nominal", TRIED)
+    duration: float = setting(0.15, "s", "nominal", TRIED)
     tried: int = setting(2, "1", "plans of the library from which a task is begun, at most",
                          "convention: a plan from a guess costs about as much")  # fmt: skip
 

@@ -223,7 +223,7 @@ class PhaseProgram:
         """x (size,) with slacks a little larger than every mode constraint needs there."""
         x, row, leeway = x.copy(), 0, Elements.current().leeway
         g = np.array(self.problem.g(x, [])).ravel()
-        for part in self._parts:
+        for part in self.parts:
             values = g[row : row + len(part.columns) * len(part.labels)]
             row += len(values)
             if part.soft is None:
@@ -239,11 +239,12 @@ class PhaseProgram:
     @cached_property
     def problem(self) -> BlockProblem:
         """The functions for IPOPT."""
-        blocks = [Block(part.z, part.g, part.f, part.columns) for part in self._parts]
+        blocks = [Block(part.z, part.g, part.f, part.columns) for part in self.parts]
         return BlockProblem(blocks, self.columns.size, ca.SX(0, 1), worth_compiling=True)
 
     @cached_property
-    def _parts(self) -> list[Part]:
+    def parts(self) -> list[Part]:
+        """What the program consists of, in the order of its rows."""
         c, zero = self.columns, ca.SX(0)
         every = np.array([c.element(e) for e in range(self.nodes)])
         body = self.element
@@ -263,7 +264,7 @@ class PhaseProgram:
         nodes = self.columns.nodes()
         return [
             Row(label, int(nodes[columns].max()), part.lower, part.upper)
-            for part in self._parts
+            for part in self.parts
             for columns in part.columns
             for label in part.labels
         ]

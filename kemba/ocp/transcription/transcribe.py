@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import casadi as ca
 import numpy as np
@@ -155,6 +156,8 @@ class Transcription:
 
     def _aims(self, index: np.ndarray) -> list[RequirementBlock]:
         """The cost of quantities that are to be as large or as small as possible."""
+        if not any(r.aim for r in self.requirements):
+            return []
         nothing = Rows("requirement", ca.SX(0, 1), 0.0, 0.0, (), (), ())
         return [
             (Block(self.stage.y, nothing.g, aim_cost(r, g), index[at, : self.layout.size]),
@@ -177,10 +180,15 @@ class Transcription:
 
     def of_state(self, expression: ca.SX) -> ca.SX:
         """An expression of the node's q, v, s, u, lam in the stage's y."""
-        full = [ca.densify(self.layout.full(self.stage.y, g)) for g in GROUPS if g != "h"]
         node = self.model.node
         symbols = [node.q, node.v, node.s, node.u, node.lam]
-        return ca.SX(ca.cse(ca.densify(ca.substitute([ca.SX(expression)], symbols, full)[0])))
+        found = ca.substitute([ca.SX(expression)], symbols, self._full)[0]
+        return ca.SX(ca.cse(ca.densify(found)))
+
+    @cached_property
+    def _full(self) -> list[ca.SX]:
+        """The node's q, v, s, u, lam of the whole robot in the stage's y."""
+        return [ca.densify(self.layout.full(self.stage.y, g)) for g in GROUPS if g != "h"]
 
     def requirement_expressions(self) -> Iterator[tuple[Requirement, ca.SX, list[int]]]:
         """Every requirement with its expression in the stage's y and the nodes where it holds.

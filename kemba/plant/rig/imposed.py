@@ -130,6 +130,25 @@ def hermite(knots: Array, x: Array, v: Array) -> ImposedMotion:
     return lambda t: (spline(t), rate(t))
 
 
+def monotone(knots: Array, x: Array) -> ImposedMotion:
+    """A way through the positions `x` (k,) at the times `knots` (k,) that never overshoots them.
+
+    Where it turns round, and at both ends, it rests for a moment.
+    """
+    from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
+
+    v = PchipInterpolator(knots, x)(knots, 1)
+    v[[0, -1]] = 0.0
+    spline = CubicHermiteSpline(knots, x, v)
+    rate = spline.derivative()
+
+    def motion(t: Array) -> tuple[Array, Array]:
+        inside = np.clip(t, knots[0], knots[-1])
+        return spline(inside), rate(inside)
+
+    return motion
+
+
 def followed(log: Trajectory) -> ImposedMotion:
     """The motion of a bench log; its speed is the log's where it has one."""
     x = log["piston/x"]

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -11,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from kemba.config import FileName
 from kemba.errors import KembaError
-from kemba.plant.rig.imposed import ImposedMotion, hermite, locked
+from kemba.plant.rig.imposed import ImposedMotion, hermite, locked, monotone
 from kemba.plant.rig.imposed import stroke as steady_stroke
 from kemba.plant.simulation.commands import Profile
 from kemba.plant.stepping.arrays import Array
@@ -178,4 +179,52 @@ class RandomRig(Rig):
         return np.array(x), np.array(v)
 
 
-AnyRig = Annotated[LockedRig | DynamometerRig | RandomRig, Field(discriminator="kind")]
+class CourseRig(Rig):
+    """A motion and valve commands that are written down, as `kemba-opt experiment` designs them.
+
+    The rod is at the `places` one after the other, with `every` between them; it turns round, or
+    rests, where the way does. `extend` and `retract`: spans of time in which each valve is on.
+    """
+
+    kind: Literal["course"] = "course"
+    places: tuple[Length, ...] = Field(min_length=2, max_length=1000)
+    every: Annotated[float, Param("s", lower=1e-3, doc="time from place to place")]
+    extend: tuple[tuple[Second, Second], ...] = ()
+    retract: tuple[tuple[Second, Second], ...] = ()
+
+    @property
+    def duration(self) -> float:
+        """Time of the course [s]."""
+        return self.every * (len(self.places) - 1)
+
+    def tests(self, rng: np.random.Generator, stroke: float) -> Iterator[Test]:
+        """As of every rig. Raises KembaError where a place is outside of the stroke, or spans of a
+        valve are not one after the other."""
+        for x in self.places:
+            if x > stroke:
+                what = f"{1e3 * x:g} mm is beyond the stroke"
+                raise KembaError("rig.places", what, f"0 to {1e3 * stroke:g} mm was expected")
+        valves = {"valve/extend": spans("extend", self.extend)}
+        valves["valve/retract"] = spans("retract", self.retract)
+        motion = monotone(self.every * np.arange(len(self.places)), np.array(self.places))
+        for supply in self.supplies:
+            for number in range(1, self.repeats + 1):
+                name = f"course-{supply / 1e6:.1f}MPa-{number}"
+                facts = {"test": "course"}
+                yield Test(name, supply, motion, valves, self.clock(self.duration), facts)
+
+
+def spans(valve: str, on: Sequence[tuple[float, float]]) -> Profile:
+    """A valve that is on in these spans [s]. Raises KembaError where they overlap."""
+    edges = [time for span in on for time in span]
+    if any(later <= earlier for earlier, later in pairwise(edges)):
+        raise KembaError(
+            f"rig.{valve}",
+            "has spans that overlap or end before they begin",
+            "[begin, end] one after the other was expected",
+        )
+    values = [0.0] + [float(i % 2 == 0) for i in range(len(edges))]
+    return Profile(np.array([-1.0, *edges]), np.array(values))
+
+
+AnyRig = Annotated[LockedRig | DynamometerRig | RandomRig | CourseRig, Field(discriminator="kind")]

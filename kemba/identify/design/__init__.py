@@ -1,0 +1,1 @@
+"""The next experiment: standard tests, and tests designed for the rivals of one answer."""

@@ -1,0 +1,100 @@
+"""Logs that tests of a rig would give, without the rig: only their motion and commands matter."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from copy import copy
+from dataclasses import replace
+from itertools import islice
+
+import numpy as np
+from scipy.signal import lfilter
+
+from kemba.identify.bench.bench_log import BenchLog, prepare
+from kemba.identify.bench.problem import BenchProblem
+from kemba.identify.design.settings import ExperimentSettings
+from kemba.identify.problem.noise import Colour, learn
+from kemba.identify.problem.problem import Theta
+from kemba.model.model import Model
+from kemba.plant.rig.rigs import Rig, Test
+from kemba.trajectory import Trajectory
+
+
+class VirtualBench:
+    """Problems that the logs of tests would pose, if this model were nearly right.
+
+    `rows`: rows of the logs per second.
+    """
+
+    def __init__(self, model: Model, rows: float) -> None:
+        self.model, self.stroke, self.rows = model, model.mechanism.stroke, rows
+        self.colour = _colour(rows)
+        self._first: BenchProblem | None = None
+
+    def problem(self, rig: Rig) -> BenchProblem:
+        """The problem of a rig's tests, the first few of them."""
+        tests = rig.tests(np.random.default_rng(0), self.stroke)
+        logs = [
+            prepare(test.name, virtual_log(test, self.rows, i))
+            for i, test in enumerate(islice(tests, ExperimentSettings.current().tests))
+        ]
+        if len(logs) > 1:
+            return self._coloured(BenchProblem(logs, self.model))
+        if self._first is None:
+            self._first = BenchProblem(logs, self.model)
+        return self._coloured(with_logs(self._first, logs))  # compiled functions are used again
+
+    def _coloured(self, problem: BenchProblem) -> BenchProblem:
+        problem.colour = {(i, 0): self.colour for i in range(len(problem.logs))}
+        return problem
+
+
+def with_logs(problem: BenchProblem, logs: Sequence[BenchLog]) -> BenchProblem:
+    """The same problem on as many other logs."""
+    found = copy(problem)
+    found.predicted = replace(problem.predicted, logs=tuple(logs))
+    found.runs = tuple(log.name for log in logs)
+    return found
+
+
+def as_predicted(problem: BenchProblem, theta: Theta) -> BenchProblem:
+    """The problem of logs in which everything is as the model at theta has it."""
+    logs = []
+    for i, log in enumerate(problem.logs):
+        readings = problem.predicted.readings(theta, i)
+        logs.append(replace(log, measured={c: y for c, (y, _) in readings.items()}))
+    return with_logs(problem, logs)
+
+
+def log_time(rig: Rig, stroke: float) -> float:
+    """Seconds of log of the tests that are judged."""
+    tests: Iterable[Test] = rig.tests(np.random.default_rng(0), stroke)
+    tests = islice(tests, ExperimentSettings.current().tests)
+    return sum(float(test.times[-1] - test.times[0]) for test in tests)
+
+
+def virtual_log(test: Test, rows: float, seed: int = 0) -> Trajectory:
+    """A test as a log with so many rows per second. Its force is the noise of the sensor alone."""
+    settings, rng = ExperimentSettings.current(), np.random.default_rng(seed)
+    step = float(test.times[1] - test.times[0])
+    times = test.times[:: max(1, round(1.0 / (step * rows)))]
+    x, _ = test.motion(times)
+    columns = {
+        "piston/x [m]": x + settings.position_noise * rng.standard_normal(len(times)),
+        "piston/F [N]": settings.force_noise * rng.standard_normal(len(times)),
+    }
+    for valve in ("extend", "retract"):
+        profile = test.valves.get(f"valve/{valve}")
+        on = np.zeros(len(times)) if profile is None else profile.at(times)
+        columns[f"valve/{valve} [1]"] = on
+    return Trajectory(times, columns, {"name": test.name})
+
+
+def _colour(rows: float) -> Colour:
+    """Colour of white noise of the force sensor and of what no model explains, in units of the
+    former."""
+    settings, rng = ExperimentSettings.current(), np.random.default_rng(0)
+    keep = float(np.exp(-1.0 / (rows * settings.memory)))
+    slow = lfilter([np.sqrt(1.0 - keep**2)], [1.0, -keep], rng.standard_normal(settings.sample))
+    share = settings.unexplained / settings.force_noise
+    return learn(rng.standard_normal(settings.sample) + share * slow)

@@ -1,0 +1,74 @@
+"""Sensors that read in coarse steps: how coarse, and what a reading that stands still is worth."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kemba.identify.problem.types import Array, Flags, Labels
+from kemba.settings import BY_HAND, Settings, setting
+
+
+class QuantisationSettings(Settings):
+    """How the step of a sensor is found."""
+
+    same: float = setting(
+        1e-6,
+        "1",
+        "readings closer than this share of their range are one reading",
+        "convention: conversion of units rounds in the fifteenth digit, files have six or more",
+    )
+    coarse: float = setting(
+        2.0,
+        "1",
+        "steps of so many sigmas of the noise are coarse",
+        "literature: below it, noise makes rounding errors independent (Widrow and Kollar 2008)",
+        decides=True,
+    )
+    longest: int = setting(
+        1000, "1", "rows at rest that count as one reading; of a longer rest more count", BY_HAND
+    )
+
+
+def step_of(values: Array) -> float:
+    """The smallest step between two readings of a channel (n,), in its unit; 0 for one reading."""
+    known = np.unique(values[np.isfinite(values)])
+    steps = np.diff(known)
+    if not len(steps):
+        return 0.0
+    least = QuantisationSettings.current().same * np.ptp(known)
+    return float(steps[steps > least].min())
+
+
+def is_coarse(step: float, sigma: float) -> bool:
+    """Whether a sensor's step is so much larger than its noise that rounding errors depend on each
+    other."""
+    return step > QuantisationSettings.current().coarse * sigma
+
+
+def telling(values: Array, sigma: float) -> Flags:
+    """Rows (n,) that tell something of their own: of readings that stand still, the middle one.
+
+    Readings stand still where they keep to one step, or change to and fro between two. They have
+    one rounding error in common, so that many of them tell no more than one. Where the noise
+    `sigma` is as large as the steps, each reading is rounded by itself and all rows count.
+    """
+    step = step_of(values)
+    if not is_coarse(step, sigma):
+        return np.ones(len(values), dtype=bool)
+    chosen = np.zeros(len(values), dtype=bool)
+    known = np.flatnonzero(np.isfinite(values))
+    level = np.round(values[known] / step).astype(int)
+    first = 0
+    while first < len(level):
+        last = first + _still(level[first:])
+        chosen[known[(first + last - 1) // 2]] = True
+        first = last
+    return chosen
+
+
+def _still(level: Labels) -> int:
+    """How many of the first readings (n,), counted in steps, keep to one level or to two."""
+    level = level[: QuantisationSettings.current().longest]
+    low, high = np.minimum.accumulate(level), np.maximum.accumulate(level)
+    moved = high - low > 1
+    return int(np.argmax(moved)) if moved.any() else len(moved)

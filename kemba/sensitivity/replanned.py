@@ -1,0 +1,171 @@
+"""The plan made anew for a changed figure, to first order, with its phases kept.
+
+The refined plan fulfils the optimality conditions of the multi-phase program. Differentiating them
+gives one linear system (KKT matrix) for the derivatives of variables and multipliers by any
+figure; it is factorised once. Source: Pirnay, Lopez-Negrete and Biegler 2012 (sIPOPT).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from kemba.config import Document
+from kemba.errors import KembaError
+from kemba.model import Model
+from kemba.ocp.nlp.ipopt import Control, Iterate
+from kemba.ocp.phases.modes import Phase
+from kemba.ocp.phases.notes import noted_phases
+from kemba.ocp.phases.program import PhaseProgram
+from kemba.ocp.phases.radau import RADAU5
+from kemba.ocp.refinement.refine import Refiner, reduction_of, valve_columns
+from kemba.ocp.refinement.solve import solve, warm
+from kemba.ocp.task.requirement import resolve
+from kemba.ocp.task.task import Task
+from kemba.ocp.transcription.layout import STEP
+from kemba.ocp.transcription.stage import COST_SCALE
+from kemba.ocp.transcription.symmetry import Reduction
+from kemba.ocp.transcription.unilateral import read_constraints
+from kemba.sensitivity.figures import Figure
+from kemba.sensitivity.kkt import Kkt, change_between
+from kemba.settings import Settings, setting
+from kemba.trajectory import Trajectory
+
+NAN = float("nan")
+
+
+class SensitivitySettings(Settings):
+    """How the plan is solved once more for its multipliers."""
+
+    pull: float = setting(
+        1e-3, "1", "proximal weight where the program alone does not converge",
+        "convention: a thousandth of the weight of the refinement",
+    )  # fmt: skip
+    iterations: int = setting(
+        100, "1", "iterations of that solve", "convention: twice those of a plan made from another"
+    )
+    tol: float = setting(
+        1e-6, "1", "IPOPT's tolerance of that solve, for sharp multipliers",
+        "convention: a hundredth of the refinement's",
+    )  # fmt: skip
+    change: float = setting(
+        0.02, "1", "of a step: the change by which the rows are differenced",
+        "convention: large beside rounding errors, small beside any bend",
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Replanned:
+    """What one step of a figure changes in the best plan of the same phases.
+
+    `cost` in the task's own weights [N2.m2.s], `duration` and `touchdown` [s], `apex` [m]; NaN
+    where there is none.
+    """
+
+    cost: float = NAN
+    duration: float = NAN
+    touchdown: float = NAN
+    apex: float = NAN
+
+
+@dataclass
+class PlanProgram:
+    """The program of the phases of a refined plan; `built` makes it for any task and model."""
+
+    plan: Trajectory
+    reduction: Reduction
+    phases: list[Phase]
+
+    @classmethod
+    def of(cls, task: Task, model: Model, plan: Trajectory) -> PlanProgram:
+        """The program of a plan of a task. Raises KembaError where the plan was not refined."""
+        requirements = resolve(task, model, Document(task.model_dump()))
+        reduction = reduction_of(model, task, requirements, plan)
+        constraints = read_constraints(model, reduction)
+        valves = len(valve_columns(model, reduction))
+        phases = noted_phases(plan.meta, constraints, valves, len(plan) - 1)
+        if phases is None:
+            hint = "a plan that was refined has them, see `refine` of the task"
+            raise KembaError(task.name, "the plan has no phases", hint=hint)
+        return cls(plan, reduction, phases)
+
+    def built(self, task: Task, model: Model) -> tuple[PhaseProgram, np.ndarray]:
+        """The program by the finer scheme, and its start (size,) from the plan."""
+        requirements = resolve(task, model, Document(task.model_dump()))
+        refiner = Refiner(model, task, requirements, self.plan, self.reduction, Control())
+        return refiner.build(self.phases, self.plan, RADAU5)
+
+
+@dataclass
+class Solution:
+    """The solution of a plan's program, without any proximal term where that converges."""
+
+    source: PlanProgram
+    program: PhaseProgram
+    point: Iterate
+
+    @cached_property
+    def kkt(self) -> Kkt:
+        """The factorised system."""
+        return Kkt.of(self.program, self.point)
+
+
+def solution(
+    source: PlanProgram, task: Task, model: Model, control: Control | None = None
+) -> Solution:
+    """A plan's program solved for a task and a model. Raises KembaError where it does not
+    converge."""
+    settings = SensitivitySettings.current()
+    options = {**warm(settings.iterations), "tol": settings.tol}
+    for weight in (0.0, settings.pull):
+        program, x = source.built(task, model)
+        if weight:
+            x = program.proximal(x, weight)
+        point = solve(program, x, options, control or Control())
+        if point.solved:
+            return Solution(source, program, point)
+    assert point.ending is not None
+    raise KembaError(task.name, f"the plan cannot be solved once more: {point.ending.sentence}")
+
+
+def of_plan(found: Solution, changed: Sequence[Figure]) -> list[Replanned]:
+    """For every figure of `changed`, what one step of it changes; see `Replanned`."""
+    return [_of_figure(found, figure) for figure in changed]
+
+
+def _of_figure(found: Solution, figure: Figure) -> Replanned:
+    share = SensitivitySettings.current().change
+    low, high = (found.source.built(*side)[0] for side in figure.sides(share))
+    change = change_between(low, high, found.point)
+    if change is None:
+        return Replanned()
+    dx = found.kkt.answer(change)
+    times = _times(found.program)
+    facts = {name: float(weights @ dx) / share for name, weights in times.items()}
+    cost = (change.f + float(found.kkt.slope @ dx)) * COST_SCALE / share
+    return Replanned(cost=cost, **facts)
+
+
+def _times(program: PhaseProgram) -> dict[str, np.ndarray]:
+    """Duration, touchdown [s] and apex [m] as weights (size,) of the variables."""
+    c, phases = program.columns, program.phases
+
+    def until(p: int) -> np.ndarray:
+        weights = np.zeros(c.size)
+        for before, phase in enumerate(phases[:p]):
+            weights[c.h[before, 0]] += phase.elements * STEP
+        return weights
+
+    found = {"duration": until(len(phases))}
+    landings = [p for p in program.impacts if phases[p].first > program.apex > 0]
+    if landings:
+        found["touchdown"] = until(landings[0])
+    names = [q.name for q in program.layout.quantities["q"]]
+    if program.apex and "body/z" in names:
+        apex, j = np.zeros(c.size), names.index("body/z")
+        apex[c.end(program.apex)["q"][j]] = program.layout.quantities["q"][j].scale
+        found["apex"] = apex
+    return found
