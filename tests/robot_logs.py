@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 from twin import cases, figures, measure, run, scripts
 
-from kemba.model import load_model
-from kemba.plant.execution.repeat import repeat_run
 from kemba.trajectory import Trajectory
 
 FRONT_E, FRONT_R, REAR_E, REAR_R = range(4)
@@ -58,33 +54,3 @@ def hops(
         logs.append(Trajectory(time, columns, {"kind": "robot", "name": f"hop{i}"}))
         forces.append(push)
     return logs, forces
-
-
-def controller_of(script: scripts.Script) -> Trajectory:
-    """The table of a hop as the controller reads it: the hips as the twin moves them."""
-    seen = measure.robot_channels(run.simulate(script), measure.Sensors())
-    columns: dict[str, np.ndarray] = {}
-    for i, leg in enumerate(("front", "rear")):
-        q = np.interp(script.ticks, *seen[f"{leg}/hip/q"])
-        columns[f"{leg}/hip/q [rad]"] = q
-        columns[f"{leg}/hip/w [rad.s-1]"] = np.gradient(q, script.ticks)
-        columns[f"{leg}/hip/tau [N.m]"] = np.zeros(len(q))
-        columns[f"{leg}/valve/extend [1]"] = script.sent[:, 2 * i]
-        columns[f"{leg}/valve/retract [1]"] = script.sent[:, 2 * i + 1]
-        columns[f"{leg}/piston/x [m]"] = np.zeros(len(q))
-    for name, value in (("x [m]", 0.0), ("z [m]", figures.STANCE_Z), ("pitch [rad]", 0.0)):
-        columns[f"body/{name}"] = np.full(len(script.ticks), value)
-    return Trajectory(script.ticks, columns)
-
-
-def plant_hops(folder: Path, runs: int = 3, seed: int = 0) -> list[Path]:
-    """Log files of hops of the full plant, with the usual noise of its sensors. The seeds are even:
-    hops of odd seeds make it tilt."""
-    plant, paths = load_model("plant"), []
-    for i in range(2 * seed, 2 * (seed + runs), 2):
-        run_folder = folder / f"hop{i}"
-        run_folder.mkdir(parents=True)
-        controller_of(hop(i)).write(run_folder / "controller.csv")
-        (repeat,) = repeat_run(run_folder, plant, run_folder / "logs", noise=True, seed=i)
-        paths.append(repeat.path)
-    return paths

@@ -65,6 +65,8 @@ CHECKED = """
 The last one was checked on drives that were simulated. With coloured noise alone, 31 of 32
 intervals hold the truth, before and after. With cogging that every repeat of the motion repeats, 8
 of 32 did with blocks of time alone, and 32 do now.
+
+Next: [own rigs](rigs.md), or [how `discover` works](discovery.md).
 """
 
 

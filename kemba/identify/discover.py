@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -73,31 +72,17 @@ def discover(
 
 
 def _of_structures(search: Search, best: Hypothesis, holdout: Problem | None) -> Discovery:
-    """Where another structure was named: built anew with it, unless effects of the model as it is
-    explain left-out data better."""
-    if search.structure(best):
-        anew = _built_anew(search, best, holdout)
-        if anew.answer.verdict == "missing":
-            return anew
-        search.say("trying the model without another structure")
-        plain = Search(_without(search.problem), search.deadline, search.say)
-        other = judged(plain, plain.run(), holdout)
-    else:
-        other = judged(search, best, holdout)
-        if not search.problem.structures & set(other.best):
-            return other
-        anew = _built_anew(search, other.best, holdout)
+    """Where another structure was named: if the answer is not complete, built anew with it, and the
+    answer that leaves the smaller error on left-out data."""
+    first = judged(search, best, holdout)
+    named = search.problem.structures & set(first.best)
+    if first.answer.verdict == "missing" or not named or time.monotonic() > search.deadline:
+        return first
+    anew = _built_anew(search, first.best, holdout)
     # one noise for both, or the model that takes more of its error for noise would look better
-    judge = (holdout or other.search.problem).heard_as(anew.search.problem)
-    left = error_ratio(judge, other.search.points[other.best].fit.theta)
-    return anew if anew.answer.error_after <= left else other
-
-
-def _without(problem: Problem) -> Problem:
-    """The problem without other structures among its candidates."""
-    found = copy(problem)
-    found.candidates = {k: c for k, c in problem.candidates.items() if k not in problem.structures}
-    return found
+    judge = (holdout or search.problem).heard_as(anew.search.problem)
+    left = error_ratio(judge, search.points[first.best].fit.theta)
+    return anew if anew.answer.error_after < left else first
 
 
 def _built_anew(search: Search, best: Hypothesis, holdout: Problem | None) -> Discovery:

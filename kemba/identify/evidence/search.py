@@ -64,7 +64,7 @@ class Search:
         refit is better than nothing, the linear evidence may choose the hypothesis to follow.
         """
         settings = SearchSettings.current()
-        for _ in range(0 if self.structure(best) else settings.followed):
+        for _ in range(settings.followed):
             guess = best or self._first_of_table()
             if guess == NULL or time.monotonic() > self.deadline:
                 return best
@@ -75,17 +75,9 @@ class Search:
             self.start(among, point.fit.theta)
             self.visit(guess)
             best = self._round(NULL, settings.leaders)
-            if best in (guess, NULL) or self.structure(best):
+            if best in (guess, NULL):
                 break
         return self._swap(self._regrow(self._grow(best))) if best else best
-
-    def structure(self, best: Hypothesis) -> str:
-        """The other structure that `best` names, where everything without it is far behind: then
-        the model is to be built anew before anything else is looked for. Else an empty text."""
-        named = self.problem.structures & set(best)
-        without = [p.log_evidence for h, p in self.points.items() if not named & set(h)]
-        ahead = self.points[best].log_evidence - max(without, default=-np.inf)
-        return min(named) if named and ahead > SearchSettings.current().far else ""
 
     def _regrow(self, best: Hypothesis) -> Hypothesis:
         """Find the motion again with an answer of several effects, and let it grow from there.
@@ -93,7 +85,7 @@ class Search:
         Each effect that joins changes the motion, and with it what the others seem to be.
         """
         for _ in range(SearchSettings.current().regrown):
-            if len(best) < 2 or time.monotonic() > self.deadline or self.structure(best):
+            if len(best) < 2 or time.monotonic() > self.deadline:
                 break
             theta, before = self.points[best].fit.theta, best
             self.say(f"looking again as if {' + '.join(best)} were there")
@@ -250,8 +242,6 @@ class Search:
         """Add effects, one by one, while the evidence grows."""
         settings = SearchSettings.current()
         while len(best) < settings.largest and time.monotonic() < self.deadline:
-            if self.structure(best):
-                break
             grown = self._round(best, settings.leaders_grown)
             if grown == best or len(grown) <= len(best):
                 break
@@ -261,7 +251,7 @@ class Search:
     def _swap(self, best: Hypothesis) -> Hypothesis:
         """Take each effect away, or swap it for another; what was swapped may grow again."""
         settings = SearchSettings.current()
-        for _ in range(0 if self.structure(best) else settings.swapped):
+        for _ in range(settings.swapped):
             before = best
             for member in best if len(best) > 1 else ():
                 rest = tuple(h for h in best if h != member)

@@ -18,7 +18,7 @@ class SearchSettings(Settings):
     far: float = setting(
         40.0,
         "nats",
-        "leaders are refitted, and structures not believed, when others are not farther behind",
+        "other leaders are refitted when not farther behind",
         BY_HAND,
         decides=True,
     )

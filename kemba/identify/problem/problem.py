@@ -193,7 +193,7 @@ class Problem(ABC):
 
     def rebuilt(self, theta: Theta) -> Self:
         """The same logs under the model with the structure that theta has switched on; its
-        figures are nuisance parameters about the values of theta."""
+        figures are nuisance parameters about their usual values."""
         raise NotImplementedError("these logs have no other structure")
 
     # Where each row was taken, and which forces may be missing

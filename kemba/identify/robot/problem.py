@@ -141,8 +141,8 @@ class RobotProblem(Problem):
 
     def rebuilt(self, theta: Theta) -> Self:
         """The same logs under the model with orifice chambers, their figures free."""
-        own = self.candidates[ORIFICE].keys()
-        values = {p.name: theta.get(key, p.typical) for key, p in own.items()}
+        # usual figures: those found beside a share of the old chambers are distorted by it
+        values = {p.name: p.typical for p in self.candidates[ORIFICE].shapes}
         model = with_orifices(self.model, values)
         found = type(self)(self.logs, model, self.unknown, free_figures(values))
         dropped = {*FREE_THEN, *(set(robot_candidates(self.model)) - set(self.candidates))}
