@@ -47,8 +47,8 @@ FOUND = """## What was found
 
 - **`discover`**: one setting changed a verdict: with secants of switches twice as long
   (`StepSettings.switch`), one of two cases of nothing was called unknown. It is the step of a
-  finite difference. It must be long where a switch acts by a threshold, and short where it bends;
-  no value is right for both, and 0.6 sizes is what cases of both kinds bear.
+  finite difference: long enough for effects that act from a threshold on, short enough for
+  effects that bend. No value is right for both, and 0.6 sizes is what cases of both kinds bear.
 - **Plans**: settings of the stages do not change how a plan ends, but its cost (column *cost*): the
   program has many local optima, and each change may lead to another one. No threshold can be
   derived that avoids this. What helps is to begin from plans that are known to be cheap

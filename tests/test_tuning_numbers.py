@@ -106,7 +106,7 @@ CONSTANTS = {  # file -> names, why
     "ocp/refinement/refine.py": ("SOLVES", "a count that progress shows"),
     "ocp/refinement/sample.py": ("WORST", "violations that a report lists"),
     "sweep/workers/farm.py": ("ENVIRONMENT", "environment of workers"),
-    "units.py": ("ALIASES", "powers of units"),
+    "units.py": ("ALIASES USUAL", "powers and sizes of units"),
 }
 
 

@@ -97,6 +97,10 @@ def propose(
     answer = read_json(Path(folder) / "answer.json")
     rivals = contenders(answer)
     model = load_model(str(answer.get("base") or "planning"), rig=True)
+    if model.mechanism.rig:
+        what = f"its model {model.name} is a rig of your own, of kind {model.mechanism.rig}"
+        hint = "tests are designed for a piston with valves and for the robot only"
+        raise KembaError(str(folder), what, hint=hint)
     design = design_rig_test(model, rivals, say, bounded)
     if design is None:
         names = ", ".join(rivals.names)

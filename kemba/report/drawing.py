@@ -132,12 +132,14 @@ def _serve(pipe: Connection, effects: dict[str, str]) -> None:
     import kemba.plotting.draw  # noqa: F401  now, while there is time
 
     load_effects(effects)
-    with suppress(EOFError):  # no more plans
+    with suppress(EOFError, OSError):  # no more plans, or nobody waits any more
         while True:
             order = pipe.recv()
+            error: KembaError | None = None
             try:
                 draw_plan(*order)
-            except KembaError as error:
-                pipe.send(error)
-            else:
-                pipe.send(None)
+            except KembaError as found:
+                error = found
+            except Exception:  # the first process tries once more, and tells what is wrong
+                return
+            pipe.send(error)

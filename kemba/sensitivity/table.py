@@ -17,7 +17,6 @@ from kemba.sensitivity.figures import Figure, figures
 from kemba.sensitivity.replanned import PlanProgram, Replanned, of_plan, solution
 from kemba.trajectory import Trajectory
 
-DIGITS = 6
 HEADER = (
     "figure", "unit", "value", "step",
     "commands/apex [m]", "commands/touchdown [s]", "commands/end_x [m]", "commands/end_z [m]",
@@ -89,4 +88,4 @@ def _cells(figure: Figure, executed: Executed | None, new: Replanned | None) -> 
 
 
 def _text(number: float | None) -> str:
-    return "" if number is None or number != number else f"{number:.{DIGITS}g}"
+    return "" if number is None or number != number else f"{number:.6g}"

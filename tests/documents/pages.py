@@ -18,6 +18,7 @@ ELSEWHERE = {
     "example-foreign.md": "tests/identify/test_examples.py",
     "gallery.md": "tests/test_examples.py",
     "tutorial.md": "tests/documents/test_tutorial.py",
+    "experiment.md": "tests/identify/test_experiment.py",
 }
 # Commands that make the pages of measurements; they take hours, and are run before a release.
 STUDIES = ("benchmarks.md", "plant.md", "refine.md", "reliability-of-the-program.md")

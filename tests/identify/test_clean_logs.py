@@ -13,6 +13,7 @@ from twin.measure import Sensors
 from kemba.identify.bench.bench_log import prepare
 from kemba.identify.bench.problem import bench_problem
 from kemba.identify.bench.validate import contradictions
+from kemba.identify.compare_logs import compare_logs
 from kemba.identify.logs.limits import limits_of
 from kemba.identify.problem.quantisation import step_of, telling
 from kemba.identify.workflow import discover_logs
@@ -76,6 +77,15 @@ def test_no_effect_is_blamed_for_the_way_a_log_was_taken(
     answer = discover_logs([path])[0]
     assert (answer.verdict, answer.added) == ("missing" if named else "nothing", named)
     assert answer.error_after < 1.7
+
+
+@pytest.mark.slow
+def test_compare_raises_no_alarm_on_a_short_log(tmp_path: Path) -> None:
+    (path,), _ = bench_case(
+        tmp_path, None, seed=947, runs=1, duration=1.5, sensors=Sensors(), tests=("opposed",)
+    )
+    found, _ = compare_logs([path])
+    assert found.tolerable and "does not explain" not in found.sentence
 
 
 def test_readings_that_stand_still_tell_one_thing() -> None:

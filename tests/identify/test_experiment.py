@@ -82,6 +82,14 @@ def test_without_rivals_there_is_nothing_to_separate(tmp_path: Path) -> None:
         contenders({"ranking": []})
 
 
+def test_rigs_of_other_kinds_are_refused(tmp_path: Path) -> None:
+    folder = answer(tmp_path, ("coulomb", "F_c", 1.0), ("viscous", "c", 1.0))
+    data = json.loads((folder / "answer.json").read_text()) | {"base": "drive_rig"}
+    (folder / "answer.json").write_text(json.dumps(data))
+    with pytest.raises(KembaError, match="kind drive"):
+        propose(folder, tmp_path / "next.yaml")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("truth", "other"),
@@ -94,6 +102,7 @@ def test_the_twin_agrees(tmp_path: Path, truth: str, other: str, short_search: N
     first = problem_of(machine.done(FIRST, stroke, tmp_path / "first"), model)
     rivals = fitted(first, (truth, other))
     design = design_rig_test(model, rivals, bounded=False)
-    assert design is not None and design.designed.pace > design.standard.pace
+    assert design is not None
+    assert design.designed.log_s <= 0.5 * design.standard.log_s
     logs = machine.done(design.designed.rig, stroke, tmp_path / "next")
     assert measured_evidence(problem_of(logs, model), rivals, truth, other) > 5.0

@@ -127,12 +127,15 @@ def conditions(problem: Problem, theta: Theta | None = None) -> list[ConditionBi
 
 
 def _tolerant(rows: Rows, region: Texts, window: Windows, found: Tolerant) -> tuple[float, bool]:
-    """Error ratio of what the figures' tolerance leaves; whether it is within the noise, and the
-    figures are not too far off."""
+    """Error ratio of what the figures' tolerance leaves; whether it is within the noise, under each
+    condition nearly so, and the figures are not too far off. One condition of many may be a little
+    worse by chance."""
     if found.q_value < BinSettings.current().false_discoveries:
         return rms(window.sums(found.left)), False
     sums = window.sums(found.left)
-    clean = not any(c.significant for c in condition_bins(rows, region, window.first, sums))
+    fair = CompareSettings.current().fair
+    bins = condition_bins(rows, region, window.first, sums)
+    clean = not any(c.significant and c.ratio > fair for c in bins)
     return rms(sums), clean and rms(sums) <= BinSettings.current().tolerated
 
 

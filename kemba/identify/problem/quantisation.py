@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from kemba.identify.problem.types import Array, Flags, Labels
-from kemba.settings import Settings, setting
-
-LONGEST = 1000  # rows that are looked through at once; a longer rest has more than one row
+from kemba.settings import BY_HAND, Settings, setting
 
 
 class QuantisationSettings(Settings):
@@ -25,6 +23,9 @@ class QuantisationSettings(Settings):
         "steps of so many sigmas of the noise are coarse",
         "literature: below it, noise makes rounding errors independent (Widrow and Kollar 2008)",
         decides=True,
+    )
+    longest: int = setting(
+        1000, "1", "rows at rest that count as one reading; of a longer rest more count", BY_HAND
     )
 
 
@@ -67,7 +68,7 @@ def telling(values: Array, sigma: float) -> Flags:
 
 def _still(level: Labels) -> int:
     """How many of the first readings (n,), counted in steps, keep to one level or to two."""
-    low = np.minimum.accumulate(level[:LONGEST])
-    high = np.maximum.accumulate(level[:LONGEST])
+    level = level[: QuantisationSettings.current().longest]
+    low, high = np.minimum.accumulate(level), np.maximum.accumulate(level)
     moved = high - low > 1
     return int(np.argmax(moved)) if moved.any() else len(moved)
