@@ -104,8 +104,8 @@ def table(records: list[dict[str, Any]]) -> str:
     low, high = report.wilson(hits, count)
     seconds = sorted(r["seconds"] for r in records)[count // 2]
     return (
-        "\n".join(rows)
-        + f"\n\nEvidence in nats. In {hits} of {count} cases the designed test gave at least "
+        "\n".join(rows) + f"\n\n{count} of {2 * len(PAIRS)} cases have run. Evidence in nats. "
+        f"In {hits} of {count} cases the designed test gave at least "
         f"{clear:g} nats for the effect that is there, in at most half the log time of the best "
         f"standard test (95 % interval {100 * low:.0f} to {100 * high:.0f} %). More evidence per "
         f"second of log than the best standard test was expected in {faster} of {count}. One "
