@@ -105,13 +105,6 @@ STORIES: dict[str, Story] = {
         ends={"solve": PLANNED},
     ),
     "execute.md": Story(ends={"--model answer": PLANNED, "review": (0, 1)}),
-    "experiment.md": Story(
-        (
-            logs("log-1.csv", "log-2.csv"),
-            "kemba-opt discover log-1.csv log-2.csv --out answer --no-figure -q",
-        ),
-        ends={"--on robot": (0, 1)},  # there may be no safe motion that tells more
-    ),
     "extending.md": Story(
         (
             of_the_page("extending.md", "python", my_effects_py=0),
