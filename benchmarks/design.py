@@ -95,11 +95,7 @@ def table(records: list[dict[str, Any]]) -> str:
                  f"{d['log_s']:.2f} s", _n(d["expected"]), _n(d["measured"]))  # fmt: skip
         rows.append("| " + " | ".join(cells) + " |")
     count = len(records)
-    hits = sum(
-        r["designed"]["measured"] >= clear
-        and r["designed"]["log_s"] <= 0.51 * r["standard"]["log_s"]
-        for r in records
-    )
+    hits = sum(r["designed"]["measured"] >= clear and _share(r) <= HALF for r in records)
     faster = sum(_pace(r["designed"]) > _pace(r["standard"]) for r in records)
     low, high = report.wilson(hits, count)
     seconds = sorted(r["seconds"] for r in records)[count // 2]
