@@ -22,6 +22,7 @@ blocks:
   a:
     kind: solve
     task: jump.yaml
+    set: {nodes: 200, refine: none}
     cases: 4
     vary: {height: {low: 0.4 m, high: 0.5 m}}
 """
@@ -115,7 +116,8 @@ def test_a_real_sweep_is_solved_and_not_repeated(
     """Two jumps on a local worker; the second time everything is there already."""
     monkeypatch.chdir(tmp_path)
     Path("s.yaml").write_text(
-        SWEEP.replace("jump.yaml", "max_jump.yaml\n    set: {nodes: 24, refine: none}")
+        SWEEP.replace("jump.yaml", "max_jump.yaml")
+        .replace("nodes: 200", "nodes: 24")
         .replace("cases: 4", "cases: 2")
         .replace("0.4 m", "0.8 m")
         .replace("0.5 m", "0.9 m")

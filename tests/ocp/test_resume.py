@@ -31,13 +31,13 @@ posix = pytest.mark.skipif(os.name != "posix", reason="sends SIGINT")
 
 
 def solve(*arguments: str) -> Result:
-    return CliRunner().invoke(app, ["solve", "--no-figure", "--no-replay", *arguments])
+    return CliRunner().invoke(app, ["solve", "--no-figure", "--no-replay", "--cold", *arguments])
 
 
 def started(folder: Path, *arguments: str) -> subprocess.Popen[str]:
     """`kemba-opt solve` in a process of its own."""
     code = "from kemba_cli.main import main; main()"
-    command = [sys.executable, "-u", "-c", code, "solve", "jump", "--no-figure"]
+    command = [sys.executable, "-u", "-c", code, "solve", "jump", "--no-figure", "--cold"]
     command += ["--out", str(folder), *arguments]
     return subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=folder.parent
