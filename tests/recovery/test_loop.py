@@ -70,7 +70,6 @@ def answered(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.slow
-@pytest.mark.xdist_group("loop")  # one answer for all of them
 def test_the_error_falls_on_the_run_that_was_kept(answered: Path) -> None:
     answer = json.loads((answered / "answer" / "answer.json").read_text("utf-8"))
     assert answer["added"] == [HIDDEN], answer["sentence"]
@@ -82,7 +81,6 @@ def test_the_error_falls_on_the_run_that_was_kept(answered: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.xdist_group("loop")  # one answer for all of them
 def test_a_rival_is_adopted_and_does_worse(answered: Path) -> None:
     answer = json.loads((answered / "answer" / "answer.json").read_text("utf-8"))
     rival = answer["ranking"][1]["effect"]
@@ -96,7 +94,6 @@ def test_a_rival_is_adopted_and_does_worse(answered: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.xdist_group("loop")  # one answer for all of them
 def test_the_next_plan_has_the_effect_in_it(answered: Path) -> None:
     """The same hop is planned for the machine found, and comes out another one."""
     found = answered / "answer" / "model.yaml"
