@@ -27,7 +27,7 @@ from kemba.plant.execution.replay import replay
 from kemba.settings import changed
 
 CASES = [
-    ("jump", "height=0.35 m"),
+    ("jump", "height=0.47 m"),
     ("jump", "height=0.5 m"),
     ("jump", "height=0.65 m"),
     ("jump", "height=0.7 m"),
