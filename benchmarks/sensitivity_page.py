@@ -45,15 +45,15 @@ times the usual iterations. No value leaves the range in which it has a meaning:
 """
 FOUND = """## What was found
 
-- **`discover`**: of the settings in the table, two changed a verdict, both on bench case 10, in which
+- **`discover`**: of the settings in the table, two changed a verdict, both on bench case 10, where
   nothing is missing. With secants of switches twice as long (`StepSettings.switch`) it was called
   unknown: that is the step of a finite difference, long enough for effects that act from a
   threshold on, short enough for effects that bend. With nominal figures allowed half of their
   tolerance (`SpikeSlabSettings.tolerances`), their scatter was taken for a sensor's scale: these
   tolerances are what was drawn, so half of them is wrong by construction.
-- **Plans**: how `stand` ends depends on two barrier parameters (one half, one double: five times the
-  usual iterations); all other settings of the stages change its cost only (column *cost*). The
-  program has many local optima, and each change may lead to another one. No threshold can be
+- **Plans**: how `stand` ends depends on two barrier parameters (one half, one double: five times
+  the usual iterations); all other settings of the stages change its cost only (column *cost*).
+  The program has many local optima, and each change may lead to another one. No threshold can be
   derived that avoids this. What helps is to begin from plans that are known to be cheap
   ([shipped plans](shipped-plans.md)), or from several starts (`kemba-opt solve TASK --starts 4`).
 - **`compare`**: the largest error ratio of a good model (1.15) and the largest error of a figure
