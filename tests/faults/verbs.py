@@ -80,9 +80,13 @@ VERBS = {
 
 
 def contents(folder: Path, patterns: tuple[str, ...]) -> dict[str, Any]:
-    """What the result files of a folder say, without what varies from run to run."""
+    """What the result files of a folder say, without what varies from run to run.
+
+    Hidden files are no results: a write that was killed may leave one.
+    """
     found: dict[str, Any] = {}
-    for file in (file for pattern in patterns for file in sorted(folder.glob(pattern))):
+    files = [file for pattern in patterns for file in sorted(folder.glob(pattern))]
+    for file in (file for file in files if not file.name.startswith(".")):
         name = str(file.relative_to(folder))
         if file.suffix == ".json":
             found[name] = _lasting(json.loads(file.read_text(encoding="utf-8")))
