@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -88,7 +89,10 @@ def test_missing_cases_are_a_bad_answer(sweep: Any, done_before: list[Path]) -> 
 def test_interruption_leaves_a_table(sweep: Any, done_before: list[Path]) -> None:
     done_before[1].unlink()
     command = [sys.executable, "-c", "from kemba_cli.main import main; main()"]
-    with subprocess.Popen([*command, "sweep", "s.yaml", "--jobs", "1", "-q"]) as client:
+    command += ["sweep", "s.yaml", "--jobs", "1", "-q"]
+    # tests that run in the background of a shell ignore this signal, and so do their children
+    usual = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
+    with subprocess.Popen(command, preexec_fn=usual) as client:
         deadline = time.monotonic() + 120
         while not _works(client.pid):
             assert client.poll() is None and time.monotonic() < deadline
