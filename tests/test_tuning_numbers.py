@@ -54,7 +54,7 @@ CONSTANTS = {  # file -> names, why
     "plant/execution/repeat.py": ("VALVE_SCATTER", "scatter of the robot's valves"),
     "plant/execution/controller.py": ("PERIOD", "rate of the robot's controller"),
     "ocp/controller.py": ("PERIOD", "rate of the robot's controller"),
-    "ocp/library/kind.py": ("LETTERS", "length of a fingerprint"),
+    "ocp/shipped/kind.py": ("LETTERS", "length of a fingerprint"),
     "effects/rigs/axis.py": ("PLATE", "tolerance of an effect's figures"),
     "effects/mechanics/geometry.py": ("SIZES", "sizes of an effect's parameters"),
     "mechanism/own_rigs.py": ("GRAVITY", "of the earth"),

@@ -104,6 +104,6 @@ def plan(
         starts=starts,
         replay=replay,
         figure=False,
-        library=not cold,
+        cold=cold,
     )
     return Planned(folder.path, answer)

@@ -6,8 +6,8 @@ from typing import Any
 
 from kemba.ocp.certificate.objective import objective
 from kemba.ocp.certificate.status import Status
-from kemba.ocp.library.shelf import Near, neighbours
 from kemba.ocp.planned import Plan
+from kemba.ocp.shipped.shelf import Near, neighbours
 
 
 def compared(found: Plan) -> tuple[dict[str, Any] | None, str]:

@@ -42,7 +42,7 @@ class Plan:
     relax: tuple[Relax, ...] = ()
     refined: bool = False
     continued: bool | None = None  # whether it comes from an earlier plan, where one was given
-    start: str = "guess"  # or the plan of the library from which it begins
+    start: str = "guess"  # or the shipped plan from which it begins
 
     @property
     def iterations(self) -> int:

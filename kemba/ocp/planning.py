@@ -18,14 +18,14 @@ from kemba.ocp.continued import continued, from_scratch
 from kemba.ocp.infeasibility.checks import check_task
 from kemba.ocp.infeasibility.diagnostic import Diagnostic
 from kemba.ocp.infeasibility.explain import Explanation, explanation, refusal
-from kemba.ocp.library.entry import Entry
-from kemba.ocp.library.shelf import Near, neighbours
 from kemba.ocp.nlp.ipopt import Control
 from kemba.ocp.nlp.watcher import Watch
 from kemba.ocp.planned import Plan, clear, explained
 from kemba.ocp.planner import Planner, searched
 from kemba.ocp.refined import refined
 from kemba.ocp.relaxation.session import Session
+from kemba.ocp.shipped.entry import Entry
+from kemba.ocp.shipped.shelf import Near, neighbours
 from kemba.ocp.task.requirement import Requirement, resolve
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.symmetry import whole
@@ -79,9 +79,9 @@ def plans_nearby(
     watch: Watch | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> Iterator[Plan]:
-    """Plans of a task that begin from near plans of the library, the nearest one first.
+    """Plans of a task that begin from near shipped plans, the nearest one first.
 
-    Only solved ones; none where the library has none that is near, or the task cannot be met.
+    Only solved ones; none where no shipped plan is near, or the task cannot be met.
     Raises ConfigErrors as `plan` does.
     """
     job = _job(task, document, None, Control(_deadline(task), log, watch, stop), tell)
@@ -90,13 +90,13 @@ def plans_nearby(
     for near in neighbours(task, job.planner.model)[: Near.current().tried]:
         found, _ = continued(job.planner, _origin(near.entry, task))
         if found is not None and found.status is Status.SOLVED:
-            yield replace(found, continued=None, start=f"library: {near.entry.name}")
+            yield replace(found, continued=None, start=f"shipped: {near.entry.name}")
         if job.planner.session.control.ended() is not None:
             return
 
 
 def _origin(entry: Entry, task: Task) -> Origin:
-    """A plan of the library with its model and what was asked of it: the task with its figures."""
+    """A shipped plan with its model and what was asked of it: the task with its figures."""
     own = task.model_copy(update=entry.figures)
     model = task_model(own)
     asked = resolve(own, model, Document(own.model_dump()))

@@ -49,13 +49,13 @@ def solve_into(
     figure: bool = True,
     origin: Origin | None = None,
     drawer: Drawer | None = None,
-    library: bool = True,
+    cold: bool = False,
 ) -> dict[str, Any]:
     """Solve `task` and fill its run folder; returns the JSON of `solve`.
 
     `start`: a trajectory to begin from. `starts`, `jobs`: how many start guesses, on how many
-    cores. `origin`: an earlier plan to continue for the changed figures. `library`: where none of
-    these is given, begin from the shipped plans that are near. `replay`: execute the plan on the
+    cores. `origin`: an earlier plan to continue for the changed figures. Where none of
+    these is given, shipped plans that are near come first, unless `cold`. `replay`: execute the plan on the
     same model and on the plant, and compare both with the task's tolerances; a plan that misses
     them is `acceptable`, not `solved`. `drawer`: what draws the figure, this process when it is
     None. Raises KembaError where the task or a file is wrong; the manifest then says `failed`.
@@ -63,7 +63,7 @@ def solve_into(
     dump_yaml(task.model_dump(exclude_none=True), folder / "task.yaml")
     log = folder / "solver.log"
     how = {"tell": listener.tell, "watch": listener.watch, "stop": listener.stop}
-    shelved = library and start is None and origin is None
+    shelved = not cold and start is None and origin is None
 
     def nearby(task: Task) -> Iterator[Plan]:
         return plans_nearby(task, document, log, **how) if shelved else iter(())  # type: ignore[arg-type]

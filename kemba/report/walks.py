@@ -1,4 +1,4 @@
-"""How the library of plans is made: one plan continued along one figure, step by step."""
+"""How shipped plans are made: one plan continued along one figure, step by step."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from kemba.ocp import Plan, Task, controller_table, load_task, plan
 from kemba.ocp.certificate.objective import objective
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.continuation.between import Origin
-from kemba.ocp.library.entry import read_plan, write_plan
-from kemba.ocp.library.kind import FIGURES, figures_of, kind_of
 from kemba.ocp.planning import plan_from, task_model
+from kemba.ocp.shipped.entry import read_plan, write_plan
+from kemba.ocp.shipped.kind import FIGURES, figures_of, kind_of
 from kemba.ocp.task.requirement import resolve
 from kemba.plant.execution.certificate import executions, summaries
 from kemba.plant.execution.counterpart import counterpart

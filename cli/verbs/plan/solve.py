@@ -112,7 +112,7 @@ def solve(
         listener = Listener(progress.tell, progress.watch, stop)
         answer = solve_into(
             folder, resolved, document, listener, start, starts, jobs, replay, figure, origin,
-            drawing, library=not cold,
+            drawing, cold=cold,
         )  # fmt: skip
     if json:
         print_json(answer)

@@ -12,18 +12,18 @@ from typer.testing import CliRunner
 from kemba.config import shipped_folder
 from kemba.ocp import load_task, task_model
 from kemba.ocp.continuation.renoded import renoded
-from kemba.ocp.library.entry import Entry, read_plan, write_plan
-from kemba.ocp.library.kind import kind_of
-from kemba.ocp.library.shelf import Near, Neighbour, neighbours, shelf
 from kemba.ocp.phases.modes import Phase
 from kemba.ocp.phases.notes import noted_phases
+from kemba.ocp.shipped.entry import Entry, read_plan, write_plan
+from kemba.ocp.shipped.kind import kind_of
+from kemba.ocp.shipped.shelf import Near, Neighbour, neighbours, shelf
 from kemba.ocp.transcription.symmetry import find_symmetry
 from kemba.ocp.transcription.unilateral import read_constraints
 from kemba.trajectory import Trajectory
 from kemba_cli.main import app
 
-SHELF = shipped_folder("library")
-STALE = "made for another robot or task: python benchmarks/library.py"
+SHELF = shipped_folder("plans")
+STALE = "made for another robot or task: python benchmarks/shipped_plans.py"
 
 
 def near(name: str, *options: str) -> list[Neighbour]:
@@ -119,7 +119,7 @@ def test_a_near_task_begins_from_a_shipped_plan(tmp_path: Path) -> None:
     answer = json.loads(done.stdout)
     assert done.exit_code == 0, answer["sentence"]
     start = answer["start"]
-    assert start.startswith("library: ") and start.removeprefix("library: ") in answer["sentence"]
+    assert start.startswith("shipped: ") and start.removeprefix("shipped: ") in answer["sentence"]
     assert answer["best_known"]["plan"] in start and answer["best_known"]["cost"] > 0.0
     assert json.loads((run / "manifest.json").read_text())["start"] == start
     assert answer["iterations"] < 150

@@ -12,8 +12,8 @@ import numpy as np
 
 from kemba.config import shipped_folder
 from kemba.model import Model
-from kemba.ocp.library.entry import Entry
-from kemba.ocp.library.kind import FIGURES, figures_of, kind_of
+from kemba.ocp.shipped.entry import Entry
+from kemba.ocp.shipped.kind import FIGURES, figures_of, kind_of
 from kemba.ocp.task.task import Task
 from kemba.settings import Settings, setting
 
@@ -29,7 +29,7 @@ class Near(Settings):
     supply: float = setting(0.1e6, "Pa", "supply pressure", TRIED)
     payload: float = setting(0.5, "kg", "at the body's centre", TRIED)
     duration: float = setting(0.15, "s", "nominal", TRIED)
-    tried: int = setting(2, "1", "plans of the library from which a task is begun, at most",
+    tried: int = setting(2, "1", "shipped plans from which a task is begun, at most",
                          "convention: a plan from a guess costs about as much")  # fmt: skip
 
     dear: float = setting(
@@ -58,12 +58,12 @@ def neighbours(task: Task, model: Model, folder: Path | None = None) -> list[Nei
     """The shipped plans near a task, the nearest first; none for another robot or kind of task.
 
     A task that asks for its own start (`guess_noise`, `seed`), another method or no refinement
-    has none. `folder`: another library.
+    has none. `folder`: where other plans are.
     """
     own = task.method == "relaxation" and task.refine == "radau"
     if not own or task.guess_noise or task.seed or task.guess != "automatic":
         return []
-    kept = shelf(folder or shipped_folder("library"))
+    kept = shelf(folder or shipped_folder("plans"))
     kind = kind_of(task, model) if kept else ""
     asked, near = figures_of(task, model), Near.current()
     found = [Neighbour(e, near.away(asked, e.figures)) for e in kept if e.kind == kind]
@@ -72,7 +72,7 @@ def neighbours(task: Task, model: Model, folder: Path | None = None) -> list[Nei
 
 @cache
 def shelf(folder: Path) -> Sequence[Entry]:
-    """The plans of a library's folder, by its index; none where there is no library."""
+    """The plans of a folder, by its index; none where there is no index."""
     index = folder / INDEX
     if not index.is_file():
         return ()

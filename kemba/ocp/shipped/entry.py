@@ -18,7 +18,7 @@ KEPT = ("phase_constraints", "phases")
 
 @dataclass(frozen=True)
 class Entry:
-    """A plan of the library.
+    """A shipped plan.
 
     `kind`: fingerprint of its task and model (`kind_of`). `figures`: height [m], distance [m],
     supply [Pa], payload [kg], duration [s], as far as the task has them. `cost`: what its task

@@ -1,8 +1,8 @@
-"""The library of plans made anew: python benchmarks/library.py [--jobs N] [--choose].
+"""The shipped plans made anew: python benchmarks/shipped_plans.py [--jobs N] [--choose].
 
-Walks of `configs/library/walks.yaml` are done on a local Dask cluster, those of one round side by
+Walks of `configs/plans/walks.yaml` are done on a local Dask cluster, those of one round side by
 side; a walk that is done is not repeated. Of all plans of the same figures the cheapest one is kept
-whose executions keep to the task's tolerances. Writes `configs/library/*.npz` and `plans.csv`,
+whose executions keep to the task's tolerances. Writes `configs/plans/*.npz` and `plans.csv`,
 and the page `docs/shipped-plans.md`.
 """
 
@@ -20,8 +20,8 @@ from typing import Any
 
 from kemba.config import load_yaml, shipped_folder
 from kemba.ocp import load_task, task_model
-from kemba.ocp.library.kind import FIGURES, kind_of
-from kemba.ocp.library.shelf import INDEX
+from kemba.ocp.shipped.kind import FIGURES, kind_of
+from kemba.ocp.shipped.shelf import INDEX
 from kemba.sweep.cases.case import Case
 from kemba.sweep.workers.farm import run_cases
 
@@ -31,18 +31,18 @@ HEAD = """\
 # Shipped plans
 
 `kemba-opt solve` begins from these plans where its task differs from one of them only by the
-figures of this table, and only a little (`kemba/ocp/library/shelf.py` says how much). See
+figures of this table, and only a little (`kemba/ocp/shipped/shelf.py` says how much). See
 [solving](solving.md#from-a-shipped-plan). They were continued from plans that were found from a
 guess. Of {tried} plans, the cheapest of each row was kept whose executions keep to the task's
 tolerances, also on the full plant. `of`: among how many. Errors are those on the plant.
-Written by `benchmarks/library.py` on {machine}.
+Written by `benchmarks/shipped_plans.py` on {machine}.
 
 """
 
 
 def walked(jobs: int | None, folder: Path) -> None:
     """Every walk that is not done yet, round by round."""
-    for walks in load_yaml(shipped_folder("library") / "walks.yaml").data["rounds"]:
+    for walks in load_yaml(shipped_folder("plans") / "walks.yaml").data["rounds"]:
         cases = [_case(walk, folder) for walk in walks]
         run_cases(cases, folder, jobs=jobs, tell=lambda case, record: print(
             case.values["name"], record["sentence"], f"{record['cpu_s']:.0f} s", flush=True
@@ -51,7 +51,7 @@ def walked(jobs: int | None, folder: Path) -> None:
 
 def choose(folder: Path) -> None:
     """The best plans to the shelf, its index and its page."""
-    shelf = shipped_folder("library")
+    shelf = shipped_folder("plans")
     found = [_facts(path) for path in sorted((folder / "plans").glob("*.json"))]
     chosen = best(found)
     for old in shelf.glob("*.npz"):
@@ -94,7 +94,7 @@ def best(found: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def write_index(path: Path, chosen: list[dict[str, Any]]) -> None:
-    """The table that `kemba.ocp.library.shelf` reads."""
+    """The table that `kemba.ocp.shipped.shelf` reads."""
     with path.open("w", encoding="utf-8", newline="") as stream:
         rows = csv.writer(stream, lineterminator="\n")
         rows.writerow(["file", "kind", *FIGURES, "cost", "of"])
@@ -126,7 +126,9 @@ def page(chosen: list[dict[str, Any]], tried: int) -> str:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--jobs", type=int, help="workers; by default the cores")
-    parser.add_argument("--folder", type=Path, default=Path("runs/library"), help="kept results")
+    parser.add_argument(
+        "--folder", type=Path, default=Path("runs/shipped-plans"), help="kept results"
+    )
     parser.add_argument("--choose", action="store_true", help="walk no further")
     words = parser.parse_args()
     if not words.choose:
