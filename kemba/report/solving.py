@@ -54,8 +54,8 @@ def solve_into(
     """Solve `task` and fill its run folder; returns the JSON of `solve`.
 
     `start`: a trajectory to begin from. `starts`, `jobs`: how many start guesses, on how many
-    cores. `origin`: an earlier plan to continue for the changed figures. Where none of
-    these is given, shipped plans that are near come first, unless `cold`. `replay`: execute the plan on the
+    cores. `origin`: an earlier plan to continue for the changed figures. Where none of these is
+    given, shipped plans that are near come first, unless `cold`. `replay`: execute the plan on the
     same model and on the plant, and compare both with the task's tolerances; a plan that misses
     them is `acceptable`, not `solved`. `drawer`: what draws the figure, this process when it is
     None. Raises KembaError where the task or a file is wrong; the manifest then says `failed`.
