@@ -112,11 +112,5 @@ def propose(
 
 
 def _figures(judged: Judged) -> dict[str, Any]:
-    """Name, expected evidence against each rival, and log time of a test."""
-    return {
-        "rig": judged.rig.name,
-        "nats": judged.evidence.least,
-        "nats_by_rival": dict(judged.evidence.nats),
-        "log_s": judged.log_s,
-        "nats_per_s": judged.pace,
-    }
+    """Name of a test, and what it is expected to give."""
+    return {"rig": judged.rig.name, **judged.evidence.json(judged.log_s)}

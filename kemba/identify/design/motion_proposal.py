@@ -72,6 +72,7 @@ class MotionProposal:
 
     def json(self) -> dict[str, Any]:
         """The figures behind the sentence; `designed` and `standard` have the same keys."""
+        standard = self.design.standard
         return {
             "motion": "sway",
             "nats": self.nats,
@@ -80,8 +81,8 @@ class MotionProposal:
             "strength": strength(self.nats),
             "log_s": self.best.log_s,
             "repeats": self.repeats,
-            "designed": _figures(self.best),
-            "standard": _figures(self.design.standard),
+            "designed": self.best.evidence.json(self.best.log_s),
+            "standard": standard.evidence.json(standard.log_s),
             "tried": self.design.tried,
         }
 
@@ -118,13 +119,3 @@ def propose_motion(
     found = MotionProposal(model, base, rivals, design)
     found.write(out, found.best)
     return found
-
-
-def _figures(tried: Tried) -> dict[str, Any]:
-    """Expected evidence against each rival, and log time of a motion."""
-    return {
-        "nats": tried.evidence.least,
-        "nats_by_rival": dict(tried.evidence.nats),
-        "log_s": tried.log_s,
-        "nats_per_s": tried.pace,
-    }

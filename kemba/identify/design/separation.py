@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -42,6 +43,15 @@ class Separation:
         """What a search makes large: evidence counts most where there is little of it."""
         clear = ExperimentSettings.current().clear
         return float(sum(np.log1p(n / clear) for n in self.nats.values()))
+
+    def json(self, log_s: float) -> dict[str, Any]:
+        """The figures for logs of `log_s` [s]."""
+        return {
+            "nats": self.least,
+            "nats_by_rival": dict(self.nats),
+            "log_s": log_s,
+            "nats_per_s": self.least / log_s,
+        }
 
 
 def separation(problem: Problem, rivals: Rivals) -> Separation | None:
