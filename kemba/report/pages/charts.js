@@ -75,7 +75,7 @@ function charts(data) {
         { ...axis, size: last ? 34 : 8, values: (u, ticks) => ticks.map((t, i) => (last ? +t.toFixed(4) + (i === ticks.length - 1 ? " s" : "") : "")) },
         { ...axis, size: AXIS, space: chart.small ? 12 : 26,
           splits: bars ? names : undefined,
-          values: bars ? () => chart.rows.map((row) => row.label) : undefined },
+          values: (u, ticks) => (bars ? chart.rows.map((row) => row.label) : ticks.map((t) => `${+t.toPrecision(6)}`)) },
       ],
       series, bands,
       hooks: {
