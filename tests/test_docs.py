@@ -82,6 +82,12 @@ def test_files_that_are_named_exist(page: Path) -> None:
         assert (ROOT / name).exists(), f"{page.name}: {name}"
 
 
+def test_pages_that_the_code_names_exist() -> None:
+    for file in [*(ROOT / "kemba").rglob("*.py"), *(ROOT / "cli").rglob("*.py")]:
+        for page in re.findall(r"docs/[\w-]+\.md", file.read_text("utf-8")):
+            assert (ROOT / page).exists(), f"{file.name}: {page}"
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_links_lead_somewhere(page: Path) -> None:
     for link in re.findall(r"\]\(([^)#:]+)(?:#[\w-]+)?\)", page.read_text("utf-8")):

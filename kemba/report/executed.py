@@ -11,12 +11,10 @@ from kemba.ocp import Plan, controller_table
 from kemba.ocp.certificate.objective import objective
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.report import answer, sentence_of
-from kemba.plant.execution.certificate import executions, plant_run, summaries
-from kemba.plant.execution.counterpart import another_robot, counterpart
-from kemba.plant.execution.replay import ends_standing
+from kemba.plant.execution.counterpart import another_robot
 from kemba.plant.execution.retiming import retimed
 from kemba.report.drawing import Drawer
-from kemba.report.verdict import verdicts
+from kemba.report.judged import judged
 from kemba.runs import RunFolder
 from kemba.stopwatch import Tell
 from kemba.trajectory import Trajectory
@@ -94,23 +92,18 @@ def _replayed(
     """
     task = found.task
     try:
-        plant = counterpart(task.model, task.payload, task.supply, task.plant, changes=task.effects)
         other = another_robot(task.model, task.plant)
-        done = executions(found.model, found.trajectory, table, plant, tell)
+        done = judged(found, table, tell=tell)
     except KembaError as error:  # a model that the simulator cannot execute still has its plan
         return _unconfirmed(found, f"it cannot be simulated: {error}"), None
-    executed = summaries(found.model, done)
-    there = done["plant_replay"]
-    motion = plant_run(there) if there else None
-    lands = bool(ends_standing(found.model, found.trajectory))
     names = [f"the plant is another robot, {other}, which {task.plant} names"] if other else []
-    judged = verdicts(executed, task.tolerances, lands).values()
-    if all(verdict.good for verdict in judged):
-        parts = [sentence_of(found), *names, *(verdict.sentence for verdict in judged)]
-        return {**executed, "sentence": "; ".join(parts)}, motion
-    causes = [verdict.sentence for verdict in judged if not verdict.good]
-    matches = [verdict.sentence for verdict in judged if verdict.good]
-    return {**executed, **_unconfirmed(found, " and ".join(causes), [*names, *matches])}, motion
+    matches = [verdict.sentence for verdict in done.verdicts.values() if verdict.good]
+    if done.good:
+        sentence = "; ".join([sentence_of(found), *names, *matches])
+        return {**done.facts, "sentence": sentence}, done.motion
+    causes = [verdict.sentence for verdict in done.verdicts.values() if not verdict.good]
+    failed = _unconfirmed(found, " and ".join(causes), [*names, *matches])
+    return {**done.facts, **failed}, done.motion
 
 
 def _unconfirmed(found: Plan, cause: str, remarks: Sequence[str] = ()) -> dict[str, Any]:

@@ -5,20 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
-from kemba.model import Model
-from kemba.ocp import Plan, Task, controller_table
+from kemba.ocp import Plan, Task
 from kemba.ocp.certificate.status import Status
-from kemba.plant.execution.certificate import executions, summaries
-from kemba.plant.execution.counterpart import counterpart
-from kemba.plant.execution.replay import ends_standing
-from kemba.plant.execution.retiming import retimed
-from kemba.report.verdict import verdicts
+from kemba.report.judged import judged, plant_of, table_of
 from kemba.settings import Settings, setting
 from kemba.sweep.scenarios.draw import scenarios
 from kemba.sweep.scenarios.share import Share, share
 from kemba.trajectory import Trajectory
 
-TRIALS = "tuned: by hand on jumps of 0.36 to 0.9 m (docs/robust.md), no benchmark"
+TRIALS = "tuned: by hand on jumps of 0.36 to 0.9 m (docs/tasks.md), no benchmark"
 
 
 class RobustSettings(Settings):
@@ -27,7 +22,7 @@ class RobustSettings(Settings):
     enough: float = setting(0.98, "1", "share of scenarios at which no other plan is tried", TRIALS)
     hold: float = setting(
         0.3, "s", "hold of a plan whose task has none",
-        "derived: a robot that was put down askew has settled by then (docs/robust.md)",
+        "derived: a robot that was put down askew has settled by then (docs/tasks.md)",
     )  # fmt: skip
     air: float = setting(0.3, "1", "cost of open valves of a candidate that has less", TRIALS)
     noise: float = setting(0.1, "1", "guess noise of other starts", TRIALS)
@@ -81,7 +76,7 @@ def most_robust(
     failed one. Raises KembaError where the plant or the uncertainties are wrong.
     """
     settings = RobustSettings.current()
-    plant = counterpart(task.model, task.payload, task.supply, task.plant)
+    plant = plant_of(task)
     cases = scenarios(task.uncertainties, plant, task.robust)
     best: Candidate | None = None
     failed: Plan | None = None
@@ -94,11 +89,10 @@ def most_robust(
             continue
         for hold in sorted({variant.hold, max(variant.hold, settings.hold)}):
             held = replace(found, task=variant.model_copy(update={"hold": hold}))
-            table = controller_table(held.model, held.trajectory, hold)
-            table = retimed(held.model, held.trajectory, table)
+            table = table_of(held)
             landed = share(held.model, held.trajectory, table, cases)
             tell(f"{name}, hold {hold:g} s: {landed.sentence}")
-            one = Candidate(held, table, landed, _good(held, table, plant))
+            one = Candidate(held, table, landed, judged(held, table, plant).good)
             if best is None or one.rank > best.rank:
                 best = one
             if best.enough:
@@ -107,12 +101,3 @@ def most_robust(
         return best
     assert failed is not None
     return Candidate(failed)
-
-
-def _good(found: Plan, table: Trajectory, plant: Model) -> bool:
-    """Whether all executions of a plan keep to its task's tolerances."""
-    done = executions(found.model, found.trajectory, table, plant)
-    lands, t = bool(ends_standing(found.model, found.trajectory)), found.task
-    facts = summaries(found.model, done)
-    judged = verdicts(facts, t.tolerances, lands)
-    return all(verdict.good for verdict in judged.values())

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from kemba.files import write_json
-from kemba.ocp import Plan, Task, controller_table, load_task, plan
+from kemba.ocp import Plan, Task, load_task, plan
 from kemba.ocp.certificate.objective import objective
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.continuation.between import Origin
@@ -16,11 +16,7 @@ from kemba.ocp.planning import plan_from, task_model
 from kemba.ocp.shipped.entry import read_plan, write_plan
 from kemba.ocp.shipped.kind import FIGURES, figures_of, kind_of
 from kemba.ocp.task.requirement import resolve
-from kemba.plant.execution.certificate import executions, summaries
-from kemba.plant.execution.counterpart import counterpart
-from kemba.plant.execution.replay import ends_standing
-from kemba.plant.execution.retiming import retimed
-from kemba.report.verdict import verdicts
+from kemba.report.judged import judged, table_of
 
 PATIENT = "solver.time_limit=3600 s"
 
@@ -48,7 +44,7 @@ def walk(work: Mapping[str, Any]) -> dict[str, Any]:
             told.append(f"{value}: none")
             continue
         origin = Origin(found.trajectory, found.model, found.requirements, once=True)
-        facts = judged(found) | {"task": work["task"], "set": list(work["set"]), "by": work["name"]}
+        facts = record(found) | {"task": work["task"], "set": list(work["set"]), "by": work["name"]}
         told.append(f"{value}: {facts['cost']:.3g}{'' if facts['good'] else ' (bad)'}")
         name = f"{work['name']}-{1e3 * float(str(value).split()[0]):04.0f}"
         write_plan(folder / f"{name}.npz", found.trajectory, found.model)
@@ -56,21 +52,17 @@ def walk(work: Mapping[str, Any]) -> dict[str, Any]:
     return {"status": "walked", "good": True, "sentence": "; ".join(told)}
 
 
-def judged(found: Plan) -> dict[str, Any]:
+def record(found: Plan) -> dict[str, Any]:
     """Kind, figures and cost of a plan, and whether its executions keep to the tolerances."""
     task, model = found.task, found.model
-    table = controller_table(model, found.trajectory, task.hold)
-    table = retimed(model, found.trajectory, table)
-    plant = counterpart(task.model, task.payload, task.supply, task.plant)
-    done = summaries(model, executions(model, found.trajectory, table, plant))
-    lands = bool(ends_standing(model, found.trajectory))
+    done = judged(found, table_of(found))
     return {
         "kind": kind_of(task, model),
         "figures": figures_of(task, model),
         "cost": objective(model, task, found.requirements, found.trajectory),
         **found.cost,
-        "plant": done["plant_replay"],
-        "good": all(v.good for v in verdicts(done, task.tolerances, lands).values()),
+        "plant": done.facts["plant_replay"],
+        "good": done.good,
     }
 
 
