@@ -15,7 +15,7 @@ from program import load
 from scipy.stats import kstest
 
 from kemba.config import load_yaml
-from kemba.sweep.table.summary import wilson
+from kemba.scenarios.rate import wilson
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "reliability-of-the-program.md"

@@ -17,8 +17,8 @@ import numpy as np
 
 from kemba.config import load_yaml
 from kemba.files import atomic_text, read_json
+from kemba.scenarios.rate import wilson
 from kemba.sweep.table.influence import with_sizes
-from kemba.sweep.table.summary import wilson
 from kemba.units import read_si
 
 CARD = Path(__file__).resolve().parent.parent / "docs" / "robustness.md"

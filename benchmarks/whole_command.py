@@ -29,7 +29,7 @@ STAGES = {
     "from a shipped plan": ("kemba.ocp.planning", "continued"),
     "refinement": ("kemba.ocp.refined", "on_phases"),
     "table": ("kemba.report.executed", "retimed"),
-    "replays": ("kemba.report.executed", "_replayed"),
+    "replays": ("kemba.report.executed", "judged"),
     "files": ("kemba.report.solving", "_write"),
     "figure": ("kemba.report.drawing", "draw_plan"),
 }

@@ -20,7 +20,7 @@ SCHEMAS = {
     "robots": "kemba.mechanism.links:RobotFile",
     "cylinders": "kemba.mechanism.cylinder:CylinderTable",
     "sweeps": "kemba.sweep.cases.schema:Sweep",
-    "uncertainties": "kemba.sweep.scenarios.draw:Uncertainties",
+    "uncertainties": "kemba.scenarios.draw:Uncertainties",
     "rigs": "kemba.plant.rig.bench:RigFile",
     "maps": "kemba.logs.columns:ColumnMap",
 }

@@ -14,7 +14,7 @@ from kemba.effects import BY_KIND
 from kemba.files import read_json
 from kemba.model.spec import model_files
 from kemba.ocp import Task, load_task
-from kemba.report import Listener, solve_into
+from kemba.report import Approach, Listener, solve_into
 from kemba.runs import Run, RunFolder, load_run
 from kemba.stopwatch import Tell, silent
 from kemba.trajectory import Trajectory
@@ -101,9 +101,7 @@ def plan(
         resolved,
         document,
         Listener(progress),
-        starts=starts,
-        replay=replay,
+        Approach(starts=starts, replay=replay, cold=cold),
         figure=False,
-        cold=cold,
     )
     return Planned(folder.path, answer)

@@ -28,7 +28,7 @@ from kemba.plant.execution.certificate import rest_after
 from kemba.plant.execution.controller import execute
 from kemba.plant.execution.replay import ends_standing
 from kemba.plotting.robot.machine import Machine, load_machine
-from kemba.report import Listener, solve_into
+from kemba.report import Approach, Listener, solve_into
 from kemba.report.earlier import origin_of
 from kemba.report.verdict import verdicts
 from kemba.runs import Run, RunFolder, write_json
@@ -210,7 +210,7 @@ def _planned(
     }
     folder.manifest |= entry(past, facts)
     origin = origin_of(past.runs[past.last].path)
-    result = solve_into(folder, task, document, listener, origin=origin)
+    result = solve_into(folder, task, document, listener, Approach(origin=origin))
     result = {**result, "confirmed": _confirmed(result, task, folder / "trajectory.csv")}
     found = replace(found, result=result)
     if (folder / "controller.csv").is_file() and result["status"] != "infeasible":

@@ -1,5 +1,6 @@
 """What verbs write: run folders filled with results, certificates and figures."""
 
-from kemba.report.solving import Listener, solve_into
+from kemba.report.best import Approach, Listener
+from kemba.report.solving import solve_into
 
-__all__ = ["Listener", "solve_into"]
+__all__ = ["Approach", "Listener", "solve_into"]

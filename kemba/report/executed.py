@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -13,17 +13,17 @@ from kemba.ocp.certificate.status import Status
 from kemba.ocp.report import answer, sentence_of
 from kemba.plant.execution.counterpart import another_robot
 from kemba.plant.execution.retiming import retimed
-from kemba.report.drawing import Drawer
-from kemba.report.judged import judged
-from kemba.runs import RunFolder
+from kemba.report.judged import Judged, judged
 from kemba.stopwatch import Tell
 from kemba.trajectory import Trajectory
 
 if TYPE_CHECKING:
-    from kemba.sweep.scenarios.share import Share
+    from kemba.scenarios.share import Share
 
     # a plan; where it was executed in scenarios, with its table and its share of successes
     Candidate = tuple[Plan, Trajectory | None, Share | None]
+
+Begun = Callable[[Trajectory], None]
 
 
 @dataclass(frozen=True)
@@ -36,11 +36,13 @@ class Motions:
 
 @dataclass(frozen=True)
 class Executed:
-    """A plan, its entries in the JSON with those of its executions, and what is written."""
+    """A plan, its entries in the JSON with those of its executions, what is written, and how the
+    executions were judged where there were any."""
 
     plan: Plan
     result: dict[str, Any]
     motions: Motions
+    judged: Judged | None = None
 
     @property
     def good(self) -> bool:
@@ -61,49 +63,46 @@ def executed(
     share: Share | None,
     replay: bool,
     tell: Tell,
-    folder: RunFolder,
-    drawing: Drawer,
+    begun: Begun,
+    place: str = "",
 ) -> Executed:
-    """A plan with its table and, if `replay`, its executions; meanwhile its figure is drawn."""
-    result = answer(found, str(folder.path))
+    """A plan with its table and, if `replay`, its executions; `begun` gets it before these.
+
+    `place`: the run folder in the answer.
+    """
+    result = answer(found, place)
     if table is None and found.attempts:
         table = controller_table(found.model, found.trajectory, found.task.hold)
     if table is not None:
-        drawing.begin(found.trajectory, folder.path)
-    plant: Trajectory | None = None
-    if replay and table is not None and found.status.plan:
-        tell("replay: the times of controller.csv")
-        if share is None:
-            table = retimed(found.model, found.trajectory, table)
-        replayed, plant = _replayed(found, table, tell)
-        result |= replayed
-        if share is not None:
-            result |= {"robust": share.summary()}
-            result["sentence"] += f"; {share.sentence}"
-    return Executed(found, result, Motions(table, plant))
-
-
-def _replayed(
-    found: Plan, table: Trajectory, tell: Tell
-) -> tuple[dict[str, Any], Trajectory | None]:
-    """The executions of a plan with the verdict, and the motion of the plant.
-
-    The plan stays solved only if all executions come near enough.
-    """
-    task = found.task
+        begun(found.trajectory)
+    if table is None or not replay or not found.status.plan:
+        return Executed(found, result, Motions(table))
+    tell("replay: the times of controller.csv")
+    if share is None:
+        table = retimed(found.model, found.trajectory, table)
+    done: Judged | None = None
     try:
-        other = another_robot(task.model, task.plant)
         done = judged(found, table, tell=tell)
+        result |= {**done.facts, **_confirmed(found, done)}
     except KembaError as error:  # a model that the simulator cannot execute still has its plan
-        return _unconfirmed(found, f"it cannot be simulated: {error}"), None
+        result |= _unconfirmed(found, f"it cannot be simulated: {error}")
+    if share is not None:
+        result |= {"robust": share.summary()}
+        result["sentence"] += f"; {share.sentence}"
+    return Executed(found, result, Motions(table, done.motion if done else None), done)
+
+
+def _confirmed(found: Plan, done: Judged) -> dict[str, Any]:
+    """What the executions of a plan change in the answer: it stays solved only if all of them come
+    near enough."""
+    task, judgements = found.task, done.verdicts.values()
+    other = another_robot(task.model, task.plant)
     names = [f"the plant is another robot, {other}, which {task.plant} names"] if other else []
-    matches = [verdict.sentence for verdict in done.verdicts.values() if verdict.good]
+    matches = [verdict.sentence for verdict in judgements if verdict.good]
     if done.good:
-        sentence = "; ".join([sentence_of(found), *names, *matches])
-        return {**done.facts, "sentence": sentence}, done.motion
-    causes = [verdict.sentence for verdict in done.verdicts.values() if not verdict.good]
-    failed = _unconfirmed(found, " and ".join(causes), [*names, *matches])
-    return {**done.facts, **failed}, done.motion
+        return {"sentence": "; ".join([sentence_of(found), *names, *matches])}
+    causes = [verdict.sentence for verdict in judgements if not verdict.good]
+    return _unconfirmed(found, " and ".join(causes), [*names, *matches])
 
 
 def _unconfirmed(found: Plan, cause: str, remarks: Sequence[str] = ()) -> dict[str, Any]:

@@ -31,6 +31,11 @@ class Judged:
         """Whether every execution keeps to the tolerances."""
         return all(verdict.good for verdict in self.verdicts.values())
 
+    @property
+    def replays(self) -> bool:
+        """Whether the executions on the plan's own model do."""
+        return all(self.verdicts[name].good for name in ("replay", "table_replay"))
+
 
 def plant_of(task: Task) -> Model:
     """The plant of a task: on its own robot, supply, payload and effects. Raises KembaError."""

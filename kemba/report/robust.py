@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from kemba.ocp import Plan, Task
 from kemba.ocp.certificate.status import Status
 from kemba.report.judged import judged, plant_of, table_of
+from kemba.scenarios.draw import scenarios
+from kemba.scenarios.share import Share, share
 from kemba.settings import Settings, setting
-from kemba.sweep.scenarios.draw import scenarios
-from kemba.sweep.scenarios.share import Share, share
 from kemba.trajectory import Trajectory
 
 TRIALS = "tuned: by hand on jumps of 0.36 to 0.9 m (docs/tasks.md), no benchmark"

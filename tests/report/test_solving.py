@@ -15,7 +15,7 @@ from kemba.ocp import load_task, task_model
 from kemba.plant import execute, replay
 from kemba.plant.execution.counterpart import counterpart
 from kemba.plant.execution.replay import LandingSettings
-from kemba.report import Listener, solve_into
+from kemba.report import Approach, Listener, solve_into
 from kemba.runs import RunFolder
 from kemba.trajectory import Trajectory
 from kemba_cli.main import app
@@ -74,7 +74,7 @@ def test_the_best_of_several_starts_is_kept(tmp_path: Path) -> None:
     folder = RunFolder.create(tmp_path / "run", task.name)
     listener = Listener(told.append)
     answer = solve_into(
-        folder, task, document, listener, starts=2, jobs=2, replay=False, figure=False
+        folder, task, document, listener, Approach(starts=2, jobs=2, replay=False), figure=False
     )
     tried = [line for line in told if line.startswith("start ")]
     assert answer["status"] == "solved"
@@ -87,7 +87,7 @@ def test_a_refined_plan_tells_the_impulses_on_its_feet(tmp_path: Path) -> None:
     """A dropped robot loses its fall at touchdown: momentum that no force column holds."""
     task, document = load_task("drop.yaml", ["nodes=40"])
     folder = RunFolder.create(tmp_path / "run", task.name)
-    answer = solve_into(folder, task, document, Listener(), replay=False, figure=False)
+    answer = solve_into(folder, task, document, Listener(), Approach(replay=False), figure=False)
     assert "refined" in answer["sentence"]
     plan = Trajectory.read(folder / "trajectory.csv")
     impulse = plan["front/foot/impulse_z"]
@@ -103,7 +103,7 @@ def test_a_plan_survives_a_folder_that_cannot_be_written(tmp_path: Path) -> None
     folder = RunFolder.create(tmp_path / "run", task.name)
     (folder / "trajectory.csv").mkdir()
     with pytest.raises(WriteError, match=r"the plan is kept in .*; give a place") as told:
-        solve_into(folder, task, document, Listener(), replay=False, figure=False)
+        solve_into(folder, task, document, Listener(), Approach(replay=False), figure=False)
     kept = Path(str(told.value).partition("kept in ")[2].partition(";")[0])
     assert len(Trajectory.read(kept / "trajectory.csv").time) == 17
     assert json.loads((tmp_path / "run" / "manifest.json").read_text())["status"] == "failed"

@@ -67,7 +67,7 @@ def solve(
     from kemba.ocp import load_task, task_model
     from kemba.ocp.nlp.interrupt import Interrupt
     from kemba.ocp.task.requirement import resolve
-    from kemba.report import Listener, solve_into
+    from kemba.report import Approach, Listener, solve_into
     from kemba.report.drawing import drawer
     from kemba.runs import RunFolder
     from kemba_cli.course import SOLVE
@@ -110,10 +110,8 @@ def solve(
         Interrupt(lambda text: say(text, quiet)) as stop,
     ):
         listener = Listener(progress.tell, progress.watch, stop)
-        answer = solve_into(
-            folder, resolved, document, listener, start, starts, jobs, replay, figure, origin,
-            drawing, cold=cold,
-        )  # fmt: skip
+        approach = Approach(start, starts, jobs, replay, origin, cold)
+        answer = solve_into(folder, resolved, document, listener, approach, figure, drawing)
     if json:
         print_json(answer)
     else:

@@ -8,10 +8,10 @@ from typing import Any
 from kemba.config import Document
 from kemba.errors import ConfigErrors, KembaError
 from kemba.ocp.task.task import parse_task
+from kemba.scenarios.sampling import sample
 from kemba.sweep.cases.case import Case, content_hash
 from kemba.sweep.cases.execution import execute_cases
 from kemba.sweep.cases.expand import Expansion, model_hash, model_name
-from kemba.sweep.cases.sampling import sample
 from kemba.sweep.cases.schema import ExecuteBlock, SolveBlock, Sweep
 
 # Keys of a task that say how it is solved, not what is asked.
@@ -56,6 +56,8 @@ def _solve_cases(expansion: Expansion, name: str, block: SolveBlock) -> list[Cas
         work: dict[str, Any] = {
             "task": task.model_dump(exclude_none=True),
             "model": model_hash(task.model),
+            "cold": block.cold,
+            "replay": block.replay,
         }
         aim = {key: value for key, value in work["task"].items() if key not in HOW}
         problem = content_hash([aim, work["model"]])

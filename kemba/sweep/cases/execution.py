@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -10,22 +9,19 @@ from typing import Any
 import numpy as np
 
 from kemba.config import Document, load_yaml, parse
-from kemba.effects import Effect
-from kemba.effects.catalogue import BY_KIND
-from kemba.effects.mechanics.load import Payload
-from kemba.errors import KembaError, suggest
+from kemba.errors import KembaError
 from kemba.model import Model
 from kemba.plant import Gains, Replay, execute
 from kemba.plant.execution.controller import read_controller
 from kemba.plant.execution.counterpart import PLAIN, counterpart
-from kemba.plant.execution.replay import first_row
 from kemba.plant.simulation.valves import scattered
-from kemba.quantity import to_si
 from kemba.runs import load_run, sha256
+from kemba.scenarios.conditions import changed_effects, standing, start_offsets
+from kemba.scenarios.sampling import sample
+from kemba.scenarios.schema import Conditions
 from kemba.sweep.cases.case import Case, Work, content_hash
 from kemba.sweep.cases.expand import Expansion, model_hash, model_name
-from kemba.sweep.cases.sampling import sample
-from kemba.sweep.cases.schema import Conditions, ExecuteBlock
+from kemba.sweep.cases.schema import ExecuteBlock
 from kemba.trajectory import Trajectory
 
 
@@ -98,8 +94,9 @@ def _run_folder(expansion: Expansion, run: str) -> Path:
 
 def _plan_folder(expansion: Expansion, name: str, block: ExecuteBlock, folder: Path) -> Path:
     """The folder of the plan to execute. Raises KembaError when there is no good plan."""
-    from kemba.ocp import controller_table, plan
     from kemba.ocp.task.task import parse_task
+    from kemba.report import Approach, Listener
+    from kemba.report.best import best_plan
 
     if block.run is not None:
         run = load_run(_run_folder(expansion, block.run))
@@ -109,12 +106,12 @@ def _plan_folder(expansion: Expansion, name: str, block: ExecuteBlock, folder: P
     task = parse_task(document)
     path = folder / "plans" / content_hash(task.model_dump(exclude_none=True))
     if not (path / "controller.csv").is_file():
-        found = plan(task, document)
-        if not found.status.plan:
+        best = best_plan(task, document, Approach(), Listener())
+        if not best.plan.status.plan or best.motions.table is None:
             at = ("blocks", name, "task")
-            raise expansion.document.error(at, f"{block.task}: {found.sentence}")
-        found.trajectory.write(path / "trajectory.csv")
-        controller_table(found.model, found.trajectory, task.hold).write(path / "controller.csv")
+            raise expansion.document.error(at, f"{block.task}: {best.result['sentence']}")
+        best.plan.trajectory.write(path / "trajectory.csv")
+        best.motions.table.write(path / "controller.csv")
     return path
 
 
@@ -143,53 +140,3 @@ def _plant(model: str, supply: float | None, plant: str, content: str) -> Model:
     `content`: the hash of its files, so that a changed file is read again.
     """
     return counterpart(model, supply=supply, plant=plant)
-
-
-def changed_effects(model: Model, conditions: Conditions) -> list[Effect]:
-    """The effects that differ from the plant's. Raises KembaError for unknown kinds."""
-    changed: list[Effect] = [Payload(m=conditions.payload)] if conditions.payload else []
-    for kind, parameters in conditions.effects.items():
-        if kind not in BY_KIND:
-            raise KembaError(f"effects.{kind}", "no such effect", hint=suggest(kind, BY_KIND))
-        listed = next((e for e in model.effects if e.name == kind), None)
-        own = listed.model_dump() if listed else {}
-        try:
-            changed.append(parse({**own, "kind": kind, **parameters}, BY_KIND[kind]))
-        except KembaError as error:
-            raise KembaError(f"effects.{kind}", error.what, error.expected, error.hint) from None
-    return changed
-
-
-def start_offsets(model: Model, conditions: Conditions) -> dict[str, float]:
-    """Offsets of the first pose in SI units. Raises KembaError for what is no coordinate."""
-    mechanism = model.mechanism
-    knees = {f"{leg}/knee/q" for leg in mechanism.legs}  # their pistons are easier to picture
-    units = {c.name: c.unit for c in mechanism.coordinates if c.name not in knees}
-    units |= {f"{leg}/piston/x": "m" for leg in mechanism.legs}
-    offsets = {}
-    for name, value in conditions.start.items():
-        if name not in units:
-            raise KembaError(f"start.{name}", "no such coordinate", hint=suggest(name, units))
-        try:
-            offsets[name] = to_si(value, units[name])
-        except ValueError as error:
-            raise KembaError(f"start.{name}", str(error)) from None
-    return offsets
-
-
-def standing(model: Model, table: Trajectory, offsets: Mapping[str, float]) -> dict[str, float]:
-    """The table's first pose, moved, with the lower foot on the ground."""
-    import casadi as ca
-
-    from kemba.plant.simulation.start import initial_values
-
-    if not offsets:
-        return {}
-    pose = first_row(model, table)
-    moved = {name: pose.get(name, 0.0) + offset for name, offset in offsets.items()}
-    q, *_ = initial_values(model, pose | moved)
-    mechanism = model.mechanism
-    feet = ca.vertcat(*(mechanism.port(f"{leg}/foot/z").phi for leg in mechanism.legs))
-    lowest = float(ca.mmin(ca.Function("feet", [mechanism.q], [feet])(q)))
-    height = q[[c.name for c in mechanism.coordinates].index("body/z")]
-    return moved | {"body/z": float(height - lowest)}

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from kemba.scenarios.rate import wilson
 from kemba.sweep.cases.case import Case, Record
 from kemba.sweep.cases.schema import Sweep
 from kemba.sweep.table.influence import influence
@@ -66,14 +67,6 @@ def _block(rows: Rows, best: Mapping[str, float]) -> dict[str, Any]:
         **{name: spread(_column(rows, name)) for name in (*TIMES, "iterations")},
         "cost_ratio": spread(ratios),
     }
-
-
-def wilson(successes: int, cases: int) -> tuple[float, float]:
-    """The 95 % Wilson interval of a success rate."""
-    from statsmodels.stats.proportion import proportion_confint
-
-    low, high = proportion_confint(successes, cases, alpha=0.05, method="wilson")
-    return float(low), float(high)
 
 
 def spread(values: Iterable[float]) -> dict[str, float] | None:

@@ -6,17 +6,29 @@ from kemba.sweep.cases.case import Record, Work
 
 
 def solve_case(work: Work) -> Record:
-    """Plan a task: the figures of `kemba-opt solve`."""
-    from kemba.config import parse
-    from kemba.ocp import Task, plan
-    from kemba.ocp.report import answer
+    """Plan a task as `kemba-opt solve` does, and execute it; the figures of its certificate.
 
-    figures = answer(plan(parse(work["task"], Task)), "")
+    `replays`: the plan's inputs and its table come out as planned on the plan's own model.
+    """
+    from kemba.config import Document, parse
+    from kemba.ocp import Task
+    from kemba.report import Approach, Listener
+    from kemba.report.best import best_plan
+
+    approach = Approach(cold=work["cold"], replay=work["replay"])
+    task, document = parse(work["task"], Task), Document(work["task"])
+    best = best_plan(task, document, approach, Listener())
     kept = (
         "status", "sentence", "apex_m", "duration_s", "cost", "solve_s", "solve_cpu_s", "build_s",
-        "iterations", "variables", "constraints", "residuals", "attempts", "good",
+        "iterations", "variables", "constraints", "residuals", "attempts", "good", "start",
+        "plant_replay",
     )  # fmt: skip
-    return {key: figures[key] for key in kept}
+    done = best.judged
+    return {
+        **{key: best.result[key] for key in kept},
+        "refined": best.plan.refined,
+        "replays": done is not None and done.replays,
+    }
 
 
 def execute_case(work: Work) -> Record:

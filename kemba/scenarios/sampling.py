@@ -9,13 +9,13 @@ from zlib import crc32
 
 import numpy as np
 
-from kemba.sweep.cases.schema import Block, Spread, Value
+from kemba.scenarios.schema import Draws, Spread, Value
 from kemba.units import read_si
 
 Values = dict[str, Value]
 
 
-def sample(block: Block, name: str, seed: int) -> list[Values]:
+def sample(block: Draws, name: str, seed: int) -> list[Values]:
     """The values of every case: each point of the grid with the same draws of what varies."""
     points = [
         dict(zip(block.grid, p, strict=True)) for p in itertools.product(*block.grid.values())
@@ -24,7 +24,7 @@ def sample(block: Block, name: str, seed: int) -> list[Values]:
     return [{**point, **draw} for point in points for draw in draws]
 
 
-def _draws(block: Block, rng: np.random.Generator) -> list[Values]:
+def _draws(block: Draws, rng: np.random.Generator) -> list[Values]:
     width = len(block.vary)
     if not width:
         return [{}]

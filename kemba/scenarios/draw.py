@@ -12,9 +12,9 @@ from pydantic import Field
 from kemba.config import Document, FileName, find_config, load_yaml, parse
 from kemba.errors import KembaError
 from kemba.model import Model
-from kemba.sweep.cases.execution import changed_effects, start_offsets
-from kemba.sweep.cases.sampling import sample
-from kemba.sweep.cases.schema import Block, Conditions, Section, Spread, Value
+from kemba.scenarios.conditions import changed_effects, start_offsets
+from kemba.scenarios.sampling import sample
+from kemba.scenarios.schema import Conditions, Draws, Section, Spread, Value
 from kemba.units import to_si
 
 EACH = "start.*/"  # such a key is drawn for every leg by itself
@@ -63,7 +63,7 @@ def scenarios(name: str | Path, plant: Model, count: int) -> list[Scenario]:
     for key, spread in asked.vary.items():
         legs = plant.mechanism.legs if key.startswith(EACH) else ("",)
         vary |= {key.replace("*", leg, 1) if leg else key: spread for leg in legs}
-    draws = sample(Block(vary=vary, cases=count), asked.name, asked.seed)
+    draws = sample(Draws(vary=vary, cases=count), asked.name, asked.seed)
     try:
         return [_scenario(plant, values) for values in draws]
     except KembaError as error:

@@ -13,9 +13,9 @@ from kemba.model import Model
 from kemba.plant.execution.certificate import rest_after
 from kemba.plant.execution.controller import execute_many
 from kemba.plant.execution.replay import LandingSettings, Replay, ends_standing
-from kemba.sweep.cases.execution import standing
-from kemba.sweep.scenarios.draw import Scenario
-from kemba.sweep.table.summary import wilson
+from kemba.scenarios.conditions import standing
+from kemba.scenarios.draw import Scenario
+from kemba.scenarios.rate import wilson
 from kemba.trajectory import Trajectory
 
 

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from kemba.sweep.cases.sampling import drawn, sample
-from kemba.sweep.cases.schema import SolveBlock, Spread
+from kemba.scenarios.sampling import drawn, sample
+from kemba.scenarios.schema import Spread
+from kemba.sweep.cases.schema import SolveBlock
 from kemba.units import read_si
 
 

@@ -11,8 +11,8 @@ import pytest
 from kemba.errors import KembaError
 from kemba.model import Model, load_model
 from kemba.plant.simulation.simulate import run
-from kemba.sweep.scenarios.draw import load_uncertainties, scenarios
-from kemba.sweep.scenarios.share import share
+from kemba.scenarios.draw import load_uncertainties, scenarios
+from kemba.scenarios.share import share
 from kemba.trajectory import Trajectory
 
 

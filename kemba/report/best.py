@@ -1,0 +1,115 @@
+"""The plan that `solve` gives: from shipped plans or a guess, executed, the best of several."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from kemba.config import Document
+from kemba.ocp import Plan, Task, plan
+from kemba.ocp.continuation.between import Origin
+from kemba.ocp.known import compared
+from kemba.ocp.nlp.watcher import Watch
+from kemba.ocp.planning import plans_nearby
+from kemba.ocp.starts import plan_best
+from kemba.report.executed import Begun, Executed, executed
+from kemba.stopwatch import Tell, silent
+from kemba.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from kemba.report.executed import Candidate
+
+
+@dataclass(frozen=True)
+class Listener:
+    """What is called at each stage and iteration, and what may ask to stop."""
+
+    tell: Tell = silent
+    watch: Watch | None = None
+    stop: Callable[[], bool] | None = None
+
+
+@dataclass(frozen=True)
+class Approach:
+    """How a plan is sought.
+
+    `start`: a trajectory to begin from. `starts`, `jobs`: how many start guesses, on how many
+    cores. `origin`: an earlier plan to continue for the changed figures. Where none of these is
+    given, shipped plans that are near come first, unless `cold`. `replay`: execute the plan on the
+    same model and on the plant, and compare both with the task's tolerances; a plan that misses
+    them is `acceptable`, not `solved`. `log`: where IPOPT's text goes.
+    """
+
+    start: Trajectory | None = None
+    starts: int = 1
+    jobs: int | None = None
+    replay: bool = True
+    origin: Origin | None = None
+    cold: bool = False
+    log: Path | None = None
+
+    @property
+    def free(self) -> bool:
+        """Whether nothing is said about where to begin."""
+        return self.start is None and self.origin is None
+
+
+def best_plan(
+    task: Task,
+    document: Document,
+    approach: Approach,
+    listener: Listener,
+    begun: Begun | None = None,
+    place: str = "",
+) -> Executed:
+    """The plan of a task, executed and judged: the first good one, or the best of all tried.
+
+    `begun` gets each plan before it is executed, at last the one that is returned. `place`: the
+    run folder in the answer. Raises KembaError where the task or a file is wrong.
+    """
+    begun = begun or (lambda plan: None)
+    made = (
+        executed(*one, approach.replay, listener.tell, begun, place)
+        for one in _candidates(task, document, approach, listener)
+    )
+    best = last = next(made)
+    while approach.starts > 1 or not best.good:
+        other = next(made, None)
+        if other is None:
+            break
+        best, last = max(best, other, key=lambda made: made.rank), other
+    if best is not last and best.motions.table is not None:
+        begun(best.plan.trajectory)
+    known, remark = compared(best.plan)
+    best.result.update(best_known=known, sentence=best.result["sentence"] + remark)
+    return best
+
+
+def _candidates(
+    task: Task, document: Document, approach: Approach, listener: Listener
+) -> Iterator[Candidate]:
+    """Plans of a task, made when they are asked for: those from shipped plans come first."""
+    how: dict[str, Any] = {"watch": listener.watch, "stop": listener.stop, "tell": listener.tell}
+
+    def nearby(task: Task) -> Iterator[Plan]:
+        shelved = approach.free and not approach.cold
+        return plans_nearby(task, document, approach.log, **how) if shelved else iter(())
+
+    def solved(task: Task) -> Plan:
+        a = approach
+        if a.starts > 1 and a.free:
+            return plan_best(task, document, a.starts, a.jobs, a.log, listener.tell)
+        return plan(task, document, log=a.log, start=a.start, origin=a.origin, **how)
+
+    if approach.replay and task.robust > 0:
+        from kemba.report.robust import most_robust  # Dask and SciPy load for half a second
+
+        found = most_robust(
+            task, lambda task: next(nearby(task), None) or solved(task), listener.tell
+        )
+        yield found.plan, found.table, found.share
+        return
+    yield from ((near, None, None) for near in nearby(task))
+    yield solved(task), None, None

@@ -1,0 +1,1 @@
+"""Scenarios: what may differ from one execution to the next, and how often a plan succeeds."""

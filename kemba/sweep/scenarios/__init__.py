@@ -1,1 +1,0 @@
-"""Scenarios: one plan under what may differ from one execution to the next."""
