@@ -23,6 +23,12 @@ TIMES = {
     "iterations": "iterations",
 }
 
+WORDS = """\
+*Refined and replaying*: refined, and both the plan's inputs and its `controller.csv` come out as
+planned on the plan's own model. *Good*: also the simulated robot (the plant) keeps to the tolerances
+of the task, which is what `kemba-opt solve` needs for exit code 0.
+""".splitlines()
+
 
 def card(folder: Path) -> str:
     """The reliability card of a sweep's folder, as Markdown."""
@@ -37,9 +43,7 @@ def card(folder: Path) -> str:
         + ", ".join(f"{name} {version}" for name, version in results["versions"].items())
         + ". Every case begins with nothing in memory; IPOPT with MUMPS, one thread a case.",
         "",
-        "*Refined and replaying*: refined, and both the plan's inputs and its `controller.csv` come "
-        "out as planned on the plan's own model. *Good*: also the simulated robot (the plant) keeps "
-        "to the tolerances of the task, which is what `kemba-opt solve` needs for exit code 0.",
+        *WORDS,
         "",
         *_rates(results["blocks"], results["cases"]),
     ]
