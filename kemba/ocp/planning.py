@@ -97,7 +97,7 @@ def plans_nearby(
 
 def _origin(entry: Entry, task: Task) -> Origin:
     """A shipped plan with its model and what was asked of it: the task with its figures."""
-    own = task.model_copy(update=entry.figures)
+    own = task.model_copy(update={**entry.figures, "feet": None})
     model = task_model(own)
     asked = resolve(own, model, Document(own.model_dump()))
     name, dear = f"the shipped plan {entry.name}", "one from a guess (--cold) may take less"
