@@ -56,7 +56,7 @@ def test_feet_need_a_moment_and_a_length() -> None:
     task, document = load_task("drop.yaml", ["feet=8 cm"])
     with pytest.raises(ConfigErrors, match=r"--set feet=8 cm: feet: needs a goal for body/z"):
         resolve(task, task_model(task), document)
-    with pytest.raises(ConfigErrors, match="a length such as '0.5 m' was expected"):
+    with pytest.raises(ConfigErrors, match=r"a length such as .* was expected"):
         load_task("jump.yaml", ["feet=8 kg"])
 
 

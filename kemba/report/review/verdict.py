@@ -24,13 +24,23 @@ class Verdict:
     sentence: str
     next: str
     command: str = ""
+    doubt: str = ""
+
+    def doubted(self, doubt: str, logs: str, run: str) -> Verdict:
+        """The verdict with what speaks against it: logs that belong to another `run`."""
+        grade: Grade = "bad" if self.grade == "bad" else "fair"
+        command = f"kemba-opt review {logs} --run {shlex.quote(run)}"
+        aim = "review these logs with the run that they execute:"
+        return Verdict(grade, self.sentence, aim, command, doubt)
 
     def html(self) -> str:
         """As the first thing on the page."""
+        doubt = f'<p class="doubt"><b>But:</b> {escape(self.doubt)}</p>' if self.doubt else ""
         command = f" <code>{escape(self.command)}</code>" if self.command else ""
         return (
             f'<div class="verdict {self.grade}" role="status"><p class="first">'
-            f"{escape(self.sentence)}</p><p><b>Next:</b> {escape(self.next)}{command}</p></div>"
+            f"{escape(self.sentence)}</p>{doubt}"
+            f"<p><b>Next:</b> {escape(self.next)}{command}</p></div>"
         )
 
 
