@@ -173,7 +173,7 @@ def _robot_parts(given: Material, book: Book, machine: Machine) -> list[str]:
     model = build_model(load_spec(given.model), supply=given.supply)
     certificate = given.run.certificate if given.run else {}
     how = (
-        '<p class="soft screen">Dashed vertical lines: touchdowns. Grey: a foot stands in the '
+        '<p class="soft screen">Dotted vertical lines: touchdowns. Grey: a foot stands in the '
         "first motion. Below each figure: the difference from the plan. Drag to zoom, double "
         "click or Escape to see all again; arrow keys move the cursor.</p>"
     )

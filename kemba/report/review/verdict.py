@@ -185,8 +185,9 @@ def _flown(events: Sequence[Events], plan: Events | None) -> str:
     if plan is None:
         return f"The robot's body reaches {mean:.3f} m"
     error = 1e3 * (mean - plan.apex)
-    side = "above" if error >= 0 else "below"
-    return f"The robot reaches {mean:.3f} m, {abs(error):.0f} mm {side} the plan, and stays upright"
+    side = "above" if error > 0 else "below"
+    off = f", {abs(error):.0f} mm {side} the plan," if round(error) else " as planned"
+    return f"The robot reaches {mean:.3f} m{off} and stays upright"
 
 
 def _joined(parts: Sequence[str]) -> str:
