@@ -103,9 +103,17 @@ def quantity_expression(model: Model, name: str) -> ca.SX:
     return node.outputs[name]
 
 
-def resolve(task: Task, model: Model, document: Document) -> list[Requirement]:
-    """All requirements of a task. Raises ConfigErrors with every wrong name, unit or range, of its
-    costs and solver options too."""
+class NotGivenError(ValueError):
+    """What a requirement needs is not in the task."""
+
+
+def resolve(
+    task: Task, model: Model, document: Document, partial: bool = False
+) -> list[Requirement]:
+    """All requirements of a task. `partial`: nothing is said of what the task does not give.
+
+    Raises ConfigErrors with every wrong name, unit or range, of its costs and solver options too.
+    """
     known, task = quantities(model), with_height(task, model)
     requirements: list[Requirement] = []
     errors: list[KembaError] = []
@@ -117,8 +125,12 @@ def resolve(task: Task, model: Model, document: Document) -> list[Requirement]:
             place = (*location, "quantity") if isinstance(bound, Goal) else location
             errors.append(document.error(place, f"{written(place)}: {error.what}", hint=error.hint))
         except ValueError as error:
-            errors.append(document.error(location, f"{written(location)}: {error}"))
-    apex, read = highest(requirements), not errors  # else the goal may be one that was not read
+            if not (partial and isinstance(error, NotGivenError)):
+                errors.append(document.error(location, f"{written(location)}: {error}"))
+    apex, read = (
+        highest(requirements),
+        not errors and not partial,
+    )  # else the goal may be one that was not read
     for key, of_the_flight in (("feet", feet_at_apex), ("clearance", flight_clearance)):
         try:
             requirements += of_the_flight(task, model, apex)
@@ -247,6 +259,6 @@ def _number(task: Task, value: float | str, quantity: Quantity) -> float:
     if value in ("height", "distance"):
         number = getattr(task, str(value))
         if number is None:
-            raise ValueError(f"refers to '{value}', which the task does not give")
+            raise NotGivenError(f"refers to '{value}', which the task does not give")
         return float(number)
     return to_si(value, quantity.unit)

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from kemba.config import Document, FileName, apply_overrides, beside, find_config, load_yaml, parse
+from kemba.config import Document, FileName, beside, parse
 from kemba.model.spec import Supply
 from kemba.quantity import Param
 
@@ -177,15 +177,6 @@ class Task(Section):
     def step(self) -> float:
         """Nominal step [s]."""
         return self.duration / self.nodes
-
-
-def load_task(name: str | Path, overrides: list[str] | None = None) -> tuple[Task, Document]:
-    """The task YAML `name` (a path or a shipped task) and its document, for error positions.
-
-    Raises KembaError with every mistake at its line.
-    """
-    document = apply_overrides(load_yaml(find_config(name, "tasks")), overrides or [])
-    return parse_task(document), document
 
 
 def _last_height(document: Document) -> Document:
