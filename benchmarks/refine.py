@@ -9,11 +9,11 @@ import platform
 import sys
 import time
 
+from kemba.ocp import load_task
 from kemba.ocp.certificate.objective import costs
 from kemba.ocp.planned import Plan
 from kemba.ocp.planning import plan
 from kemba.ocp.refinement import Refined, refine
-from kemba.ocp.task.task import load_task
 from kemba.plant.execution.replay import Replay, replay
 
 CASES = (

@@ -216,7 +216,7 @@ def planning(name: str) -> Case:
     from kemba.ocp.infeasibility.explain import refusal
     from kemba.ocp.nlp.ipopt import Control
     from kemba.ocp.planner import Planner, searched
-    from kemba.ocp.planning import task_model
+    from kemba.ocp.reading import task_model
     from kemba.ocp.refined import refined
     from kemba.ocp.relaxation.session import Session
     from kemba.ocp.task.requirement import resolve

@@ -45,6 +45,11 @@ class ConfigErrors(KembaError):  # noqa: N818  several errors, not one
         return "\n".join(str(error) for error in self.errors)
 
 
+def listed_errors(error: KembaError) -> list[KembaError]:
+    """The errors that one holds: all of several, or itself."""
+    return error.errors if isinstance(error, ConfigErrors) else [error]
+
+
 def suggest(name: str, candidates: Iterable[str]) -> str:
     """The nearest valid name as a question, or the valid names when none is near."""
     names = sorted(set(candidates))

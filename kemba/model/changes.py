@@ -8,7 +8,7 @@ from typing import Any
 
 from kemba.config import Document, parse
 from kemba.effects import Effect
-from kemba.errors import suggest
+from kemba.errors import ConfigErrors, KembaError, listed_errors, suggest
 from kemba.model.spec import load_spec
 
 Changes = Mapping[str, Mapping[str, Any]]
@@ -21,18 +21,24 @@ def changed_effects(
 
     A key of `changes` is the name of an effect (`contact`, `valve_delay:front`) or its place in
     the model's list, from 0, with those of its bases first. `document`: the task, whose places
-    are named in messages. Raises KembaError where there is no such effect, and ConfigErrors with
-    every wrong parameter.
+    are named in messages. Raises ConfigErrors with every effect that there is not and every wrong
+    parameter.
     """
     if not changes:
         return []
     source = document or Document({"effects": dict(changes)})
     listed = load_spec(model).effects
     found: dict[str, Effect] = {}
+    errors: list[KembaError] = []
     for key, values in changes.items():
-        effect = _named(listed, key, str(model), source)
-        effect = found.get(effect.name, effect)
-        found[effect.name] = parse(_part(source, key, effect, values), type(effect))
+        try:
+            effect = _named(listed, key, str(model), source)
+            effect = found.get(effect.name, effect)
+            found[effect.name] = parse(_part(source, key, effect, values), type(effect))
+        except KembaError as error:
+            errors += listed_errors(error)
+    if errors:
+        raise ConfigErrors(errors)
     return list(found.values())
 
 

@@ -7,11 +7,9 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from kemba.config import Document, find_config
-from kemba.effects.mechanics.load import Payload
+from kemba.config import Document
 from kemba.errors import KembaError
-from kemba.model import Model, load_model
-from kemba.model.changes import changed_effects
+from kemba.model import Model
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.continuation.between import Origin
 from kemba.ocp.continued import continued, from_scratch
@@ -22,6 +20,7 @@ from kemba.ocp.nlp.ipopt import Control
 from kemba.ocp.nlp.watcher import Watch
 from kemba.ocp.planned import Plan, clear, explained
 from kemba.ocp.planner import Planner, searched
+from kemba.ocp.reading import asked_of, task_model
 from kemba.ocp.refined import refined
 from kemba.ocp.relaxation.session import Session
 from kemba.ocp.shipped.entry import Entry
@@ -97,7 +96,7 @@ def plans_nearby(
 
 def _origin(entry: Entry, task: Task) -> Origin:
     """A shipped plan with its model and what was asked of it: the task with its figures."""
-    own = task.model_copy(update=entry.figures)
+    own = task.model_copy(update={**entry.figures, "feet": None})
     model = task_model(own)
     asked = resolve(own, model, Document(own.model_dump()))
     name, dear = f"the shipped plan {entry.name}", "one from a guess (--cold) may take less"
@@ -132,8 +131,7 @@ def _job(
     document = document or Document(task.model_dump())
     building = Stopwatch()
     with building.running():
-        built = task_model(task, model, document)
-        requirements = resolve(task, built, document)
+        built, requirements = asked_of(task, document, model)
         diagnostics = check_task(task, built, requirements, document)
     session = Session(control, tell, building=building)
     planner = Planner(task, built, requirements, session, start)
@@ -144,28 +142,6 @@ def _deadline(task: Task) -> float:
     return time.monotonic() + task.solver.time_limit
 
 
-def task_model(
-    task: Task, name: str | Path | None = None, document: Document | None = None
-) -> Model:
-    """The model of a task: its own unless `name` is given, with the task's supply, payload and
-    changed effects. `document` gives the places of mistakes. Raises KembaError."""
-    if name is None and document is not None:
-        look_up(task, document)
-    extra = changed_effects(name or task.model, task.effects, document)
-    extra += [Payload(m=task.payload)] if task.payload else []
-    return load_model(name or task.model, extra, task.supply)
-
-
-def look_up(task: Task, document: Document) -> None:
-    """Raise KembaError, at the line of the task, where it names a model that there is not."""
-    for key, name in (("model", task.model), ("plant", task.plant)):
-        try:
-            find_config(name, "models")
-        except KembaError as error:
-            what = f"{key}: {name}: {error.what}"
-            raise document.error((key,), what, error.expected, error.hint) from None
-
-
 def check_feasible(
     task: Task, document: Document, model: str | Path | None = None
 ) -> tuple[Model, list[Requirement]]:
@@ -173,8 +149,7 @@ def check_feasible(
 
     Raises KembaError for wrong names and units, and for what certainly cannot be met.
     """
-    built = task_model(task, model, document)
-    requirements = resolve(task, built, document)
+    built, requirements = asked_of(task, document, model)
     refused = refusal(check_task(task, built, requirements, document))
     if refused is not None:
         raise KembaError(document.source or task.name, refused.sentence)

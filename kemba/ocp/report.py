@@ -7,6 +7,7 @@ from typing import Any
 
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.planned import Plan
+from kemba.ocp.task.height import rise_of_feet
 
 
 def sentence_of(plan: Plan) -> str:
@@ -26,6 +27,7 @@ def answer(plan: Plan, run: str) -> dict[str, Any]:
         "run": run,
         "task": plan.task.name,
         "apex_m": float(max(trajectory["body/z"])),
+        "feet_m": rise_of_feet(trajectory),
         "duration_s": float(trajectory.time[-1]),
         "cost": plan.cost,
         "solve_s": plan.solve_s,

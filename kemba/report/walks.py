@@ -12,7 +12,8 @@ from kemba.ocp import Plan, Task, load_task, plan
 from kemba.ocp.certificate.objective import objective
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.continuation.between import Origin
-from kemba.ocp.planning import plan_from, task_model
+from kemba.ocp.planning import plan_from
+from kemba.ocp.reading import task_model
 from kemba.ocp.shipped.entry import read_plan, write_plan
 from kemba.ocp.shipped.kind import FIGURES, figures_of, kind_of
 from kemba.ocp.task.requirement import resolve

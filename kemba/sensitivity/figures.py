@@ -47,7 +47,7 @@ class Figure:
 
 
 def figures(task: Task, model: Model, only: Sequence[str] = ()) -> list[Figure]:
-    """Height, distance, supply, payload, and every number of the model's effects.
+    """Height or feet, distance, supply, payload, and every number of the model's effects.
 
     `only`: the names of those that are wanted. Raises KembaError where there is no such figure.
     """
@@ -60,7 +60,7 @@ def figures(task: Task, model: Model, only: Sequence[str] = ()) -> list[Figure]:
 
 
 def _asked(task: Task, model: Model) -> Iterator[Figure]:
-    for name in ("height", "distance"):
+    for name in ("height", "feet", "distance"):
         value = getattr(task, name)
         if value is not None:
             yield Figure(

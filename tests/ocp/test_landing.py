@@ -13,7 +13,8 @@ from kemba.model.impact import felt
 from kemba.ocp import Task, load_task, task_model
 from kemba.ocp.certificate.grazing import grazes
 from kemba.ocp.phases.modes import HELD, OPEN, drop_grazes
-from kemba.ocp.task.requirement import Requirement, apex_node, longest_leg, resolve
+from kemba.ocp.task.height import longest_leg
+from kemba.ocp.task.requirement import Requirement, apex_node, resolve
 from kemba.trajectory import Trajectory
 
 

@@ -88,11 +88,12 @@ def _is_measured(file: Path) -> bool:
 
 def _yaml(file: Path) -> dict[str, Any]:
     from kemba.config import load_yaml, locate, parse
+    from kemba.ocp.reading import read_task
     from kemba_cli.schemas import CALLED, SCHEMAS, kind_of, schema_of
 
     document = load_yaml(locate(file, SCHEMAS))
     kind = kind_of(document)
-    parsed = parse(document, schema_of(kind))
+    parsed = read_task(document) if kind == "tasks" else parse(document, schema_of(kind))
     remarks = _whole(kind, parsed, document)
     called = CALLED.get(kind, f"{kind.removesuffix('s')} file")
     sentence = "; ".join([f"valid {called}", *remarks])
@@ -105,10 +106,9 @@ def _whole(kind: str, parsed: Any, document: Any) -> list[str]:
     from kemba.mechanism import load_cylinder, load_robot
     from kemba.model import load_model
     from kemba.ocp.planning import check_feasible
-    from kemba.ocp.task.task import parse_task
 
     if kind == "tasks":
-        model, _ = check_feasible(parse_task(document), document)
+        model, _ = check_feasible(parsed, document)
         return model.remarks
     if kind == "models":
         return load_model(document.source).remarks

@@ -64,9 +64,9 @@ def solve(
     from kemba.config import beside, find_config
     from kemba.effects import BY_KIND
     from kemba.model.spec import model_files
-    from kemba.ocp import load_task, task_model
+    from kemba.ocp import load_task
     from kemba.ocp.nlp.interrupt import Interrupt
-    from kemba.ocp.task.requirement import resolve
+    from kemba.ocp.reading import asked_of
     from kemba.report import Approach, Listener, solve_into
     from kemba.report.drawing import drawer
     from kemba.runs import RunFolder
@@ -95,8 +95,7 @@ def solve(
         _dry_run(resolved, document, model, json)
         return
     resolved = resolved.model_copy(update={"model": beside(model or resolved.model, Path())})
-    built = task_model(resolved, document=document)
-    resolve(resolved, built, document)
+    built, _ = asked_of(resolved, document)
     if built.ignored:
         say(f"no plan can use {', '.join(built.ignored)}: it changes what is measured only", quiet)
     for remark in built.remarks:

@@ -55,6 +55,7 @@ def review(
                 "review": str(page),
                 "verdict": verdict.grade,
                 "sentence": verdict.sentence,
+                "doubt": verdict.doubt,
                 "next": verdict.next,
                 "command": verdict.command,
             }
@@ -62,6 +63,8 @@ def review(
     else:
         typer.echo(page)
         say(verdict.sentence, quiet)
+        if verdict.doubt:
+            say(f"but: {verdict.doubt}")
         say(f"next: {verdict.next} {verdict.command}".rstrip(), quiet)
     if show:
         import webbrowser

@@ -6,6 +6,7 @@ from enum import Enum
 
 from kemba.ocp.certificate.certify import Certificate
 from kemba.ocp.nlp.ending import Ending
+from kemba.ocp.task.height import rise_of_feet
 from kemba.ocp.task.task import Task
 from kemba.settings import Settings, setting
 from kemba.trajectory import Trajectory
@@ -43,7 +44,8 @@ def verdict(
     task: Task, certificate: Certificate, trajectory: Trajectory, ending: Ending | None
 ) -> tuple[Status, str]:
     """Status and sentence of a trajectory; `ending` is that of its last solve."""
-    facts = f"apex {max(trajectory['body/z']):.3f} m, {trajectory.time[-1]:.3f} s"
+    apex = f"apex {max(trajectory['body/z']):.3f} m{_feet(trajectory)}"
+    facts = f"{apex}, {trajectory.time[-1]:.3f} s"
     if ending is Ending.INTERRUPTED:
         what = f"interrupted: best iterate kept, {facts}; {_worst(certificate)}"
         return Status.INTERRUPTED, what
@@ -61,6 +63,12 @@ def verdict(
     if ending in (Ending.INFEASIBLE, Ending.REFUSED):
         return Status.INFEASIBLE, f"the solver finds no motion that meets the task: {worst}"
     return Status.STALLED, f"no plan was found, {ending.sentence}: {worst}"
+
+
+def _feet(trajectory: Trajectory) -> str:
+    """How high the feet come, beside the body's centre; empty where they stay down."""
+    rise = round(100 * (rise_of_feet(trajectory) or 0.0))
+    return f" (feet {rise} cm up)" if rise else ""
 
 
 def _worst(certificate: Certificate) -> str:

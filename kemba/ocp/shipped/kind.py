@@ -7,6 +7,7 @@ from hashlib import sha256
 from typing import Any
 
 from kemba.model import Model
+from kemba.ocp.task.height import with_height
 from kemba.ocp.task.task import Task
 
 # Numbers by which tasks of one kind differ.
@@ -14,7 +15,7 @@ FIGURES = ("height", "distance", "supply", "payload", "duration")
 # What says how a plan is made, named or judged, but not what is asked of it.
 APART = (
     *("name", "notes", "model", "plant", "effects", "nodes", "hold", "robust", "uncertainties"),
-    *("guess", "guess_noise", "seed", "solver", "tolerances"),
+    *("feet", "guess", "guess_noise", "seed", "solver", "tolerances"),
 )
 LETTERS = 12  # of a fingerprint
 
@@ -39,7 +40,8 @@ def kind_of(task: Task, model: Model) -> str:
 
 def figures_of(task: Task, model: Model) -> dict[str, float]:
     """The figures of a task; those that it does not have are left out."""
-    values = {**{name: getattr(task, name) for name in FIGURES}, "supply": model.supply}
+    asked = with_height(task, model)
+    values = {**{name: getattr(asked, name) for name in FIGURES}, "supply": model.supply}
     return {name: float(value) for name, value in values.items() if value is not None}
 
 

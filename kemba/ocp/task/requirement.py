@@ -13,9 +13,8 @@ import casadi as ca
 from kemba.config import Document
 from kemba.config.document import Location, written
 from kemba.errors import ConfigErrors, KembaError, suggest
-from kemba.mechanism.knee import flexion
-from kemba.mechanism.links import Robot
 from kemba.model import Model
+from kemba.ocp.task.height import longest_leg, with_height
 from kemba.ocp.task.options import cost_errors, option_errors
 from kemba.ocp.task.task import Bound, Goal, Task
 from kemba.quantity import Quantity, to_si
@@ -104,10 +103,18 @@ def quantity_expression(model: Model, name: str) -> ca.SX:
     return node.outputs[name]
 
 
-def resolve(task: Task, model: Model, document: Document) -> list[Requirement]:
-    """All requirements of a task. Raises ConfigErrors with every wrong name, unit or range, of its
-    costs and solver options too."""
-    known = quantities(model)
+class NotGivenError(ValueError):
+    """What a requirement needs is not in the task."""
+
+
+def resolve(
+    task: Task, model: Model, document: Document, partial: bool = False
+) -> list[Requirement]:
+    """All requirements of a task. `partial`: nothing is said of what the task does not give.
+
+    Raises ConfigErrors with every wrong name, unit or range, of its costs and solver options too.
+    """
+    known, task = quantities(model), with_height(task, model)
     requirements: list[Requirement] = []
     errors: list[KembaError] = []
     for location, pattern, at, bound in _asked(task):
@@ -118,12 +125,18 @@ def resolve(task: Task, model: Model, document: Document) -> list[Requirement]:
             place = (*location, "quantity") if isinstance(bound, Goal) else location
             errors.append(document.error(place, f"{written(place)}: {error.what}", hint=error.hint))
         except ValueError as error:
-            errors.append(document.error(location, f"{written(location)}: {error}"))
-    try:
-        requirements += flight_clearance(task, model, requirements)
-    except ValueError as error:
-        if not errors:  # else the goal it needs may be the one that could not be read
-            errors.append(document.error(("clearance",), f"clearance: {error}"))
+            if not (partial and isinstance(error, NotGivenError)):
+                errors.append(document.error(location, f"{written(location)}: {error}"))
+    apex, read = (
+        highest(requirements),
+        not errors and not partial,
+    )  # else the goal may be one that was not read
+    for key, of_the_flight in (("feet", feet_at_apex), ("clearance", flight_clearance)):
+        try:
+            requirements += of_the_flight(task, model, apex)
+        except ValueError as error:
+            if read:
+                errors.append(document.error((key,), f"{key}: {error}"))
     errors += cost_errors(task.cost, document)
     errors += option_errors(task.solver.options, document)
     if errors:
@@ -197,9 +210,7 @@ def apex_node(requirements: Sequence[Requirement], nodes: int) -> int:
     return 0 if apex is None else apex.node(nodes)
 
 
-def flight_clearance(
-    task: Task, model: Model, requirements: Sequence[Requirement]
-) -> list[Requirement]:
+def flight_clearance(task: Task, model: Model, apex: Requirement | None) -> list[Requirement]:
     """Every foot at least as high as the task's clearance in the middle of the flight.
 
     The flight is the ballistic one about the highest goal of the body, from stretched legs; of it
@@ -210,7 +221,6 @@ def flight_clearance(
     """
     if not task.clearance:
         return []
-    apex = highest(requirements)
     if apex is None or apex.at is None:
         raise ValueError("needs a goal for body/z at the top of the flight")
     robot = model.mechanism.need_robot()
@@ -229,17 +239,26 @@ def flight_clearance(
     ]
 
 
-def longest_leg(robot: Robot) -> float:
-    """Distance [m] from hip to foot with the piston out."""
-    femur, tibia = robot.leg.femur.length, robot.leg.tibia.length
-    bend = math.cos(flexion(robot.leg, robot.stroke))
-    return math.sqrt(femur**2 + tibia**2 + 2 * femur * tibia * bend)
+def feet_at_apex(task: Task, model: Model, apex: Requirement | None) -> list[Requirement]:
+    """Every foot as high as the task's `feet`, at the highest goal of the body.
+
+    Raises ValueError where there is no such goal.
+    """
+    if task.feet is None:
+        return []
+    if apex is None:
+        raise ValueError("needs a goal for body/z, at which the feet are to be so high")
+    known = quantities(model)
+    return [
+        Requirement(("feet",), known[f"{leg}/foot/z"], apex.at, task.feet, math.inf)
+        for leg in model.mechanism.legs
+    ]
 
 
 def _number(task: Task, value: float | str, quantity: Quantity) -> float:
     if value in ("height", "distance"):
         number = getattr(task, str(value))
         if number is None:
-            raise ValueError(f"refers to '{value}', which the task does not give")
+            raise NotGivenError(f"refers to '{value}', which the task does not give")
         return float(number)
     return to_si(value, quantity.unit)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from kemba.config import Document, FileName, apply_overrides, beside, find_config, load_yaml, parse
+from kemba.config import Document, FileName, beside, parse
 from kemba.model.spec import Supply
 from kemba.quantity import Param
 
@@ -126,6 +127,8 @@ class Task(Section):
     before the plan the controller keeps the first pose, valves closed, so that the robot settles.
     `folding`: whether legs may have to fold for `clearance`; if not, a low jump has what stretched
     legs leave.
+    `height` is that of the body's centre, which stands above the feet by a leg; `feet` asks instead
+    how high the feet are at the top, and `height` is that and a stretched leg.
     `effects` changes parameters of the model's effects, by name or by place in its list:
     `{contact: {mu: 0.6}}`.
     `robust`: by how many scenarios, drawn from the file `uncertainties`, plans are chosen.
@@ -136,6 +139,7 @@ class Task(Section):
     model: str = "planning"
     plant: str = "plant"
     height: Annotated[float, Param("m", lower=0.0, doc="of the body's centre")] | None = None
+    feet: Annotated[float, Param("m", lower=0.0, doc="of the feet at the top")] | None = None
     distance: Annotated[float, Param("m", doc="forward")] | None = None
     supply: Supply | None = None
     effects: dict[str, dict[str, Any]] = Field(default_factory=dict)
@@ -163,24 +167,30 @@ class Task(Section):
     solver: Solver = Field(default_factory=Solver)
     tolerances: Tolerances = Field(default_factory=Tolerances)
 
+    @model_validator(mode="after")
+    def _one_height(self) -> Task:
+        if self.height is not None and self.feet is not None:
+            raise ValueError("'feet' does not go with 'height': both say how high the robot jumps")
+        return self
+
     @property
     def step(self) -> float:
         """Nominal step [s]."""
         return self.duration / self.nodes
 
 
-def load_task(name: str | Path, overrides: list[str] | None = None) -> tuple[Task, Document]:
-    """The task YAML `name` (a path or a shipped task) and its document, for error positions.
-
-    Raises KembaError with every mistake at its line.
-    """
-    document = apply_overrides(load_yaml(find_config(name, "tasks")), overrides or [])
-    return parse_task(document), document
+def _last_height(document: Document) -> Document:
+    """The document without its own `height` where `feet` is set by an option, and the reverse."""
+    for own, rival in (("height", "feet"), ("feet", "height")):
+        if (rival,) in document.overrides and (own,) not in document.overrides:
+            data = {k: v for k, v in document.data.items() if k != own}
+            return replace(document, data=data)
+    return document
 
 
 def parse_task(document: Document) -> Task:
     """The task of a document; its own models are looked for beside it first. Raises KembaError."""
-    task = parse(document, Task)
+    task = parse(_last_height(document), Task)
     if not document.source:
         return task
     folder = Path(document.source).parent

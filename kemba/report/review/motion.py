@@ -19,7 +19,8 @@ DEGREES = 180.0 / np.pi
 @dataclass(frozen=True)
 class Shown:
     """A quantity on the page: its column, title, unit and factor from SI; for its error another
-    unit and factor. `least`: smallest span of its axis, so that noise is not magnified."""
+    unit and factor. `least`, `error_least`: smallest span of their axes, so that noise and
+    rounding are not magnified."""
 
     name: str
     title: str
@@ -28,21 +29,24 @@ class Shown:
     error: str = ""
     error_factor: float = 1.0
     least: float = 0.0
+    error_least: float = 0.0
     steps: bool = False
     level: str = ""
 
 
 BODY = (
-    Shown("body/z", "Height of the body's centre", "m", error="mm", error_factor=1e3, least=0.05),
-    Shown("body/x", "Body forward", "m", error="mm", error_factor=1e3, least=0.05),
-    Shown("body/pitch", "Pitch, nose up", "deg", DEGREES, "deg", DEGREES, least=4.0),
+    Shown("body/z", "Height of the body's centre", "m", 1.0, "mm", 1e3, 0.05, 1.0),
+    Shown("body/x", "Body forward", "m", 1.0, "mm", 1e3, 0.05, 1.0),
+    Shown("body/pitch", "Pitch, nose up", "deg", DEGREES, "deg", DEGREES, 4.0, 0.2),
 )
 JOINTS = (
-    Shown("hip/q", "hip angle", "deg", DEGREES, "deg", DEGREES),
-    Shown("piston/x", "piston extension", "mm", 1e3, "mm", 1e3, level="piston/x"),
+    Shown("hip/q", "hip angle", "deg", DEGREES, "deg", DEGREES, error_least=0.2),
+    Shown("piston/x", "piston extension", "mm", 1e3, "mm", 1e3, 0.0, 1.0, level="piston/x"),
 )
 FORCES = (
-    Shown("hip/tau", "hip torque", "N.m", error="N.m", steps=True, level="hip/tau"),
+    Shown(
+        "hip/tau", "hip torque", "N.m", error="N.m", error_least=0.2, steps=True, level="hip/tau"
+    ),
     Shown("chamber/extend/P", "pressure of the extend chamber", "bar", 1e-5, "bar", 1e-5),
     Shown("chamber/retract/P", "pressure of the retract chamber", "bar", 1e-5, "bar", 1e-5),
     Shown("piston/F", "force of the piston rod", "N", error="N"),
@@ -119,7 +123,9 @@ def _pair(
             for i, v in values.items()
             if book.tracks[i] is not plan
         ]
-        yield Chart(f"{title}, error", q.error, errors, stands=stands, small=True)
+        yield Chart(
+            f"{title}, error", q.error, errors, stands=stands, small=True, least=q.error_least
+        )
 
 
 def valve_chart(book: Book, leg: str, stands: Spans) -> Iterable[Chart]:

@@ -16,6 +16,7 @@ from kemba.logs import load_map
 from kemba.model import build_model, load_spec
 from kemba.plotting import Machine, load_machine
 from kemba.quantity import to_si
+from kemba.report.review.belonging import Stranger, doubt, own_run, strangers
 from kemba.report.review.charts import Book
 from kemba.report.review.details import certificate_tables, origin
 from kemba.report.review.events import Events, events_of, marks_of
@@ -58,6 +59,7 @@ class Material:
     supply: float | None = None
     error: ModelError | None = None
     fault: BadData | None = None
+    strangers: Sequence[Stranger] = ()
 
     @property
     def rig(self) -> bool:
@@ -140,7 +142,8 @@ def gather_material(
     facts = read_answer(answer) if answer is not None else {}
     folder = Path(answer) if answer is not None else Path()
     folder = folder if folder.is_dir() else folder.parent
-    return Material(found, read, facts, folder, judged, column_map, supply, error, fault)
+    alien = strangers(found, read) if found else []
+    return Material(found, read, facts, folder, judged, column_map, supply, error, fault, alien)
 
 
 def page_of(given: Material) -> tuple[str, str, Verdict]:
@@ -170,7 +173,7 @@ def _robot_parts(given: Material, book: Book, machine: Machine) -> list[str]:
     model = build_model(load_spec(given.model), supply=given.supply)
     certificate = given.run.certificate if given.run else {}
     how = (
-        '<p class="soft screen">Dashed vertical lines: touchdowns. Grey: a foot stands in the '
+        '<p class="soft screen">Dotted vertical lines: touchdowns. Grey: a foot stands in the '
         "first motion. Below each figure: the difference from the plan. Drag to zoom, double "
         "click or Escape to see all again; arrow keys move the cursor.</p>"
     )
@@ -225,6 +228,15 @@ def _found(given: Material) -> str:
 
 
 def _verdict(given: Material, tracks: Sequence[Track], events: Sequence[Events | None]) -> Verdict:
+    said = _said(given, tracks, events)
+    if not given.strangers or given.run is None:
+        return said
+    logs = typed([log.meta["path"] for log in given.logs], given.column_map)
+    other = own_run(given.strangers, given.run)
+    return said.doubted(doubt(given.strangers, given.run), logs, str(other) if other else "RUN")
+
+
+def _said(given: Material, tracks: Sequence[Track], events: Sequence[Events | None]) -> Verdict:
     own = None if given.model == PLANNING else given.model
     words = {
         "logs": typed([log.meta["path"] for log in given.logs], given.column_map, own),

@@ -24,13 +24,23 @@ class Verdict:
     sentence: str
     next: str
     command: str = ""
+    doubt: str = ""
+
+    def doubted(self, doubt: str, logs: str, run: str) -> Verdict:
+        """The verdict with what speaks against it: logs that belong to another `run`."""
+        grade: Grade = "bad" if self.grade == "bad" else "fair"
+        command = f"kemba-opt review {logs} --run {shlex.quote(run)}"
+        aim = "review these logs with the run that they execute:"
+        return Verdict(grade, self.sentence, aim, command, doubt)
 
     def html(self) -> str:
         """As the first thing on the page."""
+        doubt = f'<p class="doubt"><b>But:</b> {escape(self.doubt)}</p>' if self.doubt else ""
         command = f" <code>{escape(self.command)}</code>" if self.command else ""
         return (
             f'<div class="verdict {self.grade}" role="status"><p class="first">'
-            f"{escape(self.sentence)}</p><p><b>Next:</b> {escape(self.next)}{command}</p></div>"
+            f"{escape(self.sentence)}</p>{doubt}"
+            f"<p><b>Next:</b> {escape(self.next)}{command}</p></div>"
         )
 
 
@@ -175,8 +185,9 @@ def _flown(events: Sequence[Events], plan: Events | None) -> str:
     if plan is None:
         return f"The robot's body reaches {mean:.3f} m"
     error = 1e3 * (mean - plan.apex)
-    side = "above" if error >= 0 else "below"
-    return f"The robot reaches {mean:.3f} m, {abs(error):.0f} mm {side} the plan, and stays upright"
+    side = "above" if error > 0 else "below"
+    off = f", {abs(error):.0f} mm {side} the plan," if round(error) else " as planned"
+    return f"The robot reaches {mean:.3f} m{off} and stays upright"
 
 
 def _joined(parts: Sequence[str]) -> str:
