@@ -39,23 +39,23 @@ class Driver:
         self.count, self.torques = 0, np.zeros(len(self.policy.data["joints"]))
         self.sent = [[(-np.inf, 0.0)] for _ in self.policy.valves]
         self.names = measured(self.model)
+        self.joints = [str(j) for j in self.policy.data["joints"]]
+        self.fine = PolicySettings.current().fine
         self.commands: list[Array] = []
 
     def __call__(self, time: float, sense: Mapping[str, float]) -> dict[str, float]:
-        fine = PolicySettings.current().fine
+        fine = self.fine
         while self.count % fine == 0 and self.policy.tick <= self.wait + self.count // fine:
             self._tick(time, sense)
         self.count += 1
-        joints = [str(j) for j in self.policy.data["joints"]]
-        asked = {f"{j}/tau": float(t) for j, t in zip(joints, self.torques, strict=True)}
+        asked = {f"{j}/tau": float(t) for j, t in zip(self.joints, self.torques, strict=True)}
         for name, history in zip(self.policy.valves, self.sent, strict=True):
             asked[name] = next(value for at, value in reversed(history) if at <= time + 1e-9)
         return asked
 
     def _tick(self, time: float, sense: Mapping[str, float]) -> None:
         y = np.array([self._read(name, sense) for name in self.names])
-        joints = [str(j) for j in self.policy.data["joints"]]
-        rates = np.array([sense[f"{j}/w"] for j in joints])
+        rates = np.array([sense[f"{j}/w"] for j in self.joints])
         self.torques, valves = self.policy.step(y, rates)
         self.commands.append(valves)
         for name, history, value in zip(self.policy.valves, self.sent, valves, strict=True):

@@ -10,7 +10,7 @@ from kemba.effects.catalogue import BY_KIND
 from kemba.effects.mechanics.load import Payload
 from kemba.errors import KembaError, suggest
 from kemba.model import Model
-from kemba.plant.execution.replay import first_row
+from kemba.plant.execution.replay import LandingSettings, first_row
 from kemba.quantity import to_si
 from kemba.scenarios.schema import Conditions
 from kemba.trajectory import Trajectory
@@ -49,18 +49,16 @@ def start_offsets(model: Model, conditions: Conditions) -> dict[str, float]:
 
 
 def standing(model: Model, table: Trajectory, offsets: Mapping[str, float]) -> dict[str, float]:
-    """The table's first pose, moved, with the lower foot on the ground."""
-    import casadi as ca
-
-    from kemba.plant.simulation.start import initial_values
+    """The table's first pose, moved; a lower foot that stands is put on the ground again."""
+    from kemba.plant.simulation.start import initial_values, lowest_foot
 
     if not offsets:
         return {}
     pose = first_row(model, table)
     moved = {name: pose.get(name, 0.0) + offset for name, offset in offsets.items()}
+    if lowest_foot(model, pose) > LandingSettings.current().on_ground:
+        return moved  # it is dropped: held in the air as the table says
     q, *_ = initial_values(model, pose | moved)
-    mechanism = model.mechanism
-    feet = ca.vertcat(*(mechanism.port(f"{leg}/foot/z").phi for leg in mechanism.legs))
-    lowest = float(ca.mmin(ca.Function("feet", [mechanism.q], [feet])(q)))
-    height = q[[c.name for c in mechanism.coordinates].index("body/z")]
+    height = q[[c.name for c in model.mechanism.coordinates].index("body/z")]
+    lowest = lowest_foot(model, pose | moved)
     return moved | {"body/z": float(height - lowest)}

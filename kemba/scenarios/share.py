@@ -70,7 +70,7 @@ def share(
             continue
         found = done.against(case.model, plan)
         apexes.append(found.apex_error_m)
-        faults.append(_fault(found, lands))
+        faults.append(fault_of(found, lands))
     good = sum(not fault for fault in faults)
     errors = np.array(apexes)
     rank = [(bool(fault), abs(error)) for fault, error in zip(faults, apexes, strict=True)]
@@ -82,8 +82,8 @@ def share(
     return Share(len(cases), good, wilson(good, len(cases)), told, sigma)
 
 
-def _fault(found: Replay, lands: bool) -> str:
-    """What goes wrong; "" where nothing does."""
+def fault_of(found: Replay, lands: bool) -> str:
+    """What goes wrong in an execution; "" where nothing does. `lands`: whether the plan lands."""
     if lands:
         return found.fault or ""
     turned = np.abs(found.trajectory["body/pitch"]).max() > LandingSettings.current().upright

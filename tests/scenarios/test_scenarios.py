@@ -11,6 +11,7 @@ import pytest
 from kemba.errors import KembaError
 from kemba.model import Model, load_model
 from kemba.plant.simulation.simulate import run
+from kemba.scenarios.conditions import standing
 from kemba.scenarios.draw import load_uncertainties, scenarios
 from kemba.scenarios.share import share
 from kemba.trajectory import Trajectory
@@ -100,3 +101,25 @@ def test_a_robot_that_is_laid_down_does_not(tmp_path: Path) -> None:
     found = share(planning(), plan, table, scenarios(name, planning(), 4), 1)
     assert found.landed == 0
     assert "start.body/pitch" in found.worst
+
+
+def in_the_air(height: float) -> Trajectory:
+    """The table of a robot that hangs still at a height of its body."""
+    _, table = standing_plan(0.0)
+    return table.with_columns({"body/z [m]": np.full(len(table), height)})
+
+
+@pytest.mark.parametrize("lifted", [0.0, 0.2])
+def test_a_robot_that_is_dropped_stays_in_the_air(lifted: float) -> None:
+    """Askew, a foot that stood is put on the ground again; one in the air stays there."""
+    from kemba.plant.simulation.start import lowest_foot
+
+    model = planning()
+    table = in_the_air(model.mechanism.standing["body/z"] + lifted)
+    moved = standing(model, table, {"body/pitch": 0.05})
+    start = {"front/hip/q": table["front/hip/q"][0], "rear/hip/q": table["rear/hip/q"][0]}
+    low = lowest_foot(model, {"body/z": table["body/z"][0], **start, **moved})
+    if lifted:
+        assert "body/z" not in moved and low > 0.15
+    else:
+        assert low == pytest.approx(0.0, abs=1e-9)

@@ -20,6 +20,7 @@ from kemba.plant.simulation.inputs import (
     among,
     breaks,
     find_input,
+    input_names,
     input_table,
     merged,
     ticks,
@@ -71,6 +72,7 @@ class Player:
         mechanism = model.mechanism
         sensed = (*mechanism.coordinates, *mechanism.velocities, *model.states.values())
         self._sensed = [quantity.name for quantity in sensed]
+        self._inputs = {name: i for i, name in enumerate(input_names(model))}
 
     def play(self, step: float | None) -> None:
         """Fill the record, in steps of up to `step` [s]; None: as long as the motion allows.
@@ -125,7 +127,10 @@ class Player:
         sense = dict(zip(self._sensed, self.now.y.tolist(), strict=True))
         time = float(self.schedule.time[self._progress.mark[0]])
         for name, value in feedback(time, sense).items():
-            self.memory.x[first + find_input(self.model, name, "feedback")] = value
+            place = self._inputs.get(name)
+            if place is None:
+                place = find_input(self.model, name, "feedback")  # raises
+            self.memory.x[first + place] = value
         self._progress.answered[0] = True
 
 

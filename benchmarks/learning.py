@@ -1,0 +1,214 @@
+"""The loop counted in jumps: python benchmarks/learning.py --machines 40 --record learning.jsonl
+
+Hidden machines (benchmarks/hidden_machines.py) execute the shipped jump. Three ways to come nearer
+to it, three rounds of three jumps each: `learn` as the command does it, iterative learning alone
+(the correction of kemba/learn on the model as it is), and a plain least-squares fit of all
+parameters at once. Every finished way of a machine is kept in the record; an interrupted study
+goes on. `--page` only writes the section of docs/learn.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import re
+import shutil
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import numpy as np
+from hidden_machines import HiddenMachine, machine
+from learning_page import section
+from scipy.optimize import lsq_linear
+
+from kemba.config import dump_yaml
+from kemba.errors import KembaError
+from kemba.files import atomic_text
+from kemba.identify.adopt import item
+from kemba.identify.logs.reading import read_logs
+from kemba.identify.robot.problem import robot_problem
+from kemba.learn.aim import Aim
+from kemba.learn.correction import correction_from
+from kemba.learn.flight import flight_of
+from kemba.learn.round import Asked, learn
+from kemba.model import load_spec
+from kemba.ocp import load_task, task_model
+from kemba.plant.execution.certificate import rest_after
+from kemba.plant.execution.controller import execute
+from kemba.plotting.robot.machine import load_machine
+from kemba.report import Listener, solve_into
+from kemba.report.earlier import origin_of
+from kemba.runs import RunFolder, load_run
+from kemba.sweep.workers.machine import machine as this_computer
+
+PAGE = Path(__file__).resolve().parents[1] / "docs" / "learn.md"
+MARKS = ("<!-- machines: written by benchmarks/learning.py -->", "<!-- end of machines -->")
+ROUNDS = 3
+SEED = 7000
+
+Step = Callable[[Path, list[Path], Path], dict[str, Any]]  # run, all its logs, new run
+
+
+def by_learning(run: Path, logs: list[Path], new: Path) -> dict[str, Any]:
+    """One round of `kemba-opt learn`: the newest run and its logs."""
+    task = str(load_run(run).task)
+    folder = RunFolder.create(new, "jump", [*logs])
+    found = learn(Asked([run], logs[-3:], task), folder, Listener())
+    folder.finish("finished" if found.good else "failed")
+    return {"verdict": found.answer.verdict, "added": list(found.answer.added), "good": found.good}
+
+
+def by_correction(run: Path, logs: list[Path], new: Path) -> dict[str, Any]:
+    """Iterative learning alone: the same plan and model, valve edges moved."""
+    here = load_run(run)
+    task = load_task(here.task)[0]
+    model, robot = task_model(task), load_machine(task.model)
+    executed = [flight_of(log, robot) for log in read_logs(logs[-3:])]
+    rest = rest_after(model, here.trajectory, here.controller)
+    simulated = flight_of(execute(here.controller, model, extra=rest).trajectory, robot)
+    correction = correction_from(executed, simulated)
+    plain = run.parent / "run-0"
+    aimed = Aim(model, robot, here.trajectory, correction).corrected(load_run(plain).controller)
+    shutil.copytree(plain, new)
+    table = load_run(plain).controller
+    columns = {h: aimed.table[n] for h, n in zip(table.headers, table.names, strict=True)}
+    type(table)(table.time, columns, table.meta).write(new / "controller.csv")
+    return {"correction_m": correction.apex, "moved": aimed.moved}
+
+
+def by_least_squares(run: Path, logs: list[Path], new: Path) -> dict[str, Any]:
+    """Every parameter of every effect that may be missing in one linear fit, then a new plan."""
+    first = run.parent / "run-0"
+    task, document = load_task(load_run(first).task)
+    problem = robot_problem(read_logs(logs), task_model(task))
+    effects = {name: c for name, c in problem.candidates.items() if not c.sensor}
+    names = [*problem.nuisance, *(c.key for c in effects.values())]
+    nominal = np.array([v for v, _ in problem.nuisance.values()])
+    spans = [(c.lead.lower - c.lead.off, c.lead.upper - c.lead.off) for c in effects.values()]
+    low = np.r_[np.full(len(nominal), -np.inf), [a for a, _ in spans]]
+    high = np.r_[np.full(len(nominal), np.inf), [b for _, b in spans]]
+    r, jacobian = problem.residual({}), problem.jacobian({}, names)
+    size = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-12)
+    found = lsq_linear(jacobian / size, -r, (low * size, high * size)).x / size
+    listed = []
+    for (name, candidate), step in zip(effects.items(), found[len(nominal) :], strict=True):
+        values = {**candidate.typical(), candidate.key: candidate.lead.off + step}
+        listed.append(item(name, _as_listed(candidate, values)))
+    model = new.parent / f"{new.name}.yaml"
+    dump_yaml({"name": "all", "base": task.model, "effects": listed}, model)
+    load_spec(str(model))
+    task = task.model_copy(update={"model": str(model)})
+    folder = RunFolder.create(new, "jump", [*logs])
+    result = solve_into(folder, task, document, Listener(), origin=origin_of(first), replay=False)
+    folder.finish("finished")
+    return {"status": result["status"], "effects": len(listed)}
+
+
+def _as_listed(candidate: Any, values: dict[str, float]) -> dict[str, dict[str, float]]:
+    """Parameters as a model's list has them: what is searched as 1/value the other way round."""
+    told = {}
+    for key, value in values.items():
+        name = key.rsplit(".", 1)[1]
+        if name in candidate.reciprocal:
+            name, value = candidate.reciprocal[name][0], 1.0 / max(value, 1e-9)
+        told[name] = {"value": value}
+    return told
+
+
+WAYS: dict[str, Step] = {
+    "learn": by_learning,
+    "correction": by_correction,
+    "least squares": by_least_squares,
+}
+
+
+def study(hidden: HiddenMachine, way: str, first: Path, folder: Path) -> dict[str, Any]:
+    """Three rounds of one way on one machine: apex errors of every jump and what was learnt."""
+    began = time.process_time()
+    run, logs, rounds, facts = folder / "run-0", [], [], []
+    shutil.copytree(first, run)
+    for number in range(ROUNDS + 1):
+        jumps = hidden.jumps(run, folder / f"logs-{number}", number)
+        rounds.append({"apex_error_m": [j.apex_error for j in jumps],
+                       "landed": [j.landed for j in jumps]})  # fmt: skip
+        logs += [jump.log for jump in jumps]
+        if number == ROUNDS:
+            break
+        new = folder / f"run-{number + 1}"
+        try:
+            facts.append(WAYS[way](run, logs, new))
+        except KembaError as error:
+            facts.append({"failed": str(error)})
+        if (new / "controller.csv").is_file():
+            run = new
+        else:  # no new plan: the old one is executed again
+            shutil.rmtree(new, ignore_errors=True)
+    return {"rounds": rounds, "facts": facts, "cpu_s": time.process_time() - began}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--machines", type=int, default=40)
+    parser.add_argument("--ways", nargs="*", choices=WAYS, default=list(WAYS))
+    parser.add_argument("--record", type=Path, default=Path("learning.jsonl"))
+    parser.add_argument("--run", type=Path, help="plan to begin with; jump.yaml solved anew")
+    parser.add_argument("--keep", type=Path, help="where runs and logs are kept")
+    parser.add_argument("--page", action="store_true", help="only write the section")
+    asked = parser.parse_args()
+    rows = _read(asked.record)
+    if not asked.page:
+        with tempfile.TemporaryDirectory() as scratch:
+            room = asked.keep or Path(scratch)
+            first = asked.run or _planned(room / "first")
+            done = {(row["seed"], row["way"]) for row in rows}
+            for seed in range(SEED, SEED + asked.machines):
+                missing = [way for way in asked.ways if (seed, way) not in done]
+                hidden = machine(seed, first, room / f"{seed}" / "trial") if missing else None
+                for way in missing:
+                    assert hidden is not None
+                    folder = room / f"{seed}" / way.replace(" ", "-")
+                    shutil.rmtree(folder, ignore_errors=True)
+                    found = study(hidden, way, first, folder)
+                    kinds = {e["kind"]: e["parameters"] for e in hidden.effects}
+                    row = {"seed": seed, "way": way, "size": hidden.size, "effects": kinds,
+                           "machine": this_computer(), **found}  # fmt: skip
+                    rows.append(row)
+                    with asked.record.open("a", encoding="utf-8") as stream:
+                        stream.write(json.dumps(row) + "\n")
+                    print(_told(row), flush=True)
+    block = "\n".join([MARKS[0], "", section(rows), "", MARKS[1]])
+    text = PAGE.read_text(encoding="utf-8")
+    with atomic_text(PAGE) as stream:
+        pattern = f"{re.escape(MARKS[0])}.*{re.escape(MARKS[1])}"
+        stream.write(re.sub(pattern, lambda _: block, text, flags=re.DOTALL))
+
+
+def _planned(out: Path) -> Path:
+    task, document = load_task("jump.yaml")
+    folder = RunFolder.create(out, "jump", [])
+    solve_into(folder, task, document, Listener(), figure=False)
+    folder.finish("finished")
+    return out
+
+
+def _told(row: dict[str, Any]) -> str:
+    errors = [f"{1e3 * np.mean(r['apex_error_m']):+.1f}" for r in row["rounds"]]
+    kept = "kept" if all(all(r["landed"]) for r in row["rounds"]) else "lost"
+    told = f"{row['seed']} {row['way']}: {' '.join(errors)} mm"
+    return f"{told}, landings {kept}, {row['cpu_s']:.0f} s"
+
+
+def _read(path: Path) -> list[dict[str, Any]]:
+    if not path.is_file():
+        return []
+    return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+
+
+if __name__ == "__main__":
+    main()

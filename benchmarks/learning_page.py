@@ -1,0 +1,80 @@
+"""The section of docs/learn.md from the record of benchmarks/learning.py."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from kemba.scenarios.rate import wilson
+
+Row = dict[str, Any]
+GOOD = 5e-3  # m, the apex error that is aimed at
+
+
+def section(rows: Sequence[Row]) -> str:
+    """Errors by round and way, landings, and what happened on every machine."""
+    seeds = sorted({row["seed"] for row in rows})
+    text = [
+        f"{len(seeds)} machines of the twin with three to five hidden effects each, three jumps",
+        "before learning and after every round. Apex error of a round: mean of its three jumps",
+        "against the plan that was executed, as it truly is. In brackets how many machines are",
+        "within 5 mm, with Wilson's interval of 95 %.",
+        "",
+    ]
+    return "\n".join([*text, *_table(rows), "", *_machines(rows), "", _machine(rows)])
+
+
+def _ways(rows: Sequence[Row]) -> list[str]:
+    return list(dict.fromkeys(row["way"] for row in rows))
+
+
+def errors(row: Row) -> np.ndarray:
+    """Mean apex error [m] of each round."""
+    return np.array([np.mean(r["apex_error_m"]) for r in row["rounds"]])
+
+
+def kept(row: Row) -> bool:
+    """Whether every landing was kept."""
+    return all(all(r["landed"]) for r in row["rounds"])
+
+
+def _table(rows: Sequence[Row]) -> Iterator[str]:
+    rounds = max((len(row["rounds"]) for row in rows), default=0)
+    names = ["before", *(f"round {k}" for k in range(1, rounds))]
+    yield f"| median error [mm] | machines | {' | '.join(names)} | landings kept | CPU s |"
+    yield "|---|---|" + "---|" * (rounds + 2)
+    for way in _ways(rows):
+        own = [row for row in rows if row["way"] == way]
+        found = np.abs([errors(row) for row in own])
+        cells = []
+        for column in found.T:
+            good = int((column <= GOOD).sum())
+            low, high = (100 * end for end in wilson(good, len(own)))
+            cells.append(f"{1e3 * np.median(column):.1f} ({good}: {low:.0f} to {high:.0f} %)")
+        held = sum(map(kept, own))
+        cpu = np.median([row["cpu_s"] for row in own])
+        yield f"| {way} | {len(own)} | {' | '.join(cells)} | {held} of {len(own)} | {cpu:.0f} |"
+
+
+def _machines(rows: Sequence[Row]) -> Iterator[str]:
+    yield "| machine | hidden effects | " + " | ".join(_ways(rows)) + " |"
+    yield "|---|---|" + "---|" * len(_ways(rows))
+    for seed in sorted({row["seed"] for row in rows}):
+        own = {row["way"]: row for row in rows if row["seed"] == seed}
+        hidden = ", ".join(next(iter(own.values()))["effects"])
+        yield f"| {seed} | {hidden} | " + " | ".join(map(_cell, map(own.get, _ways(rows)))) + " |"
+
+
+def _cell(row: Row | None) -> str:
+    if row is None:
+        return "not run"
+    told = " ".join(f"{1e3 * e:+.1f}" for e in errors(row))
+    failed = sum("failed" in fact for fact in row["facts"])
+    marks = ["" if kept(row) else "falls", f"{failed} rounds fail" if failed else ""]
+    return ", ".join([told, *filter(None, marks)])
+
+
+def _machine(rows: Sequence[Row]) -> str:
+    return f"Computed on: {'; '.join(sorted({row['machine'] for row in rows}))}."
