@@ -68,6 +68,7 @@ LEARN: Course = {
 }
 REVIEW: Course = {**within(COMPARE, 0.0, 0.9), "drawing": 0.9}
 SIMULATE: Course = {"executing": 0.0}
+EXPERIMENT: Course = {"judging the standard": 0.0, "fitting the rivals": 0.8, "planning": 0.8}
 SENSITIVITY: Course = {"the same commands": 0.02, "the plan made anew": 0.35}
 
 

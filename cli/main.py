@@ -35,35 +35,32 @@ from kemba_cli.verbs.show.report import report
 from kemba_cli.verbs.show.review import review
 from kemba_cli.verbs.show.view import view
 
-VERBS = (
-    solve,
-    sweep,
-    sensitivity,
-    simulate,
-    characterise,
-    compare,
-    discover,
-    adopt,
-    learn,
-    experiment,
-    check,
-    effects,
-    plot,
-    view,
-    report,
-    review,
-    export,
-    schema,
-)
+PANELS = {  # as --help groups them
+    "Plan": (solve, sensitivity, sweep),
+    "Execute and look": (simulate, review, plot, report, view, export),
+    "Logs: what is missing, and what next": (
+        draft_map,
+        check,
+        compare,
+        discover,
+        adopt,
+        experiment,
+        learn,
+        characterise,
+    ),
+    "Catalogue and files": (effects, schema),
+}
+VERBS = tuple(verb for verbs in PANELS.values() for verb in verbs if verb is not draft_map)
 
 app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for verb in VERBS:
-    app.command()(with_verbose(guarded(verb)))
-app.command("map")(with_verbose(guarded(draft_map)))  # `map` is a word of Python
+for panel, verbs in PANELS.items():
+    for verb in verbs:
+        name = "map" if verb is draft_map else verb.__name__  # `map` is a word of Python
+        app.command(name, rich_help_panel=panel)(with_verbose(guarded(verb)))
 
 
 def _version(wanted: bool) -> None:
@@ -78,7 +75,10 @@ def options(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
     ] = False,
 ) -> None:
-    """Plan, execute and explain jumps of a legged robot with pneumatic knees."""
+    """Plan, execute and explain jumps of a legged robot with pneumatic knees.
+
+    Begin with: kemba-opt solve jump.yaml
+    """
 
 
 def main() -> None:

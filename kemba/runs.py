@@ -158,8 +158,10 @@ def newest_run(holds: str = "trajectory.csv", folder: str | Path = "runs") -> Pa
     """
     found = [file.parent for file in Path(folder).glob(f"*/{holds}")]
     if not found:
-        hint = "make one with: kemba-opt solve jump.yaml"
-        raise KembaError(str(folder), f"no run here has a {holds}", "a run was expected", hint)
+        what = (
+            f"no run in it has a {holds}" if Path(folder).is_dir() else "there is no run here yet"
+        )
+        raise KembaError(str(folder), what, hint="make one with: kemba-opt solve jump.yaml")
     return max(found, key=lambda run: _begun(run, holds))
 
 

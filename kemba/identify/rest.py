@@ -6,9 +6,10 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 from kemba.identify.compare.bins import BinSettings
-from kemba.identify.compare.compare import conditions, place_of
+from kemba.identify.compare.compare import conditions
 from kemba.identify.compare.force_profiles import ForceProfileSettings, force_profiles
 from kemba.identify.compare.hints import lacking
+from kemba.identify.compare.words import place_of
 from kemba.identify.doubt.unexplained import UnexplainedSettings
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis

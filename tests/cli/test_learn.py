@@ -38,7 +38,7 @@ def run_of(name: str, started: str) -> Path:
 def test_without_a_run_it_says_how_to_make_one() -> None:
     done = learn()
     assert done.exit_code == 2
-    assert "no run here has a controller.csv" in done.stderr
+    assert "runs: there is no run here yet; make one with: kemba-opt solve jump.yaml" in done.stderr
     assert "kemba-opt solve jump.yaml" in done.stderr
 
 

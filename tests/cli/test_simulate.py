@@ -100,7 +100,10 @@ def test_the_same_seed_writes_the_same_log(folder: Path) -> None:
 def test_mistakes_are_wrong_usage(folder: Path) -> None:
     done = run("simulate", "nowhere")
     assert (done.exit_code, done.stdout) == (2, "")
-    assert done.stderr == "nowhere: has no controller.csv; make one with: kemba-opt solve\n"
+    assert (
+        done.stderr
+        == "nowhere: no such run folder or table; make one with: kemba-opt solve jump.yaml\n"
+    )
     Path("bad.yaml").write_text("rig:\n  kind: locked\n  name: x\n  positons: [0.0]\n")
     assert "did you mean 'positions'?" in run("simulate", "bad.yaml").stderr
     assert run("simulate", str(folder), "--model", "plannin").exit_code == 2

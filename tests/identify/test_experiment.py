@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from rehearsal import FIRST, Machine, fitted, measured_evidence, problem_of
+from typer.testing import CliRunner
 
 from kemba.errors import KembaError
 from kemba.identify.design.rig import design_rig_test
@@ -21,6 +22,7 @@ from kemba.identify.experiment import propose
 from kemba.model.spec import load_model
 from kemba.plant.rig.bench import load_rig
 from kemba.settings import changed
+from kemba_cli.main import app
 
 
 @pytest.fixture
@@ -59,6 +61,33 @@ def test_the_designed_test_is_short_and_better_per_second(
     assert any("tests tried" in text for text in told)
     facts = found.json()
     assert facts["nats"] == facts["designed"]["nats"] and facts["rivals"][1] == "piston_damping"
+
+
+@pytest.mark.slow
+def test_the_verb_writes_the_test_and_says_what_to_type(
+    tmp_path: Path, short_search: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "answer").mkdir()
+    answer(tmp_path / "answer", ("seal_friction", "F_c", 8.0), ("piston_damping", "c", 30.0))
+    done = CliRunner().invoke(app, ["experiment", "answer"])
+    assert done.exit_code == 0, done.stderr
+    assert done.stdout == "answer/experiment.yaml\n"
+    assert done.stderr.endswith("next: kemba-opt simulate answer/experiment.yaml --noise\n")
+    assert load_rig(tmp_path / "answer" / "experiment.yaml").notes in done.stderr
+
+
+def test_the_verb_says_what_is_wrong_with_an_answer(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(app, ["experiment", "answer"])
+    assert done.exit_code == 2 and "answer.json" in done.stderr
+    assert not (tmp_path / "answer").exists()
+    (tmp_path / "answer").mkdir()
+    answer(tmp_path / "answer", ("hip_friction", "T_c", 0.6), ("hip_damping", "b", 0.1))
+    done = CliRunner().invoke(app, ["experiment", "answer"])
+    assert done.exit_code == 2 and "no rig test shows a difference" in done.stderr
 
 
 def test_effects_without_doubt_are_no_rivals() -> None:

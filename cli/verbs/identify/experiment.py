@@ -44,11 +44,14 @@ def experiment(
 
     Example: kemba-opt experiment answer --out next.yaml
     """
+    from kemba.files import read_json
     from kemba.folders import fresh
+    from kemba_cli.course import EXPERIMENT
     from kemba_cli.progress import Progress
 
+    read_json(answer / "answer.json")  # before a folder is made for the test
     path = fresh(out or answer / "experiment.yaml", force)
-    with Progress(quiet or json) as progress:
+    with Progress(quiet or json, EXPERIMENT) as progress:
         if on is Place.robot:
             facts = _on_robot(answer, path, certify, progress)
         else:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -42,7 +43,7 @@ def simulate(
 
     Example: kemba-opt simulate runs/jump-1 --repeat 3 --noise
     """
-    from kemba.folders import claimed
+    from kemba.folders import claimed, typed
     from kemba_cli.course import SIMULATE
     from kemba_cli.progress import Progress
 
@@ -63,6 +64,11 @@ def simulate(
     else:
         typer.echo("\n".join(answer["logs"] if "runs" in answer else [answer["folder"]]))
         say(answer["sentence"], quiet)
+        logs = typed(answer["logs"])
+        run = Path(source) if Path(source).is_dir() else Path(source).parent
+        of_run = (run / "certificate.json").is_file()
+        after = f"review {logs} --run {shlex.quote(str(run))}" if of_run else f"compare {logs}"
+        say(f"next: kemba-opt {after}", quiet)
 
 
 def _run(

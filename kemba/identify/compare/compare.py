@@ -14,6 +14,7 @@ from kemba.identify.compare.force_profiles import ForceProfile, force_profiles
 from kemba.identify.compare.hints import Hint, Response, conflicts, lacking, lagged
 from kemba.identify.compare.missing_force import Peak, peaks
 from kemba.identify.compare.tolerance import Tolerant, slopes, within_tolerance
+from kemba.identify.compare.words import place_of
 from kemba.identify.evidence.windows import Windows, aggregation_windows, free_starts, rms
 from kemba.identify.problem.problem import Array, MissingForce, Problem, Rows, Texts, Theta
 from kemba.settings import BY_HAND, Settings, setting
@@ -196,23 +197,3 @@ def phrase(found: Comparison) -> str:
     hints = [h for kind in ("law", "command", "conflict") for h in _first(found.hints, kind)]
     parts = [f"The model {grade} the logs: its error is {ratio}", worst, *(h.text for h in hints)]
     return "; ".join(parts) + "."
-
-
-def place_of(at: ConditionBin) -> str:
-    """A condition in plain words."""
-    phases = {
-        "stance2": "while two feet stand",
-        "stance1": "while one foot stands",
-        "impact": "while a foot hits the ground",
-        "rest": "at rest",
-        "moving": "while moving",
-        "forward": "while moving forward",
-        "back": "while moving back",
-    }
-    valves = {"00": "both valves closed", "10": "extend valve open", "01": "retract valve open"}
-    stroke = {"in": ", piston retracted", "mid": ", piston mid-stroke", "out": ", piston extended"}
-    when = phases.get(at.phase, f"in {at.phase}")
-    if not at.mode:
-        return f"{at.channel} {when}{stroke.get(at.region, '')}"
-    mode = valves.get(at.mode, "both valves open")
-    return f"{at.channel} {when}, {mode}{stroke.get(at.region, '')}"

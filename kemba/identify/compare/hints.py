@@ -16,6 +16,7 @@ from kemba.identify.compare.force_profiles import (
     risen,
 )
 from kemba.identify.compare.tolerance import Slopes
+from kemba.identify.compare.words import command, quantity
 from kemba.identify.evidence.spike_slab import SpikeSlabSettings
 from kemba.identify.evidence.windows import codes
 from kemba.identify.problem.problem import Array, Changes, Labels, Problem, Rows
@@ -78,9 +79,11 @@ class Response:
 
     @property
     def hint(self) -> Hint:
-        late = f"{self.lag[self.peak] * 1e3:.0f} ms after {self.command}"
+        late = f"{self.lag[self.peak] * 1e3:.0f} ms after {command(self.command)}"
         verb = "switches" if "valve/" in self.command else "changes"
-        return Hint("command", f"{self.channel} errs {late} {verb}", float(abs(self.z[self.peak])))
+        return Hint(
+            "command", f"{quantity(self.channel)} errs {late} {verb}", float(abs(self.z[self.peak]))
+        )
 
 
 def lacking(found: Sequence[ForceProfile]) -> list[Hint]:

@@ -65,7 +65,8 @@ def repeat_run(
     folder = Path(run)
     controller = folder / "controller.csv" if folder.is_dir() else folder
     if not controller.is_file():
-        raise KembaError(str(run), "has no controller.csv", hint="make one with: kemba-opt solve")
+        what = "has no controller.csv" if folder.exists() else "no such run folder or table"
+        raise KembaError(str(run), what, hint="make one with: kemba-opt solve jump.yaml")
     table = read_controller(controller)
     plan_file = controller.parent / "trajectory.csv"
     plan = Trajectory.read(plan_file) if plan_file.is_file() else None

@@ -1,0 +1,59 @@
+"""Conditions of errors in words: of which quantity, in which phase, with which valves open."""
+
+from __future__ import annotations
+
+from kemba.identify.compare.bins import ConditionBin
+
+BODY = {"body/x": "body position", "body/z": "body height", "body/pitch": "body pitch"}
+OF_LEG = {
+    "hip/q": "hip angle",
+    "piston/x": "piston",
+    "foot/x": "foot, along the ground,",
+    "foot/z": "foot, above the ground,",
+    "stop": "end stop",
+}
+WHEN = {
+    "stance2": "while two feet stand",
+    "stance1": "while one foot stands",
+    "impact": "while a foot hits the ground",
+    "rest": "at rest",
+    "moving": "while moving",
+    "forward": "while moving forward",
+    "back": "while moving back",
+}
+VALVES = {
+    "00": "both valves are closed",
+    "10": "the extend valve is open",
+    "01": "the retract valve is open",
+    "11": "both valves are open",
+}
+STROKE = {
+    "in": ", the piston retracted",
+    "mid": ", the piston in mid-stroke",
+    "out": ", the piston extended",
+}
+
+
+def place_of(at: ConditionBin) -> str:
+    """A condition: `body height while two feet stand and both valves are open`."""
+    when, stroke = WHEN.get(at.phase, f"in {at.phase}"), STROKE.get(at.region, "")
+    if not at.mode:
+        return f"{quantity(at.channel)} {when}{stroke}"
+    link = "and" if when.startswith("while") else "while"
+    return f"{quantity(at.channel)} {when} {link} {VALVES.get(at.mode, VALVES['11'])}{stroke}"
+
+
+def command(name: str) -> str:
+    """A command in words: `front/valve/extend` is the front extend valve; others stay."""
+    leg, _, side = name.rpartition("valve/")
+    return f"the {leg.replace('/', ' ')}{side} valve" if "valve/" in name else name
+
+
+def quantity(channel: str) -> str:
+    """A channel in words: `front/piston/x` is the front piston; one without words stays."""
+    if channel in BODY:
+        return BODY[channel]
+    leg, _, part = channel.partition("/")
+    if channel in OF_LEG:
+        return OF_LEG[channel]
+    return f"{leg} {OF_LEG[part]}" if part in OF_LEG else channel
