@@ -20,7 +20,9 @@ OUTSIDE = (
     "gear_loss",
     "cable_pull",
     "boom_drag",
+    "flexible_boom",
 )
+SHAPES = ("geometry", "boom_lever", "mass_split")  # kinds of lengths and assembly
 SURE = 0.95
 
 
@@ -54,14 +56,21 @@ def hidden(record: Record) -> list[str]:
 
 
 def kind(record: Record) -> str:
-    """null, single, sensor, pair or outside."""
-    names = hidden(record)
+    """null, single, sensor, shape, pair, many or outside."""
+    return kind_of(hidden(record))
+
+
+def kind_of(effects: str | Sequence[str] | None) -> str:
+    """The kind of a case by what is hidden in it."""
+    names = [effects] if isinstance(effects, str) else list(effects or ())
     if not names:
         return "null"
     if any(name in OUTSIDE for name in names):
         return "outside"
     if len(names) > 1:
-        return "pair"
+        return "pair" if len(names) == 2 else "many"
+    if names[0].split(":")[0] in SHAPES:
+        return "shape"
     return "sensor" if names[0].startswith("sensor") else "single"
 
 

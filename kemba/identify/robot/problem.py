@@ -195,9 +195,11 @@ class RobotProblem(Problem):
         return self.state.slopes({**typical, **theta}, names)
 
     def _is_direct(self, name: str) -> bool:
-        """Whether the force is linear in it: shapes, states, delays and lengths are not."""
+        """Whether the force is linear in it, and nothing else depends on it: shapes, states,
+        delays, lengths and what sensors show are not so."""
         physics = self.physics
-        if name in physics.moving or name in physics.base.delays or name.startswith(GEOMETRY):
+        elsewhere = is_fault(name) or name.startswith(GEOMETRY)
+        if elsewhere or name in physics.moving or name in physics.base.delays:
             return False
         lead = any(name == c.key for c in self.candidates.values())
         return name in self.state.linear or (
