@@ -108,7 +108,8 @@ class RobotProblem(Problem):
         sensors = SensorFaults(model.effects)
         noise = stated_noise(batch)
         reference = first_reference(physics, batch, physics.nominal)
-        self.lengths = standing_lengths(physics, batch, reference, self.candidates)
+        self.standing = standing_lengths(physics, batch, reference, self.candidates)
+        self.lengths = dict(self.standing.lengths)
         self.state = linearise_at(
             physics, batch, sensors, self.lengths, ground, self.unknown, noise
         )
@@ -269,7 +270,7 @@ class RobotProblem(Problem):
         )
         if faults:
             raise BadData(faults)
-        return remarks(self.lengths)
+        return remarks(self.standing)
 
     def _sensor_columns(self) -> Array:
         """Columns (n, k) of every sensor fault and every length, per size."""
