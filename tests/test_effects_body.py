@@ -10,15 +10,22 @@ import pytest
 
 from kemba.effects import Effect
 from kemba.effects.catalogue import (
+    Boom,
+    BoomLever,
     BoomSpring,
     ComOffset,
     Contact,
     GroundCompliance,
     HipSpring,
+    MassSplit,
     MotorLag,
     RotorInertia,
     TorqueScale,
 )
+from kemba.effects.sensors import as_measured
+from kemba.effects.series import Series
+from kemba.errors import KembaError
+from kemba.mechanism import robot_mechanism
 from kemba.model import Model, load_model
 
 RNG = np.random.default_rng(3)
@@ -110,3 +117,41 @@ def test_hard_compliant_floor_is_the_rigid_contact() -> None:
 
 def floor_keys() -> object:
     return GroundCompliance().forces().keys()
+
+
+def test_mass_split_is_a_robot_file_with_other_masses() -> None:
+    """Nothing is lost, and the equations are those of the links as they are then."""
+    m = 0.2
+    model, plain = load_model(extra=[MassSplit(m=m)]), load_model()
+    robot, drawn = model.mechanism.need_robot(), plain.mechanism.need_robot()
+    assert model.mechanism.mass == pytest.approx(plain.mechanism.mass)
+    assert robot.body.mass == pytest.approx(drawn.body.mass - m)
+    assert robot.leg.tibia.mass / drawn.leg.tibia.mass == pytest.approx(1 + m / (2 * 0.795))
+    assert robot.leg.tibia.com == drawn.leg.tibia.com
+    point = {name: RNG.standard_normal(7) for name in "qva"}
+    free = plain.with_effects([MassSplit()]).build(["mass_split.m"])
+    zero = {name: np.zeros(getattr(free, name).numel()) for name in free.NAMES}
+    found = free.residual(**{**zero, **point, "p": [m]})["dynamics"]
+    same = dynamics(Model(robot_mechanism(robot), plain.effects), s=zero["s"], **point)
+    np.testing.assert_allclose(np.asarray(found).ravel(), same, atol=1e-9)
+    # the same mass on the body, taken off again as links: nothing at all while nothing turns
+    falling = {"a": np.array([0.7, -9.81, 0, 0, 0, 0, 0]), "q": point["q"]}
+    np.testing.assert_allclose(added(MassSplit(m=m), **falling)[:2], 0.0, atol=1e-9)
+
+
+def test_mass_is_not_split_beyond_what_there_is() -> None:
+    with pytest.raises(KembaError, match=r"mass_split.*m = 3 kg.*no mass"):
+        load_model(extra=[MassSplit(m=3.0)])
+
+
+def test_a_longer_boom_is_lighter_and_its_encoders_show_less() -> None:
+    k = 0.02
+    point = {name: RNG.standard_normal(7) for name in "qva"}
+    longer = Boom(length_x=(1 + k) * 2.575, length_z=(1 + k) * 2.493)
+    wanted = added(longer, **point)
+    np.testing.assert_allclose(added(BoomLever(k=k), **point), wanted, atol=1e-12)
+    assert np.abs(wanted[:2]).min() > 1e-3
+    time = np.linspace(0.0, 0.1, 11)
+    for channel, share in (("body/x", 1 / (1 + k)), ("body/z", 1 / (1 + k)), ("body/pitch", 1.0)):
+        shown = as_measured([BoomLever(k=k)], channel, Series(time, time + 0.3)).value
+        np.testing.assert_allclose(shown, share * (time + 0.3))

@@ -20,7 +20,9 @@ OUTSIDE = (
     "gear_loss",
     "cable_pull",
     "boom_drag",
+    "flexible_boom",
 )
+SHAPES = ("geometry", "boom_lever", "mass_split")  # kinds of lengths and assembly
 SURE = 0.95
 
 
@@ -54,14 +56,21 @@ def hidden(record: Record) -> list[str]:
 
 
 def kind(record: Record) -> str:
-    """null, single, sensor, pair or outside."""
-    names = hidden(record)
+    """null, single, sensor, shape, pair, many or outside."""
+    return kind_of(hidden(record))
+
+
+def kind_of(effects: str | Sequence[str] | None) -> str:
+    """The kind of a case by what is hidden in it."""
+    names = [effects] if isinstance(effects, str) else list(effects or ())
     if not names:
         return "null"
     if any(name in OUTSIDE for name in names):
         return "outside"
     if len(names) > 1:
-        return "pair"
+        return "pair" if len(names) == 2 else "many"
+    if names[0].split(":")[0] in SHAPES:
+        return "shape"
     return "sensor" if names[0].startswith("sensor") else "single"
 
 
@@ -142,10 +151,10 @@ def table(records: Sequence[Record]) -> str:
     """The whole report as Markdown."""
     groups = {
         name: [r for r in records if kind(r) == name]
-        for name in ("single", "sensor", "pair", "outside", "null")
+        for name in ("single", "sensor", "shape", "pair", "many", "outside", "null")
     }
     known = [*groups["single"], *groups["sensor"]]
-    errors, covered = parameters([*known, *groups["pair"]])
+    errors, covered = parameters([*known, *groups["shape"], *groups["pair"], *groups["many"]])
     rows = [
         _row("right effect first", known, lambda r: among_first(r, 1)),
         _row("right effect first, physics", groups["single"], lambda r: among_first(r, 1)),
@@ -158,6 +167,8 @@ def table(records: Sequence[Record]) -> str:
             known,
             overlooked,
         ),
+        *_shapes(groups["shape"]),
+        *_many(groups["many"]),
         _row("both effects of a pair", groups["pair"], right),
         _row(
             "at least one of a pair, none wrong",
@@ -201,6 +212,42 @@ def table(records: Sequence[Record]) -> str:
         )
     head = ["| | share (95 % Wilson) | of |", "|---|---|---|"]
     return "\n".join([*head, *rows, "", *misses(records)])
+
+
+def _shapes(records: Sequence[Record]) -> list[str]:
+    """Rows about lengths, lever and split, where there are such cases."""
+    if not records:
+        return []
+
+    def as_shape(record: Record) -> bool:
+        return any(name.split(":")[0] in SHAPES for name in named(record))
+
+    lengths = [r for r in records if hidden(r)[0].startswith("geometry:") and right(r)]
+    shown = [r for r in records if hidden(r) != ["geometry:piston/mount"]]
+    return [
+        _row("geometry and assembly: named as such", records, as_shape),
+        _row("geometry and assembly: exactly the right one", records, right),
+        _row("the same without the mount, which hardly shows", shown, right),
+        _row("of the lengths named: within 1 mm", lengths, lambda r: _length_error(r) < 1e-3),
+    ]
+
+
+def _length_error(record: Record) -> float:
+    (effect,) = record["truth"]
+    row = next(r for r in record["answer"]["ranking"] if r["effect"] == effect["kind"])
+    return float(abs(row["parameters"]["d"]["value"] - effect["parameters"]["d"]))
+
+
+def _many(records: Sequence[Record]) -> list[str]:
+    """Rows about three to five effects at once, where there are such cases."""
+    if not records:
+        return []
+    found = [name in named(r) for r in records for name in hidden(r)]
+    wrong = [name not in hidden(r) for r in records for name in named(r)]
+    return [
+        _share("three to five at once: hidden effects named", sum(found), len(found)),
+        _share("three to five at once: of the named ones wrong", sum(wrong), len(wrong)),
+    ]
 
 
 def write(page: Path, name: str, text: str) -> None:

@@ -80,6 +80,7 @@ def main(
     """The command line of a study: run what is not yet in the file, then print the report."""
     parser = argparse.ArgumentParser(description=text)
     parser.add_argument("--cases", type=int, default=None, help="so many of the beginning only")
+    parser.add_argument("--only", default="", help="of these kinds only, as in the report")
     parser.add_argument("--out", type=Path, default=Path(f"{name}.jsonl"))
     parser.add_argument("--part", default="1/1", help="i/n: every n-th case, from the i-th on")
     parser.add_argument("--write", action="store_true", help="put the report into the docs")
@@ -107,6 +108,8 @@ def _pending(cases: Sequence[Setting], options: argparse.Namespace) -> Iterator[
     """What this part has to do and the file does not have."""
     done = {json.dumps(r["case"], sort_keys=True) for r in report.read(options.out)}
     part, parts = (int(p) for p in options.part.split("/"))
-    for setting in cases[: options.cases][part - 1 :: parts]:
+    kinds = options.only.split(",")
+    wanted = [c for c in cases if not options.only or report.kind_of(c["effect"]) in kinds]
+    for setting in wanted[: options.cases][part - 1 :: parts]:
         if json.dumps(setting, sort_keys=True) not in done:
             yield setting

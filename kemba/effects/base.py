@@ -178,8 +178,12 @@ class Effect(BaseModel):
 
     @property
     def geometry(self) -> Mapping[str, Any]:
-        """Lengths of the mechanism that it changes: part -> true minus nominal [m]."""
+        """Lengths and masses of the mechanism that it changes: part -> true minus nominal."""
         return {}
+
+    def readings(self) -> Iterable[Any]:
+        """What it makes sensors show wrongly, as faults of sensors."""
+        return ()
 
     @property
     def leg(self) -> str | None:

@@ -15,6 +15,7 @@ from kemba.effects.mechanics.boom_faults import (
     BoomSpring,
     PitchFriction,
 )
+from kemba.effects.mechanics.boom_lever import BoomLever
 from kemba.effects.mechanics.contact import Contact
 from kemba.effects.mechanics.friction import (
     DirectionFriction,
@@ -32,7 +33,7 @@ from kemba.effects.mechanics.hip import (
     RotorInertia,
     TorqueScale,
 )
-from kemba.effects.mechanics.load import ComOffset, Payload
+from kemba.effects.mechanics.load import ComOffset, MassSplit, Payload
 from kemba.effects.mechanics.motor import Motor
 from kemba.effects.mechanics.piston import EndCushion, GasSpring, PistonDamping, QuadraticDamping
 from kemba.effects.mechanics.stops import EndStop
@@ -109,6 +110,8 @@ HIP: tuple[type[Effect], ...] = (
 BODY: tuple[type[Effect], ...] = (
     Payload,
     ComOffset,
+    MassSplit,
+    BoomLever,
     BoomForce,
     BoomInertia,
     BoomFriction,

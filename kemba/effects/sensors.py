@@ -97,6 +97,9 @@ class SensorEffect(Effect):
     def parameters(self) -> dict[str, Param]:
         return self.sized(self.sigma)
 
+    def readings(self) -> Iterable[SensorEffect]:
+        return (self,)
+
     @property
     def lateness(self) -> float:
         """Seconds by which the sensor shows its channel late."""
@@ -190,8 +193,9 @@ class SensorDelay(SensorEffect):
 
 
 def in_order(effects: Iterable[Effect], channel: str) -> list[SensorEffect]:
-    """The faults of a channel (a column without its unit) in the order in which they act."""
-    faults = [e for e in effects if isinstance(e, SensorEffect) and e.channel == channel]
+    """The faults of a channel (a column without its unit) in the order in which they act; those
+    that another effect brings along, too."""
+    faults = [fault for e in effects for fault in e.readings() if fault.channel == channel]
     return sorted(faults, key=lambda fault: (STAGES.index(fault.stage), fault.kind))
 
 

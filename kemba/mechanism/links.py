@@ -14,6 +14,8 @@ from kemba.quantity import Param
 # part, as row/field of a leg in the link table: `femur/length` -> true minus nominal [m], a number
 # or a symbol
 Offsets = Mapping[str, Any]
+SPLIT = "legs/mass"  # another part: mass [kg] that is in the legs and not in the body
+LINKS = ("femur", "tibia", "cylinder", "rod")
 RESERVED = ("body", "supply", "piston")  # first parts of columns that belong to no leg
 
 
@@ -101,17 +103,35 @@ class RobotFile(Robot):
 
 
 def altered(robot: Robot, offsets: Offsets) -> Robot:
-    """The robot with its lengths changed by `offsets`; masses and centres of mass stay.
+    """The robot with its lengths changed by `offsets`; masses and centres of mass stay, but for
+    mass that `SPLIT` moves.
 
     Offsets may be symbols; the result is then not checked, and only for expressions.
     """
+    robot = _split(robot, offsets[SPLIT]) if SPLIT in offsets else robot
     leg = robot.leg
     for part, d in offsets.items():
+        if part == SPLIT:
+            continue
         row, name = part.split("/")
         table = getattr(leg, row)
         table = table.model_copy(update={name: getattr(table, name) + d})
         leg = leg.model_copy(update={row: table})
     return robot.model_copy(update={"leg": leg})
+
+
+def _split(robot: Robot, m: Any) -> Robot:
+    """The robot with mass m [kg] in the links of its legs and not in its body."""
+    carried = len(robot.legs) * sum(getattr(robot.leg, row).mass for row in LINKS)
+    links = {row: _heavier(getattr(robot.leg, row), 1 + m / carried) for row in LINKS}
+    body = _heavier(robot.body, 1 - m / robot.body.mass)
+    return robot.model_copy(update={"body": body, "leg": robot.leg.model_copy(update=links)})
+
+
+def _heavier(link: Link, factor: Any) -> Link:
+    """The link with `factor` times its mass, in the same shape."""
+    masses = {"mass": factor * link.mass, "inertia": factor * link.inertia}
+    return link.model_copy(update=masses)
 
 
 def nominal_length(leg: Leg, part: str) -> float:

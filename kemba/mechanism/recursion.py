@@ -20,17 +20,23 @@ Local = np.ndarray | tuple[Any, Any]  # (x, z) in a frame, numbers or symbols
 
 @dataclass(frozen=True)
 class Joint:
-    """What the recursion needs of one joint: placement, axis, and the inertia it carries."""
+    """What the recursion needs of one joint: placement, axis, and the inertia it carries, which may
+    be symbols."""
 
     name: str
     parent: int
     offset: Local
     turns: float  # +-1 about the counter-clockwise axis, 0 for a prismatic joint
     slides: np.ndarray  # unit axis in (x, z), zero for a revolute joint
-    mass: float
+    mass: Any
     com: np.ndarray
-    inertia: float
+    inertia: Any
     armature: float
+
+    @property
+    def heavy(self) -> bool:
+        """Whether it carries a link."""
+        return isinstance(self.mass, ca.SX) or bool(self.mass)
 
 
 @dataclass(frozen=True)
@@ -137,7 +143,7 @@ def rnea(joints: list[Joint], q: ca.SX, v: ca.SX, a: ca.SX, gravity: float) -> c
     tau: list[ca.SX] = [zero] * len(joints)
     for i in reversed(range(len(joints))):
         joint, motion = joints[i], motions[i]
-        if joint.mass:
+        if joint.heavy:
             com = motion.turn(joint.com)
             ax, az = motion.carry(com)
             inertial = (joint.mass * ax, joint.mass * az)

@@ -10,7 +10,7 @@ import numpy as np
 
 from kemba.errors import KembaError
 from kemba.mechanism import knee
-from kemba.mechanism.links import Offsets, Robot, altered, nominal_length
+from kemba.mechanism.links import SPLIT, Link, Offsets, Robot, altered, nominal_length
 from kemba.mechanism.pin_model import build_pin_model
 from kemba.mechanism.planar import Mechanism, Port
 from kemba.mechanism.recursion import (
@@ -32,7 +32,8 @@ def robot_mechanism(
 ) -> Mechanism:
     """The mechanism of a link table: q = (x, z, pitch, hips, knees), n = 3 + 2 legs.
 
-    `offsets` [m]: lengths that differ from those of the table `drawn`. `symbols`: the same
+    `offsets` [m or kg]: lengths, and mass between body and legs, that differ from those of the
+    table `drawn`. `symbols`: the same
     offsets in expressions, where these depend on parameters. Raises KembaError where the knee
     cannot close with these lengths.
     """
@@ -42,7 +43,8 @@ def robot_mechanism(
     n = len(coordinates)
     q, v, a = ca.SX.sym("q", n), ca.SX.sym("v", n), ca.SX.sym("a", n)
     shape = altered(drawn, {**offsets, **(symbols or {})})
-    joints = _placed(read_joints(build_pin_model(robot)), shape)
+    drawn_joints = read_joints(build_pin_model(robot))
+    joints = _placed(drawn_joints, shape, weighed=SPLIT in (symbols or {}))
     tree = tree_angles(shape, q)
     tree_v = ca.jtimes(tree, q, v)
     tree_a = ca.jtimes(tree_v, q, v) + ca.jtimes(tree, q, a)
@@ -50,7 +52,7 @@ def robot_mechanism(
     motions = dict(
         zip((j.name for j in joints), forward(joints, tree, tree_v, tree_a, 0.0), strict=True)
     )
-    mass = sum(j.mass for j in joints)
+    mass = sum(j.mass for j in drawn_joints)
     return Mechanism(
         name=robot.name,
         q=q,
@@ -72,7 +74,7 @@ def robot_mechanism(
         mirror=_mirror(robot),
         standing=standing_pose(robot),
         points=_points(shape, motions),
-        tolerances=link_tolerances(joints, robot.tolerances.model_dump()),
+        tolerances=link_tolerances(drawn_joints, robot.tolerances.model_dump()),
     )
 
 
@@ -100,29 +102,47 @@ def reshaped(mechanism: Mechanism, offsets: Offsets, symbols: Offsets | None = N
     return robot_mechanism(mechanism.drawn, offsets, symbols)
 
 
-def _placed(joints: list[Joint], robot: Robot) -> list[Joint]:
-    """The joints at the places that the lengths of `robot` give them, which may be symbols."""
-    offsets: dict[str, Any] = {}
+def _placed(joints: list[Joint], robot: Robot, weighed: bool) -> list[Joint]:
+    """The joints at the places that the lengths of `robot` give them, which may be symbols;
+    `weighed`: with its masses, too."""
+    leg = robot.leg
+    changes: dict[str, dict[str, Any]] = {"body/pitch": _weight(robot.body, weighed)}
     for name, place in robot.legs.items():
-        offsets[f"{name}/knee"] = (0.0, -robot.leg.femur.length)
-        offsets[f"{name}/cylinder"] = (place.fold * robot.leg.piston.mount, 0.0)
-    return [replace(j, offset=offsets.get(j.name, j.offset)) for j in joints]
+        knee = {"offset": (0.0, -leg.femur.length)}
+        mount = {"offset": (place.fold * leg.piston.mount, 0.0)}
+        changes[f"{name}/hip"] = _weight(leg.femur, weighed)
+        changes[f"{name}/knee"] = {**knee, **_weight(leg.tibia, weighed)}
+        changes[f"{name}/cylinder"] = {**mount, **_weight(leg.cylinder, weighed)}
+        changes[f"{name}/rod"] = _weight(leg.rod, weighed)
+    return [replace(j, **changes.get(j.name, {})) for j in joints]
+
+
+def _weight(link: Link, weighed: bool) -> dict[str, Any]:
+    return {"mass": link.mass, "inertia": link.inertia} if weighed else {}
 
 
 def _closed(robot: Robot, offsets: Offsets) -> Robot:
-    """The robot, if its lengths are positive and its knee closes at both ends of the stroke."""
-    for part, d in offsets.items():
+    """The robot, if its masses and lengths are positive and its knee closes at both ends of the
+    stroke."""
+    if min(robot.body.mass, robot.leg.femur.mass) <= 0.0:
+        raise KembaError(
+            "effects.mass_split",
+            f"m = {offsets[SPLIT]:g} kg leaves the body or the legs no mass",
+            "less mass than either has was expected",
+        )
+    lengths = {part: d for part, d in offsets.items() if part != SPLIT}
+    for part, d in lengths.items():
         if nominal_length(robot.leg, part) <= 0.0:
             raise KembaError(
                 f"effects.geometry:{part}",
                 f"d = {1e3 * d:g} mm leaves nothing of this length",
                 "a small difference between machine and drawing was expected",
             )
-    for x in (0.0, robot.stroke) if offsets else ():
+    for x in (0.0, robot.stroke) if lengths else ():
         try:
             knee.flexion(robot.leg, x)
         except ValueError as error:
-            name = "effects.geometry:" + next(iter(offsets))
+            name = "effects.geometry:" + next(iter(lengths))
             expected = "lengths that close the triangle femur, mount, pin at both ends"
             raise KembaError(name, str(error), f"{expected} were expected") from None
     return robot

@@ -26,15 +26,15 @@ class Boom(Effect):
     equation: ClassVar[str] = "-(I/l_x^2) ax on x; -(I/l_z^2) az - m g com/l_z on z"
     source: ClassVar[str] = "paper II-B (mass, inertia); authors' program (lengths, COM)"
     ports: ClassVar[tuple[str, ...]] = ("body_x", "body_z")
+    publishes: ClassVar[tuple[str, ...]] = ("boom_mass_x", "boom_mass_z", "boom_weight")
     nominal: ClassVar[dict[str, Tolerance]] = dict.fromkeys(
         ("inertia", "mass"), Tolerance(0.02, source="assumed: as its links, weighed or from CAD")
     )
 
     def evaluate(self, at: At) -> Contribution:
         weight = self.mass * at.gravity * self.com / self.length_z
+        mass_x, mass_z = self.inertia / self.length_x**2, self.inertia / self.length_z**2
         return Contribution(
-            effort={
-                "body_x": -self.inertia / self.length_x**2 * at.body_x.a,
-                "body_z": -self.inertia / self.length_z**2 * at.body_z.a - weight,
-            }
+            effort={"body_x": -mass_x * at.body_x.a, "body_z": -mass_z * at.body_z.a - weight},
+            publish={"boom_mass_x": mass_x, "boom_mass_z": mass_z, "boom_weight": weight},
         )

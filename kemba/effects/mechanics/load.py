@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal
 
 import casadi as ca
 
@@ -59,3 +60,25 @@ class ComOffset(Effect):
         return Contribution(
             effort={"body_x": -M * ax, "body_z": -M * az, "pitch": along * F_z - up * F_x}
         )
+
+
+class MassSplit(Effect):
+    """Mass that is in the legs and not in the body: the robot weighs what its file says.
+
+    m leaves the body and is spread over the links of all legs as these are heavy. Every link keeps
+    its shape and its centre of mass; its moment of inertia grows with its mass.
+    """
+
+    kind: Literal["mass_split"] = "mass_split"
+    m: Annotated[float, Param("kg", 0.2, doc="mass in the legs instead of the body")] = 0.0
+
+    place: ClassVar[Literal["leg", "body"]] = "body"
+    family: ClassVar[str] = "body"
+    equation: ClassVar[str] = "M -> M - m, each link of a leg -> (1 + m / all of them) times it"
+    source: ClassVar[str] = "link table: weighed as a whole, split by CAD"
+    ports: ClassVar[tuple[str, ...]] = ("body_x", "body_z", "pitch")
+    off: ClassVar[dict[str, float]] = {"m": 0.0}
+
+    @property
+    def geometry(self) -> Mapping[str, Any]:
+        return {"legs/mass": self.m}

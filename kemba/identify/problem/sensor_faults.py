@@ -22,6 +22,13 @@ def possible_faults(channel: str) -> dict[str, SensorEffect]:
     return {fault.name: fault for fault in found}
 
 
+def carriers() -> dict[str, type[Effect]]:
+    """Every other kind of effect that makes sensors show something wrong, such as a boom whose
+    encoders count with another lever."""
+    own = (Effect.readings, SensorEffect.readings)
+    return {k: e for k, e in BY_KIND.items() if e.readings not in own}
+
+
 class SensorFaults:
     """The faults of all sensors: those on a model's list, and those that theta adds.
 
@@ -30,7 +37,14 @@ class SensorFaults:
     """
 
     def __init__(self, effects: Iterable[Effect] = ()) -> None:
+        effects = list(effects)
         self.listed = {e.name: e for e in effects if isinstance(e, SensorEffect)}
+        self.carried = {e.name: e for e in effects if e.kind in carriers()}
+
+    @property
+    def present(self) -> bool:
+        """Whether the model lists anything that makes a sensor wrong."""
+        return bool(self.listed or self.carried)
 
     @property
     def nuisance(self) -> dict[str, tuple[float, float]]:
@@ -55,7 +69,17 @@ class SensorFaults:
                 fault = cls.model_validate({"channel": channel})
             if fault is not None:
                 found.append(fault.model_copy(update=values))
-        return found
+        brought = (f for effect in self._carrying(theta) for f in effect.readings())
+        return [*found, *(fault for fault in brought if fault.channel == channel)]
+
+    def _carrying(self, theta: Theta) -> list[Effect]:
+        """The effects at theta that bring faults of sensors along."""
+        found = dict(self.carried)
+        for kind, cls in carriers().items():
+            own = {f: theta[f"{kind}.{f}"] for f in cls.declared() if f"{kind}.{f}" in theta}
+            if own:
+                found[kind] = found.get(kind, cls.model_validate({"kind": kind})).bind(own)
+        return list(found.values())
 
     def shown(self, theta: Theta, channel: str, true: Series) -> Series:
         """The channel as its sensor shows it at theta, from its true values."""
@@ -71,8 +95,9 @@ class SensorFaults:
 
 
 def is_fault(name: str) -> bool:
-    """Whether a name in theta is a figure of some sensor fault."""
-    return name.partition(":")[0] in fault_kinds()
+    """Whether a name in theta is a figure that changes what some sensor shows."""
+    kind = name.partition(":")[0]
+    return kind in fault_kinds() or kind.partition(".")[0] in carriers()
 
 
 def is_straight(name: str) -> bool:

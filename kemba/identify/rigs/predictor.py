@@ -93,7 +93,7 @@ class Predictor:
 
     def true(self, log: Filtered, theta: Theta) -> Filtered:
         """The channels without the faults of their sensors, but for the one that is predicted."""
-        if not self.sensors.listed and not any(is_fault(name) for name in theta):
+        if not self.sensors.present and not any(is_fault(name) for name in theta):
             return log
         seen = Series(log.time, log.q, (log.v, log.a))
         moved = self.sensors.behind(theta, self.place, seen)

@@ -7,6 +7,7 @@ of the logs to one height are believed where they do so much better than faults 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import casadi as ca
 import numpy as np
@@ -21,6 +22,8 @@ from kemba.mechanism.links import altered
 from kemba.settings import BY_HAND, Settings, setting
 
 GEOMETRY = "geometry:"  # names of the lengths begin so
+LEVER = "boom_lever"
+HELD = 1e-6  # of its width: what is not free
 
 
 class StandingSettings(Settings):
@@ -52,6 +55,7 @@ class StandingSettings(Settings):
     body: float = setting(3e-3, "m", "prior sigma of the zero of the body's height", BY_HAND)
     angle: float = setting(4e-3, "rad", "prior sigma of the zeros of pitch and hips", BY_HAND)
     piston: float = setting(6e-4, "m", "prior sigma of the zero of a piston", BY_HAND)
+    lever: float = setting(0.04, "1", "prior sigma of the boom's lever", "derived: two sizes")
     deep: float = setting(0.02, "m", "depth below the ground at which no foot can be", BY_HAND)
     often: float = setting(
         0.01, "1", "share of samples so deep from which lengths are not believed", BY_HAND
@@ -61,11 +65,20 @@ class StandingSettings(Settings):
     )
 
 
+@dataclass(frozen=True)
+class StandingLengths:
+    """Theta with the `lengths` [m] at which feet stand; `lever`: share by which a longer boom makes
+    them stand as well, 0 where none does."""
+
+    lengths: Mapping[str, float] = field(default_factory=dict)
+    lever: float = 0.0
+
+
 class Standing:
     """Heights of the feet at samples of a motion, for any lengths of the legs.
 
-    `names`: the lengths, as they are called in theta; zeros of pitch, height, hips and pistons
-    follow them in every vector x (k,).
+    `names`: the lengths, as they are called in theta; zeros of pitch, height, hips and pistons, and
+    the share by which the boom is longer than drawn follow them in every vector x (k,).
     """
 
     def __init__(
@@ -82,19 +95,20 @@ class Standing:
     def _function(self, physics: Physics) -> ca.Function:
         """(q without knees, pistons, x) -> heights (legs,) and their slopes along x."""
         node, legs, robot = physics.node, self.legs, physics.mechanism.need_robot()
-        x = ca.SX.sym("x", len(self.names) + 2 + 2 * legs)
+        x = ca.SX.sym("x", len(self.names) + 3 + 2 * legs)
         lengths = {n: x[i] for i, n in enumerate(self.names)}
         zeros = x[len(self.names) :]
         body, pistons = ca.SX.sym("q", 3 + legs), ca.SX.sym("s", legs)
         shape = altered(robot, {n.removeprefix(GEOMETRY).removesuffix(".d"): d
                                 for n, d in lengths.items()})  # fmt: skip
-        extension = pistons - zeros[2 + legs :]
+        extension = pistons - zeros[2 + legs : 2 + 2 * legs]
         knees = [
             place.fold * flexion_of(shape.leg, extension[i])
             for i, place in enumerate(robot.legs.values())
         ]
         off = ca.vertcat(0.0, zeros[1], zeros[0], zeros[2 : 2 + legs])
-        q = ca.vertcat(body - off, *knees)
+        longer = ca.vertcat(1 + zeros[-1], 1 + zeros[-1], ca.DM.ones(1 + legs))
+        q = ca.vertcat((body - off) * longer, *knees)
         nominal = zip(physics.names, physics.nominal.tolist(), strict=True)
         p = ca.vertcat(*(lengths.get(n, ca.SX(value)) for n, value in nominal))
         feet = ca.vertcat(*(node.outputs[f"{leg}/foot/z"] for leg in physics.legs))
@@ -111,16 +125,18 @@ class Standing:
 
 def standing_lengths(
     physics: Physics, batch: Batch, reference: Reference, candidates: Mapping[str, Candidate]
-) -> dict[str, float]:
-    """Theta with the lengths at which feet stand on the ground; empty where those of the model are
-    as good, or where no lengths are candidates."""
+) -> StandingLengths:
+    """The lengths at which feet stand on the ground; none where those of the model are as good, or
+    where no lengths are candidates."""
     sizes = {c.key: c.lead.size for c in candidates.values() if c.effect.startswith(GEOMETRY)}
     if not sizes:
-        return {}
+        return StandingLengths()
     standing = Standing(physics, batch, reference, tuple(sizes))
     settings, legs = StandingSettings.current(), standing.legs
     zeros = [settings.angle, settings.body, *[settings.angle] * legs, *[settings.piston] * legs]
-    width = np.array([*(settings.prior * s for s in sizes.values()), *zeros])
+    lengths = [settings.prior * size for size in sizes.values()]
+    free = np.array([*lengths, *zeros, settings.lever])
+    width = np.array([*lengths, *zeros, settings.lever * HELD])
     start = np.zeros(len(width))
     most = _most_rows(standing.heights(start)[0])
     for i, size in enumerate(sizes.values()):
@@ -133,24 +149,31 @@ def standing_lengths(
     x, cost, rows = _refined(standing, start, width)
     _, without, _ = _only(standing, (), x, width, rows)
     if without - cost < settings.gain:
-        return {}
+        return StandingLengths()
     singles = [_only(standing, (i,), x, width, rows) for i in range(len(sizes))]
     one, alone, _ = min(singles, key=lambda fit: fit[1])
     x = one if alone - cost < settings.gain else x
     if np.mean(standing.heights(x)[0] < -settings.deep) > settings.often:
-        return {}  # feet in the ground: columns are wrong, not lengths
-    return {n: float(d) for n, d in zip(sizes, x, strict=False) if abs(d) > 0.01 * sizes[n]}
+        return StandingLengths()  # feet in the ground: columns are wrong, not lengths
+    found = {n: float(d) for n, d in zip(sizes, x, strict=False) if abs(d) > 0.01 * sizes[n]}
+    boom, by_boom, _ = _only(standing, (), x, free, rows)
+    as_good = LEVER in candidates and by_boom - min(alone, cost) < settings.gain
+    return StandingLengths(found, float(boom[-1]) if as_good else 0.0)
 
 
-def remarks(lengths: Mapping[str, float]) -> list[str]:
-    """In words, the lengths [m] at which feet stand."""
-    if not lengths:
+def remarks(found: StandingLengths) -> list[str]:
+    """In words, the lengths at which feet stand."""
+    if not found.lengths:
         return []
     parts = (
         f"{name.removeprefix(GEOMETRY).removesuffix('.d')} is {1e3 * d:+.1f} mm off"
-        for name, d in lengths.items()
+        for name, d in found.lengths.items()
     )
-    return [f"feet stand on level ground if {' and '.join(parts)}; contacts were read with that"]
+    said = f"feet stand on level ground if {' and '.join(parts)}"
+    if not found.lever:
+        return [f"{said}; contacts were read with that"]
+    other = f"or if the boom is {100 * found.lever:+.1f} % longer than drawn"
+    return [f"{said}, {other}; contacts were read with the former"]
 
 
 def _only(
@@ -159,7 +182,7 @@ def _only(
     """The refined fit with all lengths but the `free` ones as the model has them."""
     held = np.array([i not in free for i in range(len(standing.names))])
     narrow, begin = width.copy(), x.copy()
-    narrow[: len(held)][held] *= 1e-6
+    narrow[: len(held)][held] *= HELD
     begin[: len(held)][held] = 0.0
     return _refined(standing, begin, narrow, rows)
 

@@ -108,7 +108,8 @@ class RobotProblem(Problem):
         sensors = SensorFaults(model.effects)
         noise = stated_noise(batch)
         reference = first_reference(physics, batch, physics.nominal)
-        self.lengths = standing_lengths(physics, batch, reference, self.candidates)
+        self.standing = standing_lengths(physics, batch, reference, self.candidates)
+        self.lengths = dict(self.standing.lengths)
         self.state = linearise_at(
             physics, batch, sensors, self.lengths, ground, self.unknown, noise
         )
@@ -195,9 +196,11 @@ class RobotProblem(Problem):
         return self.state.slopes({**typical, **theta}, names)
 
     def _is_direct(self, name: str) -> bool:
-        """Whether the force is linear in it: shapes, states, delays and lengths are not."""
+        """Whether the force is linear in it, and nothing else depends on it: shapes, states,
+        delays, lengths and what sensors show are not so."""
         physics = self.physics
-        if name in physics.moving or name in physics.base.delays or name.startswith(GEOMETRY):
+        elsewhere = is_fault(name) or name.startswith(GEOMETRY)
+        if elsewhere or name in physics.moving or name in physics.base.delays:
             return False
         lead = any(name == c.key for c in self.candidates.values())
         return name in self.state.linear or (
@@ -267,7 +270,7 @@ class RobotProblem(Problem):
         )
         if faults:
             raise BadData(faults)
-        return remarks(self.lengths)
+        return remarks(self.standing)
 
     def _sensor_columns(self) -> Array:
         """Columns (n, k) of every sensor fault and every length, per size."""

@@ -172,7 +172,7 @@ def linearise_at(
         state = _along(physics, batch, sensors, base, ground, schedules, reference, loose, noise)
         y, g = state.measurement(base), state.acceleration(base)
         reference = smoothed(state.motion, state.gain, y, g)
-        if sensors.listed or any(map(is_fault, base)):  # as true sensors would have seen it
+        if sensors.present or any(map(is_fault, base)):  # as true sensors would have seen it
             schedules = read_schedules(physics, batch, reference, p)
         normal = [state.motion.normal[: len(s.phase), i] for i, s in enumerate(schedules)]
         schedules = tuple(loaded(s, f, dt) for s, f in zip(schedules, normal, strict=True))
