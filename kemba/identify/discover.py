@@ -13,8 +13,10 @@ from kemba.identify.doubt.cross_validation import left_out
 from kemba.identify.doubt.run_consistency import Drift, drifting
 from kemba.identify.doubt.unexplained import Formula, look, unfinished
 from kemba.identify.evidence.bootstrap import NullTest, bootstrap, smallest_detectable
+from kemba.identify.evidence.figures import settled
 from kemba.identify.evidence.linear import time_blocks
 from kemba.identify.evidence.search import Search
+from kemba.identify.evidence.search_settings import SearchSettings
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
 from kemba.identify.evidence.windows import error_ratio
 from kemba.identify.problem.problem import Problem
@@ -62,27 +64,41 @@ def discover(
     started = time.monotonic()
     share = DiscoverSettings.current().searching
     search = Search(problem, started + share * time_limit, say)
-    best = search.run()
-    if problem.structures & set(best):
-        found = _of_structures(search, best, holdout)
-    else:
-        found = judged(search, best, holdout)
+    found = _discovered(search, search.first(), holdout)
     found.answer.runtime_s = time.monotonic() - started
     return found
 
 
-def _of_structures(search: Search, best: Hypothesis, holdout: Problem | None) -> Discovery:
-    """Where another structure was named: if the answer is not complete, built anew with it, and the
-    answer that leaves the smaller error on left-out data."""
-    first = judged(search, best, holdout)
+def _discovered(search: Search, guess: Hypothesis, holdout: Problem | None) -> Discovery:
+    """The answer from a first guess on.
+
+    A structure that is far ahead is built in at once: what else is missing shows only then. Any
+    other is built in where the search names it and its answer is not complete. Of both answers the
+    one with the smaller error on left-out data counts.
+    """
+    anew = _built_anew(search, guess, holdout) if _far_ahead(search, guess) else None
+    if anew and (anew.answer.verdict == "missing" or time.monotonic() > search.deadline):
+        return anew
+    first = judged(search, search.further(guess), holdout)
     named = search.problem.structures & set(first.best)
-    if first.answer.verdict == "missing" or not named or time.monotonic() > search.deadline:
+    if first.answer.verdict == "missing" and not anew:
         return first
-    anew = _built_anew(search, first.best, holdout)
+    if anew is None and named and time.monotonic() < search.deadline:
+        anew = _built_anew(search, first.best, holdout)
+    if anew is None:
+        return first
     # one noise for both, or the model that takes more of its error for noise would look better
     judge = (holdout or search.problem).heard_as(anew.search.problem)
     left = error_ratio(judge, search.points[first.best].fit.theta)
     return anew if anew.answer.error_after < left else first
+
+
+def _far_ahead(search: Search, guess: Hypothesis) -> bool:
+    """Whether the guess is a structure that no single effect comes near to."""
+    if not search.problem.structures & set(guess):
+        return False
+    others = [p.log_evidence for h, p in search.points.items() if h != guess]
+    return search.points[guess].log_evidence - max(others) > SearchSettings.current().far
 
 
 def _built_anew(search: Search, best: Hypothesis, holdout: Problem | None) -> Discovery:
@@ -90,8 +106,9 @@ def _built_anew(search: Search, best: Hypothesis, holdout: Problem | None) -> Di
     structure = min(search.problem.structures & set(best))
     search.say(f"building the model anew with {structure}")
     theta = search.points[best].fit.theta
-    second = Search(search.problem.rebuilt(theta), search.deadline, search.say)
-    kept = holdout.rebuilt(theta) if holdout else None
+    built, figures = settled(search.problem.rebuilt(theta))
+    second = Search(built, search.deadline, search.say, begin=figures)
+    kept = holdout.rebuilt(theta).relinearise(figures) if holdout else None
     found = judged(second, second.run(), kept)
     # one noise for all rungs: that of the model that explains more of the data
     judge = (holdout or search.problem).heard_as(second.problem)

@@ -17,7 +17,7 @@ from kemba.identify.evidence.linear import (
     within,
 )
 from kemba.identify.evidence.point import Division, LinearisationPoint
-from kemba.identify.evidence.refit import Fit, Frozen
+from kemba.identify.evidence.refit import Fit, Frozen, refit
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis, Ranker
 from kemba.identify.problem.problem import Array, Problem
 from kemba.settings import BY_HAND, Settings, setting
@@ -40,15 +40,21 @@ class Baseline:
 
     `problem`: the problem under the noise colour learnt. `point`: the null. `table`: log evidence
     by hypothesis, linear. `jacobian` (n, k) and `residual` (n,) at the null. `among`: single
-    effects whose evidence is improved by a few evaluations (None: all).
+    effects whose evidence is improved by a few evaluations (None: all). `begin`: where the fit of
+    curved figures begins.
     """
 
     point: LinearisationPoint
     jacobian: Array
     residual: Array
 
-    def __init__(self, problem: Problem, among: frozenset[Hypothesis] | None = None) -> None:
-        self.problem, self.among = problem, among
+    def __init__(
+        self,
+        problem: Problem,
+        among: frozenset[Hypothesis] | None = None,
+        begin: Mapping[str, float] | None = None,
+    ) -> None:
+        self.problem, self.among, self.begin = problem, among, dict(begin or {})
         self.division = Division(problem)
         self.table: dict[Hypothesis, float] = {}
         self._start()
@@ -78,6 +84,10 @@ class Baseline:
         """Null fit, noise colour, and the linear table at the null."""
         problem, blocks = self.problem, self.division.blocks
         free = tuple(problem.nuisance)
+        if problem.own_figures:  # a linear estimate of these runs off
+            frozen = Frozen(free, problem.jacobian(self.begin, free))
+            self._rank(refit(problem, NULL, self.begin, frozen).theta)
+            return
         moving = problem.moves  # then slopes hold within the nuisance parameters' tolerances
         names = names_of(problem, {}) if moving else free
         known = problem.jacobian({}, names)

@@ -1,5 +1,6 @@
-"""Nonlinear refit of one hypothesis: least squares with priors; slopes along nuisance parameters
-are those of the null."""
+"""Nonlinear refit of one hypothesis: least squares with priors, within bounds, by steps that are
+taken only where the cost falls. Slopes along nuisance parameters are those of the null, but for
+those that are `curved`."""
 
 from __future__ import annotations
 
@@ -124,6 +125,7 @@ class _LeastSquares:
         self.own = {key: p for e in hypothesis for key, p in problem.candidates[e].keys().items()}
         self.switches = {problem.candidates[e].key for e in hypothesis}
         self.nuisance = list(frozen.names)
+        self.curved = [n for n in problem.curved if n in frozen.names]
         self.start = dict(start)
         self.settings, self.slab = RefitSettings.current(), SpikeSlabSettings.current().slab
 
@@ -155,7 +157,10 @@ class _LeastSquares:
     def _columns(self, jacobian: Array) -> dict[str, Array]:
         """Slopes of the residual per unit of each own parameter, from those per prior width."""
         rows, n = len(self.frozen.jacobian), len(self.nuisance)
-        columns = {}
+        columns = {
+            name: jacobian[:rows, self.nuisance.index(name)] / self.problem.nuisance[name][1]
+            for name in self.curved
+        }
         for i, (key, p) in enumerate(self.own.items(), start=n):
             unit = p.size if is_shape(self.problem, key) else self.slab * p.size
             columns[key] = jacobian[:rows, i] / unit
@@ -183,6 +188,11 @@ class _LeastSquares:
     def _bounds(self) -> tuple[Array, Array]:
         n, bound = len(self.nuisance), self.settings.bound
         lower, upper = np.full(n + len(self.own), -bound), np.full(n + len(self.own), bound)
+        for i, name in enumerate(self.nuisance):
+            nominal, sigma = self.problem.nuisance[name]
+            low, high = self.problem.limits(name)
+            lower[i] = max(lower[i], (low - nominal) / sigma)
+            upper[i] = min(upper[i], (high - nominal) / sigma)
         for i, (key, p) in enumerate(self.own.items(), start=n):
             if np.isfinite(p.lower):
                 lower[i] = max(
@@ -215,8 +225,10 @@ class _LeastSquares:
         jacobian = np.zeros((len(base), len(x)))
         rows = len(base) - len(x)
         slopes = self.frozen.jacobian
-        if self.problem.bends:
-            slopes = self.problem.jacobian(self._theta(x), self.nuisance)
+        if self.curved:
+            slopes = slopes.copy()
+            at = [self.nuisance.index(name) for name in self.curved]
+            slopes[:, at] = self.problem.jacobian(self._theta(x), self.curved)
         jacobian[:rows, :n] = slopes * sigmas
         jacobian[rows:] = np.eye(len(x))
         for i in range(n, len(x)):

@@ -25,24 +25,34 @@ class Search:
 
     `problem`: the problem as it is now; it is replaced when its noise colour is learnt or its
     motion found again. `deadline`: when to stop refitting, by `time.monotonic` [s]. `say`: told of
-    progress. `points`: every hypothesis that was refitted. `base`: the null model.
+    progress. `points`: every hypothesis that was refitted. `begin`: figures of the model as it is,
+    where a fit found them already. `base`: the null model.
     """
 
     problem: Problem
     deadline: float = np.inf
     say: Callable[[str], None] = lambda text: None
     points: dict[Hypothesis, LinearisationPoint] = field(default_factory=dict)
+    begin: Mapping[str, float] = field(default_factory=dict)
     base: Baseline = field(init=False)
     _thetas: dict[Hypothesis, dict[str, float]] = field(default_factory=dict)
     _stale: bool = False
 
     def run(self) -> Hypothesis:
         """The likeliest hypothesis; everything that was refitted stays in `points`."""
-        leaders = SearchSettings.current().leaders
+        return self.further(self.first())
+
+    def first(self) -> Hypothesis:
+        """The first guess: the best of the single effects that look best."""
         self.say("fitting the model as it is, and a slope for every effect")
         self.start()
-        best = self._round(NULL, leaders)
+        best = self._round(NULL, SearchSettings.current().leaders)
         self.say(f"first guess: {' + '.join(best) or 'nothing'}")
+        return best
+
+    def further(self, best: Hypothesis) -> Hypothesis:
+        """The likeliest hypothesis, searched for from the first guess."""
+        leaders = SearchSettings.current().leaders
         if self.problem.moves:
             return self._follow(best)
         if best != NULL:
@@ -122,8 +132,9 @@ class Search:
     ) -> None:
         """Null fit, noise colour, and the linear table at the null; `theta`: the best guess."""
         if self.problem.moves:
-            self.problem = with_learnt_colour(self.problem, theta or {}, careful=bool(theta))
-        self.base = Baseline(self.problem, among)
+            about = theta or self.begin
+            self.problem = with_learnt_colour(self.problem, about, careful=bool(theta))
+        self.base = Baseline(self.problem, among, theta or self.begin)
         self.problem = self.base.problem
         self.points = {NULL: self.base.point}
 

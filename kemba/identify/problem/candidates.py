@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from kemba.effects import BY_KIND
 from kemba.effects.base import Effect
 from kemba.effects.mechanics.geometry import SIZES, Geometry
+from kemba.identify.problem.line import LINE, LineResistance
 from kemba.identify.problem.problem import Candidate, Parameter, Theta
 from kemba.identify.problem.sensor_faults import possible_faults
 from kemba.identify.problem.structure import ORIFICE, OrificeShare
@@ -14,6 +15,8 @@ from kemba.model.model import Model
 from kemba.model.scene import port_name
 from kemba.quantity import Param
 from kemba.settings import BY_HAND, Settings, setting
+
+SEARCHED: dict[str, Effect] = {ORIFICE: OrificeShare(), LINE: LineResistance()}
 
 
 class CandidateSettings(Settings):
@@ -50,8 +53,8 @@ def effect_candidates(model: Model) -> dict[str, Candidate]:
 
 def by_default(name: str) -> Effect:
     """The effect of a name as its defaults have it: absent."""
-    if name == ORIFICE:
-        return OrificeShare()
+    if name in SEARCHED:
+        return SEARCHED[name]
     kind, _, place = name.partition(":")
     where = {where_field(kind): place} if place else {}
     return BY_KIND[kind].model_validate({"kind": kind, **where})

@@ -118,8 +118,9 @@ class Problem(ABC):
         settings = StepSettings.current()
         if name in self.nuisance:
             nominal, sigma = self.nuisance[name]
-            h = settings.nuisance * sigma
-            yield {name: theta.get(name, nominal) + h}, h
+            h, value = settings.nuisance * sigma, theta.get(name, nominal)
+            h = -h if value + h > self.limits(name)[1] else h
+            yield {name: value + h}, h
             return
         candidate = self.candidates[name.rsplit(".", 1)[0]]
         parameter = candidate.keys()[name]
@@ -177,6 +178,15 @@ class Problem(ABC):
         return self
 
     bends: bool = False  # whether slopes differ so much from point to point that each needs its own
+
+    @property
+    def curved(self) -> tuple[str, ...]:
+        """Nuisance parameters whose slopes are taken anew at every point of a fit."""
+        return tuple(self.nuisance if self.bends else self.own_figures)
+
+    def limits(self, name: str) -> tuple[float, float]:
+        """Smallest and largest value of a nuisance parameter. Default: its prior is enough."""
+        return -math.inf, math.inf
 
     def is_straight(self, name: str) -> bool:
         """Whether the residual is linear in this parameter, so that its slope tells everything."""

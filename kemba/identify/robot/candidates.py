@@ -9,6 +9,7 @@ from kemba.identify.problem.candidates import (
     geometry_candidates,
     leg_candidates,
 )
+from kemba.identify.problem.line import line_candidates
 from kemba.identify.problem.problem import Candidate, Parameter
 from kemba.identify.problem.structure import structure_candidates
 from kemba.model.model import Model
@@ -37,6 +38,7 @@ def robot_candidates(model: Model) -> dict[str, Candidate]:
     found = effect_candidates(model)
     apart = leg_candidates(model, [n for n in found if n not in (*GROUND, *SHARED)])
     found = {**found, **apart, **geometry_candidates(model), **structure_candidates(model)}
+    found |= line_candidates(model)
     settings = RobotCandidateSettings.current()
     if "ground_compliance" in found:
         found["ground_compliance"] = Candidate(

@@ -125,6 +125,14 @@ class RobotProblem(Problem):
         """The resampled logs side by side."""
         return self.state.batch
 
+    def limits(self, name: str) -> tuple[float, float]:
+        """Those of the physics' figures; links and sensors have their priors only."""
+        if name not in self.physics.names:
+            return super().limits(name)
+        i = self.physics.names.index(name)
+        lower, upper = self.physics.bounds
+        return float(lower[i]), float(upper[i])
+
     def relinearise(self, base: Theta) -> Self:
         """The same problem, smoothed and linearised anew with the model at `base`."""
         found, old = copy(self), self.state
