@@ -1,4 +1,4 @@
-"""Functions rewritten for speed give the numbers of the plain ones; an anchor adds what it says."""
+"""Functions rewritten for speed give the numbers of the plain ones; a proximal term adds what it says."""
 
 from __future__ import annotations
 
