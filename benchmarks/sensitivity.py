@@ -8,8 +8,9 @@
 `discover` and `compare`: cases of the blind studies, made by the twin in tests/twin. `schedule`:
 shipped tasks. Only settings marked `decides` are changed, one at a time. A case is run again from
 the first stage on that reads the setting; where no stage reads it, nothing can change and nothing
-is run. Results are kept in the file, so an interrupted study goes on where it stopped; later lines
-replace earlier ones. Its parts may run at the same time.
+is run. Results are kept in benchmarks/sensitivity.jsonl with the day on which they were run: an
+interrupted study goes on where it stopped, and the page says how old its figures are. Later lines
+replace earlier ones. Parts of a study may run at the same time.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ import re
 import sys
 import tempfile
 from concurrent.futures import ProcessPoolExecutor
+from datetime import datetime, timezone
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -44,6 +46,7 @@ BENCH = tuple(range(12))  # six effects, three unknown ones, three times nothing
 ROBOT = (0, 2, 3, 25)  # hip_spring, nothing, seal_friction, an effect that is unknown
 TASKS = ("stand", "jump", "hop")
 FACTORS = (0.5, 2.0)
+RECORDS = ROOT / "benchmarks" / "sensitivity.jsonl"
 VERBS = ("discover", "compare", "schedule")
 
 
@@ -108,7 +111,8 @@ def run(name: str, only: str, out: Path) -> str:
 
 
 def append(out: Path, record: dict[str, Any]) -> None:
-    """One more line of the file."""
+    """One more line of the file, with today's date."""
+    record = {"date": datetime.now(tz=timezone.utc).date().isoformat(), **record}
     with out.open("a", encoding="utf-8") as stream:
         stream.write(json.dumps(record) + "\n")
 
@@ -119,7 +123,7 @@ def main() -> None:
     parser.add_argument("--verbs", default=",".join(VERBS), help="which verbs are studied")
     parser.add_argument("--cases", default="", help="cases whose name matches this")
     parser.add_argument("--only", default="", help="settings whose Class.field matches this")
-    parser.add_argument("--out", type=Path, default=Path("sensitivity.jsonl"))
+    parser.add_argument("--out", type=Path, default=RECORDS)
     parser.add_argument("--part", default="1/1", help="i/n: every n-th case, from the i-th on")
     parser.add_argument("--jobs", type=int, default=1, help="cases at the same time")
     parser.add_argument("--report", action="store_true", help="run nothing, write the page")

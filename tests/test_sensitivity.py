@@ -95,4 +95,14 @@ def test_the_page_marks_what_flips_when_doubled(case: Case) -> None:
         records.append({**name, "answer": answer})
     text = section("discover", "Verdicts", changes, records)
     assert "| **`Late.limit`** | 3 | 1 | 1 | 0 | 1 | convention: three |" in text
+    assert "Run on" not in text  # of records without a date
+    dated = section("discover", "Verdicts", changes, [{**r, "date": "2026-11-22"} for r in records])
+    assert "Run on 2026-11-22." in dated
     assert flipped({case.name: {"verdict": "large"}}, {case.name: None}) == []
+
+
+def test_the_page_keeps_what_was_found_of_settings_that_are_gone(case: Case) -> None:
+    base = {"case": case.name, "setting": "", "factor": 1.0, "answer": {"verdict": "large"}}
+    gone = {**base, "setting": "Old.step", "factor": 2.0, "answer": {"verdict": "small"}}
+    text = section("discover", "Verdicts", [], [base, gone])
+    assert "`Old.step` (half 0, double 1 of 1)" in text and "| Old.step" not in text

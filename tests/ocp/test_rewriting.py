@@ -1,4 +1,4 @@
-"""Functions rewritten for speed give the numbers of the plain ones; an anchor adds what it says."""
+"""Functions rewritten for speed give the numbers of the plain ones; so does a proximal term."""
 
 from __future__ import annotations
 
@@ -83,22 +83,22 @@ def test_folding_shares_the_legs_of_half_a_robot(half: Transcription) -> None:
         assert np.array_equal(np.array(plain(z, p)), np.array(once(z, p)))
 
 
-def test_an_anchor_adds_half_the_squared_way() -> None:
+def test_a_proximal_term_adds_half_the_squared_way() -> None:
     z = ca.SX.sym("z", 2)
     columns = np.array([[0, 1], [1, 2]])
     block = Block(z, ca.vertcat(z[0] * z[1]), z[0] ** 3 - z[1], columns)
     problem = BlockProblem([block], 3, ca.SX(0, 1))
-    anchored, rng = Proximal(problem), np.random.default_rng(0)
+    near, rng = Proximal(problem), np.random.default_rng(0)
     x, start, weight = rng.normal(size=3), rng.normal(size=3), 0.7
     p, lam = [weight, *start], [0.3, -2.0]
-    (f, slope), (f0, slope0) = anchored.grad_f(x, p), problem.grad_f(x, [])
+    (f, slope), (f0, slope0) = near.grad_f(x, p), problem.grad_f(x, [])
     assert float(f) == pytest.approx(float(f0) + 0.35 * np.sum((x - start) ** 2))
     assert np.array(slope - slope0).ravel() == pytest.approx(0.7 * (x - start))
-    hessians = anchored.hess_lag(x, p, 1.5, lam), problem.hess_lag(x, [], 1.5, lam)
+    hessians = near.hess_lag(x, p, 1.5, lam), problem.hess_lag(x, [], 1.5, lam)
     assert np.array(hessians[0] - hessians[1]) == pytest.approx(1.05 * np.eye(3))
-    jacobians = anchored.jac_g(x, p)[1], problem.jac_g(x, [])[1]
+    jacobians = near.jac_g(x, p)[1], problem.jac_g(x, [])[1]
     assert np.array_equal(*map(np.array, jacobians))
-    nlp = ca.Function("nlp", [anchored.nlp["x"], anchored.nlp["p"]], [anchored.nlp["f"]])
+    nlp = ca.Function("nlp", [near.nlp["x"], near.nlp["p"]], [near.nlp["f"]])
     assert float(nlp(x, p)) == pytest.approx(float(f))
 
 

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from kemba.model import load_model
-from kemba.ocp import load_task, plan, planner
+from kemba.ocp import load_task, plan
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.nlp.ending import Ending
-from kemba.ocp.nlp.ipopt import Iterate
 from kemba.ocp.nlp.stagnation import Stagnation
 from kemba.ocp.planned import Plan
 from kemba.ocp.relaxation.guess import body_course
@@ -20,6 +17,7 @@ from kemba.ocp.task.requirement import resolve
 from kemba.settings import changed
 
 FORWARD = ("nodes=50", "refine=none")
+PATIENT = "solver.time_limit=600 s"  # a busy machine must not decide
 
 
 def told(name: str, *overrides: str) -> tuple[Plan, list[str]]:
@@ -47,15 +45,15 @@ def test_without_symmetry_it_starts_from_the_guess() -> None:
     assert solves[0] == "relax (whole robot, 25 nodes)"
 
 
-@pytest.mark.slow
-def test_what_does_not_grow_starts_from_the_guess(monkeypatch: pytest.MonkeyPatch) -> None:
-    def wither(schedule: object, half: object, point: Iterate, guess: Iterate) -> Iterate:
-        return replace(guess, ending=Ending.INFEASIBLE)
-
-    monkeypatch.setattr(planner, "grow", wither)
-    found, solves = told("jump_forward", *FORWARD)
-    assert found.status is Status.SOLVED
-    assert solves[3] == "relax (whole robot, 25 nodes)"
+def test_what_does_not_grow_starts_from_the_guess() -> None:
+    """So far a jump needs more iterations than these to grow from one that goes straight up."""
+    task, document = load_task("jump_forward", [*FORWARD, "distance=1.2 m", PATIENT])
+    whole = [f"{step} (whole robot, 25 nodes)" for step in ("move switches", "relax")]
+    solves: list[str] = []
+    with changed(Ends, relax_iterations=95):
+        found = plan(task, document, tell=solves.append, stop=lambda: solves[-1] == whole[-1])
+    assert solves[-2:] == whole
+    assert found.attempts[-2].ending is Ending.ITERATION_LIMIT
 
 
 @pytest.mark.parametrize(("rounds", "least", "most"), [(0, 0, 0), (1, 1, 1), (3, 2, 3)])

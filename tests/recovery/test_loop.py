@@ -23,7 +23,7 @@ from kemba_cli.main import app
 
 HIDDEN, SIZE = "seal_friction", 1.0
 KEPT = ("kept_1.csv", "kept_2.csv")
-SUSPECTS = (HIDDEN, "piston_damping", "valve_delay", "boom_force")
+AMONG = (HIDDEN, "piston_damping", "valve_delay", "boom_force")
 
 
 def run(*arguments: str | Path) -> str:
@@ -43,8 +43,8 @@ def test_the_error_falls_on_a_hop_that_was_kept(tmp_path: Path) -> None:
         log.write(path)
     kept = paths[2]
     before = json.loads(run("compare", kept, "--json"))
-    suspects = ("supply_scale", *SUSPECTS[1:])
-    problem = robot_problem(logs[:2], load_model("planning"), suspects)
+    among = ("supply_scale", *AMONG[1:])
+    problem = robot_problem(logs[:2], load_model("planning"), among)
     answer = discover(problem).answer
     assert answer.added == ("supply_scale",), answer.sentence
     assert answer.ranking[0].parameters["k"].value == pytest.approx(0.85, abs=0.02)
@@ -63,8 +63,8 @@ def answered(tmp_path_factory: pytest.TempPathFactory) -> Path:
     logs, _ = hops(catalogue.hidden(HIDDEN, SIZE), runs=5, figures_off=0.01)
     for name, log in zip(KEPT, logs[3:], strict=True):
         log.write(home / name)
-    problem = robot_problem(logs[:3], load_model("planning"), SUSPECTS)
-    judge = robot_problem(logs[3:], load_model("planning"), SUSPECTS)
+    problem = robot_problem(logs[:3], load_model("planning"), AMONG)
+    judge = robot_problem(logs[3:], load_model("planning"), AMONG)
     write_answer(discover(problem, judge).answer, home / "answer", "planning")
     return home
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from functools import cached_property
 
 import numpy as np
 from typing_extensions import Self
@@ -52,9 +53,6 @@ class StepSettings(Settings):
     """Steps of finite differences."""
 
     nuisance: float = setting(0.5, "1", "step of a nominal figure, in prior sigmas", BY_HAND)
-    switch: float = setting(
-        0.6, "1", "step of a switch that is off, in sizes: its secant", BY_HAND, decides=True
-    )
     parameter: float = setting(
         0.05, "1", "step of a parameter that is on, as a share of its size or value", BY_HAND
     )
@@ -101,7 +99,7 @@ class Problem(ABC):
     ) -> Array:
         """d residual / d names (n, k), per unit of each parameter.
 
-        A switch that is off has no useful derivative; it is linearised at its size (a secant). The
+        A switch that is off has no useful derivative; it gets a secant (`_secant_step`). The
         default takes finite differences with steps of physical size for all parameters.
         """
         base = self.residual(theta, runs)
@@ -126,7 +124,7 @@ class Problem(ABC):
         parameter = candidate.keys()[name]
         if name == candidate.key and theta.get(name, parameter.off) == parameter.off:
             shapes = {k: theta.get(k, p.typical) for k, p in candidate.keys().items() if k != name}
-            h = settings.switch * parameter.size
+            h = self._secant_step(parameter)
             for sign in (1.0, -1.0) if parameter.signed else (1.0,):
                 yield {**shapes, name: parameter.off + sign * h}, sign * h
             return
@@ -134,6 +132,24 @@ class Problem(ABC):
         h = settings.parameter * (parameter.size if name == candidate.key else abs(value))
         h = -h if value + h > parameter.upper else h
         yield {name: value + h}, h
+
+    def _secant_step(self, switch: Parameter) -> float:
+        """How far a switch that is off is moved: by its size; a time by one row, if that is less.
+
+        A time moves an edge. Up to one row it changes the readings beside the edge, about in
+        proportion. A longer one changes more rows, so that its secant tells little of a short one.
+        """
+        if switch.unit != "s":
+            return switch.size
+        least = max(switch.lower - switch.off, 0.0)  # of a time constant, which is never nought
+        return max(min(switch.size, self.interval), least)
+
+    @cached_property
+    def interval(self) -> float:
+        """Time between two rows of a channel [s], the median."""
+        rows = self.rows()
+        same = (np.diff(rows.run) == 0) & (np.diff(rows.channel) == 0)
+        return float(np.median(np.diff(rows.time)[same])) if same.any() else math.inf
 
     def parameters(self) -> dict[str, Parameter]:
         """Every parameter of every candidate, by its name in theta."""
