@@ -24,7 +24,8 @@ from typing import Any
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from robustness_page import page
+from repeats import drawn
+from robustness_page import PICTURE, page
 
 from kemba.config import shipped_folder
 from kemba.errors import KembaError
@@ -170,8 +171,10 @@ def main() -> None:
                 here = (name, *WAYS[way])
                 own = [r for r in rows if (r["task"], r["conditions"], r["way"]) == here]
                 print(name, way, len(own), sum(not r["fault"] for r in own), flush=True)
+    jump = asked.folder / "jump"
+    told = drawn(jump, asked.out.parent / PICTURE) if jump.is_dir() else ""
     with atomic_text(asked.out) as stream:
-        stream.write(page(rows))
+        stream.write(page(rows, told))
     print(asked.out)
 
 
