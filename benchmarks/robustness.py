@@ -42,6 +42,7 @@ from kemba.policy.write import FILE, write_policy
 from kemba.runs import Run, load_run, sha256
 from kemba.sweep.cases.execution import standing
 from kemba.sweep.scenarios.draw import Scenario, scenarios
+from kemba.sweep.scenarios.expected import executions_of
 from kemba.sweep.scenarios.share import fault_of
 from kemba.sweep.workers.machine import machine
 
@@ -106,7 +107,7 @@ def records(
     lands = bool(ends_standing(bench.model, bench.run.trajectory))
     policy = bench.run.path / FILE
     if way != "open loop" and not policy.is_file():
-        write_policy(bench.model, bench.run.controller, policy)
+        write_policy(bench.model, bench.run.controller, policy, executions_of(bench.run.path))
     parts = [bench.table, shipped_folder("uncertainties") / f"{file}.yaml"]
     parts += [policy] if way != "open loop" else []
     what = "".join(sha256(part)[:8] for part in parts)
