@@ -24,7 +24,8 @@ from typing import Any
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from robustness_page import page
+from repeats import drawn
+from robustness_page import PICTURE, page
 
 from kemba.config import shipped_folder
 from kemba.errors import KembaError
@@ -41,6 +42,7 @@ from kemba.policy.write import FILE, write_policy
 from kemba.runs import Run, load_run, sha256
 from kemba.scenarios.conditions import standing
 from kemba.scenarios.draw import Scenario, scenarios
+from kemba.scenarios.expected import executions_of
 from kemba.scenarios.share import fault_of
 from kemba.sweep.workers.machine import machine
 
@@ -105,7 +107,7 @@ def records(
     lands = bool(ends_standing(bench.model, bench.run.trajectory))
     policy = bench.run.path / FILE
     if way != "open loop" and not policy.is_file():
-        write_policy(bench.model, bench.run.controller, policy)
+        write_policy(bench.model, bench.run.controller, policy, executions_of(bench.run.path))
     parts = [bench.table, shipped_folder("uncertainties") / f"{file}.yaml"]
     parts += [policy] if way != "open loop" else []
     what = "".join(sha256(part)[:8] for part in parts)
@@ -170,8 +172,10 @@ def main() -> None:
                 here = (name, *WAYS[way])
                 own = [r for r in rows if (r["task"], r["conditions"], r["way"]) == here]
                 print(name, way, len(own), sum(not r["fault"] for r in own), flush=True)
+    jump = asked.folder / "jump"
+    told = drawn(jump, asked.out.parent / PICTURE) if jump.is_dir() else ""
     with atomic_text(asked.out) as stream:
-        stream.write(page(rows))
+        stream.write(page(rows, told))
     print(asked.out)
 
 

@@ -15,6 +15,8 @@ from kemba.units import read_si
 Row = dict[str, Any]
 COLUMNS = (("usual", "open loop"), ("twice", "open loop"), ("twice", "feedback"))
 PARTS = (("twice", "hips"), ("twice", "edges"))
+PICTURE = "images/robustness-repeats.png"
+END = 0.05  # m, the tolerance that shipped tasks have for the end on the plant
 HEAD = """\
 # How often plans land
 
@@ -34,11 +36,16 @@ stays upright. The intervals are Wilson's, of 95 %.
 """
 
 
-def page(rows: Sequence[Row]) -> str:
-    """The page as Markdown; of each task and way the rows of the latest table count."""
+def page(rows: Sequence[Row], repeats: str = "") -> str:
+    """The page as Markdown; of each task and way the rows of the latest table count.
+
+    `repeats`: what the figure of three jumps shows, in words.
+    """
     latest = {(r["task"], r["conditions"], r["way"]): r["of"] for r in rows}
     rows = [r for r in rows if latest[r["task"], r["conditions"], r["way"]] == r["of"]]
-    lines = [HEAD, *_shares(rows), "", *_apexes(rows)]
+    lines = [HEAD, *_shares(rows), "", *_ends(rows), "", *_apexes(rows)]
+    if repeats:
+        lines += ["", "## Three repeats", "", f"{repeats}.", "", f"![Three repeats]({PICTURE})"]
     if any((r["conditions"], r["way"]) in PARTS for r in rows):
         lines += ["", *_parts(rows)]
     lines += ["", *_influences(rows)]
@@ -84,6 +91,22 @@ def _shares(rows: Sequence[Row]) -> Iterator[str]:
             if faults:
                 told = ", ".join(f"{fault} ({count})" for fault, count in faults.most_common())
                 yield f"- {task}, {column[0]}, {column[1]}: {told}"
+
+
+def _ends(rows: Sequence[Row]) -> Iterator[str]:
+    yield "## Share that succeeds and ends where it should"
+    yield ""
+    yield f"Beside the above, the body's centre is at most {100 * END:g} cm from the plan's end: a"
+    yield "robot that folds up softly lands, but does not stand at its height."
+    yield ""
+    yield "| task | usual, open loop | twice, open loop | twice, feedback |"
+    yield "|---|---|---|---|"
+    for task in (t for t in _tasks(rows) if not t.startswith("max_jump")):
+        found = [_of(rows, task, column) for column in COLUMNS]
+        cells = [
+            share([{"fault": r["fault"] or r["final_error_m"] > END} for r in own]) for own in found
+        ]
+        yield f"| {task} | " + " | ".join(cells) + " |"
 
 
 def _apexes(rows: Sequence[Row]) -> Iterator[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -107,17 +107,20 @@ def _sent(table: Trajectory, policy: Policy, commands: list[Array]) -> Trajector
     return table.with_columns({headers[n]: rows[:, i] for i, n in enumerate(policy.valves)})
 
 
-def player_of(run: str | Path) -> Play:
+def player_of(
+    run: str | Path, executions: Callable[[], Sequence[Trajectory]] | None = None
+) -> Play:
     """How `repeat_run` executes a run with its policy, which is made where it is missing.
 
-    The policy is made with the model of the run's task. Raises KembaError where the run has no
-    task, or no policy can be made.
+    The policy is made with the model of the run's task and with what `executions` of the table
+    under various conditions do. Raises KembaError where the run has no task, or no policy can be
+    made.
     """
     folder = Path(run) if Path(run).is_dir() else Path(run).parent
     file, table = folder / FILE, read_controller(run)
     if not file.is_file() or file.stat().st_mtime < (folder / "controller.csv").stat().st_mtime:
         task = load_task(load_run(folder).task)[0]
-        write_policy(task_model(task), table, file)
+        write_policy(task_model(task), table, file, executions() if executions else ())
 
     def play(model: Model, sample: Array, seed: list[int], noise: bool) -> Execution:
         scatter = VALVE_SCATTER if noise else 0.0

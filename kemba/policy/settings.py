@@ -26,6 +26,10 @@ class PolicySettings(Settings):
         10, "ticks", "before and after touchdown in which no torque is added: feet that touch a "
         "little sooner or later have quite other velocities", CHOSEN,
     )  # fmt: skip
+    fewest: int = setting(
+        20, "1", "executions from which it is learnt what to expect; of fewer nothing is learnt",
+        "derived: more than the 14 deviations and rates that are weighed",
+    )  # fmt: skip
     fine: int = setting(
         4, "1", "instants a tick at which valves of the simulated robot may act", CHOSEN
     )

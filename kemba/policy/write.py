@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import casadi as ca
@@ -10,8 +11,10 @@ import numpy as np
 from kemba.errors import KembaError
 from kemba.model import Model
 from kemba.plant.execution.controller import PERIOD, Gains, hip_control, read_controller
+from kemba.plant.execution.sensors import Sensors
 from kemba.policy.course import course_of
 from kemba.policy.events import Course
+from kemba.policy.expected import expected_from
 from kemba.policy.gains import gains_of
 from kemba.policy.modes import Array
 from kemba.policy.settings import PolicySettings
@@ -20,18 +23,21 @@ from kemba.trajectory import Trajectory
 FILE = "policy.npz"
 
 
-def write_policy(model: Model, table: Trajectory, path: str | Path) -> Path:
+def write_policy(
+    model: Model, table: Trajectory, path: str | Path, executions: Sequence[Trajectory] = ()
+) -> Path:
     """The policy around an executed controller table, written to `path`.
 
-    Raises KembaError where the table cannot be simulated, or the model has contacts that are not
-    rigid.
+    `executions` of the table under various conditions tell what deviations are expected and what
+    the sensors say of them; without any, deviations are counted from the table on `model`. Raises
+    KembaError where the table cannot be simulated, or the model has contacts that are not rigid.
     """
     try:
         course = course_of(model, table)
     except ValueError as error:
         what = f"a feedback policy needs rigid contacts, but the model {error}"
         raise KembaError(model.name, what) from None
-    arrays = policy_arrays(course)
+    arrays = policy_arrays(course, executions)
     with Path(path).open("wb") as stream:
         np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]
     return Path(path)
@@ -43,7 +49,7 @@ def measured(model: Model) -> list[str]:
     return [f"{n.split('/')[0]}/piston/x" if n.endswith("/knee/q") else n for n in names]
 
 
-def policy_arrays(course: Course) -> dict[str, Array]:
+def policy_arrays(course: Course, executions: Sequence[Trajectory] = ()) -> dict[str, Array]:
     """The arrays of a policy by name, as docs/policy.md lists them."""
     model, settings = course.hybrid.model, PolicySettings.current()
     table, motion = read_controller(course.table), course.motion
@@ -51,7 +57,13 @@ def policy_arrays(course: Course) -> dict[str, Array]:
     start = round(motion.time[0] / PERIOD) - first  # a robot that falls begins later
     rows = np.clip(np.arange(ticks) - start, 0, len(motion) - 1)
     names = measured(model)
+    reference = np.column_stack([motion[n] for n in names])[rows]
     to_x = _to_state(course)[rows]
+    if len(executions) >= settings.fewest:
+        clock = (first + np.arange(ticks)) * PERIOD
+        noise = Sensors.usual().noise
+        found = expected_from(executions, clock, names, _states(model), noise)
+        reference, to_x = found.mean, found.estimate
     landing = _landing(course)
     gains = gains_of(course, landing)
     hips = np.zeros((ticks, len(course.joints), 2 * len(names)))
@@ -68,7 +80,7 @@ def policy_arrays(course: Course) -> dict[str, Array]:
         "period": np.array(PERIOD),
         "first_tick": np.array(first),
         "measured": np.array(names),
-        "reference": np.column_stack([motion[n] for n in names])[rows],
+        "reference": reference,
         "joints": np.array(course.joints),
         "joint_rows": np.array([names.index(f"{j}/q") for j in course.joints]),
         "wanted": control.wanted,
@@ -104,6 +116,13 @@ def _edges(
         "edge_value": np.array([e[2] for e in listed]),
         "edge_gain": np.array([e[3] for e in listed]).reshape(-1, size) / PERIOD,
     }
+
+
+def _states(model: Model) -> list[str]:
+    """The names of x: coordinates, velocities, effect states."""
+    mechanism = model.mechanism
+    moving = [q.name for q in (*mechanism.coordinates, *mechanism.velocities)]
+    return [*moving, *(q.name for q in model.states.values())]
 
 
 def _to_state(course: Course) -> Array:

@@ -13,6 +13,7 @@ from kemba_cli.common import Force, Json, OwnEffects, Quiet, newest, print_json,
 
 if TYPE_CHECKING:
     from kemba.plant.rig.rigs import Rig
+    from kemba.trajectory import Trajectory
 
 
 def simulate(
@@ -88,7 +89,12 @@ def _run(
     if policy:
         from kemba.policy.execute import player_of
 
-        play = player_of(source)
+        def executions() -> list[Trajectory]:
+            from kemba.scenarios.expected import executions_of
+
+            return executions_of(source)
+
+        play = player_of(source, executions)
     repeats = repeat_run(source, plant, out, repeat, noise, seed, play=play, tell=tell)
     runs = [r.summary for r in repeats]
     apex = ", ".join(f"{r['apex_m']:.3f}" for r in runs)

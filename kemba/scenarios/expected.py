@@ -1,0 +1,36 @@
+"""Executions of a run under the conditions that its feedback is made for."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from kemba.errors import KembaError
+from kemba.plant.execution.controller import execute_many, read_controller
+from kemba.plant.execution.repeat import plant_of
+from kemba.plant.execution.replay import LandingSettings
+from kemba.scenarios.conditions import standing
+from kemba.scenarios.draw import scenarios
+from kemba.settings import CHOSEN, Settings, setting
+from kemba.trajectory import Trajectory
+
+FILE = "twice"  # of configs/uncertainties
+
+
+class ExpectedSettings(Settings):
+    """From how many executions feedback learns what to expect."""
+
+    count: int = setting(64, "1", "scenarios that are executed", CHOSEN)
+
+
+def executions_of(run: str | Path, jobs: int | None = None) -> list[Trajectory]:
+    """The table of a run executed open loop on its task's plant under drawn uncertainties.
+
+    Those that cannot be simulated or do not end upright are left out. Raises KembaError where the
+    run has no table.
+    """
+    table, plant = read_controller(run), plant_of(run)
+    cases = scenarios(FILE, plant, ExpectedSettings.current().count)
+    asked = [{"model": c.model, "start": standing(c.model, table, c.start)} for c in cases]
+    upright = LandingSettings.current().upright
+    done = [d for d in execute_many(table, asked, jobs) if not isinstance(d, KembaError)]
+    return [d.trajectory for d in done if abs(d.trajectory["body/pitch"][-1]) <= upright]
