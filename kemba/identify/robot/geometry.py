@@ -23,7 +23,6 @@ from kemba.settings import BY_HAND, Settings, setting
 
 GEOMETRY = "geometry:"  # names of the lengths begin so
 LEVER = "boom_lever"
-HELD = 1e-6  # of its width: what is not free
 
 
 class StandingSettings(Settings):
@@ -35,6 +34,9 @@ class StandingSettings(Settings):
         "m",
         "height at which the ground may seem to be",
         "convention: as the search for the ground in contact.py",
+    )
+    held: float = setting(
+        1e-6, "1", "share of its width that a held unknown has", "convention: none"
     )
     window: float = setting(5e-3, "m", "height of the band in which standing feet are", BY_HAND)
     tried: tuple[float, ...] = setting(
@@ -136,7 +138,7 @@ def standing_lengths(
     zeros = [settings.angle, settings.body, *[settings.angle] * legs, *[settings.piston] * legs]
     lengths = [settings.prior * size for size in sizes.values()]
     free = np.array([*lengths, *zeros, settings.lever])
-    width = np.array([*lengths, *zeros, settings.lever * HELD])
+    width = np.array([*lengths, *zeros, settings.lever * settings.held])
     start = np.zeros(len(width))
     most = _most_rows(standing.heights(start)[0])
     for i, size in enumerate(sizes.values()):
@@ -182,7 +184,7 @@ def _only(
     """The refined fit with all lengths but the `free` ones as the model has them."""
     held = np.array([i not in free for i in range(len(standing.names))])
     narrow, begin = width.copy(), x.copy()
-    narrow[: len(held)][held] *= HELD
+    narrow[: len(held)][held] *= StandingSettings.current().held
     begin[: len(held)][held] = 0.0
     return _refined(standing, begin, narrow, rows)
 
