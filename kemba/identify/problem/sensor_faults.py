@@ -31,6 +31,7 @@ class SensorFaults:
 
     def __init__(self, effects: Iterable[Effect] = ()) -> None:
         self.listed = {e.name: e for e in effects if isinstance(e, SensorEffect)}
+        self._kinds = fault_kinds()  # asked for at every prediction
 
     @property
     def nuisance(self) -> dict[str, tuple[float, float]]:
@@ -46,7 +47,7 @@ class SensorFaults:
     def at(self, theta: Theta, channel: str) -> list[SensorEffect]:
         """The faults of a channel at theta."""
         found = []
-        for kind, cls in fault_kinds().items():
+        for kind, cls in self._kinds.items():
             name = f"{kind}:{channel}"
             own = {figure: theta.get(f"{name}.{figure}") for figure in cls.declared()}
             values = {figure: value for figure, value in own.items() if value is not None}
