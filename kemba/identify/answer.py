@@ -110,6 +110,10 @@ def phrase(answer: Answer) -> str:
     if answer.verdict == "unknown":
         more = f" A formula that fits: {answer.formula}." if answer.formula else ""
         why = f": {answer.remarks[0]}" if answer.remarks else ""
+        if answer.next:  # only where the logs are too short
+            return f"Something differs, but these logs are too short to tell what{why}. Next: " + (
+                f"{answer.next}, with strokes and pulses as they are used."
+            )
         return f"Something is missing that no effect of the catalogue explains{why}.{more}"
     if answer.verdict == "partly":
         return _partly(answer)

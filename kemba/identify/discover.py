@@ -130,6 +130,8 @@ def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> 
     best, p_value, dismissed = _believed(search, likeliest, test)
     search.say("asking whether the answer is complete")
     holdout = holdout.heard_as(search.problem) if holdout else None
+    if test.too_short:
+        return _undecided(search, test, holdout)
     # what is too small to be reported still explains: a formula must do better than with it
     slight = best and material(search, likeliest) == best
     formula = look(search, likeliest if slight else best)
@@ -141,6 +143,29 @@ def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> 
     ranking = ranked(search, best, dismissed, holdout)
     answer = _answer(search, best, p_value, test, ranking, formula, holdout, doubts)
     return Discovery(answer, search, best, holdout)
+
+
+def _undecided(search: Search, test: NullTest, holdout: Problem | None) -> Discovery:
+    """What logs allow to say that are too short for anything to be significant: whether something
+    differs, but not what."""
+    gain, doubts = _best_gain(search), Doubts()
+    differs = test.share(gain) <= DiscoverSettings.current().significant
+    if differs or error(search, NULL, holdout) > VerdictSettings.current().whole:
+        piece = DiscoverSettings.current().fine
+        doubts = Doubts((f"they hold {test.blocks} pieces of {piece:g} s, and chance alone needs "
+                         f"{test.needed} to be ruled out",))  # fmt: skip
+    ranking = ranked(search, NULL, set(), holdout)
+    answer = _answer(search, NULL, test.p_value(gain), test, ranking, None, holdout, doubts)
+    if doubts.reasons:
+        answer.next = f"record at least {(test.needed + 1) * DiscoverSettings.current().fine:.1f} s"
+        answer.sentence = phrase(answer)
+    return Discovery(answer, search, NULL, holdout)
+
+
+def _best_gain(search: Search) -> float:
+    """Evidence [nats] of the best single effect over nothing."""
+    null = search.points[NULL].log_evidence
+    return max((p.log_evidence - null for h, p in search.points.items() if h), default=0.0)
 
 
 def null_test(search: Search) -> NullTest:
@@ -161,9 +186,7 @@ def _believed(
 ) -> tuple[Hypothesis, float, set[Hypothesis]]:
     """The best hypothesis without what is not significant, too small or refuted by left-out data;
     the p-value of nothing; and the hypotheses that were dismissed."""
-    null = search.points[NULL].log_evidence
-    singles = [p.log_evidence - null for h, p in search.points.items() if h]
-    p_value = test.p_value(max(singles, default=0.0))
+    p_value = test.p_value(_best_gain(search))
     dismissed: set[Hypothesis] = set()
     if not best or p_value > DiscoverSettings.current().significant:
         return NULL, p_value, dismissed

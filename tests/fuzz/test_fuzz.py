@@ -7,14 +7,18 @@ can be made, under a name that says what happened.
 from __future__ import annotations
 
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from fuzz import sound
+from fuzz.logs import cells, text
 from fuzz.rule import outcome
 from fuzz.trial import TRIALS
+from kemba.trajectory import Trajectory
 
 CORPUS = sorted((Path(__file__).parent / "corpus").glob("[!.]*"))
 EXAMPLES = {"bench logs": 12, "mapped logs": 6, "sidecars": 6}  # of files 10 each
@@ -55,6 +59,30 @@ def test_past_findings_stay_mended(file: Path, tmp_path: Path) -> None:
     copied = Path(shutil.copy(file, tmp_path / f"input{file.suffix}"))
     found = outcome("check", copied)
     assert found.broken == "" and found.exit_code == 2, found.said
+
+
+LOST = [  # verb, log, column, rows and what was read there
+    pytest.param(
+        *("discover", sound.bench, "valve/extend [1]", slice(101, 201), "0.0"),
+        marks=pytest.mark.slow,
+    ),
+    ("check", sound.robot, "rear/hip/tau [N.m]", slice(244, 245), "1e12"),
+]
+
+
+@pytest.mark.parametrize(("verb", "log", "column", "rows", "value"), LOST, ids=["lost", "absurd"])
+def test_logs_that_were_found_once_are_answered(
+    verb: str, log: Callable[[], Trajectory], column: str, rows: slice, value: str, tmp_path: Path
+) -> None:
+    """Commands that were lost asked for a negative rise time; a torque of 1e12 N.m made NaN."""
+    table = [list(row) for row in cells(log())]
+    for row in table[rows]:
+        row[table[0].index(column)] = value
+    file = tmp_path / "input.csv"
+    file.write_text(text(table), encoding="utf-8")
+    out = ["--out", str(tmp_path / "answer"), "--no-figure"] if verb == "discover" else []
+    found = outcome(verb, file, *out)
+    assert found.broken == "" and found.exit_code == 0, found.said
 
 
 def test_the_rule_sees_what_breaks_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

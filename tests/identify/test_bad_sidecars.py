@@ -80,6 +80,14 @@ def test_one_absurd_reading_is_a_missing_one(log_file: Path, name: str, value: f
     assert compared
 
 
+def test_the_few_readings_that_a_channel_cannot_have_are_missing_ones(log_file: Path) -> None:
+    assert np.isnan(read_log(rewritten(log_file, "piston/F", 700, 1e5))["piston/F"][700])
+    table = Trajectory.read(log_file)
+    table.with_columns({"piston/F [N]": 100.0 * table["piston/F"]}).write(log_file)
+    with pytest.raises(BadData, match="cannot be"):  # many are a mistake of units, and are told
+        check_logs([read_log(log_file)])
+
+
 def test_a_scaled_voltage_may_be_a_little_off(log_file: Path) -> None:
     assert check_logs([read_log(rewritten(log_file, "valve/extend", 3, 1.0000008))]) == []
     assert check_logs([read_log(rewritten(log_file, "valve/extend", 3, -0.01))]) == []

@@ -17,6 +17,7 @@ from kemba.identify.bench.motion import SmoothedMotion
 from kemba.identify.bench.problem import bench_problem
 from kemba.identify.bench.rig_model import RigModel
 from kemba.identify.design.settings import DesignSearchSettings, ExperimentSettings
+from kemba.identify.evidence.linear import Linear, estimate, names_of, priors
 from kemba.identify.experiment import propose
 from kemba.identify.published import published
 from kemba.identify.workflow import discover_logs
@@ -38,6 +39,20 @@ def test_the_true_model_leaves_white_noise(bench_log: BenchLog) -> None:
     r = problem.residual({})
     assert np.sqrt(np.mean(r[200:] ** 2)) == pytest.approx(1.0, abs=0.1)
     assert len(problem.rows()) == len(r)
+
+
+def test_a_linear_estimate_keeps_nominal_figures_within_reach(bench_log: BenchLog) -> None:
+    """A log whose commands were lost asked for a negative rise time."""
+    problem = bench_problem([bench_log(duration=0.6)], load_model(rig=True))
+    names = names_of(problem, {})
+    at, mean, width = priors(problem, {}, names)
+    none = np.zeros(0)
+    linear = Linear(names, at, mean, width, none, none, none, none)
+    theta = estimate(problem, linear, at - 40.0 * width)
+    assert theta and all(
+        theta[name] == pytest.approx(nominal - 8.0 * sigma)
+        for name, (nominal, sigma) in problem.nuisance.items()
+    )
 
 
 @pytest.mark.parametrize(
@@ -106,7 +121,7 @@ def test_pressures_are_read_when_there_are_any(bench_log: BenchLog) -> None:
     model = load_model(rig=True)
     bare = bench_problem([log], model)
     states = bare.predicted.predictor.predict(bare.logs[0], {}).states
-    from kemba.identify.bench.pressure import absolute_pressure
+    from kemba.identify.bench.prediction import absolute_pressure
 
     columns = {
         f"{c} [Pa]": absolute_pressure(c, states, model.mechanism.need_cylinder())

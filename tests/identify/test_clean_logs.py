@@ -10,8 +10,9 @@ import pytest
 from twin.cases import bench_case
 from twin.measure import Sensors
 
+from kemba.effects import BY_KIND
 from kemba.identify.bench.bench_log import prepare
-from kemba.identify.bench.problem import bench_problem
+from kemba.identify.bench.problem import BenchProblem, bench_problem
 from kemba.identify.bench.validate import contradictions
 from kemba.identify.compare_logs import compare_logs
 from kemba.identify.logs.limits import limits_of
@@ -45,6 +46,26 @@ def stretched(time: Array, columns: Columns) -> tuple[Array, Columns]:
     return 1.05 * time, columns
 
 
+def drifting(rate: float, *headers: str) -> Callable[..., tuple[Array, Columns]]:
+    """Columns whose recorder gains on the others: it wrote at t what happened at t (1 - rate)."""
+
+    def change(time: Array, columns: Columns) -> tuple[Array, Columns]:
+        happened = time[0] + (time - time[0]) / (1.0 + rate)
+        begun = np.searchsorted(time, happened + 1e-9, side="right") - 1
+        moved = {
+            h: columns[h][begun] if "valve" in h else np.interp(happened, time, columns[h])
+            for h in headers
+        }
+        return time, columns | moved
+
+    return change
+
+
+VALVES = ("valve/extend [1]", "valve/retract [1]")
+late_valves, late_force = drifting(0.003, *VALVES), drifting(0.003, FORCE)
+late_position = drifting(0.002, POSITION)
+
+
 def changed(log: Trajectory, change: Callable[..., tuple[Array, Columns]]) -> Trajectory:
     columns = {h: log[n] for h, n in zip(log.headers, log.names, strict=True)}
     return Trajectory(*change(log.time, columns), log.meta)
@@ -61,6 +82,9 @@ def changed(log: Trajectory, change: Callable[..., tuple[Array, Columns]]) -> Tr
         (short, "random", 902, ()),
         (late, "random", 901, ("sensor_delay:piston/x",)),
         (stretched, "random", 901, ()),
+        (late_valves, "random", 901, ()),
+        (late_force, "opposed", 902, ()),
+        (late_position, "random", 901, ()),
     ],
 )
 def test_no_effect_is_blamed_for_the_way_a_log_was_taken(
@@ -119,6 +143,81 @@ def test_of_a_slow_log_times_within_a_row_are_not_looked_for(bench_log: BenchLog
 def test_an_odd_rate_makes_the_clock_doubtful(bench_log: BenchLog) -> None:
     (remark,) = limits_of([changed(bench_log(), stretched)])
     assert "set to 1000 Hz" in remark and "5.0 % too long" in remark and "scale: 0.9524" in remark
+
+
+@pytest.mark.parametrize(
+    ("columns", "rate", "owner"),
+    [
+        (VALVES, 0.004, "the valve commands"),
+        pytest.param(VALVES, -0.008, "the valve commands", marks=pytest.mark.slow),
+        pytest.param((POSITION,), 0.03, "piston/x", marks=pytest.mark.slow),
+    ],
+)
+def test_two_clocks_that_drift_apart_are_known(
+    columns: tuple[str, ...], rate: float, owner: str, bench_log: BenchLog
+) -> None:
+    problem = bench_problem([changed(bench_log(), drifting(rate, *columns))], load_model(rig=True))
+    assert problem.drift == (owner, pytest.approx(rate, rel=0.2))
+    (remark,) = problem.validate()
+    assert f"the clock of {owner} runs" in remark and ("fast" if rate > 0 else "slow") in remark
+    # on one clock the model explains the log nearly as if they had never been apart
+    sound = bench_problem([bench_log()], load_model(rig=True))
+    assert sound.drift is None and not sound.validate()
+    assert np.mean(problem.residual({}) ** 2) < 3.0 * np.mean(sound.residual({}) ** 2)
+
+
+@pytest.mark.slow
+def test_a_force_that_drifts_is_a_drift_of_the_commands_where_motion_tells_little(
+    bench_log: BenchLog,
+) -> None:
+    problem = bench_problem([changed(bench_log(), drifting(-0.005, FORCE))], load_model(rig=True))
+    assert problem.drift is not None
+    owner, rate = problem.drift
+    assert rate == pytest.approx(-0.005 if owner == "piston/F" else 0.005, rel=0.2)
+
+
+def test_what_is_missing_is_no_drift(bench_log: BenchLog) -> None:
+    late = bench_log((BY_KIND["hose_lag"](T=0.004), BY_KIND["valve_delay"](dt=0.003)))
+    assert bench_problem([late], load_model(rig=True)).drift is None
+
+
+def test_what_is_left_of_a_drift_is_a_nominal_figure(bench_log: BenchLog) -> None:
+    model = load_model(rig=True)
+    sound = BenchProblem([prepare("run", bench_log(duration=1.0))], model)
+    late = prepare("run", changed(bench_log(duration=1.0), drifting(0.002, *VALVES)))
+    moved = BenchProblem([late], model, drift=("the valve commands", 0.0))
+    errors = [np.mean(moved.residual({"clock:valve": rate}) ** 2) for rate in (0.0, 0.002, -0.002)]
+    assert np.argmin(errors) == 1
+    assert moved.nuisance.keys() - sound.nuisance.keys() == {"clock:valve"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rows", [160, 300])
+@pytest.mark.parametrize(("test", "seed"), [("random", 905), ("random", 906), ("opposed", 905)])
+def test_of_one_short_stroke_no_effect_is_sure(
+    test: str, seed: int, rows: int, tmp_path: Path
+) -> None:
+    (path,), _ = bench_case(
+        tmp_path, None, seed=seed, runs=1, duration=3.0, sensors=Sensors(), tests=(test,)
+    )
+    log = Trajectory.read(path)
+    first = 300  # a moment of rest comes before
+    columns = {h: log[n][first : first + rows] for h, n in zip(log.headers, log.names, strict=True)}
+    Trajectory(log.time[first : first + rows], columns, log.meta).write(path)
+    answer = discover_logs([path])[0]
+    assert answer.verdict in ("nothing", "unknown") and not answer.added
+    assert all(ranked.probability <= 0.5 for ranked in answer.ranking)
+
+
+def test_a_short_log_is_undecided_and_says_what_to_record(
+    bench_log: BenchLog, tmp_path: Path
+) -> None:
+    log = bench_log((BY_KIND["seal_friction"](F_c=20.0),), duration=0.4)
+    log.write(tmp_path / "short.csv")
+    answer = discover_logs([tmp_path / "short.csv"])[0]
+    assert answer.verdict == "unknown" and not answer.added and answer.p_value_nothing >= 0.125
+    assert "too short to tell what" in answer.sentence
+    assert "record at least 0.8 s" in answer.sentence
 
 
 def test_no_lag_is_read_at_the_end_of_the_search(bench_log: BenchLog) -> None:

@@ -8,16 +8,18 @@ from dataclasses import replace
 import numpy as np
 
 from kemba.effects.base import Effect
+from kemba.effects.pneumatics.constants import ATMOSPHERE
 from kemba.effects.pneumatics.switching import delayed
 from kemba.effects.series import Series
 from kemba.identify.bench.bench_log import PRESSURES, BenchLog
+from kemba.identify.bench.clocks import commands_by_one_clock, motion_by_one_clock
 from kemba.identify.bench.motion import SmoothedMotion
-from kemba.identify.bench.pressure import absolute_pressure
 from kemba.identify.bench.rig_model import Prediction, RigModel, share
 from kemba.identify.problem.candidates import by_default, switched_on
 from kemba.identify.problem.nominal import nominal_figures
 from kemba.identify.problem.problem import Array, Candidate, Theta
 from kemba.identify.problem.sensor_faults import SensorFaults
+from kemba.mechanism import Cylinder
 from kemba.model.model import Model
 
 SENT_LATE = "sent:late"  # nuisance of slow logs [s]: by how much all commands were sent later
@@ -60,11 +62,11 @@ class Predictor:
     def sent(self, run: BenchLog, theta: Theta) -> BenchLog:
         """A run with its commands at the time when they were sent, at theta."""
         late = theta.get(SENT_LATE, 0.0) if run.seen_within else 0.0
-        return run.sent(late) if late else run
+        return commands_by_one_clock(run.sent(late) if late else run, theta)
 
     def true_motion(self, run: BenchLog, theta: Theta) -> SmoothedMotion:
         """The motion that made the position sensor say what it said."""
-        motion = run.motion
+        motion = motion_by_one_clock(run.motion, theta)
         seen = Series(motion.time, motion.x, (motion.v, motion.a))
         true = self.sensors.behind(theta, "piston/x", seen)
         v, a = true.rates
@@ -105,3 +107,12 @@ def _unlike(model: Model, extra: list[Effect]) -> list[Effect]:
     """Effects not on the model's list already; those that are stay as they are."""
     names = {e.name for e in model.effects}
     return [e for e in extra if e.name not in names]
+
+
+def absolute_pressure(channel: str, states: Mapping[str, Array], cylinder: Cylinder) -> Array:
+    """[Pa] in a chamber, from its force state, or its own pressure state where it has one."""
+    chamber = channel.split("/")[1]
+    if f"chamber/{chamber}/P" in states:
+        return states[f"chamber/{chamber}/P"]
+    area = cylinder.area_extend if chamber == "extend" else cylinder.area_retract
+    return ATMOSPHERE + states[f"chamber/{chamber}/F"] / area

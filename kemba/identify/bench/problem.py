@@ -9,6 +9,8 @@ from functools import cached_property
 import numpy as np
 from typing_extensions import Self
 
+from kemba.errors import KembaError
+from kemba.identify.bench import clocks
 from kemba.identify.bench.bench_log import BenchLog, prepare
 from kemba.identify.bench.beyond import formula_columns, leftover, weight
 from kemba.identify.bench.missing import bench_missing
@@ -66,13 +68,20 @@ class BenchProblemSettings(Settings):
 class BenchProblem(Problem):
     """Residuals of bench runs; effects join the model's list when theta switches them on.
 
-    `colour`: noise colour by run and channel; without any, residuals are not whitened.
+    `colour`: noise colour by run and channel; without any, residuals are not whitened. `drift`:
+    whose clock gained on the others before the logs were put on one clock, and its rate.
     """
 
     learns_colour = True
 
-    def __init__(self, runs: Iterable[BenchLog], model: Model, sensors: bool = True) -> None:
-        logs = tuple(runs)
+    def __init__(
+        self,
+        runs: Iterable[BenchLog],
+        model: Model,
+        sensors: bool = True,
+        drift: clocks.Drift | None = None,
+    ) -> None:
+        logs, self.drift = tuple(runs), drift
         self.model = model
         self.runs = tuple(log.name for log in logs)
         self.candidates = effect_candidates(model)
@@ -85,7 +94,7 @@ class BenchProblem(Problem):
         states = predictor.rig({}).state_names
         starts = {f"start:{name}[{i}]": (i, name) for i in range(len(logs)) for name in states}
         self.predicted = PredictedLogs(settle_starts(logs, predictor), predictor, starts)
-        self.nuisance = predictor.figures | predictor.sensors.nuisance
+        self.nuisance = predictor.figures | predictor.sensors.nuisance | clocks.nuisance(drift)
         if row:  # of slow logs: times within a row are not known, and not looked for
             late = [SENT_LATE, *(c.key for c in hidden.values() if c.sensor)]
             self.nuisance |= dict.fromkeys(late, (0.0, row / np.sqrt(12.0)))
@@ -221,26 +230,36 @@ class BenchProblem(Problem):
         return np.asarray(out)
 
     def validate(self) -> list[str]:
-        """No remarks. Raises BadData where columns must be mixed up."""
+        """A remark on clocks that drift apart. Raises BadData where columns must be mixed up."""
+        if self.contradictions:
+            raise BadData(self.contradictions)
+        if self.drift is None:
+            return []
+        return [clocks.said(*self.drift, max(float(np.ptp(g.motion.time)) for g in self.logs))]
+
+    @cached_property
+    def contradictions(self) -> list[KembaError]:
+        """What must be wrong with the columns of the logs."""
         predictor = self.predicted.predictor
-        faults = [
+        return [
             fault
             for log in self.logs
             for fault in contradictions(
                 log, self.model.mechanism.stroke, lambda trial: predictor.predict(trial, {}).force
             )
         ]
-        if faults:
-            raise BadData(faults)
-        return []
 
 
 def bench_problem(logs: Sequence[Trajectory], model: Model) -> BenchProblem:
     """The problem of explaining bench logs with `model` and what may be added to it."""
     noise = position_noise([(log.time, log["piston/x"]) for log in logs])
     names = [str(log.meta.get("name", i)) for i, log in enumerate(logs)]
-    pairs = zip(names, logs, strict=True)
-    return BenchProblem([prepare(name, log, noise) for name, log in pairs], model)
+    runs = [prepare(name, log, noise) for name, log in zip(names, logs, strict=True)]
+    problem = BenchProblem(runs, model)
+    drift = None if problem.contradictions else clocks.drift_between(problem, problem.logs)
+    if drift is None:
+        return problem
+    return BenchProblem([clocks.without_drift(run, *drift) for run in runs], model, drift=drift)
 
 
 def _within(candidate: Candidate, row: float) -> bool:

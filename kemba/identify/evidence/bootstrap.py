@@ -34,14 +34,36 @@ class NullTest:
     """The best score that a single effect reaches in logs in which nothing is missing.
 
     `scores` (draws,): its log evidence less that of nothing [nats]. `names` of the parameters.
+    `blocks`: pieces of the logs whose signs were redrawn.
     """
 
     scores: Array
     names: tuple[str, ...]
+    blocks: int
 
     def p_value(self, score: float) -> float:
         """Share of such logs whose best effect looks at least as good as `score`."""
+        return max(self.share(score), self.finest)
+
+    def share(self, score: float) -> float:
+        """The same, as far as it was drawn."""
         return float((1 + np.sum(self.scores >= score)) / (1 + len(self.scores)))
+
+    @property
+    def finest(self) -> float:
+        """The smallest p-value that so few pieces can give: so many signs make so many noises, and
+        a noise and its mirror image look alike."""
+        return float(2.0 ** (1 - self.blocks))
+
+    @property
+    def needed(self) -> int:
+        """Pieces from which something can be significant."""
+        return 1 + int(np.ceil(-np.log2(DiscoverSettings.current().significant)))
+
+    @property
+    def too_short(self) -> bool:
+        """Whether the logs are too short for anything to be significant."""
+        return self.blocks < self.needed
 
     @property
     def threshold(self) -> float:
@@ -72,7 +94,7 @@ def bootstrap(
     best = np.full(draws, -np.inf)
     for hypothesis in hypotheses:
         best = np.maximum(best, _evidence(ranker, hypothesis, slopes) - base)
-    return NullTest(best, ranker.linear.names)
+    return NullTest(best, ranker.linear.names, len(noise))
 
 
 def _slopes(ranker: Ranker, noise: Array, rng: np.random.Generator, draws: int) -> Array:

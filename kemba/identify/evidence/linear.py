@@ -25,6 +25,9 @@ class LinearSettings(Settings):
     farthest: float = setting(
         4.0, "1", "largest distance of a switch from off, in sizes, where it is tried", BY_HAND
     )
+    widths: float = setting(
+        8.0, "1", "largest distance of a nominal figure from its prior mean, in sigmas", BY_HAND
+    )
     blocks: int = setting(
         4, "1", "fewest blocks: fewer runs are cut in time", "convention: for leaving out a quarter"
     )
@@ -198,10 +201,17 @@ def time_blocks(problem: Problem, wanted: int | None = None, shortest: float = 0
 
 
 def estimate(problem: Problem, linear: Linear, z: Array) -> dict[str, float]:
-    """Theta of a vector z (k,); effects whose switch is off are left out."""
+    """Theta of a vector z (k,); effects whose switch is off are left out.
+
+    Nominal figures stay within their reach: a log that is wrong may ask for a negative rise time.
+    """
     theta: dict[str, float] = {}
+    widths = LinearSettings.current().widths
     for name, value in zip(linear.names, z, strict=True):
         theta[name] = float(np.exp(value)) if is_shape(problem, name) else float(value)
+        if name in problem.nuisance:
+            nominal, sigma = problem.nuisance[name]
+            theta[name] = float(np.clip(value, nominal - widths * sigma, nominal + widths * sigma))
     return _clean(problem, theta)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
@@ -12,26 +11,9 @@ from kemba.errors import ConfigErrors, KembaError, suggest
 from kemba.identify.logs.fault import log_fault as _fault
 from kemba.identify.logs.own_rigs import own_faults
 from kemba.identify.logs.reading import OWN_RIGS, legs_of, needed
-from kemba.identify.logs.settings import GateSettings
+from kemba.identify.logs.settings import GateSettings, range_of
 from kemba.identify.problem.noise import difference_sigma
 from kemba.trajectory import TIME, Array, Trajectory
-
-# Physical limits by the last part of the name: smallest, largest, and the likely mistake.
-RANGES = {
-    "piston/x": (-0.01, 1.0, "metres from 0 (retracted) to the stroke; is it in millimetres?"),
-    "piston/v": (-8.0, 8.0, "metres per second; is it in mm/s?"),
-    "piston/F": (-3000.0, 3000.0, "newtons, pushing positive"),
-    "hip/q": (-2 * math.pi, 2 * math.pi, "radians; is it in degrees?"),
-    "hip/tau": (-60.0, 60.0, "newton metres at the joint; is it in N.mm?"),
-    "body/pitch": (-math.pi, math.pi, "radians, nose up positive; is it in degrees?"),
-    "body/x": (-20.0, 20.0, "metres; is it in millimetres?"),
-    "body/z": (-0.1, 3.0, "metres above the ground; is it in millimetres?"),
-    "body/vx": (-20.0, 20.0, "metres per second"),
-    "body/vz": (-20.0, 20.0, "metres per second"),
-    "body/ax": (-2000.0, 2000.0, "metres per second squared"),
-    "body/az": (-2000.0, 2000.0, "metres per second squared"),
-    "P": (2e4, 2e6, "pascals, absolute; is it in bar or kPa, or gauge?"),
-}
 
 
 class BadData(ConfigErrors):
@@ -74,8 +56,7 @@ def _unit_of(name: str) -> str | None:
     """The unit that a column must have; None where the gate does not know the column."""
     if "valve/" in name:
         return "1"
-    known = any(name == k or name.endswith(f"/{k}") for k in RANGES)
-    return CHANNELS[name.split("/")[-1]][0] if known else None
+    return CHANNELS[name.split("/")[-1]][0] if range_of(name) else None
 
 
 def _time(log: Trajectory) -> Iterator[KembaError]:
@@ -145,10 +126,10 @@ def _values(log: Trajectory) -> Iterator[KembaError]:
 
 
 def _range(log: Trajectory, name: str, y: Array) -> Iterator[KembaError]:
-    known = [v for k, v in RANGES.items() if name == k or name.endswith(f"/{k}")]
-    if not known:
+    known = range_of(name)
+    if known is None:
         return
-    low, high, expected = known[0]
+    low, high, expected = known
     limits = GateSettings.current()
     if name.endswith("piston/x") and "stroke" in log.meta:
         high = log.meta["stroke"] + limits.beyond

@@ -9,11 +9,11 @@ from typing import Literal
 import numpy as np
 
 from kemba.errors import KembaError
-from kemba.identify.logs.settings import GateSettings
+from kemba.identify.logs.settings import GateSettings, range_of
 from kemba.identify.logs.sidecar import check_kind, check_noise
 from kemba.logs import ColumnMap, open_log
 from kemba.mechanism import Mechanism
-from kemba.trajectory import Trajectory, sidecar
+from kemba.trajectory import Array, Trajectory, sidecar
 
 Kind = Literal["robot", "bench", "cylinder", "drive", "vessel"]
 BODY = ("body/x", "body/z", "body/pitch")
@@ -39,12 +39,23 @@ def read_log(path: str | Path, columns: ColumnMap | None = None) -> Trajectory:
 
 
 def _without_absurd(log: Trajectory) -> Trajectory:
-    """The log with readings that no channel can have as missing ones: their squares overflow."""
-    limit = GateSettings.current().absurd
+    """The log with readings that no channel can have as missing ones: their squares overflow.
+
+    So are the few that this channel cannot have, where the gate tolerates so few of them.
+    """
     columns = {h: log[name] for h, name in zip(log.headers, log.names, strict=True)}
-    wild = {h: np.abs(values) > limit for h, values in columns.items()}
+    wild = {h: _wild(n, log[n]) for h, n in zip(log.headers, log.names, strict=True)}
     broken = {h: np.where(wild[h], np.nan, columns[h]) for h in columns if wild[h].any()}
     return log.with_columns(broken) if broken else log
+
+
+def _wild(name: str, y: Array) -> np.ndarray:
+    limits, known = GateSettings.current(), range_of(name)
+    beyond = np.abs(y) > limits.absurd
+    if known is None:
+        return np.asarray(beyond)
+    outside = (y < known[0]) | (y > known[1])
+    return np.asarray(beyond | (outside & (outside.mean() <= limits.impossible)))
 
 
 def read_logs(paths: Sequence[str | Path], columns: ColumnMap | None = None) -> list[Trajectory]:

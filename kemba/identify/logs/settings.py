@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from kemba.settings import BY_HAND, Settings, setting
 
 
@@ -78,3 +80,26 @@ class GateSettings(Settings):
         0.015, "m", "a position may read so far past the stroke", BY_HAND, decides=True
     )
     dead: int = setting(200, "1", "rows without any change that mean a dead sensor", BY_HAND)
+
+
+# Physical limits by the last part of the name: smallest, largest, and the likely mistake.
+RANGES = {
+    "piston/x": (-0.01, 1.0, "metres from 0 (retracted) to the stroke; is it in millimetres?"),
+    "piston/v": (-8.0, 8.0, "metres per second; is it in mm/s?"),
+    "piston/F": (-3000.0, 3000.0, "newtons, pushing positive"),
+    "hip/q": (-2 * math.pi, 2 * math.pi, "radians; is it in degrees?"),
+    "hip/tau": (-60.0, 60.0, "newton metres at the joint; is it in N.mm?"),
+    "body/pitch": (-math.pi, math.pi, "radians, nose up positive; is it in degrees?"),
+    "body/x": (-20.0, 20.0, "metres; is it in millimetres?"),
+    "body/z": (-0.1, 3.0, "metres above the ground; is it in millimetres?"),
+    "body/vx": (-20.0, 20.0, "metres per second"),
+    "body/vz": (-20.0, 20.0, "metres per second"),
+    "body/ax": (-2000.0, 2000.0, "metres per second squared"),
+    "body/az": (-2000.0, 2000.0, "metres per second squared"),
+    "P": (2e4, 2e6, "pascals, absolute; is it in bar or kPa, or gauge?"),
+}
+
+
+def range_of(name: str) -> tuple[float, float, str] | None:
+    """Smallest and largest reading of a column, and the likely mistake; None where unknown."""
+    return next((v for k, v in RANGES.items() if name == k or name.endswith(f"/{k}")), None)

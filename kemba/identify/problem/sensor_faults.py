@@ -39,7 +39,8 @@ class SensorFaults:
     def __init__(self, effects: Iterable[Effect] = ()) -> None:
         effects = list(effects)
         self.listed = {e.name: e for e in effects if isinstance(e, SensorEffect)}
-        self.carried = {e.name: e for e in effects if e.kind in carriers()}
+        self._kinds, self._carriers = fault_kinds(), carriers()  # asked for at every prediction
+        self.carried = {e.name: e for e in effects if e.kind in self._carriers}
 
     @property
     def present(self) -> bool:
@@ -60,7 +61,7 @@ class SensorFaults:
     def at(self, theta: Theta, channel: str) -> list[SensorEffect]:
         """The faults of a channel at theta."""
         found = []
-        for kind, cls in fault_kinds().items():
+        for kind, cls in self._kinds.items():
             name = f"{kind}:{channel}"
             own = {figure: theta.get(f"{name}.{figure}") for figure in cls.declared()}
             values = {figure: value for figure, value in own.items() if value is not None}
@@ -75,7 +76,7 @@ class SensorFaults:
     def _carrying(self, theta: Theta) -> list[Effect]:
         """The effects at theta that bring faults of sensors along."""
         found = dict(self.carried)
-        for kind, cls in carriers().items():
+        for kind, cls in self._carriers.items():
             own = {f: theta[f"{kind}.{f}"] for f in cls.declared() if f"{kind}.{f}" in theta}
             if own:
                 found[kind] = found.get(kind, cls.model_validate({"kind": kind})).bind(own)

@@ -1,0 +1,199 @@
+"""Clocks of a bench log: commands, position and force may be written by clocks that drift apart.
+
+Of two recorders that begin together one may gain on the other. A rate of 0.001 is 1 ms a second:
+the chambers then seem to fill later and later, as with a hose that grows. Such rates are looked for
+before any fit, and the logs are put on one clock; what is left of the rate is a nuisance parameter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from kemba.identify.bench.bench_log import BenchLog
+from kemba.identify.bench.motion import SmoothedMotion
+from kemba.identify.evidence.colour import best_fit
+from kemba.identify.evidence.linear import Linear, condense, names_of, priors
+from kemba.identify.problem.problem import Problem, Theta
+from kemba.settings import BY_HAND, Settings, setting
+
+COMMANDS, POSITION = "clock:valve", "clock:piston/x"  # names in theta
+Drift = tuple[str, float]  # whose clock gains on the others, and its rate
+# whose clock gains on the others: in theta, its sign there
+OWNERS: Mapping[str, Mapping[str, float]] = {
+    "the valve commands": {COMMANDS: 1.0},
+    "piston/x": {POSITION: 1.0},
+    "piston/F": {COMMANDS: -1.0, POSITION: -1.0},
+}
+
+
+class ClockSettings(Settings):
+    """Clocks that run at different rates."""
+
+    rate: float = setting(
+        3e-4,
+        "1",
+        "prior sigma of what is left of a rate after logs were put on one clock",
+        "tuned: the search for it was off by 0.1e-3 to 0.3e-3 on logs of the twin",
+        decides=True,
+    )
+    farthest: float = setting(
+        0.16, "s", "largest drift over a log that is looked for before any fit", BY_HAND
+    )
+    stride: float = setting(
+        8e-3, "s", "step of that search", "derived: the fastest rise time of Table I"
+    )
+    fits: float = setting(
+        1.0,
+        "1",
+        "mean square, in noise units, that a fit with all effects may leave of logs in which no "
+        "drift is looked for",
+        "tuned: 0.8 to 1.1 on clean logs of the twin of tests/twin, where one effect is missing "
+        "0.9 to 19",
+    )
+    better: float = setting(
+        0.9,
+        "1",
+        "share of its cost that such a fit may keep with a drift that is believed",
+        "tuned: on the twin, 0.99 or more on 22 logs without drift, 0.02 to 0.6 with 10 ms or "
+        "more of the commands",
+        decides=True,
+    )
+    again: float = setting(
+        3.0, "1", "factor of the least cost within which a trial is linearised again", BY_HAND
+    )
+
+
+def nuisance(drift: Drift | None) -> dict[str, tuple[float, float]]:
+    """Nominal value and prior sigma of the rates that are not exactly known after a drift."""
+    moved = OWNERS[drift[0]] if drift else ()
+    return dict.fromkeys(moved, (0.0, ClockSettings.current().rate))
+
+
+def by_one_clock(run: BenchLog, theta: Theta) -> BenchLog:
+    """A run with commands and motion as the clock of the force would have written them."""
+    moved = commands_by_one_clock(run, theta)
+    return replace(moved, motion=motion_by_one_clock(run.motion, theta))
+
+
+def commands_by_one_clock(run: BenchLog, theta: Theta) -> BenchLog:
+    """A run with its commands when they were sent by the clock of the force, at theta."""
+    rate, begin = theta.get(COMMANDS, 0.0), run.motion.time[0]
+    if not rate:
+        return run
+
+    def true(instant: float) -> float:
+        return float(begin + (instant - begin) / (1.0 + rate))
+
+    extend, retract = ([(true(a), true(b)) for a, b in sent] for sent in run.commands)
+    return replace(run, commands=(extend, retract))
+
+
+def motion_by_one_clock(motion: SmoothedMotion, theta: Theta) -> SmoothedMotion:
+    """The motion by the clock of the force, at theta; it rests after its end."""
+    rate, time = theta.get(POSITION, 0.0), motion.time
+    if not rate:
+        return motion
+    written = time[0] + (time - time[0]) * (1.0 + rate)
+    x, v, a = (np.interp(written, time, y) for y in (motion.x, motion.v, motion.a))
+    return replace(motion, x=x, v=v * (1.0 + rate), a=a * (1.0 + rate) ** 2)
+
+
+def drift_between(problem: Problem, logs: Sequence[BenchLog]) -> Drift | None:
+    """Whose clock gains on the others and by which rate, where that explains what nothing in the
+    catalogue does; None where no drift shows.
+
+    The model with all effects free is linearised and fitted at every trial of a rate; where a rate
+    does well it is linearised again, since slopes along a wrong motion may praise a wrong rate.
+    """
+    settings, at_zero = ClockSettings.current(), _Linearised(problem, {})
+    usual = at_zero.cost({})
+    if 2.0 * usual < settings.fits * at_zero.rows:
+        return None
+    step = settings.stride / max(float(np.ptp(log.motion.time)) for log in logs)
+    half = step * np.arange(1.0, settings.farthest / settings.stride + 0.5)
+    costs = {
+        (owner, sign * rate): at_zero.cost(_theta(owner, sign * rate))
+        for owner in OWNERS
+        for sign in (1.0, -1.0)
+        for rate in (0.5 * step, *half.tolist())
+    }
+    if min(costs.values()) > settings.better * usual:
+        return None
+    leaders: dict[tuple[str, bool], Drift] = {}
+    for owner, rate in sorted(costs, key=costs.__getitem__):
+        if costs[owner, rate] < settings.again * min(costs.values()):
+            leaders.setdefault((owner, rate > 0), (owner, rate))
+    found = [_refined(problem, owner, rate, step) for owner, rate in leaders.values()]
+    alike = min(found)[0] / settings.better  # where the piston hardly moves, its clock is no matter
+    order = list(OWNERS)
+    within = [(cost, drift) for cost, drift in found if cost <= alike]
+    least, (owner, rate) = min(within, key=lambda item: (order.index(item[1][0]), item[0]))
+    inside = abs(rate) < half[-1] - 0.5 * step
+    return (owner, rate) if inside and least < settings.better * usual else None
+
+
+class _Linearised:
+    """A problem linearised at theta, with every effect of the catalogue free."""
+
+    def __init__(self, problem: Problem, theta: Theta) -> None:
+        self.problem, self.names = problem, names_of(problem, {})
+        self.slopes = problem.jacobian(theta, self.names)
+        self.rows = len(self.slopes)
+
+    def cost(self, theta: Theta) -> float:
+        """What the best fit about theta leaves."""
+        at, r = priors(self.problem, theta, self.names), self.problem.residual(theta)
+        return least_cost(condense(self.names, *at, self.slopes, r, np.zeros(len(r), dtype=int)))
+
+
+def _refined(problem: Problem, owner: str, rate: float, step: float) -> tuple[float, Drift]:
+    """Cost and drift of the best rate near a good one, with the slopes there."""
+    near = _Linearised(problem, _theta(owner, rate))
+    found = minimize_scalar(
+        lambda trial: near.cost(_theta(owner, trial)),
+        bounds=(rate - 0.5 * step, rate + 0.5 * step),
+        method="bounded",
+        options={"xatol": 0.01 * step},
+    )
+    return float(found.fun), (owner, float(found.x))
+
+
+def least_cost(linear: Linear) -> float:
+    """Half the sum of squares that the best fit leaves, with what its priors cost."""
+    z = best_fit(linear)
+    (gram, slope, power), step = linear.total, z - linear.at
+    pull = (z - linear.mean) / linear.width
+    return float(0.5 * (power + 2.0 * slope @ step + step @ gram @ step + pull @ pull))
+
+
+def without_drift(log: BenchLog, owner: str, rate: float) -> BenchLog:
+    """A log with all channels by the clock of the force.
+
+    Where the commands alone have another clock, a row shows what was sent since the row before: in
+    the mean half a row earlier, as in a slow log.
+    """
+    if OWNERS[owner].keys() == {COMMANDS} and not log.seen_within:
+        row = float(np.median(np.diff(log.motion.time)))
+        log = replace(log.sent(-0.5 * row), seen_within=row)
+    moved, time = by_one_clock(log, _theta(owner, rate)), log.motion.time
+    gained = max(0.0, *_theta(owner, rate).values())
+    known = time <= time[0] + (time[-1] - time[0]) / (1.0 + gained)
+    return replace(moved, keep={channel: k & known for channel, k in log.keep.items()})
+
+
+def said(owner: str, rate: float, span: float) -> str:
+    """A remark on a drift; `span` [s] of the log."""
+    word = "fast" if rate > 0 else "slow"
+    return (
+        f"the clock of {owner} runs {100 * abs(rate):.2g} % {word} against the others, "
+        f"{1e3 * abs(rate) * span:.2g} ms in {span:.2g} s: its column was put on their clock. "
+        "Record all columns with one clock, or let one trigger start both and check their rates"
+    )
+
+
+def _theta(owner: str, rate: float) -> dict[str, float]:
+    return {name: sign * rate for name, sign in OWNERS[owner].items()}
