@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 import tempfile
@@ -22,6 +23,14 @@ NEXT = {
     "sensitivity.md": "[how discovery works](discovery.md), or [how plans are found](solving.md)",
 }
 
+TYPES = {
+    "boolean": "true or false",
+    "integer": "whole number",
+    "number": "number",
+    "object": "group of keys",
+    "string": "text",
+}
+
 
 def on_files(files: Any, config: Any) -> Any:
     """The reference of the command line, from the command itself."""
@@ -38,6 +47,46 @@ def on_files(files: Any, config: Any) -> Any:
 
 
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
-    """A page that a script wrote, with its last line."""
+    """A page that a script wrote, with its last line; the keys of a task from its schema."""
+    if page.file.src_uri == "tasks.md":
+        body, line, rest = markdown.rpartition("\nNext: ")
+        markdown = f"{body}\n## From the schema\n\n{task_keys()}{line}{rest}"
     onwards = NEXT.get(page.file.src_uri)
     return f"{markdown}\n\nNext: {onwards}.\n" if onwards else markdown
+
+
+def task_keys() -> str:
+    """Every key of a task with its range, unit and default, from the JSON Schema of the program."""
+    from kemba.ocp.task.task import Task
+
+    schema = Task.model_json_schema()
+    parts = {"": schema, **{f"{k.lower()}.": v for k, v in schema["$defs"].items()}}
+    places = {"bound.": "start.NAME.", "goal.": "goals.NAME."}
+    rows = [
+        f"| `{places.get(part, part)}{key}` | {_kind(about)} | {_default(about)} |"
+        for part, table in parts.items()
+        for key, about in table["properties"].items()
+    ]
+    return "\n".join(["| key | what it takes | default |", "|---|---|---|", *rows]) + "\n"
+
+
+def _kind(about: dict[str, Any]) -> str:
+    """What a key takes, in words."""
+    if "enum" in about:
+        return ", ".join(f"`{word}`" for word in about["enum"])
+    if "unit" in about:
+        number = about["anyOf"][0]
+        ends = [f"{end} {number[end]:g}" for end in ("minimum", "maximum") if end in number]
+        return ", ".join([about.get("description", f"[{about['unit']}]"), *ends])
+    if "anyOf" in about:
+        kinds = [_kind(one) for one in about["anyOf"] if one.get("type") != "null"]
+        return " or ".join(dict.fromkeys(kinds))
+    if about.get("type") == "array":
+        return "list of " + " and ".join(dict.fromkeys(map(_kind, about["prefixItems"])))
+    ends = [f", {end} {about[end]}" for end in ("minimum", "maximum") if end in about]
+    return TYPES[about.get("type", "object")] + "".join(ends)
+
+
+def _default(about: dict[str, Any]) -> str:
+    known = about.get("default")
+    return "" if known in (None, "") else f"`{json.dumps(known)}`"

@@ -32,6 +32,16 @@ def test_every_key_of_a_task_is_described(section: type[Task]) -> None:
     assert set(section.model_fields) <= named
 
 
+def test_the_site_lists_the_keys_of_a_task_from_the_schema() -> None:
+    """As a table that is made when the site is built."""
+    table = runpy.run_path(str(ROOT / "docs/hooks.py"))["task_keys"]()
+    assert "| `hold` | before plan time 0 [s], minimum 0, maximum 10 | `0.0` |" in table
+    assert '| `guess` | `automatic`, `standing` | `"automatic"` |' in table
+    assert "| `feet` | of the feet at the top [m], minimum 0 |  |" in table
+    for part, section in (("", Task), ("solver.", Solver), ("tolerances.", Tolerances)):
+        assert all(f"| `{part}{name}` |" in table for name in section.model_fields)
+
+
 SECTIONS: dict[str, type[Any]] = {
     "Robot": RobotFile,
     "Place of a leg": LegPlace,

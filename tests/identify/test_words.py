@@ -40,4 +40,5 @@ def test_conditions_are_sentences(phase: str, mode: str, region: str, words: str
 def test_valves_are_named() -> None:
     assert command("front/valve/extend") == "the front extend valve"
     assert command("valve/retract") == "the retract valve"
-    assert command("front/hip/tau") == "front/hip/tau"
+    assert command("front/hip/tau") == "the front hip torque"
+    assert command("slider/F") == "slider/F"

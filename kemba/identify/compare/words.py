@@ -45,8 +45,10 @@ def place_of(at: ConditionBin) -> str:
 
 def command(name: str) -> str:
     """A command in words: `front/valve/extend` is the front extend valve; others stay."""
-    leg, _, side = name.rpartition("valve/")
-    return f"the {leg.replace('/', ' ')}{side} valve" if "valve/" in name else name
+    leg, valve, side = name.rpartition("valve/")
+    if valve:
+        return f"the {leg.replace('/', ' ')}{side} valve"
+    return f"the {name.partition('/')[0]} hip torque" if name.endswith("/hip/tau") else name
 
 
 def quantity(channel: str) -> str:

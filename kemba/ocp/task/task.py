@@ -37,7 +37,7 @@ class Bound(Section):
         return data if isinstance(data, dict) else {"equals": data}
 
 
-Share = Annotated[float, Param("1", lower=0.0, upper=1.0, doc="of the nodes")]
+Share = Annotated[float, Param("1", lower=0.0, upper=1.0, doc="share of the nodes")]
 
 
 class Goal(Section):

@@ -25,7 +25,7 @@ class PageSettings(Settings):
     after: float = setting(0.4, "s", "shown of a log after the plan's end", CHOSEN)
     drawn: int = setting(5, "1", "logs drawn over each other; more cannot be told apart", CHOSEN)
     compared: int = setting(
-        3, "1", "logs that the model is compared with: more take longer than 10 s", CHOSEN
+        2, "1", "logs that the model is compared with: more take longer than 10 s", CHOSEN
     )
 
 

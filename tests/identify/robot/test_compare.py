@@ -86,7 +86,7 @@ def test_a_weak_motor_shows_against_its_torque() -> None:
     profile = profile_of(found, "hips", "torque [N.m]")
     assert profile.gain == max(p.gain for p in found.force_profiles)
     sent = {hint.text.partition(" ms after ")[2] for hint in found.hints if hint.kind == "command"}
-    assert {"front/hip/tau changes", "rear/hip/tau changes"} & sent
+    assert {"the front hip torque changes", "the rear hip torque changes"} & sent
 
 
 @pytest.mark.slow
