@@ -124,6 +124,8 @@ def resolve(task: Task, model: Model, document: Document) -> list[Requirement]:
     except ValueError as error:
         if not errors:  # else the goal it needs may be the one that could not be read
             errors.append(document.error(("clearance",), f"clearance: {error}"))
+    if task.landing.air and not errors and (what := air_fault(task, requirements)):
+        errors.append(document.error(("landing", "air"), f"landing.air: {what}"))
     errors += cost_errors(task.cost, document)
     errors += option_errors(task.solver.options, document)
     if errors:
@@ -227,6 +229,13 @@ def flight_clearance(
         Requirement(("clearance",), known[f"{leg}/foot/z"], None, least, math.inf, during)
         for leg in (model.mechanism.legs if least > 0.0 else ())
     ]
+
+
+def air_fault(task: Task, requirements: Sequence[Requirement]) -> str | None:
+    """Why a task cannot have air on its legs in the rise of its flight, or None."""
+    if task.refine == "none":
+        return "needs the refined plan, and this task says refine: none"
+    return None if highest(requirements) else "needs a goal for body/z at the top of the flight"
 
 
 def longest_leg(robot: Robot) -> float:
