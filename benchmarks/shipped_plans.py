@@ -34,7 +34,8 @@ HEAD = """\
 figures of this table, and only a little (`kemba/ocp/shipped/shelf.py` says how much). See
 [solving](solving.md#from-a-shipped-plan). They were continued from plans that were found from a
 guess. Of {tried} plans, the cheapest of each row was kept whose executions keep to the task's
-tolerances, also on the full plant. `of`: among how many. Errors are those on the plant.
+tolerances, also on the full plant. `of`: among how many. Errors are those on the plant. `air`:
+the [`landing.air`](tasks.md) with which a plan was made, a pulse on stretched legs.
 Written by `benchmarks/shipped_plans.py` on {machine}.
 
 """
@@ -108,8 +109,8 @@ def page(chosen: list[dict[str, Any]], tried: int) -> str:
     """The page for people."""
     text = HEAD.format(tried=tried, machine=f"{platform.processor() or platform.machine()}")
     columns = ["task", *(f"{k} [{UNITS[k]}]" for k in FIGURES)]
-    columns += ["torque² [N².m².s]", "valves [s]", "cost", "of", "apex [mm]", "touchdown [ms]",
-                "end [mm]"]  # fmt: skip
+    columns += ["air", "torque² [N².m².s]", "valves [s]", "cost", "of"]
+    columns += ["apex [mm]", "touchdown [ms]", "end [mm]"]
     lines = ["| " + " | ".join(columns) + " |", "|---" * len(columns) + "|"]
     for row in chosen:
         figures = [f"{row['figures'][k]:g}" if k in row["figures"] else "" for k in FIGURES]
@@ -117,7 +118,9 @@ def page(chosen: list[dict[str, Any]], tried: int) -> str:
         late = plant["touchdown_error_s"]
         errors = [f"{1e3 * plant['apex_error_m']:+.1f}", f"{1e3 * plant['final_error_m']:.1f}"]
         errors.insert(1, "" if late is None else f"{1e3 * late:+.1f}")
-        cost = [f"{row['torque_squared_integral']:.3g}", f"{row['valve_open_s']:.2f}"]
+        air = [word.split("=")[1] for word in row["set"] if word.startswith("landing.air=")]
+        cost = ["".join(air)]
+        cost += [f"{row['torque_squared_integral']:.3g}", f"{row['valve_open_s']:.2f}"]
         cells = [row["task"], *figures, *cost, f"{row['cost']:.3g}", str(row["of"]), *errors]
         lines.append("| " + " | ".join(cells) + " |")
     return text + "\n".join(lines) + "\n"

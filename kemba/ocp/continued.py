@@ -66,3 +66,19 @@ def from_scratch(found: Plan, why: str) -> Plan:
     said = f"{found.sentence}; made from scratch, because the earlier plan could not be continued"
     sentence = found.sentence if found.status is Status.INTERRUPTED else f"{said} ({why})"
     return replace(found, sentence=sentence, continued=False)
+
+
+def with_air(planner: Planner, found: Plan) -> Plan:
+    """The plan solved again with the pulse that `landing.air` asks for.
+
+    Steps of the relaxed problem are too long for a pulse of some milliseconds, so that it comes
+    last. Where that fails, the plan without it is not what was asked.
+    """
+    asked = tuple(planner.requirements)
+    origin = Origin(found.trajectory, planner.model, asked, "the plan without air", once=True)
+    near, why = continued(planner, origin)
+    if near is None:
+        what = f"`landing.air` is not kept ({why})"
+        return replace(found, status=Status.ACCEPTABLE, sentence=f"{what}; {found.sentence}")
+    wall, cpu = found.solve_s + near.solve_s, found.solve_cpu_s + near.solve_cpu_s
+    return replace(near, continued=None, solve_s=wall, solve_cpu_s=cpu)

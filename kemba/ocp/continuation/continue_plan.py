@@ -24,11 +24,12 @@ from kemba.ocp.phases.notes import noted_phases
 from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.radau import RADAU5
 from kemba.ocp.phases.settings import Elements
+from kemba.ocp.phases.stretched import extending, stretched
 from kemba.ocp.refinement.refine import Refined, Refiner, reduction_of, refine, valve_columns
 from kemba.ocp.refinement.sample import certificate, to_trajectory
 from kemba.ocp.refinement.solve import solve, warm
 from kemba.ocp.relaxation.session import Attempt
-from kemba.ocp.task.requirement import Requirement
+from kemba.ocp.task.requirement import Requirement, apex_node
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.symmetry import Reduction
 from kemba.ocp.transcription.unilateral import read_constraints
@@ -88,8 +89,8 @@ class Continuation:
             meshed = self._meshed(start, reduction)
             if meshed is not None:
                 found = self._walk(*meshed, reduction)
-                if found.done or self.origin.once:
-                    return found
+                if found.done or self.origin.once or self.task.landing.air:
+                    return found  # phases read anew would have no pulse of air
             return self._read_anew(start)
         except KembaError as error:
             why = f"the earlier plan does not fit this model: {error}"
@@ -107,6 +108,11 @@ class Continuation:
         phases = noted_phases(start.meta, constraints, valves, len(start) - 1)
         if phases is None:
             return None
+        if self.task.landing.air:
+            apex = apex_node(self.requirements, len(start) - 1)
+            extends = extending(self.model, reduction)
+            air = self.task.landing.air
+            start, phases = stretched(start, phases, constraints, extends, apex, air)
         marks = [r.at for r in self.requirements if r.at is not None]
         return renoded(start, phases, self.task.nodes, marks)
 

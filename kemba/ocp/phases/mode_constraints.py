@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 
 import casadi as ca
 import numpy as np
@@ -13,6 +14,7 @@ from kemba.ocp.phases.modes import AHEAD, BACK, HELD, OPEN
 from kemba.ocp.phases.program import PhaseProgram, Where
 from kemba.ocp.phases.radau import STATE
 from kemba.ocp.phases.settings import ModeConstraints
+from kemba.ocp.phases.stretched import extending, rising, stretching
 from kemba.ocp.phases.view import View
 from kemba.ocp.task.requirement import SCALES
 from kemba.ocp.transcription.first_node import state_rows
@@ -164,9 +166,21 @@ def _durations(program: PhaseProgram) -> None:
     columns = [program.columns.h[:, 0]]
     low, high = 1 - task.step_variation, 1 + task.step_variation
     program.add("duration", h, sum(lasting), low, high, columns)
+    _air(program, h, lasting)
     for valve in range(len(phases[0].valves)):
         places = [phase.valves[valve] for phase in phases]
         switches = [p for p in range(1, len(phases)) if places[p] != places[p - 1]]
         for a, b in itertools.pairwise(switches):
             dwell = sum(lasting[a:b], ca.SX(0))
             program.add("dwell", h, dwell, task.min_dwell / task.duration, INF, columns)
+
+
+def _air(program: PhaseProgram, h: ca.SX, lasting: Sequence[ca.SX]) -> None:
+    """Air is let onto the legs for long enough, in the phases of the rise that do so."""
+    air, extends = program.task.landing.air, extending(program.model, program.reduction)
+    flight = rising(program.phases, program.constraints, program.apex)
+    pulses = [p for p in flight if stretching(program.phases[p], extends)]
+    if air and pulses:
+        total = sum((lasting[p] for p in pulses), ca.SX(0))
+        low = air / program.task.duration
+        program.add("landing.air", h, total, low, INF, [program.columns.h[:, 0]])

@@ -24,8 +24,11 @@ def kind_of(task: Task, model: Model) -> str:
     """A fingerprint of everything but the figures: what is asked, of which robot and effects.
 
     Payload and supply pressure are figures; any other parameter of an effect is part of the kind.
+    `landing.air` is none: a plan with it meets a task that does not ask for it, and one without
+    gets its pulse when it is continued.
     """
-    asked = task.model_dump(mode="json", exclude=set(FIGURES) | set(APART), exclude_none=True)
+    apart = dict.fromkeys((*FIGURES, *APART), True) | {"landing": {"air"}}
+    asked = task.model_dump(mode="json", exclude=apart, exclude_none=True)
     robot = model.mechanism.robot
     physics = {
         "robot": robot.model_dump(mode="json") if robot is not None else model.mechanism.name,

@@ -127,16 +127,16 @@ def resolve(
         except ValueError as error:
             if not (partial and isinstance(error, NotGivenError)):
                 errors.append(document.error(location, f"{written(location)}: {error}"))
-    apex, read = (
-        highest(requirements),
-        not errors and not partial,
-    )  # else the goal may be one that was not read
+    apex = highest(requirements)
+    read = not errors and not partial  # else the goal may be one that was not read
     for key, of_the_flight in (("feet", feet_at_apex), ("clearance", flight_clearance)):
         try:
             requirements += of_the_flight(task, model, apex)
         except ValueError as error:
             if read:
                 errors.append(document.error((key,), f"{key}: {error}"))
+    if task.landing.air and read and (what := air_fault(task, apex)):
+        errors.append(document.error(("landing", "air"), f"landing.air: {what}"))
     errors += cost_errors(task.cost, document)
     errors += option_errors(task.solver.options, document)
     if errors:
@@ -253,6 +253,13 @@ def feet_at_apex(task: Task, model: Model, apex: Requirement | None) -> list[Req
         Requirement(("feet",), known[f"{leg}/foot/z"], apex.at, task.feet, math.inf)
         for leg in model.mechanism.legs
     ]
+
+
+def air_fault(task: Task, apex: Requirement | None) -> str | None:
+    """Why a task cannot have air on its legs in the rise of its flight, or None."""
+    if task.refine == "none":
+        return "needs the refined plan, and this task says refine: none"
+    return None if apex else "needs a goal for body/z at the top of the flight"
 
 
 def _number(task: Task, value: float | str, quantity: Quantity) -> float:

@@ -71,7 +71,7 @@ class Goal(Section):
 
 
 class Landing(Section):
-    """How softly the motion lands."""
+    """How the motion lands: how softly, and on legs that air has stretched."""
 
     impact_speed: (
         Annotated[
@@ -79,6 +79,13 @@ class Landing(Section):
             Param(
                 "m.s-1", lower=0.15, doc="at most, of feet on the ground and of legs at their stops"
             ),
+        ]
+        | None
+    ) = None
+    air: (
+        Annotated[
+            float,
+            Param("s", lower=0.0, upper=1.0, doc="extending valves open in the flight's rise"),
         ]
         | None
     ) = None
