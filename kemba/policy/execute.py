@@ -18,7 +18,7 @@ from kemba.plant.simulation.simulate import simulate_one
 from kemba.policy.modes import Array
 from kemba.policy.player import Policy
 from kemba.policy.settings import PolicySettings
-from kemba.policy.write import FILE, measured, write_policy
+from kemba.policy.write import FILE, write_policy
 from kemba.runs import load_run
 from kemba.trajectory import Trajectory
 
@@ -38,7 +38,7 @@ class Driver:
     def __post_init__(self) -> None:
         self.count, self.torques = 0, np.zeros(len(self.policy.data["joints"]))
         self.sent = [[(-np.inf, 0.0)] for _ in self.policy.valves]
-        self.names = measured(self.model)
+        self.names = self.policy.measured
         self.joints = [str(j) for j in self.policy.data["joints"]]
         self.fine = PolicySettings.current().fine
         self.commands: list[Array] = []

@@ -49,8 +49,13 @@ def measured(model: Model) -> list[str]:
     return [f"{n.split('/')[0]}/piston/x" if n.endswith("/knee/q") else n for n in names]
 
 
-def policy_arrays(course: Course, executions: Sequence[Trajectory] = ()) -> dict[str, Array]:
-    """The arrays of a policy by name, as docs/policy.md lists them."""
+def policy_arrays(
+    course: Course, executions: Sequence[Trajectory] = (), also: Sequence[str] = ()
+) -> dict[str, Array]:
+    """The arrays of a policy by name, as docs/policy.md lists them.
+
+    `also`: columns of the executions that are measured as well, such as pressures.
+    """
     model, settings = course.hybrid.model, PolicySettings.current()
     table, motion = read_controller(course.table), course.motion
     ticks, first = len(table), round(table.time[0] / PERIOD)
@@ -62,6 +67,7 @@ def policy_arrays(course: Course, executions: Sequence[Trajectory] = ()) -> dict
     if len(executions) >= settings.fewest:
         clock = (first + np.arange(ticks)) * PERIOD
         noise = Sensors.usual().noise
+        names = [*names, *also]
         found = expected_from(executions, clock, names, _states(model), noise)
         reference, to_x = found.mean, found.estimate
     landing = _landing(course)

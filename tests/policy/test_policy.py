@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 
 from kemba.model import Model, load_model
 from kemba.plant import execute
+from kemba.plant.execution.sensors import Sensors
 from kemba.plant.simulation.commands import Profile
 from kemba.policy import player
 from kemba.policy.course import course_of
@@ -19,7 +20,7 @@ from kemba.policy.events import Course, Edge, Impact
 from kemba.policy.execute import execute_policy
 from kemba.policy.gains import gains_of
 from kemba.policy.player import Policy
-from kemba.policy.write import policy_arrays, write_policy
+from kemba.policy.write import measured, policy_arrays, write_policy
 from kemba.trajectory import Trajectory
 from kemba_cli.main import app
 
@@ -148,6 +149,26 @@ def test_corrections_are_bounded(course: Course, tmp_path: Path) -> None:
     assert np.abs(gap).max() <= most + 1e-9
     when = [int(np.argmax([policy.step(far, rates)[1][0] for _ in range(30)]))]
     assert abs(when[0] + 1 - 10) <= int(arrays["most_shift"])
+
+
+def test_what_is_expected_keeps_noise_from_the_valves(
+    model: Model, table: Trajectory, course: Course
+) -> None:
+    """Before anything differs between executions, sensors can say nothing; deviations are counted
+    from the mean of the executions."""
+    pitches = np.random.default_rng(2).normal(0.06, 0.02, 24)
+    done = [execute(table, model, start={"body/pitch": pitch}).trajectory for pitch in pitches]
+    plain, weighed = policy_arrays(course), policy_arrays(course, done)
+    mean = np.mean([motion["body/pitch"][:TICKS] for motion in done], axis=0)
+    k = [str(name) for name in weighed["measured"]].index("body/pitch")
+    assert weighed["reference"][:, k] == pytest.approx(mean, abs=1e-9)
+    sigma = np.array([Sensors.usual().noise.get(n.split("/")[-1], 0.0) for n in measured(model)])
+    rates = sigma * np.sqrt(12.0 / 8**3) / 1e-3  # of a line through 8 ticks
+    noise = np.concatenate([sigma, rates])
+    moved = [np.abs(arrays["edge_gain"] * noise).max() for arrays in (plain, weighed)]
+    assert moved[1] < 0.5 * moved[0]
+    few = policy_arrays(course, done[:5])
+    assert np.array_equal(few["edge_gain"], plain["edge_gain"]), "too few tell nothing"
 
 
 def test_the_reference_player_is_short_and_needs_only_numpy() -> None:
