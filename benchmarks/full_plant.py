@@ -4,12 +4,12 @@ at once.
     python benchmarks/full_plant.py            # all sets, about 5 CPU minutes each
     python benchmarks/full_plant.py --sets 0 1 --out FOLDER
 
-Each set is three random hops of 0.9 s at 1 kHz with the usual noise, and two more that are not
-learnt from. The plant (configs/models/plant.yaml) has orifice chambers, a supply line, a lag of the
-valves, seal friction, damping, a leak and cushions, none of which the planning model has. Printed
-are the ladder of held-out errors in units of the noise, the figures found, the verdict, the CPU
-seconds, and what `compare` says of the kept logs under the planning model, the plant's own and the
-model that was written.
+Each set is three shipped plans, played on the plant and logged at 1 kHz with the usual noise, and
+two more that are not learnt from. The plant (configs/models/plant.yaml) has orifice chambers, a
+supply line, a lag of the valves, seal friction, damping, a leak and cushions, none of which the
+planning model has. Printed are the ladder of held-out errors in units of the noise, the figures
+found, the verdict, the CPU seconds, and what `compare` says of the kept logs under the planning
+model, the plant's own and the model that was written.
 """
 
 from __future__ import annotations
@@ -25,77 +25,57 @@ import numpy as np
 from kemba.identify.compare_logs import compare_logs
 from kemba.identify.workflow import discover_logs
 from kemba.model import load_model
+from kemba.ocp.shipped.entry import read_plan
 from kemba.plant import Commands, Profile, run
+from kemba.plant.execution.controller import Gains
 from kemba.plant.execution.sensors import Sensors, take_log
-from kemba.plant.simulation.commands import Feedback, Sense
+from kemba.plant.simulation.commands import JointControl
 from kemba.trajectory import Trajectory
 
-LEGS = ("front", "rear")
-FEMUR, TIBIA = 0.242, 0.234  # m
-FITTED, KEPT = 3, 2  # logs of a set
+PLANS = Path(__file__).parents[1] / "configs" / "plans"
+SETS = (  # plans that are learnt from, and plans to judge by
+    (("hop-0350", "low-0400", "up-0500"), ("up-0540", "low-0430")),
+    (("up-0560", "near-0200", "mid-0760"), ("up-0580", "near-0150")),
+    (("high-0800", "ahead-0300", "low-0420"), ("high-0820", "near-0250")),
+    (("low-0360", "up-0600", "up-0740"), ("low-0380", "up-0620")),
+)
 Say = Callable[[str], None]
 
 
-def swaying(rng: np.random.Generator) -> Feedback:
-    """Hip torques [N.m] that keep each foot about under its hip, and sway it."""
-    sway, rate = 0.06 * rng.normal(size=(2, 2)), 2.0 + 4.0 * rng.random((2, 2))
-
-    def feedback(time: float, sense: Sense) -> dict[str, float]:
-        torques = {}
-        for i, (leg, fold) in enumerate(zip(LEGS, (1.0, -1.0), strict=True)):
-            bend = fold * sense[f"{leg}/knee/q"]
-            wanted = -fold * np.arctan2(TIBIA * np.sin(bend), FEMUR + TIBIA * np.cos(bend))
-            wanted += min(1.0, time / 0.2) * float(sway[i] @ np.sin(2 * np.pi * rate[i] * time))
-            torque = 150.0 * (wanted - sense[f"{leg}/hip/q"]) - 3.0 * sense[f"{leg}/hip/w"]
-            torque += 30.0 * sense["body/pitch"] + sense["body/pitch_rate"]
-            torques[f"{leg}/hip/tau"] = float(np.clip(torque, -24.8, 24.8))
-        return torques
-
-    return feedback
+def followed(plan: Trajectory) -> JointControl:
+    """The hips' controller (paper, eq. 10) with the plan's references at 1 kHz."""
+    joints = ("front/hip", "rear/hip")
+    times = np.arange(0.0, plan.time[-1] - plan.time[0], 1e-3)
+    t = plan.time - plan.time[0]
+    wanted = [[np.interp(times, t, plan[f"{j}/{x}"]) for x in ("q", "w", "tau")] for j in joints]
+    limits = np.array([[24.8, 49.7, np.inf]] * len(joints))
+    gains = Gains()
+    return JointControl(joints, times, np.moveaxis(wanted, -1, 0), limits, gains.K_p, gains.K_d)
 
 
-def valves(seed: int, rng: np.random.Generator) -> dict[str, Profile]:
-    """Three kinds of hops: legs drawn in, air before touchdown, both chambers in flight."""
-    on, width, skew = 0.03 + 0.03 * rng.random(), 0.1 + 0.07 * rng.random(), 0.003 * rng.normal()
-    land = 0.02 * rng.random()
-    found = {}
-    for i, leg in enumerate(LEGS):
-        s = skew * i
-        extend, retract = [(on, on + width + s)], []
-        if seed % 3 == 0:
-            retract = [(on + width + 0.10 + s, on + width + 0.14 + s)]
-            t = 0.55 + land + s
-            extend += [(t, t + 0.04), (t + 0.1, t + 0.25)]
-        elif seed % 3 == 1:
-            t = on + width + 0.16 + land
-            extend += [(t, t + 0.03), (t + 0.06, t + 0.10), (t + 0.2, t + 0.33)]
-        else:
-            t = on + width + 0.08 + land
-            retract = [(t, t + 0.06), (t + 0.25, t + 0.30)]
-            extend += [(t + 0.03, t + 0.10), (t + 0.3, t + 0.4)]
-        found[f"{leg}/valve/extend"] = Profile.pulses(*extend)
-        found[f"{leg}/valve/retract"] = Profile.pulses(*retract)
-    return found
-
-
-def plant_log(seed: int, duration: float = 0.9) -> Trajectory:
-    """A log of one random hop of the full plant."""
-    rng = np.random.default_rng([77, seed])
-    commands, sensors = Commands(valves(seed, rng), swaying(rng)), Sensors.usual()
-    times = sensors.times(duration, rng)
-    truth = run(load_model("plant"), {}, commands, duration, None, times).trajectory
+def plant_log(name: str, rest: float = 0.2) -> Trajectory:
+    """A log of the full plant that plays a plan of configs/plans, and `rest` [s] after it."""
+    rng = np.random.default_rng([7, *name.encode()])
+    plan = read_plan(PLANS / f"{name}.npz")
+    time = plan.time - plan.time[0]
+    valves = {n: Profile.of(time, np.round(plan[n])) for n in plan.names if "/valve/" in n}
+    placed = ("body/x", "body/z", "body/pitch", *(n for n in plan.names if n.endswith("/q")))
+    start = {n: float(plan[n][0]) for n in placed}
+    sensors, duration = Sensors.usual(), float(time[-1]) + rest
+    commands, times = Commands(valves, followed(plan)), sensors.times(duration, rng)
+    truth = run(load_model("plant"), start, commands, duration, None, times).trajectory
     log = take_log(truth, sensors, rng)
-    log.meta["name"] = f"hop{seed}"
+    log.meta["name"] = name
     return log
 
 
 def written(folder: Path, number: int) -> tuple[list[Path], list[Path]]:
     """Files of a set: logs to learn from, and logs to judge by."""
-    count, paths = FITTED + KEPT, []
-    for seed in range(number * count, (number + 1) * count):
-        paths.append(folder / f"hop{seed}.csv")
-        plant_log(seed).write(paths[-1])
-    return paths[:FITTED], paths[FITTED:]
+    files = {name: folder / f"{name}.csv" for names in SETS[number] for name in names}
+    for name, path in files.items():
+        plant_log(name).write(path)
+    fitted, kept = ([files[name] for name in names] for names in SETS[number])
+    return fitted, kept
 
 
 def study(number: int, folder: Path, say: Say) -> float:
@@ -123,7 +103,7 @@ def study(number: int, folder: Path, say: Say) -> float:
 def main() -> None:
     """Read the arguments, and print every set."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--sets", type=int, nargs="+", default=[0, 1, 2, 3])
+    parser.add_argument("--sets", type=int, nargs="+", default=list(range(len(SETS))))
     parser.add_argument("--out", type=Path, help="keep logs and answers here")
     parser.add_argument("--progress", action="store_true")
     given = parser.parse_args()

@@ -13,7 +13,7 @@ from kemba.identify.doubt.cross_validation import left_out
 from kemba.identify.doubt.run_consistency import Drift, drifting
 from kemba.identify.doubt.unexplained import Formula, look, unfinished
 from kemba.identify.evidence.bootstrap import NullTest, bootstrap, smallest_detectable
-from kemba.identify.evidence.figures import settled
+from kemba.identify.evidence.figures import Rebuilt, ahead, settled
 from kemba.identify.evidence.linear import time_blocks
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.search_settings import SearchSettings
@@ -72,51 +72,43 @@ def discover(
 def _discovered(search: Search, guess: Hypothesis, holdout: Problem | None) -> Discovery:
     """The answer from a first guess on.
 
-    A structure that is far ahead is built in at once: what else is missing shows only then. Any
-    other is built in where the search names it and its answer is not complete. Of both answers the
-    one with the smaller error on left-out data counts.
+    Another structure that leaves far less unexplained is built in at once: what else is missing
+    shows only then. Any other is built in where the search names it and its answer is not complete.
+    Of both answers the one with the smaller error on left-out data counts.
     """
-    anew = _built_anew(search, guess, holdout) if _far_ahead(search, guess) else None
+    structural = SearchSettings.current().structural
+    other = ahead(search.problem, search.points[guess].fit.theta, structural)
+    anew = _built_anew(search, other, holdout) if other else None
     if anew and (anew.answer.verdict == "missing" or time.monotonic() > search.deadline):
         return anew
     first = judged(search, search.further(guess), holdout)
-    named = search.problem.structures & set(first.best)
-    if first.answer.verdict == "missing" and not anew:
-        return first
-    if anew is None and named and time.monotonic() < search.deadline:
-        anew = _built_anew(search, first.best, holdout)
     if anew is None:
-        return first
+        named = search.problem.structures & set(first.best)
+        if first.answer.verdict == "missing" or not named or time.monotonic() > search.deadline:
+            return first
+        built = settled(search.problem.recolour(None).rebuilt({}))
+        anew = _built_anew(search, Rebuilt(*built), holdout)
     # one noise for both, or the model that takes more of its error for noise would look better
     judge = (holdout or search.problem).heard_as(anew.search.problem)
     left = error_ratio(judge, search.points[first.best].fit.theta)
     return anew if anew.answer.error_after < left else first
 
 
-def _far_ahead(search: Search, guess: Hypothesis) -> bool:
-    """Whether the guess is a structure that no single effect comes near to."""
-    if not search.problem.structures & set(guess):
-        return False
-    others = [p.log_evidence for h, p in search.points.items() if h != guess]
-    return search.points[guess].log_evidence - max(others) > SearchSettings.current().far
-
-
-def _built_anew(search: Search, best: Hypothesis, holdout: Problem | None) -> Discovery:
-    """The structure that `best` names, and what the model with that structure lacks."""
-    structure = min(search.problem.structures & set(best))
+def _built_anew(search: Search, other: Rebuilt, holdout: Problem | None) -> Discovery:
+    """What a model with the other structure lacks."""
+    (structure,) = search.problem.structures
     search.say(f"building the model anew with {structure}")
-    theta = search.points[best].fit.theta
-    built, figures = settled(search.problem.rebuilt(theta))
-    second = Search(built, search.deadline, search.say, begin=figures)
-    kept = holdout.rebuilt(theta).relinearise(figures) if holdout else None
+    search.visit((structure,))
+    second = Search(other.problem, search.deadline, search.say, begin=other.figures)
+    kept = holdout.rebuilt({}).relinearise(other.figures) if holdout else None
     found = judged(second, second.run(), kept)
     # one noise for all rungs: that of the model that explains more of the data
     judge = (holdout or search.problem).heard_as(second.problem)
     before = error_ratio(judge, search.points[NULL].fit.theta)
     alone = error(second, NULL, found.holdout)
-    row = structure_row(search, structure, (before, alone), second, found.best)
+    row = structure_row(search, structure, (before, alone), second, found.best, other.nats)
     singles = [p.log_evidence for h, p in search.points.items() if h]
-    gain = max(singles) - search.points[NULL].log_evidence
+    gain = max(max(singles) - search.points[NULL].log_evidence, other.nats)
     answer = joined(row, null_test(search).p_value(gain), found.answer, second, found.best)
     first_error = search.points[NULL].fitted_error
     search.say(f"built anew, the error is {answer.error_after:.2f} times the noise")

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.special import expit
 
 from kemba.identify.answer import Answer, Ranked, Value, Verdict, excess, phrase
 from kemba.identify.doubt.cross_validation import left_out
@@ -19,11 +20,18 @@ from kemba.identify.settings import VerdictSettings
 
 
 def structure_row(
-    first: Search, structure: str, errors: tuple[float, float], second: Search, best: Hypothesis
+    first: Search,
+    structure: str,
+    errors: tuple[float, float],
+    second: Search,
+    best: Hypothesis,
+    nats: float,
 ) -> Ranked:
     """The structure in the ranking, with its figures as the second search found them.
 
-    `errors`: of the model as it is, and with the structure alone.
+    `errors`: of the model as it is, and with the structure alone. `nats`: by which the structure is
+    ahead with every effect free; from this its probability is told where the first search, whose
+    noise may have the colour of the wrong structure's error, saw less in it.
     """
     candidate = first.problem.candidates[structure]
     units = {p.name: p for p in candidate.shapes}
@@ -37,6 +45,7 @@ def structure_row(
         value, low, high = np.clip(ends, p.lower, p.upper).tolist()
         values[name] = Value(value, low, high, p.unit)
     share = share_of(first.probabilities(), [structure])[structure]
+    share = max(share, float(expit(nats)) if nats > 0.0 else 0.0)
     gain = left_out(first, _likeliest_with(first, structure)).nats
     return Ranked(structure, share, values, (), *errors, gain)
 
