@@ -228,6 +228,11 @@ class Problem(ABC):
         """Piston position, speed and force of every row. Default: no row has a piston."""
         return OperatingPoint.nowhere(len(self.rows()))
 
+    def way(self) -> tuple[Array, Flags] | None:
+        """Position (n,) of every row on a way that is gone to and fro, and whether it goes forward
+        (n,). Default: none."""
+        return None
+
     def commands(self) -> Sequence[Changes]:
         """Per run: command -> times [s] and sizes of its changes. Empty: commands are unknown."""
         return []

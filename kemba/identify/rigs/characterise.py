@@ -22,7 +22,7 @@ from kemba.errors import KembaError
 from kemba.identify.evidence.linear import time_blocks
 from kemba.identify.evidence.windows import rms
 from kemba.identify.problem.problem import Array, Labels, Problem
-from kemba.identify.rigs.problem import RigProblem, rig_problem
+from kemba.identify.rigs.problem import rig_problem
 from kemba.identify.rigs.vessel import vessel_problem
 from kemba.model.model import Model
 from kemba.settings import BY_HAND, Settings, setting
@@ -169,8 +169,8 @@ def _divisions(problem: Problem, wanted: int) -> list[Labels]:
     """Labels (n,) of the rows in so many blocks of time, and in so many stretches of the way, each
     with two directions: what a model lacks at one place it lacks in every repeat."""
     found = [time_blocks(problem, wanted=wanted)]
-    if isinstance(problem, RigProblem):
-        place, forward = problem.way()
+    if (way := problem.way()) is not None:
+        place, forward = way
         edges = np.linspace(place.min(), place.max(), wanted + 1)[1:-1]
         found.append(2 * np.searchsorted(edges, place) + forward)
     return found
