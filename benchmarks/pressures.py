@@ -29,11 +29,11 @@ from kemba.policy.execute import execute_policy
 from kemba.policy.player import Policy
 from kemba.policy.write import policy_arrays
 from kemba.runs import Run, load_run
-from kemba.sweep.cases.execution import standing
-from kemba.sweep.scenarios.draw import Scenario, scenarios
-from kemba.sweep.scenarios.expected import executions_of
-from kemba.sweep.scenarios.share import fault_of
-from kemba.sweep.table.summary import wilson
+from kemba.scenarios.conditions import standing
+from kemba.scenarios.draw import Scenario, scenarios
+from kemba.scenarios.expected import executions_of
+from kemba.scenarios.rate import wilson
+from kemba.scenarios.share import fault_of
 from kemba.trajectory import Trajectory
 
 DWELL = 8  # ticks between two switchings of a valve, which shuts in about 6 ms
