@@ -23,7 +23,6 @@ from kemba.settings import BY_HAND, Settings, setting
 
 GEOMETRY = "geometry:"  # names of the lengths begin so
 LEVER = "boom_lever"
-HELD = 1e-6  # of its width: what is not free
 
 
 class StandingSettings(Settings):
@@ -56,6 +55,9 @@ class StandingSettings(Settings):
     angle: float = setting(4e-3, "rad", "prior sigma of the zeros of pitch and hips", BY_HAND)
     piston: float = setting(6e-4, "m", "prior sigma of the zero of a piston", BY_HAND)
     lever: float = setting(0.04, "1", "prior sigma of the boom's lever", "derived: two sizes")
+    held: float = setting(
+        1e-6, "1", "width of what is not free, as a share", "convention: as good as none"
+    )
     deep: float = setting(0.02, "m", "depth below the ground at which no foot can be", BY_HAND)
     often: float = setting(
         0.01, "1", "share of samples so deep from which lengths are not believed", BY_HAND
@@ -136,7 +138,7 @@ def standing_lengths(
     zeros = [settings.angle, settings.body, *[settings.angle] * legs, *[settings.piston] * legs]
     lengths = [settings.prior * size for size in sizes.values()]
     free = np.array([*lengths, *zeros, settings.lever])
-    width = np.array([*lengths, *zeros, settings.lever * HELD])
+    width = np.array([*lengths, *zeros, settings.lever * settings.held])
     start = np.zeros(len(width))
     most = _most_rows(standing.heights(start)[0])
     for i, size in enumerate(sizes.values()):
@@ -182,7 +184,7 @@ def _only(
     """The refined fit with all lengths but the `free` ones as the model has them."""
     held = np.array([i not in free for i in range(len(standing.names))])
     narrow, begin = width.copy(), x.copy()
-    narrow[: len(held)][held] *= HELD
+    narrow[: len(held)][held] *= StandingSettings.current().held
     begin[: len(held)][held] = 0.0
     return _refined(standing, begin, narrow, rows)
 
