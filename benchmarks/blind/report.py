@@ -9,20 +9,8 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-Record = dict[str, Any]
-OUTSIDE = (
-    "magnet",
-    "negative_stiffness",
-    "hysteresis",
-    "check_valve",
-    "temperature_drift",
-    "cogging",
-    "gear_loss",
-    "cable_pull",
-    "boom_drag",
-    "flexible_boom",
-)
-SHAPES = ("geometry", "boom_lever", "mass_split")  # kinds of lengths and assembly
+from blind.kinds import SHAPES, Record, hidden, kind, named
+
 SURE = 0.95
 
 
@@ -48,35 +36,6 @@ def wilson(hits: int, count: int) -> tuple[float, float]:
     middle = (p + z * z / (2 * count)) / (1 + z * z / count)
     half = z / (1 + z * z / count) * math.sqrt(p * (1 - p) / count + z * z / (4 * count**2))
     return max(middle - half, 0.0), min(middle + half, 1.0)
-
-
-def hidden(record: Record) -> list[str]:
-    """Names of what was hidden."""
-    return [effect["kind"] for effect in record["truth"]]
-
-
-def kind(record: Record) -> str:
-    """null, single, sensor, shape, pair, many or outside."""
-    return kind_of(hidden(record))
-
-
-def kind_of(effects: str | Sequence[str] | None) -> str:
-    """The kind of a case by what is hidden in it."""
-    names = [effects] if isinstance(effects, str) else list(effects or ())
-    if not names:
-        return "null"
-    if any(name in OUTSIDE for name in names):
-        return "outside"
-    if len(names) > 1:
-        return "pair" if len(names) == 2 else "many"
-    if names[0].split(":")[0] in SHAPES:
-        return "shape"
-    return "sensor" if names[0].startswith("sensor") else "single"
-
-
-def named(record: Record) -> list[str]:
-    """Effects that were added."""
-    return list(record["answer"]["added"])
 
 
 def in_class(record: Record) -> bool:
@@ -176,6 +135,11 @@ def table(records: Sequence[Record]) -> str:
             lambda r: bool(named(r)) and set(named(r)) <= set(hidden(r)),
         ),
         _row(
+            "outside the catalogue: nothing sure and wrong",
+            groups["outside"],
+            lambda r: not sure_and_wrong(r),
+        ),
+        _row(
             "outside the catalogue: flagged unknown",
             groups["outside"],
             lambda r: r["answer"]["verdict"] == "unknown",
@@ -211,7 +175,8 @@ def table(records: Sequence[Record]) -> str:
             )
         )
     head = ["| | share (95 % Wilson) | of |", "|---|---|---|"]
-    return "\n".join([*head, *rows, "", *misses(records)])
+    shown = [row for row in rows if not row.endswith(("| none | 0 |", "nan % | 0 |"))]
+    return "\n".join([*head, *shown, "", *misses(records)])
 
 
 def _shapes(records: Sequence[Record]) -> list[str]:

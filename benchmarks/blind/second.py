@@ -27,7 +27,7 @@ from mujoco_twin.hidden import APPLIED
 from mujoco_twin.sensors import Sensors
 
 from blind import study
-from blind.report import OUTSIDE
+from blind.kinds import OUTSIDE
 from kemba.identify.logs.gate import check_logs
 from kemba.identify.logs.reading import read_logs
 from kemba.identify.robot.problem import RobotProblem, robot_problem

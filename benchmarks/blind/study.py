@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from blind import baselines, report
+from blind.kinds import kind_of
 from kemba.identify.answer import Answer
 from kemba.identify.discover import discover
 from kemba.identify.logs.gate import BadData
@@ -109,7 +110,7 @@ def _pending(cases: Sequence[Setting], options: argparse.Namespace) -> Iterator[
     done = {json.dumps(r["case"], sort_keys=True) for r in report.read(options.out)}
     part, parts = (int(p) for p in options.part.split("/"))
     kinds = options.only.split(",")
-    wanted = [c for c in cases if not options.only or report.kind_of(c["effect"]) in kinds]
+    wanted = [c for c in cases if not options.only or kind_of(c["effect"]) in kinds]
     for setting in wanted[: options.cases][part - 1 :: parts]:
         if json.dumps(setting, sort_keys=True) not in done:
             yield setting

@@ -58,6 +58,9 @@ class StandingSettings(Settings):
     angle: float = setting(4e-3, "rad", "prior sigma of the zeros of pitch and hips", BY_HAND)
     piston: float = setting(6e-4, "m", "prior sigma of the zero of a piston", BY_HAND)
     lever: float = setting(0.04, "1", "prior sigma of the boom's lever", "derived: two sizes")
+    held: float = setting(
+        1e-6, "1", "width of what is not free, as a share", "convention: as good as none"
+    )
     deep: float = setting(0.02, "m", "depth below the ground at which no foot can be", BY_HAND)
     often: float = setting(
         0.01, "1", "share of samples so deep from which lengths are not believed", BY_HAND
