@@ -12,6 +12,7 @@ from twin.measure import Sensors
 
 from kemba.effects import BY_KIND
 from kemba.identify.bench.bench_log import prepare
+from kemba.identify.bench.clocks import ClockSettings, looked_at
 from kemba.identify.bench.problem import BenchProblem, bench_problem
 from kemba.identify.bench.validate import contradictions
 from kemba.identify.compare_logs import compare_logs
@@ -19,6 +20,7 @@ from kemba.identify.logs.limits import limits_of
 from kemba.identify.problem.quantisation import step_of, telling
 from kemba.identify.workflow import discover_logs
 from kemba.model.spec import load_model
+from kemba.settings import changed as settings_changed
 from kemba.trajectory import Array, Trajectory
 
 BenchLog = Callable[..., Trajectory]
@@ -164,6 +166,14 @@ def test_two_clocks_that_drift_apart_are_known(
     sound = bench_problem([bench_log()], load_model(rig=True))
     assert sound.drift is None and not sound.validate()
     assert np.mean(problem.residual({}) ** 2) < 3.0 * np.mean(sound.residual({}) ** 2)
+
+
+def test_a_drift_is_looked_for_in_the_first_rows_only(bench_log: BenchLog) -> None:
+    log = bench_log(duration=1.0)
+    with settings_changed(ClockSettings, rows=2500):
+        found = looked_at([log, log, log, log])
+    assert [len(one) for one in found] == [1000, 1000, 500]
+    assert looked_at([log]) == [log]
 
 
 @pytest.mark.slow

@@ -17,8 +17,10 @@ from kemba.identify.bench.bench_log import BenchLog
 from kemba.identify.bench.motion import SmoothedMotion
 from kemba.identify.evidence.colour import best_fit
 from kemba.identify.evidence.linear import Linear, condense, names_of, priors
+from kemba.identify.logs.settings import GateSettings
 from kemba.identify.problem.problem import Problem, Theta
 from kemba.settings import BY_HAND, Settings, setting
+from kemba.trajectory import Trajectory
 
 COMMANDS, POSITION = "clock:valve", "clock:piston/x"  # names in theta
 Drift = tuple[str, float]  # whose clock gains on the others, and its rate
@@ -45,6 +47,12 @@ class ClockSettings(Settings):
     )
     stride: float = setting(
         8e-3, "s", "step of that search", "derived: the fastest rise time of Table I"
+    )
+    rows: int = setting(
+        6000,
+        "1",
+        "rows of the logs in which a drift is looked for",
+        "derived: the search takes about 6 s of CPU time for so many; `check` has to end in 10 s",
     )
     fits: float = setting(
         1.0,
@@ -100,6 +108,19 @@ def motion_by_one_clock(motion: SmoothedMotion, theta: Theta) -> SmoothedMotion:
     written = time[0] + (time - time[0]) * (1.0 + rate)
     x, v, a = (np.interp(written, time, y) for y in (motion.x, motion.v, motion.a))
     return replace(motion, x=x, v=v * (1.0 + rate), a=a * (1.0 + rate) ** 2)
+
+
+def looked_at(logs: Sequence[Trajectory]) -> list[Trajectory]:
+    """The first logs, as many as are searched for a drift; the last of them is cut."""
+    found, left = [], ClockSettings.current().rows
+    for log in logs:
+        kept = slice(0, left)
+        columns = {h: log[n][kept] for h, n in zip(log.headers, log.names, strict=True)}
+        found.append(Trajectory(log.time[kept], columns, log.meta) if len(log) > left else log)
+        left -= len(log)
+        if left < GateSettings.current().fewest:
+            break
+    return found
 
 
 def drift_between(problem: Problem, logs: Sequence[BenchLog]) -> Drift | None:

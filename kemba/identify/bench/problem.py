@@ -251,15 +251,26 @@ class BenchProblem(Problem):
 
 
 def bench_problem(logs: Sequence[Trajectory], model: Model) -> BenchProblem:
-    """The problem of explaining bench logs with `model` and what may be added to it."""
+    """The problem of explaining bench logs with `model` and what may be added to it; logs whose
+    clocks drift apart are put on one clock."""
     noise = position_noise([(log.time, log["piston/x"]) for log in logs])
-    names = [str(log.meta.get("name", i)) for i, log in enumerate(logs)]
-    runs = [prepare(name, log, noise) for name, log in zip(names, logs, strict=True)]
-    problem = BenchProblem(runs, model)
-    drift = None if problem.contradictions else clocks.drift_between(problem, problem.logs)
+
+    def runs(some: Sequence[Trajectory]) -> list[BenchLog]:
+        names = [str(log.meta.get("name", i)) for i, log in enumerate(some)]
+        return [prepare(name, log, noise) for name, log in zip(names, some, strict=True)]
+
+    problem = BenchProblem(runs(logs), model)
+    if problem.contradictions:
+        return problem
+    few = clocks.looked_at(logs)
+    short = sum(map(len, few)) < sum(map(len, logs))
+    searched = BenchProblem(runs(few), model) if short else problem
+    drift = clocks.drift_between(searched, searched.logs)
     if drift is None:
         return problem
-    return BenchProblem([clocks.without_drift(run, *drift) for run in runs], model, drift=drift)
+    return BenchProblem(
+        [clocks.without_drift(run, *drift) for run in runs(logs)], model, drift=drift
+    )
 
 
 def _within(candidate: Candidate, row: float) -> bool:
