@@ -80,6 +80,9 @@ def with_air(planner: Planner, found: Plan) -> Plan:
     if near is None:
         what = f"`landing.air` is not kept ({why})"
         return replace(found, status=Status.ACCEPTABLE, sentence=f"{what}; {found.sentence}")
-    spent = {"solve_s": found.solve_s + near.solve_s,
-             "solve_cpu_s": found.solve_cpu_s + near.solve_cpu_s}  # fmt: skip
-    return replace(near, continued=None, **spent)
+    return replace(
+        near,
+        continued=None,
+        solve_s=found.solve_s + near.solve_s,
+        solve_cpu_s=found.solve_cpu_s + near.solve_cpu_s,
+    )
