@@ -35,9 +35,6 @@ class StandingSettings(Settings):
         "height at which the ground may seem to be",
         "convention: as the search for the ground in contact.py",
     )
-    held: float = setting(
-        1e-6, "1", "share of its width that a held unknown has", "convention: none"
-    )
     window: float = setting(5e-3, "m", "height of the band in which standing feet are", BY_HAND)
     tried: tuple[float, ...] = setting(
         (-3.5, -2.5, -1.75, -1.25, -0.75, -0.35, 0.35, 0.75, 1.25, 1.75, 2.5, 3.5),
