@@ -52,6 +52,9 @@ MARKS = ("<!-- machines: written by benchmarks/learning.py -->", "<!-- end of ma
 ROUNDS = 3
 SEED = 7000
 
+MOST = 10.0  # sizes by which the plain fit may change a parameter, so that the model can be built
+UNSEEN, TINY = 1e-3, 1e-9  # weight that keeps what shows nowhere at zero; so that bounds differ
+
 Step = Callable[[Path, list[Path], Path], dict[str, Any]]  # run, all its logs, new run
 
 
@@ -89,16 +92,20 @@ def by_least_squares(run: Path, logs: list[Path], new: Path) -> dict[str, Any]:
     problem = robot_problem(read_logs(logs), task_model(task))
     effects = {name: c for name, c in problem.candidates.items() if not c.sensor}
     names = [*problem.nuisance, *(c.key for c in effects.values())]
-    nominal = np.array([v for v, _ in problem.nuisance.values()])
-    spans = [(c.lead.lower - c.lead.off, c.lead.upper - c.lead.off) for c in effects.values()]
-    low = np.r_[np.full(len(nominal), -np.inf), [a for a, _ in spans]]
-    high = np.r_[np.full(len(nominal), np.inf), [b for _, b in spans]]
+    leads = [c.lead for c in effects.values()]
+    count = len(problem.nuisance)
+    size = np.array([*(sigma for _, sigma in problem.nuisance.values()), *(p.size for p in leads)])
+    low = np.r_[np.full(count, -MOST), [max(-MOST, (p.lower - p.off) / p.size) for p in leads]]
+    high = np.r_[np.full(count, MOST), [min(MOST, (p.upper - p.off) / p.size) for p in leads]]
     r, jacobian = problem.residual({}), problem.jacobian({}, names)
-    size = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-12)
-    found = lsq_linear(jacobian / size, -r, (low * size, high * size)).x / size
+    matrix = np.vstack([jacobian * size, UNSEEN * np.eye(len(names))])
+    right = np.concatenate([-r, np.zeros(len(names))])
+    found = lsq_linear(matrix, right, (low - TINY, high + TINY)).x * size
     listed = []
-    for (name, candidate), step in zip(effects.items(), found[len(nominal) :], strict=True):
-        values = {**candidate.typical(), candidate.key: candidate.lead.off + step}
+    for (name, candidate), step in zip(effects.items(), found[count:], strict=True):
+        lead = candidate.lead
+        value = float(np.clip(lead.off + step, lead.lower, lead.upper))
+        values = {**candidate.typical(), candidate.key: value}
         listed.append(item(name, _as_listed(candidate, values)))
     model = new.parent / f"{new.name}.yaml"
     dump_yaml({"name": "all", "base": task.model, "effects": listed}, model)

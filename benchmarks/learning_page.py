@@ -17,7 +17,7 @@ def section(rows: Sequence[Row]) -> str:
     """Errors by round and way, landings, and what happened on every machine."""
     seeds = sorted({row["seed"] for row in rows})
     text = [
-        f"{len(seeds)} machines of the twin with three to five hidden effects each, three jumps",
+        f"Machines run: {len(seeds)}, with three to five hidden effects each; three jumps",
         "before learning and after every round. Apex error of a round: mean of its three jumps",
         "against the plan that was executed, as it truly is. In brackets how many machines are",
         "within 5 mm, with Wilson's interval of 95 %.",

@@ -16,7 +16,7 @@ from kemba.trajectory import Trajectory
 FILE = "twice"  # of configs/uncertainties
 
 
-class ExecutedSettings(Settings):
+class FeedbackScenarioSettings(Settings):
     """From how many executions feedback learns what to expect."""
 
     count: int = setting(64, "1", "scenarios that are executed", CHOSEN)
@@ -29,7 +29,7 @@ def executions_of(run: str | Path, jobs: int | None = None) -> list[Trajectory]:
     run has no table.
     """
     table, plant = read_controller(run), plant_of(run)
-    cases = scenarios(FILE, plant, ExecutedSettings.current().count)
+    cases = scenarios(FILE, plant, FeedbackScenarioSettings.current().count)
     asked = [{"model": c.model, "start": standing(c.model, table, c.start)} for c in cases]
     upright = LandingSettings.current().upright
     done = [d for d in execute_many(table, asked, jobs) if not isinstance(d, KembaError)]
