@@ -76,8 +76,9 @@ def _discovered(search: Search, guess: Hypothesis, holdout: Problem | None) -> D
     shows only then. Any other is built in where the search names it and its answer is not complete.
     Of both answers the one with the smaller error on left-out data counts.
     """
-    structural = SearchSettings.current().structural
-    other = ahead(search.problem, search.points[guess].fit.theta, structural)
+    guessed = search.problem.structures & set(guess)
+    least = 0.0 if guessed else SearchSettings.current().structural
+    other = ahead(search.problem, search.points[guess].fit.theta, least)
     anew = _built_anew(search, other, holdout) if other else None
     if anew and (anew.answer.verdict == "missing" or time.monotonic() > search.deadline):
         return anew

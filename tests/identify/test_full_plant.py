@@ -8,7 +8,7 @@ import pytest
 
 pytest.importorskip("numba")
 
-from full_plant import plant_log, written
+from full_plant import answered, plant_log, written
 
 from kemba.identify.compare_logs import compare_logs
 from kemba.identify.evidence.figures import settled
@@ -17,7 +17,6 @@ from kemba.identify.evidence.windows import error_ratio
 from kemba.identify.problem.line import LINE
 from kemba.identify.problem.structure import ORIFICE
 from kemba.identify.robot.problem import robot_problem
-from kemba.identify.workflow import discover_logs
 from kemba.model import load_model
 
 LIKELY = (LINE, "seal_friction", "supply_droop", "both_mode_loss", "payload")
@@ -48,7 +47,7 @@ def test_orifices_a_line_and_friction_explain_the_full_plant() -> None:
 def test_discover_names_the_full_plant(tmp_path: Path) -> None:
     """All candidates, from the planning model on; the model written is as good on other logs."""
     fitted, kept = written(tmp_path, 0)
-    answer, _ = discover_logs(fitted, kept, time_limit=3600.0, out=tmp_path / "answer")
+    answer = answered(fitted, kept, None, lambda text: None, tmp_path / "answer")
     assert {ORIFICE, LINE} <= set(answer.found), answer.sentence
     assert answer.error_after < 1.5 < answer.error_before
     assert answer.verdict in ("missing", "partly") and answer.model
