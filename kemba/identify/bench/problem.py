@@ -60,7 +60,11 @@ class BenchProblemSettings(Settings):
         decides=True,
     )
     step: float = setting(
-        0.1, "1", "step of finite differences of a start, as a share of the state's scale", BY_HAND
+        0.1,
+        "1",
+        "step of finite differences of a start, as a share of the state's scale",
+        BY_HAND,
+        decides=True,
     )
     rest: float = setting(2e-3, "m.s-1", "speed below which the piston rests", BY_HAND)
 

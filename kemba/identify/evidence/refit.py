@@ -22,7 +22,9 @@ class RefitSettings(Settings):
     evaluations: int = setting(10, "1", "largest number of evaluations", BY_HAND)
     cost: float = setting(3e-6, "1", "relative change of the cost at which a fit ends", BY_HAND)
     change: float = setting(1e-4, "1", "relative change of x at which a fit ends", BY_HAND)
-    step: float = setting(0.03, "1", "step of finite differences, in prior widths", BY_HAND)
+    step: float = setting(
+        0.03, "1", "step of finite differences, in prior widths", BY_HAND, decides=True
+    )
     bound: float = setting(8.0, "1", "largest distance from the prior mean, in widths", BY_HAND)
     farthest: float = setting(3.0, "1", "largest start of a switch, in sizes", BY_HAND)
     nearest: float = setting(0.1, "1", "smallest start of a switch, in sizes", BY_HAND)

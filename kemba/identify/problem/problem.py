@@ -52,9 +52,15 @@ __all__ = [
 class StepSettings(Settings):
     """Steps of finite differences."""
 
-    nuisance: float = setting(0.5, "1", "step of a nominal figure, in prior sigmas", BY_HAND)
+    nuisance: float = setting(
+        0.5, "1", "step of a nominal figure, in prior sigmas", BY_HAND, decides=True
+    )
     parameter: float = setting(
-        0.05, "1", "step of a parameter that is on, as a share of its size or value", BY_HAND
+        0.05,
+        "1",
+        "step of a parameter that is on, as a share of its size or value",
+        BY_HAND,
+        decides=True,
     )
 
 
