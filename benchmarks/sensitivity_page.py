@@ -67,10 +67,10 @@ FOUND = """## What was found
   are 0.80 to 1.27 times, iterations 0.84 to 1.12 times those with all settings as they are. The
   cost changes by more than 2 % with six settings (8 of 42 plans). `hop` and the other settings of
   `jump` were not run, and of the robot cases only number 0 with its settings as they are.
-- **Plans, first study**: how `stand` ends depends on two barrier parameters (one half, one double: five times
-  the usual iterations); all other settings of the stages change its cost only (column *cost*).
-  The program has many local optima, and each change may lead to another one. No threshold can be
-  derived that avoids this. What helps is to begin from plans that are known to be cheap
+- **Plans, first study**: how `stand` ends depends on two barrier parameters (one half, one double:
+  five times the usual iterations); all other settings of the stages change its cost only (column
+  *cost*). The program has many local optima, and each change may lead to another one. No threshold
+  can be derived that avoids this. What helps is to begin from plans that are known to be cheap
   ([shipped plans](shipped-plans.md)), or from several starts (`kemba-opt solve TASK --starts 4`).
 - **`compare`**: the largest error ratio of a good model (1.15) and the largest error of a figure
   (two sigmas) flipped cases in which nothing is missing. Both are gone. Figures take their
