@@ -25,7 +25,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "benchmarks")]
 from blind import report
 from rehearsal import FIRST, Machine, fitted, measured_evidence, problem_of
 
-from kemba.identify.design.menu import Judged
+from kemba.identify.design.menu import JudgedRig
 from kemba.identify.design.rig import design_rig_test
 from kemba.identify.design.settings import ExperimentSettings
 from kemba.model.spec import load_model
@@ -61,7 +61,7 @@ def run(truth: str, other: str, seed: int) -> dict[str, Any]:
         seconds = time.process_time() - started
         assert design is not None
 
-        def told(judged: Judged) -> float | None:
+        def told(judged: JudgedRig) -> float | None:
             if judged.log_s > LONGEST:
                 return None
             logs = machine.done(judged.rig, stroke, folder)

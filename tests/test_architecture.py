@@ -94,6 +94,17 @@ def test_imports_go_one_way(path: Path) -> None:
             assert LEVEL[target] <= LEVEL[own], f"{path}:{line}: {own} must not import {target}"
 
 
+def test_a_name_means_one_thing() -> None:
+    """No two classes are called the same."""
+    names = Counter(
+        node.name
+        for path in SOURCES
+        for node in ast.parse(path.read_text(encoding="utf-8")).body
+        if isinstance(node, ast.ClassDef)
+    )
+    assert [name for name, count in names.items() if count > 1] == []
+
+
 # Within planning, from the bottom up.
 PLANNING = [
     "task",

@@ -1,6 +1,6 @@
 """The library: what `import kemba` offers, each function as the verb of the same name."""
 
-from kemba.api.executions import Executed, simulate
+from kemba.api.executions import Executions, simulate
 from kemba.api.learning import Compared, Discovered, compare, discover
 from kemba.api.loading import load_log, load_model, load_task
 from kemba.api.planning import Planned, plan
@@ -8,7 +8,7 @@ from kemba.api.planning import Planned, plan
 __all__ = [
     "Compared",
     "Discovered",
-    "Executed",
+    "Executions",
     "Planned",
     "compare",
     "discover",

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Executed(Result):
+class Executions(Result):
     """Executions of one run and the logs that were written."""
 
     run: Path
@@ -62,7 +62,7 @@ def simulate(
     seed: int = 0,
     force: bool = False,
     progress: Tell = silent,
-) -> Executed:
+) -> Executions:
     """Execute a run's controller on the plant and write logs, as `kemba-opt simulate` does.
 
     `out`: folder for the logs, a new one in the run without it. The same `seed` gives the same
@@ -74,4 +74,4 @@ def simulate(
     model = plant_of(path, plant)
     with claimed(None if out is None else Path(out), default, "*.csv", force) as folder:
         repeats = repeat_run(path, model, folder, repeat, noise, seed, tell=progress)
-    return Executed(path, model.name, tuple(repeats))
+    return Executions(path, model.name, tuple(repeats))

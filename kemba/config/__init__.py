@@ -12,11 +12,13 @@ from kemba.config.parsing import (
     shipped_configs,
     shipped_folder,
 )
+from kemba.config.section import Section
 
 __all__ = [
     "Document",
     "FileName",
     "Location",
+    "Section",
     "apply_overrides",
     "beside",
     "dump_yaml",

@@ -14,7 +14,7 @@ from kemba.effects.catalogue import DRIVE, OWN_RIGS
 from kemba.effects.registry import kind_of
 from kemba.errors import KembaError
 
-__all__ = ["CHECKS", "Broken", "Check", "Result", "examine"]
+__all__ = ["CHECKS", "Broken", "Check", "CheckResult", "examine"]
 
 
 def _always(effect: type[Effect]) -> bool:
@@ -73,7 +73,7 @@ CHECKS = (
 
 
 @dataclass(frozen=True)
-class Result:
+class CheckResult:
     """How a check of an effect ended; `sentence` says what is wrong."""
 
     effect: str
@@ -82,7 +82,7 @@ class Result:
     sentence: str = ""
 
 
-def examine(effect: type[Effect]) -> Iterator[Result]:
+def examine(effect: type[Effect]) -> Iterator[CheckResult]:
     """Every check that applies to an effect; its own exceptions are results too."""
     placed = Placed(effect)
     for check in CHECKS:
@@ -90,11 +90,11 @@ def examine(effect: type[Effect]) -> Iterator[Result]:
             try:
                 check.run(placed)
             except (Broken, KembaError) as error:
-                yield Result(kind_of(effect), check, False, str(error))
+                yield CheckResult(kind_of(effect), check, False, str(error))
             except Exception as error:
-                yield Result(kind_of(effect), check, False, _raised(error))
+                yield CheckResult(kind_of(effect), check, False, _raised(error))
             else:
-                yield Result(kind_of(effect), check, True)
+                yield CheckResult(kind_of(effect), check, True)
 
 
 def _raised(error: Exception) -> str:

@@ -10,7 +10,7 @@ from typing import Any
 from kemba.config import dump_yaml
 from kemba.errors import KembaError
 from kemba.files import read_json
-from kemba.identify.design.menu import Judged
+from kemba.identify.design.menu import JudgedRig
 from kemba.identify.design.rig import RigDesign, design_rig_test
 from kemba.identify.design.rivals import contenders
 from kemba.identify.design.settings import ExperimentSettings
@@ -26,7 +26,7 @@ class Proposal:
     design: RigDesign
 
     @property
-    def chosen(self) -> Judged:
+    def chosen(self) -> JudgedRig:
         """The test that was written."""
         return self.design.chosen
 
@@ -111,6 +111,6 @@ def propose(
     return found
 
 
-def _figures(judged: Judged) -> dict[str, Any]:
+def _figures(judged: JudgedRig) -> dict[str, Any]:
     """Name of a test, and what it is expected to give."""
     return {"rig": judged.rig.name, **judged.evidence.json(judged.log_s)}

@@ -26,7 +26,7 @@ BODY = "let the robot drop with the legs at rest, and move the boom by hand"
 
 
 @dataclass(frozen=True)
-class Rest:
+class Remainder:
     """Where the rest of the error sits, and which measurement would tell more of it."""
 
     where: str
@@ -47,7 +47,7 @@ def pattern_left(search: Search, best: Hypothesis) -> str:
     return str(first) if first is not None and first.gain > least else ""
 
 
-def rest_of(search: Search, best: Hypothesis, unsure: Collection[str]) -> Rest:
+def rest_of(search: Search, best: Hypothesis, unsure: Collection[str]) -> Remainder:
     """What the best hypothesis leaves. `unsure`: effects in it that have rivals."""
     problem, theta = search.problem, search.points[best].fit.theta
     profiles = force_profiles(problem, problem.residual(theta))
@@ -59,7 +59,7 @@ def rest_of(search: Search, best: Hypothesis, unsure: Collection[str]) -> Rest:
     if unsure:
         rivals = " and ".join(unsure)
         advice = f"'kemba-opt experiment' proposes a test that tells the rivals of {rivals} apart"
-    return Rest("; ".join([*worst, *law]) or "no condition in particular", advice)
+    return Remainder("; ".join([*worst, *law]) or "no condition in particular", advice)
 
 
 def _advice(channel: str) -> str:

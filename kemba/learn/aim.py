@@ -9,7 +9,7 @@ import numpy as np
 
 from kemba.errors import KembaError
 from kemba.learn.correction import Correction
-from kemba.learn.flight import Flight, flight_of
+from kemba.learn.flight import FlownJump, flight_of
 from kemba.model import Model
 from kemba.plant.execution.certificate import rest_after
 from kemba.plant.execution.controller import execute, read_controller
@@ -35,7 +35,7 @@ class Aimed:
     movement in ticks by column."""
 
     table: Trajectory
-    expected: Flight
+    expected: FlownJump
     moved: dict[str, list[int]]
 
 
@@ -48,7 +48,7 @@ class Aim:
     plan: Trajectory
     correction: Correction
 
-    def expected(self, table: Trajectory, rest: float) -> tuple[Flight, bool]:
+    def expected(self, table: Trajectory, rest: float) -> tuple[FlownJump, bool]:
         """The flight to expect of a table, and whether its simulation lands as planned.
 
         Raises KembaError where the table cannot be simulated.
@@ -56,7 +56,7 @@ class Aim:
         done = execute(table, self.model, extra=rest)
         seen, add = flight_of(done.trajectory, self.machine), self.correction
         lands = done.against(self.model, self.plan).landed
-        flight = Flight(
+        flight = FlownJump(
             seen.apex + add.apex,
             seen.apex_time,
             seen.touchdown + add.touchdown,
@@ -90,7 +90,7 @@ class Aim:
             best, table = nearest, choice
         return Aimed(table, self.expected(table, rest)[0], _moved(first, table))
 
-    def _miss(self, table: Trajectory, rest: float, wanted: Flight) -> tuple[float, bool]:
+    def _miss(self, table: Trajectory, rest: float, wanted: FlownJump) -> tuple[float, bool]:
         """The root of squared errors in units of what needs no search, and whether it lands."""
         settings = AimSettings.current()
         try:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from kemba.config import dump_yaml
-from kemba.learn.flight import Flight
+from kemba.learn.flight import FlownJump
 from kemba.settings import CHOSEN, Settings, setting
 
 QUANTITIES = ("apex", "touchdown", "pitch")
@@ -45,7 +45,7 @@ class Correction:
     limited: tuple[str, ...] = ()
 
 
-def correction_from(executed: Sequence[Flight], simulated: Flight) -> Correction:
+def correction_from(executed: Sequence[FlownJump], simulated: FlownJump) -> Correction:
     """The mean error of the executions, drawn towards zero by how much it may be chance.
 
     An error e with standard error s counts by e^2 / (e^2 + s^2), so that scatter is not chased.

@@ -25,7 +25,7 @@ class FlightSettings(Settings):
 
 
 @dataclass(frozen=True)
-class Flight:
+class FlownJump:
     """Apex [m] and its time [s]; touchdown [s] and the pitch [rad] there, NaN where no foot comes
     down after the apex; whether the body ends upright. The clock is that of the motion."""
 
@@ -36,7 +36,7 @@ class Flight:
     upright: bool
 
 
-def flight_of(motion: Trajectory, machine: Machine) -> Flight:
+def flight_of(motion: Trajectory, machine: Machine) -> FlownJump:
     """The flight of a motion with body/z, body/pitch and every leg's hip and piston (or knee)."""
     settings = FlightSettings.current()
     known = np.isfinite(motion["body/z"])
@@ -47,7 +47,7 @@ def flight_of(motion: Trajectory, machine: Machine) -> Flight:
     touchdown = _touchdown(clock, _lowest_foot(motion, machine), apex_time, settings.down)
     last = float(pitch[np.isfinite(pitch)][-1])
     at = float(np.interp(touchdown, clock, pitch)) if np.isfinite(touchdown) else np.nan
-    return Flight(apex, apex_time, touchdown, at, abs(last) <= LandingSettings.current().upright)
+    return FlownJump(apex, apex_time, touchdown, at, abs(last) <= LandingSettings.current().upright)
 
 
 def _peak(time: Array, z: Array, around: float) -> tuple[float, float]:

@@ -19,7 +19,7 @@ from kemba.identify.logs.reading import read_logs
 from kemba.identify.workflow import discover_logs
 from kemba.learn.aim import Aim, Aimed
 from kemba.learn.correction import Correction, correction_from, write_correction
-from kemba.learn.flight import Flight, flight_of
+from kemba.learn.flight import FlownJump, flight_of
 from kemba.learn.rounds import Past, entry, past_of
 from kemba.logs import load_map
 from kemba.model import Model, load_spec
@@ -63,14 +63,14 @@ class Round:
     discovery: Discovery | None
     compare_before: float
     compare_after: float
-    planned: Flight
-    executed: list[Flight]
-    simulated: Flight
-    before: Flight  # simulated on the model before this round
+    planned: FlownJump
+    executed: list[FlownJump]
+    simulated: FlownJump
+    before: FlownJump  # simulated on the model before this round
     correction: Correction = field(default_factory=Correction)
     result: dict[str, Any] = field(default_factory=dict)
     aimed: Aimed | None = None
-    target: Flight | None = None
+    target: FlownJump | None = None
 
     @property
     def expected_apex_error(self) -> float | None:
@@ -190,7 +190,7 @@ def as_executed(model: str, task: Task, path: Path) -> str:
     return str(path)
 
 
-def _simulated(model: Model, plan: Trajectory, table: Trajectory, machine: Machine) -> Flight:
+def _simulated(model: Model, plan: Trajectory, table: Trajectory, machine: Machine) -> FlownJump:
     done = execute(table, model, extra=rest_after(model, plan, table))
     return flight_of(done.trajectory, machine)
 

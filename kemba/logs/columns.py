@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
-from kemba.config import find_config, load_yaml, parse
+from kemba.config import Section, find_config, load_yaml, parse
 from kemba.errors import KembaError
 from kemba.quantity import Param, Quantity
 from kemba.trajectory import TIME
@@ -17,26 +17,22 @@ SEPARATORS = {"tab": "\t", "whitespace": r"\s+"}
 Number = float | str
 
 
-class Part(BaseModel):
+class AddedColumn(Section):
     """A column that is added to another one: the nanoseconds of a time stamp."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     source: str | int = Field(description="header of the foreign column, or its number from 1")
     unit: str | None = Field(None, description="unit of the foreign column; else our unit")
 
 
-class Source(BaseModel):
+class ColumnSource(Section):
     """Where a column comes from: ours = sign * scale * source [converted to SI] + offset.
 
     A column with `threshold` is a valve: 1 where the source lies above it, else 0.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
     source: str | int = Field(description="header of the foreign column, or its number from 1")
     unit: str | None = Field(None, description="unit of the foreign column; else our unit")
-    add: Part | None = Field(None, description="a second column that is added to the first")
+    add: AddedColumn | None = Field(None, description="a second column that is added to the first")
     scale: float = Field(1.0, description="factor")
     sign: Literal[-1, 1] = Field(1, description="-1 where the foreign column counts backwards")
     offset: Number = Field(0.0, description="added last: `-90 deg`; a bare number is in our unit")
@@ -46,7 +42,7 @@ class Source(BaseModel):
     )
 
     @model_validator(mode="after")
-    def _threshold_alone(self) -> Source:
+    def _threshold_alone(self) -> ColumnSource:
         if self.threshold is not None and (self.scale != 1 or self.offset != 0 or self.add):
             raise ValueError("goes with no scale, offset or second column: 'threshold'")
         return self
@@ -62,13 +58,11 @@ class Source(BaseModel):
         return float(self.threshold or 0.0)
 
 
-class ColumnMap(BaseModel):
+class ColumnMap(Section):
     """A map file: our header (`piston/x [m]`, `time [s]`) -> the foreign column.
 
     Columns that it does not name are ignored, whatever they hold.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     kind: str | None = Field(None, description="robot, bench, cylinder or drive; else by columns")
     notes: str = ""
@@ -80,7 +74,9 @@ class ColumnMap(BaseModel):
     origin: Literal["first"] | None = Field(
         None, description="`first`: time counts from the first row, as for stamps since 1970"
     )
-    columns: dict[str, Source] = Field(min_length=2, description="our header -> foreign column")
+    columns: dict[str, ColumnSource] = Field(
+        min_length=2, description="our header -> foreign column"
+    )
 
     @model_validator(mode="after")
     def _separator_is_not_decimal(self) -> ColumnMap:

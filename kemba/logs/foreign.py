@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from kemba.errors import KembaError, suggest
-from kemba.logs.columns import ColumnMap, Part, Source
+from kemba.logs.columns import AddedColumn, ColumnMap, ColumnSource
 from kemba.logs.text import Raw, as_numbers, first_row
 from kemba.quantity import convert
 from kemba.trajectory import TIME, Array, Trajectory
@@ -49,7 +49,7 @@ class _Reader:
         values = self._summed(TIME, source, stamps, from_first)
         return np.asarray(source.sign * source.scale * values + source.offset_in("s"))
 
-    def values(self, header: str, source: Source) -> Array:
+    def values(self, header: str, source: ColumnSource) -> Array:
         """The column (n,) in our unit."""
         numbers = self._column(header, source)
         if source.threshold is not None:
@@ -59,7 +59,7 @@ class _Reader:
         return np.asarray(source.sign * source.scale * values + source.offset_in(unit))
 
     def _summed(
-        self, header: str, source: Source, values: Column, from_first: bool = False
+        self, header: str, source: ColumnSource, values: Column, from_first: bool = False
     ) -> Array:
         total = self._converted(header, source, _counted(values, from_first))
         if source.add is not None:
@@ -67,7 +67,7 @@ class _Reader:
             total = total + self._converted(header, source.add, _counted(part, from_first))
         return total
 
-    def _converted(self, header: str, source: Source | Part, values: Array) -> Array:
+    def _converted(self, header: str, source: ColumnSource | AddedColumn, values: Array) -> Array:
         unit = header[header.index("[") + 1 : -1]
         try:
             return convert(values, source.unit or unit, unit)
@@ -78,7 +78,7 @@ class _Reader:
     def _column(
         self,
         header: str,
-        source: Source | Part,
+        source: ColumnSource | AddedColumn,
         other: Callable[[Column], Column | None] | None = None,
     ) -> Column:
         name = str(source.source)

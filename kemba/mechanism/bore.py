@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated
 
-from kemba.mechanism.table import Table
+from kemba.config import Section
 from kemba.quantity import Param
 
 # A cylinder of a tenth of a millimetre or of ten metres is a mistake in the unit.
@@ -13,7 +13,7 @@ Diameter = Annotated[float, Param("m", lower=1e-4, upper=1.0, doc="diameter")]
 Stroke = Annotated[float, Param("m", lower=1e-4, upper=10.0, doc="way of the rod")]
 
 
-class Bore(Table):
+class Bore(Section):
     """Bore, rod and stroke [m]; the rod passes through the retract chamber."""
 
     bore: Diameter

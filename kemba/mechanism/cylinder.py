@@ -6,9 +6,9 @@ from typing import Annotated, Any
 
 from pydantic import model_validator
 
+from kemba.config import Section
 from kemba.errors import KembaError
 from kemba.mechanism.bore import Bore, Diameter, Stroke
-from kemba.mechanism.table import Table
 from kemba.quantity import Param
 
 Volume = Annotated[float, Param("m3", lower=1e-9, doc="tubes and ports of one chamber")]
@@ -63,7 +63,7 @@ class Cylinder(Bore):
         return self.tube + self.area_extend * self.stroke
 
 
-class CylinderTable(Table):
+class CylinderTable(Section):
     """A cylinder as files write it: what is left out comes from the cylinder `like`, scaled.
 
     Forces and damping grow with the area of their chamber; a time constant with the volume that

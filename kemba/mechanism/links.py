@@ -7,8 +7,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator
 
+from kemba.config import Section
 from kemba.mechanism.cylinder import Cylinder, CylinderTable
-from kemba.mechanism.table import Inertia, Length, Mass, Table
+from kemba.mechanism.table import Inertia, Length, Mass
 from kemba.quantity import Param
 
 # part, as row/field of a leg in the link table: `femur/length` -> true minus nominal [m], a number
@@ -19,7 +20,7 @@ LINKS = ("femur", "tibia", "cylinder", "rod")
 RESERVED = ("body", "supply", "piston")  # first parts of columns that belong to no leg
 
 
-class Link(Table):
+class Link(Section):
     """A rigid link; COM from its upper end (a rod: before its lower end), inertia at the COM."""
 
     mass: Mass
@@ -28,7 +29,7 @@ class Link(Table):
     length: Length = 0.0
 
 
-class Piston(Table):
+class Piston(Section):
     """Where the cylinder sits: pivot beside the hip, pin on the tibia, length from pivot to pin
     with the rod in."""
 
@@ -37,7 +38,7 @@ class Piston(Table):
     retracted: Length
 
 
-class Leg(Table):
+class Leg(Section):
     """One leg, used for every entry of `Robot.legs`."""
 
     femur: Link
@@ -48,7 +49,7 @@ class Leg(Table):
     rotor_inertia: Inertia = 0.0
 
 
-class LegPlace(Table):
+class LegPlace(Section):
     """Where a leg hangs: hip position along the body, and the side to which its knee folds."""
 
     hip: Length
@@ -58,7 +59,7 @@ class LegPlace(Table):
 Share = Annotated[float, Param("1", lower=0.0, upper=0.1, doc="1 sigma, as a share of the figure")]
 
 
-class LinkTolerances(Table):
+class LinkTolerances(Section):
     """How well masses and moments of inertia of the links are known; 0: exactly.
 
     2 % is assumed: figures from drawings are off by 1 to 3 %.
@@ -68,7 +69,7 @@ class LinkTolerances(Table):
     inertia: Share = 0.02
 
 
-class Robot(Table):
+class Robot(Section):
     """A planar robot: one body, one to three legs of one kind, one kind of cylinder."""
 
     name: str

@@ -8,9 +8,10 @@ from typing import Annotated, Literal
 import casadi as ca
 from pydantic import Field, model_validator
 
+from kemba.config import Section
 from kemba.mechanism.bore import Bore
 from kemba.mechanism.planar import Mechanism, Port
-from kemba.mechanism.table import Mass, Table
+from kemba.mechanism.table import Mass
 from kemba.quantity import Param, Quantity
 
 GRAVITY = 9.81  # m.s-2
@@ -59,14 +60,14 @@ class CylinderRig(Bore):
         return self
 
 
-class Load(Table):
+class Load(Section):
     """What hangs on a drive: a weight that it lifts, or with `arm` a pendulum that it turns."""
 
     mass: Mass
     arm: Arm | None = None
 
 
-class DriveRig(Table):
+class DriveRig(Section):
     """One axis with a motor: position and force (linear) or torque (rotary) are measured.
 
     `inertia` [kg or kg.m2] of all that moves but the load. A linear axis lifts its load against
@@ -91,7 +92,7 @@ class DriveRig(Table):
         return self.sign_speed or (1e-3 if self.motion == "linear" else 1e-2)
 
 
-class VesselRig(Table):
+class VesselRig(Section):
     """A vessel of fixed volume that blows down through an orifice; P and T are measured.
 
     `wall`: area of the inner wall, unless given that of a sphere of this volume, the least there

@@ -6,9 +6,9 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
-from kemba.config import Document, find_config, is_file, load_yaml, parse, shipped_configs
+from kemba.config import Document, Section, find_config, is_file, load_yaml, parse, shipped_configs
 from kemba.effects import AnyEffect, Effect
 from kemba.effects.catalogue import CHAMBERS
 from kemba.effects.pneumatics.constants import ATMOSPHERE
@@ -22,7 +22,7 @@ from kemba.quantity import Param
 Supply = Annotated[float, Param("Pa", 0.1e6, lower=ATMOSPHERE, doc="supply pressure")]
 
 
-class ModelSpec(BaseModel):
+class ModelSpec(Section):
     """A model as its YAML writes it.
 
     `base` names another model whose effects come first; one of the same name replaces it.
@@ -31,8 +31,6 @@ class ModelSpec(BaseModel):
     robot; without any effects only pressure x area, or inertia, counts. `chambers: orifice` swaps
     the first-order chambers for eq. 1-3.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     name: str = "model"
     base: str | None = None

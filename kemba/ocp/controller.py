@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from kemba.model import Model
-from kemba.ocp.edges import Valve, rounded
+from kemba.ocp.edges import ValveEdges, rounded
 from kemba.trajectory import Trajectory
 
 PERIOD = 1e-3  # s
@@ -68,7 +68,7 @@ def _valves(model: Model, plan: Trajectory, lead: int, rows: int) -> dict[str, n
             k = np.flatnonzero(np.diff(value, prepend=0.0))
             early = plan.time[k] - plan.time[0] - np.where(value[k] > 0.5, on, off)
             names.append(name)
-            edges.append(Valve((lead + early / PERIOD).tolist(), i, force))
+            edges.append(ValveEdges((lead + early / PERIOD).tolist(), i, force))
     found = {}
     for name, switched in zip(names, rounded(edges), strict=True):
         found[name] = np.zeros(rows)

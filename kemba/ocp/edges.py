@@ -32,7 +32,7 @@ class EdgeSettings(Settings):
 
 
 @dataclass(frozen=True)
-class Valve:
+class ValveEdges:
     """A valve's edges in ticks, ascending, the first one opens. `body`: the leg it drives;
     `force`: the way it pushes, +1 or -1."""
 
@@ -52,7 +52,7 @@ class _Choice:
     impulse: tuple[float, ...]
 
 
-def rounded(valves: Sequence[Valve]) -> list[list[int]]:
+def rounded(valves: Sequence[ValveEdges]) -> list[list[int]]:
     """The tick of every edge of every valve: the one before or the one after it.
 
     Of these choices the one with the least sum of squares is sought, of

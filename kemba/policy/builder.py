@@ -13,7 +13,7 @@ from kemba.ocp.phases.modes import HELD, OPEN
 from kemba.plant.execution.controller import PERIOD
 from kemba.plant.simulation.commands import JointControl, Profile
 from kemba.plant.simulation.inputs import among
-from kemba.policy.events import Edge, Event, Flow, Impact, Tick
+from kemba.policy.events import Edge, Event, Flow, Saltation, Tick
 from kemba.policy.modes import Array, Hybrid, Point
 from kemba.policy.settings import CourseSettings
 from kemba.trajectory import Trajectory
@@ -52,14 +52,14 @@ class Builder:
         """All events in order of time, by the clock of the plan."""
         time, ticks = self.motion.time, among(self.motion.time, clock)
         hits = {int(np.searchsorted(time, t)) - 1: labels for t, _, labels in impacts}
-        yield Impact(float(time[0]) + self.begin, self._start())
+        yield Saltation(float(time[0]) + self.begin, self._start())
         for i in range(len(time) - 1):
             now = float(time[i]) + self.begin
             yield from self._edges(i, now)
             if ticks[i]:
                 yield Tick(now, round(now / PERIOD), self._hold(i))
             if i in hits:
-                yield Impact(now, self._saltation(i, hits[i]))
+                yield Saltation(now, self._saltation(i, hits[i]))
             yield Flow(now, float(time[i + 1]) + self.begin, self._flow(i, i in hits))
 
     def point(self, i: int, valves_at: float, modes_of: int | None = None) -> Point:

@@ -15,13 +15,13 @@ from kemba.plant.simulation.record import Impact as Hit
 from kemba.plant.simulation.simulate import simulate_one
 from kemba.plant.simulation.valves import delayed
 from kemba.policy.builder import Builder, switches
-from kemba.policy.events import Course
+from kemba.policy.events import EventCourse
 from kemba.policy.modes import Array, Hybrid
 from kemba.policy.settings import CourseSettings
 from kemba.trajectory import Trajectory
 
 
-def course_of(model: Model, table: Trajectory, extra: float = 0.0) -> Course:
+def course_of(model: Model, table: Trajectory, extra: float = 0.0) -> EventCourse:
     """The linearised execution of a controller table, `extra` [s] after its last row included.
 
     Raises KembaError where the table cannot be simulated, ValueError for a model with other pairs
@@ -53,7 +53,9 @@ def course_of(model: Model, table: Trajectory, extra: float = 0.0) -> Course:
     rows = np.flatnonzero(among(motion.time, clock))
     shown = {h: motion[n][rows] for h, n in zip(motion.headers, motion.names, strict=True)}
     shown_motion = Trajectory(motion.time[rows] + begin, shown)
-    return Course(hybrid, table, shown_motion, builder.x[rows], events, commands.feedback.joints)
+    return EventCourse(
+        hybrid, table, shown_motion, builder.x[rows], events, commands.feedback.joints
+    )
 
 
 def _changes(hybrid: Hybrid, motion: Trajectory) -> Array:

@@ -43,18 +43,18 @@ class Edge:
 
 
 @dataclass(frozen=True)
-class Impact:
+class Saltation:
     """A touchdown or a stop: the saltation matrix (n, n)."""
 
     time: float
     saltation: Array
 
 
-Event = Flow | Tick | Edge | Impact
+Event = Flow | Tick | Edge | Saltation
 
 
 @dataclass(frozen=True)
-class Course:
+class EventCourse:
     """An executed table and its events in order; `motion` has a row at every tick."""
 
     hybrid: Hybrid
@@ -82,6 +82,6 @@ def plain(event: Event, n: int, m: int) -> Array:
         return event.map
     if isinstance(event, Tick):
         whole[n:, :n], whole[n:, n:] = event.hold, 0.0
-    elif isinstance(event, Impact):
+    elif isinstance(event, Saltation):
         whole[:n, :n] = event.saltation
     return whole

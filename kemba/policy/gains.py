@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kemba.policy.events import Course, Edge, Event, Flow, Impact, Tick, plain
+from kemba.policy.events import Edge, Event, EventCourse, Flow, Saltation, Tick, plain
 from kemba.policy.modes import Array
 from kemba.policy.settings import PolicySettings
 
 
 @dataclass(frozen=True)
-class Gains:
+class PolicyGains:
     """`hips`: by tick, what to add to the torques (m, n) by the deviation of x; `edges`: for each
     edge that can move, by how many seconds later it is sent (n,) by the deviation of x at the
     tick at which it would be sent."""
@@ -22,7 +22,7 @@ class Gains:
     edges: list[tuple[Edge, Array]]
 
 
-def gains_of(course: Course, landing: float) -> Gains:
+def gains_of(course: EventCourse, landing: float) -> PolicyGains:
     """Gains for the time until the `landing` [s], and again from there to the end.
 
     No linear map leads through two feet that touch almost at once: the order in which they do
@@ -31,14 +31,14 @@ def gains_of(course: Course, landing: float) -> Gains:
     before = [e for e in course.events if _time(e) < landing - 1e-9]
     after = [e for e in course.events if _time(e) >= landing - 1e-9]
     first, second = _gains(course, before), _gains(course, after)
-    return Gains({**first.hips, **second.hips}, [*first.edges, *second.edges])
+    return PolicyGains({**first.hips, **second.hips}, [*first.edges, *second.edges])
 
 
 def _time(event: Event) -> float:
     return event.begin if isinstance(event, Flow) else event.time
 
 
-def weights(course: Course) -> Array:
+def weights(course: EventCourse) -> Array:
     """The weight (n,) of every squared deviation of x; chambers count by what they do only."""
     settings, model = PolicySettings.current(), course.hybrid.model
     sizes = {
@@ -54,7 +54,7 @@ def weights(course: Course) -> Array:
     return found
 
 
-def _gains(course: Course, events: Sequence[Event]) -> Gains:
+def _gains(course: EventCourse, events: Sequence[Event]) -> PolicyGains:
     """Backwards through the events: the cost to come is x^ P x^ with x^ = (x, torques)."""
     settings, n, m = PolicySettings.current(), course.hybrid.size, len(course.joints)
     Q = np.zeros((n + m, n + m))
@@ -93,7 +93,7 @@ def _gains(course: Course, events: Sequence[Event]) -> Gains:
         edge = events[position]
         assert isinstance(edge, Edge)
         edges.append((edge, _when_sent(events, closed, position, edge.sent, k)[:n]))
-    return Gains(hips, edges[::-1])
+    return PolicyGains(hips, edges[::-1])
 
 
 def _when_sent(
@@ -105,6 +105,6 @@ def _when_sent(
         event = events[i]
         if isinstance(event, Tick) and event.tick <= sent:
             break
-        if isinstance(event, Impact):
+        if isinstance(event, Saltation):
             break  # a deviation before an impact says little of what follows
     return k

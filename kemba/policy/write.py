@@ -13,7 +13,7 @@ from kemba.model import Model
 from kemba.plant.execution.controller import PERIOD, Gains, hip_control, read_controller
 from kemba.plant.execution.sensors import Sensors
 from kemba.policy.course import course_of
-from kemba.policy.events import Course
+from kemba.policy.events import EventCourse
 from kemba.policy.expected import expected_from
 from kemba.policy.gains import gains_of
 from kemba.policy.modes import Array
@@ -50,7 +50,7 @@ def measured(model: Model) -> list[str]:
 
 
 def policy_arrays(
-    course: Course, executions: Sequence[Trajectory] = (), also: Sequence[str] = ()
+    course: EventCourse, executions: Sequence[Trajectory] = (), also: Sequence[str] = ()
 ) -> dict[str, Array]:
     """The arrays of a policy by name, as docs/policy.md lists them.
 
@@ -102,7 +102,7 @@ def policy_arrays(
 
 
 def _edges(
-    course: Course, gains: dict[tuple[str, int], Array], to_x: Array, first: int
+    course: EventCourse, gains: dict[tuple[str, int], Array], to_x: Array, first: int
 ) -> dict[str, Array]:
     """Every edge of every valve in order of time, with its gain by what is measured."""
     table = read_controller(course.table)
@@ -131,7 +131,7 @@ def _states(model: Model) -> list[str]:
     return [*moving, *(q.name for q in model.states.values())]
 
 
-def _to_state(course: Course) -> Array:
+def _to_state(course: EventCourse) -> Array:
     """At every row the slope (rows, n, 2 measured) of x by what is measured and its rates.
 
     A knee follows from its piston; chambers are not measured, their deviation is taken as zero.
@@ -152,7 +152,7 @@ def _to_state(course: Course) -> Array:
     return found
 
 
-def _landing(course: Course) -> float:
+def _landing(course: EventCourse) -> float:
     """When [s] the first foot comes down after the apex; the end where none does."""
     motion = course.motion
     apex = float(motion.time[int(np.argmax(motion["body/z"]))])

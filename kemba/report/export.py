@@ -9,7 +9,7 @@ import numpy as np
 
 from kemba.errors import KembaError
 from kemba.files import atomic_text
-from kemba.logs import ColumnMap, Source
+from kemba.logs import ColumnMap, ColumnSource
 from kemba.logs.formats import MODULES, writer
 from kemba.quantity import convert
 from kemba.trajectory import TIME, Array, Trajectory
@@ -63,7 +63,7 @@ def _foreign(trajectory: Trajectory, path: Path, layout: ColumnMap) -> None:
         writer.writerows(zip(*table.values(), strict=True))
 
 
-def _back(trajectory: Trajectory, header: str, name: str, source: Source) -> Array:
+def _back(trajectory: Trajectory, header: str, name: str, source: ColumnSource) -> Array:
     time = trajectory.time
     values = time if header == TIME else trajectory[name]
     if source.delay:

@@ -30,7 +30,7 @@ class RobustSettings(Settings):
 
 
 @dataclass(frozen=True)
-class Candidate:
+class RobustCandidate:
     """A plan; with its controller table and the share of scenarios in which it succeeds, if it was
     executed. `good`: its executions keep to the task's tolerances."""
 
@@ -69,7 +69,7 @@ def variants(task: Task) -> Iterator[tuple[str, Task]]:
 
 def most_robust(
     task: Task, solve: Callable[[Task], Plan], tell: Callable[[str], None]
-) -> Candidate:
+) -> RobustCandidate:
     """The plan that succeeds in most of `task.robust` scenarios of `task.uncertainties`.
 
     Each plan is executed with its own hold and with a longer one. Where none is found, the first
@@ -78,7 +78,7 @@ def most_robust(
     settings = RobustSettings.current()
     plant = plant_of(task)
     cases = scenarios(task.uncertainties, plant, task.robust)
-    best: Candidate | None = None
+    best: RobustCandidate | None = None
     failed: Plan | None = None
     for name, variant in variants(task):
         found = solve(variant)
@@ -92,7 +92,7 @@ def most_robust(
             table = table_of(held)
             landed = share(held.model, held.trajectory, table, cases)
             tell(f"{name}, hold {hold:g} s: {landed.sentence}")
-            one = Candidate(held, table, landed, judged(held, table, plant).good)
+            one = RobustCandidate(held, table, landed, judged(held, table, plant).good)
             if best is None or one.rank > best.rank:
                 best = one
             if best.enough:
@@ -100,4 +100,4 @@ def most_robust(
     if best is not None:
         return best
     assert failed is not None
-    return Candidate(failed)
+    return RobustCandidate(failed)

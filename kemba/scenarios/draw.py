@@ -9,12 +9,12 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from kemba.config import Document, FileName, find_config, load_yaml, parse
+from kemba.config import Document, FileName, Section, find_config, load_yaml, parse
 from kemba.errors import KembaError
 from kemba.model import Model
 from kemba.scenarios.conditions import changed_effects, start_offsets
 from kemba.scenarios.sampling import sample
-from kemba.scenarios.schema import Conditions, Draws, Section, Spread, Value
+from kemba.scenarios.schema import Conditions, Draws, Spread, Value
 from kemba.units import to_si
 
 EACH = "start.*/"  # such a key is drawn for every leg by itself

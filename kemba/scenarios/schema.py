@@ -4,19 +4,14 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
+from kemba.config import Section
 from kemba.model.spec import Supply
 from kemba.quantity import Param
 from kemba.units import read_si
 
 Value = float | str
-
-
-class Section(BaseModel):
-    """A frozen part of a file; unknown keys are refused."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)
 
 
 class Spread(Section):

@@ -11,14 +11,14 @@ from kemba.errors import KembaError
 from kemba.model import Model
 from kemba.plant.execution.certificate import rest_after
 from kemba.plant.execution.controller import Execution, execute_many
-from kemba.sensitivity.figures import Figure
+from kemba.sensitivity.figures import FigureStep
 from kemba.trajectory import Trajectory
 
 NAN = float("nan")
 
 
 @dataclass(frozen=True)
-class Executed:
+class Shift:
     """What one step of a figure changes: apex [m], touchdown [s], where the body ends [m].
 
     NaN where an execution fails or does not land. `lands`: whether both executions end standing.
@@ -35,9 +35,9 @@ def of_commands(
     model: Model,
     plan: Trajectory,
     table: Trajectory,
-    changed: Sequence[Figure],
+    changed: Sequence[FigureStep],
     jobs: int | None = None,
-) -> list[Executed]:
+) -> list[Shift]:
     """For every figure of `changed`, the difference between half a step above and half below.
 
     The table goes through eq. 10 and the dead time, as on the robot. `plan`: the plan that the
@@ -56,14 +56,14 @@ def _difference(
     high: Execution | KembaError,
     below: Model,
     above: Model,
-) -> Executed:
+) -> Shift:
     if isinstance(low, KembaError) or isinstance(high, KembaError):
-        return Executed()
+        return Shift()
     first, second = low.against(below, plan), high.against(above, plan)
     late = [np.nan if r.touchdown_error_s is None else r.touchdown_error_s for r in (first, second)]
     ends = [[run.trajectory[name][-1] for name in ("body/x", "body/z")] for run in (first, second)]
     x, z = (float(b - a) for a, b in zip(*ends, strict=True))
-    return Executed(
+    return Shift(
         apex=second.apex_error_m - first.apex_error_m,
         touchdown=float(late[1] - late[0]),
         end_x=x,

@@ -25,7 +25,7 @@ class Steps(Settings):
 
 
 @dataclass(frozen=True)
-class Figure:
+class FigureStep:
     """One figure: its value and the `step` by which it changes, in its unit.
 
     A whole table of an effect has the value 1: it is multiplied by a factor. `machine`: whether it
@@ -46,7 +46,7 @@ class Figure:
         return self.at(self.value - half), self.at(self.value + half)
 
 
-def figures(task: Task, model: Model, only: Sequence[str] = ()) -> list[Figure]:
+def figures(task: Task, model: Model, only: Sequence[str] = ()) -> list[FigureStep]:
     """Height or feet, distance, supply, payload, and every number of the model's effects.
 
     `only`: the names of those that are wanted. Raises KembaError where there is no such figure.
@@ -59,11 +59,11 @@ def figures(task: Task, model: Model, only: Sequence[str] = ()) -> list[Figure]:
     return [figure for figure in found if not only or figure.name in only]
 
 
-def _asked(task: Task, model: Model) -> Iterator[Figure]:
+def _asked(task: Task, model: Model) -> Iterator[FigureStep]:
     for name in ("height", "feet", "distance"):
         value = getattr(task, name)
         if value is not None:
-            yield Figure(
+            yield FigureStep(
                 name,
                 "m",
                 float(value),
@@ -77,7 +77,7 @@ def _task_with(task: Task, model: Model, name: str) -> Callable[[float], Problem
     return lambda value: (task.model_copy(update={name: value}), model)
 
 
-def _air_and_load(task: Task, model: Model) -> Iterator[Figure]:
+def _air_and_load(task: Task, model: Model) -> Iterator[FigureStep]:
     steps = Steps.current()
 
     def fed(pressure: float) -> Problem:
@@ -86,11 +86,11 @@ def _air_and_load(task: Task, model: Model) -> Iterator[Figure]:
     def loaded(mass: float) -> Problem:
         return task, model.with_effects([Payload.model_construct(kind="payload", m=mass)])
 
-    yield Figure("supply", "Pa", model.supply, steps.pressure, True, fed)
-    yield Figure("payload", "kg", task.payload, steps.mass, True, loaded)
+    yield FigureStep("supply", "Pa", model.supply, steps.pressure, True, fed)
+    yield FigureStep("payload", "kg", task.payload, steps.mass, True, loaded)
 
 
-def _effects(task: Task, model: Model) -> Iterator[Figure]:
+def _effects(task: Task, model: Model) -> Iterator[FigureStep]:
     """Numbers by themselves; a table as a factor on all of it."""
     share = Steps.current().share
     for effect in model.effects:
@@ -101,10 +101,10 @@ def _effects(task: Task, model: Model) -> Iterator[Figure]:
             value, label = effect.value(name), f"{effect.name}.{name}"
             change = _effect_with(task, model, effect, name)
             if isinstance(value, tuple):
-                yield Figure(label, "1", 1.0, share, True, change)
+                yield FigureStep(label, "1", 1.0, share, True, change)
             elif value:
                 step = share * abs(float(value))
-                yield Figure(label, numbers[name].unit, float(value), step, True, change)
+                yield FigureStep(label, numbers[name].unit, float(value), step, True, change)
 
 
 def _effect_with(task: Task, model: Model, effect: Effect, name: str) -> Callable[[float], Problem]:

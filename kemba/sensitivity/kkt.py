@@ -19,7 +19,7 @@ import casadi as ca
 import numpy as np
 
 from kemba.ocp.nlp.ipopt import Iterate
-from kemba.ocp.phases.program import Part, PhaseProgram
+from kemba.ocp.phases.program import PhasePart, PhaseProgram
 from kemba.settings import Settings, setting
 
 Vector = np.ndarray
@@ -86,11 +86,11 @@ def change_between(low: PhaseProgram, high: PhaseProgram, point: Iterate) -> Cha
     return Change(f, gradient, g, *(_less(getattr(high, b), getattr(low, b)) for b in bounds))
 
 
-def _text(part: Part) -> str:
+def _text(part: PhasePart) -> str:
     return str(ca.Function("part", [part.z], [part.f, part.g]).serialize())
 
 
-def _evaluated(part: Part, repeats: int) -> ca.Function:
+def _evaluated(part: PhasePart, repeats: int) -> ca.Function:
     """(z, multipliers) -> cost, rows, gradient of the Lagrangian; for all repeats side by side."""
     weights = ca.SX.sym("weights", part.g.numel())
     total = part.f + ca.dot(weights, ca.densify(part.g))

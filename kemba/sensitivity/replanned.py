@@ -29,7 +29,7 @@ from kemba.ocp.transcription.layout import STEP
 from kemba.ocp.transcription.stage import COST_SCALE
 from kemba.ocp.transcription.symmetry import Reduction
 from kemba.ocp.transcription.unilateral import read_constraints
-from kemba.sensitivity.figures import Figure
+from kemba.sensitivity.figures import FigureStep
 from kemba.sensitivity.kkt import Kkt, change_between
 from kemba.settings import Settings, setting
 from kemba.trajectory import Trajectory
@@ -131,12 +131,12 @@ def solution(
     raise KembaError(task.name, f"the plan cannot be solved once more: {point.ending.sentence}")
 
 
-def of_plan(found: Solution, changed: Sequence[Figure]) -> list[Replanned]:
+def of_plan(found: Solution, changed: Sequence[FigureStep]) -> list[Replanned]:
     """For every figure of `changed`, what one step of it changes; see `Replanned`."""
     return [_of_figure(found, figure) for figure in changed]
 
 
-def _of_figure(found: Solution, figure: Figure) -> Replanned:
+def _of_figure(found: Solution, figure: FigureStep) -> Replanned:
     share = SensitivitySettings.current().change
     low, high = (found.source.built(*side)[0] for side in figure.sides(share))
     change = change_between(low, high, found.point)

@@ -12,8 +12,8 @@ from kemba.files import atomic_text
 from kemba.model import Model
 from kemba.ocp.nlp.ipopt import Control
 from kemba.ocp.task.task import Task
-from kemba.sensitivity.commands import Executed, of_commands
-from kemba.sensitivity.figures import Figure, figures
+from kemba.sensitivity.commands import Shift, of_commands
+from kemba.sensitivity.figures import FigureStep, figures
 from kemba.sensitivity.replanned import PlanProgram, Replanned, of_plan, solution
 from kemba.trajectory import Trajectory
 
@@ -33,8 +33,8 @@ class Sensitivity:
     `unsolved`: why the plan could not be differentiated, empty where it was.
     """
 
-    figures: tuple[Figure, ...]
-    commands: tuple[Executed | None, ...]
+    figures: tuple[FigureStep, ...]
+    commands: tuple[Shift | None, ...]
     replanned: tuple[Replanned | None, ...]
     unsolved: str = ""
 
@@ -79,8 +79,8 @@ def write_sensitivity(found: Sensitivity, path: Path) -> None:
             writer.writerow(_cells(*row))
 
 
-def _cells(figure: Figure, executed: Executed | None, new: Replanned | None) -> list[str]:
-    e, r = executed or Executed(), new or Replanned()
+def _cells(figure: FigureStep, executed: Shift | None, new: Replanned | None) -> list[str]:
+    e, r = executed or Shift(), new or Replanned()
     lands = float(e.lands) if executed else None
     numbers = [figure.value, figure.step, e.apex, e.touchdown, e.end_x, e.end_z, lands]
     numbers += [r.cost, r.duration, r.touchdown, r.apex]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import kemba
-from kemba.api import Executed, Planned
+from kemba.api import Executions, Planned
 from kemba.errors import ConfigErrors, KembaError
 from kemba.trajectory import Trajectory
 
@@ -27,7 +27,7 @@ def jump(tmp_path_factory: pytest.TempPathFactory, stages: list[str]) -> Planned
 
 
 @pytest.fixture(scope="module")
-def done(jump: Planned) -> Executed:
+def done(jump: Planned) -> Executions:
     return kemba.simulate(jump, repeat=2, noise=True, seed=3)
 
 
@@ -45,7 +45,7 @@ def test_results_show_themselves_in_notebooks(jump: Planned) -> None:
     assert len(jump.figure().axes) > 3
 
 
-def test_executions_give_logs_that_compare_reads(done: Executed) -> None:
+def test_executions_give_logs_that_compare_reads(done: Executions) -> None:
     assert done.landed == 2 and done.good and len(done.logs) == 2
     assert "2 of 2 landed" in str(done)
     found = kemba.compare(done.logs[0], run=done.run)
@@ -53,7 +53,7 @@ def test_executions_give_logs_that_compare_reads(done: Executed) -> None:
     assert found.figure().axes
 
 
-def test_a_log_is_a_mapping_and_a_table(done: Executed) -> None:
+def test_a_log_is_a_mapping_and_a_table(done: Executions) -> None:
     log = kemba.load_log(done.logs[0])
     assert set(dict(log)) == set(log.names) and len(log) == len(log.time)
     frame = log.to_pandas()

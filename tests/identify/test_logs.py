@@ -10,7 +10,7 @@ import pytest
 from kemba.errors import KembaError
 from kemba.identify.logs.gate import check_logs
 from kemba.identify.logs.reading import read_log, read_logs
-from kemba.logs import ColumnMap, Source, load_map
+from kemba.logs import ColumnMap, ColumnSource, load_map
 from kemba.trajectory import Trajectory
 
 FOREIGN = """\
@@ -47,9 +47,9 @@ def test_a_lagging_column_is_brought_forward(tmp_path: Path) -> None:
     lines = [f"{t},{(t - 0.004):.6f},{float(t >= 0.014)}" for t in time]
     path.write_text("\n".join(["t,x,u", *lines]) + "\n")
     columns = {
-        "time [s]": Source(source="t"),
-        "piston/x [m]": Source(source="x", delay=0.004),
-        "valve/extend [1]": Source(source="u", delay=0.004),
+        "time [s]": ColumnSource(source="t"),
+        "piston/x [m]": ColumnSource(source="x", delay=0.004),
+        "valve/extend [1]": ColumnSource(source="u", delay=0.004),
     }
     log = read_log(path, ColumnMap(kind="bench", columns=columns))
     assert log["piston/x"][:40] == pytest.approx(time[:40], abs=1e-9)

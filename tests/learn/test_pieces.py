@@ -11,7 +11,7 @@ import pytest
 from kemba.config import load_yaml
 from kemba.errors import KembaError
 from kemba.learn.correction import Correction, correction_from, write_correction
-from kemba.learn.flight import Flight, flight_of
+from kemba.learn.flight import FlownJump, flight_of
 from kemba.learn.round import as_executed
 from kemba.learn.rounds import entry, past_of, sent
 from kemba.model import load_model
@@ -51,12 +51,12 @@ def test_noise_hardly_moves_the_apex() -> None:
     assert not flight_of(ballistic(pitch=1.0), load_machine()).upright
 
 
-def flights(errors: list[float]) -> list[Flight]:
-    return [Flight(0.5 + e, 0.3, 0.5, 0.0, True) for e in errors]
+def flights(errors: list[float]) -> list[FlownJump]:
+    return [FlownJump(0.5 + e, 0.3, 0.5, 0.0, True) for e in errors]
 
 
 def test_what_repeats_is_corrected_and_scatter_is_not() -> None:
-    simulated = Flight(0.5, 0.3, 0.5, 0.0, True)
+    simulated = FlownJump(0.5, 0.3, 0.5, 0.0, True)
     assert correction_from(flights([0.02, 0.021, 0.019]), simulated).apex == pytest.approx(
         0.02, rel=0.01
     )
@@ -67,13 +67,13 @@ def test_what_repeats_is_corrected_and_scatter_is_not() -> None:
 
 
 def test_the_correction_is_bounded() -> None:
-    far = correction_from(flights([0.2, 0.2, 0.2]), Flight(0.5, 0.3, 0.5, 0.0, True))
+    far = correction_from(flights([0.2, 0.2, 0.2]), FlownJump(0.5, 0.3, 0.5, 0.0, True))
     assert far.apex == pytest.approx(0.05) and far.limited == ("apex",)
 
 
 def test_no_touchdown_corrects_none() -> None:
-    up = [Flight(0.5, 0.3, float("nan"), float("nan"), True)]
-    found = correction_from(up, Flight(0.5, 0.3, 0.5, 0.0, True))
+    up = [FlownJump(0.5, 0.3, float("nan"), float("nan"), True)]
+    found = correction_from(up, FlownJump(0.5, 0.3, 0.5, 0.0, True))
     assert (found.touchdown, found.pitch) == (0.0, 0.0)
 
 

@@ -11,7 +11,7 @@ from typer.testing import CliRunner, Result
 
 from kemba.errors import KembaError
 from kemba.identify.logs.reading import needed, read_log
-from kemba.logs import ColumnMap, Source, load_map
+from kemba.logs import ColumnMap, ColumnSource, load_map
 from kemba.logs.draft.draft import draft_map
 from kemba.logs.draft.layout import layout_of
 from kemba.logs.draft.targets import bench_targets, robot_targets
@@ -151,5 +151,5 @@ def test_the_page_lists_the_columns_that_a_log_needs() -> None:
     for targets in (robot_targets(("LEG",)), bench_targets()):
         for target in targets:
             assert f"`{target.header}`" in page, target.header
-    for entry in (*ColumnMap.model_fields, *Source.model_fields):
+    for entry in (*ColumnMap.model_fields, *ColumnSource.model_fields):
         assert f"{entry}:" in page or f"`{entry}`" in page, entry

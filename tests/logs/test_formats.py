@@ -14,7 +14,7 @@ from scipy.io import savemat
 
 from kemba.errors import KembaError
 from kemba.identify.logs.reading import read_log
-from kemba.logs import ColumnMap, Source, open_log
+from kemba.logs import ColumnMap, ColumnSource, open_log
 from kemba.report.export import export
 from kemba.trajectory import Trajectory
 
@@ -92,9 +92,9 @@ def test_an_mcap_of_others_becomes_columns(tmp_path: Path) -> None:
                 writer.add_message(slow, stamp, json.dumps({"load": i}).encode(), stamp)
         writer.finish()
     columns = {
-        "time [s]": Source(source="time", unit="ns"),
-        "piston/x [m]": Source(source="/fast/position/1", unit="mm"),
-        "piston/F [N]": Source(source="/slow/load"),
+        "time [s]": ColumnSource(source="time", unit="ns"),
+        "piston/x [m]": ColumnSource(source="/fast/position/1", unit="mm"),
+        "piston/F [N]": ColumnSource(source="/slow/load"),
     }
     log = open_log(path, ColumnMap(kind="bench", origin="first", columns=columns))
     assert log.time == pytest.approx(np.arange(10) * 1e-3, abs=1e-12)
@@ -109,9 +109,9 @@ def test_a_mat_file_of_others_is_mapped(tmp_path: Path) -> None:
     content = {"t": t, "qm": t[:, None] * 2, "vir": t**2, "note": "EMPS", "gtau": 35.15}
     savemat(tmp_path / "drive.mat", content)
     columns = {
-        "time [s]": Source(source="t"),
-        "piston/x [m]": Source(source="qm"),
-        "piston/F [N]": Source(source="vir", scale=35.15),
+        "time [s]": ColumnSource(source="t"),
+        "piston/x [m]": ColumnSource(source="qm"),
+        "piston/F [N]": ColumnSource(source="vir", scale=35.15),
     }
     log = open_log(tmp_path / "drive.mat", ColumnMap(columns=columns))
     assert log["piston/F"] == pytest.approx(35.15 * t**2)

@@ -11,7 +11,7 @@ from kemba.effects.pneumatics.timing import ValveCloseDelay
 from kemba.model import load_model
 from kemba.ocp import controller_table
 from kemba.ocp.controller import _means
-from kemba.ocp.edges import Valve, rounded
+from kemba.ocp.edges import ValveEdges, rounded
 from kemba.trajectory import Trajectory
 
 LEAD = 0.006  # s
@@ -125,18 +125,18 @@ def test_a_torque_that_changes_within_a_tick_keeps_its_impulse() -> None:
 
 def test_pulses_keep_their_length() -> None:
     """Alone, 10.4 and 20.6 go to 10 and 21: a pulse that is 0.8 ticks too long."""
-    assert rounded([Valve([10.4, 20.6], 0, 1.0)]) in ([[10, 20]], [[11, 21]])
+    assert rounded([ValveEdges([10.4, 20.6], 0, 1.0)]) in ([[10, 20]], [[11, 21]])
 
 
 def test_both_sides_of_a_piston_make_up_for_each_other() -> None:
     """A push that ends 0.36 ticks early must not meet a pull that begins 0.36 early as well."""
-    out, back = rounded([Valve([0.0, 198.36], 0, 1.0), Valve([198.36], 0, -1.0)])
+    out, back = rounded([ValveEdges([0.0, 198.36], 0, 1.0), ValveEdges([198.36], 0, -1.0)])
     assert sorted((out[1], back[0])) == [198, 199]
 
 
 def test_legs_that_do_the_same_stay_alike() -> None:
     edges = [3.5, 17.2, 40.5, 61.9]
-    front, rear = rounded([Valve(edges, 0, 1.0), Valve(edges, 1, 1.0)])
+    front, rear = rounded([ValveEdges(edges, 0, 1.0), ValveEdges(edges, 1, 1.0)])
     assert front == rear
 
 
@@ -144,7 +144,7 @@ def test_edges_keep_their_order_and_none_is_lost() -> None:
     rng = np.random.default_rng(1)
     for _ in range(20):
         valves = [
-            Valve(np.cumsum(rng.uniform(0.2, 9.0, 6)).tolist(), leg, force)
+            ValveEdges(np.cumsum(rng.uniform(0.2, 9.0, 6)).tolist(), leg, force)
             for leg in (0, 1)
             for force in (1.0, -1.0)
         ]

@@ -8,7 +8,7 @@ import pytest
 
 from kemba.model import load_model
 from kemba.ocp import load_task
-from kemba.ocp.functions.blocks import Block, BlockProblem
+from kemba.ocp.functions.blocks import BlockProblem, RowBlock
 from kemba.ocp.functions.code import Code, code_of
 from kemba.ocp.functions.proximal import Proximal
 from kemba.ocp.functions.regularised import regularised_hessian
@@ -86,7 +86,7 @@ def test_folding_shares_the_legs_of_half_a_robot(half: Transcription) -> None:
 def test_a_proximal_term_adds_half_the_squared_way() -> None:
     z = ca.SX.sym("z", 2)
     columns = np.array([[0, 1], [1, 2]])
-    block = Block(z, ca.vertcat(z[0] * z[1]), z[0] ** 3 - z[1], columns)
+    block = RowBlock(z, ca.vertcat(z[0] * z[1]), z[0] ** 3 - z[1], columns)
     problem = BlockProblem([block], 3, ca.SX(0, 1))
     near, rng = Proximal(problem), np.random.default_rng(0)
     x, start, weight = rng.normal(size=3), rng.normal(size=3), 0.7
@@ -104,7 +104,7 @@ def test_a_proximal_term_adds_half_the_squared_way() -> None:
 
 def test_damping_adds_the_same_curvature_everywhere() -> None:
     z = ca.SX.sym("z", 2)
-    block = Block(z, ca.vertcat(z[0] * z[1]), z[0] ** 3 - z[1], np.array([[0, 1], [1, 2]]))
+    block = RowBlock(z, ca.vertcat(z[0] * z[1]), z[0] ** 3 - z[1], np.array([[0, 1], [1, 2]]))
     plain = BlockProblem([block], 3, ca.SX(0, 1)).hess_lag
     at = (np.random.default_rng(0).normal(size=3), [], 1.5, [0.3, -2.0])
     added = np.array(regularised_hessian(plain)(*at) - plain(*at))

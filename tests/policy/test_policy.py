@@ -16,7 +16,7 @@ from kemba.plant.execution.sensors import Sensors
 from kemba.plant.simulation.commands import Profile
 from kemba.policy import player
 from kemba.policy.course import course_of
-from kemba.policy.events import Course, Edge, Impact
+from kemba.policy.events import Edge, EventCourse, Saltation
 from kemba.policy.execute import execute_policy
 from kemba.policy.gains import gains_of
 from kemba.policy.player import Policy
@@ -51,7 +51,7 @@ def table(model: Model) -> Trajectory:
 
 
 @pytest.fixture(scope="module")
-def course(model: Model, table: Trajectory) -> Course:
+def course(model: Model, table: Trajectory) -> EventCourse:
     return course_of(model, table)
 
 
@@ -63,7 +63,7 @@ def states(model: Model) -> list[str]:
 
 @pytest.mark.parametrize("end", [0.02, 0.05, 0.13])
 def test_the_map_from_start_to_landing_is_the_plants(
-    model: Model, table: Trajectory, course: Course, end: float
+    model: Model, table: Trajectory, course: EventCourse, end: float
 ) -> None:
     """Through flight, two touchdowns, sticking and sliding: every column within 5 %."""
     names, row = states(model), round(1000 * end)
@@ -81,15 +81,15 @@ def test_the_map_from_start_to_landing_is_the_plants(
         assert error < 0.05, f"{name}: {error:.3f}"
 
 
-def test_impacts_change_the_map(course: Course) -> None:
+def test_impacts_change_the_map(course: EventCourse) -> None:
     """Without their saltation matrices the map would be quite another one."""
-    hits = [e for e in course.events if isinstance(e, Impact)]
+    hits = [e for e in course.events if isinstance(e, Saltation)]
     assert len(hits) == 3  # the start, and each foot
     assert all(np.abs(hit.saltation - np.eye(18)).max() > 1.0 for hit in hits[1:])
 
 
 def test_an_edge_that_comes_late_acts_as_in_the_plant(
-    model: Model, table: Trajectory, course: Course
+    model: Model, table: Trajectory, course: EventCourse
 ) -> None:
     edge = next(e for e in course.events if isinstance(e, Edge) and e.valve.startswith("front"))
     n = len(states(model))
@@ -104,7 +104,7 @@ def test_an_edge_that_comes_late_acts_as_in_the_plant(
     assert np.linalg.norm(predicted - difference) < 0.05 * np.linalg.norm(difference)
 
 
-def test_gains_bring_the_body_back(model: Model, table: Trajectory, course: Course) -> None:
+def test_gains_bring_the_body_back(model: Model, table: Trajectory, course: EventCourse) -> None:
     """On the linear model the LQR's cost to come is less than without it."""
     gains = gains_of(course, 0.139)
     assert len(gains.hips) >= TICKS - 5
@@ -136,7 +136,7 @@ def test_hips_reduce_the_pitch_at_the_end(model: Model, table: Trajectory, tmp_p
     assert errors[1] < errors[0]
 
 
-def test_corrections_are_bounded(course: Course, tmp_path: Path) -> None:
+def test_corrections_are_bounded(course: EventCourse, tmp_path: Path) -> None:
     arrays = policy_arrays(course)
     file = tmp_path / "policy.npz"
     np.savez(file, **arrays)  # type: ignore[arg-type]
@@ -152,7 +152,7 @@ def test_corrections_are_bounded(course: Course, tmp_path: Path) -> None:
 
 
 def test_what_is_expected_keeps_noise_from_the_valves(
-    model: Model, table: Trajectory, course: Course
+    model: Model, table: Trajectory, course: EventCourse
 ) -> None:
     """Before anything differs between executions, sensors can say nothing; deviations are counted
     from the mean of the executions."""

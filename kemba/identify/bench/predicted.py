@@ -9,7 +9,7 @@ import numpy as np
 
 from kemba.identify.bench.bench_log import BenchLog
 from kemba.identify.bench.motion import SmoothedMotion
-from kemba.identify.bench.prediction import Predictor
+from kemba.identify.bench.prediction import BenchPredictor
 from kemba.identify.problem.types import Array, Theta
 from kemba.settings import Settings, setting
 
@@ -34,7 +34,7 @@ class PredictedLogs:
     """
 
     logs: tuple[BenchLog, ...]
-    predictor: Predictor
+    predictor: BenchPredictor
     starts: Mapping[str, tuple[int, str]]
 
     @property
@@ -72,7 +72,7 @@ def standardised(log: BenchLog, readings: Mapping[str, tuple[Array, Array]]) -> 
     }
 
 
-def settle_starts(logs: Iterable[BenchLog], predictor: Predictor) -> tuple[BenchLog, ...]:
+def settle_starts(logs: Iterable[BenchLog], predictor: BenchPredictor) -> tuple[BenchLog, ...]:
     """The logs with the first valve pulse as the data have it.
 
     A valve that is on in the first row may have been on for long, or may just have been switched.
@@ -81,7 +81,7 @@ def settle_starts(logs: Iterable[BenchLog], predictor: Predictor) -> tuple[Bench
     return tuple(_timed(_settled(log, predictor), predictor) for log in logs)
 
 
-def _timed(log: BenchLog, predictor: Predictor) -> BenchLog:
+def _timed(log: BenchLog, predictor: BenchPredictor) -> BenchLog:
     """A slow log with the variance that the unknown moments of its switchings make.
 
     Each command was sent at any time between two rows. So its moment has the standard deviation of
@@ -94,7 +94,7 @@ def _timed(log: BenchLog, predictor: Predictor) -> BenchLog:
     return replace(log, by_timing={c: change**2 / 12.0 for c, change in changes.items()})
 
 
-def _settled(log: BenchLog, predictor: Predictor) -> BenchLog:
+def _settled(log: BenchLog, predictor: BenchPredictor) -> BenchLog:
     options = [_begun(c, log.motion.time[0]) for c in log.commands]
     trials = [replace(log, commands=(e, r)) for e in options[0] for r in options[1]]
     if len(trials) == 1:

@@ -25,7 +25,7 @@ from kemba.model.model import Model
 SENT_LATE = "sent:late"  # nuisance of slow logs [s]: by how much all commands were sent later
 
 
-class Predictor:
+class BenchPredictor:
     """Rigs of one model, each compiled once with the effects that theta switches on.
 
     `figures`: nominal numbers of the model that theta may scale, with factor and 1 sigma, by name.

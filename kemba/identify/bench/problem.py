@@ -20,7 +20,7 @@ from kemba.identify.bench.operating_point import (
     switchings,
 )
 from kemba.identify.bench.predicted import PredictedLogs, settle_starts
-from kemba.identify.bench.prediction import SENT_LATE, Predictor
+from kemba.identify.bench.prediction import SENT_LATE, BenchPredictor
 from kemba.identify.bench.quiet import position_noise
 from kemba.identify.bench.validate import contradictions
 from kemba.identify.logs.gate import BadData
@@ -94,7 +94,7 @@ class BenchProblem(Problem):
         row = max(log.seen_within for log in logs)
         hidden = {n: c for n, c in self.candidates.items() if _within(c, row)}
         self.candidates = {n: c for n, c in self.candidates.items() if n not in hidden}
-        predictor = Predictor(model, self.candidates)
+        predictor = BenchPredictor(model, self.candidates)
         states = predictor.rig({}).state_names
         starts = {f"start:{name}[{i}]": (i, name) for i in range(len(logs)) for name in states}
         self.predicted = PredictedLogs(settle_starts(logs, predictor), predictor, starts)

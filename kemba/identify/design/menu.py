@@ -12,7 +12,7 @@ from kemba.plant.rig.rigs import DynamometerRig, LockedRig, RandomRig, Rig
 
 
 @dataclass(frozen=True)
-class Judged:
+class JudgedRig:
     """A rig, the evidence that its tests are expected to give, and the seconds of its logs."""
 
     rig: Rig
@@ -45,10 +45,10 @@ def menu(stroke: float) -> list[Rig]:
     ]
 
 
-def judged_menu(bench: VirtualBench, rivals: Rivals) -> Iterator[Judged]:
+def judged_menu(bench: VirtualBench, rivals: Rivals) -> Iterator[JudgedRig]:
     """Every standard test; none where a rig cannot show two of the rivals."""
     for rig in menu(bench.stroke):
         found = separation(bench.problem(rig), rivals)
         if found is None:
             return
-        yield Judged(rig, found, log_time(rig, bench.stroke))
+        yield JudgedRig(rig, found, log_time(rig, bench.stroke))

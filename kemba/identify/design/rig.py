@@ -9,7 +9,7 @@ import numpy as np
 
 from kemba.identify.design.confirm import evidence
 from kemba.identify.design.courses import beginnings, course
-from kemba.identify.design.menu import Judged, judged_menu
+from kemba.identify.design.menu import JudgedRig, judged_menu
 from kemba.identify.design.rivals import Rivals
 from kemba.identify.design.search import best_point
 from kemba.identify.design.separation import Separation, separation
@@ -28,12 +28,12 @@ from kemba.plant.rig.rigs import Rig
 class RigDesign:
     """The best standard test and the designed one; `chosen` is the one to be done."""
 
-    standard: Judged
-    designed: Judged
+    standard: JudgedRig
+    designed: JudgedRig
     tried: int
 
     @property
-    def chosen(self) -> Judged:
+    def chosen(self) -> JudgedRig:
         """The designed test, except where only the standard one settles the question."""
         clear = ExperimentSettings.current().clear
         least, other = self.designed.evidence.least, self.standard.evidence.least
@@ -77,7 +77,7 @@ def design_rig_test(
     return RigDesign(before, after, best.tried)
 
 
-def _confirmed(bench: VirtualBench, rig: Rig, rivals: Rivals) -> Judged:
+def _confirmed(bench: VirtualBench, rig: Rig, rivals: Rivals) -> JudgedRig:
     """A test, its evidence between the nearest rivals by a fit in place of slopes."""
     problem = bench.problem(rig)
     straight = separation(problem, rivals)
@@ -86,4 +86,4 @@ def _confirmed(bench: VirtualBench, rig: Rig, rivals: Rivals) -> Judged:
     logs = as_predicted(problem, rivals.theta(first))
     fitted = evidence(logs, rivals, nearest)
     nats = {**straight.nats, nearest: min(fitted, straight.least)}
-    return Judged(rig, Separation(first, nats), log_time(rig, bench.stroke))
+    return JudgedRig(rig, Separation(first, nats), log_time(rig, bench.stroke))

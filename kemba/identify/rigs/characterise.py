@@ -52,7 +52,7 @@ class RigFitSettings(Settings):
 
 
 @dataclass(frozen=True)
-class Figure:
+class FittedFigure:
     """A fitted number with its 95 % interval, and the value that the model had."""
 
     name: str
@@ -68,7 +68,7 @@ class RigFit:
     """What logs say of a rig; errors are RMS of the residual in units of the sensors' noise."""
 
     model: Model
-    figures: tuple[Figure, ...]
+    figures: tuple[FittedFigure, ...]
     error_before: float
     error_after: float
     rows: int
@@ -161,7 +161,7 @@ def _fit(
         effect, field = name.rsplit(".", 1)
         given = float(model.effect(effect).value(field))
         unit = _unit(model, name)
-        figures.append(Figure(name, unit, value, value - half, value + half, given))
+        figures.append(FittedFigure(name, unit, value, value - half, value + half, given))
     return RigFit(model, tuple(figures), before, rms(r), rows)
 
 

@@ -10,7 +10,7 @@ from kemba.identify.problem.types import Array, Flags, Rows, Texts
 from kemba.identify.robot.dynamics.physics import Physics
 from kemba.identify.robot.dynamics.settings import PlaceSettings
 from kemba.identify.robot.motion.batch import Batch
-from kemba.identify.robot.motion.contact import Schedule
+from kemba.identify.robot.motion.contact import ContactSchedule
 
 MODES = np.array(["00", "01", "10", "11"], dtype=object)  # extend, retract
 
@@ -24,7 +24,7 @@ def row_channels(physics: Physics) -> tuple[str, ...]:
 def describe(
     physics: Physics,
     batch: Batch,
-    schedules: Sequence[Schedule],
+    schedules: Sequence[ContactSchedule],
     inputs: Array,
     mask: Flags,
     runs: Sequence[int],

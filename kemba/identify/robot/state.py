@@ -29,8 +29,8 @@ from kemba.identify.robot.dynamics.reference import (
 from kemba.identify.robot.dynamics.settings import ForceDensity, LooseForceDensity
 from kemba.identify.robot.motion.batch import Batch
 from kemba.identify.robot.motion.colour import Noise
-from kemba.identify.robot.motion.contact import Schedule, loaded
-from kemba.identify.robot.motion.filter import Gains, gains, innovations
+from kemba.identify.robot.motion.contact import ContactSchedule, loaded
+from kemba.identify.robot.motion.filter import FilterGains, gains, innovations
 from kemba.identify.robot.motion.sensing import ahead, sensed
 from kemba.settings import BY_HAND, Settings, setting
 
@@ -62,9 +62,9 @@ class LinearisedState:
     sensors: SensorFaults
     base: Theta
     ground: Mapping[str, float]
-    schedules: tuple[Schedule, ...]
+    schedules: tuple[ContactSchedule, ...]
     motion: LinearisedMotion
-    gain: Gains
+    gain: FilterGains
     mask: Flags
     forces: Forces
     noise: Noise = ()
@@ -197,7 +197,7 @@ def _along(
     sensors: SensorFaults,
     base: Theta,
     ground: Mapping[str, float],
-    schedules: tuple[Schedule, ...],
+    schedules: tuple[ContactSchedule, ...],
     reference: Reference,
     unknown: ForceDensity,
     noise: Noise,

@@ -15,7 +15,7 @@ Entries = tuple[ca.MX, np.ndarray, np.ndarray]  # nonzeros, their rows, their co
 
 
 @dataclass(frozen=True)
-class Block:
+class RowBlock:
     """Rows `g` (m,) and cost `f` of the local variables `z`, repeated over `columns`.
 
     `columns` (repeats, len(z)): where each repeat's local variables stand in the full vector.
@@ -28,7 +28,7 @@ class Block:
 
 
 @dataclass(frozen=True)
-class Placed:
+class PlacedBlock:
     """The code of a block, and the `columns` (repeats, n) at which it is repeated."""
 
     code: Code
@@ -48,10 +48,10 @@ class BlockProblem:
     """
 
     def __init__(
-        self, blocks: Sequence[Block], size: int, p: ca.SX, worth_compiling: bool = False
+        self, blocks: Sequence[RowBlock], size: int, p: ca.SX, worth_compiling: bool = False
     ) -> None:
         codes = [code_of(b.z, p, b.f, b.g, worth_compiling) for b in blocks]
-        self.blocks = [Placed(c, b.columns) for c, b in zip(codes, blocks, strict=True)]
+        self.blocks = [PlacedBlock(c, b.columns) for c, b in zip(codes, blocks, strict=True)]
         self.size = size
         self.rows = sum(len(b.columns) * b.g.numel() for b in blocks)
         self.x, self.parameter = ca.MX.sym("x", size), ca.MX.sym("p", p.numel())
@@ -114,13 +114,13 @@ class BlockProblem:
     def _named(self, name: str, results: list[ca.MX], *names: str) -> ca.Function:
         return ca.Function(name, [self.x, self.parameter], results, ["x", "p"], list(names))
 
-    def _local(self, block: Placed) -> tuple[ca.MX, ca.MX]:
+    def _local(self, block: PlacedBlock) -> tuple[ca.MX, ca.MX]:
         """Local variables of every repeat, side by side; parameters and constants of all."""
         given = ca.vertcat(self.parameter, ca.DM(block.code.numbers))
         return _gather(self.x, block.columns), given
 
     @cached_property
-    def _each(self) -> list[tuple[Placed, list[ca.Function]]]:
+    def _each(self) -> list[tuple[PlacedBlock, list[ca.Function]]]:
         """Every block with its functions over its repeats."""
         return [(block, block.functions) for block in self.blocks]
 
@@ -135,14 +135,14 @@ def _gather_gradient(parts: list[tuple[ca.MX, np.ndarray]], size: int) -> ca.MX:
     return ca.densify(ca.mtimes(_adding(where, size), ca.vertcat(*(nz for nz, _ in parts))))
 
 
-def _place_jacobian(block: Placed, nonzeros: ca.MX, row: int) -> Entries:
+def _place_jacobian(block: PlacedBlock, nonzeros: ca.MX, row: int) -> Entries:
     rows, columns = (np.array(t, dtype=int) for t in block.code.jacobian.sparsity().get_triplet())
     repeats = np.arange(len(block.columns))[:, None]
     at_rows = (row + repeats * block.code.g.numel() + rows).ravel()
     return ca.vec(nonzeros), at_rows, block.columns[:, columns].ravel()
 
 
-def _place_hessian(block: Placed, nonzeros: ca.MX) -> Entries:
+def _place_hessian(block: PlacedBlock, nonzeros: ca.MX) -> Entries:
     rows, columns = (np.array(t, dtype=int) for t in block.code.hessian.sparsity().get_triplet())
     first, second = block.columns[:, rows].ravel(), block.columns[:, columns].ravel()
     return ca.vec(nonzeros), np.minimum(first, second), np.maximum(first, second)

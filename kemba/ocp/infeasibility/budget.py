@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from kemba.config import Document
 from kemba.model import Model
 from kemba.ocp.infeasibility.diagnostic import Diagnostic, key, number, place, relax
-from kemba.ocp.infeasibility.flight import Flight, air_work, hip_power, leg_swing
+from kemba.ocp.infeasibility.flight import AskedFlight, air_work, hip_power, leg_swing
 from kemba.ocp.infeasibility.settings import Checks
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
@@ -17,7 +17,7 @@ def budget_diagnostics(
     task: Task,
     model: Model,
     requirements: Sequence[Requirement],
-    flight: Flight | None,
+    flight: AskedFlight | None,
     document: Document,
 ) -> Iterator[Diagnostic]:
     """Time, energy, valves and friction of a task."""
@@ -27,7 +27,7 @@ def budget_diagnostics(
     yield from _grip(model, requirements, document)
 
 
-def _time(task: Task, flight: Flight, document: Document) -> Iterator[Diagnostic]:
+def _time(task: Task, flight: AskedFlight, document: Document) -> Iterator[Diagnostic]:
     """Rise to the apex and fall from it within the longest steps allowed."""
     longest = task.duration * (1 + task.step_variation)
     before = longest * (flight.requirement.at or 0.0)
@@ -54,7 +54,9 @@ def _time(task: Task, flight: Flight, document: Document) -> Iterator[Diagnostic
         return
 
 
-def _energy(task: Task, model: Model, flight: Flight, document: Document) -> Iterator[Diagnostic]:
+def _energy(
+    task: Task, model: Model, flight: AskedFlight, document: Document
+) -> Iterator[Diagnostic]:
     """Work of the air over the stroke against the lift, hips counted generously."""
     air, lift = air_work(model), flight.mass * flight.fall * (flight.height - flight.z0)
     asked = f"`{flight.requirement.text}` ({place(document, flight.requirement.location)})"

@@ -21,7 +21,7 @@ from kemba.ocp.infeasibility.diagnostic import (
     relax,
     spoken,
 )
-from kemba.ocp.infeasibility.flight import Flight, flight_of
+from kemba.ocp.infeasibility.flight import AskedFlight, flight_of
 from kemba.ocp.infeasibility.pose import Gap, Poses
 from kemba.ocp.infeasibility.settings import Checks
 from kemba.ocp.task.requirement import Requirement
@@ -146,7 +146,7 @@ def _reason(gaps: Sequence[Gap]) -> str:
     return " with the other requirements kept"
 
 
-def coarse_grid(task: Task, flight: Flight | None, document: Document) -> Iterator[Diagnostic]:
+def coarse_grid(task: Task, flight: AskedFlight | None, document: Document) -> Iterator[Diagnostic]:
     """Steps too long to time a push."""
     longest = Checks.current().longest_step
     if flight is None or task.step <= longest:

@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 
 from kemba.model import Model
-from kemba.ocp.functions.blocks import Block
+from kemba.ocp.functions.blocks import RowBlock
 from kemba.ocp.infeasibility.settings import ElasticSolve
 from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.nlp.ipopt import Iterate, warm
@@ -21,7 +21,7 @@ from kemba.ocp.relaxation.settings import Ends, Relaxation, Starts
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Landing, Task
 from kemba.ocp.transcription.parameters import Parameters
-from kemba.ocp.transcription.stage import Rows
+from kemba.ocp.transcription.stage import StageRows
 from kemba.ocp.transcription.symmetry import Reduction
 from kemba.ocp.transcription.transcribe import RequirementBlock, Transcription
 
@@ -81,7 +81,7 @@ class Elastic(Transcription):
         self.slack.append((requirement, column, scale))
         self.upper[0, column : column + 2] = np.inf
         below, above = ca.SX.sym("below"), ca.SX.sym("above")
-        rows = Rows(
+        rows = StageRows(
             "requirement",
             g / scale + below - above,
             requirement.lower / scale,
@@ -93,7 +93,7 @@ class Elastic(Transcription):
         shared = np.tile(index[0, column : column + 2], (len(where), 1))
         at = np.hstack([index[where, : self.layout.size], shared])
         price = ElasticSolve.current().price * (below + above) / len(where)
-        return Block(ca.vertcat(self.stage.y, below, above), rows.g, price, at), rows, where
+        return RowBlock(ca.vertcat(self.stage.y, below, above), rows.g, price, at), rows, where
 
     def start(self, Y: np.ndarray) -> np.ndarray:
         """A start guess with slack for every soft requirement.

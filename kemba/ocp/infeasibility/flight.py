@@ -14,7 +14,7 @@ from kemba.ocp.task.requirement import Requirement
 
 
 @dataclass(frozen=True)
-class Flight:
+class AskedFlight:
     """A height that asks for a flight, and what is known about it before solving.
 
     z0, z1 [m]: heights of the body at the start, and at the landing if there is one; mass [kg],
@@ -47,7 +47,9 @@ class Flight:
         return other + self.swing + self.fall * (span + lent) ** 2 / 2
 
 
-def flight_of(model: Model, requirements: Sequence[Requirement], poses: Poses) -> Flight | None:
+def flight_of(
+    model: Model, requirements: Sequence[Requirement], poses: Poses
+) -> AskedFlight | None:
     """The flight to the greatest height that is required of the body, from a start at rest."""
     highest = [
         w for w in requirements if w.quantity.name == "body/z" and w.at and np.isfinite(w.lower)
@@ -66,7 +68,7 @@ def flight_of(model: Model, requirements: Sequence[Requirement], poses: Poses) -
     end = [w for w in requirements if w.at == 1.0]
     lands = any(w.quantity.name.endswith("foot/z") and w.upper <= 1e-6 for w in end)
     below = [w for w in requirements if w.quantity.name == "body/z" and w.always]
-    return Flight(
+    return AskedFlight(
         requirement,
         requirement.lower,
         poses.highest(start) or leg,

@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 
 from kemba.model import Model
-from kemba.ocp.functions.blocks import Block, BlockProblem
+from kemba.ocp.functions.blocks import BlockProblem, RowBlock
 from kemba.ocp.phases.columns import Columns
 from kemba.ocp.phases.modes import OPEN, Phase
 from kemba.ocp.phases.radau import STATE, Scheme, element, impact
@@ -41,7 +41,7 @@ class Soft:
 
 
 @dataclass(frozen=True)
-class Part:
+class PhasePart:
     """Rows g and cost f of z between bounds, and where they hold (repeats, len(z))."""
 
     labels: tuple[str, ...]
@@ -55,7 +55,7 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Row:
+class PhaseRow:
     """One row of the program: its meaning, the node it is about, its bounds."""
 
     label: str
@@ -92,7 +92,7 @@ class PhaseProgram:
         self.lower, self.upper = self._bounds()
         self.element = element(model, self.layout, reduction, task.cost, scheme)
         self.jump = impact(model, self.layout, reduction)
-        self.added: list[Part] = []
+        self.added: list[PhasePart] = []
         self.apex = 0  # the node after which impacts are those of the landing
 
     def _closes(self, p: int) -> bool:
@@ -157,12 +157,12 @@ class PhaseProgram:
     ) -> None:
         """Add the row low <= g(z) <= high, once for each z in `columns` (repeats, len(z))."""
         if columns:
-            part = Part((label,), z, ca.SX(g), ca.SX(0), low, high, np.array(columns))
+            part = PhasePart((label,), z, ca.SX(g), ca.SX(0), low, high, np.array(columns))
             self.added.append(part)
 
     def add_cost(self, z: ca.SX, f: ca.SX, columns: np.ndarray) -> None:
         """Add the cost f(z), whose z is at `columns` (len(z),)."""
-        part = Part((), z, ca.SX(0, 1), f, 0.0, 0.0, columns[None, :])
+        part = PhasePart((), z, ca.SX(0, 1), f, 0.0, 0.0, columns[None, :])
         self.added.append(part)
 
     def mode_constraint(
@@ -187,7 +187,7 @@ class PhaseProgram:
         g = g - slack[0] * float(high < INF) + slack[-1] * float(low > -INF)
         soft = Soft(i, kind, np.array([p for p, _ in where]), above, below)
         at, price = np.hstack([np.array(columns), own]), self.elastic * ca.sum1(slack)
-        self.added.append(Part((label,), ca.vertcat(z, slack), g, price, low, high, at, soft))
+        self.added.append(PhasePart((label,), ca.vertcat(z, slack), g, price, low, high, at, soft))
 
     def proximal(self, x: np.ndarray, weight: float) -> np.ndarray:
         """Add weight / 2 times the squared scaled distance of states, inputs and durations from
@@ -202,7 +202,7 @@ class PhaseProgram:
         self.upper = np.concatenate([self.upper, x[index]])
         z, nothing = ca.SX.sym("z", 2), ca.SX(0, 1)
         pull, at = weight / 2 * (z[0] - z[1]) ** 2, np.column_stack([index, fixed])
-        self.added.append(Part((), z, nothing, pull, 0.0, 0.0, at))
+        self.added.append(PhasePart((), z, nothing, pull, 0.0, 0.0, at))
         return np.concatenate([x, x[index]])
 
     def keep_short(self, x: np.ndarray, steps: float) -> None:
@@ -239,31 +239,31 @@ class PhaseProgram:
     @cached_property
     def problem(self) -> BlockProblem:
         """The functions for IPOPT."""
-        blocks = [Block(part.z, part.g, part.f, part.columns) for part in self.parts]
+        blocks = [RowBlock(part.z, part.g, part.f, part.columns) for part in self.parts]
         return BlockProblem(blocks, self.columns.size, ca.SX(0, 1), worth_compiling=True)
 
     @cached_property
-    def parts(self) -> list[Part]:
+    def parts(self) -> list[PhasePart]:
         """What the program consists of, in the order of its rows."""
         c, zero = self.columns, ca.SX(0)
         every = np.array([c.element(e) for e in range(self.nodes)])
         body = self.element
-        found = [Part(body.labels, body.z, body.g, body.f, 0.0, 0.0, every)]
+        found = [PhasePart(body.labels, body.z, body.g, body.f, 0.0, 0.0, every)]
         hits = []
         for p in self.impacts:
             before = c.end(self.phases[p].first)
             hits.append(np.concatenate([*(before[g] for g in STATE), c.after[p], c.impulse[p]]))
         if hits:
             jump = self.jump
-            found.append(Part(jump.labels, jump.z, jump.g, zero, 0.0, 0.0, np.array(hits)))
+            found.append(PhasePart(jump.labels, jump.z, jump.g, zero, 0.0, 0.0, np.array(hits)))
         return found + self.added
 
     @cached_property
-    def rows(self) -> list[Row]:
+    def rows(self) -> list[PhaseRow]:
         """What every row means and where it holds."""
         nodes = self.columns.nodes()
         return [
-            Row(label, int(nodes[columns].max()), part.lower, part.upper)
+            PhaseRow(label, int(nodes[columns].max()), part.lower, part.upper)
             for part in self.parts
             for columns in part.columns
             for label in part.labels

@@ -22,7 +22,7 @@ from kemba.ocp.transcription.layout import Layout
 
 
 @dataclass(frozen=True)
-class Course:
+class HeightCourse:
     """Knots of the body's height: times [s], heights [m], rates [m.s-1], and the flight's span."""
 
     t: list[float]
@@ -55,7 +55,7 @@ def asked(requirements: Sequence[Requirement], name: str, at: float) -> float | 
 
 def body_course(
     requirements: Sequence[Requirement], duration: float, reach: tuple[float, float], g: float
-) -> Course:
+) -> HeightCourse:
     """Height of the body over the motion; `reach` = leg length retracted and stretched [m]."""
     low, high = reach
     top = low + Guess.current().stretch * (high - low)
@@ -68,17 +68,17 @@ def body_course(
     lands = any(w.quantity.name.endswith("foot/z") and w.at == 1.0 for w in requirements)
     if z0 > top:
         fall = float(np.sqrt(2 * (z0 - top) / g))
-        course = Course([0.0, fall], [z0, top], [0.0, -g * fall], (0.0, fall))
+        course = HeightCourse([0.0, fall], [z0, top], [0.0, -g * fall], (0.0, fall))
         return _landed(course, duration, z1 or low + Guess.current().landing * (top - low))
     if peak is None or peak.at is None:
-        return Course([0.0, duration], [z0, z1 or z0], [0.0, 0.0], (duration, duration))
+        return HeightCourse([0.0, duration], [z0, z1 or z0], [0.0, 0.0], (duration, duration))
     apex, t_apex = peak.lower, peak.at * duration
     feet = (w for w in requirements if w.quantity.name.endswith("foot/z") and w.holds(peak.at))
     lift = max((w.lower for w in feet), default=0.0)
     if lift > 0.0 and z0 < apex <= top:  # standing reaches it, but is not what is asked
         top = max(apex - lift, (z0 + apex) / 2)
     if apex <= top:
-        course = Course([0.0, t_apex], [z0, apex], [0.0, 0.0], (t_apex, t_apex))
+        course = HeightCourse([0.0, t_apex], [z0, apex], [0.0, 0.0], (t_apex, t_apex))
     else:
         rise = min(float(np.sqrt(2 * (apex - top) / g)), Guess.current().rise * t_apex)
         speed = g * rise
@@ -89,18 +89,18 @@ def body_course(
         z = [*(z0 for _ in wait), z0, top, apex]
         vz = [*(0.0 for _ in wait), 0.0, speed, 0.0]
         end = t_apex + rise if lands and t_apex < duration else t_apex
-        course = Course(knots, z, vz, (t_apex - rise, max(end, t_apex)))
+        course = HeightCourse(knots, z, vz, (t_apex - rise, max(end, t_apex)))
         if lands and end < duration:
-            course = Course([*knots, end], [*z, top], [*vz, -speed], course.flight)
+            course = HeightCourse([*knots, end], [*z, top], [*vz, -speed], course.flight)
     if t_apex < duration and (lands or z1 is not None):
         return _landed(course, duration, z1 or low + Guess.current().landing * (top - low))
     return course
 
 
-def _landed(course: Course, duration: float, z: float) -> Course:
+def _landed(course: HeightCourse, duration: float, z: float) -> HeightCourse:
     if course.t[-1] >= duration:
         return course
-    return Course([*course.t, duration], [*course.z, z], [*course.vz, 0.0], course.flight)
+    return HeightCourse([*course.t, duration], [*course.z, z], [*course.vz, 0.0], course.flight)
 
 
 def leg_pose(robot: Robot, fold: int, dx: np.ndarray, dz: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -128,7 +128,7 @@ def automatic_guess(
     gravity = model.mechanism.gravity
     if task.guess == "standing":
         still = task.duration
-        course = Course([0.0, still], [lengths[0]] * 2, [0.0] * 2, (still, still))
+        course = HeightCourse([0.0, still], [lengths[0]] * 2, [0.0] * 2, (still, still))
     else:
         course = body_course(requirements, task.duration, (lengths[0], lengths[1]), gravity)
     z, az = course(t), course(t, 2)

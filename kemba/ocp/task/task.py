@@ -6,19 +6,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
-from kemba.config import Document, FileName, beside, parse
+from kemba.config import Document, FileName, Section, beside, parse
 from kemba.model.spec import Supply
 from kemba.quantity import Param
 
 Value = float | str
-
-
-class Section(BaseModel):
-    """A frozen part of a task; unknown keys are refused."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
 
 class Bound(Section):

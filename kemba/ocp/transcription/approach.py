@@ -9,7 +9,7 @@ import casadi as ca
 from kemba.model import Model
 from kemba.model.impact import felt
 from kemba.ocp.task.requirement import SCALES
-from kemba.ocp.transcription.stage import INF, Rows, Stage
+from kemba.ocp.transcription.stage import INF, Interval, StageRows
 from kemba.ocp.transcription.symmetry import Reduction
 from kemba.ocp.transcription.unilateral import read_constraints
 
@@ -19,11 +19,11 @@ SPEED = SCALES["m.s-1"]
 def approach_rows(
     model: Model,
     reduction: Reduction,
-    stage: Stage,
+    stage: Interval,
     of_state: Callable[[ca.SX], ca.SX],
     speed: float,
     step: float,
-) -> Rows:
+) -> StageRows:
     """Rows of an interval: a gap that closes in it was closing at most at `speed` [m/s].
 
     rate(y0) + gap(y) / step >= -speed, stops by the length of the leg (`felt`). Where the gap stays
@@ -39,4 +39,4 @@ def approach_rows(
         labels.append(f"landing.impact_speed:{constraint.label}")
     units, scales = ("m.s-1",) * len(rows), (SPEED,) * len(rows)
     low = -speed / SPEED
-    return Rows("requirement", ca.vertcat(*rows), low, INF, tuple(labels), units, scales)
+    return StageRows("requirement", ca.vertcat(*rows), low, INF, tuple(labels), units, scales)

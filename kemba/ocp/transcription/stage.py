@@ -23,7 +23,7 @@ INF = np.inf
 
 
 @dataclass(frozen=True)
-class Rows:
+class StageRows:
     """Labelled rows lower <= g <= upper of one kind: defect, pair, sign, limit or requirement.
 
     `unit` and `scale` give the physical size of a violation: scale * g in unit.
@@ -39,7 +39,7 @@ class Rows:
 
 
 @dataclass(frozen=True)
-class Stage:
+class Interval:
     """Symbols and rows of one interval between the nodes y0 and y.
 
     Parameters: `eps` relaxes the pairs; `weights` = (valve penalty, switching, pair
@@ -51,7 +51,7 @@ class Stage:
     y: ca.SX
     eps: ca.SX
     weights: ca.SX
-    rows: tuple[Rows, ...]
+    rows: tuple[StageRows, ...]
     cost: ca.SX
 
     @property
@@ -62,7 +62,7 @@ class Stage:
 
 def build_stage(
     model: Model, layout: Layout, reduction: Reduction, cost: dict[str, float]
-) -> Stage:
+) -> Interval:
     """The stage of any grid."""
     y0, y = ca.SX.sym("y0", layout.size), ca.SX.sym("y", layout.size)
     node, h = model.node, layout.half(y, "h")
@@ -99,7 +99,7 @@ def build_stage(
     own = sum(w * COSTS[name](model, now["u"], h) for name, w in cost.items()) / COST_SCALE
     objective = own + _penalties(layout, y0, y, a * b, weights)
     kept = tuple(r for r in rows if r.g.numel())
-    return Stage(layout, y0, y, eps, weights, kept, ca.densify(ca.SX(objective)))
+    return Interval(layout, y0, y, eps, weights, kept, ca.densify(ca.SX(objective)))
 
 
 def _penalties(layout: Layout, y0: ca.SX, y: ca.SX, product: ca.SX, weights: ca.SX) -> ca.SX:
@@ -121,12 +121,12 @@ def _rows(
     lower: float = 0.0,
     upper: float = 0.0,
     scales: Iterable[float] | None = None,
-) -> Rows:
+) -> StageRows:
     scales = tuple(scales) if scales is not None else (1.0,) * len(labels)
-    return Rows(kind, ca.SX(g), lower, upper, tuple(labels), tuple(units), scales)
+    return StageRows(kind, ca.SX(g), lower, upper, tuple(labels), tuple(units), scales)
 
 
-def _kinematics(layout: Layout, y0: ca.SX, y: ca.SX, h: ca.SX) -> Rows:
+def _kinematics(layout: Layout, y0: ca.SX, y: ca.SX, h: ca.SX) -> StageRows:
     kept = layout.quantities["q"]
     scale = [q.scale for q in kept]
     g = (layout.half(y, "q") - layout.half(y0, "q") - h * layout.half(y, "v")) / ca.DM(scale)
@@ -137,7 +137,7 @@ def _kinematics(layout: Layout, y0: ca.SX, y: ca.SX, h: ca.SX) -> Rows:
 
 def _momentum(
     model: Model, layout: Layout, reduction: Reduction, dynamics: ca.SX, h: ca.SX
-) -> Rows:
+) -> StageRows:
     """Equations of motion times the step, projected on the half robot (virtual work)."""
     kept, rows = layout.quantities["q"], model.node.dynamics_rows
     B = ca.sparsify(ca.DM(reduction.B["q"]))
@@ -148,7 +148,7 @@ def _momentum(
     return _rows("defect", g, [f"dynamics:{q.name}" for q in kept], units, scales=size)
 
 
-def _rates(model: Model, reduction: Reduction, rate: ca.SX, h: ca.SX) -> Rows:
+def _rates(model: Model, reduction: Reduction, rate: ca.SX, h: ca.SX) -> StageRows:
     rows = [model.node.rate_rows[i] for i in reduction.rate]
     scale = [r.scale for r in rows]
     g = h * rate[reduction.rate] / ca.DM(scale) if rows else ca.SX(0, 1)
@@ -158,7 +158,7 @@ def _rates(model: Model, reduction: Reduction, rate: ca.SX, h: ca.SX) -> Rows:
 
 def _signs(
     g: ca.SX, y: ca.SX, layout: Layout, rows: Sequence[Row], scales: Sequence[float]
-) -> Rows:
+) -> StageRows:
     """Rows g >= 0, except where g is a variable whose own bound says so."""
     kept = [i for i in range(g.numel()) if not bounded_below(g[i], y, layout)]
     return _rows(

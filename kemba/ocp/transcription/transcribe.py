@@ -26,7 +26,7 @@ import casadi as ca
 import numpy as np
 
 from kemba.model import Model
-from kemba.ocp.functions.blocks import Block, BlockProblem
+from kemba.ocp.functions.blocks import BlockProblem, RowBlock
 from kemba.ocp.task.requirement import Requirement, apex_node, quantity_expression
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.approach import approach_rows
@@ -34,8 +34,8 @@ from kemba.ocp.transcription.first_node import Held, granted, state_rows
 from kemba.ocp.transcription.layout import GROUPS, STEP, Layout
 from kemba.ocp.transcription.stage import (
     INF,
-    Rows,
-    Stage,
+    Interval,
+    StageRows,
     aim_cost,
     as_variable,
     bounded_below,
@@ -43,7 +43,7 @@ from kemba.ocp.transcription.stage import (
 )
 from kemba.ocp.transcription.symmetry import Reduction
 
-RequirementBlock = tuple[Block, Rows, list[int]]  # with the nodes at which its rows hold
+RequirementBlock = tuple[RowBlock, StageRows, list[int]]  # with the nodes at which its rows hold
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ class Transcription:
         self.model, self.task, self.requirements, self.nodes = model, task, requirements, nodes
         self.reduction = reduction
         self.layout = Layout(model, reduction, task.duration / nodes, task.step_variation)
-        self.stage: Stage = build_stage(model, self.layout, reduction, task.cost)
+        self.stage: Interval = build_stage(model, self.layout, reduction, task.cost)
         n = self.layout.size
         self.shape = (nodes + 1, n + self.extra_columns())
         self.lower, self.upper = np.zeros(self.shape), np.zeros(self.shape)
@@ -88,7 +88,7 @@ class Transcription:
         moments += self._aims(index) + self._soft_landing(index)
         pairs = np.hstack([index[:-1, :n], index[1:, :n]])
         both, p = ca.vertcat(stage.y0, stage.y), ca.vertcat(stage.eps, stage.weights)
-        blocks = [Block(both, stage.g, stage.cost, pairs)]
+        blocks = [RowBlock(both, stage.g, stage.cost, pairs)]
         meanings = [m for k in range(1, nodes + 1) for r in stage.rows for m in _meanings(r, k)]
         g_bounds = [(r.lower, r.upper) for r in stage.rows for _ in r.labels] * nodes
         for block, rows, where in moments:
@@ -138,7 +138,7 @@ class Transcription:
             return None
         rows = _requirement_row(g, requirement)
         at = index[where, : self.layout.size]
-        return Block(self.stage.y, rows.g, ca.SX(0), at), rows, where
+        return RowBlock(self.stage.y, rows.g, ca.SX(0), at), rows, where
 
     def _first_node_blocks(self, index: np.ndarray) -> list[RequirementBlock]:
         """What holds in every state, at the first node; without what requirements there imply."""
@@ -149,18 +149,18 @@ class Transcription:
                 g, stage.y, self.layout, self.held
             ):
                 continue
-            rows = Rows(row.kind, g, 0.0, INF, (row.label,), (row.unit,), (row.scale,))
+            rows = StageRows(row.kind, g, 0.0, INF, (row.label,), (row.unit,), (row.scale,))
             at = index[[0], : self.layout.size]
-            blocks.append((Block(stage.y, rows.g, ca.SX(0), at), rows, [0]))
+            blocks.append((RowBlock(stage.y, rows.g, ca.SX(0), at), rows, [0]))
         return blocks
 
     def _aims(self, index: np.ndarray) -> list[RequirementBlock]:
         """The cost of quantities that are to be as large or as small as possible."""
         if not any(r.aim for r in self.requirements):
             return []
-        nothing = Rows("requirement", ca.SX(0, 1), 0.0, 0.0, (), (), ())
+        nothing = StageRows("requirement", ca.SX(0, 1), 0.0, 0.0, (), (), ())
         return [
-            (Block(self.stage.y, nothing.g, aim_cost(r, g), index[at, : self.layout.size]),
+            (RowBlock(self.stage.y, nothing.g, aim_cost(r, g), index[at, : self.layout.size]),
              nothing, [])
             for r, g, at in self.requirement_expressions() if r.aim
         ]  # fmt: skip
@@ -176,7 +176,7 @@ class Transcription:
         if not where:  # the motion ends at the apex
             return []
         both = np.hstack([index[:-1, :n], index[1:, :n]])[np.array(where) - 1]
-        return [(Block(ca.vertcat(stage.y0, stage.y), rows.g, ca.SX(0), both), rows, where)]
+        return [(RowBlock(ca.vertcat(stage.y0, stage.y), rows.g, ca.SX(0), both), rows, where)]
 
     def of_state(self, expression: ca.SX) -> ca.SX:
         """An expression of the node's q, v, s, u, lam in the stage's y."""
@@ -247,10 +247,10 @@ class Transcription:
         return np.concatenate([[0.0], np.cumsum(self.h(Y))])
 
 
-def _requirement_row(g: ca.SX, requirement: Requirement) -> Rows:
+def _requirement_row(g: ca.SX, requirement: Requirement) -> StageRows:
     scale = requirement.scale
     label = f"{requirement.text}:{requirement.quantity.name}"
-    return Rows(
+    return StageRows(
         "requirement",
         g / scale,
         requirement.lower / scale if requirement.lower > -INF else -INF,
@@ -261,7 +261,7 @@ def _requirement_row(g: ca.SX, requirement: Requirement) -> Rows:
     )
 
 
-def _meanings(rows: Rows, node: int) -> list[Meaning]:
+def _meanings(rows: StageRows, node: int) -> list[Meaning]:
     return [
         Meaning(rows.kind, label, unit, scale, node)
         for label, unit, scale in zip(rows.labels, rows.units, rows.scales, strict=True)

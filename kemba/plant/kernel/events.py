@@ -9,7 +9,7 @@ from kemba.plant.kernel.algebra.root import first_root
 from kemba.plant.kernel.forces import touching
 from kemba.plant.kernel.impact import impact
 from kemba.plant.kernel.jit import kernel, part
-from kemba.plant.kernel.machine import Machine, Memory, State
+from kemba.plant.kernel.machine import KernelModel, Memory, State
 from kemba.plant.kernel.pace import Pace, keeps_pace
 from kemba.plant.kernel.settings import ContactEvents
 from kemba.plant.kernel.step import step
@@ -35,7 +35,7 @@ class Impacts(NamedTuple):
 
 @part
 def advance(
-    m: Machine, k: Memory, now: State, spare: State, until: float, pace: Pace, log: Impacts
+    m: KernelModel, k: Memory, now: State, spare: State, until: float, pace: Pace, log: Impacts
 ) -> bool:
     """Simulate from `now` to the time `until` [s]; `now` is changed, `spare` is used as memory.
 
@@ -59,7 +59,7 @@ def advance(
 
 
 @kernel
-def collide(m: Machine, k: Memory, now: State, reach: float, log: Impacts) -> None:
+def collide(m: KernelModel, k: Memory, now: State, reach: float, log: Impacts) -> None:
     """An impact at everything that touches: of instances with a rigid gap."""
     count, at = 0, log.number[0]
     for i in range(touching(m, k, now.gap, reach)):
@@ -83,7 +83,7 @@ def collide(m: Machine, k: Memory, now: State, reach: float, log: Impacts) -> No
 
 @part
 def _until_touch(
-    m: Machine, k: Memory, now: State, new: State, h: float, reach: float, pace: Pace
+    m: KernelModel, k: Memory, now: State, new: State, h: float, reach: float, pace: Pace
 ) -> int:
     """One step: `now` becomes the state after `h` [s], or at the first touch of an open gap.
 
@@ -121,7 +121,7 @@ def _until_touch(
 
 
 @part
-def _first_hit(m: Machine, k: Memory, now: State, new: State) -> tuple[int, float]:
+def _first_hit(m: KernelModel, k: Memory, now: State, new: State) -> tuple[int, float]:
     """Which of the gaps `k.hits` closes first, and how long [s] after `now`."""
     length, first, soonest = new.time[0] - now.time[0], -1, 1e300
     for i in range(len(m.gaps)):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from kemba.plant.kernel.algebra.lcp import solve_lcp
 from kemba.plant.kernel.calls import evaluate
 from kemba.plant.kernel.jit import kernel
-from kemba.plant.kernel.machine import Machine, Memory, State
+from kemba.plant.kernel.machine import KernelModel, Memory, State
 from kemba.plant.kernel.settings import ContactEvents
 from kemba.plant.stepping.arrays import Array
 
@@ -13,7 +13,7 @@ COMPLIANT = ContactEvents.current().compliant
 
 
 @kernel
-def touching(m: Machine, k: Memory, gap: Array, reach: float) -> int:
+def touching(m: KernelModel, k: Memory, gap: Array, reach: float) -> int:
     """How many pairs take part; their rows are the first of `k.rows`: gaps within `reach` [m]
     (compliant ones within `COMPLIANT`) with the friction that belongs to them."""
     count = 0
@@ -32,7 +32,7 @@ def touching(m: Machine, k: Memory, gap: Array, reach: float) -> int:
 
 
 @kernel
-def evaluate_pairs(m: Machine, k: Memory) -> None:
+def evaluate_pairs(m: KernelModel, k: Memory) -> None:
     """The pairs at the state in `k.x`; compliant gaps push as remembered."""
     evaluate(m.pairs, k.x, k.pairs, k.gap)
     for i in range(len(m.gaps)):
@@ -44,7 +44,7 @@ def evaluate_pairs(m: Machine, k: Memory) -> None:
 
 
 @kernel
-def remember_push(m: Machine, k: Memory) -> None:
+def remember_push(m: KernelModel, k: Memory) -> None:
     """Remember how compliant gaps push at the state in `k.x`: their force is smooth, and acts as
     at the beginning of a stage."""
     for i in range(len(m.gaps)):
@@ -55,7 +55,7 @@ def remember_push(m: Machine, k: Memory) -> None:
 
 @kernel
 def add_forces(
-    m: Machine, k: Memory, count: int, T: Array, share: float, v: Array, moves: bool
+    m: KernelModel, k: Memory, count: int, T: Array, share: float, v: Array, moves: bool
 ) -> None:
     """The forces `k.lcp.z` that hold the first `count` of `k.rows` where velocities are
     v + share T lam; v becomes that.
@@ -82,7 +82,7 @@ def add_forces(
 
 
 @kernel
-def set_gaps(m: Machine, k: Memory, at: State) -> None:
+def set_gaps(m: KernelModel, k: Memory, at: State) -> None:
     """Gaps of a state and their rates, from the pairs just evaluated there."""
     for i in range(len(m.gaps)):
         at.gap[i] = k.gap[i]

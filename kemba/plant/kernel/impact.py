@@ -6,11 +6,11 @@ from kemba.plant.kernel.algebra.linear import factor, solve
 from kemba.plant.kernel.calls import evaluate
 from kemba.plant.kernel.forces import add_forces, evaluate_pairs, remember_push, set_gaps
 from kemba.plant.kernel.jit import kernel, part
-from kemba.plant.kernel.machine import Machine, Memory, State
+from kemba.plant.kernel.machine import KernelModel, Memory, State
 
 
 @part
-def impact(m: Machine, k: Memory, now: State, count: int) -> float:
+def impact(m: KernelModel, k: Memory, now: State, count: int) -> float:
     """An inelastic impact at the first `count` of the pairs `k.rows` changes the state `now`.
 
     Impulses are in `k.lcp.z` [N.s]; gives the kinetic energy lost [J]. Energy cannot grow: the
@@ -31,7 +31,7 @@ def impact(m: Machine, k: Memory, now: State, count: int) -> float:
 
 
 @part
-def instant(m: Machine, k: Memory, now: State, h: float, count: int, first: int) -> None:
+def instant(m: KernelModel, k: Memory, now: State, h: float, count: int, first: int) -> None:
     """Accelerations (n,) and forces (nl,) [N] just after `now`, into `k.x` from `first` on.
 
     The forces are those that hold the first `count` of the pairs `k.rows` over a short `h` [s];
@@ -69,7 +69,7 @@ def instant(m: Machine, k: Memory, now: State, h: float, count: int, first: int)
 
 
 @kernel
-def _accelerations(m: Machine, k: Memory, now: State, count: int) -> None:
+def _accelerations(m: KernelModel, k: Memory, now: State, count: int) -> None:
     """X (n, 1 + nl): acceleration without forces, and per force of the pairs in `k.rows`."""
     n = m.n
     for i in range(len(now.y)):

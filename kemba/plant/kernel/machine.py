@@ -9,7 +9,7 @@ import numpy as np
 from kemba.plant.stepping.arrays import Array
 
 
-class Machine(NamedTuple):
+class KernelModel(NamedTuple):
     """A model as the kernel sees it.
 
     Addresses of machine code, functions of x = (q, v, s, u, p, a, lam): `full` and `smooth` give
@@ -112,7 +112,7 @@ def lcp_memory(n: int) -> Lcp:
     )
 
 
-def memory(m: Machine, inputs: int, parameters: int, outputs: int) -> Memory:
+def memory(m: KernelModel, inputs: int, parameters: int, outputs: int) -> Memory:
     """Memory for a model with so many inputs, free parameters and outputs."""
     n, ns, nl, ng = m.n, m.ns, m.nl, len(m.gaps)
     shapes = {
@@ -144,7 +144,7 @@ def memory(m: Machine, inputs: int, parameters: int, outputs: int) -> Memory:
     )
 
 
-def state(m: Machine) -> State:
+def state(m: KernelModel) -> State:
     """A state of zeros."""
     ng = len(m.gaps)
     return State(np.zeros(1), np.zeros(2 * m.n + m.ns), np.zeros(ng), np.zeros(ng))

@@ -11,7 +11,7 @@ from kemba.plant.kernel.events import CLOSED, Impacts, advance, collide
 from kemba.plant.kernel.forces import evaluate_pairs, set_gaps, touching
 from kemba.plant.kernel.impact import instant
 from kemba.plant.kernel.jit import entry, part
-from kemba.plant.kernel.machine import Machine, Memory, State
+from kemba.plant.kernel.machine import KernelModel, Memory, State
 from kemba.plant.kernel.pace import Pace
 from kemba.plant.kernel.settings import ContactEvents
 from kemba.plant.stepping.arrays import Array
@@ -20,7 +20,7 @@ DONE, FULL, ASK, EXPLODED, BURIED = 0, 1, 2, 3, 4  # why the kernel comes back
 HELD, DEEP = ContactEvents.current().held, ContactEvents.current().deep
 
 
-class Schedule(NamedTuple):
+class Marks(NamedTuple):
     """Marks are the times (m,) [s] at which something is to do.
 
     `u` (m, nu): inputs that hold from there, NaN for those of the controller; `sent` (m, nu): as
@@ -36,7 +36,7 @@ class Schedule(NamedTuple):
     asks: bool
 
 
-class Progress(NamedTuple):
+class NextMark(NamedTuple):
     """The mark to come next, and whether the controller has answered there."""
 
     mark: Array
@@ -45,16 +45,16 @@ class Progress(NamedTuple):
 
 @entry
 def play(
-    m: Machine,
+    m: KernelModel,
     k: Memory,
     now: State,
     spare: State,
-    plan: Schedule,
+    plan: Marks,
     law: Law,
     pace: Pace,
     log: Impacts,
     table: Array,
-    progress: Progress,
+    progress: NextMark,
 ) -> int:
     """Go through the marks and fill `table` (rows, columns); the answer says why it ends.
 
@@ -84,7 +84,7 @@ def play(
 
 
 @part
-def _start(m: Machine, k: Memory, now: State, log: Impacts) -> bool:
+def _start(m: KernelModel, k: Memory, now: State, log: Impacts) -> bool:
     """What touches at the start stops at once; False where something starts deep in the ground."""
     for i in range(len(now.y)):
         k.x[i] = now.y[i]
@@ -98,7 +98,7 @@ def _start(m: Machine, k: Memory, now: State, log: Impacts) -> bool:
 
 
 @part
-def _record(m: Machine, k: Memory, now: State, plan: Schedule, mark: int, table: Array) -> None:
+def _record(m: KernelModel, k: Memory, now: State, plan: Marks, mark: int, table: Array) -> None:
     """A row of the record: state, inputs as sent, forces, outputs, all just after now."""
     size, nu, row = len(now.y), plan.sent.shape[1], plan.row[mark]
     first = len(k.x) - m.n - m.nl

@@ -17,7 +17,7 @@ from kemba.plant.kernel.algebra.linear import factor, solve
 from kemba.plant.kernel.calls import evaluate
 from kemba.plant.kernel.forces import add_forces, evaluate_pairs, remember_push, set_gaps
 from kemba.plant.kernel.jit import kernel, part
-from kemba.plant.kernel.machine import Machine, Memory, State
+from kemba.plant.kernel.machine import KernelModel, Memory, State
 from kemba.plant.kernel.settings import GAMMA, GapDrift
 
 _DRIFT = GapDrift.current()
@@ -25,7 +25,7 @@ PULL_BACK, SHORTEST, FASTEST = _DRIFT.share, _DRIFT.shortest, _DRIFT.fastest
 
 
 @kernel
-def step(m: Machine, k: Memory, now: State, h: float, count: int, new: State) -> float:
+def step(m: KernelModel, k: Memory, now: State, h: float, count: int, new: State) -> float:
     """One step of `h` [s] from `now` to `new`; the first `count` of the pairs `k.rows` stay closed.
 
     Gives how far `new` is from the result of the first stage, which is of first order: the largest
@@ -58,7 +58,7 @@ def step(m: Machine, k: Memory, now: State, h: float, count: int, new: State) ->
 
 
 @part
-def _first_stage(m: Machine, k: Memory, now: State, h: float, count: int) -> None:
+def _first_stage(m: KernelModel, k: Memory, now: State, h: float, count: int) -> None:
     """k1 into X[:, 0] and `k.k1`; `k.x` becomes the state (q1, v1, s1) behind it, v1 = `k.v`."""
     n, ns = m.n, m.ns
     remember_push(m, k)
@@ -93,7 +93,7 @@ def _first_stage(m: Machine, k: Memory, now: State, h: float, count: int) -> Non
 
 
 @part
-def _second_stage(m: Machine, k: Memory, now: State, h: float, count: int) -> None:
+def _second_stage(m: KernelModel, k: Memory, now: State, h: float, count: int) -> None:
     """k2 into Y[:, 0] and `k.k2`, acceleration per force into the other columns of Y."""
     n, ns = m.n, m.ns
     remember_push(m, k)
@@ -122,7 +122,7 @@ def _second_stage(m: Machine, k: Memory, now: State, h: float, count: int) -> No
 
 
 @part
-def _pull_back(m: Machine, k: Memory, h: float) -> None:
+def _pull_back(m: KernelModel, k: Memory, h: float) -> None:
     """Closed gaps that have drifted return to zero; those that are too deep return slowly."""
     for i in range(len(m.gaps)):
         if m.rigid[i]:

@@ -6,9 +6,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict
 
-from kemba.config import Document, find_config, load_yaml, parse
+from kemba.config import Document, Section, find_config, load_yaml, parse
 from kemba.model import Model, load_model
 from kemba.plant.execution.sensors import Sensors, take_log
 from kemba.plant.rig.imposed import drive
@@ -18,10 +17,8 @@ from kemba.trajectory import Trajectory
 FORCE_NOISE = 0.3  # N, 1 sigma of a bench force transducer
 
 
-class RigFile(BaseModel):
+class RigFile(Section):
     """A rig YAML: `rig` holds one of the rigs."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     rig: AnyRig
 

@@ -21,7 +21,7 @@ from kemba.model import Model
 from kemba.plant.rig.estimate import Estimate, mean
 from kemba.plant.rig.imposed import drive, followed
 from kemba.plant.rig.rises import Rise, RiseTable, find_rises, rise_table
-from kemba.plant.rig.strokes import Line, find_stroke, stroke_table
+from kemba.plant.rig.strokes import StrokeLine, find_stroke, stroke_table
 from kemba.plant.simulation.commands import Profile
 from kemba.trajectory import Trajectory
 
@@ -33,7 +33,7 @@ class Characteristics:
 
     cylinder: Cylinder
     rises: RiseTable | None
-    lines: list[Line]
+    lines: list[StrokeLine]
     plateaus: dict[tuple[str, float], Estimate]
     check: dict[str, tuple[float, float]]
 
@@ -74,7 +74,7 @@ def characterise(logs: dict[str, Trajectory], cylinder: Cylinder) -> Characteris
 def fitted_effects(
     cylinder: Cylinder,
     rises: RiseTable | None,
-    lines: list[Line],
+    lines: list[StrokeLine],
     plateaus: dict[tuple[str, float], Estimate],
 ) -> tuple[Chamber, ModeDamping, Valve]:
     """Chamber, damping and valve with the values of the tables."""

@@ -8,9 +8,9 @@ from itertools import pairwise
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
-from kemba.config import FileName
+from kemba.config import FileName, Section
 from kemba.errors import KembaError
 from kemba.plant.rig.imposed import ImposedMotion, hermite, locked, monotone
 from kemba.plant.rig.imposed import stroke as steady_stroke
@@ -51,10 +51,8 @@ class Test:
     facts: dict[str, Any]
 
 
-class Rig(BaseModel):
+class Rig(Section):
     """What every rig has: supply pressures, logging rate, repetitions."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     name: FileName
     notes: str = ""

@@ -61,7 +61,7 @@ class Stroke:
 
 
 @dataclass(frozen=True)
-class Line:
+class StrokeLine:
     """One row of Table II: F = F_static - c_d v."""
 
     mode: str
@@ -97,7 +97,7 @@ def find_stroke(log: Trajectory) -> Stroke | None:
     return Stroke(mode, supply, float(v[used].mean()), float(log["piston/F"][used].mean()))
 
 
-def stroke_table(strokes: Iterable[Stroke]) -> list[Line]:
+def stroke_table(strokes: Iterable[Stroke]) -> list[StrokeLine]:
     """Table II: one line per mode and supply with at least two speeds."""
     groups: dict[tuple[str, float], list[Stroke]] = {}
     for stroke in strokes:
@@ -112,5 +112,5 @@ def stroke_table(strokes: Iterable[Stroke]) -> list[Line]:
             continue
         force = np.array([stroke.force for stroke in group])
         (F_static, c_d), r2 = linear(np.column_stack([np.ones_like(v), -v]), force)
-        lines.append(Line(mode, supply, F_static, c_d, r2))
+        lines.append(StrokeLine(mode, supply, F_static, c_d, r2))
     return lines

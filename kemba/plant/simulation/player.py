@@ -13,7 +13,7 @@ from kemba.plant.kernel.control import Law
 from kemba.plant.kernel.events import MOST, NOTICED, Impacts
 from kemba.plant.kernel.machine import memory, state
 from kemba.plant.kernel.pace import Pace
-from kemba.plant.kernel.play import ASK, BURIED, DONE, EXPLODED, Progress, Schedule, play
+from kemba.plant.kernel.play import ASK, BURIED, DONE, EXPLODED, Marks, NextMark, play
 from kemba.plant.kernel.settings import StepLength
 from kemba.plant.simulation.commands import Commands, JointControl, Profile
 from kemba.plant.simulation.inputs import (
@@ -68,7 +68,7 @@ class Player:
         count, (times, lost) = np.zeros(1, dtype=int), np.zeros((2, ROOM))
         rates = np.zeros((ROOM, len(m.gaps)))
         self._log = Impacts(count, times, lost, np.zeros((ROOM, m.nl)), rates)
-        self._progress = Progress(np.zeros(1, dtype=int), np.zeros(1, dtype=bool))
+        self._progress = NextMark(np.zeros(1, dtype=int), np.zeros(1, dtype=bool))
         mechanism = model.mechanism
         sensed = (*mechanism.coordinates, *mechanism.velocities, *model.states.values())
         self._sensed = [quantity.name for quantity in sensed]
@@ -136,13 +136,13 @@ class Player:
 
 def _schedule(
     model: Model, commands: Commands, acting: Mapping[str, Profile], samples: Array, duration: float
-) -> Schedule:
+) -> Marks:
     edges = breaks([*acting.values(), *commands.profiles.values()], 0.0, duration)
     beats = ticks(commands, duration)
     ends = np.array([0.0, duration])
     marks = merged(ends, samples, edges, beats)
     wanted = among(marks, samples)
-    return Schedule(
+    return Marks(
         time=marks,
         u=input_table(model, acting, marks),
         sent=input_table(model, commands.profiles, marks),

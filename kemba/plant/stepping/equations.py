@@ -14,7 +14,7 @@ import numpy as np
 
 from kemba.model import Model
 from kemba.model.node import Node
-from kemba.plant.kernel.machine import Machine
+from kemba.plant.kernel.machine import KernelModel
 from kemba.plant.kernel.settings import StepLength
 from kemba.plant.stepping.arrays import Array
 from kemba.plant.stepping.compiled import Compiled
@@ -42,14 +42,14 @@ class Equations:
         return np.array([model.parameters[name][1] for name in self.free], dtype=float)
 
     @cached_property
-    def machine(self) -> Machine:
+    def machine(self) -> KernelModel:
         """The model as the kernel sees it."""
         address, pairs, nl = self.native.address, self.pairs, self.node.lam.numel()
         rigid = pairs.group[pairs.gaps[pairs.rigid]]
         slips = np.zeros((nl, nl), dtype=bool)
         for speed, rows in pairs.free_speeds:
             slips[speed, rows] = True
-        return Machine(
+        return KernelModel(
             full=address["full"],
             smooth=address["smooth"],
             pairs=address["pairs"],
@@ -77,7 +77,7 @@ class Equations:
 
     @cached_property
     def native(self) -> Native:
-        """The model's functions in machine code, as `Machine` describes them."""
+        """The model's functions in machine code, as `KernelModel` describes them."""
         node, forms = self.node, self.forms
         M, F, B, f = forms.parts
         n, ns = node.q.numel(), node.s.numel()

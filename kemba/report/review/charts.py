@@ -19,7 +19,7 @@ LOGS = ("#222222", "#009e73", "#8a4f9e", "#7a5c00", "#56b4e9")
 
 
 @dataclass(frozen=True)
-class Line:
+class Curve:
     """A curve (n,) on the page's grid of times; `track` is the number of its motion, which it is
     hidden with; None: it belongs to none."""
 
@@ -36,7 +36,7 @@ class Chart:
 
     title: str
     unit: str
-    lines: Sequence[Line] = ()
+    lines: Sequence[Curve] = ()
     band: tuple[Array, Array] | None = None
     levels: Sequence[float] = ()
     stands: Spans = ()

@@ -24,7 +24,7 @@ class EventSettings(Settings):
 
 
 @dataclass(frozen=True)
-class Flight:
+class FootFlight:
     """Of one foot around the apex: when it left and when it came down again [s], None where it did
     not; `grazes`: when it touched the ground for a moment on its way."""
 
@@ -41,7 +41,7 @@ class Events:
     apex_time: float
     apex: float
     feet: float | None
-    flights: dict[str, Flight]
+    flights: dict[str, FootFlight]
     fault: str | None
 
     @property
@@ -64,20 +64,20 @@ def events_of(track: Track, machine: Machine) -> Events | None:
     return Events(time, z, _feet(t, machine), flights, _fault(t, z))
 
 
-def _flight(source: Source, stands: Mask, apex: float) -> Flight:
+def _flight(source: Source, stands: Mask, apex: float) -> FootFlight:
     """The contacts around the apex; one that is shorter than a touchdown grazes."""
     spans, time = source.spans(stands), source.trajectory.time
     ends = float(time[0]), float(time[-1])
     lasts = LandingSettings.current().lasts
     firm = [(a, b) for a, b in spans if b - a >= lasts or a <= ends[0] or b >= ends[1]]
     if any(a <= apex <= b for a, b in firm):
-        return Flight(None, None)
+        return FootFlight(None, None)
     left = [float(b) for a, b in firm if a < apex and b < ends[1]]
     down = [float(a) for a, _ in firm if a > apex]
     first, last = left[-1] if left else None, down[0] if down else None
     short = [float(a) for a, b in spans if (a, b) not in firm]
     during = [a for a in short if (first or ends[0]) < a < (last or ends[1])]
-    return Flight(first, last, tuple(during))
+    return FootFlight(first, last, tuple(during))
 
 
 def _feet(t: Trajectory, machine: Machine) -> float | None:

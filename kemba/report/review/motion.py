@@ -9,7 +9,7 @@ import numpy as np
 
 from kemba.plotting import Machine
 from kemba.plotting.robot.motion import stance_spans
-from kemba.report.review.charts import Book, Chart, Line, Spans
+from kemba.report.review.charts import Book, Chart, Curve, Spans
 from kemba.report.review.tracks import Track, on_grid, plan_of
 from kemba.trajectory import Array
 
@@ -113,13 +113,13 @@ def _pair(
     having = [(i, track) for i, track in enumerate(book.tracks) if name in track.t]
     values = {i: on_grid(track, name, book.grid, q.steps) for i, track in having}
     names = [track.name for track in book.tracks]
-    lines = [Line(names[i], q.factor * v, i) for i, v in values.items()]
+    lines = [Curve(names[i], q.factor * v, i) for i, v in values.items()]
     yield Chart(title, q.unit, lines, levels=levels, stands=stands, least=q.least)
     plan = plan_of(book.tracks)
     if plan and name in plan.t and len(values) > 1 and q.name not in NO_FORCE_ERROR:
         planned = values[book.tracks.index(plan)]
         errors = [
-            Line(f"{names[i]} minus plan", q.error_factor * (v - planned), i)
+            Curve(f"{names[i]} minus plan", q.error_factor * (v - planned), i)
             for i, v in values.items()
             if book.tracks[i] is not plan
         ]

@@ -37,7 +37,7 @@ from kemba.report.review.motion import (
     rig_charts,
 )
 from kemba.report.review.tracks import Track, gather, grid_of, plan_of
-from kemba.report.review.verdict import Verdict, of_answer, of_bad_data, of_logs, of_plan
+from kemba.report.review.verdict import ReviewVerdict, of_answer, of_bad_data, of_logs, of_plan
 from kemba.report.stage import page_text, stage, write_page
 from kemba.runs import Run, load_run
 from kemba.stopwatch import Tell, silent
@@ -76,7 +76,7 @@ def review(
     out: str | Path | None = None,
     force: bool = False,
     tell: Tell = silent,
-) -> tuple[Path, Verdict]:
+) -> tuple[Path, ReviewVerdict]:
     """Write the page to `out`, by default beside what it is about; the path and the verdict.
 
     Without `force` a page that is there already is kept, and a new one is numbered.
@@ -146,7 +146,7 @@ def gather_material(
     return Material(found, read, facts, folder, judged, column_map, supply, error, fault, alien)
 
 
-def page_of(given: Material) -> tuple[str, str, Verdict]:
+def page_of(given: Material) -> tuple[str, str, ReviewVerdict]:
     """Title, body and verdict of the page."""
     run = None if given.rig else given.run
     tracks = gather(run, given.logs)
@@ -227,7 +227,9 @@ def _found(given: Material) -> str:
     return section("What the model lacks", *parts)
 
 
-def _verdict(given: Material, tracks: Sequence[Track], events: Sequence[Events | None]) -> Verdict:
+def _verdict(
+    given: Material, tracks: Sequence[Track], events: Sequence[Events | None]
+) -> ReviewVerdict:
     said = _said(given, tracks, events)
     if not given.strangers or given.run is None:
         return said
@@ -236,7 +238,9 @@ def _verdict(given: Material, tracks: Sequence[Track], events: Sequence[Events |
     return said.doubted(doubt(given.strangers, given.run), logs, str(other) if other else "RUN")
 
 
-def _said(given: Material, tracks: Sequence[Track], events: Sequence[Events | None]) -> Verdict:
+def _said(
+    given: Material, tracks: Sequence[Track], events: Sequence[Events | None]
+) -> ReviewVerdict:
     own = None if given.model == PLANNING else given.model
     words = {
         "logs": typed([log.meta["path"] for log in given.logs], given.column_map, own),

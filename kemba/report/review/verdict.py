@@ -17,7 +17,7 @@ Grade = Literal["good", "fair", "bad"]
 
 
 @dataclass(frozen=True)
-class Verdict:
+class ReviewVerdict:
     """`bad` is red: do not go on with this. `fair`: usable, but something is to be done."""
 
     grade: Grade
@@ -26,12 +26,12 @@ class Verdict:
     command: str = ""
     doubt: str = ""
 
-    def doubted(self, doubt: str, logs: str, run: str) -> Verdict:
+    def doubted(self, doubt: str, logs: str, run: str) -> ReviewVerdict:
         """The verdict with what speaks against it: logs that belong to another `run`."""
         grade: Grade = "bad" if self.grade == "bad" else "fair"
         command = f"kemba-opt review {logs} --run {shlex.quote(run)}"
         aim = "review these logs with the run that they execute:"
-        return Verdict(grade, self.sentence, aim, command, doubt)
+        return ReviewVerdict(grade, self.sentence, aim, command, doubt)
 
     def html(self) -> str:
         """As the first thing on the page."""
@@ -44,13 +44,13 @@ class Verdict:
         )
 
 
-def of_plan(certificate: Facts, run: str, events: Events | None) -> Verdict:
+def of_plan(certificate: Facts, run: str, events: Events | None) -> ReviewVerdict:
     """Whether the plan may go to the robot."""
     sentence = str(certificate["sentence"]).split(";")[0]
     if not certificate.get("good", certificate["status"] == "solved"):
         if not sentence.startswith("FAILED"):
             sentence = f"FAILED: {sentence}"
-        return Verdict("bad", _stop(sentence), _after_failure(certificate))
+        return ReviewVerdict("bad", _stop(sentence), _after_failure(certificate))
     feet = ""
     if events and events.feet is not None:
         feet = f"; the feet rise {100 * events.feet:.1f} cm"
@@ -62,7 +62,7 @@ def of_plan(certificate: Facts, run: str, events: Events | None) -> Verdict:
         lands = "lands and " if plant.get("landed") else ""
         robot = f"the simulated robot {lands}reaches {abs(error):.0f} mm {side}"
     height = certificate["apex_m"]
-    return Verdict(
+    return ReviewVerdict(
         "good",
         f"The plan is good: the body's centre reaches {height:.3f} m{feet}; {robot}.",
         "send controller.csv to the robot, or execute it on the simulated one:",
@@ -95,13 +95,13 @@ def of_logs(
     found: Comparison | None,
     answer: Facts | None,
     words: Mapping[str, str],
-) -> Verdict:
+) -> ReviewVerdict:
     """What the logs show; `words`: names of files for the commands (`logs`, `answer`, `task`)."""
     fallen = [(name, e.fault) for name, e in events if e and e.fault]
     if fallen:
         name, fault = fallen[0]
         more = f" ({len(fallen)} of {len(events)} logs)" if len(events) > 1 else ""
-        return Verdict(
+        return ReviewVerdict(
             "bad",
             f"FAILED: in {name} the robot {fault}{more}.",
             "see below where it leaves the plan; then ask what the model lacks:",
@@ -110,12 +110,14 @@ def of_logs(
     parts = [_flown([e for _, e in events if e], plan)]
     if answer:
         said = of_answer(answer, words)
-        return Verdict(said.grade, _joined([*parts, said.sentence]), said.next, said.command)
+        return ReviewVerdict(said.grade, _joined([*parts, said.sentence]), said.next, said.command)
     if found is None:
-        return Verdict("fair", _joined(parts), "compare it with a model:", "kemba-opt compare")
+        return ReviewVerdict(
+            "fair", _joined(parts), "compare it with a model:", "kemba-opt compare"
+        )
     ratio = f"{short(found.noise_ratio)} times the noise"
     if found.good:
-        return Verdict(
+        return ReviewVerdict(
             "good",
             _joined([*parts, f"the model explains the logs to within the noise ({ratio})"]),
             "nothing is to be added to the model; plan the next jump with it.",
@@ -123,8 +125,10 @@ def of_logs(
     if found.tolerable:
         text = f"the model errs by {ratio}, which figures within their tolerance would explain"
         aim = "go on with this model, or identify its figures:"
-        return Verdict("fair", _joined([*parts, text]), aim, f"kemba-opt discover {words['logs']}")
-    return Verdict(
+        return ReviewVerdict(
+            "fair", _joined([*parts, text]), aim, f"kemba-opt discover {words['logs']}"
+        )
+    return ReviewVerdict(
         "fair",
         _joined([*parts, f"the model does not explain the logs: its error is {ratio}"]),
         "find what the model lacks:",
@@ -132,9 +136,9 @@ def of_logs(
     )
 
 
-def of_bad_data(text: str, words: Mapping[str, str]) -> Verdict:
+def of_bad_data(text: str, words: Mapping[str, str]) -> ReviewVerdict:
     """Logs that cannot be right."""
-    return Verdict(
+    return ReviewVerdict(
         "bad",
         f"FAILED: a log cannot be right: {_stop(text)}",
         "correct the log, or map its columns with --map; then check it:",
@@ -142,7 +146,7 @@ def of_bad_data(text: str, words: Mapping[str, str]) -> Verdict:
     )
 
 
-def of_answer(answer: Facts, words: Mapping[str, str]) -> Verdict:
+def of_answer(answer: Facts, words: Mapping[str, str]) -> ReviewVerdict:
     """What `discover` answered. A verdict that is not known here is given in its own words."""
     verdict, folder = str(answer["verdict"]), words["answer"]
     own = str(answer.get("sentence") or verdict).split(". ")[0].rstrip(".") + "."
@@ -158,17 +162,21 @@ def of_answer(answer: Facts, words: Mapping[str, str]) -> Verdict:
             )
         rest = ", and something more that is not known" if verdict == "partly" else ""
         if not answer.get("model"):
-            return Verdict("fair", f"The model lacks {names}{rest}{falls}.", "take more logs.")
+            return ReviewVerdict(
+                "fair", f"The model lacks {names}{rest}{falls}.", "take more logs."
+            )
         aim = "plan again with the corrected model:"
         task = words.get("task", "jump.yaml")
         command = f"kemba-opt solve {task} --model {folder}/model.yaml"
-        return Verdict("fair", f"The model lacks {names}{rest}{falls}.", aim, command)
+        return ReviewVerdict("fair", f"The model lacks {names}{rest}{falls}.", aim, command)
     if verdict == "nothing":
-        return Verdict("good", own, "nothing is to be added to the model; plan the next jump.")
+        return ReviewVerdict(
+            "good", own, "nothing is to be added to the model; plan the next jump."
+        )
     if verdict == "bad-data":
-        return Verdict("bad", f"FAILED: {own}", "correct the logs, and run discover again.")
+        return ReviewVerdict("bad", f"FAILED: {own}", "correct the logs, and run discover again.")
     aim = "design the test that tells more:"
-    return Verdict("fair", own, aim, f"kemba-opt experiment {folder}")
+    return ReviewVerdict("fair", own, aim, f"kemba-opt experiment {folder}")
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -6,9 +6,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from kemba.config import FileName
+from kemba.config import FileName, Section
 from kemba.quantity import Param
-from kemba.scenarios.schema import Conditions, Draws, Section
+from kemba.scenarios.schema import Conditions, Draws
 
 
 class Block(Draws):

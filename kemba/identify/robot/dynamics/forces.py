@@ -24,7 +24,7 @@ class ForcesSettings(Settings):
 
 
 @dataclass
-class Line:
+class ForceLine:
     """Force (N, k) at p, and its slopes (N, k) along parameters in which it is linear."""
 
     p: Array
@@ -40,7 +40,7 @@ class Forces:
         self.physics, self.batch, self.motion = physics, batch, motion
         self._inputs: dict[bytes, list[Inputs]] = {}
         self._states: dict[bytes, tuple[ca.DM, ca.DM]] = {}
-        self._lines: dict[bytes, Line] = {}
+        self._lines: dict[bytes, ForceLine] = {}
         self._middle = tuple(prepared(a) for a in motion.middle)
 
     def at(self, p: Array, delays: Array) -> Array:
@@ -70,7 +70,7 @@ class Forces:
         key = delays.tobytes() + p[~straight].tobytes()
         line = self._lines.get(key)
         if line is None:
-            line = Line(p.copy(), self._exact(p, delays))
+            line = ForceLine(p.copy(), self._exact(p, delays))
             _keep(self._lines, key, line)
         moved = np.flatnonzero(p != line.p)
         if crossed[np.ix_(moved, moved)].any():

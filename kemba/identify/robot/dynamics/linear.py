@@ -13,8 +13,8 @@ from kemba.identify.robot.dynamics.reference import Reference, integrator
 from kemba.identify.robot.dynamics.settings import ContactForceSettings, PlaceSettings
 from kemba.identify.robot.motion.batch import Batch
 from kemba.identify.robot.motion.colour import Noise, coloured
-from kemba.identify.robot.motion.contact import Schedule, steady
-from kemba.identify.robot.motion.filter import Gains, System, smooth
+from kemba.identify.robot.motion.contact import ContactSchedule, steady
+from kemba.identify.robot.motion.filter import FilterGains, System, smooth
 from kemba.identify.robot.motion.sensing import travelled
 
 
@@ -85,7 +85,7 @@ class LinearisedMotion:
 def linearise_along(
     physics: Physics,
     batch: Batch,
-    schedules: Sequence[Schedule],
+    schedules: Sequence[ContactSchedule],
     ref: Reference,
     density: Array,
     states: tuple[Array, Array],
@@ -149,7 +149,7 @@ def linearise_along(
 
 def _filter_system(
     batch: Batch,
-    schedules: Sequence[Schedule],
+    schedules: Sequence[ContactSchedule],
     measured: tuple[Array, Array],
     slopes: tuple[Array, Array],
     unknown: Array,
@@ -229,7 +229,7 @@ def contact_force(
     return (acting @ rigid[..., None])[..., 0], feet
 
 
-def smoothed(motion: LinearisedMotion, gain: Gains, y: Array, g: Array) -> Reference:
+def smoothed(motion: LinearisedMotion, gain: FilterGains, y: Array, g: Array) -> Reference:
     """A better reference: the smoothed deviations added. `y` (n, L, m) measured beyond the
     reference, `g` (n, L, k) acceleration of the model beyond the reference's."""
     k = motion.ref.q.shape[2]

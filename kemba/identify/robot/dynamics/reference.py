@@ -15,7 +15,7 @@ from kemba.identify.robot.dynamics.settings import (
     KinematicSettings,
 )
 from kemba.identify.robot.motion.batch import Batch
-from kemba.identify.robot.motion.contact import Schedule, read_schedule
+from kemba.identify.robot.motion.contact import ContactSchedule, read_schedule
 from kemba.identify.robot.motion.filter import System, gains, smooth
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -77,7 +77,7 @@ def first_reference(physics: Physics, batch: Batch, p: Array) -> Reference:
 
 def read_schedules(
     physics: Physics, batch: Batch, ref: Reference, p: Array
-) -> tuple[Schedule, ...]:
+) -> tuple[ContactSchedule, ...]:
     """Contact read from the motion of each run; `p` (k,) gives the lengths of the legs."""
     q, v = batch.flat(ref.q), batch.flat(ref.v)
     legs = len(physics.legs)
@@ -99,7 +99,7 @@ def read_schedules(
 
 
 def densities(
-    physics: Physics, batch: Batch, schedules: Sequence[Schedule], least: ForceDensity
+    physics: Physics, batch: Batch, schedules: Sequence[ContactSchedule], least: ForceDensity
 ) -> Array:
     """(n, L, k + 2 legs): density of unknown force per measured channel and foot axis.
 

@@ -64,7 +64,7 @@ class ContactSettings(Settings):
 
 
 @dataclass(frozen=True)
-class Schedule:
+class ContactSchedule:
     """Contacts of one run at its n nodes.
 
     Per leg, (n, legs): `foot`: it may touch the ground; `settled`: it rests on the ground;
@@ -91,7 +91,9 @@ class Schedule:
         return np.hstack([feet.reshape(len(feet), -1), self.rests])
 
 
-def read_schedule(time: Array, feet: Array, pistons: Array, stroke: float, body: Array) -> Schedule:
+def read_schedule(
+    time: Array, feet: Array, pistons: Array, stroke: float, body: Array
+) -> ContactSchedule:
     """The schedule of one run at `time` (n,) [s].
 
     `feet` (n, legs, [x, z]) [m], `pistons` (n, legs) [m], `stroke` [m], `body` (n, 3): x, z [m] and
@@ -139,7 +141,7 @@ def read_schedule(time: Array, feet: Array, pistons: Array, stroke: float, body:
     phase = np.array(["flight", "stance1", "stance2"], dtype=object)[np.minimum(count, 2)]
     phase[(count == feet.shape[1]) & (speed < limits.slow_body)] = "rest"
     phase[impact.any(axis=1)] = "impact"
-    return Schedule(may, settled, struck, slides, low, high, phase, rests, sticks)
+    return ContactSchedule(may, settled, struck, slides, low, high, phase, rests, sticks)
 
 
 def _after(flags: Flags, steps: float) -> Flags:
@@ -148,7 +150,7 @@ def _after(flags: Flags, steps: float) -> Flags:
     return np.asarray(np.convolve(begin, np.ones(max(1, round(steps))))[: len(flags)] > 0)
 
 
-def loaded(schedule: Schedule, normal: Array, dt: float) -> Schedule:
+def loaded(schedule: ContactSchedule, normal: Array, dt: float) -> ContactSchedule:
     """The same with only those feet settled that carry a load: `normal` (n, legs) in N, steady."""
     settings = ContactSettings.current()
     width = max(3, round(settings.rate_window / dt))

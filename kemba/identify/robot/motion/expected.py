@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from kemba.identify.robot.motion.colour import simulated
-from kemba.identify.robot.motion.filter import Gains, System, innovations
+from kemba.identify.robot.motion.filter import FilterGains, System, innovations
 from kemba.settings import BY_HAND, Settings, setting
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -21,7 +21,7 @@ class ExpectedSettings(Settings):
     least: float = setting(0.02, "1", "smallest power", BY_HAND)
 
 
-def expected_power(system: System, gain: Gains, seed: int = 0) -> Array:
+def expected_power(system: System, gain: FilterGains, seed: int = 0) -> Array:
     """Mean square (n, L, m) of the whitened innovations that sensor noise alone makes.
 
     It is below 1 where the filter allows for contact forces that a steady stance does not need.

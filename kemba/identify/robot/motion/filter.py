@@ -42,7 +42,7 @@ class System:
 
 
 @dataclass(frozen=True)
-class Gains:
+class FilterGains:
     """What the filter makes of a System: gains, whiteners of the innovations, predicted P, and
     what becomes of a predicted state in a step that corrects it."""
 
@@ -52,7 +52,7 @@ class Gains:
     turn: Array
 
 
-def gains(system: System) -> Gains:
+def gains(system: System) -> FilterGains:
     """Run the covariance recursion."""
     s = system
     n, runs, m, d = s.H.shape
@@ -79,10 +79,10 @@ def gains(system: System) -> Gains:
         P = A @ P @ A.swapaxes(-1, -2) + (K[k] * R[k][:, None, :]) @ K[k].swapaxes(-1, -2)
         P = s.F[k] @ P @ Ft[k] + noise[k]
         P = 0.5 * (P + P.swapaxes(-1, -2))
-    return Gains(K, np.linalg.inv(L), P_all, s.F @ (eye - K @ s.H))
+    return FilterGains(K, np.linalg.inv(L), P_all, s.F @ (eye - K @ s.H))
 
 
-def innovations(system: System, gain: Gains, y: Array, g: Array) -> tuple[Array, Array]:
+def innovations(system: System, gain: FilterGains, y: Array, g: Array) -> tuple[Array, Array]:
     """(predicted x (n, L, d, c), innovations (n, L, m, c)) of columns y (n, L, m, c), g."""
     s = system
     n, runs, _, d = s.H.shape
@@ -97,7 +97,7 @@ def innovations(system: System, gain: Gains, y: Array, g: Array) -> tuple[Array,
     return states, y - s.H @ states
 
 
-def smooth(system: System, gain: Gains, y: Array, g: Array) -> tuple[Array, Array]:
+def smooth(system: System, gain: FilterGains, y: Array, g: Array) -> tuple[Array, Array]:
     """(smoothed x (n, L, d), smoothed w (n, L, k)) of one column (Bryson and Frazier)."""
     s = system
     states, errors = innovations(s, gain, y[..., None], g[..., None])
@@ -115,7 +115,7 @@ def smooth(system: System, gain: Gains, y: Array, g: Array) -> tuple[Array, Arra
     return x, w
 
 
-def smooth_with_band(system: System, gain: Gains, y: Array, g: Array) -> tuple[Array, Array]:
+def smooth_with_band(system: System, gain: FilterGains, y: Array, g: Array) -> tuple[Array, Array]:
     """(smoothed x, its variances), both (n, L, d), of one column; `g` (n, L, j) pushes the first
     j channels of G."""
     s = system

@@ -20,14 +20,14 @@ from kemba.identify.problem.sensor_noise import (
     lag_noise,
     weighted,
 )
-from kemba.identify.robot.motion.filter import Gains, System, innovations
+from kemba.identify.robot.motion.filter import FilterGains, System, innovations
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
 def learnt_noise(
     system: System,
-    gain: Gains,
+    gain: FilterGains,
     errors: Array,
     sigma: Array,
     h: Array,
@@ -83,7 +83,7 @@ def _force_noise(memory: float, push: Array, h: Array, j: int) -> Array:
     return g
 
 
-def _through(system: System, gain: Gains, y: Array, g: Array) -> Array:
+def _through(system: System, gain: FilterGains, y: Array, g: Array) -> Array:
     """Whitened errors (n, L, m, c) that noise of the sensors `y` (n, L, m, c) and accelerations `g`
     (n, L, j, c) make."""
     _, found = innovations(system, gain, y, g)

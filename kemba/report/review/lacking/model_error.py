@@ -12,7 +12,7 @@ from kemba.identify.compare.compare import Comparison
 from kemba.identify.compare_logs import compare_read
 from kemba.identify.problem.types import MissingForce
 from kemba.identify.workflow import check_all, model_of
-from kemba.report.review.charts import Book, Chart, Line
+from kemba.report.review.charts import Book, Chart, Curve
 from kemba.report.review.html import meter, table
 from kemba.report.review.lacking.heat import heat_table
 from kemba.report.review.tracks import PageSettings
@@ -107,7 +107,7 @@ def _band(book: Book, missing: MissingForce, k: int, clock: float) -> str:
         Chart(
             f"Missing on {channel.replace('/', ' ')}, 95 % band",
             missing.units[k],
-            [Line("missing", at(missing.force[:, k]))],
+            [Curve("missing", at(missing.force[:, k]))],
             (at(low[:, k]), at(high[:, k])),
             levels=(0.0,),
             stands=stands,

@@ -10,8 +10,8 @@ import numpy as np
 
 from kemba.model import Model
 from kemba.plotting import Machine
-from kemba.report.review.charts import Book, Chart, Line
-from kemba.report.review.events import Events, Flight
+from kemba.report.review.charts import Book, Chart, Curve
+from kemba.report.review.events import Events, FootFlight
 from kemba.report.review.html import table
 from kemba.report.review.limits.energy import Energy, energy_of, put_in
 from kemba.report.review.limits.torque_speed import torque_speed
@@ -43,7 +43,7 @@ def event_table(tracks: Sequence[Track], events: Sequence[Events | None]) -> str
     return table(title, heads, rows)
 
 
-def _touchdown(flight: Flight | None) -> str:
+def _touchdown(flight: FootFlight | None) -> str:
     if flight is None:
         return "-"
     text = _or_dash(flight.landed, 1, "s", 3)
@@ -69,7 +69,7 @@ def limit_parts(book: Book, model: Model, machine: Machine) -> list[str]:
     ):
         for leg, uses in used.items():
             lines = [
-                Line(track.name, 100.0 * _onto(book.grid, track, getattr(use, name)), i)
+                Curve(track.name, 100.0 * _onto(book.grid, track, getattr(use, name)), i)
                 for i, (track, use) in enumerate(zip(book.tracks, uses, strict=True))
             ]
             charts.append(book.add(Chart(f"{leg.title()}: {title}", "%", lines, levels=(100.0,))))
@@ -117,7 +117,7 @@ def energy_parts(book: Book, machine: Machine, certificate: Mapping[str, Any]) -
     charts = []
     for title, name in (("Work of the pistons", "pistons"), ("Work of the hips", "hips")):
         lines = [
-            Line(track.name, _onto(book.grid, track, work), i)
+            Curve(track.name, _onto(book.grid, track, work), i)
             for i, (track, one) in enumerate(zip(book.tracks, found, strict=True))
             if (work := getattr(one, name)) is not None
         ]
