@@ -55,7 +55,7 @@ def _wild(name: str, y: Array) -> np.ndarray:
     if known is None:
         return np.asarray(beyond)
     outside = (y < known[0]) | (y > known[1])
-    return np.asarray(beyond | (outside & (outside.mean() <= limits.impossible)))
+    return np.asarray(beyond | (outside & (outside.sum() <= limits.impossible * len(y))))
 
 
 def read_logs(paths: Sequence[str | Path], columns: ColumnMap | None = None) -> list[Trajectory]:
