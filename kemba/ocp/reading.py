@@ -29,7 +29,8 @@ def read_task(document: Document) -> Task:
     try:
         return parse_task(document)
     except ConfigErrors as error:
-        raise ConfigErrors([*error.errors, *_further(document)]) from None
+        told = {str(each): each for each in (*error.errors, *_further(document))}
+        raise ConfigErrors(told.values()) from None
 
 
 def _further(document: Document) -> list[KembaError]:

@@ -199,7 +199,7 @@ def test_the_path_on_stdout_and_talk_on_stderr() -> None:
     lines = done.stderr.splitlines()
     apex = load_run("runs/max_jump-1").certificate["apex_m"]
     assert apex >= 1.0 - 1e-6
-    assert lines[-1].startswith(f"solved: apex {apex:.3f} m, ")
+    assert lines[-1].startswith(f"solved: apex {apex:.3f} m (feet ")
     *stages, drawing, _ = lines
     assert stages and all("nodes)" in line for line in stages) and "drawing" in drawing
     files = {path.name for path in Path("runs/max_jump-1").iterdir()}

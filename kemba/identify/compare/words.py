@@ -27,7 +27,7 @@ VALVES = {
     "01": "the retract valve is open",
     "11": "both valves are open",
 }
-STROKE = {
+PLACES = {
     "in": ", the piston retracted",
     "mid": ", the piston in mid-stroke",
     "out": ", the piston extended",
@@ -36,7 +36,7 @@ STROKE = {
 
 def place_of(at: ConditionBin) -> str:
     """A condition: `body height while two feet stand and both valves are open`."""
-    when, stroke = WHEN.get(at.phase, f"in {at.phase}"), STROKE.get(at.region, "")
+    when, stroke = WHEN.get(at.phase, f"in {at.phase}"), PLACES.get(at.region, "")
     if not at.mode:
         return f"{quantity(at.channel)} {when}{stroke}"
     link = "and" if when.startswith("while") else "while"
