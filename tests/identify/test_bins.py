@@ -14,6 +14,7 @@ from kemba.identify.compare.bins import (
 )
 from kemba.identify.compare.tolerance import Slopes, within_tolerance
 from kemba.identify.evidence.bootstrap import NullTest
+from kemba.identify.evidence.windows import Windows, changes, rms
 from kemba.identify.problem.problem import Rows
 
 
@@ -130,3 +131,20 @@ def test_figures_may_be_off_by_their_tolerance_and_not_by_more(off: float, toler
 @pytest.mark.parametrize(("q", "significant"), [(0.009, True), (0.011, False), (0.5, False)])
 def test_one_false_discovery_in_a_hundred_is_allowed(q: float, significant: bool) -> None:
     assert ConditionBin("body/z", "flight", "00", "in", 2.0, q).significant == significant
+
+
+def test_windows_are_in_units_of_noise() -> None:
+    windows = Windows(np.array([0, 3]), np.array([2.0, 4.0]))
+    assert windows.sums(np.array([1.0, 2.0, 3.0, 8.0])).tolist() == [3.0, 2.0]
+
+
+def test_a_window_ends_with_its_condition() -> None:
+    none = np.zeros(4, dtype=int)
+    phase = np.array(["rest", "rest", "moving", "moving"])
+    mode = np.array(["00", "00", "00", "10"])
+    rows = Rows(none, none, np.arange(4.0), phase, mode, ("piston/F",), np.ones(4))
+    assert changes(rows, np.full(4, "")).tolist() == [True, False, True, True]
+
+
+def test_an_error_is_the_root_of_the_mean_square() -> None:
+    assert rms(np.array([3.0, -4.0, 0.0, 0.0])) == 2.5
