@@ -54,16 +54,20 @@ def card(folder: Path) -> str:
 
 
 def _rates(blocks: dict[str, Any], rows: list[dict[str, Any]]) -> Iterator[str]:
-    yield "| block | a plan | refined and replaying | good | 95 % Wilson interval | expected |"
-    yield "|---|---:|---:|---:|---:|---:|"
+    yield (
+        "| block | a plan | refined and replaying | from a shipped plan | good "
+        "| 95 % Wilson interval | expected |"
+    )
+    yield "|---|---:|---:|---:|---:|---:|---:|"
     for name, block in blocks.items():
         own = [row for row in rows if row["block"] == name]
         plans = sum(row["status"] in ("solved", "acceptable") for row in own)
         replaying = sum(bool(row["refined"] and row["replays"]) for row in own)
+        shipped = sum((row["start"] or "").startswith("shipped") for row in own)
         low, high = block["interval"]
         yield (
-            f"| {name} | {plans} | {replaying} | {block['succeeded']} of {block['cases']} "
-            f"({block['rate']:.1%}) | {low:.1%} to {high:.1%} | {block['expected']:.0%} |"
+            f"| {name} | {plans} | {replaying} | {shipped} "
+            f"| {block['succeeded']} of {block['cases']} ({block['rate']:.1%}) | {low:.1%} to {high:.1%} | {block['expected']:.0%} |"
         )
 
 
