@@ -67,7 +67,8 @@ def _rates(blocks: dict[str, Any], rows: list[dict[str, Any]]) -> Iterator[str]:
         low, high = block["interval"]
         yield (
             f"| {name} | {plans} | {replaying} | {shipped} "
-            f"| {block['succeeded']} of {block['cases']} ({block['rate']:.1%}) | {low:.1%} to {high:.1%} | {block['expected']:.0%} |"
+            f"| {block['succeeded']} of {block['cases']} ({block['rate']:.1%}) "
+            f"| {low:.1%} to {high:.1%} | {block['expected']:.0%} |"
         )
 
 
