@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pkgutil
 import re
 import runpy
 import shlex
@@ -102,6 +103,12 @@ def test_pages_that_the_code_names_exist() -> None:
 def test_links_lead_somewhere(page: Path) -> None:
     for link in re.findall(r"\]\(([^)#:]+)(?:#[\w-]+)?\)", page.read_text("utf-8")):
         assert (page.parent / link).exists(), f"{page.name}: {link}"
+
+
+def test_what_the_reference_takes_from_the_code_is_there() -> None:
+    for page in PAGES:
+        for name in re.findall(r"^::: ([\w.]+)$", page.read_text("utf-8"), re.MULTILINE):
+            assert pkgutil.resolve_name(name), f"{page.name}: {name}"
 
 
 def test_every_page_has_a_way_onwards() -> None:
