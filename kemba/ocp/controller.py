@@ -32,8 +32,7 @@ def controller_table(model: Model, plan: Trajectory, hold: float = 0.0) -> Traje
         for symbol in ("q", "w"):
             header = f"{leg}/hip/{symbol} [rad{'.s-1' if symbol == 'w' else ''}]"
             columns[header] = states[f"{leg}/hip/{symbol}"]
-        torque = _means(plan.time, plan[f"{leg}/hip/tau"], clock)
-        columns[f"{leg}/hip/tau [N.m]"] = np.where(ticks < lead, 0.0, torque)
+        columns[f"{leg}/hip/tau [N.m]"] = _means(plan.time, plan[f"{leg}/hip/tau"], clock)
         for chamber in ("extend", "retract"):
             name = f"{leg}/valve/{chamber}"
             columns[f"{name} [1]"] = valves[name]
@@ -49,7 +48,8 @@ def controller_table(model: Model, plan: Trajectory, hold: float = 0.0) -> Traje
 
 
 def _means(time: np.ndarray, values: np.ndarray, clock: np.ndarray) -> np.ndarray:
-    """Means over the ticks (n,) of what is values[k] on (t[k-1], t[k]]; the last value stays."""
+    """Means over the ticks (n,) of what is values[k] on (t[k-1], t[k]]: nothing before the first
+    time, and the last value stays."""
     knots = np.append(time, time[-1] + 2 * PERIOD)
     held = np.append(values[1:], values[-1])
     integral = np.concatenate([[0.0], np.cumsum(held * np.diff(knots))])
