@@ -104,7 +104,7 @@ def _candidates(
         return plan(task, document, log=a.log, start=a.start, origin=a.origin, **how)
 
     if approach.replay and task.robust > 0:
-        from kemba.report.robust import most_robust  # Dask and SciPy load for half a second
+        from kemba.report.robust import most_robust  # loads SciPy, which most plans do not need
 
         found = most_robust(
             task, lambda task: next(nearby(task), None) or solved(task), listener.tell
