@@ -8,8 +8,9 @@ from typing import Any
 
 from kemba.config import Document, parse
 from kemba.effects import Effect
+from kemba.effects.catalogue import CHAMBERS
 from kemba.errors import ConfigErrors, KembaError, listed_errors, suggest
-from kemba.model.spec import load_spec
+from kemba.model.spec import ModelSpec, load_spec
 
 Changes = Mapping[str, Mapping[str, Any]]
 
@@ -27,7 +28,7 @@ def changed_effects(
     if not changes:
         return []
     source = document or Document({"effects": dict(changes)})
-    listed = load_spec(model).effects
+    listed = _listed(load_spec(model))
     found: dict[str, Effect] = {}
     errors: list[KembaError] = []
     for key, values in changes.items():
@@ -40,6 +41,13 @@ def changed_effects(
     if errors:
         raise ConfigErrors(errors)
     return list(found.values())
+
+
+def _listed(spec: ModelSpec) -> tuple[Effect, ...]:
+    """The effects of a model: those on its list, then those of its chambers."""
+    names = {effect.name for effect in spec.effects}
+    chambers = CHAMBERS[spec.chambers or "first_order"]()
+    return (*spec.effects, *(effect for effect in chambers if effect.name not in names))
 
 
 def _named(listed: tuple[Effect, ...], key: str, model: str, source: Document) -> Effect:

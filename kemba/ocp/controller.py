@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from kemba.model import Model
+from kemba.ocp.between_nodes import course
 from kemba.ocp.edges import ValveEdges, rounded
 from kemba.trajectory import Trajectory
 
@@ -29,9 +30,8 @@ def controller_table(model: Model, plan: Trajectory, hold: float = 0.0) -> Traje
     columns: dict[str, np.ndarray] = {}
     states, valves = plan.interpolate(clock), _valves(model, plan, lead, len(ticks))
     for leg in model.mechanism.legs:
-        for symbol in ("q", "w"):
-            header = f"{leg}/hip/{symbol} [rad{'.s-1' if symbol == 'w' else ''}]"
-            columns[header] = states[f"{leg}/hip/{symbol}"]
+        q, w = course(plan, f"{leg}/hip/q", f"{leg}/hip/w", clock)
+        columns |= {f"{leg}/hip/q [rad]": q, f"{leg}/hip/w [rad.s-1]": w}
         columns[f"{leg}/hip/tau [N.m]"] = _means(plan.time, plan[f"{leg}/hip/tau"], clock)
         for chamber in ("extend", "retract"):
             name = f"{leg}/valve/{chamber}"

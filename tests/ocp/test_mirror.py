@@ -92,7 +92,7 @@ def test_tasks(planning: Model, override: str, symmetric: bool) -> None:
     assert requirements_are_symmetric(planning, resolve(task, planning, document)) is symmetric
 
 
-def test_wishes_of_both_legs_alike(planning: Model) -> None:
+def test_equal_requirements_of_both_legs(planning: Model) -> None:
     """Of a jump ahead all but the way ahead, with hips at odds with each other not theirs."""
     hips = "start={front/hip/q: -1.1, rear/hip/q: 1.2, body/x: 0 m}"
     task, document = load_task("jump_forward.yaml", [hips])

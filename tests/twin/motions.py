@@ -6,7 +6,7 @@ import numpy as np
 
 from .figures import STANCE_Z
 from .layout import knees
-from .plan import Sight, Wish, fold_of, length_of, record, slope_of
+from .plan import Sight, Demand, fold_of, length_of, record, slope_of
 from .run import Truth
 from .scripts import (
     FRONT_E,
@@ -57,19 +57,19 @@ class Leaper:
             if not self.pushes:
                 self.done = see.t + 0.1
 
-    def __call__(self, see: Sight) -> Wish:
+    def __call__(self, see: Sight) -> Demand:
         t = see.t - self.since
         if self.phase in ("wait", "rest"):
             if self.pushes and t >= self.wait:
                 self._enter("push", see)
-            return Wish(valves=(0, 0, 0, 0))
+            return Demand(valves=(0, 0, 0, 0))
         if self.phase == "push":
             return self._push(see, t)
         if self.phase == "air":
             return self._air(see, t)
         return self._land(see, t)
 
-    def _push(self, see: Sight, t: float) -> Wish:
+    def _push(self, see: Sight, t: float) -> Demand:
         length = self.pushes[0]
         on = [int(self.skew[n] <= t < length + self.skew[n]) for n in range(2)]
         if t > length and see.airborne:
@@ -79,9 +79,9 @@ class Leaper:
             self.pushes.pop(0)
             self._enter("land", see)
         lean = -self.lean * min(1.0, t / 0.15)
-        return Wish(valves=(on[0], 0, on[1], 0), hip_offset=(lean, lean))
+        return Demand(valves=(on[0], 0, on[1], 0), hip_offset=(lean, lean))
 
-    def _air(self, see: Sight, t: float) -> Wish:
+    def _air(self, see: Sight, t: float) -> Demand:
         if t > 0.03 and see.feet[:, 1].min() < 3e-4 and see.w[1] < 0.0:
             self._enter("land", see)
         drop = max(see.y[1] - length_of(min(self.land)), 0.0)
@@ -94,13 +94,13 @@ class Leaper:
             hips = tuple(a + blend * (b - a) for a, b in zip(self.from_hips, target, strict=True))
             rates = tuple(slope * (b - a) for a, b in zip(self.from_hips, target, strict=True))
         if left < 0.05:
-            return Wish(valves=(1, 0, 1, 0), hips=hips, hip_rates=rates, airborne=True)
+            return Demand(valves=(1, 0, 1, 0), hips=hips, hip_rates=rates, airborne=True)
         wanted = self.land
         if self.tuck is not None and left > 0.16:
             wanted = (self.tuck, self.tuck)
-        return Wish(x=wanted, hips=hips, hip_rates=rates, airborne=True, stiff=25.0)
+        return Demand(x=wanted, hips=hips, hip_rates=rates, airborne=True, stiff=25.0)
 
-    def _land(self, see: Sight, t: float) -> Wish:
+    def _land(self, see: Sight, t: float) -> Demand:
         z, speed, skew, brake = self.sink
         stop = max(-speed, 0.0) / brake
         height = z + speed * min(t, stop) + 0.5 * brake * min(t, stop) ** 2
@@ -110,11 +110,11 @@ class Leaper:
         height += (STANCE_Z + 0.004 - height) * min(slow, 1.0)
         if slow > 1.3:
             self._enter("rest", see)
-            return Wish(valves=(0, 0, 0, 0))
+            return Demand(valves=(0, 0, 0, 0))
         x = piston_of(height)
         v = rate / slope_of(x)
         back = self.lean * max(0.0, 1.0 - 2.0 * slow)
-        return Wish(
+        return Demand(
             x=(x + skew, x - skew), v=(v, v), hip_offset=(back, back), stiff=20.0, both=self.both
         )
 
@@ -181,7 +181,7 @@ class Squats:
         wave = 0.5 - 0.5 * np.cos(2 * np.pi * phase)
         return STANCE_Z + wave * (self.depth + sign * self.tilt)
 
-    def __call__(self, see: Sight) -> Wish:
+    def __call__(self, see: Sight) -> Demand:
         t = see.t - self.begin
         if t > self.period + self.pause:
             self.begin = see.t
@@ -190,7 +190,7 @@ class Squats:
         now = [piston_of(self._length(t, s)) for s in (1.0, -1.0)]
         before = [piston_of(self._length(t - 1e-3, s)) for s in (1.0, -1.0)]
         resting = t < 0.0 or t > self.period - 0.03
-        return Wish(
+        return Demand(
             x=(now[0], now[1]),
             v=((now[0] - before[0]) / 1e-3, (now[1] - before[1]) / 1e-3),
             valves=(0, 0, 0, 0) if resting else None,

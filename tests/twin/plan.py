@@ -42,7 +42,7 @@ class Sight:
 
 
 @dataclass
-class Wish:
+class Demand:
     """What the planner wants: per leg a piston reference (or fixed valves), and hip angles."""
 
     x: tuple[float, float] = (0.0, 0.0)
@@ -69,20 +69,22 @@ def length_of(x: float) -> float:
     return float(np.interp(x, _X, _L))
 
 
-def knee_rule(leg: int, wish: Wish, see: Sight) -> tuple[bool, bool]:
+def knee_rule(leg: int, demand: Demand, see: Sight) -> tuple[bool, bool]:
     """Extend, retract: on/off so that the force chases what the reference asks for."""
     x, v = see.y[5 + leg], see.w[5 + leg]
     ahead = x + 0.01 * v
     gear = slope_of(ahead)
-    mass = _KNEE_MASS + (0.0 if wish.airborne else _HALF_MASS * gear**2)
-    weight = 0.0 if wish.airborne else _HALF_WEIGHT * gear
-    accel = wish.stiff**2 * (wish.x[leg] - ahead) + 1.6 * wish.stiff * (wish.v[leg] - v)
+    mass = _KNEE_MASS + (0.0 if demand.airborne else _HALF_MASS * gear**2)
+    weight = 0.0 if demand.airborne else _HALF_WEIGHT * gear
+    accel = demand.stiff**2 * (demand.x[leg] - ahead) + 1.6 * demand.stiff * (demand.v[leg] - v)
     force = mass * accel + weight + 40.0 * v
     extend = force > see.force[leg, 0] + 15.0
-    if wish.both and 0.0 < force < 150.0:
+    if demand.both and 0.0 < force < 150.0:
         return True, True
     # retract only when clearly asked for, or with both valves on as a brake
-    retract = force < -60.0 - see.force[leg, 1] or (force < 60.0 and v > 0.25 and not wish.airborne)
+    retract = force < -60.0 - see.force[leg, 1] or (
+        force < 60.0 and v > 0.25 and not demand.airborne
+    )
     return bool(extend), bool(retract)
 
 
@@ -90,7 +92,7 @@ def record(
     name: str,
     ticks: np.ndarray,
     start: Start,
-    goal: Callable[[Sight], Wish],
+    goal: Callable[[Sight], Demand],
     kp: float = KP,
     kd: float = KD,
     stop: Callable[[Sight], bool] | None = None,
@@ -111,8 +113,8 @@ def record(
         if stop is not None and stop(see):
             n = k
             break
-        wish = goal(see)
-        want = wish.valves or [w for leg in range(2) for w in knee_rule(leg, wish, see)]
+        demand = goal(see)
+        want = demand.valves or [w for leg in range(2) for w in knee_rule(leg, demand, see)]
         for i in range(4):
             before = sent[k - 1, i] if k else 0.0
             sent[k, i] = before
@@ -124,7 +126,7 @@ def record(
             break
         due = [e for e in pending if e[0] < ticks[k + 1]]
         pending = [e for e in pending if e[0] >= ticks[k + 1]]
-        row = _row(wish, kp, kd)
+        row = _row(demand, kp, kd)
         *_, command, _ = machine.integrate(
             y, u, anchor, ticks[k : k + 2], 1, STEP, np.stack([row, row]), no_push,
             np.array(due, dtype=float).reshape(-1, 3), robot.mass, robot.inertia, figures,
@@ -145,15 +147,15 @@ def _look(t: float, y: np.ndarray) -> Sight:
     return Sight(float(t), pose, rate, layout.feet(y[:NQ]), air)
 
 
-def _row(wish: Wish, kp: float, kd: float) -> np.ndarray:
+def _row(demand: Demand, kp: float, kd: float) -> np.ndarray:
     row = np.zeros(R_COUNT)
     row[R_KP], row[R_KD] = kp, kd
-    if wish.hips is None:
+    if demand.hips is None:
         row[R_FOLLOW] = 1.0
-        row[R_Q : R_Q + 2] = wish.hip_offset
+        row[R_Q : R_Q + 2] = demand.hip_offset
     else:
-        row[R_Q : R_Q + 2] = wish.hips
-        row[R_QD : R_QD + 2] = wish.hip_rates
+        row[R_Q : R_Q + 2] = demand.hips
+        row[R_QD : R_QD + 2] = demand.hip_rates
     return row
 
 
