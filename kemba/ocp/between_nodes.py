@@ -6,8 +6,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from kemba.ocp.phases.notes import LETTERS, PHASE
 from kemba.ocp.phases.modes import OPEN
+from kemba.ocp.phases.notes import LETTERS, PHASE
 from kemba.trajectory import Array, Trajectory
 
 

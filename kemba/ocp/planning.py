@@ -106,10 +106,17 @@ def _origin(entry: Entry, task: Task) -> Origin:
 
 
 def plan_from(
-    origin: Origin, task: Task, document: Document | None = None
+    origin: Origin,
+    task: Task,
+    document: Document | None = None,
+    log: Path | None = None,
+    tell: Tell = silent,
+    watch: Watch | None = None,
+    stop: Callable[[], bool] | None = None,
 ) -> tuple[Plan | None, str]:
     """A task's plan from another plan, or None and the reason where that fails."""
-    return continued(_job(task, document, None, Control(_deadline(task))).planner, origin)
+    control = Control(_deadline(task), log, watch, stop)
+    return continued(_job(task, document, None, control, tell).planner, origin)
 
 
 @dataclass(frozen=True)

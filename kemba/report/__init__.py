@@ -1,6 +1,7 @@
 """What verbs write: run folders filled with results, certificates and figures."""
 
-from kemba.report.best import Approach, Listener
+from kemba.report.best import Approach
+from kemba.report.listener import Listener
 from kemba.report.solving import solve_into
 
 __all__ = ["Approach", "Listener", "solve_into"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,24 +11,15 @@ from kemba.config import Document
 from kemba.ocp import Plan, Task, plan
 from kemba.ocp.continuation.between import Origin
 from kemba.ocp.known import compared
-from kemba.ocp.nlp.watcher import Watch
 from kemba.ocp.planning import plans_nearby
 from kemba.ocp.starts import plan_best
 from kemba.report.executed import Begun, Executed, executed
-from kemba.stopwatch import Tell, silent
+from kemba.report.listener import Listener
+from kemba.report.matched import matched
 from kemba.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from kemba.report.executed import Candidate
-
-
-@dataclass(frozen=True)
-class Listener:
-    """What is called at each stage and iteration, and what may ask to stop."""
-
-    tell: Tell = silent
-    watch: Watch | None = None
-    stop: Callable[[], bool] | None = None
 
 
 @dataclass(frozen=True)
@@ -80,6 +71,9 @@ def best_plan(
         if other is None:
             break
         best, last = max(best, other, key=lambda made: made.rank), other
+    if not best.good and approach.replay:
+        for last in matched(best, task, document, listener, begun, approach.log, place):
+            best = last if last.good else best
     if best is not last and best.motions.table is not None:
         begun(best.plan.trajectory)
     known, remark = compared(best.plan)

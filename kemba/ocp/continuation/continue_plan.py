@@ -23,8 +23,7 @@ from kemba.ocp.phases.modes import Phase
 from kemba.ocp.phases.notes import noted_phases
 from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.radau import RADAU5
-from kemba.ocp.phases.settings import Elements, Refining
-from kemba.ocp.phases.ticks import add_ticks
+from kemba.ocp.phases.settings import Elements
 from kemba.ocp.phases.stretched import extending, stretched
 from kemba.ocp.refinement.refine import Refined, Refiner, reduction_of, refine, valve_columns
 from kemba.ocp.refinement.sample import certificate, to_trajectory
@@ -143,18 +142,9 @@ class Continuation:
         self.tell(f"from {self.origin.name}: the best one")
         for weight in (0.0, Continuing.current().close):
             best = self._solved(1.0, near.trajectory, phases, reduction, weight)
-            if best.ending.cut_short:
+            if best.ending.cut_short or (best.done and self._cost(best) <= self._cost(near)):
                 return best
-            if best.done and self._cost(best) <= self._cost(near):
-                return self._on_ticks(best, phases, reduction)
-        return self._on_ticks(near, phases, reduction)
-
-    def _on_ticks(self, found: Refined, phases: list[Phase], reduction: Reduction) -> Refined:
-        """The plan with valves that switch on the controller's ticks; as it is where that fails."""
-        assert found.trajectory is not None
-        near = Refining.current().near_fine
-        ticked = self._solved(1.0, found.trajectory, phases, reduction, near, ticks=True)
-        return ticked if ticked.done else found
+        return near
 
     def _cost(self, found: Refined) -> float:
         assert found.trajectory is not None
@@ -167,17 +157,13 @@ class Continuation:
         phases: list[Phase],
         reduction: Reduction,
         weight: float,
-        ticks: bool = False,
     ) -> Refined:
-        """The plan at `share` of the change from a trajectory, with a proximal `weight`; `ticks`:
-        valves switch on those of the controller."""
+        """The plan at `share` of the change from a trajectory, with a proximal `weight`."""
         model = model_between(self.origin.model, self.model, share)
         asked = requirements_between(self.origin.requirements, self.requirements, share)
         refiner = Refiner(model, self.task, asked, start, reduction, self.control)
         program, x = refiner.build(phases, start, RADAU5)
         program.keep_short(x, Elements.current().fair)
-        if ticks:
-            add_ticks(program, x)
         if weight:
             x = program.proximal(x, weight)
         most = min(Continuing.current().iterations, self.task.solver.max_iterations)

@@ -20,7 +20,6 @@ from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.radau import RADAU3, RADAU5, STATE, Scheme
 from kemba.ocp.phases.requirements import add_requirements
 from kemba.ocp.phases.settings import Elements, Refining, Repair
-from kemba.ocp.phases.ticks import add_ticks
 from kemba.ocp.refinement.repair import misfit, repaired, simplified
 from kemba.ocp.refinement.sample import certificate, to_trajectory
 from kemba.ocp.refinement.solve import rough, solve, warm
@@ -210,24 +209,18 @@ class Refiner:
 
     def fine(self, coarser: PhaseProgram, x: np.ndarray) -> Refined:
         """The exact program with the finer scheme, from a solution `x` (size,) with the coarser
-        one; valves switch on the controller's ticks, unless that does not solve."""
+        one."""
         self.tell(Stage("phases: the best plan, more exactly", 3, SOLVES))
-        settings, ended = Refining.current(), Refined(None, None, Ending.GAVE_UP, self.iterations)
-        for ticks in (True, False):
-            program, _ = self.build(coarser.phases, self.plan, RADAU5)
-            start = carried(program, coarser, x)
-            if ticks and not add_ticks(program, start):
-                continue
-            start = program.proximal(start, settings.near_fine)
-            found = self._solve(program, start, warm(settings.rough_iterations))
-            ended = self._ended(program, found)
-            if found.solved:
-                trajectory = to_trajectory(program, found.Y)
-                measured = certificate(program, found.Y, trajectory)
-                return replace(ended, trajectory=trajectory, certificate=measured)
-            if ended.done:
-                break
-        return ended
+        settings = Refining.current()
+        program, _ = self.build(coarser.phases, self.plan, RADAU5)
+        start = program.proximal(carried(program, coarser, x), settings.near_fine)
+        found = self._solve(program, start, warm(settings.rough_iterations))
+        ended = self._ended(program, found)
+        if not found.solved:
+            return ended
+        trajectory = to_trajectory(program, found.Y)
+        measured = certificate(program, found.Y, trajectory)
+        return replace(ended, trajectory=trajectory, certificate=measured)
 
     def build(
         self, phases: Sequence[Phase], start: Trajectory, scheme: Scheme, elastic: float = 0.0

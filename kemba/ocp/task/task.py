@@ -132,6 +132,8 @@ class Task(Section):
     how high the feet are at the top, and `height` is that and a stretched leg.
     `effects` changes parameters of the model's effects, by name or by place in its list:
     `{contact: {mu: 0.6}}`.
+    `fit_air`: where the plant does not move as planned, the air of the model is fitted to its
+    motion and the plan made again.
     `robust`: by how many scenarios, drawn from the file `uncertainties`, plans are chosen.
     """
 
@@ -165,6 +167,7 @@ class Task(Section):
     min_dwell: Annotated[float, Param("s", lower=0.0, doc="of a valve between switches")] = 0.01
     method: Literal["relaxation", "penalty", "penalty_ramped"] = "relaxation"
     refine: Literal["none", "radau"] = "radau"
+    fit_air: bool = True
     solver: Solver = Field(default_factory=Solver)
     tolerances: Tolerances = Field(default_factory=Tolerances)
 

@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 
 from kemba.effects import Effect
-from kemba.errors import KembaError
 from kemba.model import Model
 from kemba.plant.execution.controller import execute
 from kemba.plant.execution.replay import LandingSettings
@@ -43,9 +42,19 @@ class AirFitSettings(Settings):
     other: float = setting(0.2, "1", "the same for rise times and damping", CHOSEN)
     most: float = setting(3.0, "1", "sigmas by which a factor may differ from 1", CHOSEN)
     prior: float = setting(
-        3.0, "1", "weight of the factors beside the motion: one sigma is an error of so many", CHOSEN
+        3.0,
+        "1",
+        "weight of the factors: one sigma counts as an error of so many",
+        CHOSEN,
     )
     steps: int = setting(3, "1", "Gauss-Newton steps at most", CHOSEN)
+    shares: tuple[float, ...] = setting(
+        (1.0, 0.5, 0.25), "1", "of a step that are tried", "convention: halved twice"
+    )
+    falls: float = setting(
+        0.9, "1", "times the error that a step must leave at most to be worth another", CHOSEN
+    )
+    told: float = setting(5e-3, "1", "smaller changes are not told", "convention: half a percent")
     secant: float = setting(0.01, "1", "step of a factor for its slope", CHOSEN)
 
 
@@ -61,38 +70,61 @@ class FittedAir:
     def changes(self, model: Model) -> dict[str, dict[str, Any]]:
         """The figures of `model` times these factors, as the `effects` of a task."""
         return {
-            e.name: {f: getattr(e, f) for f in FIGURES[e.name]}
+            e.name: {figure: _rounded(getattr(e, figure)) for figure in FIGURES[e.name]}
             for e in _scaled(model, np.array([*self.factors.values()]))
         }
 
+    def summary(self) -> dict[str, Any]:
+        """The figures of the certificate."""
+        return {"factors": dict(self.factors), "before": self.before, "after": self.after}
 
-def fitted_air(model: Model, table: Trajectory, plant: Trajectory) -> FittedAir | None:
-    """The air of `model` for which the executed `table` moves as `plant`, the plant's execution of it.
+    @property
+    def sentence(self) -> str:
+        """What was changed, in words."""
+        told = [
+            f"{name.partition('.')[2]} {100 * (factor - 1):+.0f} %"
+            for name, factor in self.factors.items()
+            if abs(factor - 1) >= AirFitSettings.current().told
+        ]
+        figures = ", ".join(told) or "hardly changed"
+        return f"the air of its model is fitted to the simulated robot ({figures})"
 
-    Compared are the body, the hips and the pistons, up to the first landing. None where the model
-    has no first-order chambers. Raises KembaError where the table cannot be executed.
+
+def _rounded(figure: Any) -> Any:
+    """A figure with five digits, so that the task file can be read."""
+    if isinstance(figure, Sequence):
+        return [_rounded(value) for value in figure]
+    return float(f"{figure:.5g}")
+
+
+def fitted_air(
+    model: Model, table: Trajectory, plant: Trajectory, start: FittedAir | None = None
+) -> FittedAir | None:
+    """The air of `model` for which the executed `table` moves as `plant`, its execution there.
+
+    Compared are the body, the hips and the pistons, up to the first landing. `start`: an earlier
+    fit to begin from. None where the model has no first-order chambers. Raises KembaError where the
+    table cannot be executed.
     """
-    names = [effect.name for effect in model.effects]
-    if any(name not in names for name in FIGURES):
+    listed = [effect.name for effect in model.effects]
+    if any(name not in listed for name in FIGURES):
         return None
     settings = AirFitSettings.current()
-    motion = _Motion.of(model, table, plant)
     usual = np.array([settings.force if f in FORCES else settings.other for _, f in _listed()])
-    factors = np.ones(len(usual))
+    factors = np.array([*start.factors.values()]) if start else np.ones(len(usual))
+    motion = _Motion.of(model, table, plant, factors)
     first = error = motion.error(factors)
     for _ in range(settings.steps):
-        columns = [motion.error(factors + step) - error for step in settings.secant * np.eye(len(usual))]
-        weights = settings.prior / usual
-        A = np.vstack([np.column_stack(columns) / settings.secant, np.diag(weights)])
-        b = np.concatenate([-error, weights * (1.0 - factors)])
-        step = np.linalg.lstsq(A, b, rcond=None)[0]
+        step = motion.step(factors, error, usual)
+        shares = (factors + share * step for share in settings.shares)
         limits = settings.most * usual
-        trial = np.clip(factors + step, 1.0 - limits, 1.0 + limits)
-        new = motion.error(trial)
-        if not _norm(new) < _norm(error):
+        tried = ((k, motion.error(k)) for k in (np.clip(k, 1 - limits, 1 + limits) for k in shares))
+        nearer = next(((k, e) for k, e in tried if _norm(e) < settings.falls * _norm(error)), None)
+        if nearer is None:
             break
-        factors, error = trial, new
-    found = {f"{name}.{figure}": float(k) for (name, figure), k in zip(_listed(), factors, strict=True)}
+        factors, error = nearer
+    names = [f"{name}.{figure}" for name, figure in _listed()]
+    found = dict(zip(names, factors.tolist(), strict=True))
     return FittedAir(found, _norm(first), _norm(error))
 
 
@@ -130,22 +162,37 @@ class _Motion:
     times: Array
 
     @classmethod
-    def of(cls, model: Model, table: Trajectory, plant: Trajectory) -> _Motion:
+    def of(cls, model: Model, table: Trajectory, plant: Trajectory, factors: Array) -> _Motion:
         s = AirFitSettings.current()
         units = {"body/x": s.height, "body/z": s.height, "body/vz": s.speed, "body/pitch": s.joint}
         for leg in model.mechanism.legs:
             units |= {f"{leg}/hip/q": s.joint, f"{leg}/piston/x": s.piston}
-        own = execute(table, model).trajectory
+        own = execute(table, model.with_effects(_scaled(model, factors))).trajectory
         until = min(_lands(model, motion) for motion in (own, plant))
         return cls(model, table, plant, units, np.arange(s.every, until, s.every))
+
+    def step(self, factors: Array, error: Array, usual: Array) -> Array:
+        """The Gauss-Newton step of the factors (n,), drawn towards 1 by how far they `usual`ly are
+        from it; `error` is that of the factors."""
+        settings = AirFitSettings.current()
+        moved = factors + settings.secant * np.eye(len(factors))
+        slopes = [(self.error(each) - error) / settings.secant for each in moved]
+        weights = settings.prior / usual
+        A = np.vstack([np.column_stack(slopes), np.diag(weights)])
+        b = np.concatenate([-error, weights * (1.0 - factors)])
+        found: Array = np.linalg.lstsq(A, b, rcond=None)[0]
+        return found
 
     def error(self, factors: Array) -> Array:
         """Simulated minus the plant's, in the units of each column (columns x times)."""
         model = self.model.with_effects(_scaled(self.model, factors))
         motion = execute(self.table, model).trajectory
         rows = [
-            (np.interp(self.times, motion.time, motion[name])
-            - np.interp(self.times, self.plant.time, self.plant[name])) / unit
+            (
+                np.interp(self.times, motion.time, motion[name])
+                - np.interp(self.times, self.plant.time, self.plant[name])
+            )
+            / unit
             for name, unit in self.units.items()
         ]
         return np.concatenate(rows)
@@ -156,5 +203,6 @@ def _lands(model: Model, motion: Trajectory) -> float:
     low = LandingSettings.current().on_ground
     feet = np.min([motion[f"{leg}/foot/z"] for leg in model.mechanism.legs], axis=0)
     apex = int(np.argmax(motion["body/z"]))
-    comes = np.flatnonzero((feet[:-1] > low) & (feet[1:] <= low) & (np.arange(len(feet) - 1) >= apex))
+    down = np.flatnonzero((feet[:-1] > low) & (feet[1:] <= low))
+    comes = down[down >= apex]
     return float(motion.time[comes[0]] if len(comes) else motion.time[-1])

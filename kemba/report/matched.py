@@ -1,0 +1,98 @@
+"""A plan that the plant executes as planned: the air of its model fitted to the plant's motion.
+
+Eq. 4 to 7 with Tables I and II differ from eq. 1 to 3 by a few percent of force. That changes the
+take-off by 0.1 m/s, and the touchdown by 20 ms. No table of commands can make up for it, but a plan
+can be made with figures that hold along its own motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+from kemba.config import Document
+from kemba.errors import KembaError
+from kemba.ocp import Plan, Task
+from kemba.ocp.continuation.between import Origin
+from kemba.ocp.planning import plan_from
+from kemba.ocp.reading import task_model
+from kemba.plant.execution.fitted_air import FittedAir, fitted_air
+from kemba.report.executed import Begun, Executed, executed
+from kemba.report.listener import Listener
+from kemba.settings import Settings, setting
+
+
+class MatchSettings(Settings):
+    """How often a plan is made again with fitted air."""
+
+    rounds: int = setting(
+        3, "1", "fits at most; of 12 jumps that missed, 7 were good after one", "tuned: by hand"
+    )
+
+
+def matched(
+    first: Executed,
+    task: Task,
+    document: Document,
+    listener: Listener,
+    begun: Begun,
+    log: Path | None = None,
+    place: str = "",
+) -> Iterator[Executed]:
+    """Plans of a task with fitted air, each executed, until one is good.
+
+    Nothing where the plan fails by itself, the task says `fit_air: false`, or its model has no
+    first-order chambers.
+    """
+    now, fit = first, None
+    for _ in range(MatchSettings.current().rounds):
+        fit = _fitted(now, task, fit)
+        if fit is None or now.good:
+            return
+        listener.tell("the air of the plan's model, fitted to the simulated robot")
+        new = _planned(now.plan, fit, task, document, listener, log)
+        if new is None:
+            return
+        now = executed(new, None, None, True, listener.tell, begun, place)
+        now.result["fitted_air"] = fit.summary()
+        now.result["sentence"] += f"; {fit.sentence}"
+        yield now
+
+
+def _fitted(now: Executed, task: Task, earlier: FittedAir | None) -> FittedAir | None:
+    """The air of the task's model fitted to the plant's motion; None where the plan itself fails or
+    nothing can be fitted."""
+    done, table = now.judged, now.motions.table
+    if not task.fit_air or not now.plan.refined or done is None or not done.replays:
+        return None
+    if done.motion is None or table is None:
+        return None
+    try:
+        return fitted_air(task_model(task), table, done.motion, earlier)
+    except KembaError:
+        return None
+
+
+def _planned(
+    old: Plan, fit: FittedAir, task: Task, document: Document, listener: Listener, log: Path | None
+) -> Plan | None:
+    """The plan continued with fitted air; None where that fails."""
+    changes = {name: dict(values) for name, values in task.effects.items()}
+    for name, values in fit.changes(task_model(task)).items():
+        changes[name] = {**changes.get(name, {}), **values}
+    asked = task.model_copy(update={"effects": changes})
+    origin = Origin(old.trajectory, old.model, old.requirements, "the plan before", once=True)
+    watch, stop = listener.watch, listener.stop
+    new, _ = plan_from(origin, asked, document, log, listener.tell, watch, stop)
+    if new is None:
+        return None
+    return replace(
+        new,
+        attempts=old.attempts + new.attempts,
+        solve_s=old.solve_s + new.solve_s,
+        solve_cpu_s=old.solve_cpu_s + new.solve_cpu_s,
+        build_s=old.build_s + new.build_s,
+        continued=old.continued,
+        start=old.start,
+    )
