@@ -136,7 +136,9 @@ def learn(asked: Asked, folder: RunFolder, listener: Listener) -> Round:
     old = load_task(run.task)[0]
     found = _learnt(asked, past, run, old, folder, listener.tell)
     task, document = load_task(asked.target, list(asked.overrides))
-    task = task.model_copy(update={"model": found.model, "plant": beside(task.plant, Path())})
+    # what the logs teach is the model; fitted to the shipped plant it would be another one
+    update = {"model": found.model, "plant": beside(task.plant, Path()), "fit_air": False}
+    task = task.model_copy(update=update)
     if asked.correct:
         found = replace(found, correction=correction_from(found.executed, found.simulated))
     return _planned(found, task, document, folder, listener)

@@ -43,7 +43,7 @@ def test_the_plant_is_changed_too(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("option", "words"),
     [
-        ("effects.contakt.mu=0.6", "has no effect 'contakt'; 0 to 4, or a name on its list, was"),
+        ("effects.contakt.mu=0.6", "has no effect 'contakt'; 0 to 6, or a name on its list, was"),
         ("effects[9].mu=0.6", "has no effect '9'"),
         ("effects.contact.mew=0.6", "mew: unknown key"),
         ("effects.contact.mu=3 m", "mu: '3 m' is a length"),
