@@ -6,7 +6,7 @@ import numpy as np
 
 from .figures import STANCE_Z
 from .layout import knees
-from .plan import Sight, Demand, fold_of, length_of, record, slope_of
+from .plan import Demand, Sight, fold_of, length_of, record, slope_of
 from .run import Truth
 from .scripts import (
     FRONT_E,
