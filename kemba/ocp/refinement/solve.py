@@ -20,7 +20,7 @@ def solve(
     own = {**program.task.solver.options, **exact(), **options}
     elastic = program.elastic > 0.0  # such a program has a solution
     longest = np.inf if elastic else settings.stagnation_iterations
-    stagnation = Stagnation(longest, settings.stagnation_near)
+    stagnation = Stagnation(longest, settings.stagnation_near, settings.slow)
     return Ipopt(program, own, control).solve(Iterate(start), stagnation=stagnation)
 
 
