@@ -178,6 +178,10 @@ class RobotProblem(Problem):
         """Whitened (predicted - measured) (n,), rows as `rows` describes them."""
         return self.state.pick(self.state.residuals([theta]), runs)[:, 0]
 
+    def residuals(self, thetas: Sequence[Theta]) -> Array:
+        """The same (n, c) at each theta; the filter takes them side by side."""
+        return self.state.pick(self.state.residuals(thetas))
+
     def jacobian(
         self, theta: Theta, names: Iterable[str], runs: Collection[int] | None = None
     ) -> Array:
@@ -236,12 +240,8 @@ class RobotProblem(Problem):
         """Per channel, measured minus predicted (k,) in its unit, over short times that begin on
         the measured motion; contact forces are the data's."""
         state, batch = self.state, self.batch
-        steps = max(
-            2,
-            round(
-                RobotProblemSettings.current().predicted / float(np.median(batch.h[batch.valid]))
-            ),
-        )
+        row = float(np.median(batch.h[batch.valid]))
+        steps = max(2, round(RobotProblemSettings.current().predicted / row))
         y = np.nan_to_num(state.measurement(theta))
         g = state.motion.extend(state.acceleration(theta)[..., None])[..., 0]
         errors = predicted_error(state.motion.system, y, g, steps)

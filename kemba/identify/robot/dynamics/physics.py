@@ -11,6 +11,7 @@ import numpy as np
 
 from kemba.identify.problem.nominal import leg_by_leg, link_figures, nominal_figures
 from kemba.identify.robot.dynamics.air import StateRunner
+from kemba.identify.robot.dynamics.samples import SampleMap
 from kemba.mechanism.robot import link_regressors
 from kemba.model.model import Model
 from kemba.model.rest import rate_of
@@ -70,7 +71,7 @@ class Physics:
         self.states = StateRunner([node.q, node.v, node.s, node.u, p], rate, states)
         self.lengths = np.array([n.startswith("geometry:") for n in self.names])
         self.grip = grip
-        self._maps: dict[tuple[str, int], ca.Function] = {}
+        self._maps: dict[str, SampleMap] = {}
 
     def _bounds(self, figures: Mapping[str, tuple[float, float]]) -> tuple[Array, Array]:
         """Smallest and largest value (k,) of every parameter; of `figures` what a linear estimate
@@ -125,21 +126,11 @@ class Physics:
             bends[row // rows, column] = True
         return ~(np.diag(bends) | self.moves), bends
 
-    def call(self, name: str, *args: Array | ca.DM, p: Array | None = None) -> list[Array]:
-        """Function `name` over samples (N, .), or (., N) as `prepared` makes them: arrays
-        (N, rows) or (N, rows, columns)."""
-        given = [a if isinstance(a, ca.DM) else prepared(a) for a in args]
-        function, count = self.functions[name], given[0].shape[1]
-        if (name, count) not in self._maps:
-            fixed = [len(args)] if p is not None else []
-            self._maps[name, count] = function.map(f"{name}_map", "serial", count, fixed, [])
-        answers = self._maps[name, count].call(given + ([ca.DM(p)] if p is not None else []))
-        blocks = []
-        for i, answer in enumerate(answers):
-            rows, columns = function.size_out(i)
-            block = np.asarray(answer.full()).reshape(rows, count, columns).transpose(1, 0, 2)
-            blocks.append(block[:, :, 0] if columns == 1 else block)
-        return blocks
+    def call(self, name: str, *samples: Array, p: Array | None = None) -> list[Array]:
+        """Function `name` over samples (N, .): arrays (N, rows) or (N, rows, columns)."""
+        if name not in self._maps:
+            self._maps[name] = SampleMap(self.functions[name])
+        return self._maps[name](samples, p)
 
     def knees(self, pistons: Array, p: Array) -> Array:
         """Knee coordinates (n, legs) of piston extensions (n, legs) at parameters p (k,)."""
@@ -164,8 +155,3 @@ class Physics:
         for i, leg in enumerate(self.legs):
             rows[f"{leg}/valve/extend"], rows[f"{leg}/valve/retract"] = valves[2 * i : 2 * i + 2]
         return np.stack([rows[name] for name in self.inputs])
-
-
-def prepared(samples: Array) -> ca.DM:
-    """Samples (N, .) as the functions take them."""
-    return ca.DM(np.ascontiguousarray(samples.T))
