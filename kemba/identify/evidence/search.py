@@ -125,7 +125,7 @@ class Search:
         nothing."""
         count = len(self.problem.candidates)
         null = self.points[NULL].log_evidence + log_prior(NULL, count)
-        tables = {h: e for h, e in self.base.table.items() if h in self.points and len(h) == 1}
+        tables = {h: e for h, e in self._singles().items() if h in self.points}
         first = max(tables, key=tables.__getitem__, default=NULL)
         better = first and tables[first] + log_prior(first, count) > null
         return first if better else NULL
@@ -165,13 +165,17 @@ class Search:
                 self.visit((structure,))
         return self.best()
 
+    def _singles(self) -> dict[Hypothesis, float]:
+        """Linear evidence of every single effect."""
+        return {h: e for h, e in self.base.table.items() if len(h) == 1}
+
     def _extensions(self, given: Hypothesis) -> dict[Hypothesis, float]:
         """Linear evidence of `given` plus one effect. The members of a pair that is much better
         than any single effect count as much as the best single effect."""
         if given != NULL:
             ranker = self.base.ranker(self.points[given].linear)
             return ranker.table((len(given) + 1,), given=given)
-        single: dict[Hypothesis, float] = {h: e for h, e in self.base.table.items() if len(h) == 1}
+        single = self._singles()
         base = max(single.values())
         pairs = [h for h in self.base.table if len(h) == 2]
         best_pair = max(pairs, key=self.base.table.__getitem__, default=NULL)
@@ -288,7 +292,7 @@ class Search:
     def probabilities(self, dismissed: Collection[Hypothesis] = ()) -> dict[Hypothesis, float]:
         """Of all refitted hypotheses, and of the other single effects by their linear evidence;
         without the hypotheses `dismissed` as too small or as refuted by left-out data."""
-        evidence = {h: e for h, e in self.base.table.items() if len(h) == 1}
+        evidence = self._singles()
         evidence |= {h: p.log_evidence for h, p in self.points.items()}
         evidence = {h: e for h, e in evidence.items() if h not in dismissed}
         return probabilities(evidence, len(self.problem.candidates))
