@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -296,8 +296,3 @@ class Search:
         evidence |= {h: p.log_evidence for h, p in self.points.items()}
         evidence = {h: e for h, e in evidence.items() if h not in dismissed}
         return probabilities(evidence, len(self.problem.candidates))
-
-
-def share_of(probability: Mapping[Hypothesis, float], effects: Iterable[str]) -> dict[str, float]:
-    """Probability that each effect is among the missing ones."""
-    return {e: sum(p for h, p in probability.items() if e in h) for e in effects}
