@@ -10,7 +10,7 @@ from typing_extensions import Self
 
 from kemba.identify.logs.gate import BadData
 from kemba.identify.problem.candidates import sensor_candidates
-from kemba.identify.problem.problem import Problem
+from kemba.identify.problem.problem import Problem, mean_slope
 from kemba.identify.problem.sensor_faults import SensorFaults, is_fault, is_straight
 from kemba.identify.problem.structure import (
     FIGURES,
@@ -193,12 +193,11 @@ class RobotProblem(Problem):
         columns = self._direct(theta, direct) if direct else {}
         steps = {n: list(self.steps(theta, n)) for n in names if n not in columns}
         moved = [{**theta, **step} for group in steps.values() for step, _ in group]
-        shifted = self.state.residuals([theta, *moved]) if moved else np.empty(0)
-        k = 1
+        if moved:
+            shifted = np.where(self.state.mask[..., None], self.state.residuals([theta, *moved]), 0)
+            base, there = shifted[..., 0], iter(np.moveaxis(shifted[..., 1:], -1, 0))
         for name, group in steps.items():
-            slopes = [(shifted[..., k + i] - shifted[..., 0]) / h for i, (_, h) in enumerate(group)]
-            columns[name] = np.mean(slopes, axis=0)
-            k += len(group)
+            columns[name] = mean_slope(base, [next(there) for _ in group], [h for _, h in group])
         return self.state.pick(np.stack([columns[n] for n in names], axis=-1), runs)
 
     def _direct(self, theta: Theta, names: Sequence[str]) -> dict[str, Array]:
