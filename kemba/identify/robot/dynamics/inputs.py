@@ -59,11 +59,16 @@ def read_inputs(physics: Physics, batch: Batch, ref: Reference, delays: Array) -
 
 
 def air_states(
-    physics: Physics, batch: Batch, inputs: Sequence[Inputs], p: Array
+    physics: Physics,
+    batch: Batch,
+    inputs: Sequence[Inputs],
+    p: Array,
+    among: Index | None = None,
 ) -> tuple[Array, Array]:
-    """Effect states (n, L, ns) and inputs (n, L, nu), both the mean over each step."""
+    """Effect states (n, L, ns) and inputs (n, L, nu), both the mean over each step; `among`: states
+    that are asked for (None: all)."""
     moving = p[physics.moves]
-    states = [d.means(physics.states.run(d.h, *d.given, moving)) for d in inputs]
+    states = [d.means(physics.states.run(d.h, *d.given, moving, among)) for d in inputs]
     return batch.pad(states, 0.0), batch.pad([d.inputs for d in inputs], 0.0)
 
 
