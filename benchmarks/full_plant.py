@@ -120,7 +120,7 @@ def study(number: int, folder: Path, among: Collection[str] | None, say: Say) ->
         "set": number,
         "likely": among is not None,
         "seconds": spent,
-        "answer": answer.json(),
+        "answer": answer.json() | {"model": None},  # where it was written is of no use later
         "compare": compared,
     }
 
@@ -129,7 +129,7 @@ def main() -> None:
     """Read the arguments, run the sets that are not in the file, and print the table of all."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--sets", type=int, nargs="+", default=list(range(len(SETS))))
-    parser.add_argument("--out", type=Path, default=Path("full_plant.jsonl"))
+    parser.add_argument("--out", type=Path, default=ROOT / "benchmarks" / "full_plant.jsonl")
     parser.add_argument("--logs", type=Path, help="keep logs and models here")
     parser.add_argument("--progress", action="store_true")
     parser.add_argument("--likely", action="store_true", help="only the effects named in LIKELY")
