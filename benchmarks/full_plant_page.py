@@ -49,25 +49,36 @@ def _row(record: Record, names: Sequence[str]) -> str:
 
 def _figures(records: Sequence[Record]) -> list[str]:
     """One row per figure that any answer names: its true value, then values with intervals."""
-    found = [_named(record) for record in records]
+    found, plant = [_named(record) for record in records], load_model("plant")
     keys = sorted({key for values in found for key in values}, key=lambda k: (k[0] != ORIFICE, k))
-    plant = load_model("plant")
-    lines = []
+    lines, covered, count = [], 0, 0
     for effect, name in keys:
-        cells = [values.get((effect, name), "not named") for values in found]
-        lines.append(f"| `{effect}` {name} | {_truth(plant, effect, name)} | {' | '.join(cells)} |")
-    return lines
+        own = [values.get((effect, name)) for values in found]
+        unit = next(v["unit"] for v in own if v)
+        truth = _truth(plant, effect, name)
+        known = [v for v in own if v and truth is not None]
+        covered += sum(v["low"] <= truth <= v["high"] for v in known)
+        count += len(known)
+        cells = [_with_interval(v) if v else "not named" for v in own]
+        said = "not in the plant" if truth is None else f"{_shown(truth, unit)} {_unit(unit)}"
+        lines.append(f"| `{effect}` {name} | {said.rstrip()} | {' | '.join(cells)} |")
+    return [*lines, "", f"{covered} of {count} intervals contain the plant's figure."]
 
 
-def _named(record: Record) -> dict[tuple[str, str], str]:
+def _named(record: Record) -> dict[tuple[str, str], Mapping[str, Any]]:
+    """Every figure of the effects that an answer names, as its JSON has it."""
     answer = record["answer"]
     return {
-        (row["effect"], name): f"{_shown(v['value'], v['unit'])} ({_shown(v['low'], v['unit'])} to "
-        f"{_shown(v['high'], v['unit'])}) {_unit(v['unit'])}".rstrip()
+        (row["effect"], name): value
         for row in answer["ranking"]
         if row["effect"] in answer["found"]
-        for name, v in row["parameters"].items()
+        for name, value in row["parameters"].items()
     }
+
+
+def _with_interval(value: Mapping[str, Any]) -> str:
+    centre, low, high = (_shown(value[k], value["unit"]) for k in ("value", "low", "high"))
+    return f"{centre} ({low} to {high}) {_unit(value['unit'])}".rstrip()
 
 
 def _shown(value: float, unit: str) -> str:
@@ -78,14 +89,13 @@ def _unit(unit: str) -> str:
     return "" if unit == "1" else UNITS.get(unit, (unit, 1.0))[0]
 
 
-def _truth(plant: Model, effect: str, name: str) -> str:
-    """The plant's own figure; `level` is the pressure at its valves over the usual one."""
+def _truth(plant: Model, effect: str, name: str) -> float | None:
+    """The plant's own figure, None where it has none; `level` is the pressure at its valves over
+    the usual one."""
     kind = "orifice_chamber" if effect == ORIFICE else effect
-    known = {e.name: e for e in plant.effects}
-    if kind not in known:
-        return "not in the plant"
+    own = {e.name: e for e in plant.effects}.get(kind)
+    if own is None:
+        return None
     if name == "level":
-        return f"{known[kind].gauge[1] / OrificeChamber().gauge[1]:.3g}"  # type: ignore[attr-defined]
-    units = known[kind].parameters()
-    unit = units[name].unit if name in units else "1"
-    return f"{_shown(float(known[kind].value(name)), unit)} {_unit(unit)}".rstrip()
+        return float(own.gauge[1] / OrificeChamber().gauge[1])  # type: ignore[attr-defined]
+    return float(own.value(name))

@@ -95,3 +95,4 @@ def test_figures_of_the_full_plant_stand_beside_the_truth() -> None:
     assert "| `seal_friction` F_c | 5 N | not named | 4 (4 to 4) N |" in text
     assert "| `payload` m | not in the plant | not named | 0.1 (0.1 to 0.1) kg |" in text
     assert "| a | missing | 2.40 | 0.90 | - | 0.90 | - | 90 |" in text
+    assert text.endswith("0 of 2 intervals contain the plant's figure.")
