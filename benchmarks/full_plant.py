@@ -1,26 +1,33 @@
 """Logs of the full plant against the planning model: what `discover` makes of five model errors
 at once.
 
-    python benchmarks/full_plant.py            # all sets, about 5 CPU minutes each
-    python benchmarks/full_plant.py --likely --sets 1 --out FOLDER
+    python benchmarks/full_plant.py            # all sets, about 2 CPU minutes each
+    python benchmarks/full_plant.py --sets 1 --logs FOLDER --progress
+    python benchmarks/full_plant.py --write    # into docs/discovery.md; finished sets are kept
 
 Each set is three shipped plans, played on the plant and logged at 1 kHz with the usual noise, and
 two more that are not learnt from. The plant (configs/models/plant.yaml) has orifice chambers, a
 supply line, a lag of the valves, seal friction, damping, a leak and cushions, none of which the
-planning model has. Printed are the ladder of held-out errors in units of the noise, the figures
-found, the verdict, the CPU seconds, and what `compare` says of the kept logs under the planning
+planning model has. Kept of each set, in a file: verdict, ladder of held-out errors in units of the
+noise, figures found, CPU seconds, and what `compare` says of the kept logs under the planning
 model, the plant's own and the model that was written.
 """
 
 from __future__ import annotations
 
 import argparse
+import sys
 import tempfile
 import time
 from collections.abc import Callable, Collection
 from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).parent))
 
 import numpy as np
+from blind import report
+from full_plant_page import page
 
 from kemba.identify.answer import Answer
 from kemba.identify.compare_logs import compare_logs
@@ -35,7 +42,8 @@ from kemba.plant.execution.sensors import Sensors, take_log
 from kemba.plant.simulation.commands import JointControl
 from kemba.trajectory import Trajectory
 
-PLANS = Path(__file__).parents[1] / "configs" / "plans"
+ROOT = Path(__file__).parents[1]
+PLANS, DOCS = ROOT / "configs" / "plans", ROOT / "docs" / "discovery.md"
 SETS = (  # plans that are learnt from, and plans to judge by
     (("hop-0350", "low-0400", "up-0500"), ("up-0540", "low-0430")),
     (("up-0560", "near-0200", "mid-0760"), ("up-0580", "near-0150")),
@@ -99,49 +107,49 @@ def answered(
     return answer
 
 
-def study(number: int, folder: Path, among: Collection[str] | None, say: Say) -> float:
-    """One set; prints its table and returns the error of the answer."""
+def study(number: int, folder: Path, among: Collection[str] | None, say: Say) -> dict[str, Any]:
+    """The record of one set."""
     fitted, kept = written(folder, number)
     begin = time.process_time()
     answer = answered(fitted, kept, among, say, folder / "answer")
     spent = time.process_time() - begin
-    print(f"\nset {number}: {answer.verdict}, {spent:.0f} CPU s\n{answer.sentence}")
-    for name, error in answer.ladder:
-        print(f"  {error:6.2f}  {name}")
-    for row in (r for r in answer.ranking if r.effect in answer.found):
-        figures = ", ".join(
-            f"{k} {v.value:.3g} ({v.low:.3g} to {v.high:.3g}) {v.unit}"
-            for k, v in row.parameters.items()
-        )
-        print(f"  {row.effect}: {figures}")
-    for model in ("planning", "plant", *([answer.model] if answer.model else [])):
-        told, _ = compare_logs(kept, model)
-        ratios = f"{told.noise_ratio:.2f}, within tolerances {told.tolerant_ratio:.2f}"
-        print(f"  compare says of {Path(model).stem}: {ratios} times the noise")
-    return answer.error_after
+    models = {"planning": "planning", "plant": "plant"}
+    models |= {"found": answer.model} if answer.model else {}
+    compared = {name: compare_logs(kept, model)[0].noise_ratio for name, model in models.items()}
+    return {
+        "set": number,
+        "likely": among is not None,
+        "seconds": spent,
+        "answer": answer.json() | {"model": None},  # where it was written is of no use later
+        "compare": compared,
+    }
 
 
 def main() -> None:
-    """Read the arguments, and print every set."""
+    """Read the arguments, run the sets that are not in the file, and print the table of all."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--sets", type=int, nargs="+", default=list(range(len(SETS))))
-    parser.add_argument("--out", type=Path, help="keep logs and answers here")
+    parser.add_argument("--out", type=Path, default=ROOT / "benchmarks" / "full_plant.jsonl")
+    parser.add_argument("--logs", type=Path, help="keep logs and models here")
     parser.add_argument("--progress", action="store_true")
     parser.add_argument("--likely", action="store_true", help="only the effects named in LIKELY")
+    parser.add_argument("--write", action="store_true", help="put the table into the docs")
     given = parser.parse_args()
-    load_model("plant")
+    say: Say = (lambda text: print("  ", text, flush=True)) if given.progress else lambda _: None
+    done = {(r["set"], r["likely"]) for r in report.read(given.out)}
     with tempfile.TemporaryDirectory() as scratch:
-        root = given.out or Path(scratch)
-        say: Say = (
-            (lambda text: print("  ", text, flush=True)) if given.progress else lambda _: None
-        )
-        left = []
-        for number in given.sets:
-            folder = root / f"set{number}"
+        for number in (n for n in given.sets if (n, given.likely) not in done):
+            folder = (given.logs or Path(scratch)) / f"set{number}"
             folder.mkdir(parents=True, exist_ok=True)
-            left.append(study(number, folder, LIKELY if given.likely else None, say))
-    within = sum(error <= 1.5 for error in left)
-    print(f"\n{within} of {len(left)} answers leave 1.5 times the noise or less")
+            record = study(number, folder, LIKELY if given.likely else None, say)
+            report.append(given.out, record)
+            print(f"set {number}: {record['answer']['sentence']}", flush=True)
+    records = [r for r in report.read(given.out) if r["likely"] == given.likely]
+    names = {number: [*fitted, *kept] for number, (fitted, kept) in enumerate(SETS)}
+    text = page(sorted(records, key=lambda r: r["set"]), names)
+    print(text)
+    if given.write:
+        report.write(DOCS, "full plant", text)
 
 
 if __name__ == "__main__":

@@ -19,7 +19,7 @@ ROOT = Path(__file__).parent.parent
 # From the bottom up; a room may import its own level and those below.
 LEVELS = [
     {"errors"},
-    {"cache", "files", "instructions", "settings", "stopwatch", "units"},
+    {"cache", "files", "instructions", "machine_code", "settings", "stopwatch", "units"},
     {"folders"},
     {"quantity"},
     {"config"},

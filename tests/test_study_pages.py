@@ -12,6 +12,7 @@ import pytest
 ROOT = Path(__file__).parent.parent
 sys.path.insert(0, str(ROOT / "benchmarks"))
 
+import full_plant_page
 import learning_page
 import robustness_page
 
@@ -70,3 +71,28 @@ def test_machines_are_counted_by_round() -> None:
     text = learning_page.section(rows)
     assert "| learn | 2 | 25.0 (0: 0 to 66 %) | 5.0 (1: 9 to 91 %) | 1 of 2 | 1 |" in text
     assert "| 2 | payload | -30.0 -6.0, falls | not run |" in text
+
+
+def test_figures_of_the_full_plant_stand_beside_the_truth() -> None:
+    """One set named the line, another one friction with an effect that the plant does not have."""
+
+    def record(number: int, error: float, *rows: tuple[str, str, float, str]) -> dict[str, Any]:
+        ranking = [
+            {"effect": e, "parameters": {n: {"value": v, "low": v, "high": v, "unit": u}}}
+            for e, n, v, u in rows
+        ]
+        found = [e for e, *_ in rows[:-1]]  # the last one is ranked, but not in the answer
+        answer = {"verdict": "missing", "error_before": 2.4, "error_after": error,
+                  "ranking": ranking, "found": found}  # fmt: skip
+        return {"set": number, "seconds": 90.0, "answer": answer, "compare": {"plant": 0.9}}
+
+    line, friction = ("supply_line", "a", 4e-6, "m2"), ("seal_friction", "F_c", 4.0, "N")
+    records = [record(0, 0.9, line, friction), record(1, 1.6, friction, ("payload", "m", 0.1, "kg"),
+                                                      line)]  # fmt: skip
+    text = full_plant_page.page(records, {0: ["a", "b", "c"], 1: ["d", "e", "f"], 2: ["g"]})
+    assert "2 of 3 sets have run; 1 answers leave 1.5 times" in text
+    assert "| `supply_line` a | 3.65 mm2 | 4 (4 to 4) mm2 | not named |" in text
+    assert "| `seal_friction` F_c | 5 N | not named | 4 (4 to 4) N |" in text
+    assert "| `payload` m | not in the plant | not named | 0.1 (0.1 to 0.1) kg |" in text
+    assert "| a | missing | 2.40 | 0.90 | - | 0.90 | - | 90 |" in text
+    assert text.endswith("0 of 2 intervals contain the plant's figure.")

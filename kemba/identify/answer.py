@@ -97,6 +97,9 @@ class Answer:
         return {**asdict(self), **more, "probabilities": PROBABILITY}
 
 
+ENDED = "the time limit ended the search; with a larger --time-limit it goes on"
+
+
 def phrase(answer: Answer) -> str:
     """The verdict in one plain sentence."""
     if answer.verdict == "nothing":
@@ -114,7 +117,8 @@ def phrase(answer: Answer) -> str:
             return f"Something differs, but these logs are too short to tell what{why}. Next: " + (
                 f"{answer.next}, with strokes and pulses as they are used."
             )
-        return f"Something is missing that no effect of the catalogue explains{why}.{more}"
+        tried = "effect that was tried" if ENDED in answer.remarks else "effect of the catalogue"
+        return f"Something is missing that no {tried} explains{why}.{more}"
     if answer.verdict == "partly":
         return _partly(answer)
     parts = [r for r in answer.ranking if r.effect in answer.added]

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kemba.identify.answer import Answer, Ranked, Verdict, excess, phrase
+from kemba.identify.answer import ENDED, Answer, Ranked, phrase
 from kemba.identify.doubt.cross_validation import left_out
-from kemba.identify.doubt.run_consistency import Drift, drifting
-from kemba.identify.doubt.unexplained import Formula, look, unfinished
+from kemba.identify.doubt.run_consistency import drifting
+from kemba.identify.doubt.unexplained import Formula, look
 from kemba.identify.evidence.bootstrap import NullTest, bootstrap, smallest_detectable
 from kemba.identify.evidence.figures import Rebuilt, ahead, settled
 from kemba.identify.evidence.linear import time_blocks
@@ -21,9 +21,10 @@ from kemba.identify.evidence.spike_slab import NULL, Hypothesis
 from kemba.identify.evidence.windows import error_ratio
 from kemba.identify.problem.problem import Problem
 from kemba.identify.ranking import error, ladder, ranked, strength
-from kemba.identify.rest import pattern_left, rest_of
+from kemba.identify.rest import rest_of
 from kemba.identify.settings import DiscoverSettings, VerdictSettings
 from kemba.identify.stages import joined, structure_row
+from kemba.identify.verdict import Doubts, doubts_about, is_sure, verdict_on
 
 Talk = Callable[[str], None]
 
@@ -41,14 +42,6 @@ class Discovery:
     best: Hypothesis
     holdout: Problem | None = None
     earlier: tuple[float, ...] = ()
-
-
-@dataclass(frozen=True)
-class Doubts:
-    """Why an answer is not complete. `part`: it explains enough of the error to be a part."""
-
-    reasons: tuple[str, ...] = ()
-    part: bool = False
 
 
 def discover(
@@ -78,14 +71,15 @@ def _discovered(search: Search, guess: Hypothesis, holdout: Problem | None) -> D
     """
     guessed = search.problem.structures & set(guess)
     least = 0.0 if guessed else SearchSettings.current().structural
-    other = ahead(search.problem, search.points[guess].fit.theta, least)
+    theta = search.points[guess].fit.theta
+    other = None if search.ended else ahead(search.problem, theta, least)
     anew = _built_anew(search, other, holdout) if other else None
-    if anew and (anew.answer.verdict == "missing" or time.monotonic() > search.deadline):
+    if anew and (anew.answer.verdict == "missing" or search.ended):
         return anew
     first = judged(search, search.further(guess), holdout)
     if anew is None:
         named = search.problem.structures & set(first.best)
-        if first.answer.verdict == "missing" or not named or time.monotonic() > search.deadline:
+        if first.answer.verdict == "missing" or not named or search.ended:
             return first
         built = settled(search.problem.recolour(None).rebuilt({}))
         anew = _built_anew(search, Rebuilt(*built), holdout)
@@ -118,6 +112,7 @@ def _built_anew(search: Search, other: Rebuilt, holdout: Problem | None) -> Disc
 
 def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> Discovery:
     """What the finished `search` with its `best` hypothesis allows to say."""
+    ended = search.ended
     search.say("asking how often logs in which nothing is missing look like these")
     test, likeliest = null_test(search), best
     best, p_value, dismissed = _believed(search, likeliest, test)
@@ -131,10 +126,12 @@ def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> 
     drift = drifting(search, best)
     if drift is not None and formula is not None and drift.nats > formula.gain:
         formula = None
-    doubts = Doubts() if formula else doubts_about(search, best, drift, holdout)
+    doubts = Doubts() if formula else doubts_about(search, best, drift, holdout, ended)
     search.say("ranking the effects")
     ranking = ranked(search, best, dismissed, holdout)
     answer = _answer(search, best, p_value, test, ranking, formula, holdout, doubts)
+    if ended and ENDED not in answer.remarks:
+        answer.remarks = [*answer.remarks, ENDED]
     return Discovery(answer, search, best, holdout)
 
 
@@ -217,41 +214,6 @@ def material(search: Search, hypothesis: Hypothesis) -> Hypothesis:
     strongest = max(hypothesis, key=lambda e: strength(search, e, hypothesis))
     wanted = {e: settings.matters if e == strongest else least for e in hypothesis}
     return tuple(e for e in hypothesis if share(e) >= wanted[e])
-
-
-def doubts_about(
-    search: Search, best: Hypothesis, drift: Drift | None, holdout: Problem | None
-) -> Doubts:
-    """Why the best answer cannot be complete, and whether it is a part of one."""
-    settings, reasons = VerdictSettings.current(), []
-    if drift is not None:
-        reasons.append(str(drift))
-    elif unfinished(search, best):
-        reasons.append("the error that is left repeats itself with motion and valves")
-    elif pattern := pattern_left(search, best):
-        reasons.append(f"the error that is left has a pattern: {pattern}")
-    before, after = (error(search, h, holdout) for h in (NULL, best))
-    least = settings.part_of_structure if reasons else settings.part
-    if best and after > settings.whole and excess(after) > settings.whole_share * excess(before):
-        reasons.append(
-            f"{' and '.join(best)} fits best, but leaves an error of {after:.3g} times the noise"
-        )
-    part = bool(best) and excess(after) <= (1.0 - least) * excess(before)
-    return Doubts(tuple(reasons), part)
-
-
-def verdict_on(best: Hypothesis, formula: Formula | None, doubts: Doubts) -> Verdict:
-    """Missing, where the answer is complete; partly, where it explains enough of the error."""
-    if formula is not None or (doubts.reasons and not doubts.part):
-        return "unknown"
-    if not best:
-        return "nothing"
-    return "partly" if doubts.reasons else "missing"
-
-
-def is_sure(ranked: Ranked) -> bool:
-    """Whether an effect is likely enough to be added to a model, and nothing could stand for it."""
-    return ranked.probability >= VerdictSettings.current().sure and not ranked.equivalent_to
 
 
 def _answer(

@@ -10,8 +10,13 @@ import numpy as np
 from kemba.identify.answer import Ranked, Value
 from kemba.identify.doubt.cross_validation import left_out, left_out_error
 from kemba.identify.evidence.linear import is_shape
-from kemba.identify.evidence.search import Search, share_of
-from kemba.identify.evidence.spike_slab import NULL, Hypothesis, SpikeSlabSettings
+from kemba.identify.evidence.search import Search
+from kemba.identify.evidence.spike_slab import (
+    NULL,
+    Hypothesis,
+    SpikeSlabSettings,
+    share_of,
+)
 from kemba.identify.evidence.windows import error_ratio
 from kemba.identify.problem.problem import Array, Candidate, Problem
 from kemba.identify.settings import RankingSettings

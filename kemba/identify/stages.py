@@ -13,8 +13,8 @@ from scipy.special import expit
 
 from kemba.identify.answer import Answer, Ranked, Value, Verdict, excess, phrase
 from kemba.identify.doubt.cross_validation import left_out
-from kemba.identify.evidence.search import Search, share_of
-from kemba.identify.evidence.spike_slab import Hypothesis, SpikeSlabSettings
+from kemba.identify.evidence.search import Search
+from kemba.identify.evidence.spike_slab import Hypothesis, SpikeSlabSettings, share_of
 from kemba.identify.rest import rest_of
 from kemba.identify.settings import VerdictSettings
 

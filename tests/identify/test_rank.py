@@ -8,13 +8,14 @@ from collections.abc import Collection, Mapping
 import numpy as np
 import pytest
 
-from kemba.identify.answer import Answer, Ranked, phrase
-from kemba.identify.discover import discover, doubts_about, material, verdict_on
+from kemba.identify.answer import ENDED, Answer, Ranked, phrase
+from kemba.identify.discover import discover, material
 from kemba.identify.doubt.cross_validation import Gain, left_out, left_out_error
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import SpikeSlabSettings, probabilities
 from kemba.identify.problem.problem import Array, Candidate, Parameter, Problem, Rows, Theta
 from kemba.identify.ranking import values
+from kemba.identify.verdict import doubts_about, verdict_on
 
 EFFECTS = ("bend", "drag", "hum", "kick", "ramp", "twin", "wave")
 
@@ -119,6 +120,17 @@ def test_what_the_catalogue_lacks_is_unknown() -> None:
     answer = discover(problem).answer
     assert answer.verdict == "unknown"
     assert answer.formula is not None and "step" in answer.formula
+
+
+def test_what_is_sure_is_told_where_the_time_ends_the_search() -> None:
+    truth = {"kick.a": 9.0, "wave.a": -6.0, "hum.a": 6.0}
+    answer = discover(Toy(truth, seed=2), time_limit=0.0).answer
+    assert answer.found == ("hum",) and answer.added == ()  # none was tried beside the first
+    assert answer.verdict == "partly" and ENDED in answer.remarks
+    whole = discover(Toy(truth, seed=2)).answer
+    assert set(whole.found) == {"kick", "wave", "hum"} and ENDED not in whole.remarks
+    single = discover(Toy({"kick.a": 9.0}, seed=2), time_limit=0.0).answer
+    assert single.verdict == "missing" and ENDED in single.remarks
 
 
 def test_probabilities_prefer_the_simpler_of_equals() -> None:

@@ -7,7 +7,15 @@ from collections.abc import Collection
 import numpy as np
 import pytest
 
-from kemba.identify.problem.problem import Array, Candidate, Parameter, Problem, Rows, Theta
+from kemba.identify.problem.problem import (
+    Array,
+    Candidate,
+    Parameter,
+    Problem,
+    Rows,
+    Theta,
+    mean_slope,
+)
 
 ROW = 1e-3  # s
 EDGES = (0.0505, 0.1205, 0.3105)  # s, between two rows
@@ -64,3 +72,12 @@ def test_a_time_constant_is_moved_to_its_shortest_at_least() -> None:
 
 def test_other_effects_are_moved_by_their_size() -> None:
     assert column(Edges(), "bend.F") == pytest.approx(10.0)  # 10 N squared, over 10 N
+
+
+def test_a_step_to_where_nothing_can_be_predicted_is_left_out() -> None:
+    """A length that leaves no volume to the air on one side would count 1e16 sigmas."""
+    base, there = np.array([1.0, 2.0]), [np.array([2.0, 4.0]), np.array([0.0, 1e16])]
+    np.testing.assert_allclose(mean_slope(base, there, [0.5, -0.5]), [2.0, 4.0])
+    np.testing.assert_allclose(mean_slope(base, there[:1] * 2, [0.5, -0.5]), 0.0)
+    broken = [np.array([np.nan, 0.0]), np.array([np.inf, 0.0])]
+    np.testing.assert_allclose(mean_slope(base, broken, [0.5, -0.5]), 0.0)

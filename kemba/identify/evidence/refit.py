@@ -130,6 +130,7 @@ class _LeastSquares:
         self.curved = [n for n in problem.curved if n in frozen.names]
         self.start = dict(start)
         self.settings, self.slab = RefitSettings.current(), SpikeSlabSettings.current().slab
+        self._last: tuple[Array, Array] | None = None  # x, and residuals there
 
     def run(self) -> Fit:
         x0 = np.array([*self._nuisance_start(), *(self._in(k, self.start[k]) for k in self.own)])
@@ -216,9 +217,15 @@ class _LeastSquares:
 
     def _residual(self, x: Array) -> Array:
         """Residuals (n,), then the distances (k,) from the prior means in widths."""
-        r = self.problem.residual(self._theta(x))
+        # slopes are asked for where the residual was
+        if self._last is None or not np.array_equal(x, self._last[0]):
+            r = self._bounded(self.problem.residual(self._theta(x)))
+            self._last = x.copy(), np.concatenate([r, x])
+        return self._last[1]
+
+    def _bounded(self, r: Array) -> Array:
         absurd = self.settings.absurd
-        return np.concatenate([np.nan_to_num(np.clip(r, -absurd, absurd), nan=absurd), x])
+        return np.nan_to_num(np.clip(r, -absurd, absurd), nan=absurd)
 
     def _jacobian(self, x: Array) -> Array:
         base = self._residual(x)
@@ -233,9 +240,8 @@ class _LeastSquares:
             slopes[:, at] = self.problem.jacobian(self._theta(x), self.curved)
         jacobian[:rows, :n] = slopes * sigmas
         jacobian[rows:] = np.eye(len(x))
-        for i in range(n, len(x)):
-            h = self.settings.step
-            moved = x.copy()
-            moved[i] += h
-            jacobian[:rows, i] = (self._residual(moved) - base)[:rows] / h
+        if self.own:
+            moved = x + self.settings.step * np.eye(len(x))[n:]
+            there = self._bounded(self.problem.residuals([self._theta(z) for z in moved]))
+            jacobian[:rows, n:] = (there - base[:rows, None]) / self.settings.step
         return jacobian

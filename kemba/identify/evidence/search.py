@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -37,6 +37,11 @@ class Search:
     base: Baseline = field(init=False)
     _thetas: dict[Hypothesis, dict[str, float]] = field(default_factory=dict)
     _stale: bool = False
+
+    @property
+    def ended(self) -> bool:
+        """Whether the time is over. A first effect is refitted all the same."""
+        return time.monotonic() > self.deadline
 
     def run(self) -> Hypothesis:
         """The likeliest hypothesis; everything that was refitted stays in `points`."""
@@ -76,7 +81,7 @@ class Search:
         settings = SearchSettings.current()
         for _ in range(settings.followed):
             guess = best or self._first_of_table()
-            if guess == NULL or time.monotonic() > self.deadline:
+            if guess == NULL or self.ended:
                 return best
             point = self.points[guess]
             self.say(f"looking again as if {' + '.join(guess)} were there")
@@ -95,7 +100,7 @@ class Search:
         Each effect that joins changes the motion, and with it what the others seem to be.
         """
         for _ in range(SearchSettings.current().regrown):
-            if len(best) < 2 or time.monotonic() > self.deadline:
+            if len(best) < 2 or self.ended:
                 break
             theta, before = self.points[best].fit.theta, best
             self.say(f"looking again as if {' + '.join(best)} were there")
@@ -120,9 +125,7 @@ class Search:
         nothing."""
         count = len(self.problem.candidates)
         null = self.points[NULL].log_evidence + log_prior(NULL, count)
-        tables: dict[Hypothesis, float] = {
-            h: e for h, e in self.base.table.items() if h in self.points and len(h) == 1
-        }
+        tables = {h: e for h, e in self._singles().items() if h in self.points}
         first = max(tables, key=tables.__getitem__, default=NULL)
         better = first and tables[first] + log_prior(first, count) > null
         return first if better else NULL
@@ -154,7 +157,7 @@ class Search:
                 break  # even the linear evidence gains nothing
             if table[hypothesis] < table[order[0]] - reach and hypothesis not in order[:sure]:
                 break
-            if time.monotonic() > self.deadline:
+            if self.ended and (given or number > 1):
                 break
             self.visit(hypothesis, number, len(order))
         if given == NULL and self.points[NULL].fitted_error > settings.structural:
@@ -162,13 +165,17 @@ class Search:
                 self.visit((structure,))
         return self.best()
 
+    def _singles(self) -> dict[Hypothesis, float]:
+        """Linear evidence of every single effect."""
+        return {h: e for h, e in self.base.table.items() if len(h) == 1}
+
     def _extensions(self, given: Hypothesis) -> dict[Hypothesis, float]:
         """Linear evidence of `given` plus one effect. The members of a pair that is much better
         than any single effect count as much as the best single effect."""
         if given != NULL:
             ranker = self.base.ranker(self.points[given].linear)
             return ranker.table((len(given) + 1,), given=given)
-        single: dict[Hypothesis, float] = {h: e for h, e in self.base.table.items() if len(h) == 1}
+        single = self._singles()
         base = max(single.values())
         pairs = [h for h in self.base.table if len(h) == 2]
         best_pair = max(pairs, key=self.base.table.__getitem__, default=NULL)
@@ -252,7 +259,7 @@ class Search:
     def _grow(self, best: Hypothesis) -> Hypothesis:
         """Add effects, one by one, while the evidence grows."""
         settings = SearchSettings.current()
-        while len(best) < settings.largest and time.monotonic() < self.deadline:
+        while len(best) < settings.largest and not self.ended:
             grown = self._round(best, settings.leaders_grown)
             if grown == best or len(grown) <= len(best):
                 break
@@ -270,7 +277,7 @@ class Search:
                 least = self.points[best].log_evidence - settings.far
                 self._round(rest, settings.leaders_swapped, least)
             best = self.best()
-            if best == before or time.monotonic() > self.deadline:
+            if best == before or self.ended:
                 break
             best = self._grow(best)
         return best
@@ -285,14 +292,7 @@ class Search:
     def probabilities(self, dismissed: Collection[Hypothesis] = ()) -> dict[Hypothesis, float]:
         """Of all refitted hypotheses, and of the other single effects by their linear evidence;
         without the hypotheses `dismissed` as too small or as refuted by left-out data."""
-        evidence: dict[Hypothesis, float] = {
-            h: e for h, e in self.base.table.items() if len(h) == 1
-        }
+        evidence = self._singles()
         evidence |= {h: p.log_evidence for h, p in self.points.items()}
         evidence = {h: e for h, e in evidence.items() if h not in dismissed}
         return probabilities(evidence, len(self.problem.candidates))
-
-
-def share_of(probability: Mapping[Hypothesis, float], effects: Iterable[str]) -> dict[str, float]:
-    """Probability that each effect is among the missing ones."""
-    return {e: sum(p for h, p in probability.items() if e in h) for e in effects}

@@ -197,3 +197,8 @@ def probabilities(evidence: Mapping[Hypothesis, float], count: int) -> dict[Hypo
     logs = np.array([e + log_prior(h, count) for h, e in evidence.items()])
     weights = np.exp(logs - logsumexp(logs))
     return dict(zip(evidence, weights.tolist(), strict=True))
+
+
+def share_of(probability: Mapping[Hypothesis, float], effects: Iterable[str]) -> dict[str, float]:
+    """Probability that each effect is among the missing ones."""
+    return {e: sum(p for h, p in probability.items() if e in h) for e in effects}

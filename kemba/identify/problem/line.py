@@ -29,7 +29,7 @@ class LineSettings(Settings):
     volume: float = setting(
         0.7, "1", "prior width of the logarithm of the volume", "convention: a factor of two"
     )
-    reach: float = setting(10.0, "1", "a volume is looked for within this factor", BY_HAND)
+    reach: float = setting(30.0, "1", "a volume is looked for within this factor", BY_HAND)
 
 
 class LineResistance(SupplyLine):

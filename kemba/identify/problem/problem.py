@@ -62,6 +62,20 @@ class StepSettings(Settings):
         BY_HAND,
         decides=True,
     )
+    absurd: float = setting(
+        1e5, "1", "residual in sigmas at which nothing can be predicted", "convention: beyond data"
+    )
+
+
+def mean_slope(base: Array, there: Sequence[Array], steps: Sequence[float]) -> Array:
+    """Mean slope, shaped as the residuals `base`, of finite `steps` that lead to the residuals
+    `there`; zero where every step leads to where nothing can be predicted: a rod that is driven
+    through its cylinder's end leaves no volume to the air."""
+    absurd = StepSettings.current().absurd
+    known = [i for i, r in enumerate(there) if np.all(np.abs(r) < absurd)]
+    if not known:
+        return np.zeros_like(base)
+    return np.asarray(np.mean([(there[i] - base) / steps[i] for i in known], axis=0))
 
 
 class Problem(ABC):
@@ -93,6 +107,11 @@ class Problem(ABC):
     @abstractmethod
     def residual(self, theta: Theta, runs: Collection[int] | None = None) -> Array:
         """Whitened residuals (n,) of the runs with these indices, in their order (None: all)."""
+
+    def residuals(self, thetas: Sequence[Theta]) -> Array:
+        """Whitened residuals (n, c) of all runs at each of c thetas; quicker where a problem can
+        share work between them."""
+        return np.stack([self.residual(theta) for theta in thetas], axis=1)
 
     @abstractmethod
     def rows(self, runs: Collection[int] | None = None) -> Rows:

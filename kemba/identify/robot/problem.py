@@ -10,7 +10,7 @@ from typing_extensions import Self
 
 from kemba.identify.logs.gate import BadData
 from kemba.identify.problem.candidates import sensor_candidates
-from kemba.identify.problem.problem import Problem
+from kemba.identify.problem.problem import Problem, mean_slope
 from kemba.identify.problem.sensor_faults import SensorFaults, is_fault, is_straight
 from kemba.identify.problem.structure import (
     FIGURES,
@@ -178,6 +178,10 @@ class RobotProblem(Problem):
         """Whitened (predicted - measured) (n,), rows as `rows` describes them."""
         return self.state.pick(self.state.residuals([theta]), runs)[:, 0]
 
+    def residuals(self, thetas: Sequence[Theta]) -> Array:
+        """The same (n, c) at each theta; the filter takes them side by side."""
+        return self.state.pick(self.state.residuals(thetas))
+
     def jacobian(
         self, theta: Theta, names: Iterable[str], runs: Collection[int] | None = None
     ) -> Array:
@@ -189,12 +193,11 @@ class RobotProblem(Problem):
         columns = self._direct(theta, direct) if direct else {}
         steps = {n: list(self.steps(theta, n)) for n in names if n not in columns}
         moved = [{**theta, **step} for group in steps.values() for step, _ in group]
-        shifted = self.state.residuals([theta, *moved]) if moved else np.empty(0)
-        k = 1
+        if moved:
+            shifted = np.where(self.state.mask[..., None], self.state.residuals([theta, *moved]), 0)
+            base, there = shifted[..., 0], iter(np.moveaxis(shifted[..., 1:], -1, 0))
         for name, group in steps.items():
-            slopes = [(shifted[..., k + i] - shifted[..., 0]) / h for i, (_, h) in enumerate(group)]
-            columns[name] = np.mean(slopes, axis=0)
-            k += len(group)
+            columns[name] = mean_slope(base, [next(there) for _ in group], [h for _, h in group])
         return self.state.pick(np.stack([columns[n] for n in names], axis=-1), runs)
 
     def _direct(self, theta: Theta, names: Sequence[str]) -> dict[str, Array]:
@@ -236,12 +239,8 @@ class RobotProblem(Problem):
         """Per channel, measured minus predicted (k,) in its unit, over short times that begin on
         the measured motion; contact forces are the data's."""
         state, batch = self.state, self.batch
-        steps = max(
-            2,
-            round(
-                RobotProblemSettings.current().predicted / float(np.median(batch.h[batch.valid]))
-            ),
-        )
+        row = float(np.median(batch.h[batch.valid]))
+        steps = max(2, round(RobotProblemSettings.current().predicted / row))
         y = np.nan_to_num(state.measurement(theta))
         g = state.motion.extend(state.acceleration(theta)[..., None])[..., 0]
         errors = predicted_error(state.motion.system, y, g, steps)

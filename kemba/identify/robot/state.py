@@ -222,5 +222,5 @@ def values_at(physics: Physics, theta: Theta) -> tuple[Array, Array]:
     names = zip(physics.names, physics.nominal, strict=True)
     p = np.array([without_delay(n, theta.get(n, value)) for n, value in names])
     p = np.clip(p, *physics.bounds)
-    valves = [leg for leg in physics.legs for _ in range(2)]
-    return p, np.array([physics.base.timing(leg, theta) for leg in valves])
+    late = [physics.base.timing(leg, theta) for leg in physics.legs]
+    return p, np.repeat(late, 2, axis=0)  # both valves of a leg

@@ -12,6 +12,7 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
+from kemba.machine_code import Native
 from kemba.model import Model
 from kemba.model.node import Node
 from kemba.plant.kernel.machine import KernelModel
@@ -20,7 +21,6 @@ from kemba.plant.stepping.arrays import Array
 from kemba.plant.stepping.compiled import Compiled
 from kemba.plant.stepping.forms import Forms
 from kemba.plant.stepping.imposed import impose
-from kemba.plant.stepping.native import Native
 from kemba.plant.stepping.pairs import PairTable
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from kemba.effects.pneumatics.switching import delayed, instants, is_on
 from kemba.identify.robot.motion.resampled import ResampledLog
+from kemba.machine_code import Native
 from kemba.model.exponential import midpoint_step
 from kemba.model.rest import Rest
 from kemba.quantity import Quantity
@@ -27,25 +28,44 @@ class StateRunner:
         if not self.count:
             return
         self._rest = Rest(s, [q, v, u, p], rate, quantities)
-        h = ca.SX.sym("h")
-        held = [q, v, u, p]
-        after, mean = midpoint_step(rate, s, held, held, h)
-        self._step = ca.Function("step", [s, h, q, v, u, p], [after, mean], {"cse": True})
-        self._runs: dict[int, ca.Function] = {}
+        self._symbols, self._rate = symbols, rate
+        self._codes: dict[bytes, Native] = {}
 
-    def run(self, h: ca.DM, q: ca.DM, v: ca.DM, u: ca.DM, p: Array) -> Array:
-        """Mean of the states (ns, N) over steps h (1, N) with q, v, u (., N) held over each."""
-        count = h.shape[1]
+    def run(
+        self, h: Array, q: Array, v: Array, u: Array, p: Array, among: Index | None = None
+    ) -> Array:
+        """Mean of the states (N, ns) over steps h (N,) with q, v, u (N, .) held over each.
+
+        `among`: states that are asked for, and that depend on no others (None: all); the others
+        stay at rest.
+        """
+        count = len(h)
         if not self.count:
-            return np.empty((0, count))
-        start = self._rest(q[:, 0], 0.0 * v[:, 0], u[:, 0], p)
-        if count not in self._runs:
-            whole = self._step.mapaccum(count)
-            args = [ca.MX.sym(f"i{i}", *whole.size_in(i)) for i in range(5)]
-            one = ca.MX.sym("p", self._step.size1_in(5))
-            means = whole(*args, ca.repmat(one, 1, count))[1]
-            self._runs[count] = ca.Function("means", [*args, one], [means])
-        return np.asarray(self._runs[count](start, h, q, v, u, p).full())
+            return np.empty((count, 0))
+        own = np.arange(self.count) if among is None else among
+        rest, ns = self._rest(q[0], 0.0 * v[0], u[0], p), len(own)
+        same = np.broadcast_to(p, (count, len(p)))
+        given = np.hstack([h[:, None], q, v, u, same])
+        x = np.zeros((count + 1, ns + given.shape[1]))
+        x[:-1, ns:] = given
+        x[0, :ns] = rest[own]
+        means = np.zeros((count, ns))
+        # each step begins where the one before has ended
+        self._code(own).rows("step", x[:-1], x[1:, :ns], means)
+        whole = np.tile(rest, (count, 1))
+        whole[:, own] = means
+        return whole
+
+    def _code(self, own: Index) -> Native:
+        """A step of these states."""
+        key = own.tobytes()
+        if key not in self._codes:
+            q, v, s, u, p = self._symbols
+            h, held = ca.SX.sym("h"), [q, v, u, p]
+            at = own.tolist()
+            step = midpoint_step(self._rate[at], s[at], held, held, h)
+            self._codes[key] = Native([s[at], h, *held], {"step": step})
+        return self._codes[key]
 
 
 def substeps(log: ResampledLog, delays: Array) -> tuple[Array, Array, Index]:

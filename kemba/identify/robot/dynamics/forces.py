@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
+from kemba.identify.robot.dynamics.air import Index
 from kemba.identify.robot.dynamics.inputs import Inputs, air_states, read_inputs
 from kemba.identify.robot.dynamics.linear import LinearisedMotion
-from kemba.identify.robot.dynamics.physics import Physics, prepared
+from kemba.identify.robot.dynamics.physics import Physics
 from kemba.identify.robot.motion.batch import Batch
 from kemba.settings import BY_HAND, Settings, setting
 
@@ -39,9 +39,8 @@ class Forces:
     def __init__(self, physics: Physics, batch: Batch, motion: LinearisedMotion) -> None:
         self.physics, self.batch, self.motion = physics, batch, motion
         self._inputs: dict[bytes, list[Inputs]] = {}
-        self._states: dict[bytes, tuple[ca.DM, ca.DM]] = {}
+        self._states: dict[bytes, tuple[Array, Array]] = {}
         self._lines: dict[bytes, ForceLine] = {}
-        self._middle = tuple(prepared(a) for a in motion.middle)
 
     def at(self, p: Array, delays: Array) -> Array:
         """Force (n, L, k) that the motion needs beyond model and contact."""
@@ -49,20 +48,20 @@ class Forces:
 
     def slopes(self, p: Array, delays: Array) -> Array:
         """d force / dp (N, k, len(p)) at the samples."""
-        given = (*self._middle, *self.states(p, delays))
+        given = (*self.motion.middle, *self.states(p, delays, None))
         return self.physics.call("by_parameter", *given, p=p)[0]
 
-    def states(self, p: Array, delays: Array) -> tuple[ca.DM, ca.DM]:
-        """Effect states and inputs at the samples."""
-        key = delays.tobytes() + p[self.physics.moves].tobytes()
+    def states(self, p: Array, delays: Array, among: Index | None) -> tuple[Array, Array]:
+        """Effect states (N, ns) and inputs (N, nu) at the samples; `among`: states that are asked
+        for (None: all)."""
+        key = delays.tobytes() + p[self.physics.moves].tobytes() + bytes([among is None])
         if key not in self._states:
             given = self._inputs.get(delays.tobytes())
             if given is None:
                 given = read_inputs(self.physics, self.batch, self.motion.ref, delays)
                 _keep(self._inputs, delays.tobytes(), given)
-            states = air_states(self.physics, self.batch, given, p)
-            ready = tuple(prepared(self.batch.flat(a)) for a in states)
-            _keep(self._states, key, ready)
+            states, inputs = air_states(self.physics, self.batch, given, p, among)
+            _keep(self._states, key, (self.batch.flat(states), self.batch.flat(inputs)))
         return self._states[key]
 
     def _force(self, p: Array, delays: Array) -> Array:
@@ -85,8 +84,8 @@ class Forces:
         return force
 
     def _exact(self, p: Array, delays: Array) -> Array:
-        given = (*self._middle, *self.states(p, delays))
-        return self.physics.call("residual", *given, p=p)[0]
+        states = self.states(p, delays, self.physics.states_at(p))
+        return self.physics.call("residual", *self.motion.middle, *states, p=p)[0]
 
 
 def _keep(store: dict[bytes, Any], key: bytes, value: Any) -> None:

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
 from kemba.identify.robot.dynamics.air import Index, substeps
@@ -21,26 +20,26 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 class Inputs:
     """One run cut at every switching.
 
-    `given`: steps (1, N) [s], q, v and inputs (., N) of the integration. `h` (N,) [s]: the same
-    steps; `index` (n,) of each node among them; `width` (n,) [s] of each node's step. `inputs`
-    (n, nu): mean over each node's step.
+    `h` (N,) [s]: steps of the integration; `given`: q, v and inputs (N, .) over them; `index` (n,)
+    of each node among them; `width` (n,) [s] of each node's step. `inputs` (n, nu): mean over each
+    node's step.
     """
 
-    given: tuple[ca.DM, ca.DM, ca.DM, ca.DM]
     h: Array
+    given: tuple[Array, Array, Array]
     index: Index
     width: Array
     inputs: Array
 
     def means(self, values: Array) -> Array:
-        """(n, k): values (k, N) averaged over the step from each node."""
+        """(n, k): values (N, k) averaged over the step from each node."""
         return _means(values, self.h, self.index, self.width)
 
 
 def _means(values: Array, h: Array, index: Index, width: Array) -> Array:
-    padded = np.append(values * h, 0 * values[:, :1], axis=1)
-    sums = np.add.reduceat(padded, index, axis=1)
-    return np.vstack([(sums / width).T[:-1], values[:, -1:].T])
+    padded = np.append(values * h[:, None], 0 * values[:1], axis=0)
+    sums = np.add.reduceat(padded, index, axis=0)
+    return np.vstack([(sums / width[:, None])[:-1], values[-1:]])
 
 
 def read_inputs(physics: Physics, batch: Batch, ref: Reference, delays: Array) -> list[Inputs]:
@@ -53,24 +52,28 @@ def read_inputs(physics: Physics, batch: Batch, ref: Reference, delays: Array) -
         middle = 0.5 * (times[1:] + times[:-1])
         q, v = (_at(log.time, a[:n, i], middle) for a in (ref.q, ref.v))
         held = np.clip(np.searchsorted(log.time, middle, side="right") - 1, 0, n - 1)
-        u = physics.arrange(log.torque[held].T, valves)
-        given = (ca.DM(h[None, :]), ca.DM(q), ca.DM(v), ca.DM(u))
+        u = physics.arrange(log.torque[held].T, valves).T
         width = np.append(np.diff(log.time), 1.0)
-        found.append(Inputs(given, h, index, width, _means(u, h, index, width)))
+        found.append(Inputs(h, (q, v, u), index, width, _means(u, h, index, width)))
     return found
 
 
 def air_states(
-    physics: Physics, batch: Batch, inputs: Sequence[Inputs], p: Array
+    physics: Physics,
+    batch: Batch,
+    inputs: Sequence[Inputs],
+    p: Array,
+    among: Index | None = None,
 ) -> tuple[Array, Array]:
-    """Effect states (n, L, ns) and inputs (n, L, nu), both the mean over each step."""
+    """Effect states (n, L, ns) and inputs (n, L, nu), both the mean over each step; `among`: states
+    that are asked for (None: all)."""
     moving = p[physics.moves]
-    states = [d.means(physics.states.run(*d.given, moving)) for d in inputs]
+    states = [d.means(physics.states.run(d.h, *d.given, moving, among)) for d in inputs]
     return batch.pad(states, 0.0), batch.pad([d.inputs for d in inputs], 0.0)
 
 
 def _at(time: Array, values: Array, times: Array) -> Array:
-    """Linear interpolation of (n, k) at times: (k, m)."""
+    """Linear interpolation of (n, k) at times: (m, k)."""
     right = np.clip(np.searchsorted(time, times), 1, len(time) - 1)
     share = ((times - time[right - 1]) / (time[right] - time[right - 1]))[:, None]
-    return np.asarray((values[right - 1] + share * (values[right] - values[right - 1])).T)
+    return np.asarray(values[right - 1] + share * (values[right] - values[right - 1]))

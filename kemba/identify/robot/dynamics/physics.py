@@ -10,7 +10,8 @@ import casadi as ca
 import numpy as np
 
 from kemba.identify.problem.nominal import leg_by_leg, link_figures, nominal_figures
-from kemba.identify.robot.dynamics.air import StateRunner
+from kemba.identify.robot.dynamics.air import Index, StateRunner
+from kemba.identify.robot.dynamics.samples import SampleMap
 from kemba.mechanism.robot import link_regressors
 from kemba.model.model import Model
 from kemba.model.rest import rate_of
@@ -68,9 +69,10 @@ class Physics:
         p = ca.vertcat(*(self.p[int(i)] for i in np.flatnonzero(self.moves)))
         states = list(self.model.states.values())
         self.states = StateRunner([node.q, node.v, node.s, node.u, p], rate, states)
+        self._follows = ca.jacobian_sparsity(rate, node.s)
         self.lengths = np.array([n.startswith("geometry:") for n in self.names])
         self.grip = grip
-        self._maps: dict[tuple[str, int], ca.Function] = {}
+        self._maps: dict[str, SampleMap] = {}
 
     def _bounds(self, figures: Mapping[str, tuple[float, float]]) -> tuple[Array, Array]:
         """Smallest and largest value (k,) of every parameter; of `figures` what a linear estimate
@@ -94,7 +96,7 @@ class Physics:
     def functions(self) -> dict[str, ca.Function]:
         """All functions of samples, by name."""
         node = self.node
-        r = ca.substitute(node.dynamics, node.lam, ca.SX.zeros(node.lam.numel()))
+        r = self._force
         full = [node.q, node.v, node.a, node.s, node.u, self.p]
         y = ca.vertcat(*(node.outputs[name] for name in self.channels))
         feet = ca.vertcat(*(node.outputs[f"{g}/foot/{x}"] for g in self.legs for x in "xz"))
@@ -116,8 +118,7 @@ class Physics:
     def straight(self) -> tuple[Flags, Flags]:
         """Parameters (k,) in which the force at given effect states is linear, and pairs (k, k)
         of parameters that multiply each other."""
-        r = ca.substitute(self.node.dynamics, self.node.lam, 0 * self.node.lam)
-        slopes = ca.jacobian(r, self.p)
+        slopes = ca.jacobian(self._force, self.p)
         rows, _, count = *slopes.shape, self.p.numel()
         second = ca.jacobian_sparsity(ca.vec(ca.densify(slopes)), self.p)
         bends = np.zeros((count, count), bool)
@@ -125,21 +126,41 @@ class Physics:
             bends[row // rows, column] = True
         return ~(np.diag(bends) | self.moves), bends
 
-    def call(self, name: str, *args: Array | ca.DM, p: Array | None = None) -> list[Array]:
-        """Function `name` over samples (N, .), or (., N) as `prepared` makes them: arrays
-        (N, rows) or (N, rows, columns)."""
-        given = [a if isinstance(a, ca.DM) else prepared(a) for a in args]
-        function, count = self.functions[name], given[0].shape[1]
-        if (name, count) not in self._maps:
-            fixed = [len(args)] if p is not None else []
-            self._maps[name, count] = function.map(f"{name}_map", "serial", count, fixed, [])
-        answers = self._maps[name, count].call(given + ([ca.DM(p)] if p is not None else []))
-        blocks = []
-        for i, answer in enumerate(answers):
-            rows, columns = function.size_out(i)
-            block = np.asarray(answer.full()).reshape(rows, count, columns).transpose(1, 0, 2)
-            blocks.append(block[:, :, 0] if columns == 1 else block)
-        return blocks
+    def states_at(self, p: Array) -> Index | None:
+        """Effect states that forces at p (k,) depend on; None: all of them."""
+        switches, without = self._without
+        return None if np.any(p[switches] != 0.0) else without
+
+    @cached_property
+    def _without(self) -> tuple[Index, Index]:
+        """Parameters that switch effects with states on, and the states that matter while all of
+        them are zero."""
+        named = [
+            f"{effect.name}.{field}"
+            for effect in self.base.effects
+            if effect.states()
+            for field, off in effect.off.items()
+            if off == 0.0
+        ]
+        switches = np.array([i for i, n in enumerate(self.names) if n in named], dtype=int)
+        r, zero = self._force, self.p[switches.tolist()]
+        bare = ca.substitute(r, zero, ca.SX.zeros(zero.shape))
+        found = set(ca.jacobian_sparsity(bare, self.node.s).get_triplet()[1])
+        pairs = list(zip(*self._follows.get_triplet(), strict=True))
+        while more := {of for state, of in pairs if state in found} - found:
+            found |= more
+        return switches, np.array(sorted(found), dtype=int)
+
+    @property
+    def _force(self) -> ca.SX:
+        """Generalised force (n,) that a motion needs beyond model and contact."""
+        return ca.substitute(self.node.dynamics, self.node.lam, 0 * self.node.lam)
+
+    def call(self, name: str, *samples: Array, p: Array | None = None) -> list[Array]:
+        """Function `name` over samples (N, .): arrays (N, rows) or (N, rows, columns)."""
+        if name not in self._maps:
+            self._maps[name] = SampleMap(self.functions[name])
+        return self._maps[name](samples, p)
 
     def knees(self, pistons: Array, p: Array) -> Array:
         """Knee coordinates (n, legs) of piston extensions (n, legs) at parameters p (k,)."""
@@ -164,8 +185,3 @@ class Physics:
         for i, leg in enumerate(self.legs):
             rows[f"{leg}/valve/extend"], rows[f"{leg}/valve/retract"] = valves[2 * i : 2 * i + 2]
         return np.stack([rows[name] for name in self.inputs])
-
-
-def prepared(samples: Array) -> ca.DM:
-    """Samples (N, .) as the functions take them."""
-    return ca.DM(np.ascontiguousarray(samples.T))

@@ -3,6 +3,9 @@
 LLVM comes with numba. Nothing is optimised, since CasADi has shared what is common: a model takes
 a few hundredths of a second to translate, and its code is twenty times quicker than CasADi's own
 virtual machine.
+
+Every function also comes as a loop over rows. Where the output of one row is an input of the next,
+as with steps in time, it is written there.
 """
 
 from __future__ import annotations
@@ -13,11 +16,12 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 
 from kemba.errors import KembaError
 from kemba.instructions import replay
-from kemba.plant.stepping.arrays import Array
 
+Array = NDArray[Any]
 BINARY = {ca.OP_ADD: "fadd", ca.OP_SUB: "fsub", ca.OP_MUL: "fmul", ca.OP_DIV: "fdiv"}
 COMPARE = {ca.OP_LT: "olt", ca.OP_LE: "ole", ca.OP_EQ: "oeq", ca.OP_NE: "une"}
 INTRINSIC = {
@@ -58,6 +62,26 @@ class Native:
         self._engine = llvm.create_mcjit_compiler(module, machine)  # holds the code
         self._engine.finalize_object()
         self.address = {name: self._engine.get_function_address(name) for name in functions}
+        self._loops = {
+            name: self._engine.get_function_address(f"{name}.rows") for name in functions
+        }
+
+    def rows(self, name: str, x: Array, *outputs: Array) -> None:
+        """Evaluate one function for every row of x (n, .), into the rows of up to two outputs, in
+        place and one after the other.
+
+        Rows may lie anywhere, each of them in one piece: an output that is a part of x, one row
+        further, makes steps in time.
+        """
+        import ctypes
+
+        arrays = (x, *outputs, np.empty((1, 0)))[:3]
+        if any(a.dtype != np.float64 or a.strides[1] != a.itemsize for a in arrays if a.size):
+            raise ValueError("rows of doubles in one piece were expected")
+        word = ctypes.c_void_p
+        call = ctypes.CFUNCTYPE(None, word, word, word, *[ctypes.c_int64] * 4)
+        strides = [a.strides[0] // a.itemsize for a in arrays]
+        call(self._loops[name])(*(a.ctypes.data for a in arrays), len(outputs[0]), *strides)
 
     def __call__(self, name: str, x: Array, *outputs: Array) -> None:
         """Evaluate one function into arrays in place (for looking at; the kernel calls itself)."""
@@ -89,7 +113,7 @@ class _Program:
                 place = self._at(f"y{k}", row * output.shape[1] + column)
                 self._lines.append(f"store double {value}, double* {place}")
         head = f"define void @{name}(double* %x, double* %y0, double* %y1) {{"
-        return "\n".join([head, *self._lines, "ret void", "}"])
+        return "\n".join([head, *self._lines, "ret void", "}", _loop(name)])
 
     def _apply(self, kind: int, *a: str) -> str:
         if kind in BINARY:
@@ -117,7 +141,7 @@ class _Program:
             return self._new(simple[kind].format(*a))
         if kind == ca.OP_NOT:
             return self._apply(ca.OP_EQ, a[0], "0.0")
-        raise KembaError("plant", f"has no machine code for CasADi's operation {kind}")
+        raise KembaError("model", f"has no machine code for CasADi's operation {kind}")
 
     def _new(self, text: str) -> str:
         self._count += 1
@@ -138,6 +162,41 @@ class _Program:
         if declaration not in self.declarations:
             self.declarations.append(declaration)
         return self._new(f"call double @{name}({', '.join(f'double {x}' for x in operands)})")
+
+
+def _loop(name: str) -> str:
+    """The assembly of a function over n rows of x, y0 and y1, which begin dx, d0 and d1 numbers
+    after each other."""
+    parts = (("x", "dx"), ("y0", "d0"), ("y1", "d1"))
+    places = [
+        line
+        for array, stride in parts
+        for line in (
+            f"%at.{array} = mul i64 %i, %{stride}",
+            f"%row.{array} = getelementptr double, double* %{array}, i64 %at.{array}",
+        )
+    ]
+    given = ", ".join(f"double* %row.{array}" for array, _ in parts)
+    return "\n".join(
+        [
+            f"define void @{name}.rows(double* %x, double* %y0, double* %y1, "
+            "i64 %n, i64 %dx, i64 %d0, i64 %d1) {",
+            "begin:",
+            "br label %test",
+            "test:",
+            "%i = phi i64 [0, %begin], [%next, %body]",
+            "%more = icmp slt i64 %i, %n",
+            "br i1 %more, label %body, label %end",
+            "body:",
+            *places,
+            f"call void @{name}({given})",
+            "%next = add i64 %i, 1",
+            "br label %test",
+            "end:",
+            "ret void",
+            "}",
+        ]
+    )
 
 
 def _number(value: float) -> str:

@@ -1,0 +1,66 @@
+"""What may be said of a finished search: why its answer is not complete, and the verdict."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from kemba.identify.answer import ENDED, Ranked, Verdict, excess
+from kemba.identify.doubt.run_consistency import Drift
+from kemba.identify.doubt.unexplained import Formula, unfinished
+from kemba.identify.evidence.search import Search
+from kemba.identify.evidence.spike_slab import NULL, Hypothesis
+from kemba.identify.problem.problem import Problem
+from kemba.identify.ranking import error
+from kemba.identify.rest import pattern_left
+from kemba.identify.settings import VerdictSettings
+
+
+@dataclass(frozen=True)
+class Doubts:
+    """Why an answer is not complete. `part`: it explains enough of the error to be a part."""
+
+    reasons: tuple[str, ...] = ()
+    part: bool = False
+
+
+def doubts_about(
+    search: Search,
+    best: Hypothesis,
+    drift: Drift | None,
+    holdout: Problem | None,
+    ended: bool = False,
+) -> Doubts:
+    """Why the best answer cannot be complete, and whether it is a part of one; `ended`: the time
+    was over before the search was."""
+    settings, reasons = VerdictSettings.current(), []
+    if drift is not None:
+        reasons.append(str(drift))
+    elif unfinished(search, best):
+        reasons.append("the error that is left repeats itself with motion and valves")
+    elif pattern := pattern_left(search, best):
+        reasons.append(f"the error that is left has a pattern: {pattern}")
+    before, after = (error(search, h, holdout) for h in (NULL, best))
+    least = settings.part_of_structure if reasons else settings.part
+    if ended and after > settings.whole:
+        reasons.append(ENDED)
+        least = 0.0  # however little it explains, nothing else could be asked
+    if best and after > settings.whole and excess(after) > settings.whole_share * excess(before):
+        reasons.append(
+            f"{' and '.join(best)} fits best, but leaves an error of {after:.3g} times the noise"
+        )
+    part = bool(best) and excess(after) <= (1.0 - least) * excess(before)
+    return Doubts(tuple(reasons), part)
+
+
+def verdict_on(best: Hypothesis, formula: Formula | None, doubts: Doubts) -> Verdict:
+    """Missing, where the answer is complete; partly, where it explains enough of the error."""
+    if formula is not None or (doubts.reasons and not doubts.part):
+        return "unknown"
+    if not best:
+        return "nothing"
+    return "partly" if doubts.reasons else "missing"
+
+
+def is_sure(ranked: Ranked) -> bool:
+    """Whether an effect is likely enough to be added to a model, and nothing could stand for it."""
+    return ranked.probability >= VerdictSettings.current().sure and not ranked.equivalent_to
