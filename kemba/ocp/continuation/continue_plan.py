@@ -16,9 +16,11 @@ from kemba.ocp.continuation.between import (
     model_between,
     requirements_between,
 )
+from kemba.ocp.continuation.impacts import with_impacts
 from kemba.ocp.continuation.renoded import renoded
 from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.nlp.ipopt import Control
+from kemba.ocp.nlp.stagnation import Stagnation
 from kemba.ocp.phases.modes import Phase
 from kemba.ocp.phases.notes import noted_phases
 from kemba.ocp.phases.program import PhaseProgram
@@ -51,6 +53,14 @@ class Continuing(Settings):
     )
     close: float = setting(
         0.1, "1", "proximal weight where the best plan is sought and 0 does not converge", TRIED,
+        decides=True,
+    )  # fmt: skip
+    patience: int = setting(
+        10, "1", "first iterations without a smaller violation, after which a solve is given up; "
+        "those that converged had none for 9 at most", TRIED, decides=True,
+    )  # fmt: skip
+    underway: float = setting(
+        0.5, "1", "scaled violation below which a solve is no longer given up for that", TRIED,
         decides=True,
     )  # fmt: skip
     solves: int = setting(
@@ -183,11 +193,15 @@ class Continuation:
         program, x = refiner.build(phases, start, RADAU5)
         if self.solution is not None:  # finer than the trajectory, which has no stages
             x = np.clip(self.solution[: x.size], program.lower, program.upper)
+        else:
+            x = with_impacts(program, x)
         program.keep_short(x, Elements.current().fair)
         if weight:
             x = program.proximal(x, weight)
-        most = min(Continuing.current().iterations, self.task.solver.max_iterations)
-        found = solve(program, x, warm(most), self.control)
+        settings = Continuing.current()
+        most = min(settings.iterations, self.task.solver.max_iterations)
+        stagnation = Stagnation(settings.patience, settings.underway)
+        found = solve(program, x, warm(most), self.control, stagnation)
         assert found.ending is not None
         name = f"near the earlier plan, {share:.0%}" if weight else "from the earlier plan"
         self.steps.append(Attempt(name, found.ending, found.iterations))
