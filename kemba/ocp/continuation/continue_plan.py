@@ -63,6 +63,10 @@ class Continuing(Settings):
         0.5, "1", "scaled violation below which a solve is no longer given up for that", TRIED,
         decides=True,
     )  # fmt: skip
+    ease: float = setting(
+        1e3, "1", "how much rather impulses of the start change than its velocities, scaled",
+        "convention: a trajectory says nothing of impulses",
+    )  # fmt: skip
     solves: int = setting(
         8, "1", "solves at most on the way to the changed figures",
         "convention: a plan from scratch costs about as much", decides=True,
@@ -194,7 +198,7 @@ class Continuation:
         if self.solution is not None:  # finer than the trajectory, which has no stages
             x = np.clip(self.solution[: x.size], program.lower, program.upper)
         else:
-            x = with_impacts(program, x)
+            x = with_impacts(program, x, Continuing.current().ease)
         program.keep_short(x, Elements.current().fair)
         if weight:
             x = program.proximal(x, weight)

@@ -7,14 +7,13 @@ import numpy as np
 
 from kemba.ocp.phases.program import PhaseProgram
 
-FREE = 1e3  # how much rather impulses change than velocities, scaled: nothing is known of them
 
-
-def with_impacts(program: PhaseProgram, x: np.ndarray) -> np.ndarray:
+def with_impacts(program: PhaseProgram, x: np.ndarray, ease: float) -> np.ndarray:
     """x (size,) with velocities after impacts and impulses that meet the rows of the impact.
 
     Velocities at the end of the first element after it are carried back to its begin, then changed
-    as little as the rows need; those of the element's stages lie in between.
+    as little as the rows need; those of the element's stages lie in between. `ease`: how much
+    rather impulses change than velocities.
     """
     x, c = x.copy(), program.columns
     if not program.impacts:
@@ -34,8 +33,8 @@ def with_impacts(program: PhaseProgram, x: np.ndarray) -> np.ndarray:
         columns = at[-own:]
         free = program.lower[columns] < program.upper[columns]
         g, slope = (np.array(part) for part in rows(x[at]))
-        ease = np.where(np.isin(columns, c.impulse[p]), FREE, 1.0)[free]
-        x[columns[free]] -= ease * (np.linalg.pinv(slope[:, free] * ease) @ g.ravel())
+        weights = np.where(np.isin(columns, c.impulse[p]), ease, 1.0)[free]
+        x[columns[free]] -= weights * (np.linalg.pinv(slope[:, free] * weights) @ g.ravel())
         for stage, share in zip(c.stages[first], program.scheme.points, strict=True):
             x[stage["v"]] = x[c.after[p]] + share * (x[ends[0]] - x[c.after[p]])
     return np.clip(x, program.lower, program.upper)
