@@ -74,9 +74,14 @@ def _told(rows: list[dict[str, Any]]) -> list[str]:
             f"Against {what}: within 1.10 in {np.sum(known <= 1.1)} of {len(known)} tasks, within "
             f"1.5 in {np.sum(known <= 1.5)}, at most {known.max():.3g} times."
         )
-    good = sum(r["good"] for r in rows)
-    cpu = np.median([r["cpu_s"] for r in rows])
-    said.append(f"{good} of {len(rows)} defaults are good; median of {cpu:.1f} CPU s.")
+    every = [json.loads(line) for line in RECORD.read_text(encoding="utf-8").splitlines()]
+    own = [row for row in every if row["kind"] == "default"]
+    good, cpu = sum(row["good"] for row in own), np.median([row["cpu_s"] for row in own])
+    none = sum(row["cost"] is None for row in own)
+    said.append(
+        f"Of {len(own)} defaults {good} are good, also on the plant, and {none} have no refined "
+        f"plan; {cpu:.1f} CPU s in the median."
+    )
     return said
 
 

@@ -37,4 +37,4 @@ def with_impacts(program: PhaseProgram, x: np.ndarray, ease: float) -> np.ndarra
         x[columns[free]] -= weights * (np.linalg.pinv(slope[:, free] * weights) @ g.ravel())
         for stage, share in zip(c.stages[first], program.scheme.points, strict=True):
             x[stage["v"]] = x[c.after[p]] + share * (x[ends[0]] - x[c.after[p]])
-    return np.clip(x, program.lower, program.upper)
+    return np.asarray(np.clip(x, program.lower, program.upper))
