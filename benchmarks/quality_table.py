@@ -39,9 +39,10 @@ def compared() -> list[dict[str, Any]]:
 
 
 def ratio(row: dict[str, Any], key: str) -> float:
-    """The default's cost over the best one; infinite where only a random start has a plan."""
+    """The default's cost over the best one; infinite where only a random start has a plan, not a
+    number where none has."""
     if row[key] is None:
-        return np.nan if row["own"] is None else 0.0
+        return np.nan
     return float(row["own"] / row[key]) if row["own"] else np.inf
 
 
