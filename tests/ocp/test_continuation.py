@@ -10,12 +10,19 @@ import pytest
 from plain_task import plain_task
 from typer.testing import CliRunner
 
+from kemba.config import shipped_folder
 from kemba.effects.mechanics.friction import SealFriction
 from kemba.effects.mechanics.load import Payload
 from kemba.model import load_model
 from kemba.ocp.continuation.between import completed, model_between, requirements_between
+from kemba.ocp.continuation.impacts import with_impacts
+from kemba.ocp.nlp.ipopt import Control
 from kemba.ocp.phases.modes import Phase
 from kemba.ocp.phases.notes import noted_phases, phase_notes
+from kemba.ocp.phases.radau import RADAU3
+from kemba.ocp.reading import asked_of, load_task
+from kemba.ocp.refinement.refine import Refiner, reduction_of, valve_columns
+from kemba.ocp.shipped.entry import read_plan
 from kemba.ocp.transcription.symmetry import whole
 from kemba.ocp.transcription.unilateral import read_constraints
 from kemba.report.earlier import origin_of
@@ -134,3 +141,23 @@ def test_columns_of_new_effects_are_filled(hop: Path) -> None:
     )
     found = completed(short, origin.model)
     assert np.all(found["front/foot/Fz"] == 0.0)
+
+
+def test_impacts_of_a_start_are_met() -> None:
+    """A trajectory has no velocities after impacts; the start of a continuation has."""
+    task, document = load_task("jump.yaml")
+    model, asked = asked_of(task, document)
+    plan = read_plan(shipped_folder("plans") / "up-0500.npz")
+    half = reduction_of(model, task, asked, plan)
+    constraints = read_constraints(model, half)
+    valves = len(valve_columns(model, half))
+    phases = noted_phases(plan.meta, constraints, valves, len(plan) - 1)
+    assert phases is not None
+    program, x = Refiner(model, task, asked, plan, half, Control()).build(phases, plan, RADAU3)
+    impacts = [row.label.startswith("impact") for row in program.rows]
+    worst = [
+        float(np.abs(np.array(program.problem.g(y, [])).ravel()[impacts]).max())
+        for y in (x, with_impacts(program, x, 1e3))
+    ]
+    assert worst[0] > 1.0
+    assert worst[1] < 1e-9

@@ -1,4 +1,4 @@
-"""The earlier plan solved again for changed figures: near it first, then the best one."""
+"""The earlier plan solved again for changed figures: at once, else near it first."""
 
 from __future__ import annotations
 
@@ -16,9 +16,11 @@ from kemba.ocp.continuation.between import (
     model_between,
     requirements_between,
 )
+from kemba.ocp.continuation.impacts import with_impacts
 from kemba.ocp.continuation.renoded import renoded
 from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.nlp.ipopt import Control
+from kemba.ocp.nlp.stagnation import Stagnation
 from kemba.ocp.phases.modes import Phase
 from kemba.ocp.phases.notes import noted_phases
 from kemba.ocp.phases.program import PhaseProgram
@@ -53,6 +55,18 @@ class Continuing(Settings):
         0.1, "1", "proximal weight where the best plan is sought and 0 does not converge", TRIED,
         decides=True,
     )  # fmt: skip
+    patience: int = setting(
+        10, "1", "first iterations without a smaller violation, after which a solve is given up; "
+        "those that converged had none for 9 at most", TRIED, decides=True,
+    )  # fmt: skip
+    underway: float = setting(
+        0.5, "1", "scaled violation below which a solve is no longer given up for that", TRIED,
+        decides=True,
+    )  # fmt: skip
+    ease: float = setting(
+        1e3, "1", "how much rather impulses of the start change than its velocities, scaled",
+        "convention: a trajectory says nothing of impulses",
+    )  # fmt: skip
     solves: int = setting(
         8, "1", "solves at most on the way to the changed figures",
         "convention: a plan from scratch costs about as much", decides=True,
@@ -79,6 +93,7 @@ class Continuation:
     tell: Callable[[str], None] = lambda text: None
     steps: list[Attempt] = field(default_factory=list)
     size: tuple[int, int] = (0, 0)  # variables and rows of the last program
+    solution: np.ndarray | None = None  # of the last program that was solved
 
     def run(self) -> Refined:
         """The plan on the phases of the earlier one; where these do not fit, on phases read
@@ -88,7 +103,7 @@ class Continuation:
             reduction = reduction_of(self.model, self.task, self.requirements, start)
             meshed = self._meshed(start, reduction)
             if meshed is not None:
-                found = self._walk(*meshed, reduction)
+                found = self._at_once(*meshed, reduction) or self._walk(*meshed, reduction)
                 if found.done or self.origin.once or self.task.landing.air:
                     return found  # phases read anew would have no pulse of air
             return self._read_anew(start)
@@ -115,6 +130,23 @@ class Continuation:
             start, phases = stretched(start, phases, constraints, extends, apex, air)
         marks = [r.at for r in self.requirements if r.at is not None]
         return renoded(start, phases, self.task.nodes, marks)
+
+    def _at_once(
+        self, start: Trajectory, phases: list[Phase], reduction: Reduction
+    ) -> Refined | None:
+        """The best plan in one solve; None where it does not converge, or costs so much more than
+        the earlier plan that another minimum is likely."""
+        self.tell(f"from {self.origin.name}: the best one")
+        found = self._solved(1.0, start, phases, reduction, 0.0)
+        if found.ending.cut_short:
+            return found
+        o = self.origin
+        before = objective(o.model, self.task, o.requirements, o.plan)
+        most = before + (Continuing.current().dear - 1.0) * abs(before)
+        if found.done and self._cost(found) <= most:
+            return found
+        self.solution = None
+        return None
 
     def _walk(self, start: Trajectory, phases: list[Phase], reduction: Reduction) -> Refined:
         """In one step if it converges, else in halves; then the best plan for what is asked."""
@@ -163,15 +195,23 @@ class Continuation:
         asked = requirements_between(self.origin.requirements, self.requirements, share)
         refiner = Refiner(model, self.task, asked, start, reduction, self.control)
         program, x = refiner.build(phases, start, RADAU5)
+        if self.solution is not None:  # finer than the trajectory, which has no stages
+            x = np.clip(self.solution[: x.size], program.lower, program.upper)
+        else:
+            x = with_impacts(program, x, Continuing.current().ease)
         program.keep_short(x, Elements.current().fair)
         if weight:
             x = program.proximal(x, weight)
-        most = min(Continuing.current().iterations, self.task.solver.max_iterations)
-        found = solve(program, x, warm(most), self.control)
+        settings = Continuing.current()
+        most = min(settings.iterations, self.task.solver.max_iterations)
+        stagnation = Stagnation(settings.patience, settings.underway)
+        found = solve(program, x, warm(most), self.control, stagnation)
         assert found.ending is not None
         name = f"near the earlier plan, {share:.0%}" if weight else "from the earlier plan"
         self.steps.append(Attempt(name, found.ending, found.iterations))
         self.size = len(program.lower), len(program.rows)
+        if found.solved:
+            self.solution = found.Y
         return _ended(program, found.Y, found.ending, found.iterations)
 
     def _read_anew(self, start: Trajectory) -> Refined:

@@ -1,0 +1,1 @@
+"""Programs with complementarity pairs from the literature, and kemba's schedule on them."""
