@@ -96,11 +96,13 @@ def review(
     return write_page(path, title, body), verdict
 
 
-def report_run(run: str | Path, out: str | Path | None = None, force: bool = False) -> Path:
+def report_run(
+    run: str | Path, out: str | Path | None = None, force: bool = False
+) -> tuple[Path, ReviewVerdict]:
     """The page of a run alone, by default a new `report.html` in it. Raises KembaError."""
     folder = load_run(run).path
     path = place_for(out, folder / "report.html", force)
-    return review(run=folder, out=path, force=True)[0]
+    return review(run=folder, out=path, force=True)
 
 
 def default_path(
