@@ -5,15 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import pairwise
 
 import casadi as ca
 import numpy as np
 
+from kemba.config import load_yaml
 from kemba.effects.pneumatics.chamber import STEADY, Chamber
 from kemba.effects.pneumatics.tables import at_supply
 from kemba.mechanism import Mechanism, Robot, knee
 from kemba.model import Model, build_model, load_spec
-from kemba.plotting.source import Mask
+from kemba.plotting.source import Mask, Source
+from kemba.quantity import to_si
 from kemba.trajectory import Array, Trajectory
 
 OVERTRAVEL = 0.004  # m; a sensor may read this far beyond the stops
@@ -102,10 +105,10 @@ def _bridged(stands: Mask, low: Mask) -> Mask:
     """`stands` (n,) with each break filled during which `low` (n,) holds all the time."""
     edges = np.flatnonzero(np.diff(stands.astype(int)))
     found = stands.copy()
-    for a, b in zip(edges, edges[1:], strict=False):
+    for a, b in pairwise(edges.tolist()):
         if not stands[a + 1] and low[a + 1 : b + 1].all():
             found[a + 1 : b + 1] = True
-    return found
+    return np.asarray(found)
 
 
 def _averaged(time: Array, values: Array) -> tuple[Array, int]:
@@ -125,6 +128,25 @@ def load_machine(model: str = "planning", supply: float | None = None) -> Machin
     mechanism = built.mechanism
     places = ca.Function("places", [mechanism.q], [ca.vertcat(*mechanism.points.values())])
     return Machine(mechanism.need_robot(), mechanism, _limits(built), places)
+
+
+def machine_of(source: Source, model: str | None = None) -> Machine:
+    """The robot of `model` (a path or a shipped model), else of the run's own task with its
+    supply pressure, else the shipped one. Raises KembaError."""
+    task = source.path.with_name("task.yaml") if source.path else None
+    if model is not None or task is None or not task.is_file():
+        return load_machine(model or "planning")
+    data = load_yaml(task).data
+    asked = data if isinstance(data, dict) else {}
+    supply = to_si(asked["supply"], "Pa") if "supply" in asked else None
+    return load_machine(asked.get("model", "planning"), supply)
+
+
+def stance_spans(source: Source, machine: Machine, leg: str) -> list[tuple[float, float]]:
+    """When the leg's foot is on the ground; any foot for `body`. Start and end in s."""
+    legs = machine.mechanism.legs if leg == "body" else (leg,)
+    stands = [machine.stance(source.trajectory, name) for name in legs]
+    return source.spans(np.any(stands, axis=0))
 
 
 def _limits(model: Model) -> dict[str, tuple[float, ...]]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kemba.plotting import Machine
-from kemba.plotting.robot.motion import stance_spans
+from kemba.plotting.robot.machine import stance_spans
 from kemba.report.review.charts import Book, Chart, Curve, Spans
 from kemba.report.review.tracks import Track, on_grid, plan_of
 from kemba.trajectory import Array
