@@ -43,7 +43,11 @@ def compare(
 
     if out is not None and figure is False:
         raise typer.BadParameter("--out names the figure", param_hint="--no-figure")
-    path = place_for(out, Path("compare.png"), force) if figure or out is not None else None
+    path = None
+    if figure or out is not None:
+        from kemba.plotting.style import figure_name
+
+        path = figure_name(place_for(out, Path("compare.png"), force))
     with Progress(quiet or json, COMPARE) as progress:
         found, _ = compare_logs(logs, model, column_map, run, progress.tell)
     if path is not None:

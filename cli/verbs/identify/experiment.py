@@ -44,13 +44,13 @@ def experiment(
 
     Example: kemba-opt experiment answer --out next.yaml
     """
-    from kemba.files import read_json
     from kemba.folders import fresh
+    from kemba.identify.answer import read_answer
     from kemba_cli.course import EXPERIMENT
     from kemba_cli.next_steps import say_next
     from kemba_cli.progress import Progress
 
-    read_json(answer / "answer.json")  # before a folder is made for the test
+    read_answer(answer)  # before a folder is made for the test
     path = fresh(out or answer / "experiment.yaml", force)
     with Progress(quiet or json, EXPERIMENT) as progress:
         if on is Place.robot:

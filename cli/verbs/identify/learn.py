@@ -90,10 +90,17 @@ def learn(
 
 
 def _told_apart(runs: list[Path], logs: list[Path]) -> tuple[list[Path], list[Path]]:
-    """The runs and the logs among the arguments; a folder of logs stands for what it holds."""
+    """The runs and the logs among the arguments; a folder of logs stands for what it holds.
+
+    Raises KembaError where a log does not exist.
+    """
     folders = [path for path in runs if path.is_dir() or path.suffix != ".csv"]
     listed: list[Path] = []
     for path in [*logs, *(path for path in runs if path not in folders)]:
+        if not path.exists():
+            from kemba.errors import KembaError
+
+            raise KembaError(str(path), "no such file or folder", "logs of the run were expected")
         listed += sorted(path.glob("*.csv")) if path.is_dir() else [path]
     return folders, listed
 

@@ -10,6 +10,7 @@ from typing import Any
 from kemba.config import load_yaml
 from kemba.errors import KembaError
 from kemba.folders import place_for, typed
+from kemba.identify.answer import read_answer
 from kemba.identify.logs.gate import BadData
 from kemba.identify.logs.reading import read_logs
 from kemba.logs import load_map
@@ -21,7 +22,7 @@ from kemba.report.review.charts import Book
 from kemba.report.review.details import certificate_tables, origin
 from kemba.report.review.events import Events, events_of, marks_of
 from kemba.report.review.html import folded, section
-from kemba.report.review.lacking.found import Facts, answer_parts, read_answer
+from kemba.report.review.lacking.found import Facts, answer_parts
 from kemba.report.review.lacking.model_error import (
     ModelError,
     error_tables,

@@ -79,7 +79,7 @@ def gains(system: System) -> FilterGains:
         P = A @ P @ A.swapaxes(-1, -2) + (K[k] * R[k][:, None, :]) @ K[k].swapaxes(-1, -2)
         P = s.F[k] @ P @ Ft[k] + noise[k]
         P = 0.5 * (P + P.swapaxes(-1, -2))
-    whitener = np.linalg.inv(np.linalg.cholesky(S_all))
+    whitener = np.asarray(np.linalg.inv(np.linalg.cholesky(S_all)), dtype=float)
     return FilterGains(K, whitener, P_all, s.F @ (eye - K @ s.H))
 
 
