@@ -46,5 +46,5 @@ def draft_map(
         listed = ", ".join(f"'{header}'" for header in found.missing)
         say(f"not found: {listed}. Add them to {out}; without them the log says too little.", quiet)
         raise typer.Exit(BAD_ANSWER)
-    say(f"read {out}: signs and zeros of angles cannot be guessed", quiet)
+    say(f"look through {out}: signs and zeros of angles cannot be guessed", quiet)
     say_next(after_map(log, out), quiet)
