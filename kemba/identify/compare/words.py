@@ -8,8 +8,8 @@ BODY = {"body/x": "body position", "body/z": "body height", "body/pitch": "body 
 OF_LEG = {
     "hip/q": "hip angle",
     "piston/x": "piston",
-    "foot/x": "foot, along the ground,",
-    "foot/z": "foot, above the ground,",
+    "foot/x": "foot position",
+    "foot/z": "foot height",
     "stop": "end stop",
 }
 WHEN = {

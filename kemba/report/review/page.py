@@ -175,12 +175,13 @@ def page_of(given: Material) -> tuple[str, str, ReviewVerdict]:
 def _robot_parts(given: Material, book: Book, machine: Machine) -> list[str]:
     model = build_model(load_spec(given.model), supply=given.supply)
     certificate = given.run.certificate if given.run else {}
+    plan = plan_of(book.tracks)
+    below = "Below each figure: the difference from the plan. " if plan else ""
     how = (
         '<p class="soft screen">Dotted vertical lines: touchdowns. Grey: a foot stands in the '
-        "first motion. Below each figure: the difference from the plan. Drag to zoom, double "
-        "click or Escape to see all again; arrow keys move the cursor.</p>"
+        f"first motion. {below}Drag to zoom, double click or Escape to see all again; arrow keys "
+        "move the cursor.</p>"
     )
-    plan = plan_of(book.tracks)
     shown = next((t for t in reversed(book.tracks) if t.role == "plant"), plan)
     shown = next((t for t in book.tracks if t.role == "log"), shown)
     return [
