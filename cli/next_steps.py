@@ -49,8 +49,8 @@ def _own() -> str:
     return "".join(f" --effects {shlex.quote(str(file))}" for file in effect_files.get())
 
 
-def after_solve(run: str, status: str, good: bool) -> str:
-    """A good plan is executed; another one is looked at, or continued."""
+def after_solve(run: str, good: bool, status: str = "") -> str:
+    """A good plan is executed; another one is looked at, or continued. So is that of `learn`."""
     if status == "interrupted":
         return f"solve --resume {shlex.quote(run)}"
     return after_plan(run) if good else f"report {shlex.quote(run)}"
@@ -102,8 +102,8 @@ def after_compare(
 
 
 def discover(logs: Sequence[Log], column_map: str | None, model: str) -> str:
-    """The question what a model lacks."""
-    return f"discover {_typed(logs, column_map, model)} --out answer"
+    """The question what a model lacks; its answer goes to a folder that is free."""
+    return f"discover {_typed(logs, column_map, model)}"
 
 
 def after_discover(logs: Sequence[Log], column_map: str | None, model: str, answer: Path) -> str:
@@ -121,11 +121,6 @@ def after_model(model: Path, rig: bool = False, logs: Sequence[Log] = ()) -> str
 def after_experiment(file: Path | str, is_task: bool) -> str:
     """A test is tried in simulation: a rig at once, a motion when it is planned."""
     return f"solve {file}" if is_task else f"simulate {file} --noise"
-
-
-def after_learn(run: str, good: bool) -> str:
-    """The new plan is executed, or looked at when it is not confirmed."""
-    return after_plan(run) if good else f"report {shlex.quote(run)}"
 
 
 def after_sweep(file: str, folder: Path, finished: bool) -> str:

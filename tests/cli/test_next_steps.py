@@ -35,7 +35,7 @@ def found(folder: Path) -> list[str]:
     checked = [{"file": log, "kind": "log"} for log in LOGS]
     return [
         *(
-            next_steps.after_solve(str(run), s, s == "solved")
+            next_steps.after_solve(str(run), s == "solved", s)
             for s in ("solved", "stalled", "interrupted")
         ),
         next_steps.after_simulate(LOGS, run),
@@ -51,8 +51,6 @@ def found(folder: Path) -> list[str]:
         next_steps.after_model(folder / "my model.yaml", True, LOGS),
         next_steps.after_experiment(folder / "next.yaml", True),
         next_steps.after_experiment(folder / "next.yaml", False),
-        next_steps.after_learn(str(run), True),
-        next_steps.after_learn(str(run), False),
         next_steps.after_sweep("my sweep.yaml", folder, False),
     ]
 
@@ -69,7 +67,7 @@ def test_what_comes_next_can_be_typed(tmp_path: Path) -> None:
 
 def test_the_planning_model_needs_no_option_and_another_does() -> None:
     asked = next_steps.discover(["a.csv"], "map.yaml", "planning")
-    assert asked == "discover a.csv --map map.yaml --out answer"
+    assert asked == "discover a.csv --map map.yaml"
     assert "--model mine.yaml" in next_steps.discover(["a.csv"], None, "mine.yaml")
 
 

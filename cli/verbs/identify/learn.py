@@ -58,7 +58,7 @@ def learn(
     from kemba.report import Listener
     from kemba.runs import RunFolder, load_run
     from kemba_cli.course import LEARN
-    from kemba_cli.next_steps import after_learn, say_next
+    from kemba_cli.next_steps import after_solve, say_next
     from kemba_cli.progress import Progress
 
     folders, listed = _told_apart(runs or [], logs or [])
@@ -84,7 +84,7 @@ def learn(
         typer.echo(str(folder.path))
         say(found.sentence, quiet and found.good)
         say(f"{page}", quiet)
-        say_next(after_learn(str(folder.path), found.good), quiet)
+        say_next(after_solve(str(folder.path), found.good), quiet)
     if not found.good:
         raise typer.Exit(1)
 

@@ -117,7 +117,7 @@ def solve(
     else:
         typer.echo(answer["run"])
         say(answer["sentence"], quiet and answer["good"])  # why it failed is always said
-        say_next(after_solve(answer["run"], answer["status"], answer["good"]), quiet)
+        say_next(after_solve(answer["run"], answer["good"], answer["status"]), quiet)
     if answer["status"] == "interrupted":
         raise typer.Exit(130)
     if not answer["good"]:
