@@ -8,6 +8,9 @@ BODY = {"body/x": "body position", "body/z": "body height", "body/pitch": "body 
 OF_LEG = {
     "hip/q": "hip angle",
     "piston/x": "piston",
+    "piston/F": "force on the rod",
+    "chamber/extend/P": "pressure of the extend chamber",
+    "chamber/retract/P": "pressure of the retract chamber",
     "foot/x": "foot position",
     "foot/z": "foot height",
     "stop": "end stop",

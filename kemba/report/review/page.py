@@ -176,7 +176,9 @@ def _robot_parts(given: Material, book: Book, machine: Machine) -> list[str]:
     model = build_model(load_spec(given.model), supply=given.supply)
     certificate = given.run.certificate if given.run else {}
     plan = plan_of(book.tracks)
-    below = "Below each figure: the difference from the plan. " if plan else ""
+    below = (
+        "Below each figure: the difference from the plan. " if plan and len(book.tracks) > 1 else ""
+    )
     how = (
         '<p class="soft screen">Dotted vertical lines: touchdowns. Grey: a foot stands in the '
         f"first motion. {below}Drag to zoom, double click or Escape to see all again; arrow keys "
