@@ -120,7 +120,8 @@ def after_model(model: Path, rig: bool = False, logs: Sequence[Log] = ()) -> str
 
 def after_experiment(file: Path | str, is_task: bool) -> str:
     """A test is tried in simulation: a rig at once, a motion when it is planned."""
-    return f"solve {file}" if is_task else f"simulate {file} --noise"
+    named = shlex.quote(str(file))
+    return f"solve {named}" if is_task else f"simulate {named} --noise"
 
 
 def after_sweep(file: str, folder: Path, finished: bool) -> str:
