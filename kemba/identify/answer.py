@@ -171,6 +171,7 @@ def read_answer(folder: str | Path) -> dict[str, Any]:
         hint = "make one with: kemba-opt discover LOG... --out answer"
         raise KembaError(str(folder), "holds no answer.json", hint=hint)
     found = read_json(file)
-    if not isinstance(found, dict) or not isinstance(found.get("verdict"), str):
+    known = found if isinstance(found, dict) else {}
+    if not (isinstance(known.get("verdict"), str) or isinstance(known.get("ranking"), list)):
         raise KembaError(str(file), "is no answer", "the answer.json of discover was expected")
-    return found
+    return known
