@@ -15,8 +15,12 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 
+effect_files: ContextVar[tuple[Path, ...]] = ContextVar("effect_files", default=())
+
+
 def _load_effects(files: list[Path] | None) -> list[Path] | None:
     """Add the effects of the user's files, before the verb reads any YAML."""
+    effect_files.set(tuple(files or ()))
     if files:
         from kemba.effects import BY_KIND
         from kemba.errors import KembaError

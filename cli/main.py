@@ -13,6 +13,7 @@ from typing import Annotated
 import typer
 
 import kemba
+from kemba_cli.earlier import figure_at, is_new_folder, is_picture
 from kemba_cli.failures import guarded
 from kemba_cli.verbose import with_verbose
 from kemba_cli.verbs.identify.adopt import adopt
@@ -50,6 +51,11 @@ PANELS = {  # as --help groups them
     ),
     "Catalogue and files": (effects, schema),
 }
+# verbs whose `--figure` took a place before it was the switch that it is at all verbs
+PLACED = {
+    compare: figure_at("--out", is_picture),
+    characterise: figure_at("--figures", is_new_folder),
+}
 VERBS = tuple(verb for verbs in PANELS.values() for verb in verbs if verb is not draft_map)
 
 app = typer.Typer(
@@ -60,7 +66,8 @@ app = typer.Typer(
 for panel, verbs in PANELS.items():
     for verb in verbs:
         name = "map" if verb is draft_map else verb.__name__  # `map` is a word of Python
-        app.command(name, rich_help_panel=panel)(with_verbose(guarded(verb)))
+        shape = PLACED.get(verb)
+        app.command(name, cls=shape, rich_help_panel=panel)(with_verbose(guarded(verb)))
 
 
 def _version(wanted: bool) -> None:

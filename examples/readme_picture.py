@@ -19,7 +19,8 @@ from PIL import Image, ImageSequence
 
 import kemba
 from kemba.plotting import load_machine, load_source
-from kemba.plotting.robot.sticks import StickFigure, poses
+from kemba.plotting.robot.poses import poses
+from kemba.plotting.robot.sticks import StickFigure
 from kemba.plotting.robot.strip import draw_ground
 from kemba.plotting.style import BLUE, GREEN, GREY, INK, VERMILLION, paper_style
 

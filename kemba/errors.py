@@ -6,6 +6,7 @@ import difflib
 from collections.abc import Iterable
 
 LISTED = 12  # a hint with more names than this does not help
+PART, FEW = 3, 4  # so many letters of a name tell it, where so few names have them
 
 
 class KembaError(Exception):
@@ -59,5 +60,9 @@ def suggest(name: str, candidates: Iterable[str]) -> str:
     near = difflib.get_close_matches(str(name).casefold(), folded, n=1)
     if near:
         return f"did you mean '{folded[near[0]]}'?"
+    typed = str(name).casefold()
+    parts = [name for key, name in folded.items() if typed in key] if len(typed) >= PART else []
+    if 0 < len(parts) <= FEW:
+        return "did you mean " + " or ".join(f"'{part}'" for part in parts) + "?"
     more = f", ... ({len(names) - LISTED} more)" if len(names) > LISTED else ""
     return "one of: " + ", ".join(names[:LISTED]) + more

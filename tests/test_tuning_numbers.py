@@ -103,7 +103,7 @@ CONSTANTS = {  # file -> names, why
     "identify/design/courses.py": ("STEEPEST", "the shape of a cubic"),
     "identify/design/robot.py": ("STANDARD", "the motion that others are compared with"),
     "config/writer.py": ("WIDTH", "width of lines"),
-    "errors.py": ("LISTED", "length of messages"),
+    "errors.py": ("LISTED PART FEW", "length of messages"),
     "folders.py": ("PROBE MANY", "free space that a run takes; length of messages"),
     "ocp/refinement/refine.py": ("SOLVES", "a count that progress shows"),
     "ocp/refinement/sample.py": ("WORST", "violations that a report lists"),

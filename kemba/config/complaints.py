@@ -112,6 +112,11 @@ def _report(found: Complaint, document: Document) -> KembaError:
         return _not_among(found, document)
     if found.kind == "value_error":
         return document.error(place, _at(place, str(found.context["error"])))
+    if found.kind == "too_short":
+        least = f"at least {found.context['min_length']} were expected"
+        count = int(found.context["actual_length"])
+        what = f"has {count} {'entry' if count == 1 else 'entries'}"
+        return document.error(place, _at(place, what), least)
     message = found.message[0].lower() + found.message[1:]
     return document.error(place, _at(place, f"{_shown(found.value)}: {message}"))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from kemba.files import atomic_text
 __all__ = ["Document", "Location", "dump_text", "dump_yaml", "load_text", "load_yaml", "written"]
 
 WIDE = 160  # characters of a line that are shown
+TIGHT = re.compile(r"\s*[\w*/.-]+:[^\s/]")  # `height:0.5 m`, which YAML reads as one word
 
 
 @dataclass(frozen=True)
@@ -127,4 +129,7 @@ def _syntax_error(error: YamlError, document: Document) -> KembaError:
     line, column = error.mark
     before = "".join(document.lines[line : line + 1])[: column + 1]
     hint = "indent with spaces, not tabs" if "\t" in before else error.hint
+    tight = [n for n, text in enumerate(document.lines[: line + 1], 1) if TIGHT.match(text)]
+    if tight and "expected ':'" in error.what:
+        hint = f"a space is missing behind the colon in line {tight[-1]}"
     return document.error_at(line, column, error.what, hint=hint)

@@ -9,7 +9,7 @@ from typing import Any
 from kemba.config import dump_yaml, parse
 from kemba.effects import BY_KIND
 from kemba.errors import KembaError, suggest
-from kemba.files import read_json
+from kemba.identify.answer import read_answer
 from kemba.identify.problem.candidates import where_field
 from kemba.identify.problem.structure import ORIFICE, orifice_item
 from kemba.model.spec import ModelSpec, load_spec
@@ -60,7 +60,7 @@ def reference(base: str) -> str:
 def adopt_effect(folder: str | Path, effect: str, out: Path) -> Path:
     """The model of another row of an answer's ranking. Raises KembaError."""
     file = Path(folder) / "answer.json"
-    answer = read_json(file)
+    answer = read_answer(folder)
     names = [row["effect"] for row in answer["ranking"]]
     if effect not in names:
         raise KembaError(

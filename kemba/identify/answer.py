@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
+from kemba.errors import KembaError
+from kemba.files import read_json
 from kemba.identify.settings import DiscoverSettings
 
 Verdict = Literal["missing", "partly", "nothing", "unknown", "bad-data"]
@@ -163,3 +166,16 @@ def _doubt(parts: Sequence[Ranked]) -> str:
         if r.equivalent_to
     ]
     return "".join(texts)
+
+
+def read_answer(folder: str | Path) -> dict[str, Any]:
+    """The answer.json of a folder that discover wrote. Raises KembaError where there is none."""
+    file = Path(folder) / "answer.json" if Path(folder).is_dir() else Path(folder)
+    if not file.is_file():
+        hint = "make one with: kemba-opt discover LOG... --out answer"
+        raise KembaError(str(folder), "holds no answer.json", hint=hint)
+    found = read_json(file)
+    known = found if isinstance(found, dict) else {}
+    if not (isinstance(known.get("verdict"), str) or isinstance(known.get("ranking"), list)):
+        raise KembaError(str(file), "is no answer", "the answer.json of discover was expected")
+    return known

@@ -9,7 +9,7 @@ from typing import Any
 
 from kemba.config import dump_yaml
 from kemba.errors import KembaError
-from kemba.files import read_json
+from kemba.identify.answer import read_answer
 from kemba.identify.design.menu import JudgedRig
 from kemba.identify.design.rig import RigDesign, design_rig_test
 from kemba.identify.design.rivals import contenders
@@ -94,7 +94,7 @@ def propose(
     `bounded`: in about a minute. Raises KembaError where no test shows a difference, or a file
     cannot be read or written.
     """
-    answer = read_json(Path(folder) / "answer.json")
+    answer = read_answer(folder)
     rivals = contenders(answer)
     model = load_model(str(answer.get("base") or "planning"), rig=True)
     if model.mechanism.rig:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterable
 from html import escape
 from pathlib import Path
@@ -14,6 +15,7 @@ from kemba.plant.execution.controller import execute
 from kemba.plotting.study.learning import plot_executions, plot_rounds
 from kemba.plotting.style import svg_text
 from kemba.report.review.html import pairs
+from kemba.report.review.verdict import ReviewVerdict
 from kemba.report.stage import write_page
 
 Rows = Iterable[tuple[str, Any]]
@@ -21,9 +23,8 @@ Rows = Iterable[tuple[str, Any]]
 
 def write_learning(found: Round, folder: Path) -> Path:
     """Write learning.html to the folder of the new run; it needs no other file."""
-    tone = "" if found.good else " bad"
     parts = [
-        f'<p class="verdict{tone}">{escape(found.sentence)}</p>',
+        verdict_of(found, folder).html(),
         f'<div class="facts">{"".join(_tables(found))}</div>',
         "<h2>Executed and expected</h2>",
         "<p>The run that was learnt from: what the robot did, and what the models before and "
@@ -37,12 +38,24 @@ def write_learning(found: Round, folder: Path) -> Path:
     return write_page(folder / "learning.html", title, "\n".join(parts))
 
 
+def verdict_of(found: Round, folder: Path) -> ReviewVerdict:
+    """The round in words, and what to do with its plan."""
+    run = shlex.quote(str(folder))
+    if not found.good:
+        aim = "do not send it to the robot; see why:"
+        return ReviewVerdict("bad", found.sentence, aim, f"kemba-opt report {run}")
+    sure = found.answer.verdict in ("missing", "nothing") and not found.correction.limited
+    aim = "send controller.csv to the robot, or execute it on the simulated one:"
+    command = f"kemba-opt simulate {run} --repeat 3 --noise"
+    return ReviewVerdict("good" if sure else "fair", found.sentence, aim, command)
+
+
 def _tables(found: Round) -> Iterable[str]:
     yield pairs("what was learnt", [
         ("verdict", found.answer.verdict),
         ("added", ", ".join(found.answer.added) or "nothing"),
-        ("model error before", f"{found.compare_before:.2f} x noise"),
-        ("model error after", f"{found.compare_after:.2f} x noise"),
+        ("model error before", f"{found.compare_before:.2f} times the noise"),
+        ("model error after", f"{found.compare_after:.2f} times the noise"),
         ("logs", len(found.past.logs)),
     ])  # fmt: skip
     executed = sum(f.apex for f in found.executed) / len(found.executed)
@@ -89,9 +102,9 @@ def _correction(found: Round) -> str:
     if found.aimed is None:
         return "No table was corrected."
     edges = sum(bool(k) for moved in found.aimed.moved.values() for k in moved)
-    limited = f" ({', '.join(c.limited)} at its bound)" if c.limited else ""
+    limited = f" ({', '.join(c.limited)}: the most that is corrected)" if c.limited else ""
     return (
-        f"Beyond the learnt model the executions went {1e3 * c.apex:+.1f} mm at the apex and "
-        f"{1e3 * c.touchdown:+.1f} ms at touchdown{limited}, by {c.logs} logs. This is no physics: "
-        f"it moved {edges} valve edges of controller.csv, and is in correction.yaml alone."
+        f"What the learnt model does not explain of {c.logs} logs: {1e3 * c.apex:+.1f} mm at the "
+        f"apex and {1e3 * c.touchdown:+.1f} ms at touchdown{limited}. It is not added to the "
+        f"model: {edges} valve edges of controller.csv were moved for it (correction.yaml)."
     )

@@ -17,6 +17,7 @@ from kemba.identify.compare_logs import compare_logs
 from kemba.identify.discover import Discovery
 from kemba.identify.logs.reading import read_logs
 from kemba.identify.workflow import discover_logs
+from kemba.learn import words
 from kemba.learn.aim import Aim, Aimed
 from kemba.learn.correction import Correction, correction_from, write_correction
 from kemba.learn.flight import FlownJump, flight_of
@@ -109,19 +110,22 @@ class Round:
     @property
     def sentence(self) -> str:
         """The round in words."""
-        missed = f"executions missed the planned apex by {1e3 * self.executed_apex_error:+.1f} mm"
-        error = f"the model's error goes from {self.compare_before:.2f} to "
-        parts = [
-            f"round {self.past.round}: {missed}",
-            self.answer.sentence,
-            f"{error}{self.compare_after:.2f} times the noise",
-        ]
-        if self.expected_apex_error is not None:
-            expected = f"{1e3 * self.expected_apex_error:+.1f} mm"
-            parts.append(f"the next run is expected to miss its apex by {expected}")
-        if not self.good:
-            parts.append(f"but the next plan is not confirmed: {self.result.get('sentence')}")
-        return "; ".join(parts)
+        failed = "" if self.good else f"FAILED: the next plan is not confirmed: {self._why}"
+        return words.sentences(
+            [
+                failed,
+                f"round {self.past.round}: {words.jumped(self.executed_apex_error)}",
+                words.learnt(
+                    self.answer.verdict, self.answer.added, self.compare_before, self.compare_after
+                ),
+                words.expected(self.expected_apex_error),
+                words.beyond(self.correction.limited),
+            ]
+        )
+
+    @property
+    def _why(self) -> str:
+        return str(self.result.get("sentence") or "there is none").removeprefix("FAILED: ")
 
 
 def learn(asked: Asked, folder: RunFolder, listener: Listener) -> Round:

@@ -64,7 +64,9 @@ class ColumnMap(Section):
     Columns that it does not name are ignored, whatever they hold.
     """
 
-    kind: str | None = Field(None, description="robot, bench, cylinder or drive; else by columns")
+    kind: str | None = Field(
+        None, description="robot, bench, cylinder, drive or vessel; else by columns"
+    )
     notes: str = ""
     separator: str = Field(",", min_length=1, description="`;`, `tab`, `whitespace`, ...")
     decimal: Literal[".", ","] = Field(".", description="the decimal sign")

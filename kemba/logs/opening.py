@@ -18,6 +18,7 @@ from kemba.trajectory import TIME, Trajectory, check_times, sidecar
 TEXTS = (".csv", ".txt", ".tsv", ".dat")
 BINARY = tuple(f".{ending}" for ending in MODULES)
 ENDINGS = (*TEXTS, *BINARY)
+YAML = (".yaml", ".yml")
 
 
 def open_log(path: Path, columns: ColumnMap | None = None, strict: bool = True) -> Trajectory:
@@ -28,6 +29,7 @@ def open_log(path: Path, columns: ColumnMap | None = None, strict: bool = True) 
     """
     if path.is_dir():
         raise KembaError(str(path), "is a folder", "a log was expected")
+    _no_yaml(path)
     if path.suffix.lower() not in BINARY and columns is None:
         return Trajectory.read(path, strict)
     raw, meta = raw_columns(path, columns)
@@ -42,11 +44,18 @@ def raw_columns(path: Path, layout: ColumnMap | None) -> tuple[Raw, dict[str, An
     """All columns of a file as they are, and the metadata it holds. Raises KembaError."""
     if not path.is_file():
         raise KembaError(str(path), "no such file")
+    _no_yaml(path)
     if path.suffix.lower() in BINARY:
         return reader(path)(path)
     if layout is None:
         raise KembaError(str(path), "a column map says how to read a text table")
     return read_text(path, layout), {}
+
+
+def _no_yaml(path: Path) -> None:
+    if path.suffix.lower() in YAML:
+        endings = ", ".join(ENDINGS)
+        raise KembaError(str(path), "is a YAML file", f"a log was expected: {endings}")
 
 
 def _own(raw: Raw, path: Path, meta: dict[str, Any]) -> Trajectory:

@@ -2,19 +2,27 @@
 
 Figures are made without pyplot, so they need no display; pass `figure=pyplot.figure()` to a
 function to have one that `pyplot.show` opens.
+
+Everything is imported when first asked for: who only reads a log needs no matplotlib.
 """
 
-from kemba.plotting.bands import Band, plot_bands, plot_ladder
-from kemba.plotting.draw import draw, machine_of
-from kemba.plotting.heat import plot_heat_map
-from kemba.plotting.rig.bench import plot_bench, plot_force_velocity, valve_modes
-from kemba.plotting.rig.rig import bench_logs, plot_rig
-from kemba.plotting.robot.animation import animate, save_animation
-from kemba.plotting.robot.machine import Machine, load_machine
-from kemba.plotting.robot.motion import plot_motion
-from kemba.plotting.source import Source, default_path, load_source, load_sources
-from kemba.plotting.study.robustness import plot_growth, plot_robustness
-from kemba.plotting.style import paper_figure, paper_style, save_figure, svg_text
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from kemba.plotting.bands import Band, plot_bands, plot_ladder
+    from kemba.plotting.choice import draw
+    from kemba.plotting.heat import plot_heat_map
+    from kemba.plotting.rig.bench import plot_bench, plot_force_velocity, valve_modes
+    from kemba.plotting.rig.rig import bench_logs, plot_rig
+    from kemba.plotting.robot.animation import animate, save_animation
+    from kemba.plotting.robot.machine import Machine, load_machine, machine_of
+    from kemba.plotting.robot.motion import plot_motion
+    from kemba.plotting.source import Source, default_path, load_source, load_sources
+    from kemba.plotting.study.robustness import plot_growth, plot_robustness
+    from kemba.plotting.style import paper_figure, paper_style, save_figure, svg_text
 
 __all__ = [
     "Band",
@@ -44,3 +52,24 @@ __all__ = [
     "svg_text",
     "valve_modes",
 ]
+
+_HOMES = {  # module -> names that it offers
+    "kemba.plotting.bands": "Band plot_bands plot_ladder",
+    "kemba.plotting.choice": "draw",
+    "kemba.plotting.heat": "plot_heat_map",
+    "kemba.plotting.rig.bench": "plot_bench plot_force_velocity valve_modes",
+    "kemba.plotting.rig.rig": "bench_logs plot_rig",
+    "kemba.plotting.robot.animation": "animate save_animation",
+    "kemba.plotting.robot.machine": "Machine load_machine machine_of",
+    "kemba.plotting.robot.motion": "plot_motion",
+    "kemba.plotting.source": "Source default_path load_source load_sources",
+    "kemba.plotting.study.robustness": "plot_growth plot_robustness",
+    "kemba.plotting.style": "paper_figure paper_style save_figure svg_text",
+}
+
+
+def __getattr__(name: str) -> Any:
+    for module, names in _HOMES.items():
+        if name in names.split():
+            return getattr(import_module(module), name)
+    raise AttributeError(f"module 'kemba.plotting' has no attribute '{name}'")

@@ -76,12 +76,18 @@ def paper_figure(height: float, width: float = WIDTH, figure: Figure | None = No
     return figure
 
 
-def save_figure(figure: Figure, path: str | Path) -> Path:
-    """Write the figure as PNG, PDF or SVG by the ending of `path`. Raises KembaError."""
+def figure_name(path: str | Path) -> Path:
+    """`path`, whose ending is a format of figures. Raises KembaError where it is not."""
     path = Path(path)
     if path.suffix.lstrip(".").lower() not in FORMATS:
         what = f"no figure format '{path.suffix}'" if path.suffix else "has no ending"
         raise KembaError(str(path), what, "a name ending in .png, .pdf or .svg was expected")
+    return path
+
+
+def save_figure(figure: Figure, path: str | Path) -> Path:
+    """Write the figure as PNG, PDF or SVG by the ending of `path`. Raises KembaError."""
+    path = figure_name(path)
     with atomic_path(path) as temporary, matplotlib.rc_context(RC):
         if path.suffix.lower() == ".png":
             _lay_out(figure)

@@ -129,7 +129,7 @@ def draw_plan(plan: Trajectory, folder: Path) -> None:
 
 def _serve(pipe: Connection, effects: dict[str, str]) -> None:
     """Draw the plans that come; answer each with None or the error."""
-    import kemba.plotting.draw  # noqa: F401  now, while there is time
+    import kemba.plotting.choice  # noqa: F401  now, while there is time
 
     load_effects(effects)
     with suppress(EOFError, OSError):  # no more plans, or nobody waits any more

@@ -15,8 +15,8 @@ from kemba.errors import KembaError
 from kemba.files import atomic_text, plain
 from kemba.folders import place_for
 from kemba.logs import load_map
-from kemba.plotting.draw import machine_of
-from kemba.plotting.robot.sticks import CYLINDER, Pose, poses
+from kemba.plotting.robot.machine import machine_of
+from kemba.plotting.robot.poses import CYLINDER, Pose, poses
 from kemba.plotting.source import Source, load_source
 from kemba.trajectory import Array
 

@@ -58,7 +58,7 @@ def test_check_names_the_next_command(folder: Path) -> None:
     logs = [str(folder / f"run_{number}.csv") for number in range(2)]
     done = run("check", *logs)
     assert done.exit_code == 0
-    assert done.stderr == f"next: kemba-opt discover {' '.join(logs)} --out answer\n"
+    assert done.stderr == f"next: kemba-opt discover {' '.join(logs)}\n"
     assert run("check", *logs, "-q").stderr == ""
 
 

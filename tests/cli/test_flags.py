@@ -16,7 +16,7 @@ from kemba_cli.main import app
 COMMANDS: dict[str, Any] = dict(typer.main.get_command(app).commands)  # type: ignore[attr-defined]
 SHORT = {"-q": "quiet", "-v": "verbose", "-h": "help"}
 CONTINUES = {"sweep"}  # a folder that is there is continued, not replaced
-NO_FOLDER = {"compare"}  # --figure FILE is all that it writes
+DRAWS = {"solve", "sweep", "compare", "discover", "characterise"}  # figures beside an answer
 
 
 def options(command: Any) -> list[Any]:
@@ -43,7 +43,7 @@ def test_what_writes_can_be_told_where_and_to_replace(verb: str) -> None:
     known = names(COMMANDS[verb])
     if {"--out", "--figure", "--animate"} & known and verb not in CONTINUES:
         assert "--force" in known
-    if "--force" in known and verb not in NO_FOLDER:
+    if "--force" in known:
         assert "--out" in known
 
 
@@ -56,6 +56,52 @@ def test_options_look_alike(verb: str) -> None:
         assert option.help and option.help[0].isupper() and option.help.endswith("."), option.opts
         if option.is_flag and option.default is True:
             assert [f"--no-{option.opts[0][2:]}"] == option.secondary_opts
+
+
+@pytest.mark.parametrize("verb", COMMANDS)
+def test_figures_are_a_switch_everywhere(verb: str) -> None:
+    """`--figure/--no-figure`, where a verb draws figures beside its answer."""
+    found = [o for o in options(COMMANDS[verb]) if "--figure" in o.opts]
+    assert bool(found) == (verb in DRAWS)
+    assert all(o.is_flag and o.secondary_opts == ["--no-figure"] for o in found)
+
+
+@pytest.mark.parametrize(
+    ("words", "meant"),
+    [
+        (["a.csv", "--figure", "heat.png"], ["a.csv", "--out", "heat.png"]),
+        (["--figure=heat.png", "a.csv"], ["--out", "heat.png", "a.csv"]),
+        (["--figure", "a.csv"], ["--figure", "a.csv"]),
+        (["a.csv", "--figure", "--json"], ["a.csv", "--figure", "--json"]),
+        (["a.csv", "--figure"], ["a.csv", "--figure"]),
+    ],
+)
+def test_compare_reads_the_earlier_form_too(words: list[str], meant: list[str]) -> None:
+    """`--figure FILE`, which scripts still write."""
+    command = COMMANDS["compare"]
+
+    def read(typed: list[str]) -> dict[str, object]:
+        return dict(command.make_context("compare", list(typed)).params)
+
+    assert read(words) == read(meant)
+    assert read(words)["logs"] == [Path("a.csv")]
+
+
+def test_characterise_tells_a_new_folder_from_logs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("bench").mkdir()
+    Path("bench/a.csv").touch()
+
+    def read(*words: str) -> tuple[object, ...]:
+        found = COMMANDS["characterise"].make_context("characterise", list(words)).params
+        return found["logs"], found["figure"], found["figures"]
+
+    logs = [Path("bench")]
+    assert read("bench", "--figure", "drawn") == (logs, None, Path("drawn"))
+    assert read("--figure", "bench") == (logs, True, None)
+    assert read("bench", "--no-figure") == (logs, False, None)
 
 
 def test_a_name_means_the_same_everywhere() -> None:

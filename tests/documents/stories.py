@@ -152,5 +152,5 @@ STORIES: dict[str, Story] = {
         ends={"--time-limit": (0, 1)},
     ),
     "tasks.md": Story((mine,)),
-    "why-not.md": Story(ends={"--time-limit 1": (1,), "height=": PLANNED}),
+    "why-not.md": Story(ends={"--time-limit 1": (1,), "--resume": PLANNED}),
 }

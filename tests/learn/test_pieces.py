@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from kemba.config import load_yaml
 from kemba.errors import KembaError
+from kemba.identify.answer import Answer
 from kemba.learn.correction import Correction, correction_from, write_correction
 from kemba.learn.flight import FlownJump, flight_of
-from kemba.learn.round import as_executed
+from kemba.learn.page import verdict_of
+from kemba.learn.round import Round, as_executed
 from kemba.learn.rounds import entry, past_of, sent
 from kemba.model import load_model
 from kemba.ocp import load_task
@@ -155,3 +158,46 @@ def test_models_have_the_supply_and_payload_of_the_run(tmp_path: Path) -> None:
     assert built.effect("payload").value("m") == pytest.approx(0.3)
     plain, _ = load_task("jump", [])
     assert as_executed("planning", plain, tmp_path / "no.yaml") == "planning"
+
+
+def a_round(verdict: str, added: list[str], good: bool, limited: tuple[str, ...]) -> Round:
+    """A round with these results, of one jump that stayed 9 mm too low."""
+    planned, executed = (FlownJump(z, 0.4, 0.5, 0.0, True) for z in (0.5, 0.491))
+    answer = Answer("unknown", sentence="")
+    answer.verdict, answer.added = verdict, added  # type: ignore[assignment]
+    correction = Correction(logs=3, limited=limited)
+    result = {"confirmed": good, "sentence": "FAILED: the simulated robot tips over."}
+    past = SimpleNamespace(round=2)
+    flown = (planned, [executed], executed, planned)
+    return Round(past, "m.yaml", answer, None, 3.0, 1.2, *flown, correction, result)  # type: ignore
+
+
+@pytest.mark.parametrize(
+    ("verdict", "added", "good", "limited", "grade", "told"),
+    [
+        (
+            "missing", ["a", "b"], True, (), "good",
+            "Round 2: the robot jumped 9.0 mm lower than planned. The model lacks a and b; with "
+            "them its error goes from 3.00 to 1.20 times the noise.",
+        ),
+        (
+            "partly", ["a"], True, ("touchdown",), "fair",
+            "Round 2: the robot jumped 9.0 mm lower than planned. The model lacks a, and something "
+            "more that is not known; with it its error goes from 3.00 to 1.20 times the noise. But "
+            "in touchdown the executions differ from the learnt model by more than is corrected: "
+            "do not trust the model there before it has seen more logs.",
+        ),
+        (
+            "nothing", [], False, (), "bad",
+            "FAILED: the next plan is not confirmed: the simulated robot tips over. Round 2: the "
+            "robot jumped 9.0 mm lower than planned. The model lacks nothing that these logs show.",
+        ),
+    ],
+)  # fmt: skip
+def test_a_round_is_told_in_plain_words(
+    verdict: str, added: list[str], good: bool, limited: tuple[str, ...], grade: str, told: str
+) -> None:
+    said = verdict_of(a_round(verdict, added, good, limited), Path("runs/jump-2"))
+    assert (said.grade, said.sentence) == (grade, told)
+    verb = "simulate" if good else "report"
+    assert said.command.startswith(f"kemba-opt {verb} runs/jump-2")

@@ -20,7 +20,7 @@ from kemba.plotting import (
     plot_motion,
     save_figure,
 )
-from kemba.plotting.robot.motion import stance_spans
+from kemba.plotting.robot.machine import stance_spans
 from kemba.trajectory import Trajectory
 
 LABELS = {
@@ -126,6 +126,23 @@ def test_stance_is_shaded_in_every_panel(plan: Source, log: Source, machine: Mac
         assert len(bands.get_paths()) == 2
     (_, takeoff), (landing, _) = stance_spans(log, machine, "front")  # from the foot's height
     assert (takeoff, landing) == pytest.approx((0.20, 0.49), abs=0.03)
+
+
+def test_a_foot_that_stays_down_has_not_left_the_ground(log: Source, machine: Machine) -> None:
+    """Its force is lost in the noise for a while after it has touched; its height tells."""
+    t = log.trajectory
+    at = machine.coordinates(t)
+    assert at is not None
+    down = machine.points(at)["front/foot"][:, 1] < 4e-3
+    landed = t.time[np.flatnonzero(~down)[-1] + 1]
+    light = (t.time > landed + 0.015) & (t.time < landed + 0.04)
+    noise = np.random.default_rng(1).normal(0.0, 1.0, len(t))
+    force = np.where(down & ~light, 30.0, 0.0) + noise
+    measured = t.with_columns({"front/foot/Fz [N]": force})
+    spans = stance_spans(Source("log", measured), machine, "front")
+    assert len(spans) == 2 and spans[1] == pytest.approx((landed, t.time[-1]), abs=0.01)
+    blind = measured.select(["front/foot/Fz"])  # without its joints only the force is known
+    assert len(stance_spans(Source("log", blind), machine, "front")) == 3
 
 
 def test_runs_overlay_in_their_colours(plan: Source, log: Source, machine: Machine) -> None:

@@ -12,11 +12,12 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from kemba.files import read_json
+from kemba.identify.answer import read_answer
 from kemba.identify.logs.clock import in_plans_clock, start_of
 from kemba.mechanism import load_robot
 from kemba.plotting import Source, load_machine
 from kemba.report.review.events import events_of
-from kemba.report.review.lacking.found import answer_parts, read_answer
+from kemba.report.review.lacking.found import answer_parts
 from kemba.report.review.limits.use import air_drawn, motor_share
 from kemba.report.review.tracks import Track, gather, grid_of, on_grid
 from kemba.report.review.verdict import of_answer, of_logs, of_plan

@@ -25,8 +25,12 @@ def adopt(
     """
     from kemba.folders import fresh
     from kemba.identify.adopt import adopt_effect
+    from kemba.model import load_model
+    from kemba_cli.next_steps import after_model, say_next
 
     path = out or answer / f"model_{effect.replace(':', '_').replace('/', '_')}.yaml"
     fresh(path, force)
     adopt_effect(answer, effect, path)
     print_json({"model": str(path), "added": effect}) if json else typer.echo(path)
+    rig = bool(load_model(path, rig=True).mechanism.rig)
+    say_next(after_model(path, rig), quiet or json)

@@ -19,9 +19,13 @@ def characterise(
         list[Path] | None, typer.Argument(help="Bench logs (CSV), or folders of them.")
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Model YAML to write.")] = None,
+    figure: Annotated[
+        bool | None,
+        typer.Option("--figure/--no-figure", help="Draw the paper's figure of each rig."),
+    ] = None,
     figures: Annotated[
         Path | None,
-        typer.Option("--figure", "--figures", help="Folder for the paper's figure of each rig."),
+        typer.Option(help="Folder for them (a new folder figures beside the model)."),
     ] = None,
     model: Annotated[
         str, typer.Option(help="Model YAML whose robot has the cylinder that was tested.")
@@ -47,20 +51,25 @@ def characterise(
     from kemba.model import load_model
 
     if load_model(model, rig=True).mechanism.rig:
+        if figure or figures:
+            what = "figures are drawn of the paper's rigs only"
+            raise typer.BadParameter(what, param_hint="--figure")
         _own_rig(logs, model, out, force, json, quiet)
         return
     from kemba.plant.rig.characterise import characterise as fit
     from kemba.plant.rig.tables import as_json
     from kemba.trajectory import Trajectory
+    from kemba_cli.next_steps import after_model, say_next
 
     if out:
         fresh(out, force)
+    folder = _folder(figure, figures, out)
     files = [f for item in logs for f in (sorted(item.glob("*.csv")) if item.is_dir() else [item])]
     read = {str(file): Trajectory.read(file) for file in files}
     found = fit(read, load_model(model, rig=True).mechanism.need_cylinder())
     if out:
         found.write_model(out, out.stem)
-    drawn = _draw(found, read, figures, model) if figures else []
+    drawn = _draw(found, read, folder, model) if folder else []
     answer: dict[str, Any] = {"logs": len(files), **as_json(found), "model": out and str(out)}
     answer["figures"] = drawn
     if json:
@@ -70,6 +79,18 @@ def characterise(
     for path in drawn:
         say(f"wrote {path}", quiet)
     say(f"wrote {out}" if out else "write a model with --out MODEL.yaml", quiet)
+    say_next(after_model(out) if out else "", quiet)
+
+
+def _folder(figure: bool | None, figures: Path | None, model: Path | None) -> Path | None:
+    """Where the figures go; None for none. Raises BadParameter for a place that is not used."""
+    from kemba.folders import next_free
+
+    if figure is False and figures is not None:
+        raise typer.BadParameter("--figures names their folder", param_hint="--no-figure")
+    if not figure and figures is None:
+        return None
+    return figures or next_free((model.parent if model else Path()) / "figures")
 
 
 def _own_rig(
@@ -81,6 +102,7 @@ def _own_rig(
     from kemba.folders import fresh
     from kemba.identify.adopt import reference
     from kemba.identify.rigs.files import characterise_logs
+    from kemba_cli.next_steps import after_model, say_next
 
     if out:
         fresh(out, force)
@@ -98,6 +120,7 @@ def _own_rig(
     error = f"{found.error_before:.3g} to {found.error_after:.3g} times the noise of the sensors"
     typer.echo(f"The error falls from {error}. Intervals are those of one mounting.")
     say(f"wrote {out}" if out else "write a model with --out MODEL.yaml", quiet)
+    say_next(after_model(out, True, logs) if out else "", quiet)
 
 
 def _print_paper(json: bool, quiet: bool) -> None:

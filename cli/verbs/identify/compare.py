@@ -19,7 +19,12 @@ def compare(
     logs: Annotated[list[Path], typer.Argument(help="Logs (CSV) of one machine, any order.")],
     model: Annotated[str, typer.Option(help="Model YAML to judge.")] = "planning",
     run: Annotated[Path | None, typer.Option(help="Run folder that was executed.")] = None,
-    figure: Annotated[Path | None, typer.Option(help="Also save the figure here.")] = None,
+    figure: Annotated[
+        bool | None, typer.Option("--figure/--no-figure", help="Draw where the model fails.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Figure to write: PNG, PDF or SVG (a new compare.png here).")
+    ] = None,
     column_map: Foreign = None,
     force: Force = False,
     own_effects: OwnEffects = None,
@@ -28,32 +33,36 @@ def compare(
 ) -> None:
     """Say whether a model explains logs to within their noise and, if not, where it fails.
 
-    Example: kemba-opt compare jump_1.csv jump_2.csv --figure heat_map.png
+    Example: kemba-opt compare jump_1.csv jump_2.csv --out heat_map.png
     """
-    from kemba.folders import fresh, typed
+    from kemba.folders import place_for
     from kemba.identify.compare_logs import compare_logs
     from kemba_cli.course import COMPARE
+    from kemba_cli.next_steps import after_compare, say_next
     from kemba_cli.progress import Progress
 
-    if figure is not None:
-        fresh(figure, force, "--figure")
+    if out is not None and figure is False:
+        raise typer.BadParameter("--out names the figure", param_hint="--no-figure")
+    path = None
+    if figure or out is not None:
+        from kemba.plotting.style import figure_name
+
+        path = figure_name(place_for(out, Path("compare.png"), force))
     with Progress(quiet or json, COMPARE) as progress:
         found, _ = compare_logs(logs, model, column_map, run, progress.tell)
-    if figure is not None:
+    if path is not None:
         from kemba.plotting.study.comparison import plot_comparison
         from kemba.plotting.style import save_figure
 
-        save_figure(plot_comparison(found), figure)
-        say(f"wrote {figure}", quiet)
+        save_figure(plot_comparison(found), path)
+        say(f"wrote {path}", quiet)
     if json:
-        print_json(found.json())
+        print_json({**found.json(), **({"figure": str(path)} if path else {})})
         return
     typer.echo(found.sentence)
     if not quiet:
         _print(found)
-    if not found.good and not found.tolerable:
-        own = None if model == "planning" else model
-        say(f"next: kemba-opt discover {typed(logs, column_map, own)} --out answer", quiet)
+    say_next(after_compare(logs, column_map, model, run, found.good or found.tolerable), quiet)
 
 
 def _print(found: Comparison) -> None:

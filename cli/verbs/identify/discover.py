@@ -43,9 +43,10 @@ def discover(
 
     Example: kemba-opt discover bench_1.csv bench_2.csv --holdout bench_3.csv
     """
-    from kemba.folders import claimed, typed
+    from kemba.folders import claimed
     from kemba.identify.workflow import discover_logs, write_answer
     from kemba_cli.course import DISCOVER
+    from kemba_cli.next_steps import after_discover, say_next
     from kemba_cli.progress import Progress
 
     with claimed(out, "answer", "answer.json", force) as folder:
@@ -63,8 +64,7 @@ def discover(
                 draw_discovery(found, folder)
         finally:  # also when the disk is full: it took minutes
             _tell(answer, folder, json, quiet)
-            own = None if model == "planning" else model
-            say(f"next: kemba-opt review {typed(logs, column_map, own)} --answer {folder}", quiet)
+            say_next(after_discover(logs, column_map, model, folder), quiet or json)
     if answer.verdict == "bad-data":
         raise typer.Exit(BAD_ANSWER)
 

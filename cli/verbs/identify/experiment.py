@@ -44,12 +44,13 @@ def experiment(
 
     Example: kemba-opt experiment answer --out next.yaml
     """
-    from kemba.files import read_json
     from kemba.folders import fresh
+    from kemba.identify.answer import read_answer
     from kemba_cli.course import EXPERIMENT
+    from kemba_cli.next_steps import say_next
     from kemba_cli.progress import Progress
 
-    read_json(answer / "answer.json")  # before a folder is made for the test
+    read_answer(answer)  # before a folder is made for the test
     path = fresh(out or answer / "experiment.yaml", force)
     with Progress(quiet or json, EXPERIMENT) as progress:
         if on is Place.robot:
@@ -61,24 +62,28 @@ def experiment(
     else:
         typer.echo(path)
         say(facts["sentence"], quiet)
-        say((facts["next"] and f"next: {facts['next']}") or facts["why"], quiet)
+        say_next(facts["next"].removeprefix("kemba-opt "), quiet)
+        if not facts["next"]:
+            say(facts["why"], quiet)
     if not facts["next"]:
         raise typer.Exit(BAD_ANSWER)
 
 
 def _on_rig(answer: Path, path: Path, progress: Progress) -> dict[str, Any]:
     from kemba.identify.experiment import propose
+    from kemba_cli.next_steps import after_experiment
 
     found = propose(answer, path, progress.tell)
-    return {**found.json(), "next": f"kemba-opt simulate {path} --noise"}
+    return {**found.json(), "next": f"kemba-opt {after_experiment(path, False)}"}
 
 
 def _on_robot(answer: Path, path: Path, certify: bool, progress: Progress) -> dict[str, Any]:
     """The motion as a task; with `certify` also a plan of it that is good, and what that gives."""
     from kemba.identify.design.motion_proposal import propose_motion
+    from kemba_cli.next_steps import after_experiment, after_plan
 
     found = propose_motion(answer, path, progress.tell)
-    facts = {**found.json(), "next": f"kemba-opt solve {path}"}
+    facts = {**found.json(), "next": f"kemba-opt {after_experiment(path, True)}"}
     if not certify:
         return facts
     for tried in found.design.best[:PLANS]:
@@ -86,7 +91,7 @@ def _on_robot(answer: Path, path: Path, certify: bool, progress: Progress) -> di
         if plan["good"]:
             run = plan["run"]
             planned = {"run": run, "plan": plan["sentence"], "nats_of_plan": found.nats_of(run)}
-            return {**facts, **planned, "next": f"kemba-opt simulate {run} --repeat 3 --noise"}
+            return {**facts, **planned, "next": f"kemba-opt {after_plan(run)}"}
     why = f"no plan of these motions is certified: {plan['sentence']}"
     return {**facts, "run": None, "why": why, "next": ""}
 

@@ -58,6 +58,7 @@ def learn(
     from kemba.report import Listener
     from kemba.runs import RunFolder, load_run
     from kemba_cli.course import LEARN
+    from kemba_cli.next_steps import after_solve, say_next
     from kemba_cli.progress import Progress
 
     folders, listed = _told_apart(runs or [], logs or [])
@@ -83,15 +84,23 @@ def learn(
         typer.echo(str(folder.path))
         say(found.sentence, quiet and found.good)
         say(f"{page}", quiet)
+        say_next(after_solve(str(folder.path), found.good), quiet)
     if not found.good:
         raise typer.Exit(1)
 
 
 def _told_apart(runs: list[Path], logs: list[Path]) -> tuple[list[Path], list[Path]]:
-    """The runs and the logs among the arguments; a folder of logs stands for what it holds."""
+    """The runs and the logs among the arguments; a folder of logs stands for what it holds.
+
+    Raises KembaError where a log does not exist.
+    """
     folders = [path for path in runs if path.is_dir() or path.suffix != ".csv"]
     listed: list[Path] = []
     for path in [*logs, *(path for path in runs if path not in folders)]:
+        if not path.exists():
+            from kemba.errors import KembaError
+
+            raise KembaError(str(path), "no such file or folder", "logs of the run were expected")
         listed += sorted(path.glob("*.csv")) if path.is_dir() else [path]
     return folders, listed
 

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from kemba_cli.common import Foreign, Json, OwnEffects, Quiet, print_json, say
+from kemba_cli.common import Foreign, Json, OwnEffects, Quiet, print_json
 from kemba_cli.failures import BAD_INPUT
 
 
@@ -30,6 +30,7 @@ def check(
     """
     from kemba.errors import KembaError
     from kemba.logs import ENDINGS
+    from kemba_cli.next_steps import after_check, say_next
 
     answers = []
     for file in files:
@@ -41,12 +42,7 @@ def check(
     _tell(answers, json, quiet)
     if not all(answer["good"] for answer in answers):
         raise typer.Exit(BAD_INPUT)
-    logs = [answer["file"] for answer in answers if answer["kind"] == "log"]
-    if logs and not json:
-        from kemba.folders import typed
-
-        own = None if model == "planning" else model
-        say(f"next: kemba-opt discover {typed(logs, column_map, own)} --out answer", quiet)
+    say_next(after_check(answers, column_map, model), quiet or json)
 
 
 def _tell(answers: list[dict[str, Any]], json: bool, quiet: bool) -> None:

@@ -27,9 +27,10 @@ def draft_map(
     Example: kemba-opt map their_log.csv --out their_map.yaml
     """
     from kemba.files import atomic_text
-    from kemba.folders import fresh, typed
+    from kemba.folders import fresh
     from kemba.logs.draft.draft import draft_map as draft
     from kemba.model import load_model
+    from kemba_cli.next_steps import after_map, say_next
 
     out = out or Path(f"{log.stem}_map.yaml")
     fresh(out, force)
@@ -45,5 +46,5 @@ def draft_map(
         listed = ", ".join(f"'{header}'" for header in found.missing)
         say(f"not found: {listed}. Add them to {out}; without them the log says too little.", quiet)
         raise typer.Exit(BAD_ANSWER)
-    say(f"read {out}: signs and zeros of angles cannot be guessed", quiet)
-    say(f"next: kemba-opt check {typed([log], out)}", quiet)
+    say(f"look through {out}: signs and zeros of angles cannot be guessed", quiet)
+    say_next(after_map(log, out), quiet)

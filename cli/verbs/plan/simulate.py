@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -44,8 +43,9 @@ def simulate(
 
     Example: kemba-opt simulate runs/jump-1 --repeat 3 --noise
     """
-    from kemba.folders import claimed, typed
+    from kemba.folders import claimed
     from kemba_cli.course import SIMULATE
+    from kemba_cli.next_steps import after_simulate, say_next
     from kemba_cli.progress import Progress
 
     source = source or str(newest(quiet, "controller.csv"))
@@ -65,11 +65,8 @@ def simulate(
     else:
         typer.echo("\n".join(answer["logs"] if "runs" in answer else [answer["folder"]]))
         say(answer["sentence"], quiet)
-        logs = typed(answer["logs"])
         run = Path(source) if Path(source).is_dir() else Path(source).parent
-        of_run = (run / "certificate.json").is_file()
-        after = f"review {logs} --run {shlex.quote(str(run))}" if of_run else f"compare {logs}"
-        say(f"next: kemba-opt {after}", quiet)
+        say_next(after_simulate(answer["logs"], run), quiet)
 
 
 def _run(

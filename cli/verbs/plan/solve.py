@@ -71,6 +71,7 @@ def solve(
     from kemba.report.drawing import drawer
     from kemba.runs import RunFolder
     from kemba_cli.course import SOLVE
+    from kemba_cli.next_steps import after_solve, say_next
     from kemba_cli.progress import Progress
 
     start, origin = None, None
@@ -116,6 +117,7 @@ def solve(
     else:
         typer.echo(answer["run"])
         say(answer["sentence"], quiet and answer["good"])  # why it failed is always said
+        say_next(after_solve(answer["run"], answer["good"], answer["status"]), quiet)
     if answer["status"] == "interrupted":
         raise typer.Exit(130)
     if not answer["good"]:

@@ -31,6 +31,7 @@ def sweep(
     time_limit: Annotated[
         float | None, typer.Option(min=0.1, help="Seconds after which to stop.")
     ] = None,
+    figure: Annotated[bool, typer.Option(help="Draw the executions of every block.")] = True,
     own_effects: OwnEffects = None,
     json: Json = False,
     quiet: Quiet = False,
@@ -43,13 +44,17 @@ def sweep(
     """
     from kemba import sweep as room
     from kemba.folders import held
+    from kemba_cli.next_steps import after_sweep, say_next
 
     if scheduler is not None:
         room.check_scheduler(scheduler)
     asked, document = room.load_sweep(file, list(overrides or []))
     with held(out or Path("sweeps") / asked.name) as folder:
         room.open_folder(folder, asked, document)
-        good = _run(folder, asked, document, scheduler, jobs, time_limit, json, quiet)
+        status, good = _run(
+            folder, asked, document, scheduler, jobs, time_limit, figure, json, quiet
+        )
+    say_next(after_sweep(file, folder, status == "finished"), quiet or json)
     if not good:
         raise typer.Exit(1)
 
@@ -61,10 +66,11 @@ def _run(
     scheduler: str | None,
     jobs: int | None,
     time_limit: float | None,
+    figure: bool,
     json: bool,
     quiet: bool,
-) -> bool:
-    """Do what is missing, write and print the results; whether all is as expected."""
+) -> tuple[str, bool]:
+    """Do what is missing, write and print the results; the status, and whether all is well."""
     from kemba import sweep as room
 
     say(f"results in {folder}", quiet or json)
@@ -79,9 +85,10 @@ def _run(
     finally:
         known = records or {c.key: r for c in cases if (r := c.record(folder)) is not None}
         summary = room.write_results(folder, asked, cases, known, status)
-    _figures(folder, cases, known, summary)
+    if figure:
+        _figures(folder, cases, known, summary)
     _answer(folder, status, summary, json)
-    return status == "finished" and bool(summary["good"])
+    return status, status == "finished" and bool(summary["good"])
 
 
 def _answer(folder: Path, status: str, summary: dict[str, Any], json: bool) -> None:

@@ -47,6 +47,7 @@ def plot(
     from kemba.folders import fresh, next_free
     from kemba.logs import load_map
     from kemba.plotting.window import open_window, show_windows
+    from kemba_cli.next_steps import after_plot, say_next
 
     for path, option in ((out, "--out"), (animate, "--animate")):
         if path is not None:
@@ -74,5 +75,6 @@ def plot(
     else:
         for path in paths.values():
             typer.echo(path)
+        say_next(after_plot(runs), quiet)
     if show:
         show_windows()

@@ -27,7 +27,12 @@ def report(
     Example: kemba-opt report runs/jump-1
     """
     from kemba.report.review.page import report_run
+    from kemba_cli.next_steps import say_verdict
 
     run = run or newest(quiet, "certificate.json")
-    path = report_run(run, out, force)
-    print_json({"report": str(path)}) if json else typer.echo(path)
+    path, verdict = report_run(run, out, force)
+    if json:
+        print_json({"report": str(path), **verdict.json()})
+    else:
+        typer.echo(path)
+        say_verdict(verdict, quiet)

@@ -40,6 +40,7 @@ def review(
     from kemba.report.review.page import review as write
     from kemba.runs import newest_logs
     from kemba_cli.course import REVIEW
+    from kemba_cli.next_steps import say_verdict
     from kemba_cli.progress import Progress
 
     logs, run, answer = _told_apart(logs or [], run, answer)
@@ -50,22 +51,10 @@ def review(
     with Progress(quiet or json, REVIEW) as progress:
         page, verdict = write(logs, run, answer, model, column_map, out, force, progress.tell)
     if json:
-        print_json(
-            {
-                "review": str(page),
-                "verdict": verdict.grade,
-                "sentence": verdict.sentence,
-                "doubt": verdict.doubt,
-                "next": verdict.next,
-                "command": verdict.command,
-            }
-        )
+        print_json({"review": str(page), **verdict.json()})
     else:
         typer.echo(page)
-        say(verdict.sentence, quiet)
-        if verdict.doubt:
-            say(f"but: {verdict.doubt}")
-        say(f"next: {verdict.next} {verdict.command}".rstrip(), quiet)
+        say_verdict(verdict, quiet)
     if show:
         import webbrowser
 

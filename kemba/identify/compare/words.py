@@ -8,8 +8,11 @@ BODY = {"body/x": "body position", "body/z": "body height", "body/pitch": "body 
 OF_LEG = {
     "hip/q": "hip angle",
     "piston/x": "piston",
-    "foot/x": "foot, along the ground,",
-    "foot/z": "foot, above the ground,",
+    "piston/F": "force on the rod",
+    "chamber/extend/P": "pressure of the extend chamber",
+    "chamber/retract/P": "pressure of the retract chamber",
+    "foot/x": "foot position",
+    "foot/z": "foot height",
     "stop": "end stop",
 }
 WHEN = {

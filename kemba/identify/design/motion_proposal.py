@@ -10,7 +10,7 @@ from typing import Any
 
 from kemba.config import dump_yaml
 from kemba.errors import KembaError
-from kemba.files import read_json
+from kemba.identify.answer import read_answer
 from kemba.identify.design.motions import task
 from kemba.identify.design.rivals import Rivals, contenders
 from kemba.identify.design.robot import RobotDesign, Tried, design_motion, expected_of_run
@@ -107,7 +107,7 @@ def propose_motion(
     `bounded`: in about a minute. Raises KembaError where no motion shows a difference, or a file
     cannot be read or written.
     """
-    answer = read_json(Path(folder) / "answer.json")
+    answer = read_answer(folder)
     rivals, base = contenders(answer), str(answer.get("base") or "planning")
     model = load_model(base)
     if model.mechanism.rig or not model.mechanism.robot:

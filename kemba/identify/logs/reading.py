@@ -28,6 +28,9 @@ def read_log(path: str | Path, columns: ColumnMap | None = None) -> Trajectory:
     path = Path(path)
     log = open_log(path, columns, strict=False)
     log.meta.setdefault("kind", (columns and columns.kind) or kind_of(log, path))
+    if log.meta["kind"] == "plan":
+        hint = f"logs of it come from the robot, or from: kemba-opt simulate {path.parent}"
+        raise KembaError(str(path), "is a plan, not a log", hint=hint)
     log.meta["name"] = path.stem
     log.meta["path"] = str(path)
     beside = str(sidecar(path))

@@ -14,7 +14,8 @@ def check_kind(kind: Any, kinds: Collection[str], where: str) -> str:
     if isinstance(kind, str) and kind in kinds:
         return kind
     named = " or ".join(f"'kind: {k}'" for k in kinds)
-    hint = suggest(kind, kinds) if isinstance(kind, str) else ""
+    near = suggest(kind, kinds) if isinstance(kind, str) else ""
+    hint = near if near.startswith("did you") else ""  # they are all named already
     raise KembaError(f"{where}: kind", f"'{kind}' is no kind of log", f"{named} was expected", hint)
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -70,6 +71,11 @@ class LinearisedState:
     noise: Noise = ()
     linear: Mapping[str, tuple[Array, float]] = field(default_factory=dict)
 
+    @cached_property
+    def _at_base(self) -> Array:
+        """Free parameters (k,) where the model was linearised."""
+        return values_at(self.physics, self.base)[0]
+
     def measurement(self, theta: Theta) -> Array:
         """Measured minus reference (n, L, m) in the channel's unit, the reference as the sensors at
         theta see it; NaN where nothing was measured."""
@@ -85,7 +91,7 @@ class LinearisedState:
         """Channels (n, L, k), and places (n, L, 3 legs) of feet and pistons, along the reference,
         of a robot with the lengths at theta."""
         p, _ = values_at(self.physics, theta)
-        at, _ = values_at(self.physics, self.base)
+        at = self._at_base
         own = self.physics.lengths
         if np.array_equal(p[own], at[own]):
             return self.motion.y, self.motion.places

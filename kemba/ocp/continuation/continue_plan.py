@@ -25,7 +25,7 @@ from kemba.ocp.phases.modes import Phase
 from kemba.ocp.phases.notes import noted_phases
 from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.radau import RADAU5
-from kemba.ocp.phases.settings import Elements
+from kemba.ocp.phases.settings import Elements, Refining
 from kemba.ocp.phases.stretched import extending, stretched
 from kemba.ocp.refinement.refine import Refined, Refiner, reduction_of, refine, valve_columns
 from kemba.ocp.refinement.sample import certificate, to_trajectory
@@ -204,7 +204,8 @@ class Continuation:
             x = program.proximal(x, weight)
         settings = Continuing.current()
         most = min(settings.iterations, self.task.solver.max_iterations)
-        stagnation = Stagnation(settings.patience, settings.underway)
+        slow = Refining.current().slow
+        stagnation = Stagnation(settings.patience, settings.underway, slow)
         found = solve(program, x, warm(most), self.control, stagnation)
         assert found.ending is not None
         name = f"near the earlier plan, {share:.0%}" if weight else "from the earlier plan"

@@ -12,7 +12,8 @@ from matplotlib.figure import Figure
 
 from kemba.errors import KembaError
 from kemba.plotting.robot.machine import Machine
-from kemba.plotting.robot.sticks import Pose, StickFigure, poses
+from kemba.plotting.robot.poses import Pose, poses
+from kemba.plotting.robot.sticks import StickFigure
 from kemba.plotting.robot.strip import draw_ground
 from kemba.plotting.source import Source
 from kemba.plotting.style import GREY, INK, paper_style

@@ -5,19 +5,23 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import pairwise
 
 import casadi as ca
 import numpy as np
 
+from kemba.config import load_yaml
 from kemba.effects.pneumatics.chamber import STEADY, Chamber
 from kemba.effects.pneumatics.tables import at_supply
 from kemba.mechanism import Mechanism, Robot, knee
 from kemba.model import Model, build_model, load_spec
-from kemba.plotting.source import Mask
+from kemba.plotting.source import Mask, Source
+from kemba.quantity import to_si
 from kemba.trajectory import Array, Trajectory
 
 OVERTRAVEL = 0.004  # m; a sensor may read this far beyond the stops
 ON_GROUND = 0.01  # m; a foot below this height counts as standing when its force is not known
+STAYS = 0.005  # m; a foot that stays below this between two contacts has not left the ground
 PRESSED = 0.02  # of the weight; more than this on a foot means it stands
 CLEAR = 4.0  # times its noise: what a measured force must exceed
 MOMENT = 7e-3  # s, over which a measured force is averaged
@@ -70,7 +74,8 @@ class Machine:
     def stance(self, trajectory: Trajectory, leg: str) -> Mask:
         """In which rows (n,) the leg's foot stands: by its force, else by its height.
 
-        A measured force is noisy: its mean over a few milliseconds must stand out.
+        A measured force is noisy: its mean over a few milliseconds must stand out. Where it does
+        not, between two contacts, the foot's height tells whether it has left the ground.
         """
         if f"{leg}/foot/Fz" in trajectory:
             force, least = trajectory[f"{leg}/foot/Fz"], PRESSED * self.mechanism.weight
@@ -80,11 +85,30 @@ class Machine:
 
             calm, rows = _averaged(trajectory.time, np.nan_to_num(force))
             noise = difference_sigma(force) / np.sqrt(rows)
-            return np.asarray(calm > max(least, CLEAR * noise))
-        coordinates = self.coordinates(trajectory) if leg in self.mechanism.legs else None
-        if coordinates is None:
+            pressed = np.asarray(calm > max(least, CLEAR * noise))
+            height = self._height(trajectory, leg)
+            if height is None:
+                return pressed
+            return _bridged(pressed, _averaged(trajectory.time, height)[0] < STAYS)
+        height = self._height(trajectory, leg)
+        if height is None:
             return np.zeros(len(trajectory), dtype=bool)
-        return np.asarray(self.points(coordinates)[f"{leg}/foot"][:, 1] < ON_GROUND)
+        return np.asarray(height < ON_GROUND)
+
+    def _height(self, trajectory: Trajectory, leg: str) -> Array | None:
+        """The height (n,) [m] of a leg's foot, or None where columns are missing."""
+        coordinates = self.coordinates(trajectory) if leg in self.mechanism.legs else None
+        return None if coordinates is None else self.points(coordinates)[f"{leg}/foot"][:, 1]
+
+
+def _bridged(stands: Mask, low: Mask) -> Mask:
+    """`stands` (n,) with each break filled during which `low` (n,) holds all the time."""
+    edges = np.flatnonzero(np.diff(stands.astype(int)))
+    found = stands.copy()
+    for a, b in pairwise(edges.tolist()):
+        if not stands[a + 1] and low[a + 1 : b + 1].all():
+            found[a + 1 : b + 1] = True
+    return np.asarray(found)
 
 
 def _averaged(time: Array, values: Array) -> tuple[Array, int]:
@@ -104,6 +128,25 @@ def load_machine(model: str = "planning", supply: float | None = None) -> Machin
     mechanism = built.mechanism
     places = ca.Function("places", [mechanism.q], [ca.vertcat(*mechanism.points.values())])
     return Machine(mechanism.need_robot(), mechanism, _limits(built), places)
+
+
+def machine_of(source: Source, model: str | None = None) -> Machine:
+    """The robot of `model` (a path or a shipped model), else of the run's own task with its
+    supply pressure, else the shipped one. Raises KembaError."""
+    task = source.path.with_name("task.yaml") if source.path else None
+    if model is not None or task is None or not task.is_file():
+        return load_machine(model or "planning")
+    data = load_yaml(task).data
+    asked = data if isinstance(data, dict) else {}
+    supply = to_si(asked["supply"], "Pa") if "supply" in asked else None
+    return load_machine(asked.get("model", "planning"), supply)
+
+
+def stance_spans(source: Source, machine: Machine, leg: str) -> list[tuple[float, float]]:
+    """When the leg's foot is on the ground; any foot for `body`. Start and end in s."""
+    legs = machine.mechanism.legs if leg == "body" else (leg,)
+    stands = [machine.stance(source.trajectory, name) for name in legs]
+    return source.spans(np.any(stands, axis=0))
 
 
 def _limits(model: Model) -> dict[str, tuple[float, ...]]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
@@ -12,7 +11,7 @@ from matplotlib.lines import Line2D
 
 from kemba.errors import KembaError
 from kemba.plotting.panels import DEGREES, MILLIMETRES, Panel, Trace, draw_panel, shade, widen
-from kemba.plotting.robot.machine import Machine
+from kemba.plotting.robot.machine import Machine, stance_spans
 from kemba.plotting.robot.strip import draw_strip, film, strip_height
 from kemba.plotting.source import Source
 from kemba.plotting.style import INK, WIDTH, colour, paper_figure, paper_style
@@ -120,13 +119,6 @@ def _axes(figure: Figure, grid: GridSpec, rows: list[list[Panel]], first: int) -
             row.append(figure.add_subplot(place, sharex=above, sharey=alike))
         table.append(row)
     return table
-
-
-def stance_spans(source: Source, machine: Machine, leg: str) -> list[tuple[float, float]]:
-    """When the leg's foot is on the ground; any foot for `body`. Start and end in s."""
-    legs = machine.mechanism.legs if leg == "body" else (leg,)
-    stands = [machine.stance(source.trajectory, name) for name in legs]
-    return source.spans(np.any(stands, axis=0))
 
 
 def _name_legs(axes: list[list[Axes]], rows: list[list[Panel]], legs: tuple[str, ...]) -> None:

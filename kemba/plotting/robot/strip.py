@@ -8,7 +8,8 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from kemba.plotting.robot.machine import Machine
-from kemba.plotting.robot.sticks import Pose, StickFigure, poses
+from kemba.plotting.robot.poses import Pose, poses
+from kemba.plotting.robot.sticks import StickFigure
 from kemba.plotting.source import Source
 from kemba.plotting.style import GREY, INK, SHADE
 from kemba.trajectory import Array

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kemba.plotting import Machine
-from kemba.plotting.robot.motion import stance_spans
+from kemba.plotting.robot.machine import stance_spans
 from kemba.report.review.charts import Book, Chart, Curve, Spans
 from kemba.report.review.tracks import Track, on_grid, plan_of
 from kemba.trajectory import Array
@@ -54,11 +54,11 @@ FORCES = (
     Shown("foot/Fx", "ground force, along", "N", error="N"),
 )
 RIG = (
-    Shown("piston/x", "Piston extension", "mm", 1e3, "mm", 1e3),
-    Shown("piston/v", "Piston speed", "m/s", error="m/s"),
-    Shown("piston/F", "Force of the piston rod", "N", error="N"),
-    Shown("chamber/extend/P", "Pressure of the extend chamber", "bar", 1e-5, "bar", 1e-5),
-    Shown("chamber/retract/P", "Pressure of the retract chamber", "bar", 1e-5, "bar", 1e-5),
+    Shown("piston/x", "Piston extension", "mm", 1e3, "mm", 1e3, least=1.0),
+    Shown("piston/v", "Piston speed", "m/s", error="m/s", least=0.01),
+    Shown("piston/F", "Force of the piston rod", "N", error="N", least=1.0),
+    Shown("chamber/extend/P", "Pressure of the extend chamber", "bar", 1e-5, "bar", 1e-5, 0.1),
+    Shown("chamber/retract/P", "Pressure of the retract chamber", "bar", 1e-5, "bar", 1e-5, 0.1),
 )
 NO_FORCE_ERROR = ("foot/Fz", "foot/Fx")  # a touchdown some ms late would fill the chart
 

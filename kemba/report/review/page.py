@@ -10,6 +10,7 @@ from typing import Any
 from kemba.config import load_yaml
 from kemba.errors import KembaError
 from kemba.folders import place_for, typed
+from kemba.identify.answer import read_answer
 from kemba.identify.logs.gate import BadData
 from kemba.identify.logs.reading import read_logs
 from kemba.logs import load_map
@@ -21,7 +22,7 @@ from kemba.report.review.charts import Book
 from kemba.report.review.details import certificate_tables, origin
 from kemba.report.review.events import Events, events_of, marks_of
 from kemba.report.review.html import folded, section
-from kemba.report.review.lacking.found import Facts, answer_parts, read_answer
+from kemba.report.review.lacking.found import Facts, answer_parts
 from kemba.report.review.lacking.model_error import (
     ModelError,
     error_tables,
@@ -96,11 +97,13 @@ def review(
     return write_page(path, title, body), verdict
 
 
-def report_run(run: str | Path, out: str | Path | None = None, force: bool = False) -> Path:
+def report_run(
+    run: str | Path, out: str | Path | None = None, force: bool = False
+) -> tuple[Path, ReviewVerdict]:
     """The page of a run alone, by default a new `report.html` in it. Raises KembaError."""
     folder = load_run(run).path
     path = place_for(out, folder / "report.html", force)
-    return review(run=folder, out=path, force=True)[0]
+    return review(run=folder, out=path, force=True)
 
 
 def default_path(
@@ -172,12 +175,15 @@ def page_of(given: Material) -> tuple[str, str, ReviewVerdict]:
 def _robot_parts(given: Material, book: Book, machine: Machine) -> list[str]:
     model = build_model(load_spec(given.model), supply=given.supply)
     certificate = given.run.certificate if given.run else {}
+    plan = plan_of(book.tracks)
+    below = (
+        "Below each figure: the difference from the plan. " if plan and len(book.tracks) > 1 else ""
+    )
     how = (
         '<p class="soft screen">Dotted vertical lines: touchdowns. Grey: a foot stands in the '
-        "first motion. Below each figure: the difference from the plan. Drag to zoom, double "
-        "click or Escape to see all again; arrow keys move the cursor.</p>"
+        f"first motion. {below}Drag to zoom, double click or Escape to see all again; arrow keys "
+        "move the cursor.</p>"
     )
-    plan = plan_of(book.tracks)
     shown = next((t for t in reversed(book.tracks) if t.role == "plant"), plan)
     shown = next((t for t in book.tracks if t.role == "log"), shown)
     return [

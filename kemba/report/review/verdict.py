@@ -33,6 +33,16 @@ class ReviewVerdict:
         aim = "review these logs with the run that they execute:"
         return ReviewVerdict(grade, self.sentence, aim, command, doubt)
 
+    def json(self) -> dict[str, str]:
+        """As `review` and `report` print it with `--json`."""
+        return {
+            "verdict": self.grade,
+            "sentence": self.sentence,
+            "doubt": self.doubt,
+            "next": self.next,
+            "command": self.command,
+        }
+
     def html(self) -> str:
         """As the first thing on the page."""
         doubt = f'<p class="doubt"><b>But:</b> {escape(self.doubt)}</p>' if self.doubt else ""

@@ -12,7 +12,7 @@ from kemba.identify.robot.dynamics.inputs import Inputs, air_states, read_inputs
 from kemba.identify.robot.dynamics.linear import LinearisedMotion
 from kemba.identify.robot.dynamics.physics import Physics
 from kemba.identify.robot.motion.batch import Batch
-from kemba.settings import BY_HAND, Settings, setting
+from kemba.settings import BY_HAND, CHOSEN, Settings, setting
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -20,7 +20,10 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 class ForcesSettings(Settings):
     """What is kept of computed forces."""
 
-    kept: int = setting(4, "1", "results that are kept beside the first one", BY_HAND)
+    kept: int = setting(4, "1", "inputs and states that are kept beside the first ones", BY_HAND)
+    lines: int = setting(
+        50_000_000, "1", "bytes of forces that are kept: the next Jacobian asks for them", CHOSEN
+    )
 
 
 @dataclass
@@ -56,12 +59,13 @@ class Forces:
         for (None: all)."""
         key = delays.tobytes() + p[self.physics.moves].tobytes() + bytes([among is None])
         if key not in self._states:
+            kept = ForcesSettings.current().kept
             given = self._inputs.get(delays.tobytes())
             if given is None:
                 given = read_inputs(self.physics, self.batch, self.motion.ref, delays)
-                _keep(self._inputs, delays.tobytes(), given)
+                _keep(self._inputs, delays.tobytes(), given, kept)
             states, inputs = air_states(self.physics, self.batch, given, p, among)
-            _keep(self._states, key, (self.batch.flat(states), self.batch.flat(inputs)))
+            _keep(self._states, key, (self.batch.flat(states), self.batch.flat(inputs)), kept)
         return self._states[key]
 
     def _force(self, p: Array, delays: Array) -> Array:
@@ -70,7 +74,8 @@ class Forces:
         line = self._lines.get(key)
         if line is None:
             line = ForceLine(p.copy(), self._exact(p, delays))
-            _keep(self._lines, key, line)
+            settings = ForcesSettings.current()
+            _keep(self._lines, key, line, max(settings.kept, settings.lines // line.force.nbytes))
         moved = np.flatnonzero(p != line.p)
         if crossed[np.ix_(moved, moved)].any():
             return self._exact(p, delays)
@@ -88,8 +93,8 @@ class Forces:
         return self.physics.call("residual", *self.motion.middle, *states, p=p)[0]
 
 
-def _keep(store: dict[bytes, Any], key: bytes, value: Any) -> None:
-    """Add to a store that holds the first one and the last few."""
-    if len(store) > ForcesSettings.current().kept:
+def _keep(store: dict[bytes, Any], key: bytes, value: Any, most: int) -> None:
+    """Add to a store that holds the first one and the last ones, `most` of them."""
+    if len(store) > most:
         del store[list(store)[1]]
     store[key] = value

@@ -73,6 +73,7 @@ class Physics:
         self.lengths = np.array([n.startswith("geometry:") for n in self.names])
         self.grip = grip
         self._maps: dict[str, SampleMap] = {}
+        self._knees: dict[tuple[int, bytes], tuple[Array, Array]] = {}
 
     def _bounds(self, figures: Mapping[str, tuple[float, float]]) -> tuple[Array, Array]:
         """Smallest and largest value (k,) of every parameter; of `figures` what a linear estimate
@@ -169,7 +170,15 @@ class Physics:
         )
 
     def _knee(self, i: int, p: Array) -> tuple[Array, Array]:
-        """Piston extension and knee angle on a fine grid, the extension increasing."""
+        """Piston extension and knee angle on a fine grid, the extension increasing; the same for
+        all p with the same lengths."""
+        key = (i, p[self.lengths].tobytes())
+        if key not in self._knees:
+            self._knees = {k: v for k, v in self._knees.items() if k[1] == key[1]}
+            self._knees[key] = self._folded(i, p)
+        return self._knees[key]
+
+    def _folded(self, i: int, p: Array) -> tuple[Array, Array]:
         m, k = self.mechanism, 3 + len(self.legs) + i
         low, high = m.coordinates[k].lower, m.coordinates[k].upper
         grid = np.sign(low + high) * np.linspace(0.0, FOLDED, 4001)

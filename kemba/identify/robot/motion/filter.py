@@ -64,7 +64,7 @@ def gains(system: System) -> FilterGains:
     Ft, Ht = s.F.swapaxes(-1, -2), s.H.swapaxes(-1, -2)
     eye, diagonal = np.eye(d), np.arange(m)
     K = np.empty((n, runs, d, m))
-    L = np.empty((n, runs, m, m))
+    S_all = np.empty((n, runs, m, m))
     P_all = np.empty((n, runs, d, d))
     P = s.P0.copy()
     for k in range(n):
@@ -72,14 +72,15 @@ def gains(system: System) -> FilterGains:
         PHt = P @ Ht[k]
         S = s.H[k] @ PHt
         S[:, diagonal, diagonal] += R[k]
-        L[k] = np.linalg.cholesky(S)
+        S_all[k] = S
         # Joseph's form keeps P positive where a row is a thousand times sharper than the state
         K[k] = np.linalg.solve(S, PHt.swapaxes(-1, -2)).swapaxes(-1, -2)
         A = eye - K[k] @ s.H[k]
         P = A @ P @ A.swapaxes(-1, -2) + (K[k] * R[k][:, None, :]) @ K[k].swapaxes(-1, -2)
         P = s.F[k] @ P @ Ft[k] + noise[k]
         P = 0.5 * (P + P.swapaxes(-1, -2))
-    return FilterGains(K, np.linalg.inv(L), P_all, s.F @ (eye - K @ s.H))
+    whitener = np.asarray(np.linalg.inv(np.linalg.cholesky(S_all)), dtype=float)
+    return FilterGains(K, whitener, P_all, s.F @ (eye - K @ s.H))
 
 
 def innovations(system: System, gain: FilterGains, y: Array, g: Array) -> tuple[Array, Array]:

@@ -8,8 +8,6 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from kemba.errors import KembaError
-from kemba.files import read_json
 from kemba.report.review.html import meter, picture, table
 
 Facts = Mapping[str, Any]
@@ -19,18 +17,6 @@ PICTURES = {
     "residual": "Error of the worst channel in time, before and after",
 }
 RANKED = 8  # effects shown
-
-
-def read_answer(folder: str | Path) -> Facts:
-    """The answer.json of a folder. Raises KembaError where there is none."""
-    file = Path(folder) / "answer.json" if Path(folder).is_dir() else Path(folder)
-    if not file.is_file():
-        expected = "a folder with answer.json, as discover writes it, was expected"
-        raise KembaError(str(folder), "holds no answer", expected)
-    found = read_json(file)
-    if not isinstance(found, dict) or not isinstance(found.get("verdict"), str):
-        raise KembaError(str(file), "is no answer", "the answer.json of discover was expected")
-    return found
 
 
 def answer_parts(answer: Facts, folder: Path, pictures: bool) -> list[str]:

@@ -67,8 +67,9 @@ def error_tables(error: ModelError, total: int) -> str:
 
 
 def _readable(header: str) -> tuple[str, float]:
-    """A channel's header in millimetres and degrees, and the factor from SI."""
-    for unit, better, factor in (("[m]", "[mm]", 1e3), ("[rad]", "[deg]", 180.0 / np.pi)):
+    """A channel's header in millimetres, degrees and bar, and the factor from SI."""
+    usual = (("[m]", "[mm]", 1e3), ("[rad]", "[deg]", 180.0 / np.pi), ("[Pa]", "[bar]", 1e-5))
+    for unit, better, factor in usual:
         if header.endswith(unit):
             return header.replace(unit, better), factor
     return header, 1.0
@@ -85,10 +86,9 @@ def missing_charts(book: Book, error: ModelError, clock: Callable[[str], float])
     order = np.argsort(-worst.evidence())[:BANDS]
     shift = clock(worst.run)
     shown = "".join(_band(book, worst, k, shift) for k in sorted(order.tolist()))
-    note = (
-        f"Of {worst.run}. Where the band leaves zero, the model lacks a force there. While a foot "
-        "stands, the ground hides most of a missing force."
-    )
+    note = f"Of {worst.run}. Where the band leaves zero, the model lacks a force there."
+    if worst.stance:
+        note += " While a foot stands, the ground hides most of a missing force."
     return f'<p class="soft">{escape(note)}</p><div class="grid">{shown}</div>'
 
 

@@ -49,8 +49,9 @@ def _touchdown(flight: FootFlight | None) -> str:
     text = _or_dash(flight.landed, 1, "s", 3)
     if flight.grazes:
         first = ", ".join(f"{time:.3f}" for time in flight.grazes[:2])
-        more = f" and {len(flight.grazes) - 2} times more" if len(flight.grazes) > 2 else ""
-        text += f" (grazes at {first} s{more})"
+        others = len(flight.grazes) - 2
+        more = f" and {others} more" if others > 0 else ""
+        text += f'<span class="aside">grazes at {first} s{more}</span>'
     return text
 
 
@@ -101,7 +102,12 @@ def _limit_table(
             )
     heads = ["motion", "leg", "largest torque", "of what there is", "at the limit for"]
     heads += ["largest use of friction", "foot slides", "lowest supply"]
-    return table("Limits: 100 % is all there is", heads, rows)
+    note = (
+        '<p class="soft">100 % of the torque is what the motor gives at that speed; 100 % of the '
+        "friction is where a foot begins to slide. A measured foot may show more: its forces are "
+        "noisy, or the ground grips better than in the model.</p>"
+    )
+    return table("Largest use of motors and ground", heads, rows) + note
 
 
 def energy_parts(book: Book, machine: Machine, certificate: Mapping[str, Any]) -> list[str]:

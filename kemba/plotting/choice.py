@@ -6,13 +6,11 @@ from collections.abc import Sequence
 
 from matplotlib.figure import Figure
 
-from kemba.config import load_yaml
 from kemba.errors import KembaError
 from kemba.plotting.rig.bench import plot_bench
-from kemba.plotting.robot.machine import Machine, load_machine
+from kemba.plotting.robot.machine import machine_of
 from kemba.plotting.robot.motion import plot_motion
 from kemba.plotting.source import Source
-from kemba.quantity import to_si
 
 
 def draw(
@@ -30,15 +28,3 @@ def draw(
         hint = f"'{bench[0].name}' is a bench log; plot the two kinds one after the other"
         raise KembaError(robot.name, "is a robot's motion", hint=hint)
     return plot_bench(sources, figure)
-
-
-def machine_of(source: Source, model: str | None = None) -> Machine:
-    """The robot of `model` (a path or a shipped model), else of the run's own task with its
-    supply pressure, else the shipped one. Raises KembaError."""
-    task = source.path.with_name("task.yaml") if source.path else None
-    if model is not None or task is None or not task.is_file():
-        return load_machine(model or "planning")
-    data = load_yaml(task).data
-    asked = data if isinstance(data, dict) else {}
-    supply = to_si(asked["supply"], "Pa") if "supply" in asked else None
-    return load_machine(asked.get("model", "planning"), supply)

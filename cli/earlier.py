@@ -1,0 +1,50 @@
+"""Forms of options that scripts still write: `--figure FILE`, where `--figure` is now a switch."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from typer.core import TyperCommand
+
+TABLES = (".csv", ".parquet", ".mcap", ".mat", ".npz", ".json")  # endings of logs
+
+
+def figure_at(place: str, fits: Callable[[str], bool]) -> type[TyperCommand]:
+    """A command that reads `--figure PLACE` as the option `place` with that value.
+
+    `fits`: whether the word behind `--figure` is a place, and not the next argument.
+    """
+
+    class Command(TyperCommand):
+        def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+            return super().parse_args(ctx, _moved(args, place, fits))
+
+    return Command
+
+
+def _moved(args: list[str], place: str, fits: Callable[[str], bool]) -> list[str]:
+    """The words of a command line with `--figure PLACE` and `--figure=PLACE` replaced."""
+    found: list[str] = []
+    for number, word in enumerate(args):
+        name, is_set, value = word.partition("=")
+        after = args[number + 1] if number + 1 < len(args) else "-"
+        if name == "--figure" and is_set:
+            found += [place, value]
+        elif word == "--figure" and not after.startswith("-") and fits(after):
+            found.append(place)  # the value follows by itself
+        else:
+            found.append(word)
+    return found
+
+
+def is_picture(word: str) -> bool:
+    """Whether a word behind `compare --figure` is the picture's name, not a log."""
+    return Path(word).suffix.lower() not in TABLES
+
+
+def is_new_folder(word: str) -> bool:
+    """Whether a word behind `characterise --figure` is a folder for pictures, not logs."""
+    path = Path(word)
+    return path.suffix.lower() not in TABLES and not any(path.glob("*.csv"))

@@ -1,0 +1,54 @@
+"""A round of learning in plain words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+LACKS = {
+    "partly": ", and something more that is not known",
+    "missing": "",
+}
+ELSE = {
+    "nothing": "the model lacks nothing that these logs show",
+    "unknown": "the model lacks something that no effect of the catalogue explains",
+    "bad-data": "the logs contradict themselves",
+}
+
+
+def jumped(error: float) -> str:
+    """What the robot did; `error`: executed minus planned apex [m]."""
+    side = "higher" if error >= 0.0 else "lower"
+    return f"the robot jumped {1e3 * abs(error):.1f} mm {side} than planned"
+
+
+def learnt(verdict: str, added: Sequence[str], before: float, after: float) -> str:
+    """What the model lacks; `before`, `after`: errors of `compare`, in units of the noise."""
+    if verdict not in LACKS or not added:
+        return ELSE.get(verdict, "nothing was added to the model")
+    names = " and ".join([", ".join(added[:-1]), added[-1]] if len(added) > 1 else added)
+    them = "them" if len(added) > 1 else "it"
+    falls = f"with {them} its error goes from {before:.2f} to {after:.2f} times the noise"
+    return f"the model lacks {names}{LACKS[verdict]}; {falls}"
+
+
+def expected(error: float | None) -> str:
+    """What the next run should do; `error`: expected minus planned apex [m]."""
+    if error is None:
+        return ""
+    side = "above" if error >= 0.0 else "below"
+    return f"the next run is expected to reach {1e3 * abs(error):.1f} mm {side} its planned apex"
+
+
+def beyond(limited: Sequence[str]) -> str:
+    """What executions do beyond the learnt model and its correction; empty for nothing."""
+    if not limited:
+        return ""
+    return (
+        f"but in {' and '.join(limited)} the executions differ from the learnt model by more than "
+        "is corrected: do not trust the model there before it has seen more logs"
+    )
+
+
+def sentences(parts: Sequence[str]) -> str:
+    """Parts as sentences; empty ones are left out."""
+    return " ".join(f"{part[:1].upper()}{part[1:].rstrip('.')}." for part in parts if part)
