@@ -23,7 +23,7 @@ SWEEP = """\
 name: small
 seed: 1
 blocks:
-  a: {kind: solve, task: task.yaml, grid: {height: [0.34 m, 0.35 m]}}
+  a: {kind: solve, task: task.yaml, replay: false, grid: {height: [0.34 m, 0.35 m]}}
 """
 TASK = """\
 name: quick
