@@ -1,8 +1,8 @@
-"""Machines drawn from what a discovery believes of machines in which nothing is missing.
+"""Machines that differ from their model as a discovery believes that they do.
 
 Its test of nothing draws such machines too: nominal figures off within the tolerances that the
-model declares, every effect of the catalogue and every sensor fault there with the small share of
-its size that the spike allows. The machine here is the twin of tests/twin: other code, not
+model declares, and every effect of the catalogue and every sensor fault there with the small share
+of its size that the spike allows. The machine here is the twin of tests/twin: other code, and not
 linearised.
 """
 
@@ -38,19 +38,25 @@ COLUMN = {  # of the twin's table of figures, by nominal figure of the rig's mod
 STIFF = 1e-4  # s; a lag shorter than this is none: the twin cannot integrate it
 
 
-def machine(seed: int, sensors: Sensors) -> tuple[Robot, list[dict[str, Any]]]:
-    """A robot and its small effects, sensor faults among them, as `bench_case` takes them."""
-    rng, prior = np.random.default_rng([seed, 11]), SpikeSlabSettings.current()
-    model = load_model(rig=True)
-    share, robot = rng.choice(prior.tolerances), Robot()
-    air = robot.air.copy()
-    for name, (_, tolerance) in nominal_figures(model).items():
+def robot(seed: int) -> Robot:
+    """A robot whose nominal figures are off as its model declares."""
+    rng, nominal = np.random.default_rng([seed, 11]), Robot()
+    share, air = rng.choice(SpikeSlabSettings.current().tolerances), nominal.air.copy()
+    for name, (_, tolerance) in nominal_figures(load_model(rig=True)).items():
         air[:, COLUMN[name]] *= 1.0 + share * tolerance * rng.standard_normal()
+    return replace(nominal, air=air)
+
+
+def small_effects(
+    seed: int, sensors: Sensors, except_for: str | None = None
+) -> list[dict[str, Any]]:
+    """Every effect and sensor fault with a small share of its size, as `bench_case` takes them."""
+    rng, model = np.random.default_rng([seed, 12]), load_model(rig=True)
     noise = {channel: sensors.spread(channel) for channel in fault_channels("bench")}
     candidates = effect_candidates(model) | sensor_candidates(noise, model)
-    small = [_small(candidate, prior.spike * rng.standard_normal()) for candidate in
-             candidates.values()]  # fmt: skip
-    return replace(robot, air=air), [effect for effect in small if effect]
+    spike = SpikeSlabSettings.current().spike
+    found = [_small(c, spike * rng.standard_normal()) for c in candidates.values()]
+    return [effect for effect in found if effect and effect["kind"] != except_for]
 
 
 def _small(candidate: Candidate, size: float) -> dict[str, Any] | None:
