@@ -12,7 +12,10 @@ machines that differ as the discovery believes:
 
 - `declared`: nominal figures are off by the tolerances that the model declares (declared.py);
 - `near`: by half as much, by 1 %. p-values are larger, and intervals hold the truth more often;
-- `imperfect`: as declared, and every effect and sensor fault is there with about 5 % of its size.
+- `imperfect`: as declared, and every effect and sensor fault is there with about 5 % of its size,
+  but no delay and no lag;
+- `late`: with these, too. 5 % of a delay is a tenth of a row: an edge then falls before or after a
+  reading, which no slope over a whole row tells.
 
 Records are added to benchmarks/program.json; benchmarks/program_page.py writes its page from them.
 """
@@ -41,7 +44,7 @@ SEED = 70_000  # no case of it was looked at while the method was built
 HIDDEN = ("seal_friction", "valve_delay", "piston_damping", "supply_scale", "gas_spring")
 NOISES = (1.0, 0.5, 2.0)
 LENGTH, RUNS = 2.0, 2  # s and logs of a case
-MACHINES = ("declared", "near", "imperfect")
+MACHINES = ("declared", "near", "imperfect", "late")
 SPREAD = 0.3  # of the logarithm of a hidden effect's size
 
 
@@ -70,8 +73,8 @@ def case(
     """Logs of one machine, each of `length` [s], and the truth."""
     sensors, seed = Sensors(noise=NOISES[number % len(NOISES)]), SEED + number
     effects = [draw(effect, 1.0, seed, sensors, SPREAD)] if effect else []
-    if machines == "imperfect":
-        effects += small_effects(seed, sensors, except_for=effect)
+    if machines in ("imperfect", "late"):
+        effects += small_effects(seed, sensors, machines == "late", except_for=effect)
     own = None if machines == "near" else robot(seed)
     return bench_case(
         folder, effects, seed=seed, runs=RUNS, duration=length, sensors=sensors, robot=own

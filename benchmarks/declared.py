@@ -48,14 +48,16 @@ def robot(seed: int) -> Robot:
 
 
 def small_effects(
-    seed: int, sensors: Sensors, except_for: str | None = None
+    seed: int, sensors: Sensors, times: bool, except_for: str | None = None
 ) -> list[dict[str, Any]]:
-    """Every effect and sensor fault with a small share of its size, as `bench_case` takes them."""
+    """Every effect and sensor fault with a small share of its size, as `bench_case` takes them;
+    delays and lags among them only with `times`."""
     rng, model = np.random.default_rng([seed, 12]), load_model(rig=True)
     noise = {channel: sensors.spread(channel) for channel in fault_channels("bench")}
     candidates = effect_candidates(model) | sensor_candidates(noise, model)
     spike = SpikeSlabSettings.current().spike
-    found = [_small(c, spike * rng.standard_normal()) for c in candidates.values()]
+    wanted = [c for c in candidates.values() if times or c.lead.unit != "s"]
+    found = [_small(c, spike * rng.standard_normal()) for c in wanted]
     return [effect for effect in found if effect and effect["kind"] != except_for]
 
 

@@ -82,7 +82,8 @@ More: `python benchmarks/faults.py --faults 50 --seed 3`.
 MACHINES = {
     "near": "figures off by 1 %, no effect",
     "declared": "figures off by the declared tolerances, no effect",
-    "imperfect": "the same, and every effect and sensor fault at about 5 % of its size",
+    "imperfect": "the same, and every effect and sensor fault at about 5 %, but no delay or lag",
+    "late": "the same with delays and lags",
 }
 
 
@@ -109,9 +110,10 @@ Kolmogorov-Smirnov, below 0.05 the p-values are not uniform):
 {table(truths, [row for row in hidden if row])}
 
 Where no effect is there at all, p-values are larger than uniform ones and intervals wider than
-needed: the test is careful. Where all are there at once, delays of a fraction of a row among them,
-p-values are smaller than they should be, and something is blamed too often. Why the twin and the
-model differ there by more than their noise is not yet known.
+needed: the test is careful. Delays of a fraction of a row are where it is not careful enough: an
+edge then falls before or after a reading, which jumps by as much as for a delay of a whole row. The
+test knows only the slope over a row. So small delays together look like a large one, p-values are
+too small, and a machine with all of them is blamed too often.
 """
 
 
