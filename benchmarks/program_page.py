@@ -112,8 +112,8 @@ Kolmogorov-Smirnov, below 0.05 the p-values are not uniform):
 Where no effect is there at all, p-values are larger than uniform ones and intervals wider than
 needed: the test is careful. Delays of a fraction of a row are where it is not careful enough: an
 edge then falls before or after a reading, which jumps by as much as for a delay of a whole row. The
-test knows only the slope over a row. So small delays together look like a large one, p-values are
-too small, and a machine with all of them is blamed too often.
+test knows only the slope over a row, so that its p-values are too small there. The verdict then
+rests on the other rule: an effect below a fifth of its size is no finding.
 """
 
 
