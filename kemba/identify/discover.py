@@ -102,8 +102,7 @@ def _built_anew(search: Search, other: Rebuilt, holdout: Problem | None) -> Disc
     before = error_ratio(judge, search.points[NULL].fit.theta)
     alone = error(second, NULL, found.holdout)
     row = structure_row(search, structure, (before, alone), second, found.best, other.nats)
-    singles = [p.log_evidence for h, p in search.points.items() if h]
-    gain = max(max(singles) - search.points[NULL].log_evidence, other.nats)
+    gain = max(_best_gain(search), other.nats)
     answer = joined(row, null_test(search).p_value(gain), found.answer, second, found.best)
     first_error = search.points[NULL].fitted_error
     search.say(f"built anew, the error is {answer.error_after:.2f} times the noise")
@@ -153,9 +152,13 @@ def _undecided(search: Search, test: NullTest, holdout: Problem | None) -> Disco
 
 
 def _best_gain(search: Search) -> float:
-    """Evidence [nats] of the best single effect over nothing."""
+    """Evidence [nats] of the best single effect over nothing; of the smallest sets that were
+    refitted, where no single effect was. A larger set is one of many more than the simulated logs
+    are searched for, and would look rarer than it is."""
+    sizes = [len(h) for h in search.points if h]
     null = search.points[NULL].log_evidence
-    return max((p.log_evidence - null for h, p in search.points.items() if h), default=0.0)
+    gains = (p.log_evidence - null for h, p in search.points.items() if len(h) == min(sizes))
+    return max(gains) if sizes else 0.0
 
 
 def null_test(search: Search) -> NullTest:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -153,6 +154,7 @@ def _learnt(
 ) -> Round:
     """Compare with the run's model, discover, compare with the model found."""
     kept, out = [*asked.holdout] or [*past.logs], folder / "answer"
+    shutil.rmtree(out, ignore_errors=True)  # of a round that was killed
     out.mkdir()
     here = as_executed(old.model, old, out / "model_of_the_run.yaml")
     before, _ = compare_logs(kept, here, asked.column_map, tell=tell)

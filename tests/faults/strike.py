@@ -1,4 +1,5 @@
-"""Faults while a verb works: signals, full disks, a clock that goes back; and the verb again."""
+"""Faults while a verb works: signals, full disks, folders that cannot be written, a clock that goes
+back; and the verb again."""
 
 from __future__ import annotations
 
@@ -27,6 +28,13 @@ import resource, signal
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, ({size}, {size}))
 """
+# root could write everywhere: without its capabilities it is a user like any other (Linux)
+PLAIN_USER = """\
+import ctypes, os
+if os.geteuid() == 0:
+    header, none = (ctypes.c_uint32 * 2)(0x20080522, 0), (ctypes.c_uint32 * 6)()
+    assert ctypes.CDLL(None).capset(header, none) == 0
+"""
 INTERRUPTED = 130
 LONGEST = 600.0  # s of wall time; a busy machine is slow
 
@@ -34,18 +42,19 @@ LONGEST = 600.0  # s of wall time; a busy machine is slow
 @dataclass(frozen=True)
 class Fault:
     """`signal` after a share `when` of the usual time, no file larger than `size` bytes, a `clock`
-    that goes back."""
+    that goes back, a folder that is `shut`: nothing can be written into it."""
 
     name: str
     signal: int | None = None
     when: float = 0.5
     size: int | None = None
     clock: bool = False
+    shut: bool = False
 
     @property
     def code(self) -> str:
         """The Python that is run."""
-        before = CLOCK if self.clock else ""
+        before = (CLOCK if self.clock else "") + (PLAIN_USER if self.shut else "")
         if self.size is not None:
             before += FULL.format(size=self.size)
         return before + MAIN
@@ -81,8 +90,13 @@ def reference(verb: Verb, folder: Path) -> tuple[dict[str, Any], float]:
 def struck(verb: Verb, fault: Fault, folder: Path, usual: dict[str, Any], seconds: float) -> Trace:
     """Run the verb with a fault, look at what it left, run it again, and look again."""
     verb.begin(emptied(folder))
+    if fault.shut:
+        folder.chmod(0o555)
     code, said = _struck(verb, fault, folder, seconds)
+    folder.chmod(0o755)
     wrong = [f"half a file: {text}" for text in half_written(folder)]
+    if fault.shut and "cannot be written" not in said:
+        wrong.append(f"not told that the folder is shut: exit code {code}: {said[-300:]}")
     if "unexpectedly" in said or "Traceback" in said:
         wrong.append(f"no words: {said[-300:]}")
     out = folder / verb.out

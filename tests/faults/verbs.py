@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import atexit
 import json
 import shutil
+import subprocess
+import sys
+import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 from fuzz.logs import cells, text
 from fuzz.sound import bench
+from plain_task import plain_task
 
 from kemba.config import load_yaml
 from kemba.errors import KembaError
@@ -23,7 +29,7 @@ SWEEP = """\
 name: small
 seed: 1
 blocks:
-  a: {kind: solve, task: task.yaml, grid: {height: [0.34 m, 0.35 m]}}
+  a: {kind: solve, task: task.yaml, replay: false, grid: {height: [0.34 m, 0.35 m]}}
 """
 TASK = """\
 name: quick
@@ -60,6 +66,30 @@ def _log(folder: Path) -> None:
     (folder / "log.csv").write_text(text(cells(bench())), encoding="utf-8")
 
 
+WEAK = "name: weak\nbase: planning\neffects:\n  - {kind: supply_scale, k: 0.9}\n"
+BEFORE = (  # what is learnt from: a plan, executed on a machine whose supply is weak
+    "solve task.yaml --set height=0.45m --set duration=0.7s --no-figure --out run",
+    "simulate run --model weak.yaml --noise --out logs",
+)
+
+
+@cache
+def _executed() -> Path:
+    """A folder with an executed run, made once."""
+    folder = Path(tempfile.mkdtemp(prefix="kemba-executed-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    plain_task(folder).rename(folder / "task.yaml")
+    (folder / "weak.yaml").write_text(WEAK, encoding="utf-8")
+    code = "from kemba_cli.main import main; main()"
+    for words in BEFORE:
+        subprocess.run([sys.executable, "-c", code, *words.split()], cwd=folder, check=True)
+    return folder
+
+
+def _run(folder: Path) -> None:
+    shutil.copytree(_executed(), folder, dirs_exist_ok=True)
+
+
 VERBS = {
     "solve": Verb(
         ("solve", "task.yaml", "--out", "out", "--no-replay", "--no-figure"),
@@ -75,6 +105,12 @@ VERBS = {
     ),
     "sweep": Verb(
         ("sweep", "sweep.yaml", "--out", "out", "--jobs", "1"), "out", ("cases/*.json",), _sweep
+    ),
+    "learn": Verb(
+        ("learn", "run", "--logs", "logs", "--out", "out"),
+        "out",
+        ("trajectory.csv", "controller*.csv", "answer/answer.json", "correction.yaml"),
+        _run,
     ),
 }
 

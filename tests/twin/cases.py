@@ -162,12 +162,14 @@ def bench_case(
     disturbance: float = 1.0,
     spread: float = 0.3,
     chambers: str = "first_order",
+    robot: Robot | None = None,
 ) -> tuple[list[Path], dict]:
-    """Bench logs in `folder`; arguments as in `robot_case`."""
+    """Bench logs in `folder`; arguments as in `robot_case`; `robot`: this one, none drawn."""
     sensors = sensors or Sensors()
-    chosen, faults, robot, others = _setting(
+    chosen, faults, drawn, others = _setting(
         effect, size, seed, "both", sensors, spread, figures_off, floor, True
     )
+    robot = robot or drawn
     paths = []
     for run in range(runs):
         rng = np.random.default_rng([seed, 2, run])
