@@ -61,10 +61,10 @@ def matched(
 
 
 def _fitted(now: Executed, task: Task, earlier: FittedAir | None) -> FittedAir | None:
-    """The air of the task's model fitted to the plant's motion; None where the plan itself fails or
-    nothing can be fitted."""
+    """The air of the task's model fitted to the plant's motion; None where the plan's own inputs do
+    not come true on its model, or nothing can be fitted."""
     done, table = now.judged, now.motions.table
-    if not task.fit_air or not now.plan.refined or done is None or not done.replays:
+    if not task.fit_air or done is None or not done.verdicts["replay"].good:
         return None
     if done.motion is None or table is None:
         return None
