@@ -8,7 +8,8 @@ from kemba.sweep.cases.case import Record, Work
 def solve_case(work: Work) -> Record:
     """Plan a task as `kemba-opt solve` does, and execute it; the figures of its certificate.
 
-    `replays`: the plan's inputs and its table come out as planned on the plan's own model.
+    `replays`: the plan's inputs and its table come out as planned on the plan's own model;
+    `fitted`: the air of that model is fitted to the plant.
     """
     from kemba.config import Document, parse
     from kemba.ocp import Task
@@ -28,6 +29,7 @@ def solve_case(work: Work) -> Record:
         **{key: best.result[key] for key in kept},
         "refined": best.plan.refined,
         "replays": done is not None and done.replays,
+        "fitted": "fitted_air" in best.result,
     }
 
 
