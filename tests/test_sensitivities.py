@@ -31,7 +31,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
         "solve",
         "jump.yaml",
         "--set",
-        "nodes=40",
+        "nodes=50",
         "--cold",
         "--no-figure",
         "-q",

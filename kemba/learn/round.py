@@ -32,7 +32,7 @@ from kemba.plant.execution.replay import ends_standing
 from kemba.plotting.robot.machine import Machine, load_machine
 from kemba.report import Approach, Listener, solve_into
 from kemba.report.earlier import origin_of
-from kemba.report.verdict import verdicts
+from kemba.report.judging.verdict import verdicts
 from kemba.runs import Run, RunFolder, write_json
 from kemba.trajectory import Trajectory
 

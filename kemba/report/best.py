@@ -13,13 +13,13 @@ from kemba.ocp.continuation.between import Origin
 from kemba.ocp.known import compared
 from kemba.ocp.planning import plans_nearby
 from kemba.ocp.starts import plan_best
-from kemba.report.executed import Begun, Executed, executed
+from kemba.report.judging.executed import Begun, Executed, executed
+from kemba.report.judging.matched import matched
 from kemba.report.listener import Listener
-from kemba.report.matched import matched
 from kemba.trajectory import Trajectory
 
 if TYPE_CHECKING:
-    from kemba.report.executed import Candidate
+    from kemba.report.judging.executed import Candidate
 
 
 @dataclass(frozen=True)

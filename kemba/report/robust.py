@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from kemba.ocp import Plan, Task
 from kemba.ocp.certificate.status import Status
-from kemba.report.judged import judged, plant_of, table_of
+from kemba.report.judging.judged import judged, plant_of, table_of
 from kemba.scenarios.draw import scenarios
 from kemba.scenarios.share import Share, share
 from kemba.settings import Settings, setting

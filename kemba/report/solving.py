@@ -14,7 +14,7 @@ from kemba.files import WriteError
 from kemba.ocp import Plan, Task
 from kemba.report.best import Approach, best_plan
 from kemba.report.drawing import Drawer, Here, Nowhere
-from kemba.report.executed import Motions
+from kemba.report.judging.executed import Motions
 from kemba.report.listener import Listener
 from kemba.runs import PLANT_RUN, RunFolder, write_json
 from kemba.trajectory import Trajectory

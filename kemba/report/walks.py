@@ -17,7 +17,7 @@ from kemba.ocp.reading import task_model
 from kemba.ocp.shipped.entry import read_plan, write_plan
 from kemba.ocp.shipped.kind import FIGURES, figures_of, kind_of
 from kemba.ocp.task.requirement import resolve
-from kemba.report.judged import judged, table_of
+from kemba.report.judging.judged import judged, table_of
 
 PATIENT = "solver.time_limit=3600 s"
 

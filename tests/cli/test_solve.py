@@ -199,8 +199,9 @@ def test_the_path_on_stdout_and_talk_on_stderr() -> None:
     lines = done.stderr.splitlines()
     apex = load_run("runs/max_jump-1").certificate["apex_m"]
     assert apex >= 1.0 - 1e-6
-    assert lines[-1].startswith(f"solved: apex {apex:.3f} m (feet ")
-    *stages, drawing, _ = lines
+    assert lines[-2].startswith(f"solved: apex {apex:.3f} m (feet ")
+    assert lines[-1].startswith("next: kemba-opt simulate runs/max_jump-1")
+    *stages, drawing, _, _ = lines
     assert stages and all("nodes)" in line for line in stages) and "drawing" in drawing
     files = {path.name for path in Path("runs/max_jump-1").iterdir()}
     assert {"task.yaml", "trajectory.csv", "controller.csv", "figure.png", "solver.log"} <= files
@@ -223,7 +224,9 @@ def test_a_failed_solve_draws_what_it_has() -> None:
     done = run("jump.yaml", *COARSE, "--time-limit", "0.2", "--out", "short")
     assert done.exit_code == 1
     assert Path("short/figure.png").is_file()
-    assert done.stderr.splitlines()[-1].startswith("FAILED: a limit came before a plan was found")
+    said, following = done.stderr.splitlines()[-2:]
+    assert said.startswith("FAILED: a limit came before a plan was found")
+    assert following == "next: kemba-opt report short"
 
 
 def test_dry_run_says_the_size_and_solves_nothing() -> None:

@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from kemba.ocp.task.task import Tolerances
-from kemba.report.verdict import verdicts
+from kemba.report.judging.verdict import verdicts
 from kemba_cli.main import app
 
 LANDED = {

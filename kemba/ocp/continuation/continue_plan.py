@@ -134,8 +134,8 @@ class Continuation:
     def _at_once(
         self, start: Trajectory, phases: list[Phase], reduction: Reduction
     ) -> Refined | None:
-        """The best plan in one solve; None where it does not converge, or costs so much more than
-        the earlier plan that another minimum is likely."""
+        """The best plan in one solve; None where it does not converge or misses the tolerances, or
+        costs so much more than the earlier plan that another minimum is likely."""
         self.tell(f"from {self.origin.name}: the best one")
         found = self._solved(1.0, start, phases, reduction, 0.0)
         if found.ending.cut_short:
@@ -143,7 +143,9 @@ class Continuation:
         o = self.origin
         before = objective(o.model, self.task, o.requirements, o.plan)
         most = before + (Continuing.current().dear - 1.0) * abs(before)
-        if found.done and self._cost(found) <= most:
+        measured = found.certificate
+        kept = measured is not None and measured.within(self.task.tolerances)
+        if kept and self._cost(found) <= most:
             return found
         self.solution = None
         return None

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping
 from html import escape
 from typing import Any
 
+from kemba.report.judging.verdict import EXECUTIONS
 from kemba.report.review.html import Rows, folded, pairs
-from kemba.report.verdict import EXECUTIONS
 from kemba.runs import Run
 
 Facts = Mapping[str, Any]

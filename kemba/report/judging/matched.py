@@ -18,12 +18,12 @@ from kemba.ocp.continuation.between import Origin
 from kemba.ocp.planning import plan_from
 from kemba.ocp.reading import task_model
 from kemba.plant.execution.fitted_air import FittedAir, fitted_air
-from kemba.report.executed import Begun, Executed, executed
+from kemba.report.judging.executed import Begun, Executed, executed
 from kemba.report.listener import Listener
 from kemba.settings import Settings, setting
 
 
-class MatchSettings(Settings):
+class RefitRounds(Settings):
     """How often a plan is made again with fitted air."""
 
     rounds: int = setting(
@@ -46,7 +46,7 @@ def matched(
     first-order chambers.
     """
     now, fit = first, None
-    for _ in range(MatchSettings.current().rounds):
+    for _ in range(RefitRounds.current().rounds):
         fit = _fitted(now, task, fit)
         if fit is None or now.good:
             return
@@ -74,6 +74,14 @@ def _fitted(now: Executed, task: Task, earlier: FittedAir | None) -> FittedAir |
         return None
 
 
+def _origin_of(old: Plan) -> str:
+    """What the sentence calls the plan from which the first one began."""
+    if old.continued:
+        return "the earlier plan"
+    kind, _, name = old.start.partition(": ")
+    return f"the shipped plan {name}" if kind == "shipped" else "the plan before"
+
+
 def _planned(
     old: Plan, fit: FittedAir, task: Task, document: Document, listener: Listener, log: Path | None
 ) -> Plan | None:
@@ -82,7 +90,7 @@ def _planned(
     for name, values in fit.changes(task_model(task)).items():
         changes[name] = {**changes.get(name, {}), **values}
     asked = task.model_copy(update={"effects": changes})
-    origin = Origin(old.trajectory, old.model, old.requirements, "the plan before", once=True)
+    origin = Origin(old.trajectory, old.model, old.requirements, _origin_of(old), once=True)
     watch, stop = listener.watch, listener.stop
     new, _ = plan_from(origin, asked, document, log, listener.tell, watch, stop)
     if new is None:

@@ -12,7 +12,7 @@ from kemba.plant.execution.certificate import executions, plant_run, summaries
 from kemba.plant.execution.counterpart import counterpart
 from kemba.plant.execution.replay import ends_standing
 from kemba.plant.execution.retiming import retimed
-from kemba.report.verdict import Verdict, verdicts
+from kemba.report.judging.verdict import Verdict, verdicts
 from kemba.stopwatch import Tell, silent
 from kemba.trajectory import Trajectory
 

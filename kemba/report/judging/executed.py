@@ -13,7 +13,7 @@ from kemba.ocp.certificate.status import Status
 from kemba.ocp.report import answer, sentence_of
 from kemba.plant.execution.counterpart import another_robot
 from kemba.plant.execution.retiming import retimed
-from kemba.report.judged import Judged, judged
+from kemba.report.judging.judged import Judged, judged
 from kemba.stopwatch import Tell
 from kemba.trajectory import Trajectory
 
