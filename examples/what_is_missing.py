@@ -1,6 +1,6 @@
 """Which effect is missing.
 
-A machine with seal friction that the plan knows nothing of: three logs, one answer.
+A machine with seal friction that the plan knows nothing of: logs of three motions, one answer.
 """
 
 from pathlib import Path
@@ -14,9 +14,9 @@ Path("machine.yaml").write_text(
     encoding="utf-8",
 )
 logs = []
-for number, height in enumerate(("0.47 m", "0.48 m", "0.5 m")):
-    jump = kemba.plan("jump.yaml", height=height)
-    logs += kemba.simulate(jump, plant="machine.yaml", noise=True, seed=number).logs
+for number, task in enumerate(("jump.yaml", "hop.yaml", "stand.yaml")):
+    motion = kemba.plan(task)
+    logs += kemba.simulate(motion, plant="machine.yaml", noise=True, seed=number).logs
 found = kemba.discover(logs)
 print(found.sentence)
 assert found.ranking[0].effect == "seal_friction"
