@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -60,7 +62,7 @@ def test_many_faults_lose_nothing(name: str, usual: Any, tmp_path: Path) -> None
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize("name", ["solve", "discover", "simulate"])
+@pytest.mark.parametrize("name", VERBS)
 def test_of_two_at_a_time_one_is_refused(name: str, usual: Any, tmp_path: Path) -> None:
     verb, folder = VERBS[name], tmp_path / "work"
     verb.begin(emptied(folder))
@@ -82,6 +84,26 @@ def test_the_comparison_sees_a_lost_file(usual: Any, tmp_path: Path) -> None:
     wanted = {**results, "one-more.csv": b""}
     found = struck(VERBS["simulate"], Fault("nothing"), tmp_path / "work", wanted, seconds)
     assert found.exit_code == 0 and found.wrong == ["exit code 0, but other results"]
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    """A folder with a file system of 100 kB; skipped where nothing may be mounted."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=100k", "tmpfs", str(folder)]
+    if shutil.which("mount") is None or subprocess.run(mount, capture_output=True).returncode:
+        pytest.skip("mounting a small disk needs the rights of an administrator")
+    yield folder
+    subprocess.run(["umount", str(folder)], check=True)
+
+
+def test_a_small_disk_is_told_before_the_work(small_disk: Path) -> None:
+    VERBS["solve"].begin(small_disk)
+    done = run(VERBS["solve"], small_disk)
+    assert done.returncode == 1
+    assert "No space left on device; free some space" in done.stderr
+    assert not any((small_disk / "out").glob("*"))
 
 
 @pytest.mark.nightly
