@@ -110,11 +110,13 @@ Kolmogorov-Smirnov, below 0.05 the p-values are not uniform):
 {table(truths, [row for row in hidden if row])}
 
 Where no effect is there at all, p-values are larger than uniform ones and intervals wider than
-needed: the test is careful. Delays of a fraction of a row are where it is not careful enough: its
-p-values are too small there, and the verdict rests on the other rule, that an effect below a fifth
-of its size is no finding. Of nine such machines tried before the last change two were false alarms.
-In one case looked at, the gain vanished when times were no candidates; a likely reason, not shown,
-is that an edge falls before or after a reading, while the test knows only the slope over a row.
+needed: the test is careful. On machines drawn as the test believes them to be it is not careful
+enough: p-values should be uniform there and are too small, and false alarms are above the 3 % that
+are aimed at. The logs are no linear problem, and the test simulates them by slopes. Delays of a
+fraction of a row are worst: in one case looked at, the gain vanished when times were no candidates;
+a likely reason, not shown, is that an edge falls before or after a reading, while the test knows
+only the slope over a row. The verdict also rests on another rule: an effect below a fifth of its
+size is no finding.
 """
 
 
