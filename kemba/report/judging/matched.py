@@ -27,7 +27,7 @@ class RefitRounds(Settings):
     """How often a plan is made again with fitted air."""
 
     rounds: int = setting(
-        3, "1", "fits at most; of 12 jumps that missed, 7 were good after one", "tuned: by hand"
+        3, "1", "fits at most; most jumps that missed were good after one or two", "tuned: by hand"
     )
 
 
@@ -47,8 +47,8 @@ def matched(
     """
     now, fit = first, None
     for _ in range(RefitRounds.current().rounds):
-        fit = _fitted(now, task, fit)
-        if fit is None or now.good:
+        fit = _fitted(now, task, fit) if not now.good else None
+        if fit is None:
             return
         listener.tell("the air of the plan's model, fitted to the simulated robot")
         new = _planned(now.plan, fit, task, document, listener, log)
