@@ -12,7 +12,6 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import re
 import shutil
 import tempfile
 import time
@@ -23,13 +22,13 @@ from typing import Any
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
+from block import put_block
 from hidden_machines import HiddenMachine, machine
 from learning_page import section
 from scipy.optimize import lsq_linear
 
 from kemba.config import dump_yaml
 from kemba.errors import KembaError
-from kemba.files import atomic_text
 from kemba.identify.adopt import item
 from kemba.identify.logs.reading import read_logs
 from kemba.identify.robot.problem import robot_problem
@@ -189,11 +188,7 @@ def main() -> None:
                     with asked.record.open("a", encoding="utf-8") as stream:
                         stream.write(json.dumps(row) + "\n")
                     print(_told(row), flush=True)
-    block = "\n".join([MARKS[0], "", section(rows), "", MARKS[1]])
-    text = PAGE.read_text(encoding="utf-8")
-    with atomic_text(PAGE) as stream:
-        pattern = f"{re.escape(MARKS[0])}.*{re.escape(MARKS[1])}"
-        stream.write(re.sub(pattern, lambda _: block, text, flags=re.DOTALL))
+    put_block(PAGE, *MARKS, [section(rows)])
 
 
 def _planned(out: Path) -> Path:

@@ -19,6 +19,7 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
+from block import put_block
 from mpcc.methods import METHODS
 from mpcc.problem import Mpcc, branches, problems
 
@@ -103,9 +104,7 @@ def main() -> None:
     lines = table(asked.starts)
     print("\n".join(lines))
     if asked.save is not None:
-        before, rest = asked.save.read_text(encoding="utf-8").split(BEGIN)
-        text = "\n".join([before + BEGIN, "", *lines, "", END]) + rest.split(END)[1]
-        asked.save.write_text(text, encoding="utf-8")
+        put_block(asked.save, BEGIN, END, lines)
 
 
 if __name__ == "__main__":

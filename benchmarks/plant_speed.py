@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import os
-import re
 import subprocess
 import sys
 import tempfile
@@ -20,10 +19,10 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
+from block import put_block
 
 from kemba.effects.mechanics.ground import GroundFriction
 from kemba.effects.mechanics.load import Payload
-from kemba.files import atomic_text
 from kemba.ocp import controller_table, load_task, plan
 from kemba.plant import Execution, execute, execute_many, replay, replays
 from kemba.plant.execution.counterpart import counterpart
@@ -153,11 +152,7 @@ def main() -> None:
         print(line, flush=True)
         lines.append(line)
     if asked.save:
-        text = asked.save.read_text(encoding="utf-8")
-        block = "\n".join([MARKS[0], "", *lines, "", MARKS[1]])
-        pattern = f"{re.escape(MARKS[0])}.*{re.escape(MARKS[1])}"
-        with atomic_text(asked.save) as stream:
-            stream.write(re.sub(pattern, lambda _: block, text, flags=re.DOTALL))
+        put_block(asked.save, *MARKS, lines)
 
 
 if __name__ == "__main__":

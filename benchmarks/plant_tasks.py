@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import re
 import subprocess
 import sys
 import tempfile
@@ -18,7 +17,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from kemba.files import atomic_text
+from block import put_block
+
 from kemba.sweep.workers.machine import machine
 
 TASKS = ("jump", "hop", "max_jump", "drop", "stand", "jump_forward")
@@ -71,11 +71,7 @@ def main() -> None:
         print(line, flush=True)
         lines.append(line)
     if asked.save:
-        text = asked.save.read_text(encoding="utf-8")
-        block = "\n".join([MARKS[0], "", *lines, "", MARKS[1]])
-        pattern = f"{re.escape(MARKS[0])}.*{re.escape(MARKS[1])}"
-        with atomic_text(asked.save) as stream:
-            stream.write(re.sub(pattern, lambda _: block, text, flags=re.DOTALL))
+        put_block(asked.save, *MARKS, lines)
 
 
 if __name__ == "__main__":

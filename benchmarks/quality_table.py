@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from block import put_block
 
 from kemba.sweep import machine
 
@@ -88,6 +89,4 @@ def _told(rows: list[dict[str, Any]]) -> list[str]:
 
 def written(page: Path) -> None:
     """Put the table into the page."""
-    before, rest = page.read_text(encoding="utf-8").split(BEGIN)
-    text = "\n".join([before + BEGIN, "", *summary(), "", END]) + rest.split(END)[1]
-    page.write_text(text, encoding="utf-8")
+    put_block(page, BEGIN, END, summary())

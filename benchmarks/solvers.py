@@ -19,6 +19,7 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
+from block import put_block
 from load_program import load
 
 BEGIN, END = "<!-- solvers: written by benchmarks/solvers.py -->", "<!-- end of solvers -->"
@@ -95,9 +96,7 @@ def main() -> None:
             print(lines[-1], flush=True)
     lines.append(f"\nCasADi {ca.CasadiMeta.version()}; at most {asked.limit} CPU seconds each.")
     if asked.save is not None:
-        before, rest = asked.save.read_text(encoding="utf-8").split(BEGIN)
-        text = "\n".join([before + BEGIN, "", *lines, "", END]) + rest.split(END)[1]
-        asked.save.write_text(text, encoding="utf-8")
+        put_block(asked.save, BEGIN, END, lines)
 
 
 if __name__ == "__main__":
