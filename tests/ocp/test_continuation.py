@@ -120,6 +120,16 @@ def test_between_two_models() -> None:
     assert model_between(old, new, 1.0) is new
 
 
+def test_tables_are_between_as_well() -> None:
+    old = load_model("planning")
+    chamber = old.effect("chamber")
+    pushes = tuple(0.8 * force for force in chamber.value("F_extend"))
+    new = old.with_effects([chamber.bind({"F_extend": pushes})])
+    half = model_between(old, new, 0.5).effect("chamber")
+    assert half.value("F_extend") == pytest.approx(0.9 * np.array(chamber.value("F_extend")))
+    assert half.value("F_retract") == chamber.value("F_retract")
+
+
 def test_between_two_tasks(hop: Path) -> None:
     origin = origin_of(hop)
     apex = next(r for r in origin.requirements if r.location == ("goals", "apex"))

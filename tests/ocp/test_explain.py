@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from kemba.config import find_config
 from kemba.ocp import Task, load_task, task_model
 from kemba.ocp.infeasibility.checks import check_task
-from kemba.ocp.infeasibility.diagnostic import Diagnostic
+from kemba.ocp.infeasibility.diagnostic import Diagnostic, Relax
 from kemba.ocp.infeasibility.flight import air_work, inertia_and_weight
 from kemba.ocp.task.requirement import resolve
 from kemba_cli.main import app
@@ -145,3 +145,9 @@ def test_poses_that_a_chain_cannot_hold() -> None:
     """Feet on the ground, pistons retracted, body level: the knees cannot be straight too."""
     (found,) = diagnostics("jump", "start.front/knee/q=50 deg")
     assert found.certain and found.relax and "no pose" in found.sentence
+
+
+def test_small_gaps_are_told_with_digits_enough() -> None:
+    gap = Relax("start.*/piston/x", "", "front/piston/x", 0.0, 2.4e-5, "m")
+    assert str(gap).startswith("`start.*/piston/x`: 0 m asked, 2e-05 m is the least")
+    assert gap.placed() == str(gap), "a task without a file has no place to name"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import isfinite
+from typing import Any
 
 import numpy as np
 
@@ -34,8 +35,8 @@ class Origin:
 def model_between(old: Model, new: Model, share: float) -> Model:
     """The new model with its numbers at `share` of the way from the old ones.
 
-    An effect that only the new model has grows from the value at which it is absent. Tables, and
-    effects that only the old model has, change at once.
+    An effect that only the new model has grows from the value at which it is absent. Tables of
+    another size, and effects that only the old model has, change at once.
     """
     if share >= 1.0:
         return new
@@ -49,14 +50,22 @@ def _effect_between(old: Effect | None, new: Effect, share: float) -> Effect:
     if old is None:
         start = {name: float(value) for name, value in new.off.items()}
     else:
-        start = {name: old.value(name) for name in old.parameters()}
-    changed = {}
-    for name, first in start.items():
-        last = new.value(name)
-        numbers = isinstance(first, float | int) and isinstance(last, float | int)
-        if numbers and first != last:
-            changed[name] = first + share * (last - first)
+        tables = [name for name, value in old if isinstance(value, tuple)]
+        start = {name: old.value(name) for name in (*old.parameters(), *tables)}
+    between = {name: _figure(first, new.value(name), share) for name, first in start.items()}
+    changed = {name: value for name, value in between.items() if value is not None}
     return new.bind(changed) if changed else new
+
+
+def _figure(first: Any, last: Any, share: float) -> Any:
+    """A number or table on the way; None where it does not change or changes at once."""
+    if first == last:
+        return None
+    if isinstance(first, float | int) and isinstance(last, float | int):
+        return _between(first, last, share)
+    if isinstance(first, tuple) and isinstance(last, tuple) and len(first) == len(last):
+        return tuple(_between(a, b, share) for a, b in zip(first, last, strict=True))
+    return None
 
 
 def requirements_between(

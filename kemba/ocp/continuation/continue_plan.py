@@ -151,22 +151,25 @@ class Continuation:
         return None
 
     def _walk(self, start: Trajectory, phases: list[Phase], reduction: Reduction) -> Refined:
-        """In one step if it converges, else in halves; then the best plan for what is asked."""
+        """In one step if it converges, else from the earlier plan solved anew on these intervals, in
+        halves; then the best plan for what is asked."""
         settings = Continuing.current()
-        done, step = 0.0, 1.0
+        done, step, settled = 0.0, 1.0, False
         found = Refined(None, None, Ending.GAVE_UP, 0)
-        for _ in range(1 if self.origin.once else settings.solves):
+        for _ in range(3 if self.origin.once else settings.solves):
             share = min(1.0, done + step)
             self.tell(f"from {self.origin.name}: {share:.0%} of the change")
             found = self._solved(share, start, phases, reduction, settings.near)
             if found.trajectory is not None:
-                start, done = found.trajectory, share
+                start, done, settled = found.trajectory, share, True
                 if done >= 1.0:
                     return self._best(found, phases, reduction)
+                step = 1.0 if not done else step
             elif found.done or step / 2 < settings.shortest:
                 break
             else:
-                step /= 2
+                step = step / 2 if settled else 0.0
+                settled = True
         return replace(found, trajectory=None, certificate=None)
 
     def _best(self, near: Refined, phases: list[Phase], reduction: Reduction) -> Refined:

@@ -48,7 +48,7 @@ def _time(task: Task, flight: AskedFlight, document: Document) -> Iterator[Diagn
             f"{task.duration:g} s in all leave at most {span:.2f} s for it"
         )
         if certain:
-            yield Diagnostic(f"{most} ({most.where}); {reason}", True, (most,), cause=True)
+            yield Diagnostic(f"{most.placed()}; {reason}", True, (most,), cause=True)
         else:
             yield Diagnostic(reason, False, cause=True)
         return

@@ -100,7 +100,7 @@ def _against_range(requirement: Requirement, q: Quantity, document: Document) ->
     above = requirement.lower > q.upper
     asked, end = (requirement.lower, q.upper) if above else (requirement.upper, q.lower)
     given = relax(document, requirement, asked, end)
-    sentence = f"{given} ({given.where}); {q.name} stays within "
+    sentence = f"{given.placed()}; {q.name} stays within "
     sentence += f"{number(q.lower, q.unit)} to {number(q.upper, q.unit)}"
     return Diagnostic(sentence, True, (given,))
 
@@ -117,7 +117,7 @@ def impossible_poses(
         given = one_per_requirement(
             relax(document, g.requirement, g.asked, g.reachable) for g in single
         )
-        why = "; ".join(f"{r} ({r.where})" for r in given) or "the requirements exclude each other"
+        why = "; ".join(r.placed() for r in given) or "the requirements exclude each other"
         reason = "" if together is None else _reason(single)
         certain = together is not None
         yield Diagnostic(

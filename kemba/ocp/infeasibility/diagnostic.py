@@ -26,7 +26,7 @@ class Relax:
     def __str__(self) -> str:
         """`goals.apex`: 1.45 m asked, 1.21 m is the most that can be reached."""
         end = "most" if self.asked > self.reachable else "least"
-        asked, reachable = number(self.asked, self.unit), number(self.reachable, self.unit)
+        asked, reachable = apart(self.asked, self.reachable, self.unit)
         name = f"`{self.requirement}`"
         if (
             self.quantity not in (self.requirement.partition(".")[2], "")
@@ -34,6 +34,10 @@ class Relax:
         ):
             name += f" ({self.quantity})"
         return f"{name}: {asked} asked, {reachable} is the {end} that can be reached"
+
+    def placed(self, more: str = "") -> str:
+        """The same with `more` behind it, and its place in the task, if it has one."""
+        return f"{self}{more}" + (f" ({self.where})" if self.where else "")
 
 
 @dataclass(frozen=True)
@@ -50,12 +54,18 @@ class Diagnostic:
     cause: bool = False
 
 
-def number(value: float, unit: str) -> str:
+def number(value: float, unit: str, digits: int = 3) -> str:
     """A value as people write it: `0.35 m`, `-10 deg`, `0`."""
     if unit == "rad":
         value, unit = math.degrees(value), "deg"
-    text = f"{round(value, 3) + 0.0:.4g}"
+    text = f"{round(value, digits) + 0.0:.{digits + 1}g}"
     return text if unit == "1" else f"{text} {unit}"
+
+
+def apart(asked: float, reachable: float, unit: str) -> tuple[str, str]:
+    """Two values with as many digits as show that they differ."""
+    pairs = ((number(asked, unit, d), number(reachable, unit, d)) for d in range(3, 9))
+    return next((pair for pair in pairs if pair[0] != pair[1]), (f"{asked:g}", f"{reachable:g}"))
 
 
 def place(document: Document, location: Location) -> str:

@@ -57,7 +57,7 @@ def explanation(
     )
     if given:
         time = f" within {trajectory.time[-1]:.2f} s"
-        requirements = [f"{r}{time * (r is given[0])} ({r.where})" for r in given]
+        requirements = [r.placed(time * (r is given[0])) for r in given]
         requirements[0] = f"cannot be met: {requirements[0]}"
         if transcription.task.landing != task.landing:
             requirements.append("`landing` is not counted in this and may ask for still less")
