@@ -15,7 +15,7 @@ from kemba.config import Document
 from kemba.errors import KembaError
 from kemba.ocp import Plan, Task
 from kemba.ocp.continuation.between import Origin
-from kemba.ocp.planning import plan_from
+from kemba.ocp.planning import plan, plan_from
 from kemba.ocp.reading import task_model
 from kemba.plant.execution.fitted_air import FittedAir, fitted_air
 from kemba.report.judging.executed import Begun, Executed, executed
@@ -85,7 +85,7 @@ def _origin_of(old: Plan) -> str:
 def _planned(
     old: Plan, fit: FittedAir, task: Task, document: Document, listener: Listener, log: Path | None
 ) -> Plan | None:
-    """The plan continued with fitted air; None where that fails."""
+    """The plan continued with fitted air, or made anew with it; None where both fail."""
     changes = {name: dict(values) for name, values in task.effects.items()}
     for name, values in fit.changes(task_model(task)).items():
         changes[name] = {**changes.get(name, {}), **values}
@@ -94,6 +94,8 @@ def _planned(
     watch, stop = listener.watch, listener.stop
     new, _ = plan_from(origin, asked, document, log, listener.tell, watch, stop)
     if new is None:
+        new = plan(asked, document, log=log, tell=listener.tell, watch=watch, stop=stop)
+    if not new.status.plan:
         return None
     return replace(
         new,
