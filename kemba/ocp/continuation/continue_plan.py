@@ -151,8 +151,8 @@ class Continuation:
         return None
 
     def _walk(self, start: Trajectory, phases: list[Phase], reduction: Reduction) -> Refined:
-        """In one step if it converges, else from the earlier plan solved anew on these intervals, in
-        halves; then the best plan for what is asked."""
+        """In one step if it converges, else in halves, from the earlier plan solved on these
+        intervals; then the best plan for what is asked."""
         settings = Continuing.current()
         done, step, settled = 0.0, 1.0, False
         found = Refined(None, None, Ending.GAVE_UP, 0)
