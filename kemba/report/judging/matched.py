@@ -90,7 +90,8 @@ def _planned(
     for name, values in fit.changes(task_model(task)).items():
         changes[name] = {**changes.get(name, {}), **values}
     asked = task.model_copy(update={"effects": changes})
-    origin = Origin(old.trajectory, old.model, old.requirements, _origin_of(old), once=True)
+    known, stages = (old.trajectory, old.model, old.requirements), old.stages
+    origin = Origin(*known, _origin_of(old), once=True, stages=stages)
     watch, stop = listener.watch, listener.stop
     new, _ = plan_from(origin, asked, document, log, listener.tell, watch, stop)
     if new is None:
