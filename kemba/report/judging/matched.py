@@ -7,8 +7,8 @@ can be made with figures that hold along its own motion.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from kemba.config import Document
@@ -27,7 +27,7 @@ class RefitRounds(Settings):
     """How often a plan is made again with fitted air."""
 
     rounds: int = setting(
-        3, "1", "fits at most; most jumps that missed were good after one or two", "tuned: by hand"
+        4, "1", "fits at most; most jumps that missed were good after one or two", "tuned: by hand"
     )
 
 
@@ -46,10 +46,13 @@ def matched(
     first-order chambers.
     """
     now, fit = first, None
+    tried: list[_Tried] = []
     for _ in range(RefitRounds.current().rounds):
-        fit = _fitted(now, task, fit) if not now.good else None
-        if fit is None:
+        tried.append(_Tried(fit, _late(now)))
+        new_fit = None if now.good else _between(tried) or _fitted(now, task, fit)
+        if new_fit is None or (fit is not None and new_fit.factors == fit.factors):
             return
+        fit = new_fit
         listener.tell("the air of the plan's model, fitted to the simulated robot")
         new = _planned(now.plan, fit, task, document, listener, log)
         if new is None:
@@ -58,6 +61,33 @@ def matched(
         now.result["fitted_air"] = fit.summary()
         now.result["sentence"] += f"; {fit.sentence}"
         yield now
+
+
+@dataclass(frozen=True)
+class _Tried:
+    """A fit, None for the tables' figures, and how late [s] the plant touched down with its plan."""
+
+    fit: FittedAir | None
+    late: float
+
+
+def _late(now: Executed) -> float:
+    there = now.judged.facts["plant_replay"] if now.judged else None
+    return float((there or {}).get("touchdown_error_s") or 0.0)
+
+
+def _between(tried: Sequence[_Tried]) -> FittedAir | None:
+    """Air between the last two figures that were tried, by the secant of their touchdowns; None
+    where these are not on both sides of the plan's.
+
+    A fit is made for one motion, and the next plan is another. Of a jump whose feet rise by a
+    centimetre, one plan can land 70 ms late and the next one 20 ms early.
+    """
+    if len(tried) < 2 or tried[-2].late * tried[-1].late >= 0.0:
+        return None
+    old, new = tried[-2:]
+    assert new.fit is not None
+    return new.fit.towards(old.fit, new.late / (new.late - old.late))
 
 
 def _fitted(now: Executed, task: Task, earlier: FittedAir | None) -> FittedAir | None:
