@@ -43,8 +43,9 @@ class Stages:
         same = tuple(program.phases) == self.phases and program.scheme.stages == self.stages
         if not same or len(scale) > len(self.values):
             return None
-        found: np.ndarray = self.values[: len(scale)] / scale
-        return np.clip(found, program.lower[: len(scale)], program.upper[: len(scale)])
+        lower, upper = program.lower[: len(scale)], program.upper[: len(scale)]
+        found: np.ndarray = np.clip(self.values[: len(scale)] / scale, lower, upper)
+        return found
 
 
 def _scales(program: PhaseProgram) -> np.ndarray:

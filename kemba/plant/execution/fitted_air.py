@@ -49,8 +49,8 @@ class AirFitSettings(Settings):
     )
     steps: int = setting(6, "1", "Gauss-Newton steps at most", CHOSEN)
     damping: tuple[float, ...] = setting(
-        (0.0, 10.0, 100.0), "1", "weights of a step that are tried: one sigma of a factor counts as "
-        "an error of so many", CHOSEN,
+        (0.0, 10.0, 100.0), "1", "weights of a step that are tried: one sigma of a factor counts "
+        "as an error of so many", CHOSEN,
     )  # fmt: skip
     falls: float = setting(
         0.9, "1", "times the error that a step must leave at most to be worth another", CHOSEN

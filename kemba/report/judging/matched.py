@@ -46,10 +46,10 @@ def matched(
     first-order chambers.
     """
     now, fit = first, None
-    tried: list[_Tried] = []
+    tried: list[Tried] = []
     for _ in range(RefitRounds.current().rounds):
-        tried.append(_Tried(fit, _late(now)))
-        new_fit = None if now.good else _between(tried) or _fitted(now, task, fit)
+        tried.append(Tried(fit, _late(now)))
+        new_fit = None if now.good else between(tried) or _fitted(now, task, fit)
         if new_fit is None or (fit is not None and new_fit.factors == fit.factors):
             return
         fit = new_fit
@@ -64,8 +64,8 @@ def matched(
 
 
 @dataclass(frozen=True)
-class _Tried:
-    """A fit, None for the tables' figures, and how late [s] the plant touched down with its plan."""
+class Tried:
+    """A fit, None for the tables, and how late [s] the plant touched down with its plan."""
 
     fit: FittedAir | None
     late: float
@@ -76,7 +76,7 @@ def _late(now: Executed) -> float:
     return float((there or {}).get("touchdown_error_s") or 0.0)
 
 
-def _between(tried: Sequence[_Tried]) -> FittedAir | None:
+def between(tried: Sequence[Tried]) -> FittedAir | None:
     """Air between the last two figures that were tried, by the secant of their touchdowns; None
     where these are not on both sides of the plan's.
 
