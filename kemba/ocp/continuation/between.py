@@ -21,8 +21,9 @@ class Origin:
     """An earlier plan, the model it was made with, and what was asked of it.
 
     `name`: what sentences call it; `dear`: what to do where the new plan costs much more. `once`:
-    where the whole change fails in one step, nothing else is tried. `stages`: the solved program of
-    the plan, where it is at hand.
+    where the whole change fails in one step, nothing else is tried. `ticks`: valve edges of the new
+    plan are on the controller's ticks. `stages`: the solved program of the plan, where it is at
+    hand.
     """
 
     plan: Trajectory
@@ -31,6 +32,7 @@ class Origin:
     name: str = "the earlier plan"
     dear: str = "one without --from may take less"
     once: bool = False
+    ticks: bool = False
     stages: Stages | None = None
 
 

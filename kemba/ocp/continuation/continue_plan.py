@@ -28,6 +28,7 @@ from kemba.ocp.phases.radau import RADAU5
 from kemba.ocp.phases.settings import Elements, Refining
 from kemba.ocp.phases.stages import Stages
 from kemba.ocp.phases.stretched import extending, stretched
+from kemba.ocp.phases.ticks import on_ticks
 from kemba.ocp.refinement.refine import Refined, Refiner, reduction_of, refine, valve_columns
 from kemba.ocp.refinement.sample import certificate, to_trajectory
 from kemba.ocp.refinement.solve import solve, warm
@@ -211,6 +212,8 @@ class Continuation:
             kept = self.origin.stages.start(program) if self.origin.stages else None
             x = with_impacts(program, x, Continuing.current().ease) if kept is None else kept
         program.keep_short(x, Elements.current().fair)
+        if self.origin.ticks:
+            on_ticks(program, x)
         if weight:
             x = program.proximal(x, weight)
         settings = Continuing.current()
