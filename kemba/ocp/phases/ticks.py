@@ -45,11 +45,11 @@ def edge_times(
         edges.append(ValveEdges(ticks, leg, force))
         owners.append(own)
     found: dict[int, float] = {}
-    for own, ticks in zip(owners, rounded(edges), strict=True):
-        for (p, late), tick in zip(own, ticks, strict=True):
+    for own, chosen in zip(owners, rounded(edges), strict=True):
+        for (p, late), tick in zip(own, chosen, strict=True):
             if p:
                 found.setdefault(p, (tick - lead) * PERIOD + late)
-    return found
+    return dict(sorted(found.items()))
 
 
 def _valves(model: Model, reduction: Reduction) -> list[tuple[int, float]]:
