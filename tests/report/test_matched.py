@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from kemba.config import dump_yaml
 from kemba.ocp import load_task
 from kemba.plant.execution.fitted_air import FittedAir
-from kemba.report.judging.matched import Tried, between
+from kemba.report.judging.matched import TriedAir, between
 from kemba_cli.main import app
 
 WEAK = {"kind": "chamber", "F_extend": [258, 291, 314], "F_retract": [239, 260, 291]}  # 10 % less
@@ -50,18 +50,18 @@ def fit(factor: float) -> FittedAir:
 
 
 def test_between_figures_on_both_sides_the_secant_is_tried() -> None:
-    found = between([Tried(None, 0.06), Tried(fit(0.8), -0.02)])
+    found = between([TriedAir(None, 0.06), TriedAir(fit(0.8), -0.02)])
     assert found is not None
     assert found.factors["chamber.F_extend"] == pytest.approx(0.85)  # a quarter back to 1
     assert found.factors["chamber.vent"] == pytest.approx(1.15)
-    again = between([Tried(None, 0.06), Tried(fit(0.8), -0.02), Tried(found, 0.02)])
+    again = between([TriedAir(None, 0.06), TriedAir(fit(0.8), -0.02), TriedAir(found, 0.02)])
     assert again is not None and again.factors["chamber.F_extend"] == pytest.approx(0.825)
 
 
 def test_on_one_side_the_air_is_fitted_again() -> None:
-    assert between([Tried(None, 0.06)]) is None
-    assert between([Tried(None, 0.06), Tried(fit(0.8), 0.02)]) is None
-    assert between([Tried(None, 0.06), Tried(fit(0.8), 0.0)]) is None, "or nothing lands"
+    assert between([TriedAir(None, 0.06)]) is None
+    assert between([TriedAir(None, 0.06), TriedAir(fit(0.8), 0.02)]) is None
+    assert between([TriedAir(None, 0.06), TriedAir(fit(0.8), 0.0)]) is None, "or nothing lands"
 
 
 def test_a_low_jump_lands_when_it_should(tmp_path: Path) -> None:

@@ -47,7 +47,7 @@ def matched(
     no first-order chambers. Nothing where the plan fails by itself.
     """
     now, fit, ticks = first, None, False
-    tried: list[Tried] = []
+    tried: list[TriedAir] = []
     for _ in range(RefitRounds.current().rounds):
         if now.good or not _replays(now):
             return
@@ -55,7 +55,7 @@ def matched(
             ticks = True
             listener.tell("valve edges on the ticks of the controller")
         else:
-            tried.append(Tried(fit, _late(now)))
+            tried.append(TriedAir(fit, _late(now)))
             new_fit = between(tried) or _fitted(now, task, fit)
             if new_fit is None or (fit is not None and new_fit.factors == fit.factors):
                 return
@@ -72,7 +72,7 @@ def matched(
 
 
 @dataclass(frozen=True)
-class Tried:
+class TriedAir:
     """A fit, None for the tables, and how late [s] the plant touched down with its plan."""
 
     fit: FittedAir | None
@@ -89,7 +89,7 @@ def _late(now: Executed) -> float:
     return float((there or {}).get("touchdown_error_s") or 0.0)
 
 
-def between(tried: Sequence[Tried]) -> FittedAir | None:
+def between(tried: Sequence[TriedAir]) -> FittedAir | None:
     """Air between the last two figures that were tried, by the secant of their touchdowns; None
     where these are not on both sides of the plan's.
 
