@@ -7,8 +7,9 @@ import pytest
 
 from kemba.model import Model, load_model
 from kemba.ocp.continuation.between import Origin
+from kemba.ocp.controller import PERIOD
 from kemba.ocp.phases.modes import Phase
-from kemba.ocp.phases.ticks import PERIOD, edge_times
+from kemba.ocp.phases.ticks import edge_times
 from kemba.ocp.planned import Plan
 from kemba.ocp.planning import plan_from, plans_nearby
 from kemba.ocp.reading import load_task

@@ -12,13 +12,12 @@ import casadi as ca
 import numpy as np
 
 from kemba.model import Model
+from kemba.ocp.controller import PERIOD
 from kemba.ocp.edges import ValveEdges, rounded
 from kemba.ocp.phases.modes import Phase
 from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.transcription.layout import STEP
 from kemba.ocp.transcription.symmetry import Reduction
-
-PERIOD = 1e-3  # s, of the controller
 
 
 def edge_times(
