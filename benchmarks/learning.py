@@ -42,6 +42,7 @@ from kemba.plant.execution.certificate import rest_after
 from kemba.plant.execution.controller import execute
 from kemba.plotting.robot.machine import load_machine
 from kemba.report import Listener, solve_into
+from kemba.report.best import Approach
 from kemba.report.earlier import origin_of
 from kemba.runs import RunFolder, load_run
 from kemba.sweep.workers.machine import machine as this_computer
@@ -111,7 +112,8 @@ def by_least_squares(run: Path, logs: list[Path], new: Path) -> dict[str, Any]:
     load_spec(str(model))
     task = task.model_copy(update={"model": str(model)})
     folder = RunFolder.create(new, "jump", [*logs])
-    result = solve_into(folder, task, document, Listener(), origin=origin_of(first), replay=False)
+    approach = Approach(origin=origin_of(first), replay=False)
+    result = solve_into(folder, task, document, Listener(), approach, figure=False)
     folder.finish("finished")
     return {"status": result["status"], "effects": len(listed)}
 

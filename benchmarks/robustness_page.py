@@ -36,6 +36,13 @@ stays upright. The intervals are Wilson's, of 95 %.
 """
 
 
+STAND = """\
+`stand` asks for rest in the middle of the stroke, where no position of the valves bears the weight:
+its plan balances on pulses of air, without torque. A little less force, or another payload, and the
+legs sink to their stops, feet sliding apart; it lands, but does not stand at its height. Neither
+less friction in the plan (mu 0.4) nor a cost on air changes that (0 of 40 each)."""
+
+
 def page(rows: Sequence[Row], repeats: str = "") -> str:
     """The page as Markdown; of each task and way the rows of the latest table count.
 
@@ -107,6 +114,8 @@ def _ends(rows: Sequence[Row]) -> Iterator[str]:
             share([{"fault": r["fault"] or r["final_error_m"] > END} for r in own]) for own in found
         ]
         yield f"| {task} | " + " | ".join(cells) + " |"
+    if "stand" in _tasks(rows):
+        yield from ("", STAND)
 
 
 def _apexes(rows: Sequence[Row]) -> Iterator[str]:

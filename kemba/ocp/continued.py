@@ -57,6 +57,7 @@ def continued(planner: Planner, origin: Origin) -> tuple[Plan | None, str]:
         constraints=way.size[1],
         refined=True,
         continued=True,
+        stages=answer.stages,
     )
     return found, ""
 
@@ -75,7 +76,8 @@ def with_air(planner: Planner, found: Plan) -> Plan:
     last. Where that fails, the plan without it is not what was asked.
     """
     asked = tuple(planner.requirements)
-    origin = Origin(found.trajectory, planner.model, asked, "the plan without air", once=True)
+    name, model = "the plan without air", planner.model
+    origin = Origin(found.trajectory, model, asked, name, once=True, stages=found.stages)
     near, why = continued(planner, origin)
     if near is None:
         what = f"`landing.air` is not kept ({why})"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from kemba.model import Model
 from kemba.ocp.certificate.certify import Certificate, certify
@@ -13,6 +13,7 @@ from kemba.ocp.certificate.status import Status, verdict
 from kemba.ocp.infeasibility.diagnostic import Relax
 from kemba.ocp.infeasibility.explain import Explanation
 from kemba.ocp.nlp.ipopt import Iterate
+from kemba.ocp.phases.stages import Stages
 from kemba.ocp.relaxation.session import Attempt, Session
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
@@ -43,6 +44,7 @@ class Plan:
     refined: bool = False
     continued: bool | None = None  # whether it comes from an earlier plan, where one was given
     start: str = "guess"  # or the shipped plan from which it begins
+    stages: Stages | None = field(default=None, repr=False, compare=False)  # of a refined plan
 
     @property
     def iterations(self) -> int:

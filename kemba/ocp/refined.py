@@ -85,4 +85,5 @@ def on_phases(planner: Planner, found: Plan) -> Plan:
         sentence=f"{sentence}, refined on {len(answer.phases)} phases",
         cost=costs(model, new),
         refined=True,
+        stages=answer.stages,
     )

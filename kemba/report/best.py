@@ -61,19 +61,16 @@ def best_plan(
     run folder in the answer. Raises KembaError where the task or a file is wrong.
     """
     begun = begun or (lambda plan: None)
-    made = (
-        executed(*one, approach.replay, listener.tell, begun, place)
-        for one in _candidates(task, document, approach, listener)
-    )
-    best = last = next(made)
-    while approach.starts > 1 or not best.good:
-        other = next(made, None)
-        if other is None:
+    best: Executed | None = None
+    for one in _candidates(task, document, approach, listener):
+        made = last = executed(*one, approach.replay, listener.tell, begun, place)
+        if not made.good and approach.replay:
+            for last in matched(made, task, document, listener, begun, approach.log, place):
+                made = last if last.good else made
+        best = made if best is None else max(best, made, key=lambda made: made.rank)
+        if best.good and approach.starts == 1:
             break
-        best, last = max(best, other, key=lambda made: made.rank), other
-    if not best.good and approach.replay:
-        for last in matched(best, task, document, listener, begun, approach.log, place):
-            best = last if last.good else best
+    assert best is not None
     if best is not last and best.motions.table is not None:
         begun(best.plan.trajectory)
     known, remark = compared(best.plan)

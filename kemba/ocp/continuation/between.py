@@ -11,6 +11,7 @@ import numpy as np
 
 from kemba.effects import Effect
 from kemba.model import Model
+from kemba.ocp.phases.stages import Stages
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.transcription.solution import groups
 from kemba.trajectory import Trajectory
@@ -21,7 +22,9 @@ class Origin:
     """An earlier plan, the model it was made with, and what was asked of it.
 
     `name`: what sentences call it; `dear`: what to do where the new plan costs much more. `once`:
-    where the whole change fails in one step, nothing else is tried.
+    where the whole change fails in one step, nothing else is tried. `ticks`: valve edges of the new
+    plan are on the controller's ticks. `stages`: the solved program of the plan, where it is at
+    hand.
     """
 
     plan: Trajectory
@@ -30,6 +33,8 @@ class Origin:
     name: str = "the earlier plan"
     dear: str = "one without --from may take less"
     once: bool = False
+    ticks: bool = False
+    stages: Stages | None = None
 
 
 def model_between(old: Model, new: Model, share: float) -> Model:

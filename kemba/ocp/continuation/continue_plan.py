@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -26,7 +26,9 @@ from kemba.ocp.phases.notes import noted_phases
 from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.radau import RADAU5
 from kemba.ocp.phases.settings import Elements, Refining
+from kemba.ocp.phases.stages import Stages
 from kemba.ocp.phases.stretched import extending, stretched
+from kemba.ocp.phases.ticks import on_ticks
 from kemba.ocp.refinement.refine import Refined, Refiner, reduction_of, refine, valve_columns
 from kemba.ocp.refinement.sample import certificate, to_trajectory
 from kemba.ocp.refinement.solve import solve, warm
@@ -101,11 +103,13 @@ class Continuation:
         try:
             start = completed(self.origin.plan, self.model)
             reduction = reduction_of(self.model, self.task, self.requirements, start)
-            meshed = self._meshed(start, reduction)
-            if meshed is not None:
+            found: Refined | None = None
+            for meshed in self._meshes(start, reduction):
                 found = self._at_once(*meshed, reduction) or self._walk(*meshed, reduction)
-                if found.done or self.origin.once or self.task.landing.air:
-                    return found  # phases read anew would have no pulse of air
+                if found.done:
+                    return found
+            if found is not None and (self.origin.once or self.task.landing.air):
+                return found  # phases read anew would have no pulse of air
             return self._read_anew(start)
         except KembaError as error:
             why = f"the earlier plan does not fit this model: {error}"
@@ -113,23 +117,28 @@ class Continuation:
         except ValueError as error:
             return Refined(None, None, Ending.UNSUITABLE, 0, reason=f"the model {error}")
 
-    def _meshed(
+    def _meshes(
         self, start: Trajectory, reduction: Reduction
-    ) -> tuple[Trajectory, list[Phase]] | None:
-        """The earlier plan on the task's nodes, shared among its phases by how long they last;
-        None where its notes do not fit."""
+    ) -> Iterator[tuple[Trajectory, list[Phase]]]:
+        """The earlier plan on its own nodes, where its stages are known; then on the task's nodes,
+        shared among its phases by how long they last. Nothing where its notes do not fit."""
         constraints = read_constraints(self.model, reduction)
         valves = len(valve_columns(self.model, reduction))
         phases = noted_phases(start.meta, constraints, valves, len(start) - 1)
         if phases is None:
-            return None
+            return
         if self.task.landing.air:
             apex = apex_node(self.requirements, len(start) - 1)
             extends = extending(self.model, reduction)
             air = self.task.landing.air
             start, phases = stretched(start, phases, constraints, extends, apex, air)
+        stages = self.origin.stages
+        if stages is not None and (tuple(phases), stages.nodes) == (stages.phases, self.task.nodes):
+            yield start, phases
         marks = [r.at for r in self.requirements if r.at is not None]
-        return renoded(start, phases, self.task.nodes, marks)
+        shared = renoded(start, phases, self.task.nodes, marks)
+        if shared is not None:
+            yield shared
 
     def _at_once(
         self, start: Trajectory, phases: list[Phase], reduction: Reduction
@@ -203,8 +212,11 @@ class Continuation:
         if self.solution is not None:  # finer than the trajectory, which has no stages
             x = np.clip(self.solution[: x.size], program.lower, program.upper)
         else:
-            x = with_impacts(program, x, Continuing.current().ease)
+            kept = self.origin.stages.start(program) if self.origin.stages else None
+            x = with_impacts(program, x, Continuing.current().ease) if kept is None else kept
         program.keep_short(x, Elements.current().fair)
+        if self.origin.ticks:
+            on_ticks(program, x)
         if weight:
             x = program.proximal(x, weight)
         settings = Continuing.current()
@@ -236,4 +248,5 @@ def _ended(program: PhaseProgram, x: np.ndarray, ending: Ending, iterations: int
         return Refined(None, None, ending, iterations, phases)
     trajectory = to_trajectory(program, x)
     measured = certificate(program, x, trajectory)
-    return Refined(trajectory, measured, ending, iterations, phases)
+    own = Stages.of(program, x)
+    return Refined(trajectory, measured, ending, iterations, phases, stages=own)

@@ -20,6 +20,7 @@ from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.radau import RADAU3, RADAU5, STATE, Scheme
 from kemba.ocp.phases.requirements import add_requirements
 from kemba.ocp.phases.settings import Elements, Refining, Repair
+from kemba.ocp.phases.stages import Stages
 from kemba.ocp.refinement.repair import misfit, repaired, simplified
 from kemba.ocp.refinement.sample import certificate, to_trajectory
 from kemba.ocp.refinement.solve import rough, solve, warm
@@ -45,7 +46,7 @@ class Refined:
     """A plan on phases: its trajectory, what it violates, how the last solve ended, iterations.
 
     `trajectory` and `certificate` are None where no program could be built or solved; `reason`
-    says why a program could not be built.
+    says why a program could not be built. `stages`: the program's solution.
     """
 
     trajectory: Trajectory | None
@@ -54,6 +55,7 @@ class Refined:
     iterations: int
     phases: tuple[Phase, ...] = ()
     reason: str = ""
+    stages: Stages | None = None
 
     @property
     def solved(self) -> bool:
@@ -220,7 +222,8 @@ class Refiner:
             return ended
         trajectory = to_trajectory(program, found.Y)
         measured = certificate(program, found.Y, trajectory)
-        return replace(ended, trajectory=trajectory, certificate=measured)
+        own = Stages.of(program, found.Y)
+        return replace(ended, trajectory=trajectory, certificate=measured, stages=own)
 
     def build(
         self, phases: Sequence[Phase], start: Trajectory, scheme: Scheme, elastic: float = 0.0

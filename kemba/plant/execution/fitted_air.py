@@ -7,7 +7,7 @@ one factor, are fitted by Gauss-Newton steps so that the executed table moves as
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -47,10 +47,11 @@ class AirFitSettings(Settings):
         "weight of the factors: one sigma counts as an error of so many",
         CHOSEN,
     )
-    steps: int = setting(3, "1", "Gauss-Newton steps at most", CHOSEN)
-    shares: tuple[float, ...] = setting(
-        (1.0, 0.5, 0.25), "1", "of a step that are tried", "convention: halved twice"
-    )
+    steps: int = setting(6, "1", "Gauss-Newton steps at most", CHOSEN)
+    damping: tuple[float, ...] = setting(
+        (0.0, 10.0, 100.0), "1", "weights of a step that are tried: one sigma of a factor counts "
+        "as an error of so many", CHOSEN,
+    )  # fmt: skip
     falls: float = setting(
         0.9, "1", "times the error that a step must leave at most to be worth another", CHOSEN
     )
@@ -73,6 +74,13 @@ class FittedAir:
             e.name: {figure: _rounded(getattr(e, figure)) for figure in FIGURES[e.name]}
             for e in _scaled(model, np.array([*self.factors.values()]))
         }
+
+    def towards(self, other: FittedAir | None, share: float) -> FittedAir:
+        """Factors at `share` of the way to those of another fit, or to 1; errors are those of this
+        one."""
+        ends = other.factors if other else dict.fromkeys(self.factors, 1.0)
+        new = {name: own + share * (ends[name] - own) for name, own in self.factors.items()}
+        return FittedAir(new, self.before, self.after)
 
     def summary(self) -> dict[str, Any]:
         """The figures of the certificate."""
@@ -115,10 +123,10 @@ def fitted_air(
     motion = _Motion.of(model, table, plant, factors)
     first = error = motion.error(factors)
     for _ in range(settings.steps):
-        step = motion.step(factors, error, usual)
-        shares = (factors + share * step for share in settings.shares)
         limits = settings.most * usual
-        tried = ((k, motion.error(k)) for k in (np.clip(k, 1 - limits, 1 + limits) for k in shares))
+        steps = motion.steps(factors, error, usual)
+        near = (np.clip(factors + step, 1 - limits, 1 + limits) for step in steps)
+        tried = ((k, motion.error(k)) for k in near)
         nearer = next(((k, e) for k, e in tried if _norm(e) < settings.falls * _norm(error)), None)
         if nearer is None:
             break
@@ -171,17 +179,17 @@ class _Motion:
         until = min(_lands(model, motion) for motion in (own, plant))
         return cls(model, table, plant, units, np.arange(s.every, until, s.every))
 
-    def step(self, factors: Array, error: Array, usual: Array) -> Array:
-        """The Gauss-Newton step of the factors (n,), drawn towards 1 by how far they `usual`ly are
-        from it; `error` is that of the factors."""
+    def steps(self, factors: Array, error: Array, usual: Array) -> Iterator[Array]:
+        """Gauss-Newton steps of the factors (n,), drawn towards 1 by how far they `usual`ly are
+        from it, shorter and shorter; `error` is that of the factors."""
         settings = AirFitSettings.current()
         moved = factors + settings.secant * np.eye(len(factors))
         slopes = [(self.error(each) - error) / settings.secant for each in moved]
         weights = settings.prior / usual
-        A = np.vstack([np.column_stack(slopes), np.diag(weights)])
-        b = np.concatenate([-error, weights * (1.0 - factors)])
-        found: Array = np.linalg.lstsq(A, b, rcond=None)[0]
-        return found
+        b = np.concatenate([-error, weights * (1.0 - factors), np.zeros(len(factors))])
+        for damping in settings.damping:
+            A = np.vstack([np.column_stack(slopes), np.diag(weights), np.diag(damping / usual)])
+            yield np.linalg.lstsq(A, b, rcond=None)[0]
 
     def error(self, factors: Array) -> Array:
         """Simulated minus the plant's, in the units of each column (columns x times)."""

@@ -50,11 +50,12 @@ class Executed:
         return bool(self.result["good"])
 
     @property
-    def rank(self) -> tuple[bool, bool, float]:
-        """Better ones are greater: good, a plan at all, by cost."""
+    def rank(self) -> tuple[bool, bool, bool, float]:
+        """Better ones are greater: good, a plan at all, true on its own model, by cost."""
         found = self.plan
         cost = objective(found.model, found.task, found.requirements, found.trajectory)
-        return self.good, found.status.plan, -cost
+        replays = self.judged is not None and self.judged.replays
+        return self.good, found.status.plan, replays, -cost
 
 
 def executed(
