@@ -105,6 +105,7 @@ class Continuation:
             reduction = reduction_of(self.model, self.task, self.requirements, start)
             found: Refined | None = None
             for meshed in self._meshes(start, reduction):
+                self.solution = None  # it was on other nodes
                 found = self._at_once(*meshed, reduction) or self._walk(*meshed, reduction)
                 if found.done:
                     return found
