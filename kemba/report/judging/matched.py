@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from kemba.config import Document
 from kemba.errors import KembaError
@@ -24,10 +25,10 @@ from kemba.settings import Settings, setting
 
 
 class RefitRounds(Settings):
-    """How often a plan is made again with fitted air."""
+    """How often a plan is made again: with fitted air, on ticks, or from a guess."""
 
     rounds: int = setting(
-        4, "1", "fits at most; most jumps that missed were good after one or two", "tuned: by hand"
+        6, "1", "plans at most; most jumps that missed were good after one or two", "tuned: by hand"
     )
 
 
@@ -44,27 +45,41 @@ def matched(
 
     Where only the table misses on the plan's own model, valve edges are put on its ticks. Where
     the plant misses, the air is fitted; not where the task says `fit_air: false`, or its model has
-    no first-order chambers. Nothing where the plan fails by itself.
+    no first-order chambers. A plan with fitted air that does not come true on its own model is made
+    anew from a guess, once. Nothing where the first plan fails by itself.
     """
-    now, fit, ticks = first, None, False
+    how: dict[str, Any] = {
+        "log": log,
+        "tell": listener.tell,
+        "watch": listener.watch,
+        "stop": listener.stop,
+    }
+    now, fit, ticks, anew = first, None, False, False
     tried: list[TriedAir] = []
     for _ in range(RefitRounds.current().rounds):
-        if now.good or not _replays(now):
+        own = _replays(now)
+        if now.good or (not own and (fit is None or anew)):
             return
-        if not ticks and now.judged is not None and not now.judged.replays:
+        if not own:
+            anew = True  # with the same air, from a guess
+        elif not ticks and now.judged is not None and not now.judged.replays:
             ticks = True
-            listener.tell("valve edges on the ticks of the controller")
+            tell("valve edges on the ticks of the controller")
         else:
             tried.append(TriedAir(fit, _late(now)))
             new_fit = between(tried) or _fitted(now, task, fit)
             if new_fit is None or (fit is not None and new_fit.factors == fit.factors):
                 return
             fit = new_fit
-            listener.tell("the air of the plan's model, fitted to the simulated robot")
-        new = _planned(now.plan, fit, ticks, task, document, listener, log)
-        if new is None:
+            tell("the air of the plan's model, fitted to the simulated robot")
+        asked = _with_air(task, fit)
+        new = _continued(now.plan, asked, document, ticks, fit is None, how) if own else None
+        if new is None and fit is not None:
+            new = plan(asked, document, **how)
+        if new is None or not new.status.plan:
             return
-        now = executed(new, None, None, True, listener.tell, begun, place)
+        new = _summed(now.plan, new)
+        now = executed(new, None, None, True, tell, begun, place)
         if fit is not None:
             now.result["fitted_air"] = fit.summary()
             now.result["sentence"] += f"; {fit.sentence}"
@@ -123,29 +138,25 @@ def _origin_of(old: Plan) -> str:
     return f"the shipped plan {name}" if kind == "shipped" else "the plan before"
 
 
-def _planned(
-    old: Plan,
-    fit: FittedAir | None,
-    ticks: bool,
-    task: Task,
-    document: Document,
-    listener: Listener,
-    log: Path | None,
-) -> Plan | None:
-    """The plan continued with fitted air, if any, its valve edges on ticks if `ticks`; where that
-    fails, a plan made anew with that air. None where both fail."""
+def _with_air(task: Task, fit: FittedAir | None) -> Task:
+    """The task with fitted air among its effects."""
     changes = {name: dict(values) for name, values in task.effects.items()}
     for name, values in (fit.changes(task_model(task)) if fit else {}).items():
         changes[name] = {**changes.get(name, {}), **values}
-    asked = task.model_copy(update={"effects": changes})
-    known, stages = (old.trajectory, old.model, old.requirements), old.stages
-    origin = Origin(*known, _origin_of(old), once=fit is None, ticks=ticks, stages=stages)
-    watch, stop = listener.watch, listener.stop
-    new, _ = plan_from(origin, asked, document, log, listener.tell, watch, stop)
-    if new is None and fit is not None:
-        new = plan(asked, document, log=log, tell=listener.tell, watch=watch, stop=stop)
-    if new is None or not new.status.plan:
-        return None
+    return task.model_copy(update={"effects": changes})
+
+
+def _continued(
+    old: Plan, asked: Task, document: Document, ticks: bool, once: bool, how: dict[str, Any]
+) -> Plan | None:
+    """A plan continued for a task, with valve edges on ticks if `ticks`; None where that fails."""
+    known = old.trajectory, old.model, old.requirements
+    origin = Origin(*known, _origin_of(old), once=once, ticks=ticks, stages=old.stages)
+    return plan_from(origin, asked, document, **how)[0]
+
+
+def _summed(old: Plan, new: Plan) -> Plan:
+    """The new plan with the solves and the times of both."""
     return replace(
         new,
         attempts=old.attempts + new.attempts,
