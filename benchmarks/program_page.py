@@ -2,7 +2,8 @@
 
     python benchmarks/program_page.py
 
-Reads benchmarks/program.json (kept by fuzz.py, faults.py, calibration.py and mutants.py) and
+Reads benchmarks/program.json (kept by fuzz.py, faults.py, calibration.py, redrawn_noise.py and
+mutants.py) and
 benchmarks/program_points.yaml (24 defects that were found once, and the tests that watch them).
 """
 
