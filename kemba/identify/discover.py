@@ -14,6 +14,7 @@ from kemba.identify.doubt.run_consistency import drifting
 from kemba.identify.doubt.unexplained import Formula, look
 from kemba.identify.evidence.bootstrap import NullTest, bootstrap, smallest_detectable
 from kemba.identify.evidence.figures import Rebuilt, ahead, settled
+from kemba.identify.evidence.left_out_noise import left_out_noise
 from kemba.identify.evidence.linear import time_blocks
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.search_settings import SearchSettings
@@ -163,15 +164,12 @@ def _best_gain(search: Search) -> float:
 
 def null_test(search: Search) -> NullTest:
     """The bootstrap of the search, with the noise these data have."""
-    base = search.base
+    base, linear = search.base, search.base.point.linear
     blocks = time_blocks(search.problem, shortest=DiscoverSettings.current().fine)
-    left = base.residual + base.jacobian @ (base.flexible_fit() - base.point.linear.at)
-    pieces = base.jacobian * left[:, None]
-    order = np.argsort(blocks, kind="stable")
-    edges = np.flatnonzero(np.diff(blocks[order], prepend=-1))
-    noise = np.add.reduceat(pieces[order], edges, axis=0)
+    left = base.residual + base.jacobian @ (base.flexible_fit() - linear.at)
+    noise = left_out_noise(base.jacobian, left, linear.width, blocks)
     singles = [(name,) for name in search.problem.candidates]
-    return bootstrap(base.ranker(base.point.linear), noise, singles)
+    return bootstrap(base.ranker(linear), noise, singles)
 
 
 def _believed(

@@ -84,8 +84,8 @@ def bootstrap(
 
     In each of them the nominal figures are off within their tolerance, every effect is there with
     the small share of its size that the spike allows, and the noise is another. `noise` (blocks,
-    k): J'e of short blocks of the error that a flexible model leaves. A block keeps the colour of
-    the noise; a random sign of each block makes new noise.
+    k): J'e of short blocks of the error of a flexible model. A block keeps the colour of the
+    noise; a random sign of each block makes new noise.
     """
     draws = BootstrapSettings.current().draws if draws is None else draws
     rng = np.random.default_rng(seed)

@@ -1,0 +1,46 @@
+"""The noise of each block of the logs, as a flexible model fitted to all other blocks leaves it."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import cholesky, solve_triangular
+
+from kemba.identify.problem.problem import Array, Labels
+from kemba.settings import BY_HAND, Settings, setting
+
+
+class LeftOutNoiseSettings(Settings):
+    """How much of the noise a fit may have taken for effects."""
+
+    most: float = setting(
+        4.0,
+        "1",
+        "largest factor by which what is left of a block is enlarged: of what acts in one block "
+        "only nobody can tell whether it is noise",
+        BY_HAND,
+        decides=True,
+    )
+
+
+def left_out_noise(jacobian: Array, left: Array, width: Array, blocks: Labels) -> Array:
+    """J'e (b, k) of each block, e being the error of a fit to the other blocks.
+
+    `jacobian` (n, k), `left` (n,): what the fit to all blocks leaves; `width` (k,): prior widths
+    of that fit; `blocks` (n,): labels of the rows. A fit of many effects takes slow noise for
+    effects: in its own blocks it leaves too little of just the noise that looks like an effect.
+    """
+    scaled = jacobian * width
+    order = np.argsort(blocks, kind="stable")
+    parts = np.split(order, np.flatnonzero(np.diff(blocks[order])) + 1)
+    root = cholesky(scaled.T @ scaled + np.eye(len(width)), lower=True)
+    pieces = [root @ _enlarged(scaled[rows], left[rows], root) for rows in parts]
+    return np.asarray(np.stack(pieces) / width)
+
+
+def _enlarged(own: Array, left: Array, root: Array) -> Array:
+    """(I - H)^-1 J'e (k,) of one block, by the directions of its share H in what is known."""
+    seen = solve_triangular(root, own.T, lower=True)
+    share, directions = np.linalg.eigh(seen @ seen.T)
+    most = LeftOutNoiseSettings.current().most
+    factor = 1.0 / np.clip(1.0 - share, 1.0 / most, 1.0)
+    return np.asarray(directions @ (factor * (directions.T @ (seen @ left))))
