@@ -10,6 +10,7 @@ import numpy as np
 
 from kemba.identify.answer import ENDED, Answer, Ranked, phrase
 from kemba.identify.doubt.cross_validation import left_out
+from kemba.identify.doubt.parsimony import Belief, simplest
 from kemba.identify.doubt.run_consistency import drifting
 from kemba.identify.doubt.unexplained import Formula, look
 from kemba.identify.evidence.bootstrap import NullTest, bootstrap, smallest_detectable
@@ -114,7 +115,8 @@ def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> 
     ended = search.ended
     search.say("asking how often logs in which nothing is missing look like these")
     test, likeliest = null_test(search), best
-    best, p_value, dismissed = _believed(search, likeliest, test)
+    belief = _believed(search, likeliest, test)
+    best, p_value, dismissed = belief.best, belief.p_value, belief.dismissed
     search.say("asking whether the answer is complete")
     holdout = holdout.heard_as(search.problem) if holdout else None
     if test.too_short:
@@ -125,10 +127,11 @@ def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> 
     drift = drifting(search, best)
     if drift is not None and formula is not None and drift.nats > formula.gain:
         formula = None
-    doubts = Doubts() if formula else doubts_about(search, best, drift, holdout, ended)
+    doubts = Doubts() if formula else doubts_about(search, belief, drift, holdout, ended)
     search.say("ranking the effects")
-    ranking = ranked(search, best, dismissed, holdout)
+    ranking = ranked(search, best, dismissed, holdout, belief.rivals)
     answer = _answer(search, best, p_value, test, ranking, formula, holdout, doubts)
+    answer.remarks = [*answer.remarks, *belief.remarks]
     if ended and ENDED not in answer.remarks:
         answer.remarks = [*answer.remarks, ENDED]
     return Discovery(answer, search, best, holdout)
@@ -174,31 +177,32 @@ def null_test(search: Search) -> NullTest:
     return bootstrap(base.ranker(base.point.linear), noise, singles)
 
 
-def _believed(
-    search: Search, best: Hypothesis, test: NullTest
-) -> tuple[Hypothesis, float, set[Hypothesis]]:
-    """The best hypothesis without what is not significant, too small or refuted by left-out data;
-    the p-value of nothing; and the hypotheses that were dismissed."""
+def _believed(search: Search, best: Hypothesis, test: NullTest) -> Belief:
+    """The best hypothesis without what is not significant, too small, refuted by left-out data or
+    of no use there."""
     p_value = test.p_value(_best_gain(search))
-    dismissed: set[Hypothesis] = set()
     if not best or p_value > DiscoverSettings.current().significant:
-        return NULL, p_value, dismissed
-    while best:
+        return Belief(NULL, p_value)
+    belief = Belief(best, p_value)
+    while belief.best:
+        best = belief.best
         grave = material(search, best)
         if grave != best:
-            dismissed.add(best)
-            best = grave
-            if best:
-                search.visit(best)
+            belief = belief.without(best, grave)
+            if grave:
+                search.visit(grave)
             continue
         smaller = [h for h in search.points if len(h) == len(best) - 1 and set(h) < set(best)]
         against = max(smaller, key=lambda h: search.points[h].log_evidence, default=NULL)
         gain = left_out(search, best, against)
-        if not gain.refuted and (len(best) == 1 or gain.pays):
-            return best, p_value, dismissed
-        dismissed.add(best)
-        best = against
-    return NULL, p_value, dismissed
+        if gain.refuted or (len(best) > 1 and not gain.pays):
+            belief = belief.without(best, against)
+            continue
+        simpler = simplest(search, belief)
+        if simpler.best == best:
+            return simpler
+        belief = simpler
+    return belief
 
 
 def material(search: Search, hypothesis: Hypothesis) -> Hypothesis:

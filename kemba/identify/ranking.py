@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from itertools import pairwise
 
 import numpy as np
@@ -32,9 +32,14 @@ def error(search: Search, hypothesis: Hypothesis, holdout: Problem | None) -> fl
 
 
 def ranked(
-    search: Search, best: Hypothesis, dismissed: set[Hypothesis], holdout: Problem | None
+    search: Search,
+    best: Hypothesis,
+    dismissed: Collection[Hypothesis],
+    holdout: Problem | None,
+    rivals: Collection[Hypothesis] = (),
 ) -> list[Ranked]:
-    """The effects in order of probability; those of the best answer first."""
+    """The effects in order of probability; those of the best answer first. `rivals`: hypotheses
+    that predict left-out data as well as the best one."""
     problem = search.problem
     probability = search.probabilities(dismissed) if best else _doubted(search.probabilities())
     shares = share_of(probability, problem.candidates)
@@ -50,7 +55,7 @@ def ranked(
                 effect,
                 shares[effect],
                 values(search, hypothesis, effect),
-                equivalents(search, hypothesis, effect) if effect in best else (),
+                equivalents(search, hypothesis, effect, rivals) if effect in best else (),
                 before,
                 error(search, hypothesis, holdout),
                 left_out(search, hypothesis).nats,
@@ -84,8 +89,11 @@ def strength(search: Search, effect: str, best: Hypothesis) -> float:
     return points[best].log_evidence - points[rest].log_evidence if rest in points else 0.0
 
 
-def equivalents(search: Search, hypothesis: Hypothesis, effect: str) -> tuple[str, ...]:
-    """Effects that could stand in this one's place and explain the data as well."""
+def equivalents(
+    search: Search, hypothesis: Hypothesis, effect: str, rivals: Collection[Hypothesis] = ()
+) -> tuple[str, ...]:
+    """Effects that could stand in this one's place and explain the data as well, or that do so in
+    one of the `rivals`."""
     own, same = search.points[hypothesis].log_evidence, RankingSettings.current().same
     rest = set(hypothesis) - {effect}
     found = []
@@ -93,7 +101,8 @@ def equivalents(search: Search, hypothesis: Hypothesis, effect: str) -> tuple[st
         swapped = set(other) - rest
         if len(other) == len(hypothesis) and rest < set(other) | {""} and len(swapped) == 1:
             (name,) = swapped
-            if name != effect and rest <= set(other) and own - point.log_evidence < same:
+            as_good = other in rivals or own - point.log_evidence < same
+            if name != effect and rest <= set(other) and as_good:
                 found.append(name)
     return tuple(sorted(found))
 

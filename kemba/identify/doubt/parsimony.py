@@ -1,0 +1,101 @@
+"""What is believed of a search: the fewest effects that predict left-out data as well as any more.
+
+Evidence counts every row as new. The motion is read from the same noisy rows that judge it, so that
+a row's noise is in the prediction as well; from thousands of rows a wrong effect may gain many nats
+by this. Such a gain does not add up over successive rows. What physics is missing errs for longer
+than a row and shows in the error that is summed over aggregation windows. So that error, of blocks
+that the fit has not seen, decides how many effects are named, by the one-standard-error rule
+(Breiman, Friedman, Olshen and Stone 1984; Hastie, Tibshirani and Friedman 2009, 7.10): of answers
+within one standard error of the best one, the smallest counts. The standard error is that of the
+paired difference, block by block.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from kemba.identify.doubt.cross_validation import gained, left_out_powers
+from kemba.identify.evidence.search import Search
+from kemba.identify.evidence.spike_slab import NULL, Hypothesis
+from kemba.identify.problem.problem import Array
+
+Powers = Mapping[Hypothesis, Array]  # left-out sum of squares (b,) of every block
+
+
+@dataclass(frozen=True)
+class Belief:
+    """The hypothesis that is believed, and the p-value of nothing.
+
+    `dismissed`: hypotheses that are too small, refuted, or no better than a smaller one. `rivals`:
+    others, with as many effects, that predict left-out data as well. `remarks`: what was left out.
+    """
+
+    best: Hypothesis = NULL
+    p_value: float = 1.0
+    dismissed: frozenset[Hypothesis] = frozenset()
+    rivals: tuple[Hypothesis, ...] = ()
+    remarks: tuple[str, ...] = ()
+
+    def without(self, hypothesis: Hypothesis, best: Hypothesis) -> Belief:
+        """The same with `hypothesis` dismissed for `best`."""
+        return replace(self, best=best, dismissed=self.dismissed | {hypothesis})
+
+
+def simplest(search: Search, belief: Belief) -> Belief:
+    """The belief with the fewest effects that left-out data need.
+
+    Effects are taken out one by one, each time the one without which the error is smallest, for as
+    long as the error stays within one standard error of the smallest. A last effect stays: whether
+    there is any is asked by the bootstrap.
+    """
+    best, rest = belief.best, belief.best
+    path = {best}
+    while len(rest) > 1:
+        smaller = [tuple(e for e in rest if e != member) for member in rest]
+        for number, hypothesis in enumerate(smaller, start=1):
+            search.visit(hypothesis, number, len(smaller))
+        search.refresh()
+        path |= set(smaller)
+        powers = {h: left_out_powers(search, h) for h in path}
+        least = min(powers, key=lambda h: powers[h].sum())
+        rest = min(smaller, key=lambda h: powers[h].sum())
+        if not as_good(powers[rest], powers[least]):
+            break
+    if len(path) == 1:
+        return belief
+    equal = [h for h in path if as_good(powers[h], powers[least])]
+    few = [h for h in equal if len(h) == min(map(len, equal))]
+    chosen = max(few, key=lambda h: search.points[h].log_evidence)
+    if chosen == best:
+        return belief
+    rivals = tuple(sorted(h for h in few if h != chosen))
+    remark = _remark(search, best, chosen)
+    return replace(
+        belief,
+        best=chosen,
+        dismissed=belief.dismissed | larger(search, chosen),
+        rivals=rivals,
+        remarks=(*belief.remarks, remark),
+    )
+
+
+def as_good(powers: Array, least: Array) -> bool:
+    """Whether left-out sums of squares (b,) are within one standard error of the `least` ones."""
+    return not gained(0.5 * (powers - least)).pays
+
+
+def larger(search: Search, chosen: Hypothesis) -> frozenset[Hypothesis]:
+    """Refitted hypotheses with more effects that predict left-out data no better."""
+    own = left_out_powers(search, chosen)
+    more = (h for h in search.points if len(h) > len(chosen))
+    return frozenset(h for h in more if as_good(own, left_out_powers(search, h)))
+
+
+def _remark(search: Search, best: Hypothesis, chosen: Hypothesis) -> str:
+    dropped = [e for e in best if e not in chosen]
+    nats = search.points[best].log_evidence - search.points[chosen].log_evidence
+    return (
+        f"{' and '.join(dropped)} would fit these readings better (by {nats:.0f} nats), but do not "
+        "predict left-out data any better, and are left out; logs of other motions would tell"
+    )
