@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from itertools import pairwise
 
 import numpy as np
 
 from kemba.identify.answer import Ranked, Value
 from kemba.identify.doubt.cross_validation import left_out, left_out_error
+from kemba.identify.doubt.parsimony import Belief
 from kemba.identify.evidence.linear import is_shape
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import (
@@ -31,17 +32,12 @@ def error(search: Search, hypothesis: Hypothesis, holdout: Problem | None) -> fl
     return error_ratio(holdout, search.points[hypothesis].fit.theta, unknown)
 
 
-def ranked(
-    search: Search,
-    best: Hypothesis,
-    dismissed: Collection[Hypothesis],
-    holdout: Problem | None,
-    rivals: Collection[Hypothesis] = (),
-) -> list[Ranked]:
-    """The effects in order of probability; those of the best answer first. `rivals`: hypotheses
-    that predict left-out data as well as the best one."""
-    problem = search.problem
-    probability = search.probabilities(dismissed) if best else _doubted(search.probabilities())
+def ranked(search: Search, belief: Belief, holdout: Problem | None) -> list[Ranked]:
+    """The effects in order of probability; those of the answer that is believed first."""
+    problem, best = search.problem, belief.best
+    probability = (
+        search.probabilities(belief.dismissed) if best else _doubted(search.probabilities())
+    )
     shares = share_of(probability, problem.candidates)
     order = sorted(shares, key=lambda e: (e not in best, -strength(search, e, best), -shares[e]))
     found = []
@@ -55,7 +51,7 @@ def ranked(
                 effect,
                 shares[effect],
                 values(search, hypothesis, effect),
-                equivalents(search, hypothesis, effect, rivals) if effect in best else (),
+                equivalents(search, belief, effect) if effect in best else (),
                 before,
                 error(search, hypothesis, holdout),
                 left_out(search, hypothesis).nats,
@@ -89,21 +85,17 @@ def strength(search: Search, effect: str, best: Hypothesis) -> float:
     return points[best].log_evidence - points[rest].log_evidence if rest in points else 0.0
 
 
-def equivalents(
-    search: Search, hypothesis: Hypothesis, effect: str, rivals: Collection[Hypothesis] = ()
-) -> tuple[str, ...]:
-    """Effects that could stand in this one's place and explain the data as well, or that do so in
-    one of the `rivals`."""
+def equivalents(search: Search, belief: Belief, effect: str) -> tuple[str, ...]:
+    """Effects that could stand in this one's place in the answer: they explain the data, or predict
+    left-out data, as well."""
+    hypothesis = belief.best
     own, same = search.points[hypothesis].log_evidence, RankingSettings.current().same
-    rest = set(hypothesis) - {effect}
-    found = []
-    for other, point in search.points.items():
+    near = {h for h, p in search.points.items() if own - p.log_evidence < same}
+    rest, found = set(hypothesis) - {effect}, []
+    for other in (near - belief.dismissed) | set(belief.rivals):
         swapped = set(other) - rest
-        if len(other) == len(hypothesis) and rest < set(other) | {""} and len(swapped) == 1:
-            (name,) = swapped
-            as_good = other in rivals or own - point.log_evidence < same
-            if name != effect and rest <= set(other) and as_good:
-                found.append(name)
+        if len(other) == len(hypothesis) and rest <= set(other) and swapped != {effect}:
+            found += swapped
     return tuple(sorted(found))
 
 

@@ -65,4 +65,4 @@ def test_rivals_that_left_out_data_cannot_tell_are_named() -> None:
     assert nats > 10.0
     doubts = doubts_about(search, found, None, None)
     assert verdict_on(found.best, None, doubts) == "partly"
-    assert equivalents(search, found.best, "drag", found.rivals) == ("twin",)
+    assert equivalents(search, found, "drag") == ("twin",)

@@ -67,15 +67,28 @@ def simplest(search: Search, belief: Belief) -> Belief:
     equal = [h for h in path if as_good(powers[h], powers[least])]
     few = [h for h in equal if len(h) == min(map(len, equal))]
     chosen = max(few, key=lambda h: search.points[h].log_evidence)
-    if chosen == best:
-        return belief
-    rivals = tuple(sorted(h for h in few if h != chosen))
-    remark = _remark(search, best, chosen)
+    return belief if chosen == best else _instead(search, belief, chosen, powers[least])
+
+
+def _instead(search: Search, belief: Belief, chosen: Hypothesis, least: Array) -> Belief:
+    """The belief in a smaller hypothesis. Others with as many effects that predict as well are its
+    rivals, whatever their evidence is, which was not believed of the larger one either; those that
+    predict worse are dismissed, and so are larger ones that predict no better."""
+    own, rivals, dismissed = left_out_powers(search, chosen), [], set(belief.dismissed)
+    for other in search.points:
+        if len(other) < len(chosen) or other == chosen:
+            continue
+        powers = left_out_powers(search, other)
+        if len(other) == len(chosen) and as_good(powers, least):
+            rivals.append(other)
+        elif as_good(own, powers):
+            dismissed.add(other)
+    remark = _remark(search, belief.best, chosen)
     return replace(
         belief,
         best=chosen,
-        dismissed=belief.dismissed | larger(search, chosen),
-        rivals=rivals,
+        dismissed=frozenset(dismissed),
+        rivals=tuple(sorted(rivals)),
         remarks=(*belief.remarks, remark),
     )
 
@@ -83,13 +96,6 @@ def simplest(search: Search, belief: Belief) -> Belief:
 def as_good(powers: Array, least: Array) -> bool:
     """Whether left-out sums of squares (b,) are within one standard error of the `least` ones."""
     return not gained(0.5 * (powers - least)).pays
-
-
-def larger(search: Search, chosen: Hypothesis) -> frozenset[Hypothesis]:
-    """Refitted hypotheses with more effects that predict left-out data no better."""
-    own = left_out_powers(search, chosen)
-    more = (h for h in search.points if len(h) > len(chosen))
-    return frozenset(h for h in more if as_good(own, left_out_powers(search, h)))
 
 
 def _remark(search: Search, best: Hypothesis, chosen: Hypothesis) -> str:
