@@ -39,7 +39,7 @@ class Belief:
 
     def without(self, hypothesis: Hypothesis, best: Hypothesis) -> Belief:
         """The same with `hypothesis` dismissed for `best`."""
-        return replace(self, best=best, dismissed=self.dismissed | {hypothesis})
+        return replace(self, best=best, dismissed=self.dismissed | {hypothesis}, rivals=())
 
 
 def simplest(search: Search, belief: Belief) -> Belief:
@@ -74,7 +74,7 @@ def _instead(search: Search, belief: Belief, chosen: Hypothesis, least: Array) -
     """The belief in a smaller hypothesis. Others with as many effects that predict as well are its
     rivals, whatever their evidence is, which was not believed of the larger one either; those that
     predict worse are dismissed, and so are larger ones that predict no better."""
-    own, rivals, dismissed = left_out_powers(search, chosen), [], set(belief.dismissed)
+    own, rivals, dismissed = left_out_powers(search, chosen), [], {belief.best, *belief.dismissed}
     for other in search.points:
         if len(other) < len(chosen) or other == chosen:
             continue
