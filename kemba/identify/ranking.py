@@ -91,11 +91,12 @@ def equivalents(search: Search, belief: Belief, effect: str) -> tuple[str, ...]:
     hypothesis = belief.best
     own, same = search.points[hypothesis].log_evidence, RankingSettings.current().same
     near = {h for h, p in search.points.items() if own - p.log_evidence < same}
-    rest, found = set(hypothesis) - {effect}, []
+    rest = set(hypothesis) - {effect}
+    found: set[str] = set()
     for other in (near - belief.dismissed) | set(belief.rivals):
         swapped = set(other) - rest
         if len(other) == len(hypothesis) and rest <= set(other) and swapped != {effect}:
-            found += swapped
+            found |= swapped
     return tuple(sorted(found))
 
 

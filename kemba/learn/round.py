@@ -116,7 +116,7 @@ class Round:
             "executed_apex_error_m": self.executed_apex_error,
             "unexplained_apex_m": self.correction.apex,
             "simulated_touchdown_s": finite(self.simulated.touchdown),
-            "executed_touchdown_s": finite(np.mean([f.touchdown for f in self.executed])),
+            "executed_touchdown_s": finite(float(np.mean([f.touchdown for f in self.executed]))),
             "contradicted": list(self.contradicted),
             "refused": list(self.refused),
             "good": self.good,
