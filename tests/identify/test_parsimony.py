@@ -55,8 +55,8 @@ def test_rivals_that_left_out_data_cannot_tell_are_named() -> None:
     """Evidence is far ahead for one of two, by what does not last: the answer is not sure of it."""
     problem = windowed({"drag.a": 9.0}, seed=1)
     flicker = np.tile([1.0, -1.0, -1.0, 1.0], len(problem.measured) // 4)
-    problem._shapes["twin"] = problem._shapes["twin"] + 0.05 * flicker
-    problem.measured = problem.measured - 0.4 * flicker
+    problem._shapes["twin"] = problem._shapes["twin"] + 0.02 * flicker
+    problem.measured = problem.measured - 0.3 * flicker
     search = searched(problem, "drag", "twin")
     best = ("drag", "twin")
     found = simplest(search, Belief(best, 0.01))

@@ -19,6 +19,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from kemba.identify.doubt.cross_validation import gained, left_out, left_out_powers
+from kemba.identify.evidence.bootstrap import BootstrapSettings
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
 from kemba.identify.problem.problem import Array
@@ -105,8 +106,10 @@ def _instead(search: Search, belief: Belief, chosen: Hypothesis) -> Belief:
 
 
 def as_good(powers: Array, least: Array) -> bool:
-    """Whether left-out sums of squares (b,) are within one standard error of the `least` ones."""
-    return not gained(0.5 * (powers - least)).pays
+    """Whether left-out sums of squares (b,) are within one standard error of the `least` ones, or
+    less than any evidence is between them."""
+    gain = gained(0.5 * (powers - least))
+    return not gain.pays or gain.nats < BootstrapSettings.current().least
 
 
 def _remark(search: Search, best: Hypothesis, chosen: Hypothesis) -> str:
