@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 from kemba.identify.doubt.cross_validation import gained, left_out, left_out_powers
 from kemba.identify.evidence.bootstrap import BootstrapSettings
 from kemba.identify.evidence.search import Search
-from kemba.identify.evidence.spike_slab import NULL, Hypothesis
+from kemba.identify.evidence.spike_slab import NULL, Hypothesis, log_prior
 from kemba.identify.problem.problem import Array
 
 Powers = Mapping[Hypothesis, Array]  # left-out sum of squares (b,) of every block
@@ -72,7 +72,12 @@ def simplest(search: Search, belief: Belief) -> Belief:
     fine = [h for h in equal if overclaimed(search, h, best, powers)] or [best]
     few = [h for h in fine if len(h) == min(map(len, fine))]
     chosen = max(few, key=lambda h: search.points[h].log_evidence)
-    return belief if chosen == best else _instead(search, belief, chosen)
+    if chosen == best:
+        return belief
+    # the evidence proposed this one as a part of the best only: alone it need not be the likeliest
+    count, parts = len(search.problem.candidates), [h for h in path if set(h) <= set(chosen)]
+    chosen = max(parts, key=lambda h: search.points[h].log_evidence + log_prior(h, count))
+    return _instead(search, belief, chosen)
 
 
 def overclaimed(search: Search, smaller: Hypothesis, larger: Hypothesis, powers: Powers) -> bool:
