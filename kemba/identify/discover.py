@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from kemba.identify.answer import ENDED, Answer, Ranked, phrase
 from kemba.identify.doubt.cross_validation import left_out
+from kemba.identify.doubt.parsimony import Belief, simplest
 from kemba.identify.doubt.run_consistency import drifting
 from kemba.identify.doubt.unexplained import Formula, look
 from kemba.identify.evidence.bootstrap import NullTest, bootstrap, smallest_detectable
@@ -24,7 +25,7 @@ from kemba.identify.problem.problem import Problem
 from kemba.identify.ranking import error, ladder, ranked, strength
 from kemba.identify.rest import rest_of
 from kemba.identify.settings import DiscoverSettings, VerdictSettings
-from kemba.identify.stages import joined, structure_row
+from kemba.identify.stages import is_mixture, joined, structure_row, unbuilt
 from kemba.identify.verdict import Doubts, doubts_about, is_sure, verdict_on
 
 Talk = Callable[[str], None]
@@ -67,8 +68,9 @@ def _discovered(search: Search, guess: Hypothesis, holdout: Problem | None) -> D
     """The answer from a first guess on.
 
     Another structure that leaves far less unexplained is built in at once: what else is missing
-    shows only then. Any other is built in where the search names it and its answer is not complete.
-    Of both answers the one with the smaller error on left-out data counts.
+    shows only then. Any other is built in where the search names it and its answer is not complete,
+    or a mixture of both structures, which no machine is. Of both answers the one with the smaller
+    error on left-out data counts; a complete one counts more than a mixture.
     """
     guessed = search.problem.structures & set(guess)
     least = 0.0 if guessed else SearchSettings.current().structural
@@ -78,12 +80,17 @@ def _discovered(search: Search, guess: Hypothesis, holdout: Problem | None) -> D
     if anew and (anew.answer.verdict == "missing" or search.ended):
         return anew
     first = judged(search, search.further(guess), holdout)
+    named = search.problem.structures & set(first.best)
+    mixed = any(is_mixture(first.answer, structure) for structure in named)
+    if mixed:
+        first = replace(first, answer=unbuilt(first.answer, *named))
     if anew is None:
-        named = search.problem.structures & set(first.best)
         if first.answer.verdict == "missing" or not named or search.ended:
             return first
         built = settled(search.problem.recolour(None).rebuilt({}))
         anew = _built_anew(search, Rebuilt(*built), holdout)
+    if mixed and anew.answer.verdict == "missing":
+        return anew
     # one noise for both, or the model that takes more of its error for noise would look better
     judge = (holdout or search.problem).heard_as(anew.search.problem)
     left = error_ratio(judge, search.points[first.best].fit.theta)
@@ -115,7 +122,8 @@ def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> 
     ended = search.ended
     search.say("asking how often logs in which nothing is missing look like these")
     test, likeliest = null_test(search), best
-    best, p_value, dismissed = _believed(search, likeliest, test)
+    belief = _believed(search, likeliest, test)
+    best, p_value = belief.best, belief.p_value
     search.say("asking whether the answer is complete")
     holdout = holdout.heard_as(search.problem) if holdout else None
     if test.too_short:
@@ -126,10 +134,11 @@ def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> 
     drift = drifting(search, best)
     if drift is not None and formula is not None and drift.nats > formula.gain:
         formula = None
-    doubts = Doubts() if formula else doubts_about(search, best, drift, holdout, ended)
+    doubts = Doubts() if formula else doubts_about(search, belief, drift, holdout, ended)
     search.say("ranking the effects")
-    ranking = ranked(search, best, dismissed, holdout)
+    ranking = ranked(search, belief, holdout)
     answer = _answer(search, best, p_value, test, ranking, formula, holdout, doubts)
+    answer.remarks = [*answer.remarks, *belief.remarks]
     if ended and ENDED not in answer.remarks:
         answer.remarks = [*answer.remarks, ENDED]
     return Discovery(answer, search, best, holdout)
@@ -144,7 +153,7 @@ def _undecided(search: Search, test: NullTest, holdout: Problem | None) -> Disco
         piece = DiscoverSettings.current().fine
         doubts = Doubts((f"they hold {test.blocks} pieces of {piece:g} s, and chance alone needs "
                          f"{test.needed} to be ruled out",))  # fmt: skip
-    ranking = ranked(search, NULL, set(), holdout)
+    ranking = ranked(search, Belief(), holdout)
     answer = _answer(search, NULL, test.p_value(gain), test, ranking, None, holdout, doubts)
     if doubts.reasons:
         answer.next = f"record at least {(test.needed + 1) * DiscoverSettings.current().fine:.1f} s"
@@ -172,31 +181,32 @@ def null_test(search: Search) -> NullTest:
     return bootstrap(base.ranker(linear), noise, singles)
 
 
-def _believed(
-    search: Search, best: Hypothesis, test: NullTest
-) -> tuple[Hypothesis, float, set[Hypothesis]]:
-    """The best hypothesis without what is not significant, too small or refuted by left-out data;
-    the p-value of nothing; and the hypotheses that were dismissed."""
+def _believed(search: Search, best: Hypothesis, test: NullTest) -> Belief:
+    """The best hypothesis without what is not significant, too small, refuted by left-out data or
+    of no use there."""
     p_value = test.p_value(_best_gain(search))
-    dismissed: set[Hypothesis] = set()
     if not best or p_value > DiscoverSettings.current().significant:
-        return NULL, p_value, dismissed
-    while best:
+        return Belief(NULL, p_value)
+    belief = Belief(best, p_value)
+    while belief.best:
+        best = belief.best
         grave = material(search, best)
         if grave != best:
-            dismissed.add(best)
-            best = grave
-            if best:
-                search.visit(best)
+            belief = belief.without(best, grave)
+            if grave:
+                search.visit(grave)
             continue
         smaller = [h for h in search.points if len(h) == len(best) - 1 and set(h) < set(best)]
         against = max(smaller, key=lambda h: search.points[h].log_evidence, default=NULL)
         gain = left_out(search, best, against)
-        if not gain.refuted and (len(best) == 1 or gain.pays):
-            return best, p_value, dismissed
-        dismissed.add(best)
-        best = against
-    return NULL, p_value, dismissed
+        if gain.refuted or (len(best) > 1 and not gain.pays):
+            belief = belief.without(best, against)
+            continue
+        simpler = simplest(search, belief)
+        if simpler.best == best:
+            return simpler
+        belief = simpler
+    return belief
 
 
 def material(search: Search, hypothesis: Hypothesis) -> Hypothesis:

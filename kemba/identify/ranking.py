@@ -9,6 +9,7 @@ import numpy as np
 
 from kemba.identify.answer import Ranked, Value
 from kemba.identify.doubt.cross_validation import left_out, left_out_error
+from kemba.identify.doubt.parsimony import Belief
 from kemba.identify.evidence.linear import is_shape
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import (
@@ -31,12 +32,12 @@ def error(search: Search, hypothesis: Hypothesis, holdout: Problem | None) -> fl
     return error_ratio(holdout, search.points[hypothesis].fit.theta, unknown)
 
 
-def ranked(
-    search: Search, best: Hypothesis, dismissed: set[Hypothesis], holdout: Problem | None
-) -> list[Ranked]:
-    """The effects in order of probability; those of the best answer first."""
-    problem = search.problem
-    probability = search.probabilities(dismissed) if best else _doubted(search.probabilities())
+def ranked(search: Search, belief: Belief, holdout: Problem | None) -> list[Ranked]:
+    """The effects in order of probability; those of the answer that is believed first."""
+    problem, best = search.problem, belief.best
+    probability = (
+        search.probabilities(belief.dismissed) if best else _doubted(search.probabilities())
+    )
     shares = share_of(probability, problem.candidates)
     order = sorted(shares, key=lambda e: (e not in best, -strength(search, e, best), -shares[e]))
     found = []
@@ -50,7 +51,7 @@ def ranked(
                 effect,
                 shares[effect],
                 values(search, hypothesis, effect),
-                equivalents(search, hypothesis, effect) if effect in best else (),
+                equivalents(search, belief, effect) if effect in best else (),
                 before,
                 error(search, hypothesis, holdout),
                 left_out(search, hypothesis).nats,
@@ -84,17 +85,18 @@ def strength(search: Search, effect: str, best: Hypothesis) -> float:
     return points[best].log_evidence - points[rest].log_evidence if rest in points else 0.0
 
 
-def equivalents(search: Search, hypothesis: Hypothesis, effect: str) -> tuple[str, ...]:
-    """Effects that could stand in this one's place and explain the data as well."""
+def equivalents(search: Search, belief: Belief, effect: str) -> tuple[str, ...]:
+    """Effects that could stand in this one's place in the answer: they explain the data, or predict
+    left-out data, as well."""
+    hypothesis = belief.best
     own, same = search.points[hypothesis].log_evidence, RankingSettings.current().same
+    near = {h for h, p in search.points.items() if own - p.log_evidence < same}
     rest = set(hypothesis) - {effect}
-    found = []
-    for other, point in search.points.items():
+    found: set[str] = set()
+    for other in (near - belief.dismissed) | set(belief.rivals):
         swapped = set(other) - rest
-        if len(other) == len(hypothesis) and rest < set(other) | {""} and len(swapped) == 1:
-            (name,) = swapped
-            if name != effect and rest <= set(other) and own - point.log_evidence < same:
-                found.append(name)
+        if len(other) == len(hypothesis) and rest <= set(other) and swapped != {effect}:
+            found |= swapped
     return tuple(sorted(found))
 
 

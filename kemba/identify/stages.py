@@ -84,6 +84,29 @@ def joined(row: Ranked, p_value: float, answer: Answer, second: Search, best: Hy
     return found
 
 
+def is_mixture(answer: Answer, structure: str) -> bool:
+    """Whether an answer has the `structure` as a share of the rods' force only, beside the old one:
+    the model that is written would have it whole, and be another one."""
+    for row in answer.ranking:
+        if row.effect == structure and "a" in row.parameters:
+            share = row.parameters["a"]
+            return not share.low <= 1.0 <= share.high
+    return False
+
+
+def unbuilt(answer: Answer, structure: str) -> Answer:
+    """Such an answer: a part of one, from which no model can be written."""
+    if answer.verdict not in ("missing", "partly"):
+        return answer
+    remark = f"{structure} is there as a share only, beside the chambers of the model"
+    left = answer.rest or f"a model with {structure} instead was not built, or explains less"
+    found = replace(
+        answer, verdict="partly", added=(), rest=left, remarks=[remark, *answer.remarks]
+    )
+    found.sentence = phrase(found)
+    return found
+
+
 def _verdict(second: Verdict, before: float, after: float) -> Verdict:
     """What the verdict on the second model says of the first, from the errors before and after."""
     settings = VerdictSettings.current()

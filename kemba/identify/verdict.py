@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from kemba.identify.answer import ENDED, Ranked, Verdict, excess
+from kemba.identify.doubt.parsimony import Belief
 from kemba.identify.doubt.run_consistency import Drift
 from kemba.identify.doubt.unexplained import Formula, unfinished
 from kemba.identify.evidence.search import Search
@@ -25,14 +26,14 @@ class Doubts:
 
 def doubts_about(
     search: Search,
-    best: Hypothesis,
+    belief: Belief,
     drift: Drift | None,
     holdout: Problem | None,
     ended: bool = False,
 ) -> Doubts:
     """Why the best answer cannot be complete, and whether it is a part of one; `ended`: the time
     was over before the search was."""
-    settings, reasons = VerdictSettings.current(), []
+    settings, reasons, best = VerdictSettings.current(), [], belief.best
     if drift is not None:
         reasons.append(str(drift))
     elif unfinished(search, best):
@@ -48,6 +49,9 @@ def doubts_about(
         reasons.append(
             f"{' and '.join(best)} fits best, but leaves an error of {after:.3g} times the noise"
         )
+    if belief.rivals:
+        others = ", ".join(" + ".join(h) for h in belief.rivals)
+        reasons.append(f"{others} would predict left-out data as well as {' + '.join(best)}")
     part = bool(best) and excess(after) <= (1.0 - least) * excess(before)
     return Doubts(tuple(reasons), part)
 

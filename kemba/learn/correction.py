@@ -14,6 +14,11 @@ from kemba.learn.flight import FlownJump
 from kemba.settings import CHOSEN, Settings, setting
 
 QUANTITIES = ("apex", "touchdown", "pitch")
+SAID = {
+    "apex": ("rises to", "rise to", "m"),
+    "touchdown": ("lands at", "land at", "s"),
+    "pitch": ("touches down with a pitch of", "have", "rad"),
+}
 NOTE = "what executions did beyond the learnt model; it moves valve edges and is no physics"
 
 
@@ -66,6 +71,23 @@ def correction_from(executed: Sequence[FlownJump], simulated: FlownJump) -> Corr
             limited.append(name)
         found[name] = float(np.clip(counted, -bound, bound))
     return Correction(**found, logs=len(executed), limited=tuple(limited))
+
+
+def contradictions(executed: Sequence[FlownJump], simulated: FlownJump) -> tuple[str, ...]:
+    """What a simulation does otherwise than its executions, by more than is corrected, in words."""
+    settings, found = CorrectionSettings.current(), []
+    for name, (does, do, unit) in SAID.items():
+        values = np.array([getattr(f, name) for f in executed])
+        values = values[np.isfinite(values)]
+        ours, bound = float(getattr(simulated, name)), float(getattr(settings, name))
+        if not len(values) or (name == "pitch" and not np.isfinite(ours)):
+            continue  # no touchdown is said once
+        logs = f"where the logs {do} {values.mean():.3f} {unit}"
+        if not np.isfinite(ours):
+            found.append(f"does not land {logs}")
+        elif abs(ours - values.mean()) > bound:
+            found.append(f"{does} {ours:.3f} {unit} {logs}")
+    return tuple(found)
 
 
 def write_correction(

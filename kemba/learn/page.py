@@ -44,7 +44,7 @@ def verdict_of(found: Round, folder: Path) -> ReviewVerdict:
     if not found.good:
         aim = "do not send it to the robot; see why:"
         return ReviewVerdict("bad", found.sentence, aim, f"kemba-opt report {run}")
-    sure = found.answer.verdict in ("missing", "nothing") and not found.correction.limited
+    sure = found.answer.verdict in ("missing", "nothing") and not found.refused
     aim = "send controller.csv to the robot, or execute it on the simulated one:"
     command = f"kemba-opt simulate {run} --repeat 3 --noise"
     return ReviewVerdict("good" if sure else "fair", found.sentence, aim, command)
@@ -66,6 +66,13 @@ def _tables(found: Round) -> Iterable[str]:
         ("model after", f"{found.simulated.apex:.4f} m"),
     ]
     yield pairs("apex of the run that was executed", rows)
+    landed = sum(f.touchdown for f in found.executed) / len(found.executed)
+    yield pairs("touchdown of that run", [
+        ("planned", _seconds(found.planned.touchdown)),
+        ("executed, mean", _seconds(landed)),
+        ("model before", _seconds(found.before.touchdown)),
+        ("model after", _seconds(found.simulated.touchdown)),
+    ])  # fmt: skip
     if found.aimed is not None and found.target is not None:
         landing = 1e3 * (found.aimed.expected.touchdown - found.target.touchdown)
         yield pairs("the next run", [
@@ -73,6 +80,10 @@ def _tables(found: Round) -> Iterable[str]:
             ("expected apex", f"{found.aimed.expected.apex:.4f} m"),
             ("expected touchdown", f"{landing:+.1f} ms from the plan's"),
         ])  # fmt: skip
+
+
+def _seconds(value: float) -> str:
+    return f"{value:.3f} s" if value == value else "none"
 
 
 def _executions(found: Round) -> Any:

@@ -20,7 +20,12 @@ from kemba.identify.logs.reading import read_logs
 from kemba.identify.workflow import discover_logs
 from kemba.learn import words
 from kemba.learn.aim import Aim, Aimed
-from kemba.learn.correction import Correction, correction_from, write_correction
+from kemba.learn.correction import (
+    Correction,
+    contradictions,
+    correction_from,
+    write_correction,
+)
 from kemba.learn.flight import FlownJump, flight_of
 from kemba.learn.rounds import Past, entry, past_of
 from kemba.logs import load_map
@@ -73,6 +78,12 @@ class Round:
     result: dict[str, Any] = field(default_factory=dict)
     aimed: Aimed | None = None
     target: FlownJump | None = None
+    refused: tuple[str, ...] = ()  # why the learnt model is not `model`, which it else is
+
+    @property
+    def contradicted(self) -> tuple[str, ...]:
+        """What `model` does otherwise than the executions, by more than is corrected, in words."""
+        return contradictions(self.executed, self.simulated)
 
     @property
     def expected_apex_error(self) -> float | None:
@@ -88,8 +99,8 @@ class Round:
 
     @property
     def good(self) -> bool:
-        """Whether there is a new plan that its own executions confirm."""
-        return bool(self.result.get("confirmed"))
+        """Whether there is a new plan that its model's executions confirm, and logs that model."""
+        return bool(self.result.get("confirmed")) and not self.contradicted
 
     def json(self) -> dict[str, Any]:
         """The object that `--json` prints."""
@@ -104,6 +115,10 @@ class Round:
             "expected_apex_error_m": self.expected_apex_error,
             "executed_apex_error_m": self.executed_apex_error,
             "unexplained_apex_m": self.correction.apex,
+            "simulated_touchdown_s": finite(self.simulated.touchdown),
+            "executed_touchdown_s": finite(float(np.mean([f.touchdown for f in self.executed]))),
+            "contradicted": list(self.contradicted),
+            "refused": list(self.refused),
             "good": self.good,
             "sentence": self.sentence,
         }
@@ -119,13 +134,15 @@ class Round:
                 words.learnt(
                     self.answer.verdict, self.answer.added, self.compare_before, self.compare_after
                 ),
+                words.refused(self.refused, self.answer.added),
                 words.expected(self.expected_apex_error),
-                words.beyond(self.correction.limited),
             ]
         )
 
     @property
     def _why(self) -> str:
+        if self.contradicted and self.result.get("confirmed"):
+            return f"the executed plan's table, on its model, {' and '.join(self.contradicted)}"
         return str(self.result.get("sentence") or "there is none").removeprefix("FAILED: ")
 
 
@@ -166,25 +183,37 @@ def _learnt(
     model, after = old.model, before.noise_ratio
     if answer.verdict in LEARNT and answer.added:
         tell("comparing with what was learnt")
-        found = write_model(out / "model.yaml", old.model, answer.json()["ranking"], answer.added)
-        model = str(found.resolve())
+        file = write_model(out / "model.yaml", old.model, answer.json()["ranking"], answer.added)
+        model = str(file.resolve())
         here = as_executed(model, old, out / "model_learnt_of_the_run.yaml")
         after = compare_logs(kept, here, asked.column_map)[0].noise_ratio
     machine = load_machine(old.model)
     table, plan = run.controller, run.trajectory
-    learnt = task_model(old.model_copy(update={"model": model}))
-    return Round(
+    found = Round(
         past=past,
-        model=model,
+        model=old.model,
         answer=answer,
         discovery=discovery,
         compare_before=before.noise_ratio,
         compare_after=after,
         planned=flight_of(plan, machine),
         executed=[flight_of(log, machine) for log in past.executed[past.last]],
-        simulated=_simulated(learnt, plan, table, machine),
-        before=_simulated(task_model(old), plan, table, machine),
+        simulated=(unlearnt := _simulated(task_model(old), plan, table, machine)),
+        before=unlearnt,
     )
+    if model == old.model:
+        return found
+    learnt = task_model(old.model_copy(update={"model": model}))
+    return with_model(found, model, _simulated(learnt, plan, table, machine))
+
+
+def with_model(found: Round, model: str, simulated: FlownJump) -> Round:
+    """The round with the learnt `model`, unless executions contradict more of what that does in
+    simulation than of what the run's own model does."""
+    told = contradictions(found.executed, simulated)
+    if len(told) > len(found.contradicted):
+        return replace(found, refused=told)
+    return replace(found, model=model, simulated=simulated)
 
 
 def as_executed(model: str, task: Task, path: Path) -> str:
@@ -196,6 +225,11 @@ def as_executed(model: str, task: Task, path: Path) -> str:
     data = {"name": f"{spec.name}_of_the_run", "base": reference(model), "effects": extra}
     dump_yaml(data | ({"supply": task.supply} if task.supply else {}), path)
     return str(path)
+
+
+def finite(value: float) -> float | None:
+    """A number as JSON has it: null where there is none."""
+    return float(value) if np.isfinite(value) else None
 
 
 def _simulated(model: Model, plan: Trajectory, table: Trajectory, machine: Machine) -> FlownJump:

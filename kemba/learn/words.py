@@ -39,13 +39,14 @@ def expected(error: float | None) -> str:
     return f"the next run is expected to reach {1e3 * abs(error):.1f} mm {side} its planned apex"
 
 
-def beyond(limited: Sequence[str]) -> str:
-    """What executions do beyond the learnt model and its correction; empty for nothing."""
-    if not limited:
+def refused(contradicted: Sequence[str], added: Sequence[str]) -> str:
+    """Why the learnt model is not planned with; empty where it is."""
+    if not contradicted:
         return ""
+    them = "them" if len(added) > 1 else "it"
     return (
-        f"but in {' and '.join(limited)} the executions differ from the learnt model by more than "
-        "is corrected: do not trust the model there before it has seen more logs"
+        f"but the model with {them} {' and '.join(contradicted)}: the plan is made with the model "
+        "of the run, and its table is corrected"
     )
 
 

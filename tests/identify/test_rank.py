@@ -11,6 +11,7 @@ from toy_problem import Toy
 from kemba.identify.answer import ENDED, Answer, Ranked, phrase
 from kemba.identify.discover import discover, material
 from kemba.identify.doubt.cross_validation import Gain, left_out, left_out_error
+from kemba.identify.doubt.parsimony import Belief
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import SpikeSlabSettings, probabilities
 from kemba.identify.ranking import values
@@ -107,7 +108,7 @@ def test_an_answer_that_leaves_much_of_the_error_is_not_the_whole(
     problem = Toy({"kick.a": size}, seed=4)
     rng = np.random.default_rng(5)
     problem.measured += np.sqrt(noise**2 - 1.0) * rng.standard_normal(len(problem.measured))
-    found = doubts_about(searched(problem), ("kick",), None, None)
+    found = doubts_about(searched(problem), Belief(("kick",)), None, None)
     assert verdict_on(("kick",), None, found) == verdict
     if verdict != "missing":
         (doubt,) = found.reasons

@@ -19,7 +19,7 @@ from kemba.identify.discover import discover
 from kemba.identify.problem.candidates import by_default
 from kemba.identify.problem.structure import ORIFICE, structure_candidates
 from kemba.identify.robot.problem import robot_problem
-from kemba.identify.stages import joined
+from kemba.identify.stages import is_mixture, joined, unbuilt
 from kemba.model import Model, load_model
 from kemba.model.spec import load_spec
 from kemba.trajectory import Trajectory
@@ -133,3 +133,17 @@ def test_orifice_chambers_are_named_on_robot_logs() -> None:
     answer = discover(fitted, held).answer
     assert ORIFICE in answer.added, answer.sentence
     assert answer.error_after < 1.3 < 5.0 < answer.error_before
+
+
+@pytest.mark.parametrize(("low", "high", "mixed"), [(0.69, 0.87, True), (0.9, 1.1, False)])
+def test_a_share_of_another_structure_is_no_whole_answer(
+    low: float, high: float, mixed: bool
+) -> None:
+    """The model that is written has the structure whole: 0.78 of it land elsewhere."""
+    row = Ranked(ORIFICE, 1.0, {"a": Value((low + high) / 2, low, high, "1")}, (), 2.5, 0.9)
+    answer = Answer("missing", 0.002, "", [row], (ORIFICE,), 2.5, 0.9, found=(ORIFICE,))
+    assert is_mixture(answer, ORIFICE) == mixed
+    if mixed:
+        part = unbuilt(answer, ORIFICE)
+        assert (part.verdict, part.added, part.found) == ("partly", (), (ORIFICE,))
+        assert "Likely, but not sure: chambers:orifice" in part.sentence

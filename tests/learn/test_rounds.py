@@ -81,3 +81,18 @@ def test_three_rounds(planned: Path, tmp_path: Path) -> None:
     assert errors[-1] < 5e-3 and errors[-1] < errors[0], errors
     history = load_run(folder).manifest["learnt_before"]
     assert [e["round"] for e in history] == [1, 2]
+
+
+@pytest.mark.nightly
+def test_the_shipped_loop_lands_when_its_logs_land(tmp_path: Path) -> None:
+    """The loop of the README. Its learnt model once landed 70 ms after the logs: it had a mass and
+    a torque that contact noise feigned, and orifice chambers whole that were found as a share."""
+    folder, logs = tmp_path / "run-1", tmp_path / "logs"
+    run("solve", "jump.yaml", "--no-figure", "--out", folder)
+    run("simulate", folder, "--repeat", "3", "--noise", "--out", logs)
+    found = run("learn", folder, "--logs", logs, "--time-limit", "900", "--out", tmp_path / "run-2")
+    assert found["good"] and not found["refused"], found["sentence"]
+    assert found["simulated_touchdown_s"] == pytest.approx(found["executed_touchdown_s"], abs=0.015)
+    assert found["compare_after"] < 1.2 < found["compare_before"]
+    assert "chambers:orifice" in found["added"]
+    assert not {"mass_split", "torque_scale"} & set(found["added"])

@@ -64,6 +64,11 @@ def left_out(search: Search, hypothesis: Hypothesis, against: Hypothesis = NULL)
     ours = _predicted(search, search.points[hypothesis])
     theirs = _predicted(search, search.points[against])
     gains = ours - theirs
+    return gained(gains)
+
+
+def gained(gains: Array) -> Gain:
+    """Sum of gains (b,) [nats] of blocks, and its standard error."""
     count = len(gains)
     return Gain(float(gains.sum()), float(np.sqrt(count) * gains.std(ddof=1)) if count > 1 else 0.0)
 
@@ -123,5 +128,11 @@ def left_out_error(search: Search, hypothesis: Hypothesis) -> float:
     """RMS of whitened residuals summed over aggregation windows, as `error_ratio`, each block of
     time predicted from all others."""
     point = search.points[hypothesis]
-    power = float(_powers(search, point, point.windowed).sum())
+    power = float(left_out_powers(search, hypothesis).sum())
     return float(np.sqrt(max(power, 0.0) / point.windowed.count.sum()))
+
+
+def left_out_powers(search: Search, hypothesis: Hypothesis) -> Array:
+    """Sum of squares (b,) behind this error, of each block."""
+    point = search.points[hypothesis]
+    return _powers(search, point, point.windowed)

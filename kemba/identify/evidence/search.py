@@ -214,7 +214,7 @@ class Search:
             self.base.jacobian[:, self.base.point.linear.index(candidate.key)] = change / size
             self._stale = True
 
-    def _refresh(self) -> None:
+    def refresh(self) -> None:
         """Score everything again with the secants learnt."""
         if self._stale:
             self.base.rescore()
@@ -252,7 +252,7 @@ class Search:
 
     def best(self) -> Hypothesis:
         """The likeliest of all refitted hypotheses."""
-        self._refresh()
+        self.refresh()
         count = len(self.problem.candidates)
         return max(self.points, key=lambda h: self.points[h].log_evidence + log_prior(h, count))
 

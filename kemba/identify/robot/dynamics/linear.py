@@ -13,7 +13,7 @@ from kemba.identify.robot.dynamics.reference import Reference, integrator
 from kemba.identify.robot.dynamics.settings import ContactForceSettings, PlaceSettings
 from kemba.identify.robot.motion.batch import Batch
 from kemba.identify.robot.motion.colour import Noise, coloured
-from kemba.identify.robot.motion.contact import ContactSchedule, steady
+from kemba.identify.robot.motion.contact import ContactSchedule, steady, steady_while
 from kemba.identify.robot.motion.filter import FilterGains, System, smooth
 from kemba.identify.robot.motion.sensing import travelled
 
@@ -32,7 +32,7 @@ class LinearisedMotion:
     system: System  # with the noise of the sensors as it is coloured
     plain: System  # the same with white noise
     inverse: Array  # (n, L, k, k) of the mass matrix
-    contact: Array  # (n, L, k) generalised contact and stop force found in the data
+    contact: Array  # (n, L, k) generalised contact and stop force found in the data, steady
     normal: Array  # (n, L, legs) contact force, up, steady
     y: Array  # (n, L, m) measured coordinates along the reference
     rate: Array  # (n, L, m) their rates
@@ -113,13 +113,18 @@ def linearise_along(
     Jf_force = Jf.copy()
     Jf_force[..., 1::2, :] -= physics.grip * slip[..., None] * Jf[..., 0::2, :]
     channels = np.concatenate([Jy, Jf_force], axis=2).swapaxes(-1, -2)
-    contact, feet_force = contact_force(channels, density, force, k, legs)
+    rigid, acts = rigid_forces(channels, density, force, k, legs)
     dt = float(np.median(batch.h[batch.valid]))
-    normal = steady(feet_force[..., 1::2], dt)
+    normal = steady(rigid[..., legs + 1 :: 2], dt)
+    acting = channels[..., k - legs :]
+    raw = (acting @ np.where(acts, rigid, 0.0)[..., None])[..., 0]
+    shift = -(inverse @ (force - raw)[..., None])[..., 0]
     # Inertia is judged at the model's acceleration. The data's own is mostly noise, and noise in a
-    # regressor makes the mass look smaller.
-    shift = -(inverse @ (force - contact)[..., None])[..., 0]
-    mid = (mid[0], mid[1], mid[2] + batch.flat(shift))
+    # regressor makes the mass look smaller. The same noise is in the forces of contacts and stops,
+    # which are read from the data: from row to row they are smoothed.
+    contact = (acting @ steady_while(rigid, acts, dt)[..., None])[..., 0]
+    calm = mid[2] - batch.flat((inverse @ (force - contact)[..., None])[..., 0])
+    mid = (mid[0], mid[1], calm)
     A_q, A_v = (-inverse @ batch.deep(a) for a in physics.call("stiffness", *mid, s, u, p=p))
     pressed = slip * np.maximum(normal, 0.0)
     less_grip = (pressed[..., None] * Jf[..., 0::2, :]).sum(axis=2)
@@ -208,10 +213,10 @@ def scatter(pushed: Array, density: Array, h: Array) -> Array:
     return np.asarray((pushed * (density / h[..., None])[..., None, :]) @ pushed.swapaxes(-1, -2))
 
 
-def contact_force(
+def rigid_forces(
     channels: Array, density: Array, force: Array, k: int, legs: int
-) -> tuple[Array, Array]:
-    """Generalised force (n, L, k) of contacts and stops, and the feet's forces (n, L, 2 legs) [N].
+) -> tuple[Array, Flags]:
+    """Forces (n, L, 3 legs) [N] of the stops and then of the feet, and where these act.
 
     `force` (n, L, k) is what the motion needs beyond the model. It is split among the `channels`
     (n, L, k, c) with the smallest norm, each channel weighted by the `density` (n, L, c) of its
@@ -222,11 +227,8 @@ def contact_force(
     S = weighted @ channels.swapaxes(-1, -2)
     S = S + 1e-9 * np.eye(k)
     share = (weighted.swapaxes(-1, -2) @ np.linalg.solve(S, force[..., None]))[..., 0]
-    feet = share[..., k:]
-    stops = share[..., k - legs : k] * (density[..., k - legs : k] > stopped)
-    rigid = np.concatenate([stops, feet], axis=-1)
-    acting = channels[..., k - legs :]
-    return (acting @ rigid[..., None])[..., 0], feet
+    least = np.array([stopped] * legs + [0.0] * 2 * legs)
+    return share[..., k - legs :], density[..., k - legs :] > least
 
 
 def smoothed(motion: LinearisedMotion, gain: FilterGains, y: Array, g: Array) -> Reference:

@@ -168,6 +168,13 @@ def steady(values: Array, dt: float) -> Array:
     return np.asarray(gaussian_filter1d(values, ContactSettings.current().steady / dt, axis=0))
 
 
+def steady_while(values: Array, acts: Flags, dt: float) -> Array:
+    """Forces (n, ...), smoothed over the rows in which they act; zero in the others."""
+    weight = steady(acts.astype(float), dt)
+    mean = steady(np.where(acts, values, 0.0), dt) / np.maximum(weight, 1e-12)
+    return np.where(acts, mean, 0.0)
+
+
 def slope(values: Array, dt: float) -> Array:
     """Rate of a noisy signal (n, ...) over a few hundredths of a second."""
     width = ContactSettings.current().rate_window

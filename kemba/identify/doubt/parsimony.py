@@ -1,0 +1,126 @@
+"""What is believed of a search: the fewest effects that predict left-out data as well as any more.
+
+Evidence counts every row as new. The motion is read from the same noisy rows that judge it, so that
+a row's noise is in the prediction as well; from thousands of rows a wrong effect may gain many nats
+by this. Such a gain does not add up over successive rows. What physics is missing errs for longer
+than a row and shows in the error that is summed over aggregation windows. So evidence proposes an
+answer, and the windowed error of blocks that the fit has not seen may call for a smaller one, where
+
+- it is within one standard error of the least error: the rule of Breiman, Friedman, Olshen and
+  Stone (1984), with the standard error of the paired difference, block by block; and
+- evidence claims too much: the rows of left-out blocks gain more nats by the larger answer than
+  their windows do, by more than one standard error. The first rule alone took true damping out of
+  an answer on logs of the full plant: a few logs cannot tell a small gain from none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from kemba.identify.doubt.cross_validation import gained, left_out, left_out_powers
+from kemba.identify.evidence.bootstrap import BootstrapSettings
+from kemba.identify.evidence.search import Search
+from kemba.identify.evidence.spike_slab import NULL, Hypothesis, log_prior
+from kemba.identify.problem.problem import Array
+
+Powers = Mapping[Hypothesis, Array]  # left-out sum of squares (b,) of every block
+
+
+@dataclass(frozen=True)
+class Belief:
+    """The hypothesis that is believed, and the p-value of nothing.
+
+    `dismissed`: hypotheses that are too small, refuted, or no better than a smaller one. `rivals`:
+    others, with as many effects, that predict left-out data as well. `remarks`: what was left out.
+    """
+
+    best: Hypothesis = NULL
+    p_value: float = 1.0
+    dismissed: frozenset[Hypothesis] = frozenset()
+    rivals: tuple[Hypothesis, ...] = ()
+    remarks: tuple[str, ...] = ()
+
+    def without(self, hypothesis: Hypothesis, best: Hypothesis) -> Belief:
+        """The same with `hypothesis` dismissed for `best`."""
+        return replace(self, best=best, dismissed=self.dismissed | {hypothesis}, rivals=())
+
+
+def simplest(search: Search, belief: Belief) -> Belief:
+    """The belief with the fewest effects that left-out data need.
+
+    Effects are taken out one by one, each time the one without which the error is smallest, for as
+    long as the error stays within one standard error of the smallest. A last effect stays: whether
+    there is any is asked by the bootstrap.
+    """
+    best, rest = belief.best, belief.best
+    path = {best}
+    while len(rest) > 1:
+        smaller = [tuple(e for e in rest if e != member) for member in rest]
+        for number, hypothesis in enumerate(smaller, start=1):
+            search.visit(hypothesis, number, len(smaller))
+        search.refresh()
+        path |= set(smaller)
+        powers = {h: left_out_powers(search, h) for h in path}
+        least = min(powers, key=lambda h: powers[h].sum())
+        rest = min(smaller, key=lambda h: powers[h].sum())
+        if not as_good(powers[rest], powers[least]):
+            break
+    if len(path) == 1:
+        return belief
+    equal = [h for h in path if as_good(powers[h], powers[least])]
+    fine = [h for h in equal if overclaimed(search, h, best, powers)] or [best]
+    few = [h for h in fine if len(h) == min(map(len, fine))]
+    chosen = max(few, key=lambda h: search.points[h].log_evidence)
+    if chosen == best:
+        return belief
+    # the evidence proposed this one as a part of the best only: alone it need not be the likeliest
+    count, parts = len(search.problem.candidates), [h for h in path if set(h) <= set(chosen)]
+    chosen = max(parts, key=lambda h: search.points[h].log_evidence + log_prior(h, count))
+    return _instead(search, belief, chosen)
+
+
+def overclaimed(search: Search, smaller: Hypothesis, larger: Hypothesis, powers: Powers) -> bool:
+    """Whether rows of left-out blocks gain more by the larger hypothesis than their windows do."""
+    windows = gained(0.5 * (powers[smaller] - powers[larger]))
+    return windows.nats + windows.error < left_out(search, larger, smaller).nats
+
+
+def _instead(search: Search, belief: Belief, chosen: Hypothesis) -> Belief:
+    """The belief in a smaller hypothesis. Others with as many effects that predict as well, within
+    one standard error, are its rivals, whatever their evidence is, which was not believed of the
+    larger one either; those that predict worse are dismissed, and so are larger ones that predict
+    no better."""
+    own, rivals, dismissed = left_out_powers(search, chosen), [], {belief.best, *belief.dismissed}
+    for other in search.points:
+        if len(other) < len(chosen) or other == chosen:
+            continue
+        powers = left_out_powers(search, other)
+        if len(other) == len(chosen) and as_good(powers, own):
+            rivals.append(other)
+        elif as_good(own, powers):
+            dismissed.add(other)
+    remark = _remark(search, belief.best, chosen)
+    return replace(
+        belief,
+        best=chosen,
+        dismissed=frozenset(dismissed),
+        rivals=tuple(sorted(rivals)),
+        remarks=(*belief.remarks, remark),
+    )
+
+
+def as_good(powers: Array, least: Array) -> bool:
+    """Whether left-out sums of squares (b,) are within one standard error of the `least` ones, or
+    less than any evidence is between them."""
+    gain = gained(0.5 * (powers - least))
+    return not gain.pays or gain.nats < BootstrapSettings.current().least
+
+
+def _remark(search: Search, best: Hypothesis, chosen: Hypothesis) -> str:
+    dropped = [e for e in best if e not in chosen]
+    nats = search.points[best].log_evidence - search.points[chosen].log_evidence
+    return (
+        f"{' and '.join(dropped)} would fit these readings better (by {nats:.0f} nats), but do not "
+        "predict left-out data any better, and are left out; logs of other motions would tell"
+    )

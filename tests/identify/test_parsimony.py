@@ -1,0 +1,81 @@
+"""How many effects an answer names: those that left-out data need, and no more."""
+
+from __future__ import annotations
+
+import numpy as np
+from toy_problem import Toy
+
+from kemba.identify.discover import discover
+from kemba.identify.doubt.cross_validation import left_out, left_out_error
+from kemba.identify.doubt.parsimony import Belief, simplest
+from kemba.identify.evidence.search import Search
+from kemba.identify.ranking import equivalents
+from kemba.identify.verdict import doubts_about, verdict_on
+
+
+def windowed(truth: dict[str, float], seed: int = 0, artefact: float = 0.0) -> Toy:
+    """A toy judged over 20 rows. `artefact`: size of an error that changes sign from row to row, as
+    `wave` now does: nothing that lasts."""
+    problem = Toy(truth, seed)
+    problem.window = 20
+    problem._shapes["wave"] = np.where(np.arange(len(problem.measured)) % 2, 1.0, -1.0)
+    problem.measured = problem.measured + artefact * problem._shapes["wave"]
+    return problem
+
+
+def searched(problem: Toy, *best: str) -> Search:
+    search = Search(problem)
+    search.start()
+    for size in range(1, len(best) + 1):
+        search.visit(tuple(sorted(best[:size])))
+    return search
+
+
+def test_nats_that_do_not_last_name_no_effect() -> None:
+    """The rows are sure of the wave, in every block; what is left after 20 rows is not."""
+    problem = windowed({"kick.a": 9.0}, artefact=4.0)
+    search = searched(problem, "kick", "wave")
+    gain = left_out(search, ("kick", "wave"), ("kick",))
+    assert gain.pays and gain.nats > 1000.0
+    alone, both = (left_out_error(search, h) for h in (("kick",), ("kick", "wave")))
+    assert abs(alone - both) < 0.01
+    answer = discover(problem).answer
+    assert (answer.verdict, answer.added) == ("missing", ("kick",))
+    assert answer.ranking[0].probability > 0.95
+    assert any("wave would fit these readings better" in remark for remark in answer.remarks)
+
+
+def test_an_effect_that_left_out_data_need_stays_however_small() -> None:
+    search = searched(windowed({"kick.a": 9.0, "bend.a": 3.0}), "kick", "bend")
+    belief = Belief(("bend", "kick"), 0.01)
+    assert simplest(search, belief) == belief
+
+
+def test_rivals_that_left_out_data_cannot_tell_are_named() -> None:
+    """Evidence is far ahead for one of two, by what does not last: the answer is not sure of it."""
+    problem = windowed({"drag.a": 9.0}, seed=1)
+    flicker = np.tile([1.0, -1.0, -1.0, 1.0], len(problem.measured) // 4)
+    problem._shapes["twin"] = problem._shapes["twin"] + 0.02 * flicker
+    problem.measured = problem.measured - 0.3 * flicker
+    search = searched(problem, "drag", "twin")
+    best = ("drag", "twin")
+    found = simplest(search, Belief(best, 0.01))
+    assert found.best == ("drag",) and found.rivals == (("twin",),)
+    assert best in found.dismissed and found.remarks
+    nats = search.points["drag",].log_evidence - search.points["twin",].log_evidence
+    assert nats > 10.0
+    doubts = doubts_about(search, found, None, None)
+    assert verdict_on(found.best, None, doubts) == "partly"
+    assert equivalents(search, found, "drag") == ("twin",)
+
+
+def test_a_small_gain_that_lasts_stays_though_it_is_within_its_scatter() -> None:
+    """A bend in one run of three: windows gain what the rows do, and evidence stands."""
+    problem = windowed({"kick.a": 9.0})
+    one = problem.rows().run == 0
+    problem.measured = problem.measured + 3.0 * problem._shapes["bend"] * one
+    search = searched(problem, "kick", "bend")
+    gain = left_out(search, ("bend", "kick"), ("kick",))
+    assert gain.nats > 0.0
+    belief = Belief(("bend", "kick"), 0.01)
+    assert simplest(search, belief) == belief
