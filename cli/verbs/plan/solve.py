@@ -62,8 +62,11 @@ def solve(
 ) -> None:
     """Plan a motion; write trajectory, controller table, certificate and figure to a run folder.
 
-    Exit code 1 when no plan is found, or when its re-simulation or the simulated robot leaves it
-    by more than the task's tolerances.
+    Exit code 1 when no plan is found, or when its re-simulation or the
+    simulated robot leaves it by more than the task's tolerances.
+
+    `height` is that of the body's centre: at 0.45 m the feet rise 1 cm.
+    `--set "feet=8 cm"` asks for the height of the feet instead.
 
     Example: kemba-opt solve jump.yaml --set "height=0.48 m"
     """
