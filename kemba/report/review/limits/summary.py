@@ -65,8 +65,8 @@ def limit_parts(book: Book, model: Model, machine: Machine) -> list[str]:
         if motor:
             planes.append(torque_speed(leg, book.tracks, uses, motor))
     for title, name in (
-        ("hip torque, share of the motor's limit", "motor"),
-        ("foot force, share of the friction cone", "cone"),
+        ("hip: share of motor limit", "motor"),
+        ("foot: share of friction cone", "cone"),
     ):
         for leg, uses in used.items():
             lines = [
