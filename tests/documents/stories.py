@@ -162,5 +162,6 @@ STORIES: dict[str, Story] = {
         ends={"--time-limit": (0, 1)},
     ),
     "tasks.md": Story((mine,), instead={"--robust 60": "--robust 2"}),
-    "why-not.md": Story(ends={"--time-limit 1": (1,)}),
+    # how far one second comes depends on the machine, and so does what is continued from there
+    "why-not.md": Story(ends={"--time-limit 1": (1,), "--resume": PLANNED}),
 }
