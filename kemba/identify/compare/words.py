@@ -33,7 +33,6 @@ VALVES = {
     "01": "the retract valve is open",
     "11": "both valves are open",
 }
-USUAL = {"m": ("mm", 1e3), "rad": ("deg", degrees(1.0)), "Pa": ("bar", 1e-5)}
 PLACES = {
     "in": ", the piston retracted",
     "mid": ", the piston in mid-stroke",
@@ -71,7 +70,8 @@ def quantity(channel: str) -> str:
 def off_by(header: str, error: float) -> str:
     """An error [SI] of a column in words and in a usual unit: `body height 19 mm`."""
     name, _, unit = header.rstrip("]").partition(" [")
-    usual, factor = USUAL.get(unit, (unit, 1.0))
+    better = {"m": ("mm", 1e3), "rad": ("deg", degrees(1.0)), "Pa": ("bar", 1e-5)}
+    usual, factor = better.get(unit, (unit, 1.0))
     return f"{quantity(name)} {short(factor * error)} {usual}"
 
 
