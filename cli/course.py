@@ -47,9 +47,9 @@ DISCOVER: Course = {
     "finding the motion": 0.01,
     "fitting the model": 0.06,
     "refitting": 0.42,
-    "looking again": 0.55,
-    "asking how often": 0.95,
-    "asking whether": 0.96,
+    "searching again": 0.55,
+    "simulating logs": 0.95,
+    "testing whether": 0.96,
     "ranking": 0.98,
 }
 

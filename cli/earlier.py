@@ -6,22 +6,22 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from typer.core import TyperCommand
+from kemba_cli.usage import Command
 
 TABLES = (".csv", ".parquet", ".mcap", ".mat", ".npz", ".json")  # endings of logs
 
 
-def figure_at(place: str, fits: Callable[[str], bool]) -> type[TyperCommand]:
+def figure_at(place: str, fits: Callable[[str], bool]) -> type[Command]:
     """A command that reads `--figure PLACE` as the option `place` with that value.
 
     `fits`: whether the word behind `--figure` is a place, and not the next argument.
     """
 
-    class Command(TyperCommand):
+    class Placed(Command):
         def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
             return super().parse_args(ctx, _moved(args, place, fits))
 
-    return Command
+    return Placed
 
 
 def _moved(args: list[str], place: str, fits: Callable[[str], bool]) -> list[str]:

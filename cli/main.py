@@ -15,6 +15,7 @@ import typer
 import kemba
 from kemba_cli.earlier import figure_at, is_new_folder, is_picture
 from kemba_cli.failures import guarded
+from kemba_cli.usage import Command
 from kemba_cli.verbose import with_verbose
 from kemba_cli.verbs.identify.adopt import adopt
 from kemba_cli.verbs.identify.characterise import characterise
@@ -66,7 +67,7 @@ app = typer.Typer(
 for panel, verbs in PANELS.items():
     for verb in verbs:
         name = "map" if verb is draft_map else verb.__name__  # `map` is a word of Python
-        shape = PLACED.get(verb)
+        shape = PLACED.get(verb, Command)
         app.command(name, cls=shape, rich_help_panel=panel)(with_verbose(guarded(verb)))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 import tempfile
@@ -41,9 +42,21 @@ def on_files(files: Any, config: Any) -> Any:
         command = [sys.executable, "-m", "typer", "kemba_cli.main", "utils", "docs"]
         options = ["--name", "kemba-opt", "--output", str(page)]
         subprocess.run([*command, *options], check=True, capture_output=True)
-        text = page.read_text(encoding="utf-8")
+        text = whole_summaries(page.read_text(encoding="utf-8"))
     files.append(File.generated(config, "cli.md", content=text))
     return files
+
+
+def whole_summaries(text: str) -> str:
+    """The list of verbs with their whole first sentences, which the generator cuts, and links."""
+    import typer.main
+
+    from kemba_cli.main import app
+
+    for verb, command in typer.main.get_command(app).commands.items():
+        line = f"* [`{verb}`](#kemba-opt-{verb}): {command.help.splitlines()[0]}"
+        text = re.sub(rf"^\* `{verb}`: .*$", lambda _, line=line: line, text, flags=re.MULTILINE)
+    return text
 
 
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import shlex
 from collections.abc import Iterable
 
 LISTED = 12  # a hint with more names than this does not help
@@ -49,6 +50,12 @@ class ConfigErrors(KembaError):  # noqa: N818  several errors, not one
 def listed_errors(error: KembaError) -> list[KembaError]:
     """The errors that one holds: all of several, or itself."""
     return error.errors if isinstance(error, ConfigErrors) else [error]
+
+
+def map_hint(path: object) -> str:
+    """What to do with the log of another program."""
+    what = "for a log of another program, draft a column map"
+    return f"{what}: kemba-opt map {shlex.quote(str(path))}"
 
 
 def suggest(name: str, candidates: Iterable[str]) -> str:

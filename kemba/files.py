@@ -89,7 +89,10 @@ def plain(data: Any) -> Any:
     if isinstance(data, (list, tuple, set, frozenset)):
         return [plain(value) for value in data]
     if hasattr(data, "tolist"):  # numpy scalars and arrays
-        return plain(data.tolist())
+        # the sum is quick, and finite only where each number is
+        numbers = getattr(getattr(data, "dtype", None), "kind", "") == "f"
+        finite = numbers and math.isfinite(data.sum())
+        return data.tolist() if finite else plain(data.tolist())
     if isinstance(data, float) and not math.isfinite(data):
         return None
     return str(data) if isinstance(data, Path) else data

@@ -11,7 +11,7 @@ from typing import Any, TextIO
 
 import numpy as np
 
-from kemba.errors import KembaError
+from kemba.errors import KembaError, map_hint
 from kemba.quantity import Quantity, is_si
 
 Table = np.ndarray[Any, np.dtype[np.float64]]
@@ -49,7 +49,10 @@ def _headers(stream: TextIO, path: str | Path) -> list[str]:
         )
     if ";" in line and "," not in line:
         raise KembaError(
-            f"{path}:1", "is separated by semicolons", "commas, and decimal points, were expected"
+            f"{path}:1",
+            "is separated by semicolons",
+            "commas, and decimal points, were expected",
+            map_hint(path),
         )
     return [cell.strip() for cell in next(csv.reader([line]))]
 
@@ -61,13 +64,11 @@ def _check_headers(headers: list[str], path: str | Path) -> None:
         try:
             quantity = Quantity.from_header(header)
         except KembaError as error:
-            hint = "map foreign columns with --map" if column == 1 else ""
+            hint = map_hint(path) if column == 1 else ""
             raise KembaError(where, error.what, error.expected, hint) from None
         if not is_si(quantity.unit):
             what = f"'{header}' is not in SI units"
-            raise KembaError(
-                where, what, "SI inside the file was expected", "convert it with --map"
-            )
+            raise KembaError(where, what, "SI inside the file was expected", map_hint(path))
         if quantity.name in seen:
             what = f"column '{quantity.name}' stands twice"
             raise KembaError(where, what, hint=f"it is column {seen[quantity.name]} already")

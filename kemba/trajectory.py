@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from kemba.config.document import dump_yaml, load_yaml
-from kemba.errors import KembaError, suggest
+from kemba.errors import KembaError, map_hint, suggest
 from kemba.files import atomic_text
 from kemba.quantity import Quantity
 from kemba.table import read_table
@@ -157,7 +157,7 @@ class Trajectory:
         """
         headers, table = read_table(path)
         if headers[0] != TIME:
-            hint = "map foreign columns with --map" if TIME not in headers else ""
+            hint = map_hint(path) if TIME not in headers else ""
             raise KembaError(
                 f"{path}:1:1", f"the first column is '{headers[0]}'", f"'{TIME}' was expected", hint
             )

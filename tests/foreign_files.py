@@ -120,3 +120,22 @@ def joint_state(log: Trajectory, path: Path) -> Path:
     frame["e4"] = 0.0
     frame.to_csv(path, index=False, header=False)
     return path
+
+
+def workshop(log: Trajectory, path: Path) -> Path:
+    """German names throughout, units behind them, and a few tenths of a volt on closed valves."""
+    words = {
+        "body/x": "Vorschub", "body/z": "Hoehe", "body/pitch": "Nick", "hip/q": "Huefte",
+        "hip/tau": "Moment_Huefte", "piston/x": "Kolben", "valve/extend": "Ventil_ausfahren",
+        "valve/retract": "Ventil_einfahren", "front/": "vorne", "rear/": "hinten",
+    }  # fmt: skip
+    units = {"m": (1e3, "mm"), "rad": (np.degrees(1), "Grad"), "N.m": (1, "Nm"), "1": (24, "V")}
+    table = {"Zeitstempel_ms": (EPOCH + np.round(log.time * 1e3)).astype(np.int64), "Modus": "AUTO"}
+    for name in log.names:
+        said = [
+            word for part, word in words.items() if name.endswith(part) or name.startswith(part)
+        ]
+        scale, unit = units[log.unit(name)]
+        table["_".join([*said, unit])] = log[name] * scale + (0.3 if unit == "V" else 0.0)
+    pd.DataFrame(table).to_csv(path, sep=";", decimal=",", index=False)
+    return path

@@ -120,11 +120,17 @@ def test_dialects_that_are_understood(tmp_path: Path, text: str) -> None:
         (HEADER + "0,1_0,2\n", ":2:2: body/z [m]: '1_0' is not a number"),
         (HEADER + "0,1e999,2\n", ":2:2: the number is infinite"),
         (HEADER.replace(",", ";"), ":1: is separated by semicolons; commas, and decimal points"),
-        ("t,z\n", ":1:1: column header 't' is malformed; 'path/symbol [unit]' was expected; map"),
+        (
+            "t,z\n",
+            ":1:1: column header 't' is malformed; 'path/symbol [unit]' was expected; for a log",
+        ),
         ("time [s],z [m/s]\n", ":1:2: column header 'z [m/s]' has the malformed unit 'm/s'"),
         ("time [s],z [mm]\n", ":1:2: 'z [mm]' is not in SI units; SI inside the file was expected"),
         ("time [s],z [m],z [m]\n", ":1:3: column 'z' stands twice; it is column 2 already"),
-        ("z [m]\n1\n", ":1:1: the first column is 'z [m]'; 'time [s]' was expected; map"),
+        (
+            "z [m]\n1\n",
+            ":1:1: the first column is 'z [m]'; 'time [s]' was expected; for a log",
+        ),
     ],
 )
 def test_faulty_files_are_explained(tmp_path: Path, text: str, message: str) -> None:

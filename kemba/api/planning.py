@@ -81,7 +81,8 @@ def plan(
     """Plan a motion and certify it, as `kemba-opt solve` does.
 
     `task`: a path, a shipped name, or a loaded task; `out`: its run folder, `runs/TASK-N` without.
-    `changes` are those of `--set`. `cold`: begin from a guess, also where a shipped
+    `changes` are those of `--set`: `height` is that of the body's centre (at 0.45 m the feet rise
+    1 cm), `feet` that of the feet. `cold`: begin from a guess, also where a shipped
     plan is near. `progress` gets the name of every stage. Raises KembaError for
     mistakes; a task that cannot be met is no mistake, the certificate says why.
     """

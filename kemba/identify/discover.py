@@ -120,11 +120,11 @@ def _built_anew(search: Search, other: Rebuilt, holdout: Problem | None) -> Disc
 def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> Discovery:
     """What the finished `search` with its `best` hypothesis allows to say."""
     ended = search.ended
-    search.say("asking how often logs in which nothing is missing look like these")
+    search.say("simulating logs in which nothing is missing")
     test, likeliest = null_test(search), best
     belief = _believed(search, likeliest, test)
     best, p_value = belief.best, belief.p_value
-    search.say("asking whether the answer is complete")
+    search.say("testing whether more is missing")
     holdout = holdout.heard_as(search.problem) if holdout else None
     if test.too_short:
         return _undecided(search, test, holdout)

@@ -89,7 +89,7 @@ def propose(
     say: Callable[[str], None] = lambda text: None,
     bounded: bool = True,
 ) -> Proposal:
-    """The test of a rig that best separates the rivals of an answer, written to `out` as a YAML.
+    """The test of a rig that best tells the possible effects of an answer apart, a YAML in `out`.
 
     `bounded`: in about a minute. Raises KembaError where no test shows a difference, or a file
     cannot be read or written.

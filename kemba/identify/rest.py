@@ -57,8 +57,8 @@ def rest_of(search: Search, best: Hypothesis, unsure: Collection[str]) -> Remain
     channel = profiles[0].channel if law else bins[0].channel if worst else ""
     advice = _advice(channel)
     if unsure:
-        rivals = " and ".join(unsure)
-        advice = f"'kemba-opt experiment' proposes a test that tells the rivals of {rivals} apart"
+        named = " and ".join(unsure)
+        advice = f"'kemba-opt experiment' proposes a test that tells {named} from what looks alike"
     return Remainder("; ".join([*worst, *law]) or "no condition in particular", advice)
 
 

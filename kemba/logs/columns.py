@@ -8,8 +8,8 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from kemba.config import Section, find_config, load_yaml, parse
-from kemba.errors import KembaError
-from kemba.quantity import Param, Quantity
+from kemba.errors import ConfigErrors, KembaError
+from kemba.quantity import Param, Quantity, convert
 from kemba.trajectory import TIME
 from kemba.units import read_si, to_si
 
@@ -35,7 +35,7 @@ class ColumnSource(Section):
     add: AddedColumn | None = Field(None, description="a second column that is added to the first")
     scale: float = Field(1.0, description="factor")
     sign: Literal[-1, 1] = Field(1, description="-1 where the foreign column counts backwards")
-    offset: Number = Field(0.0, description="added last: `-90 deg`; a bare number is in our unit")
+    offset: Number = Field(0.0, description="added last, with a unit: `-90 deg`")
     delay: Annotated[float, Param("s", doc="how late the column is")] = 0.0
     threshold: Number | None = Field(
         None, description="of a valve: on above it, in the foreign column's unit"
@@ -101,16 +101,38 @@ def load_map(name: str | Path) -> ColumnMap:
 
 
 def check_map(found: ColumnMap, where: str) -> None:
-    """Raise KembaError where a map has no time, a malformed header or a unit that does not fit."""
+    """Raise all the errors of a map: no time, a malformed header, a unit that does not fit."""
+    errors = []
     if TIME not in found.columns:
-        raise KembaError(where, f"columns: '{TIME}' is not mapped", "every log needs its time")
+        what = f"columns: '{TIME}' is not mapped"
+        errors.append(KembaError(where, what, "every log needs its time"))
     for header, source in found.columns.items():
         try:
             unit = "s" if header == TIME else Quantity.from_header(header).unit
+            _check_units(source, unit)
             source.offset_in(unit)
             source.level()
         except KembaError as error:
-            what = f"columns: {error.what}"
-            raise KembaError(where, what, error.expected, error.hint) from None
+            errors.append(KembaError(where, f"columns: {error.what}", error.expected, error.hint))
         except ValueError as error:
-            raise KembaError(where, f"columns: '{header}': {error}") from None
+            errors.append(KembaError(where, f"columns: '{header}': {error}"))
+    if errors:
+        raise ConfigErrors(errors)
+
+
+def _check_units(source: ColumnSource, ours: str) -> None:
+    """Raise ValueError where a unit is unknown or of another dimension, or an offset could be in
+    their unit or in ours."""
+    for part in (source, source.add):
+        unit = part.unit if part is not None else None
+        if unit is not None and (part is not source or source.threshold is None):
+            try:
+                convert(1.0, unit, ours)
+            except ValueError as error:
+                raise ValueError(f"unit '{unit}' {error}") from None
+    bare = not isinstance(source.offset, str) and source.offset != 0.0
+    other = source.unit is not None and source.threshold is None
+    if bare and other and convert(1.0, source.unit or ours, ours) != 1.0:
+        value = f"{source.offset:g}"  # it could be in theirs or in ours
+        either = f"'{value} {source.unit}' or '{value} {ours}'"
+        raise ValueError(f"offset {value} needs a unit: {either}")

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from kemba.config import load_yaml
-from kemba.errors import KembaError
+from kemba.errors import KembaError, map_hint
 from kemba.logs.columns import ColumnMap
 from kemba.logs.foreign import mapped
 from kemba.logs.formats import MODULES, reader
@@ -43,7 +43,7 @@ def open_log(path: Path, columns: ColumnMap | None = None, strict: bool = True) 
 def raw_columns(path: Path, layout: ColumnMap | None) -> tuple[Raw, dict[str, Any]]:
     """All columns of a file as they are, and the metadata it holds. Raises KembaError."""
     if not path.is_file():
-        raise KembaError(str(path), "no such file")
+        raise KembaError(str(path), "is a folder" if path.is_dir() else "no such file")
     _no_yaml(path)
     if path.suffix.lower() in BINARY:
         return reader(path)(path)
@@ -61,7 +61,7 @@ def _no_yaml(path: Path) -> None:
 def _own(raw: Raw, path: Path, meta: dict[str, Any]) -> Trajectory:
     if TIME not in raw:
         what = f"has no column '{TIME}'"
-        raise KembaError(str(path), what, hint=f"draft a column map: kemba-opt map {path}")
+        raise KembaError(str(path), what, hint=map_hint(path))
     texts = [name for name, values in raw.items() if values.dtype == object and name != TIME]
     columns = {n: np.asarray(v, dtype=float) for n, v in raw.items() if n not in (TIME, *texts)}
     return Trajectory(np.asarray(raw[TIME], dtype=float), columns, meta)

@@ -35,7 +35,9 @@ def read_text(path: Path, layout: ColumnMap) -> Raw:
         )
     except pd.errors.EmptyDataError:
         raise KembaError(str(path), "is empty", "a table was expected") from None
-    except (pd.errors.ParserError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError:
+        raise KembaError(str(path), "is not a text", "a table was expected") from None
+    except pd.errors.ParserError as error:
         what = f"is no table with the separator '{layout.separator}': {error}".strip()
         raise KembaError(str(path), what, hint="`separator` and `skip_rows` of the map") from None
     except OSError as error:

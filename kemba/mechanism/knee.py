@@ -9,6 +9,7 @@ import numpy as np
 
 from kemba.mechanism.links import Leg
 
+Array = np.ndarray[Any, np.dtype[np.float64]]
 REACH = 1.0 - 1e-9  # largest cosine of an angle whose slope is still finite
 
 
@@ -38,10 +39,15 @@ def flexion(leg: Leg, x: float) -> float:
 
     Raises ValueError where the linkage cannot reach.
     """
+    return float(flexions(leg, np.array([x]))[0])
+
+
+def flexions(leg: Leg, x: Array) -> Array:
+    """Knee flexions (n,) [rad] for piston extensions `x` (n,) [m]. Raises as `flexion` does."""
     cosine, phase = _triangle(leg, x)
-    if abs(cosine) > 1.0:
-        raise ValueError(f"the knee cannot reach a piston extension of {x:g} m")
-    return float(np.arccos(cosine) - np.arctan2(*phase))
+    if np.any(beyond := np.abs(cosine) > 1.0):
+        raise ValueError(f"the knee cannot reach a piston extension of {x[beyond][0]:g} m")
+    return np.asarray(np.arccos(cosine) - np.arctan2(*phase))
 
 
 def flexion_of(leg: Leg, x: ca.SX) -> ca.SX:

@@ -37,3 +37,10 @@ def test_version() -> None:
 def test_unknown_verbs_and_options_are_wrong_usage() -> None:
     assert CliRunner().invoke(app, ["chek"]).exit_code == 2
     assert CliRunner().invoke(app, ["check", "--nope"]).exit_code == 2
+
+
+@pytest.mark.parametrize("verb", ["compare", "discover", "adopt", "map", "export", "check"])
+def test_a_missing_argument_is_answered_by_an_example(verb: str) -> None:
+    done = CliRunner().invoke(app, [verb])
+    assert done.exit_code == 2
+    assert f"Example: kemba-opt {verb}" in " ".join(done.stderr.replace("│", " ").split())

@@ -20,8 +20,6 @@ ELSEWHERE = {
     "tutorial.md": "tests/documents/test_tutorial.py",
     "experiment.md": "tests/identify/test_experiment.py",
 }
-# Commands that make the pages of measurements; they take hours, and are run before a release.
-STUDIES = ("benchmarks.md", "plant.md", "refine.md", "reliability-of-the-program.md")
 
 
 def text_of(page: str) -> str:

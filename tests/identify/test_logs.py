@@ -70,6 +70,25 @@ def test_a_map_without_time_is_refused(tmp_path: Path) -> None:
         load_map(path)
 
 
+def test_all_wrong_units_of_a_map_are_told_at_once(tmp_path: Path) -> None:
+    columns = [
+        "time [s]: {source: t, unit: mss}",
+        "body/z [m]: {source: z, unit: kg}",
+        "body/pitch [rad]: {source: r, unit: deg, offset: -90}",
+        "front/hip/q [rad]: {source: q, unit: deg, offset: -90 deg}",
+        "front/valve/extend [1]: {source: v, unit: V, threshold: 12 V}",
+    ]
+    path = tmp_path / "map.yaml"
+    path.write_text("columns:\n" + "".join(f"  {line}\n" for line in columns), encoding="utf-8")
+    with pytest.raises(KembaError) as told:
+        load_map(path)
+    said = str(told.value).splitlines()
+    assert len(said) == 3
+    assert "'mss'; did you mean 'ms'?" in said[0]
+    assert "unit 'kg' is a mass" in said[1]
+    assert "offset -90 needs a unit: '-90 deg' or '-90 rad'" in said[2]
+
+
 def test_order_of_arguments_is_no_matter(tmp_path: Path, log_file: Path) -> None:
     other = log_file.with_name("a.csv")
     other.write_text(log_file.read_text())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from kemba.identify.compare import words
 from kemba.identify.compare.bins import ConditionBin
 from kemba.identify.compare.words import command, place_of, quantity
 
@@ -42,3 +43,12 @@ def test_valves_are_named() -> None:
     assert command("valve/retract") == "the retract valve"
     assert command("front/hip/tau") == "the front hip torque"
     assert command("slider/F") == "slider/F"
+
+
+def test_sizes_have_usual_units_and_efforts_a_place() -> None:
+    assert words.off_by("body/z [m]", 0.0191) == "body height 19 mm"
+    assert words.off_by("rear/hip/q [rad]", 0.0437) == "rear hip angle 2.5 deg"
+    assert words.effort("front/piston/x", "N") == "force on the front rod"
+    assert words.effort("rear/hip/q", "N.m") == "torque on the rear hip"
+    assert words.effort("body/z", "N") == "force on the body, z"
+    assert words.effort("piston/F", "N") == "force at piston/F"

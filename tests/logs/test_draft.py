@@ -24,6 +24,7 @@ FILES = {
     "snake": ("log.parquet", foreign_files.snake),
     "abbreviated": ("log.csv", foreign_files.abbreviated),
     "player": ("log.tsv", foreign_files.player),
+    "workshop": ("log.csv", foreign_files.workshop),
 }
 
 
@@ -129,6 +130,8 @@ def test_names_say_what_they_mean() -> None:
     assert named_unit("pos [mm]") == ("pos", "mm")
     assert named_unit("pos_mm") == ("pos", "mm")
     assert named_unit("hip_front") == ("hip_front", None)
+    assert named_unit("Nick_Grad") == ("Nick", "deg")
+    assert named_unit("pitch [degrees]") == ("pitch", "deg")
     assert meaning("frontHipTorque", LEGS) == {
         "leg": {"front"}, "part": {"hip"}, "kind": {"torque"},
     }  # fmt: skip

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import json
 import re
+import resource
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -140,7 +143,7 @@ def test_without_anything_the_newest_run_is_taken(
     shutil.copytree(jump, "runs/jump-1", ignore=shutil.ignore_patterns("review*.html"))
     Path("runs/jump-1/logs/review.html").touch()
     done = call("review")
-    assert "the newest run: runs/jump-1\nwith its 2 newest logs\n" in done.stderr
+    assert "the newest run: runs/jump-1\nwith its newest logs: 2\n" in done.stderr
     assert done.stdout == "runs/jump-1/logs/review-2.html\n"
     assert call("review", "--out", "runs/jump-1/logs/review.html").exit_code == 2
 
@@ -279,3 +282,26 @@ def test_folders_are_taken_for_what_they_hold(jump: Path, tmp_path: Path) -> Non
     assert done.exit_code == 0, done.stderr
     text = out.read_text(encoding="utf-8")
     assert "2 logs" in text and "The robot reaches" in text and "lacks seal_friction" in text
+
+
+def test_a_page_takes_no_library_that_it_does_not_need() -> None:
+    """`scipy.signal` and `scipy.stats` take half a second each."""
+    code = (
+        "import sys, kemba.report.review.page;"
+        "heavy = {'matplotlib', 'scipy.stats', 'scipy.signal', 'dask', 'pandas', 'numba'};"
+        "print(sorted(heavy & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.slow
+def test_a_page_is_there_within_ten_seconds(jump: Path, tmp_path: Path) -> None:
+    """Of processor time: what a machine with nothing else to do takes."""
+    logs = sorted(str(path) for path in (jump / "logs").glob("*.csv"))
+    words = ["review", *logs, "--run", str(jump), "--out", str(tmp_path / "page.html"), "-q"]
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    code = "from kemba_cli.main import main; main()"
+    subprocess.run([sys.executable, "-c", code, *words], check=True, capture_output=True)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    assert after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime < 10.0

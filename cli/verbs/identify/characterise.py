@@ -25,20 +25,22 @@ def characterise(
     ] = None,
     figures: Annotated[
         Path | None,
-        typer.Option(help="Folder for them (a new folder figures beside the model)."),
+        typer.Option(help="Folder for these figures (a new folder figures beside the model)."),
     ] = None,
     model: Annotated[
         str, typer.Option(help="Model YAML whose robot has the cylinder that was tested.")
     ] = "planning",
     paper: Annotated[
-        bool, typer.Option("--paper", help="No logs: what the paper's own tables imply.")
+        bool, typer.Option("--paper", help="Use the paper's own tables instead of logs.")
     ] = False,
     force: Force = False,
     own_effects: OwnEffects = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Fit eq. 4 to 7 to bench logs; print Tables I and II beside the paper's; write a model.
+    """Fit air and friction of a cylinder to bench logs, and write them as a model.
+
+    It fits eq. 4 to 7 of the paper, and prints Tables I and II beside the paper's own.
 
     Example: kemba-opt characterise bench/locked bench/dynamometer --out cylinder.yaml
     """

@@ -68,6 +68,7 @@ def compare(
 def _print(found: Comparison) -> None:
     from rich.table import Table
 
+    from kemba.identify.compare.words import effort, off_by, place_of
     from kemba.units import short
 
     table = Table("channel", "RMS", "largest", "noise", "error / noise")
@@ -76,14 +77,14 @@ def _print(found: Comparison) -> None:
         table.add_row(c.name.replace("[", r"\["), *numbers)
     results().print(table)
     for at in sorted((c for c in found.bins if c.significant), key=lambda c: c.q_value)[:SHOWN]:
-        parts = (f"valves {at.mode}" * bool(at.mode), f"piston {at.region}" * bool(at.region))
-        where = ", ".join((f"{at.channel} in {at.phase}", *filter(None, parts)))
-        typer.echo(f"  {where}: {short(at.ratio)} times the noise (q = {at.q_value:.1g})")
+        typer.echo(f"  {place_of(at)}: {short(at.ratio)} times the noise")
     for hint in found.hints[:SHOWN]:
         typer.echo(f"  {hint.text}")
     for peak in found.peaks:
         if peak.low * peak.high > 0 and not found.good:
             size = f"{peak.value:+.3g} {peak.unit} ({peak.low:.3g} to {peak.high:.3g})"
-            typer.echo(f"  missing at {peak.channel}: {size} at {peak.time_s:.3f} s of {peak.run}")
-    for header, error in found.plan.items():
-        typer.echo(f"  plan missed by up to {error:.3g} in {header}")
+            when = f"at {peak.time_s:.3f} s of {peak.run}"
+            typer.echo(f"  missing {effort(peak.channel, peak.unit)}: {size} {when}")
+    if found.plan:
+        parts = (off_by(header, error) for header, error in found.plan.items())
+        typer.echo(f"  farthest from the plan: {', '.join(parts)}")

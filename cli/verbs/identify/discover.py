@@ -22,7 +22,7 @@ def discover(
     holdout: Annotated[
         list[Path] | None, typer.Option(help="A log kept for judging only; may be repeated.")
     ] = None,
-    model: Annotated[str, typer.Option(help="Model YAML whose gaps to find.")] = "planning",
+    model: Annotated[str, typer.Option(help="Model YAML that may lack an effect.")] = "planning",
     out: Annotated[
         Path | None,
         typer.Option(help="Folder for answer.json, model.yaml, figures (answer, answer-2, ...)."),

@@ -1,4 +1,4 @@
-"""`kemba-opt experiment`: the next test that separates the rivals of an answer."""
+"""`kemba-opt experiment`: the next test that tells the possible effects of an answer apart."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def experiment(
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Design the test that best separates the rivals of an answer, as a rig or a task YAML.
+    """Design the test that best tells the possible effects of an answer apart: a rig or task YAML.
 
     Exit code 1 when no plan of the robot's motion is certified.
 

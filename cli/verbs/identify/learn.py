@@ -34,7 +34,10 @@ def learn(
         float, typer.Option(min=5.0, help="Seconds of discovery at most.")
     ] = 300.0,
     correct: Annotated[
-        bool, typer.Option(help="Correct what the model does not explain, by valve edges.")
+        bool,
+        typer.Option(
+            help="Correct what the model does not explain by shifting when valves switch."
+        ),
     ] = True,
     force: Force = False,
     own_effects: OwnEffects = None,

@@ -18,7 +18,7 @@ def effects(
     name: Annotated[str, typer.Argument(help="One effect; the whole catalogue if omitted.")] = "",
     test: Annotated[
         Path | None,
-        typer.Option("--test", help="Python file: try every promise on each of its effects."),
+        typer.Option("--test", help="Python file: run the checks that every effect must pass."),
     ] = None,
     own_effects: OwnEffects = None,
     json: Json = False,

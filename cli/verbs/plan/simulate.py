@@ -25,7 +25,10 @@ def simulate(
     ] = None,
     repeat: Annotated[int, typer.Option(min=1, help="How often to execute the run.")] = 1,
     noise: Annotated[
-        bool, typer.Option("--noise", help="Noisy sensors, scattering valves.")
+        bool,
+        typer.Option(
+            "--noise", help="Add the noise of sensors, and scatter to the times of valves."
+        ),
     ] = False,
     policy: Annotated[
         bool, typer.Option("--policy", help="With feedback: the run's policy.npz, made if missing.")

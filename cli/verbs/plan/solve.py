@@ -41,12 +41,18 @@ def solve(
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Check the task and say its size; solve nothing.")
     ] = False,
-    starts: Annotated[int, typer.Option(min=1, help="Guesses to try; the best is kept.")] = 1,
+    starts: Annotated[
+        int, typer.Option(min=1, help="Initial guesses to try; the best plan is kept.")
+    ] = 1,
     robust: Annotated[
         int | None,
-        typer.Option(min=1, help="Scenarios; of several plans, the one that lands in most."),
+        typer.Option(
+            min=1, help="Executions under drawn conditions; the plan that lands in most is kept."
+        ),
     ] = None,
-    jobs: Annotated[int | None, typer.Option(min=1, help="Starts at a time.")] = None,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="Guesses that are solved at the same time.")
+    ] = None,
     replay: Annotated[bool, typer.Option(help="Execute the plan in simulation.")] = True,
     figure: Annotated[bool, typer.Option(help="Draw the plan.")] = True,
     force: Force = False,
@@ -56,8 +62,11 @@ def solve(
 ) -> None:
     """Plan a motion; write trajectory, controller table, certificate and figure to a run folder.
 
-    Exit code 1 when it is not solved, or when its replay or the plant misses the task's
-    tolerances.
+    Exit code 1 when no plan is found, or when its re-simulation or the
+    simulated robot leaves it by more than the task's tolerances.
+
+    `height` is that of the body's centre: at 0.45 m the feet rise 1 cm.
+    `--set "feet=8 cm"` asks for the height of the feet instead.
 
     Example: kemba-opt solve jump.yaml --set "height=0.48 m"
     """
@@ -143,4 +152,4 @@ def _dry_run(task: Task, document: Any, model: str | None, json: bool) -> None:
     if json:
         print_json({"task": task.name, **size})
     else:
-        typer.echo(f"{task.name}: {size['variables']} variables, {size['constraints']} rows")
+        typer.echo(f"{task.name}: {size['variables']} variables, {size['constraints']} constraints")

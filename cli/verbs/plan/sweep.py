@@ -15,7 +15,7 @@ EVERY = 10.0  # s between lines where no one watches
 
 
 def sweep(
-    file: Annotated[str, typer.Argument(metavar="SWEEP", help="Sweep YAML, here or shipped.")],
+    file: Annotated[str, typer.Argument(metavar="sweep", help="Sweep YAML, here or shipped.")],
     out: Annotated[
         Path | None, typer.Option(help="Folder to write or to continue (sweeps/NAME).")
     ] = None,
@@ -23,7 +23,7 @@ def sweep(
         list[str] | None, typer.Option("--set", help="Override a key: --set seed=2.")
     ] = None,
     scheduler: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="A Dask scheduler instead of our own.")
+        str | None, typer.Option(metavar="<address>", help="A Dask scheduler instead of our own.")
     ] = None,
     jobs: Annotated[
         int | None, typer.Option(min=1, help="Processes of our own (as many as cores).")

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.signal import lfilter
 
 from kemba.effects.mechanics.friction import V_COULOMB
 from kemba.identify.bench.motion import SmoothedMotion
@@ -60,6 +59,8 @@ def terms(motion: SmoothedMotion, u: Array, stroke: float) -> Iterator[tuple[str
 def features(motion: SmoothedMotion, u: Array, stroke: float) -> Array:
     """Quantities (n, m) that a missing force could depend on: functions of position and speed,
     times functions of how long ago each valve was on. `u` (n, 2): share of each valve being on."""
+    from scipy.signal import lfilter  # it takes half a second
+
     settings, step = FormulaSettings.current(), float(np.median(np.diff(motion.time)))
     x, v = motion.x / stroke - 0.5, motion.v / settings.speed
     places = [np.ones(len(x)), x, x**2, v, np.abs(v), v * x, np.tanh(motion.v / V_COULOMB)]

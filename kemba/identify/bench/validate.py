@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
-from scipy.signal import correlate
 
 from kemba.errors import KembaError
 from kemba.identify.bench.bench_log import BenchLog
@@ -121,6 +120,8 @@ def _clock(run: BenchLog, predict: Predict) -> list[KembaError]:
     if not measured.std() or not expected.std():
         return []
     far = min(int(limits.farthest / limits.resolution), len(grid) // 3)
+    from scipy.signal import correlate  # it takes half a second
+
     both = correlate(measured - measured.mean(), expected - expected.mean(), "same", "fft")
     both /= len(grid) * measured.std() * expected.std()
     middle = len(grid) // 2

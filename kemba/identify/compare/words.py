@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from math import degrees
+
 from kemba.identify.compare.bins import ConditionBin
+from kemba.units import short
 
 BODY = {"body/x": "body position", "body/z": "body height", "body/pitch": "body pitch"}
 OF_LEG = {
@@ -62,3 +65,21 @@ def quantity(channel: str) -> str:
     if channel in OF_LEG:
         return OF_LEG[channel]
     return f"{leg} {OF_LEG[part]}" if part in OF_LEG else channel
+
+
+def off_by(header: str, error: float) -> str:
+    """An error [SI] of a column in words and in a usual unit: `body height 19 mm`."""
+    name, _, unit = header.rstrip("]").partition(" [")
+    better = {"m": ("mm", 1e3), "rad": ("deg", degrees(1.0)), "Pa": ("bar", 1e-5)}
+    usual, factor = better.get(unit, (unit, 1.0))
+    return f"{quantity(name)} {short(factor * error)} {usual}"
+
+
+def effort(channel: str, unit: str) -> str:
+    """A missing effort in words: `force on the front rod`, `torque on the rear hip`."""
+    kind = "torque" if unit == "N.m" else "force"
+    leg, _, part = channel.partition("/")
+    if leg == "body":
+        return f"{kind} on the body, {part}"
+    place = {"piston/x": "rod", "hip/q": "hip"}.get(part, "")
+    return f"{kind} on the {leg} {place}" if place else f"{kind} at {channel}"

@@ -102,7 +102,7 @@ def propose_motion(
     say: Callable[[str], None] = lambda text: None,
     bounded: bool = True,
 ) -> MotionProposal:
-    """The safe motion that best separates the rivals of an answer, written to `out` as a task.
+    """The safe motion that best tells the possible effects of an answer apart, a task in `out`.
 
     `bounded`: in about a minute. Raises KembaError where no motion shows a difference, or a file
     cannot be read or written.

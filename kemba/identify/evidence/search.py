@@ -84,7 +84,7 @@ class Search:
             if guess == NULL or self.ended:
                 return best
             point = self.points[guess]
-            self.say(f"looking again as if {' + '.join(guess)} were there")
+            self.say(f"searching again with {' + '.join(guess)} in the model")
             among = self._contenders()
             self.problem = self.problem.relinearise(point.fit.theta)
             self.start(among, point.fit.theta)
@@ -103,7 +103,7 @@ class Search:
             if len(best) < 2 or self.ended:
                 break
             theta, before = self.points[best].fit.theta, best
-            self.say(f"looking again as if {' + '.join(best)} were there")
+            self.say(f"searching again with {' + '.join(best)} in the model")
             self.problem = self.problem.relinearise(theta)
             self.start(frozenset(), theta)
             self.visit(best)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from kemba.errors import KembaError
 from kemba.trajectory import Trajectory
 
+UNMAPPED = "of a log of another program, give its source in the column map (--map)"
+
 
 def log_fault(
     log: Trajectory,

@@ -8,6 +8,7 @@ import numpy as np
 
 from kemba.effects.sensors import CHANNELS
 from kemba.errors import ConfigErrors, KembaError, suggest
+from kemba.identify.logs.fault import UNMAPPED
 from kemba.identify.logs.fault import log_fault as _fault
 from kemba.identify.logs.own_rigs import own_faults
 from kemba.identify.logs.reading import OWN_RIGS, legs_of, needed
@@ -42,7 +43,7 @@ def _faults(log: Trajectory) -> list[KembaError]:
 def _columns(log: Trajectory) -> Iterator[KembaError]:
     for name in needed(log):
         if name not in log:
-            hint = f"{suggest(name, log.names)} Map foreign columns with --map".strip()
+            hint = "; ".join(filter(None, (suggest(name, log.names), UNMAPPED)))
             yield _fault(log, f"needs the column '{name}', which is missing", hint=hint)
     for name in log.names:
         unit = _unit_of(name)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from kemba.errors import KembaError, suggest
-from kemba.identify.logs.fault import log_fault
+from kemba.identify.logs.fault import UNMAPPED, log_fault
 from kemba.settings import BY_HAND, Settings, setting
 from kemba.trajectory import TIME, Trajectory
 
@@ -45,7 +45,7 @@ def _columns(log: Trajectory) -> Iterator[KembaError]:
         if name not in log:
             if vessel and known:
                 continue  # one of pressure and temperature is enough
-            hint = f"{suggest(name, log.names)} Map foreign columns with --map".strip()
+            hint = "; ".join(filter(None, (suggest(name, log.names), UNMAPPED)))
             what = f"needs the column '{name} [{unit}]', which is missing"
             yield log_fault(log, what, "the model's rig asks for it", hint)
         elif log.unit(name) != unit:

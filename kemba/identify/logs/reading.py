@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from kemba.errors import KembaError
+from kemba.errors import KembaError, map_hint
 from kemba.identify.logs.settings import GateSettings, range_of
 from kemba.identify.logs.sidecar import check_kind, check_noise
 from kemba.logs import ColumnMap, open_log
@@ -157,7 +157,7 @@ def kind_of(log: Trajectory, where: str | Path = "") -> Kind:
         f"{where}:1",
         "has neither the columns of a robot log nor those of a bench log",
         f"at least {', '.join(BENCH)} of a rig, or body/z and so on of a robot, were expected",
-        "map foreign columns with --map",
+        map_hint(where),
     )
 
 

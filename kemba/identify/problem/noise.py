@@ -8,7 +8,6 @@ from statistics import NormalDist
 import numpy as np
 from scipy.linalg import solve_toeplitz
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
-from scipy.signal import lfilter
 
 from kemba.identify.problem.problem import Array
 from kemba.identify.problem.quantisation import step_of
@@ -85,6 +84,8 @@ class Colour:
     @property
     def spread(self) -> float:
         """Standard deviation of the coloured series itself."""
+        from scipy.signal import lfilter  # rigs only: it takes half a second
+
         impulse = np.zeros(2000)
         impulse[0] = 1.0
         response = lfilter([1.0], np.concatenate([[1.0], -self.phi]), impulse)
@@ -138,6 +139,8 @@ def whiten(residual: Array, colour: Colour) -> Array:
 
     The first rows are scaled by the series' spread instead.
     """
+    from scipy.signal import lfilter
+
     if colour.weight is not None:
         residual = (residual.T * colour.weight).T
     taps = np.concatenate([[1.0], -colour.phi])

@@ -27,23 +27,24 @@ WORDS: dict[str, dict[str, str]] = {
         "acceleration": "a acc accel acceleration ax az ddx ddy ddz",
     },
     "direction": {
-        "x": "x horizontal forward vx ax fx dx ddx",
+        "x": "x horizontal forward vorschub vx ax fx dx ddx",
         "z": "z y height vertical hoehe altitude vz az fz fy dy dz ddy ddz",
         "pitch": "pitch tilt nick r",
     },
     "side": {
-        "extend": "extend ext extension push out cap head ue 1 a",
-        "retract": "retract ret retraction pull in rod ur 2 b",
+        "extend": "extend ext extension ausfahren aus push out cap head ue 1 a",
+        "retract": "retract ret retraction einfahren ein pull in rod ur 2 b",
     },
     "time": {"time": "t time timestamp stamp clock epoch elapsed zeit sec secs"},
     "rest": {"nanoseconds": "nanosec nanosecs nsec nsecs nanoseconds"},
 }
 LEG_WORDS = {
-    "front": "front f fore fr vorn",
+    "front": "front f fore fr vorn vorne",
     "rear": "rear back hind b r h hinten",
     "left": "left l links",
     "right": "right r rechts",
 }
+SPELT = {"degrees": "deg", "degree": "deg", "Grad": "deg", "grad": "deg"}
 UNITS = "ns us µs ms s min mm cm m in deg rad bar mbar kPa MPa Pa psi kN N Nm N.m mN.m mV V".split()
 BRACKETED = re.compile(r"^(?P<name>.*?)\s*[\[(](?P<unit>[^\])]*)[\])]\s*$")
 WORD = re.compile(r"[A-Z]?[a-zµ°]+|[A-Z]+(?![a-z])|\d+")
@@ -70,9 +71,11 @@ def named_unit(name: str) -> tuple[str, str | None]:
     """A column's name without its unit, and the unit: of `pos [mm]`, `pos (mm)` or `pos_mm`."""
     match = BRACKETED.match(name)
     if match:
-        return match["name"], match["unit"].strip() or None
+        unit = match["unit"].strip()
+        return match["name"], SPELT.get(unit, unit) or None
     head, mark, tail = name.rpartition("_")
-    return (head, tail) if mark and head and tail in UNITS else (name, None)
+    known = mark and head and (tail in UNITS or tail in SPELT)
+    return (head, SPELT.get(tail, tail)) if known else (name, None)
 
 
 def meaning(name: str, legs: Sequence[str]) -> Meaning:

@@ -13,6 +13,7 @@ from kemba.model.spec import Supply
 from kemba.quantity import Param
 
 Value = float | str
+CENTRE = "of the body's centre: at 0.45 m the feet of the shipped robot rise 1 cm"
 
 
 class Bound(Section):
@@ -141,7 +142,7 @@ class Task(Section):
     notes: str = ""
     model: str = "planning"
     plant: str = "plant"
-    height: Annotated[float, Param("m", lower=0.0, doc="of the body's centre")] | None = None
+    height: Annotated[float, Param("m", lower=0.0, doc=CENTRE)] | None = None
     feet: Annotated[float, Param("m", lower=0.0, doc="of the feet at the top")] | None = None
     distance: Annotated[float, Param("m", doc="forward")] | None = None
     supply: Supply | None = None

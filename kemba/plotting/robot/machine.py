@@ -62,7 +62,7 @@ class Machine:
     def _knee(self, leg: str, extension: Array) -> Array:
         """Knee angles [rad] of piston extensions [m], from a table with a fine grid."""
         table = np.linspace(-OVERTRAVEL, self.mechanism.stroke + OVERTRAVEL, 2001)
-        bend = [knee.flexion(self.robot.leg, x) for x in table]
+        bend = knee.flexions(self.robot.leg, table)
         return np.asarray(self.robot.legs[leg].fold * np.interp(extension, table, bend))
 
     def points(self, coordinates: Array) -> dict[str, Array]:

@@ -48,12 +48,9 @@ def matched(
     no first-order chambers. A plan with fitted air that does not come true on its own model is made
     anew from a guess, once. Nothing where the first plan fails by itself.
     """
-    how: dict[str, Any] = {
-        "log": log,
-        "tell": listener.tell,
-        "watch": listener.watch,
-        "stop": listener.stop,
-    }
+    tell = listener.tell
+    how: dict[str, Any] = {"log": log, "tell": tell}
+    how |= {"watch": listener.watch, "stop": listener.stop}
     now, fit, ticks, anew = first, None, False, False
     tried: list[TriedAir] = []
     for _ in range(RefitRounds.current().rounds):

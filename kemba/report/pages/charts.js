@@ -36,11 +36,10 @@ function charts(data) {
       c.strokeStyle = data.tracks[track].colour; c.lineWidth = dpr; c.setLineDash([2 * dpr, 2 * dpr]);
       c.beginPath(); c.moveTo(x(t), box.top); c.lineTo(x(t), box.top + box.height); c.stroke();
     });
-    if (chart.small) {
-      c.fillStyle = SOFT; c.font = `${11 * dpr}px system-ui, sans-serif`; c.textBaseline = "top"; c.textAlign = "left";
-      c.fillText(`error [${chart.unit}]`, box.left + 4 * dpr, box.top + 2 * dpr);
-    }
     c.restore();
+    if (!chart.small) return;
+    c.fillStyle = SOFT; c.font = `${11 * dpr}px system-ui, sans-serif`; c.textBaseline = "bottom"; c.textAlign = "left";
+    c.fillText(`error [${chart.unit}]`, box.left, box.top - 2 * dpr);
   }
 
   function reach(chart, low, high) { // of the y axis: at least `least` wide
@@ -65,6 +64,7 @@ function charts(data) {
     const axis = { stroke: SOFT, font, grid: { stroke: GRID, width: 1 }, ticks: { stroke: GRID, size: 4 } };
     const names = (u) => chart.rows.map((row, i) => chart.rows.length - i - 0.5);
     const plot = new uPlot({
+      padding: [chart.small ? 15 : null, null, null, null],
       width: box.clientWidth, height: box.clientHeight, legend: { show: false },
       cursor: { y: false, drag: { x: true, y: false, setScale: false }, sync: { key: "page" }, points: { size: 5 } },
       scales: {

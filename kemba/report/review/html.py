@@ -25,7 +25,7 @@ def table(title: str, heads: Sequence[str], rows: Iterable[Sequence[str]]) -> st
     if not lines:
         return ""
     head = "".join(f'<th scope="col">{escape(name)}</th>' for name in heads)
-    caption = f"<caption>{escape(title)}</caption>"
+    caption = f"<caption><span>{escape(title)}</span></caption>"
     return f'<div class="wide"><table>{caption}<tr>{head}</tr>{"".join(lines)}</table></div>'
 
 

@@ -65,15 +65,15 @@ def limit_parts(book: Book, model: Model, machine: Machine) -> list[str]:
         if motor:
             planes.append(torque_speed(leg, book.tracks, uses, motor))
     for title, name in (
-        ("share of the torque there is", "motor"),
-        ("share of the friction cone", "cone"),
+        ("hip: share of motor limit", "motor"),
+        ("foot: share of friction cone", "cone"),
     ):
         for leg, uses in used.items():
             lines = [
                 Curve(track.name, 100.0 * _onto(book.grid, track, getattr(use, name)), i)
                 for i, (track, use) in enumerate(zip(book.tracks, uses, strict=True))
             ]
-            charts.append(book.add(Chart(f"{leg.title()}: {title}", "%", lines, levels=(100.0,))))
+            charts.append(book.add(Chart(f"{leg.title()} {title}", "%", lines, levels=(100.0,))))
     grid = f'<div class="grid legs">{"".join(planes)}{"".join(charts)}</div>'
     return [_limit_table(book.tracks, used, machine), grid]
 
@@ -100,11 +100,11 @@ def _limit_table(
                     _or_dash(droop(track.t), 100, "%", 0),
                 ]
             )
-    heads = ["motion", "leg", "largest torque", "of what there is", "at the limit for"]
-    heads += ["largest use of friction", "foot slides", "lowest supply"]
+    heads = ["motion", "leg", "largest torque", "largest share of the limit", "time at the limit"]
+    heads += ["largest share of the friction cone", "foot slides", "lowest supply"]
     note = (
-        '<p class="soft">100 % of the torque is what the motor gives at that speed; 100 % of the '
-        "friction is where a foot begins to slide. A measured foot may show more: its forces are "
+        '<p class="soft">The limit is the torque that the motor gives at that speed. At 100 % of '
+        "the friction cone a foot begins to slide; a measured foot may show more: its forces are "
         "noisy, or the ground grips better than in the model.</p>"
     )
     return table("Largest use of motors and ground", heads, rows) + note
