@@ -12,6 +12,7 @@ from ocp.runs import solved
 from kemba.model import load_model
 from kemba.ocp import load_task, plan
 from kemba.ocp.certificate.certify import certify
+from kemba.ocp.certificate.status import law
 from kemba.ocp.planner import Planner
 from kemba.ocp.relaxation.schedule import find, fix, tighten
 from kemba.ocp.task.requirement import resolve
@@ -49,8 +50,22 @@ def test_the_worst_violation_is_named() -> None:
     assert first["violation"] > 0 and first["unit"]
     plan = failed.plan
     assert plan.time[first["node"]] == pytest.approx(first["time_s"])
-    named = f"worst: {first['what']} by {first['violation']:.3g} {first['unit']}"
+    named = f"worst: {law(first['what'])}, off by {first['violation']:.3g} {first['unit']}"
     assert named in failed.run.certificate["sentence"]
+
+
+@pytest.mark.parametrize(
+    ("what", "words"),
+    [
+        ("dynamics:front/hip/q", "the equation of motion of front/hip/q"),
+        ("rear/contact:slip forward", "slip forward of rear/contact"),
+        ("front/motor:speed_forward", "speed forward of front/motor"),
+        ("start.*/foot/z:front/foot/z", "`start.*/foot/z` on front/foot/z"),
+        ("goals.apex:body/z", "`goals.apex` on body/z"),
+    ],
+)
+def test_rows_have_words(what: str, words: str) -> None:
+    assert law(what) == words
 
 
 def test_building_and_solving_take_different_seconds() -> None:

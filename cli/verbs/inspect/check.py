@@ -39,19 +39,19 @@ def check(
             answers.append({"file": str(file), "good": True, **answer})
         except KembaError as error:
             answers.append({"file": str(file), "good": False, "sentence": str(error)})
-    _tell(answers, json, quiet)
+    _tell(answers, json)
     if not all(answer["good"] for answer in answers):
         raise typer.Exit(BAD_INPUT)
     say_next(after_check(answers, column_map, model), quiet or json)
 
 
-def _tell(answers: list[dict[str, Any]], json: bool, quiet: bool) -> None:
+def _tell(answers: list[dict[str, Any]], json: bool) -> None:
     if json:
         print_json({"files": answers})
     for answer in answers:
         if not answer["good"]:
             typer.echo(answer["sentence"], err=True)
-        elif not json and not quiet:
+        elif not json:
             typer.echo(f"{answer['file']}: {answer['sentence']}")
 
 

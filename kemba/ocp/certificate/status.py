@@ -11,6 +11,14 @@ from kemba.ocp.task.task import Task
 from kemba.settings import Settings, setting
 from kemba.trajectory import Trajectory
 
+# what the rows of a plan are called in the certificate's `worst`, in words
+LAWS = {
+    "dynamics": "the equation of motion",
+    "kinematics": "place and rate",
+    "rate": "the rate",
+    "bound": "the bound",
+}
+
 
 class Judging(Settings):
     """When a plan that misses its tolerances is still usable."""
@@ -75,4 +83,14 @@ def _worst(certificate: Certificate) -> str:
     if not certificate.worst:
         return "nothing is violated"
     v = certificate.worst[0]
-    return f"worst: {v.what} by {v.violation:.3g} {v.unit} at node {v.node} ({v.time_s:.3f} s)"
+    off = f"off by {v.violation:.3g} {v.unit} at node {v.node} ({v.time_s:.3f} s)"
+    return f"worst: {law(v.what)}, {off}"
+
+
+def law(what: str) -> str:
+    """What is violated, in words: `the equation of motion of front/hip/q`."""
+    kind, _, name = what.partition(":")
+    if kind in LAWS:
+        return f"{LAWS[kind]} of {name}"
+    asked = "." in kind or "/" in name  # `goals.apex:body/z`, unlike `rear/contact:gap`
+    return f"`{kind}` on {name}" if asked else f"{name.replace('_', ' ')} of {kind}"
