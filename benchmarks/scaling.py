@@ -1,6 +1,6 @@
 """Solve time against the number of nodes, with the fitted exponent.
 
-    python benchmarks/scaling.py [--save docs/scaling.png] [--repeats 3]
+    python benchmarks/scaling.py [--save docs/scaling.png] [--repeats 3] [--nodes 50 100]
 
 Prints the median CPU time of cold solves from slightly different guesses, not refined, and the
 exponent p of time ~ N^p. Aim: p at most 1.5.
@@ -9,6 +9,7 @@ exponent p of time ~ N^p. Aim: p at most 1.5.
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -36,10 +37,12 @@ def seconds(name: str, nodes: int, repeats: int, limit: float) -> float:
     return float(np.median(times)) if times else np.nan
 
 
-def exponent(times: np.ndarray) -> float:
-    """The power of N that fits the times."""
+def exponent(nodes: Sequence[int], times: np.ndarray) -> float:
+    """The power of N that fits the times; NaN where fewer than two are known."""
     known = np.isfinite(times)
-    return float(np.polyfit(np.log(np.array(NODES)[known]), np.log(times[known]), 1)[0])
+    if known.sum() < 2:
+        return np.nan
+    return float(np.polyfit(np.log(np.array(nodes)[known]), np.log(times[known]), 1)[0])
 
 
 def main() -> None:
@@ -47,21 +50,22 @@ def main() -> None:
     parser.add_argument("--save", default="scaling.png")
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--time-limit", type=float, default=300.0)
+    parser.add_argument("--nodes", type=int, nargs="+", default=NODES)
     asked = parser.parse_args()
     print(machine())
     measured = {
         name.removesuffix(".yaml"): np.array(
-            [seconds(name, nodes, asked.repeats, asked.time_limit) for nodes in NODES]
+            [seconds(name, nodes, asked.repeats, asked.time_limit) for nodes in asked.nodes]
         )
         for name in TASKS
     }
-    powers = {name: exponent(times) for name, times in measured.items()}
-    print("| task |" + "".join(f" N = {nodes} |" for nodes in NODES) + " exponent |")
-    print("|---|" + "---:|" * (len(NODES) + 1))
+    powers = {name: exponent(asked.nodes, times) for name, times in measured.items()}
+    print("| task |" + "".join(f" N = {nodes} |" for nodes in asked.nodes) + " exponent |")
+    print("|---|" + "---:|" * (len(asked.nodes) + 1))
     for name, times in measured.items():
         cells = "".join(f" {value:.2f} s |" for value in times)
         print(f"| {name} |{cells} {powers[name]:.2f} |")
-    print(save_figure(plot_growth(np.array(NODES), measured, powers), asked.save))
+    print(save_figure(plot_growth(np.array(asked.nodes), measured, powers), asked.save))
 
 
 if __name__ == "__main__":

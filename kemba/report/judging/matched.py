@@ -45,8 +45,9 @@ def matched(
 
     Where only the table misses on the plan's own model, valve edges are put on its ticks. Where
     the plant misses, the air is fitted; not where the task says `fit_air: false`, or its model has
-    no first-order chambers. A plan with fitted air that does not come true on its own model is made
-    anew from a guess, once. Nothing where the first plan fails by itself.
+    no first-order chambers. Where a plan with fitted air does not come true on its own model, or no
+    other air fits better, it is made anew from a guess, once. Nothing where the first plan fails by
+    itself.
     """
     tell = listener.tell
     how: dict[str, Any] = {"log": log, "tell": tell}
@@ -54,23 +55,22 @@ def matched(
     now, fit, ticks, anew = first, None, False, False
     tried: list[TriedAir] = []
     for _ in range(RefitRounds.current().rounds):
-        own = _replays(now)
-        if now.good or (not own and (fit is None or anew)):
+        if now.good:
             return
-        if not own:
-            anew = True  # with the same air, from a guess
-        elif not ticks and now.judged is not None and not now.judged.replays:
+        near = True
+        if not ticks and _table_misses(now):
             ticks = True
             tell("valve edges on the ticks of the controller")
-        else:
-            tried.append(TriedAir(fit, _late(now)))
-            new_fit = between(tried) or _fitted(now, task, fit)
-            if new_fit is None or (fit is not None and new_fit.factors == fit.factors):
-                return
-            fit = new_fit
+        elif other := _other_air(now, task, fit, tried):
+            fit = other
             tell("the air of the plan's model, fitted to the simulated robot")
+        elif fit is not None and not anew:
+            anew, near = True, False
+            tell("a plan from a guess, with this air")
+        else:
+            return
         asked = _with_air(task, fit)
-        new = _continued(now.plan, asked, document, ticks, fit is None, how) if own else None
+        new = _continued(now.plan, asked, document, ticks, fit is None, how) if near else None
         if new is None and fit is not None:
             new = plan(asked, document, **how)
         if new is None or not new.status.plan:
@@ -94,6 +94,22 @@ class TriedAir:
 def _replays(now: Executed) -> bool:
     """Whether the plan's own inputs come true on its model."""
     return now.judged is not None and now.judged.verdicts["replay"].good
+
+
+def _table_misses(now: Executed) -> bool:
+    """Whether of its own model's executions only that of the table misses."""
+    return _replays(now) and now.judged is not None and not now.judged.replays
+
+
+def _other_air(
+    now: Executed, task: Task, fit: FittedAir | None, tried: list[TriedAir]
+) -> FittedAir | None:
+    """Air that fits better, None where there is none; what the plan has is noted in `tried`."""
+    if not _replays(now):
+        return None
+    tried.append(TriedAir(fit, _late(now)))
+    new = between(tried) or _fitted(now, task, fit)
+    return None if new is None or (fit is not None and new.factors == fit.factors) else new
 
 
 def _late(now: Executed) -> float:
