@@ -15,7 +15,7 @@ FIGURES = ("height", "distance", "supply", "payload", "duration")
 # What says how a plan is made, named or judged, but not what is asked of it.
 APART = (
     *("name", "notes", "model", "plant", "effects", "nodes", "hold", "robust", "uncertainties"),
-    *("feet", "folding", "guess", "guess_noise", "seed", "fit_air", "solver", "tolerances"),
+    *("feet", "guess", "guess_noise", "seed", "fit_air", "solver", "tolerances"),
 )
 LETTERS = 12  # of a fingerprint
 
