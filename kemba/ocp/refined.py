@@ -16,14 +16,10 @@ from kemba.stopwatch import Stopwatch
 
 
 def refined(planner: Planner, found: Plan) -> Plan:
-    """The plan on its own phases; where that fails, one from another start.
-
-    A second start often gives a similar plan that can be refined. It is tried on half a robot
-    only: on a whole one, one failure takes long enough.
-    """
+    """The plan on its own phases; where that fails, one from another start, which often gives a
+    similar plan that can be refined."""
     first = on_phases(planner, found)
-    half = next(planner.reductions()).symmetric and planner.start is None
-    if first.refined or first.status is not Status.ACCEPTABLE or not half:
+    if first.refined or first.status is not Status.ACCEPTABLE or planner.start is not None:
         return first
     task, noise = planner.task, Refining.current().second_start
     nudged = {"guess_noise": max(task.guess_noise, noise), "seed": task.seed + 1}
