@@ -233,7 +233,8 @@ def test_dry_run_says_the_size_and_solves_nothing() -> None:
     done = run("jump.yaml", "--dry-run")
     assert done.exit_code == 0
     size = answer(run("jump.yaml", "--dry-run", "--json"))
-    assert done.stdout == f"jump: {size['variables']} variables, {size['constraints']} constraints\n"
+    told = f"{size['variables']} variables, {size['constraints']} constraints"
+    assert done.stdout == f"jump: {told}\n"
     assert 2500 < size["variables"] < 4500, "the paper's program has 8982"
     assert not Path("runs").exists()
     assert run("jump.yaml", "--dry-run", "--set", "cost.torqe=1").exit_code == 2
