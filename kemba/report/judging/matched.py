@@ -164,7 +164,8 @@ def _continued(
 ) -> Plan | None:
     """A plan continued for a task, with valve edges on ticks if `ticks`; None where that fails."""
     known = old.trajectory, old.model, old.requirements
-    origin = Origin(*known, _origin_of(old), once=once, ticks=ticks, stages=old.stages)
+    names = _origin_of(old), "other starts (--starts 4) may take less"
+    origin = Origin(*known, *names, once=once, ticks=ticks, stages=old.stages)
     return plan_from(origin, asked, document, **how)[0]
 
 
