@@ -39,8 +39,7 @@ stays upright. The intervals are Wilson's, of 95 %.
 STAND = """\
 `stand` asks for rest in the middle of the stroke, where no position of the valves bears the weight:
 its plan balances on pulses of air, without torque. A little less force, or another payload, and the
-legs sink to their stops, feet sliding apart; it lands, but does not stand at its height. Neither
-less friction in the plan (mu 0.4) nor a cost on air changes that (0 of 40 each)."""
+legs sink to their stops, feet sliding apart; it lands, but does not stand at its height."""
 
 
 def page(rows: Sequence[Row], repeats: str = "") -> str:

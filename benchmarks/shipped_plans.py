@@ -38,8 +38,8 @@ tolerances, also on the full plant. `of`: among how many. Errors are those on th
 the [`landing.air`](tasks.md) with which a plan was made, a pulse on stretched legs.
 Heights of 0.44 to 0.46 m and 0.9 m and distances beyond 0.3 m have none: with the tables of the
 planning model no plan that was tried keeps to the plant. With
-[fitted air](solving.md#air-that-fits-the-plant) `solve` finds good ones at these heights and
-0.35, 0.4 and 0.5 m ahead ([height by height](solving.md#height-by-height)), at 0.6 m none yet.
+[fitted air](solving.md#air-that-fits-the-plant) `solve` finds good ones at these heights
+([height by height](solving.md#height-by-height)) and at some of these distances.
 Facts of 28 plans were read again from their files when the page was written anew, so that `of` is
 too low at 0.64 to 0.72 m.
 Written by `benchmarks/shipped_plans.py` on {machine}.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import resource
 import shutil
 import subprocess
 import sys
@@ -293,15 +292,3 @@ def test_a_page_takes_no_library_that_it_does_not_need() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
-
-
-@pytest.mark.slow
-def test_a_page_is_there_within_ten_seconds(jump: Path, tmp_path: Path) -> None:
-    """Of processor time: what a machine with nothing else to do takes."""
-    logs = sorted(str(path) for path in (jump / "logs").glob("*.csv"))
-    words = ["review", *logs, "--run", str(jump), "--out", str(tmp_path / "page.html"), "-q"]
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    code = "from kemba_cli.main import main; main()"
-    subprocess.run([sys.executable, "-c", code, *words], check=True, capture_output=True)
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    assert after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime < 10.0

@@ -22,7 +22,8 @@ class Origin:
     """An earlier plan, the model it was made with, and what was asked of it.
 
     `name`: what sentences call it; `dear`: what to do where the new plan costs much more. `once`:
-    where the whole change fails in one step, nothing else is tried. `ticks`: valve edges of the new
+    where the whole change fails in one step, also from the earlier plan solved on its new
+    intervals, nothing else is tried. `ticks`: valve edges of the new
     plan are on the controller's ticks. `stages`: the solved program of the plan, where it is at
     hand.
     """

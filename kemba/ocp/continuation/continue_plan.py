@@ -161,12 +161,13 @@ class Continuation:
         return None
 
     def _walk(self, start: Trajectory, phases: list[Phase], reduction: Reduction) -> Refined:
-        """In one step if it converges, else in halves, from the earlier plan solved on these
-        intervals; then the best plan for what is asked."""
+        """In one step if it converges; else from the earlier plan solved on these intervals, in one
+        step again, then in halves. At last the best plan for what is asked."""
         settings = Continuing.current()
         done, step, settled = 0.0, 1.0, False
         found = Refined(None, None, Ending.GAVE_UP, 0)
-        for _ in range(3 if self.origin.once else settings.solves):
+        whole = 3  # solves: the change, none of it, the change again
+        for _ in range(whole if self.origin.once else settings.solves):
             share = min(1.0, done + step)
             self.tell(f"from {self.origin.name}: {share:.0%} of the change")
             found = self._solved(share, start, phases, reduction, settings.near)
@@ -174,7 +175,7 @@ class Continuation:
                 start, done, settled = found.trajectory, share, True
                 if done >= 1.0:
                     return self._best(found, phases, reduction)
-                step = 1.0 if not done else step
+                step = step or 1.0
             elif found.done or step / 2 < settings.shortest:
                 break
             else:

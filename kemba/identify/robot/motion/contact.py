@@ -14,7 +14,6 @@ from scipy.ndimage import (
     minimum_filter1d,
 )
 
-from kemba.identify.robot.motion.parabola import rate
 from kemba.settings import BY_HAND, Settings, setting
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -179,7 +178,9 @@ def slope(values: Array, dt: float) -> Array:
     """Rate of a noisy signal (n, ...) over a few hundredths of a second."""
     width = ContactSettings.current().rate_window
     window = min(2 * max(2, round(width / dt / 2)) + 1, (len(values) - 1) // 2 * 2 + 1)
-    return rate(values, window, dt)
+    from scipy.signal import savgol_filter  # it takes half a second
+
+    return np.asarray(savgol_filter(values, window, 2, deriv=1, delta=dt, axis=0))
 
 
 def ground_level(z: Array, rate: Array) -> float:

@@ -11,7 +11,6 @@ from kemba.effects.mechanics.contact import Contact
 from kemba.effects.mechanics.motor import Motor
 from kemba.effects.pneumatics.constants import ATMOSPHERE, GAS, TEMPERATURE
 from kemba.identify.problem.noise import difference_sigma
-from kemba.identify.robot.motion.parabola import rate as fitted_rate
 from kemba.mechanism import Cylinder
 from kemba.model import Model
 from kemba.plotting import Machine
@@ -99,11 +98,13 @@ def rate(track: Track, speed: str, position: str) -> Array:
         return t[speed]
     if position not in t or len(t) < 5:
         return np.full(len(t), np.nan)
+    from scipy.signal import savgol_filter  # it takes half a second
+
     step = float(np.median(np.diff(t.time)))
     width = max(5, 2 * round(0.5 * UseSettings.current().smooth / step) + 1)
     if width > len(t):
         return np.gradient(t[position], t.time)
-    return fitted_rate(t[position], width, step)
+    return np.asarray(savgol_filter(t[position], width, 2, deriv=1, delta=step))
 
 
 def full_for(track: Track, share: Array) -> float:
