@@ -66,7 +66,7 @@ def best_plan(
         made = last = executed(*one, approach.replay, listener.tell, begun, place)
         if not made.good and approach.replay:
             for last in matched(made, task, document, listener, begun, approach.log, place):
-                made = last if last.good else made
+                made = max(made, last, key=lambda made: made.rank[:3])
         best = made if best is None else max(best, made, key=lambda made: made.rank)
         if best.good and approach.starts == 1:
             break

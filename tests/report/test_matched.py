@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from kemba.config import dump_yaml
 from kemba.ocp import load_task
 from kemba.plant.execution.fitted_air import FittedAir
-from kemba.report.judging.matched import TriedAir, between
+from kemba.report.judging.remedies import TriedAir, between
 from kemba_cli.main import app
 
 WEAK = {"kind": "chamber", "F_extend": [258, 291, 314], "F_retract": [239, 260, 291]}  # 10 % less
