@@ -214,19 +214,26 @@ def _many(records: Sequence[Record]) -> list[str]:
     if not records:
         return []
     pairs = [(r, effect) for r in records for effect in r["truth"]]
-    seen = [(r, e["kind"]) for r, e in pairs if detectable(r, e)]
     start = "three to five at once: "
     rows = []
     for label, names in (("named", named), ("named, likely ones included", likely)):
-        wrong = [name not in hidden(r) for r in records for name in names(r)]
-        hits = [e["kind"] in names(r) for r, e in pairs]
-        large = [name in names(r) for r, name in seen]
+        hits = [(e["kind"] in names(r), detectable(r, e)) for r, e in pairs]
+        large = [hit for hit, seen in hits if seen]
+        wrong = [(r, name) for r in records for name in names(r) if name not in hidden(r)]
+        count, far = sum(len(names(r)) for r in records), [not _like_hidden(*w) for w in wrong]
         rows += [
-            _share(f"{start}hidden effects {label}", sum(hits), len(hits)),
+            _share(f"{start}hidden effects {label}", sum(hit for hit, _ in hits), len(hits)),
             _share(f"{start}those above their detectable size {label}", sum(large), len(large)),
-            _share(f"{start}of those {label}: wrong", sum(wrong), len(wrong)),
+            _share(f"{start}of those {label}: wrong", len(wrong), count),
+            _share(f"{start}of those {label}: wrong, no hidden one like it", sum(far), count),
         ]
     return [*rows, _row(f"{start}error beyond the noise falls 5 x", records, _excess_falls)]
+
+
+def _like_hidden(record: Record, name: str) -> bool:
+    """Whether the answer says that it cannot tell this effect from a hidden one."""
+    rows = [r for r in record["answer"]["ranking"] if r["effect"] == name]
+    return any(set(r["equivalent_to"]) & set(hidden(record)) for r in rows)
 
 
 def _excess_falls(record: Record) -> bool:
