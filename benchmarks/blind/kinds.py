@@ -48,3 +48,8 @@ def kind_of(effects: str | Sequence[str] | None) -> str:
 def named(record: Record) -> list[str]:
     """Effects that were added."""
     return list(record["answer"]["added"])
+
+
+def likely(record: Record) -> list[str]:
+    """Effects that the answer names, sure or not."""
+    return list(record["answer"]["found"])

@@ -9,9 +9,10 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from blind.kinds import SHAPES, Record, hidden, kind, named
+from blind.kinds import SHAPES, Record, hidden, kind, likely, named
 
 SURE = 0.95
+FALLS = 5.0  # times that the error beyond the noise has to fall where several effects are hidden
 
 
 def read(path: Path) -> list[Record]:
@@ -75,9 +76,14 @@ def overlooked(record: Record) -> bool:
     if record["answer"]["verdict"] != "nothing":
         return False
     (effect,) = record["truth"]
+    return detectable(record, effect)
+
+
+def detectable(record: Record, effect: Record) -> bool:
+    """Whether a hidden effect is larger than the size of it that the answer says it sees."""
     lead, true = next(iter(effect["parameters"].items()))
     least = record["answer"]["smallest_detectable"].get(effect["kind"], {}).get(lead, 0.0)
-    return abs(true - _off(lead, true)) > least
+    return bool(abs(true - _off(lead, true)) > least)
 
 
 def _off(name: str, true: float) -> float:
@@ -207,12 +213,32 @@ def _many(records: Sequence[Record]) -> list[str]:
     """Rows about three to five effects at once, where there are such cases."""
     if not records:
         return []
-    found = [name in named(r) for r in records for name in hidden(r)]
-    wrong = [name not in hidden(r) for r in records for name in named(r)]
-    return [
-        _share("three to five at once: hidden effects named", sum(found), len(found)),
-        _share("three to five at once: of the named ones wrong", sum(wrong), len(wrong)),
-    ]
+    pairs = [(r, effect) for r in records for effect in r["truth"]]
+    start = "three to five at once: "
+    rows = []
+    for label, names in (("named", named), ("named, likely ones included", likely)):
+        hits = [(e["kind"] in names(r), detectable(r, e)) for r, e in pairs]
+        large = [hit for hit, seen in hits if seen]
+        wrong = [(r, name) for r in records for name in names(r) if name not in hidden(r)]
+        count, far = sum(len(names(r)) for r in records), [not _like_hidden(*w) for w in wrong]
+        rows += [
+            _share(f"{start}hidden effects {label}", sum(hit for hit, _ in hits), len(hits)),
+            _share(f"{start}those above their detectable size {label}", sum(large), len(large)),
+            _share(f"{start}of those {label}: wrong", len(wrong), count),
+            _share(f"{start}of those {label}: wrong, no hidden one like it", sum(far), count),
+        ]
+    return [*rows, _row(f"{start}error beyond the noise falls 5 x", records, _excess_falls)]
+
+
+def _like_hidden(record: Record, name: str) -> bool:
+    """Whether the answer says that it cannot tell this effect from a hidden one."""
+    rows = [r for r in record["answer"]["ranking"] if r["effect"] == name]
+    return any(set(r["equivalent_to"]) & set(hidden(record)) for r in rows)
+
+
+def _excess_falls(record: Record) -> bool:
+    answer = record["answer"]
+    return bool(answer["excess_before"] >= FALLS * answer["excess_after"])
 
 
 def write(page: Path, name: str, text: str) -> None:

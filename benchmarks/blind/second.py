@@ -66,7 +66,7 @@ def cases() -> list[dict[str, Any]]:
             "size": SIZES[turn % 3],
             "noise": NOISES[(turn + turn // 3) % 3],
             "figures_off": float(rng.choice([0.01, 0.02])),
-            "runs": 3,
+            "runs": 5 if isinstance(effect, list) else 3,
             "air": str(rng.choice(AIR)),
             "colour": study.colour(i),
         }

@@ -10,6 +10,7 @@ import numpy as np
 from kemba.identify.answer import Ranked, Value
 from kemba.identify.doubt.cross_validation import left_out, left_out_error
 from kemba.identify.doubt.parsimony import Belief
+from kemba.identify.evidence.bounded import within_bounds
 from kemba.identify.evidence.linear import is_shape
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import (
@@ -108,9 +109,10 @@ def values(search: Search, hypothesis: Hypothesis, effect: str) -> dict[str, Val
     """
     point, candidate = search.points[hypothesis], search.problem.candidates[effect]
     found, imperfection = {}, SpikeSlabSettings.current().spike
+    z = within_bounds(search.problem, point)
     for key, parameter in candidate.keys().items():
         i = point.linear.index(key)
-        centre, sd = point.score.z[i], float(np.sqrt(point.score.covariance[i, i]))
+        centre, sd = z[i], float(np.sqrt(point.score.covariance[i, i]))
         step = 1.0 if is_shape(search.problem, key) else abs(centre - parameter.off)
         sd = float(np.hypot(sd, imperfection * step))
         low, high = centre - 1.96 * sd, centre + 1.96 * sd

@@ -13,6 +13,7 @@ from scipy.special import expit
 
 from kemba.identify.answer import Answer, Ranked, Value, Verdict, excess, phrase
 from kemba.identify.doubt.cross_validation import left_out
+from kemba.identify.evidence.bounded import within_bounds
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import Hypothesis, SpikeSlabSettings, share_of
 from kemba.identify.rest import rest_of
@@ -36,10 +37,10 @@ def structure_row(
     candidate = first.problem.candidates[structure]
     units = {p.name: p for p in candidate.shapes}
     point, imperfection = second.points[best], SpikeSlabSettings.current().spike
-    values = {}
+    values, z = {}, within_bounds(second.problem, point)
     for key, name in second.problem.own_figures.items():
         i, p = point.linear.index(key), units[name]
-        centre = float(point.score.z[i])
+        centre = float(z[i])
         sd = float(np.hypot(np.sqrt(point.score.covariance[i, i]), imperfection * abs(centre)))
         ends = (centre, centre - 1.96 * sd, centre + 1.96 * sd)
         value, low, high = np.clip(ends, p.lower, p.upper).tolist()

@@ -241,7 +241,10 @@ class _LeastSquares:
         jacobian[:rows, :n] = slopes * sigmas
         jacobian[rows:] = np.eye(len(x))
         if self.own:
-            moved = x + self.settings.step * np.eye(len(x))[n:]
+            # inwards at an upper bound: beyond it nothing changes
+            upper, step = self._bounds()[1][n:], self.settings.step
+            steps = np.where(x[n:] + step > upper, -step, step)
+            moved = x + np.eye(len(x))[n:] * steps[:, None]
             there = self._bounded(self.problem.residuals([self._theta(z) for z in moved]))
-            jacobian[:rows, n:] = (there - base[:rows, None]) / self.settings.step
+            jacobian[:rows, n:] = (there - base[:rows, None]) / steps
         return jacobian
