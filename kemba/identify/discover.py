@@ -173,9 +173,10 @@ def _best_gain(search: Search) -> float:
 
 def null_test(search: Search) -> NullTest:
     """The bootstrap of the search, with the noise these data have."""
-    base, linear = search.base, search.base.point.linear
+    base, mode = search.base, search.base.point.mode
+    linear = mode.linear
     blocks = time_blocks(search.problem, shortest=DiscoverSettings.current().fine)
-    left = base.residual + base.jacobian @ (base.flexible_fit() - linear.at)
+    left = mode.residual + base.jacobian @ (base.flexible_fit() - linear.at)
     noise = left_out_noise(base.jacobian, left, linear.width, blocks)
     singles = [(name,) for name in search.problem.candidates]
     return bootstrap(base.ranker(linear), noise, singles)
