@@ -162,9 +162,16 @@ def _undecided(search: Search, test: NullTest, holdout: Problem | None) -> Disco
 
 
 def _best_gain(search: Search) -> float:
-    """Evidence [nats] of the best single effect over nothing; of the smallest sets that were
-    refitted, where no single effect was. A larger set is one of many more than the simulated logs
-    are searched for, and would look rarer than it is."""
+    """Evidence [nats] of the best single effect over nothing, as in the simulated logs: by the
+    slopes about the null's mode. A refit, with shapes of its own, finds more than any of theirs.
+
+    Where the motion depends on the model, slopes along the null's motion tell too little: of the
+    refitted single effects; of the smallest sets that were refitted, where no single effect was. A
+    larger set is one of many more than the simulated logs are searched for, and would look rarer
+    than it is.
+    """
+    if not search.problem.moves:
+        return search.base.best_gain()
     sizes = [len(h) for h in search.points if h]
     null = search.points[NULL].log_evidence
     gains = (p.log_evidence - null for h, p in search.points.items() if len(h) == min(sizes))

@@ -30,7 +30,7 @@ def learnt_colour(
     blocks = time_blocks(plain) if blocks is None else blocks
     linear, jacobian, _ = linearise(plain, theta, blocks)
     on = tuple(n for n, c in plain.candidates.items() if is_on(theta, c.key, c.lead))
-    mode = mode_of(plain, on, theta, linear, jacobian, blocks)
+    mode = mode_of(plain, on, [theta], linear, jacobian, blocks)
     left = mode.residual + jacobian @ (best_fit(mode.linear) - mode.linear.at)
     return plain.recolour(left, careful=careful), jacobian
 

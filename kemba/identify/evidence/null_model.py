@@ -73,6 +73,11 @@ class Baseline:
         setting)."""
         return Ranker(linear, self.problem.candidates, self.problem.nuisance, spike)
 
+    def best_gain(self) -> float:
+        """Linear evidence [nats] of the best single effect over the null, about the null's mode."""
+        singles = self.ranker(self.point.mode.linear).table((1,))
+        return max(singles.values()) - self.point.log_evidence
+
     def flexible_fit(self) -> Array:
         """z (k,) of the best fit about the null's mode, every effect free within its full size."""
         return best_fit(self.point.mode.linear)
@@ -129,7 +134,8 @@ class Baseline:
         """The point of a refitted hypothesis with its slopes (n, k) along `names`."""
         r = self.problem.residual(fit.theta)
         linear, windowed = self.division.linear(fit.theta, names, slopes, r)
-        mode = self._mode(hypothesis, [fit.theta, self._beside(fit.theta)], linear, slopes)
+        beside = () if self.problem.moves else (self._beside(fit.theta),)
+        mode = self._mode(hypothesis, (fit.theta, *beside), linear, slopes)
         score = self.ranker(mode.linear).score(hypothesis)
         return LinearisationPoint(hypothesis, fit, linear, windowed, mode, score)
 
@@ -142,8 +148,8 @@ class Baseline:
     def also_from(self, point: LinearisationPoint) -> bool:
         """Whether the null fits better from the mode of another hypothesis, as where edges lie on
         the other side of readings; it is judged there from now on."""
-        candidates = self.problem.candidates
-        if self.problem.moves or any(candidates[e].shapes for e in point.hypothesis):
+        leads = [self.problem.candidates[effect].lead for effect in point.hypothesis]
+        if self.problem.moves or any(lead.unit != "s" for lead in leads):
             return False
         mode = self._mode(NULL, [point.mode.theta], self.point.linear, self.jacobian)
         if mode.cost >= self.point.mode.cost:
@@ -161,10 +167,8 @@ class Baseline:
         linear: Linear,
         slopes: Array,
     ) -> Mode:
-        """The best mode of a hypothesis from these starts."""
-        blocks = self.division.blocks
-        found = [mode_of(self.problem, hypothesis, s, linear, slopes, blocks) for s in starts]
-        return min(found, key=lambda mode: mode.cost)
+        """The mode of a hypothesis from the best of these starts."""
+        return mode_of(self.problem, hypothesis, starts, linear, slopes, self.division.blocks)
 
     def _improved(self, hypothesis: Hypothesis) -> float:
         """Log evidence of a single effect with the true residual at its linear estimate.

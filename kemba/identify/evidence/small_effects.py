@@ -8,7 +8,7 @@ on a machine that has a little of many. So every hypothesis is judged by the res
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,23 +45,23 @@ class Mode:
 def mode_of(
     problem: Problem,
     hypothesis: Hypothesis,
-    start: Theta,
+    starts: Iterable[Theta],
     linear: Linear,
     jacobian: Array,
     blocks: Labels,
 ) -> Mode:
-    """The mode of a hypothesis, by linear steps from `start`.
+    """The mode of a hypothesis, by linear steps from the best of `starts`.
 
     `linear` and its `jacobian` (n, k): slopes that hold there; `blocks` (n,) label the rows. Where
     the motion depends on the model, the residual is as straight as its slopes: the start is kept.
     """
     settings = SmallEffectsSettings.current()
-    best = at = _at(problem, hypothesis, start, linear, jacobian, blocks)
+    tried = [_at(problem, hypothesis, theta, linear, jacobian, blocks) for theta in starts]
+    best = at = min(tried, key=lambda mode: mode.cost)
     reached = _ranker(problem, at.linear).score(hypothesis).log_evidence
     for _ in range(0 if problem.moves else settings.rounds):
-        at = _at(
-            problem, hypothesis, _possible(problem, hypothesis, at.linear), linear, jacobian, blocks
-        )
+        theta = _possible(problem, hypothesis, at.linear)
+        at = _at(problem, hypothesis, theta, linear, jacobian, blocks)
         if not np.all(np.abs(at.residual) < settings.absurd):
             break  # a linear estimate may point to where nothing can be predicted
         best = at if at.cost < best.cost else best
