@@ -85,9 +85,10 @@ MACHINES = {
     "declared": "figures off by the declared tolerances, no effect; before",
     "imperfect before": "the same, and every effect and sensor fault at about 5 %, but no delay or "
     "lag; before",
-    "imperfect": "the same after it, machines of other seeds",
-    "late before": "the same with delays and lags; before hypotheses were scored at their mode",
-    "late": "the same since then, machines of other seeds",
+    "imperfect": "the same after it, machines of other seeds; before hypotheses were scored at "
+    "their mode",
+    "late before": "the same with delays and lags; before",
+    "late": "the same since hypotheses are scored at their mode, machines of other seeds",
 }
 
 
