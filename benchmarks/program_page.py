@@ -123,8 +123,8 @@ On machines drawn as the test believes them to be p-values were too small. A cau
 noise of the simulated logs: the fit that tells it from physics has some sixty figures, and takes
 slow noise for effects. {noise}
 
-Delays of a fraction of a row were worst: an edge falls before or after a reading, while a slope over
-a row tells of neither. A refitted delay had the residual of its own size, and the model without it
+Delays of a fraction of a row were worst: an edge falls before or after a reading, while a slope
+over a row tells of neither. A refitted delay had the residual of its own size, and the model without it
 had not. Every hypothesis is now scored where it fits best, small effects included, by the residual
 there (`kemba/identify/evidence/small_effects.py`), and logs and simulated logs are asked the same:
 what the slopes about the best fit of nothing say of single effects.
