@@ -14,8 +14,8 @@ machines that differ as the discovery believes:
 - `near`: by half as much, by 1 %. p-values are larger, and intervals hold the truth more often;
 - `imperfect`: as declared, and every effect and sensor fault is there with about 5 % of its size,
   but no delay and no lag;
-- `late`: with these, too. 5 % of a delay is a tenth of a row: an edge then falls before or after a
-  reading, which no slope over a whole row tells.
+- `late`: with these, too: a machine as the discovery believes in every respect. 5 % of a delay is a
+  tenth of a row: an edge then falls before or after a reading.
 
 Records are added to benchmarks/program.json; benchmarks/program_page.py writes its page from them.
 """

@@ -85,8 +85,10 @@ MACHINES = {
     "declared": "figures off by the declared tolerances, no effect; before",
     "imperfect before": "the same, and every effect and sensor fault at about 5 %, but no delay or "
     "lag; before",
-    "imperfect": "the same after it, machines of other seeds",
-    "late": "the same with delays and lags; before",
+    "imperfect": "the same after it, machines of other seeds; before hypotheses were scored at "
+    "their mode",
+    "late before": "the same with delays and lags; before",
+    "late": "the same since hypotheses are scored at their mode, machines of other seeds",
 }
 
 
@@ -121,9 +123,11 @@ On machines drawn as the test believes them to be p-values were too small. A cau
 noise of the simulated logs: the fit that tells it from physics has some sixty figures, and takes
 slow noise for effects. {noise}
 
-Delays of a fraction of a row are worst, and not mended: an edge falls before or after a reading,
-while the test knows only the slope over a row. A refitted delay has the slope of its own size, and
-the model without it has not, so that refits gain what the simulated slopes do not.
+Delays of a fraction of a row were worst: an edge falls before or after a reading, while a slope
+over a row tells of neither. A refitted delay had the residual of its own size, and the model without it
+had not. Every hypothesis is now scored where it fits best, small effects included, by the residual
+there (`kemba/identify/evidence/small_effects.py`), and logs and simulated logs are asked the same:
+what the slopes about the best fit of nothing say of single effects.
 The verdict also rests on another rule: an effect below a fifth of its size is no finding.
 """
 

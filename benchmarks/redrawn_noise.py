@@ -49,8 +49,9 @@ def powers(seed: int, folder: Path) -> tuple[float, float, float]:
     search = Search(admitted(logs, model_of(logs, "planning"))[0])
     search.start()
     base, problem = search.base, search.problem
-    linear, jacobian = base.point.linear, base.jacobian
-    left = base.residual + jacobian @ (base.flexible_fit() - linear.at)
+    mode, jacobian = base.point.mode, base.jacobian
+    linear = mode.linear
+    left = mode.residual + jacobian @ (base.flexible_fit() - linear.at)
     blocks = time_blocks(problem, shortest=DiscoverSettings.current().fine)
     along = directions(jacobian, base.ranker(linear).nuisance)
     plain = np.stack([jacobian[blocks == b].T @ left[blocks == b] for b in np.unique(blocks)])

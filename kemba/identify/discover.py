@@ -162,9 +162,16 @@ def _undecided(search: Search, test: NullTest, holdout: Problem | None) -> Disco
 
 
 def _best_gain(search: Search) -> float:
-    """Evidence [nats] of the best single effect over nothing; of the smallest sets that were
-    refitted, where no single effect was. A larger set is one of many more than the simulated logs
-    are searched for, and would look rarer than it is."""
+    """Evidence [nats] of the best single effect over nothing, as in the simulated logs: by the
+    slopes about the null's mode. A refit, with shapes of its own, finds more than any of theirs.
+
+    Where the motion depends on the model, slopes along the null's motion tell too little: of the
+    refitted single effects; of the smallest sets that were refitted, where no single effect was. A
+    larger set is one of many more than the simulated logs are searched for, and would look rarer
+    than it is.
+    """
+    if not search.problem.moves:
+        return search.base.best_gain()
     sizes = [len(h) for h in search.points if h]
     null = search.points[NULL].log_evidence
     gains = (p.log_evidence - null for h, p in search.points.items() if len(h) == min(sizes))
@@ -173,9 +180,10 @@ def _best_gain(search: Search) -> float:
 
 def null_test(search: Search) -> NullTest:
     """The bootstrap of the search, with the noise these data have."""
-    base, linear = search.base, search.base.point.linear
+    base, mode = search.base, search.base.point.mode
+    linear = mode.linear
     blocks = time_blocks(search.problem, shortest=DiscoverSettings.current().fine)
-    left = base.residual + base.jacobian @ (base.flexible_fit() - linear.at)
+    left = mode.residual + base.jacobian @ (base.flexible_fit() - linear.at)
     noise = left_out_noise(base.jacobian, left, linear.width, blocks)
     singles = [(name,) for name in search.problem.candidates]
     return bootstrap(base.ranker(linear), noise, singles)

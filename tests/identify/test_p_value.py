@@ -72,9 +72,10 @@ def test_intervals_hold_the_truth_as_often_as_they_say() -> None:
 
 
 def search(**gains: float) -> Any:
-    """A finished search: evidence by effects, as a_b for two together."""
+    """A finished search where the motion moves: evidence by effects, as a_b for two together."""
     points = {tuple(name.split("_")): gain for name, gain in gains.items()} | {(): 0.0}
-    return SimpleNamespace(points={h: SimpleNamespace(log_evidence=g) for h, g in points.items()})
+    found = {h: SimpleNamespace(log_evidence=gain) for h, gain in points.items()}
+    return SimpleNamespace(points=found, problem=SimpleNamespace(moves=True))
 
 
 def test_the_best_of_the_pairs_does_not_count_as_one_effect() -> None:

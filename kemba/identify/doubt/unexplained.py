@@ -176,7 +176,7 @@ def look(search: Search, best: Hypothesis) -> Formula | None:
     if not formulas:
         return None
     ranker, names = extended(
-        search, null.linear, search.base.jacobian, search.base.residual, formulas
+        search, null.mode.linear, search.base.jacobian, null.mode.residual, formulas
     )
     alone, ahead = _grow(ranker, names, ()), by_chance(len(names))
     catalogue = search.points[best].log_evidence - null.log_evidence

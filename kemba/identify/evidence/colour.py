@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from kemba.identify.evidence.linear import Linear, linearise, time_blocks
+from kemba.identify.evidence.linear import Linear, is_on, linearise, time_blocks
+from kemba.identify.evidence.small_effects import mode_of
 from kemba.identify.problem.problem import Array, Labels, Problem, Theta
 
 
@@ -27,8 +28,10 @@ def learnt_colour(
     """The same, and the Jacobian (n, k) at theta of the problem without colour."""
     plain = problem.recolour(None)
     blocks = time_blocks(plain) if blocks is None else blocks
-    linear, jacobian, r = linearise(plain, theta, blocks)
-    left = r + jacobian @ (best_fit(linear) - linear.at)
+    linear, jacobian, _ = linearise(plain, theta, blocks)
+    on = tuple(n for n, c in plain.candidates.items() if is_on(theta, c.key, c.lead))
+    mode = mode_of(plain, on, [theta], linear, jacobian, blocks)
+    left = mode.residual + jacobian @ (best_fit(mode.linear) - mode.linear.at)
     return plain.recolour(left, careful=careful), jacobian
 
 

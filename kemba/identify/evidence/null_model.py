@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from kemba.identify.evidence.linear import (
 )
 from kemba.identify.evidence.point import Division, LinearisationPoint
 from kemba.identify.evidence.refit import Fit, Frozen, refit
+from kemba.identify.evidence.small_effects import Mode, mode_of
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis, Ranker
 from kemba.identify.problem.problem import Array, Problem
 from kemba.settings import BY_HAND, Settings, setting
@@ -71,9 +73,14 @@ class Baseline:
         setting)."""
         return Ranker(linear, self.problem.candidates, self.problem.nuisance, spike)
 
+    def best_gain(self) -> float:
+        """Linear evidence [nats] of the best single effect over the null, about the null's mode."""
+        singles = self.ranker(self.point.mode.linear).table((1,))
+        return max(singles.values()) - self.point.log_evidence
+
     def flexible_fit(self) -> Array:
-        """z (k,) of the best fit at the null with every effect free within its full size."""
-        return best_fit(self.point.linear)
+        """z (k,) of the best fit about the null's mode, every effect free within its full size."""
+        return best_fit(self.point.mode.linear)
 
     def seen_from(self, theta: Mapping[str, float]) -> None:
         """Learn the noise colour from the residual at theta, and rank all hypotheses again."""
@@ -105,7 +112,7 @@ class Baseline:
         self.jacobian = self.problem.jacobian(theta, names) if jacobian is None else jacobian
         self.residual = self.problem.residual(theta)
         self.rescore(theta, names)
-        ranker = self.ranker(self.point.linear)
+        ranker = self.ranker(self.point.mode.linear)
         self.table = ranker.table((0, 1, 2) if self.among is None else (0, 1))
         for hypothesis in [h for h in self.table if len(h) == 1]:
             if self.among is None or hypothesis in self.among:
@@ -117,9 +124,51 @@ class Baseline:
         names = names or self.point.linear.names
         linear, windowed = self.division.linear(theta, names, self.jacobian, self.residual)
         fit = Fit(dict(theta), 0.5 * float(self.residual @ self.residual))
-        self.point = LinearisationPoint(
-            NULL, fit, linear, windowed, self.ranker(linear).score(NULL)
-        )
+        mode = self._mode(NULL, [theta], linear, self.jacobian)
+        score = self.ranker(mode.linear).score(NULL)
+        self.point = LinearisationPoint(NULL, fit, linear, windowed, mode, score)
+
+    def judged(
+        self, hypothesis: Hypothesis, fit: Fit, names: Names, slopes: Array
+    ) -> LinearisationPoint:
+        """The point of a refitted hypothesis with its slopes (n, k) along `names`."""
+        r = self.problem.residual(fit.theta)
+        linear, windowed = self.division.linear(fit.theta, names, slopes, r)
+        beside = () if self.problem.moves else (self._beside(fit.theta),)
+        mode = self._mode(hypothesis, (fit.theta, *beside), linear, slopes)
+        score = self.ranker(mode.linear).score(hypothesis)
+        return LinearisationPoint(hypothesis, fit, linear, windowed, mode, score)
+
+    def _beside(self, theta: Mapping[str, float]) -> dict[str, float]:
+        """Theta with what the mode of nothing has a little of beside its effects."""
+        on = {key.rsplit(".", 1)[0] for key in theta}
+        found = self.point.mode.theta.items()
+        return {k: v for k, v in found if k.rsplit(".", 1)[0] not in on} | dict(theta)
+
+    def also_from(self, point: LinearisationPoint) -> bool:
+        """Whether the null fits better from the mode of another hypothesis, as where edges lie on
+        the other side of readings; it is judged there from now on."""
+        leads = [self.problem.candidates[effect].lead for effect in point.hypothesis]
+        if self.problem.moves or any(lead.unit != "s" for lead in leads):
+            return False
+        mode = self._mode(NULL, [point.mode.theta], self.point.linear, self.jacobian)
+        if mode.cost >= self.point.mode.cost:
+            return False
+        score = self.ranker(mode.linear).score(NULL)
+        self.point = replace(self.point, mode=mode, score=score)
+        singles = self.ranker(mode.linear).table((1,))
+        self.table |= {h: max(e, self.table[h]) for h, e in singles.items()}
+        return True
+
+    def _mode(
+        self,
+        hypothesis: Hypothesis,
+        starts: Iterable[Mapping[str, float]],
+        linear: Linear,
+        slopes: Array,
+    ) -> Mode:
+        """The mode of a hypothesis from the best of these starts."""
+        return mode_of(self.problem, hypothesis, starts, linear, slopes, self.division.blocks)
 
     def _improved(self, hypothesis: Hypothesis) -> float:
         """Log evidence of a single effect with the true residual at its linear estimate.
@@ -143,7 +192,7 @@ class Baseline:
         null."""
         settings = NullModelSettings.current()
         free = {*self.problem.nuisance, *(self.problem.candidates[e].key for e in hypothesis)}
-        linear, best = self.point.linear, -np.inf
+        linear, best = self.point.mode.linear, -np.inf
         own = np.array([name in free for name in linear.names])
         for step in range(settings.glances + 1):
             if step or theta != self.point.fit.theta:

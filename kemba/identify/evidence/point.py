@@ -9,6 +9,7 @@ import numpy as np
 
 from kemba.identify.evidence.linear import Linear, condense, priors, time_blocks
 from kemba.identify.evidence.refit import Fit
+from kemba.identify.evidence.small_effects import Mode
 from kemba.identify.evidence.spike_slab import Hypothesis, Score
 from kemba.identify.evidence.windows import Windows, windows_of
 from kemba.identify.problem.problem import Array, Labels, Problem
@@ -18,14 +19,16 @@ from kemba.identify.problem.problem import Array, Labels, Problem
 class LinearisationPoint:
     """A hypothesis refitted, with the problem linearised there.
 
-    `linear`: by rows; `windowed`: by sums over aggregation windows. `score`: evidence of the
-    hypothesis.
+    `linear`: by rows; `windowed`: by sums over aggregation windows; in both of them effects that it
+    does not name are absent. `mode`: its best fit, where they may be there a little.
+    `score`: evidence of the hypothesis.
     """
 
     hypothesis: Hypothesis
     fit: Fit
     linear: Linear
     windowed: Linear
+    mode: Mode
     score: Score
 
     @property

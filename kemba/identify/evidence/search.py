@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from kemba.identify.evidence.colour import with_learnt_colour
-from kemba.identify.evidence.linear import Linear, estimate, names_of
+from kemba.identify.evidence.linear import estimate, names_of
 from kemba.identify.evidence.null_model import Baseline
 from kemba.identify.evidence.point import LinearisationPoint
 from kemba.identify.evidence.refit import Fit, refit
@@ -173,7 +173,7 @@ class Search:
         """Linear evidence of `given` plus one effect. The members of a pair that is much better
         than any single effect count as much as the best single effect."""
         if given != NULL:
-            ranker = self.base.ranker(self.points[given].linear)
+            ranker = self.base.ranker(self.points[given].mode.linear)
             return ranker.table((len(given) + 1,), given=given)
         single = self._singles()
         base = max(single.values())
@@ -193,6 +193,8 @@ class Search:
             self._learn_secant(hypothesis, fit)
             self.points[hypothesis] = self._point(hypothesis, fit)
             self._thetas[hypothesis] = fit.theta
+            if len(hypothesis) == 1 and self.base.also_from(self.points[hypothesis]):
+                self._judge_again()
         return self.points[hypothesis]
 
     def _learn_secant(self, hypothesis: Hypothesis, fit: Fit) -> None:
@@ -218,25 +220,23 @@ class Search:
         """Score everything again with the secants learnt."""
         if self._stale:
             self.base.rescore()
-            self.points = {h: self._point(h, p.fit) for h, p in self.points.items() if h}
-            self.points[NULL] = self.base.point
+            self._judge_again()
             self._stale = False
 
-    def _point(self, hypothesis: Hypothesis, fit: Fit) -> LinearisationPoint:
-        linear, windowed = self._near(fit)
-        score = self.base.ranker(linear).score(hypothesis)
-        return LinearisationPoint(hypothesis, fit, linear, windowed, score)
+    def _judge_again(self) -> None:
+        """Score every refitted hypothesis beside the null as it is now."""
+        others = {h: self._point(h, p.fit) for h, p in self.points.items() if h}
+        self.points = {**others, NULL: self.base.point}
 
-    def _near(self, fit: Fit) -> tuple[Linear, Linear]:
-        """The problem about a refitted point, by rows and by windows: slopes of its own parameters
-        are those of the fit, all others are the null's."""
+    def _point(self, hypothesis: Hypothesis, fit: Fit) -> LinearisationPoint:
+        """The problem about a refitted point: slopes of its own parameters are those of the fit,
+        all others are the null's."""
         names, base = names_of(self.problem, fit.theta), self.base
         known = base.point.linear
         columns = [
             fit.columns[n] if n in fit.columns else base.jacobian[:, known.index(n)] for n in names
         ]
-        r = self.problem.residual(fit.theta)
-        return base.division.linear(fit.theta, names, np.stack(columns, axis=1), r)
+        return base.judged(hypothesis, fit, names, np.stack(columns, axis=1))
 
     def _guess(self, hypothesis: Hypothesis) -> dict[str, float]:
         """Where a refit starts: at its last result, or at the linear estimate from the largest part
@@ -246,8 +246,9 @@ class Search:
         parts = [h for h in self.points if set(h) < set(hypothesis)]
         part = max(parts, key=lambda h: (len(h), self.points[h].log_evidence))
         point = self.points[part]
-        z = self.base.ranker(point.linear).score(hypothesis).z
-        guess = estimate(self.problem, point.linear, z)
+        linear = point.mode.linear
+        z = self.base.ranker(linear).score(hypothesis).z
+        guess = estimate(self.problem, linear, z)
         return {**guess, **{k: v for k, v in point.fit.theta.items() if k not in guess}}
 
     def best(self) -> Hypothesis:
