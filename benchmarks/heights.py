@@ -13,7 +13,7 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -35,11 +35,14 @@ BEGIN = "<!-- heights: written by benchmarks/heights.py -->"
 END = "<!-- end of heights -->"
 
 
-def planned(height: float, folder: Path) -> Path:
-    """The run of a height, made where it is missing."""
+def planned(height: float, folder: Path, changes: Sequence[str] = ()) -> Path:
+    """The run of a height, made where it is missing; `changes`: of the task."""
     out = folder / f"{height:.2f}"
     if not (out / "certificate.json").is_file():
-        words = ["solve", "jump.yaml", "--set", f"height={height} m", "--no-figure", "--quiet"]
+        options = [
+            word for change in (f"height={height} m", *changes) for word in ("--set", change)
+        ]
+        words = ["solve", "jump.yaml", *options, "--no-figure", "--quiet"]
         call = [sys.executable, "-c", SOLVE, *words, "--out", str(out)]
         subprocess.run(call, check=False)
     return out
@@ -109,8 +112,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--folder", type=Path, default=Path("runs/heights"))
     parser.add_argument("--save", type=Path, help="the page to write the table into")
+    parser.add_argument(
+        "--set", action="append", default=[], help="change the task: duration=0.8 s"
+    )
     asked = parser.parse_args()
-    rows = [row(height, planned(height, asked.folder)) for height in sorted(HEIGHTS)]
+    rows = [row(h, planned(h, asked.folder, asked.set)) for h in sorted(HEIGHTS)]
     lines = list(summary(rows))
     if asked.save:
         put_block(asked.save, BEGIN, END, lines)

@@ -11,10 +11,10 @@ from kemba.config import Document
 from kemba.ocp import Plan, Task, plan
 from kemba.ocp.continuation.between import Origin
 from kemba.ocp.known import compared
-from kemba.ocp.planning import plans_nearby
+from kemba.ocp.planning import plan_from, plans_nearby
 from kemba.ocp.starts import plan_best
 from kemba.report.judging.executed import Begun, Executed, executed
-from kemba.report.judging.matched import matched
+from kemba.report.judging.matched import matched, summed
 from kemba.report.listener import Listener
 from kemba.trajectory import Trajectory
 
@@ -97,8 +97,15 @@ def _candidates(
     if approach.replay and task.robust > 0:
         from kemba.report.robust import most_robust  # loads SciPy, which most plans do not need
 
+        def changed(found: Plan, task: Task) -> Plan | None:
+            names = "the plan as asked", "other starts (--starts 4) may take less"
+            known = found.trajectory, found.model, found.requirements
+            origin = Origin(*known, *names, once=True, stages=found.stages)
+            new, _ = plan_from(origin, task, document, approach.log, **how)
+            return new and summed(found, new)
+
         found = most_robust(
-            task, lambda task: next(nearby(task), None) or solved(task), listener.tell
+            task, lambda task: next(nearby(task), None) or solved(task), changed, listener.tell
         )
         yield found.plan, found.table, found.share
         return

@@ -75,7 +75,7 @@ def matched(
             new = plan(asked, document, **how)
         if new is None or not new.status.plan:
             return
-        new = _summed(now.plan, new)
+        new = summed(now.plan, new)
         now = executed(new, None, None, True, tell, begun, place)
         if fit is not None:
             now.result["fitted_air"] = fit.summary()
@@ -169,7 +169,7 @@ def _continued(
     return plan_from(origin, asked, document, **how)[0]
 
 
-def _summed(old: Plan, new: Plan) -> Plan:
+def summed(old: Plan, new: Plan) -> Plan:
     """The new plan with the solves and the times of both."""
     return replace(
         new,
