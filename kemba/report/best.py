@@ -64,9 +64,14 @@ def best_plan(
     best: Executed | None = None
     for one in _candidates(task, document, approach, listener):
         made = last = executed(*one, approach.replay, listener.tell, begun, place)
-        if not made.good and approach.replay:
-            for last in matched(made, task, document, listener, begun, approach.log, place):
+        if approach.replay and not made.good:
+            asked = one[0].task if task.robust else task
+            for last in matched(made, asked, document, listener, begun, approach.log, place):
                 made = last if last.good else made
+        if one[2] is not None and made.plan is not one[0]:
+            from kemba.report.robust import with_share
+
+            made = with_share(made)
         best = made if best is None else max(best, made, key=lambda made: made.rank)
         if best.good and approach.starts == 1:
             break

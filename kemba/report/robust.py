@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 from kemba.model import Model
 from kemba.ocp import Plan, Task
 from kemba.ocp.certificate.status import Status
+from kemba.report.judging.executed import Executed
 from kemba.report.judging.judged import judged, plant_of, table_of
-from kemba.report.robust_ways import RobustSettings, changes, variants
+from kemba.report.robust_ways import WAYS, Changed, RobustSettings, variants
 from kemba.scenarios.draw import Scenario, scenarios
 from kemba.scenarios.share import Share, share
 from kemba.trajectory import Trajectory
 
 Solve = Callable[[Task], Plan]
 Change = Callable[[Plan, Task], Plan | None]
+Way = Callable[[Plan, Sequence[Scenario]], Changed]
 
 
 @dataclass(frozen=True)
@@ -57,13 +59,8 @@ def most_robust(
     search = _Search(plant, scenarios(task.uncertainties, plant, task.robust), tell)
     first = solve(task)
     search.take("as asked", first)
-    if first.status.plan:
-        for name, changed in changes(task, first, search.cases):
-            if search.over:
-                break
-            found = change(first, changed)
-            told = found and replace(found, sentence=f"{found.sentence}; {name}")
-            search.take(name, told)
+    for way in WAYS if first.status.plan else ():
+        search.along(way, first, change)
     for name, variant in variants(task):
         if search.over:
             break
@@ -81,11 +78,22 @@ class _Search:
     best: RobustCandidate | None = field(default=None)
     over: bool = False
 
-    def take(self, name: str, found: Plan | None) -> None:
+    def along(self, way: Sequence[Way], found: Plan, change: Change) -> None:
+        """Execute a plan after each change of a way that it needs, as far as that goes."""
+        for step in way:
+            changed = None if self.over else step(found, self.cases)
+            if changed is None:
+                continue
+            name, task = changed
+            new = change(found, task)
+            if new is None:
+                self.tell(f"{name}: no plan")
+                return
+            found = replace(new, sentence=f"{new.sentence}; {name}")
+            self.take(name, found)
+
+    def take(self, name: str, found: Plan) -> None:
         """Execute a plan in all scenarios, with its own hold and with a longer one."""
-        if found is None:
-            self.tell(f"{name}: no plan")
-            return
         self.over = found.status is Status.INTERRUPTED
         if self.over or not found.status.plan:
             return
@@ -101,3 +109,16 @@ class _Search:
             if self.best.enough:
                 self.over = True
                 return
+
+
+def with_share(found: Executed) -> Executed:
+    """A plan that was made again after its share was taken, with its own; the same where it has no
+    table. Raises KembaError where the plant or the uncertainties are wrong."""
+    plan, table = found.plan, found.motions.table
+    if table is None:
+        return found
+    cases = scenarios(plan.task.uncertainties, plant_of(plan.task), plan.task.robust)
+    landed = share(plan.model, plan.trajectory, table, cases)
+    sentence = f"{found.result['sentence']}; {landed.sentence}"
+    result = {**found.result, "robust": landed.summary(), "sentence": sentence}
+    return replace(found, result=result)

@@ -13,6 +13,7 @@ from kemba.ocp.certificate.grip import grip_of
 from kemba.scenarios.draw import Scenario
 from kemba.settings import Settings, setting
 
+Changed = tuple[str, Task] | None  # the changed task, and words for the sentence of its plan
 TRIALS = "tuned: by hand on jumps of 0.36 to 0.9 m (docs/tasks.md), no benchmark"
 
 
@@ -37,22 +38,27 @@ class RobustSettings(Settings):
     starts: int = setting(1, "1", "other starts", "convention: three times a plain plan at most")
 
 
-def changes(task: Task, found: Plan, cases: Sequence[Scenario]) -> Iterator[tuple[str, Task]]:
-    """What the plan of `task` may be continued for, with words for the plan's sentence.
+def gripping(found: Plan, cases: Sequence[Scenario]) -> Changed:
+    """What a plan is continued for where it leans on more friction than the scenarios have."""
+    task, grip = found.task, least_grip(found.model, cases)
+    if (grip_of(found.model, found.trajectory) or 0.0) <= grip:
+        return None
+    return f"on {grip:.0%} of the ground's friction", task.model_copy(update={"grip": grip})
 
-    First what the scenarios' ground holds, within the task; then more time than the task gives.
-    """
-    settings = RobustSettings.current()
-    grip = least_grip(found.model, cases)
-    used = grip_of(found.model, found.trajectory) or 0.0
-    sure = task.model_copy(update={"grip": min(task.grip, grip)})
-    if used > sure.grip:
-        yield f"on {sure.grip:.0%} of the ground's friction", sure
+
+def longer(found: Plan, cases: Sequence[Scenario]) -> Changed:
+    """What a plan is continued for where it takes all the time that its task has."""
+    task, settings = found.task, RobustSettings.current()
     longest = task.duration * (1.0 + task.step_variation)
-    if found.trajectory.time[-1] >= longest * (1.0 - settings.full):
-        duration = task.duration * (1.0 + settings.longer)
-        longer = sure.model_copy(update={"duration": duration})
-        yield f"with a duration of {duration:.3g} s instead of {task.duration:g} s", longer
+    if found.trajectory.time[-1] < longest * (1.0 - settings.full):
+        return None
+    duration = task.duration * (1.0 + settings.longer)
+    words = f"with a duration of {duration:.3g} s instead of {task.duration:g} s"
+    return words, task.model_copy(update={"duration": duration})
+
+
+# in which order a plan is changed: first within its task, then with more time than that gives
+WAYS = ((gripping,), (longer, gripping))
 
 
 def variants(task: Task) -> Iterator[tuple[str, Task]]:

@@ -21,7 +21,7 @@ from kemba.report.judging.judged import judged, plant_of, table_of
 @cache
 def high(grip: float) -> Plan:
     """A jump of 0.84 m from a shipped plan, which leans on the friction as far as it goes."""
-    task, document = load_task("jump.yaml", ["height=0.84 m", f"grip={grip}"])
+    task, document = load_task("jump.yaml", ["height=0.84 m", "duration=0.7 s", f"grip={grip}"])
     return next(plans_nearby(task, document))
 
 
@@ -53,7 +53,9 @@ def test_it_does_not_slip_where_the_ground_has_no_more(grip: float, slips: bool)
 
 def test_a_plan_from_a_guess_keeps_to_it() -> None:
     """A jump that needs 0.23 of the friction."""
-    task, document = load_task("jump.yaml", ["nodes=50", "grip=0.15", "guess_noise=0.01"])
+    task, document = load_task(
+        "jump.yaml", ["duration=0.7 s", "nodes=50", "grip=0.15", "guess_noise=0.01"]
+    )
     found = plan(task, document)
     assert found.status is Status.SOLVED, found.sentence
     assert grip_of(found.model, found.trajectory) < 0.151
