@@ -2,6 +2,7 @@
 
     python benchmarks/heights.py [--folder runs/heights]          # plans what is not there yet
     python benchmarks/heights.py --save docs/solving.md          # writes the table
+    python benchmarks/heights.py --folder runs/longer --set "duration=0.75 s" --save docs/solving.md
 
 A run is kept in the folder; delete it to plan it anew.
 """
@@ -33,6 +34,8 @@ HEIGHTS = (*(round(0.36 + 0.02 * i, 2) for i in range(28)), 0.45)  # m
 SOLVE = "from kemba_cli.main import main; main()"
 BEGIN = "<!-- heights: written by benchmarks/heights.py -->"
 END = "<!-- end of heights -->"
+CHANGED = "<!-- changed heights: written by benchmarks/heights.py --set -->"
+END_CHANGED = "<!-- end of changed heights -->"
 
 
 def planned(height: float, folder: Path, changes: Sequence[str] = ()) -> Path:
@@ -117,9 +120,10 @@ def main() -> None:
     )
     asked = parser.parse_args()
     rows = [row(h, planned(h, asked.folder, asked.set)) for h in sorted(HEIGHTS)]
-    lines = list(summary(rows))
+    told = [f"With `{change}`:" for change in asked.set]
+    lines = [*told, *([""] if told else []), *summary(rows)]
     if asked.save:
-        put_block(asked.save, BEGIN, END, lines)
+        put_block(asked.save, *((CHANGED, END_CHANGED) if asked.set else (BEGIN, END)), lines)
     print("\n".join(lines))
 
 
