@@ -2,6 +2,7 @@
 
     python benchmarks/heights.py [--folder runs/heights]          # plans what is not there yet
     python benchmarks/heights.py --save docs/solving.md          # writes the table
+    python benchmarks/heights.py --folder runs/longer --set "duration=0.75 s" --save docs/solving.md
 
 A run is kept in the folder; delete it to plan it anew.
 """
@@ -13,7 +14,7 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -33,13 +34,18 @@ HEIGHTS = (*(round(0.36 + 0.02 * i, 2) for i in range(28)), 0.45)  # m
 SOLVE = "from kemba_cli.main import main; main()"
 BEGIN = "<!-- heights: written by benchmarks/heights.py -->"
 END = "<!-- end of heights -->"
+CHANGED = "<!-- changed heights: written by benchmarks/heights.py --set -->"
+END_CHANGED = "<!-- end of changed heights -->"
 
 
-def planned(height: float, folder: Path) -> Path:
-    """The run of a height, made where it is missing."""
+def planned(height: float, folder: Path, changes: Sequence[str] = ()) -> Path:
+    """The run of a height, made where it is missing; `changes`: of the task."""
     out = folder / f"{height:.2f}"
     if not (out / "certificate.json").is_file():
-        words = ["solve", "jump.yaml", "--set", f"height={height} m", "--no-figure", "--quiet"]
+        options = [
+            word for change in (f"height={height} m", *changes) for word in ("--set", change)
+        ]
+        words = ["solve", "jump.yaml", *options, "--no-figure", "--quiet"]
         call = [sys.executable, "-c", SOLVE, *words, "--out", str(out)]
         subprocess.run(call, check=False)
     return out
@@ -109,11 +115,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--folder", type=Path, default=Path("runs/heights"))
     parser.add_argument("--save", type=Path, help="the page to write the table into")
+    parser.add_argument(
+        "--set", action="append", default=[], help="change the task: duration=0.8 s"
+    )
     asked = parser.parse_args()
-    rows = [row(height, planned(height, asked.folder)) for height in sorted(HEIGHTS)]
-    lines = list(summary(rows))
+    rows = [row(h, planned(h, asked.folder, asked.set)) for h in sorted(HEIGHTS)]
+    told = [f"With `{change}`:" for change in asked.set]
+    lines = [*told, *([""] if told else []), *summary(rows)]
     if asked.save:
-        put_block(asked.save, BEGIN, END, lines)
+        put_block(asked.save, *((CHANGED, END_CHANGED) if asked.set else (BEGIN, END)), lines)
     print("\n".join(lines))
 
 

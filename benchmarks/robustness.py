@@ -19,6 +19,7 @@ import sys
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
+from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -74,11 +75,21 @@ class Bench:
         return self.run.path / "controller.csv"
 
 
+def _parts(words: str) -> tuple[str, list[str]]:
+    """The task of some words, and its changes."""
+    task, *changes = words.split(" ", 1)
+    return task, changes[0].split(", ") if changes else []
+
+
+def _folder_of(words: str, folder: Path) -> Path:
+    task, changes = _parts(words)
+    return folder / "-".join([task, *(c.replace(" ", "") for c in changes)])
+
+
 def planned(words: str, folder: Path, anew: bool) -> Bench:
     """The plan of a task with its changes, from `folder` where it is there."""
-    task, *changes = words.split(" ", 1)
-    changes = changes[0].split(", ") if changes else []
-    out = folder / "-".join([task, *(c.replace(" ", "") for c in changes)])
+    task, changes = _parts(words)
+    out = _folder_of(words, folder)
     if anew and out.exists():
         shutil.rmtree(out)
     if not (out / "controller.csv").is_file():
@@ -166,7 +177,7 @@ def main() -> None:
             for way in asked.ways:
                 cases = range(asked.cases or asked.drawn)
                 for row in records(bench, *WAYS[way], cases, asked.drawn, known):
-                    rows.append({**row, "machine": machine()})
+                    rows.append({**row, "machine": machine(), "on": date.today().isoformat()})
                     with kept.open("a", encoding="utf-8") as stream:
                         stream.write(json.dumps(rows[-1]) + "\n")
                 here = (name, *WAYS[way])
@@ -175,8 +186,19 @@ def main() -> None:
     jump = asked.folder / "jump"
     told = drawn(jump, asked.out.parent / PICTURE) if jump.is_dir() else ""
     with atomic_text(asked.out) as stream:
-        stream.write(page(rows, told))
+        stream.write(page(rows, told, _costs(rows, asked.folder)))
     print(asked.out)
+
+
+def _costs(rows: list[dict[str, Any]], folder: Path) -> dict[str, float]:
+    """The squared torque of every task whose run is in the folder."""
+    found = {}
+    for name in dict.fromkeys(row["task"] for row in rows):
+        file = _folder_of(name, folder) / "certificate.json"
+        if file.is_file():
+            facts = json.loads(file.read_text(encoding="utf-8"))
+            found[name] = float(facts["cost"]["torque_squared_integral"])
+    return found
 
 
 def _read(path: Path) -> list[dict[str, Any]]:

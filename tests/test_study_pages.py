@@ -24,15 +24,16 @@ def execution(index: int, way: str, fault: str, of: str = "new") -> dict[str, An
     return {
         "task": "stand", "conditions": "twice", "way": way, "of": of, "drawn": 8, "index": index,
         "fault": fault, "apex_error_m": -0.01 * index, "final_error_m": 0.02 * index, "cpu_s": 0.1,
-        "machine": "here", "values": {"payload": f"{0.1 * index} kg"},
+        "machine": "here", "on": "2026-11-22", "values": {"payload": f"{0.1 * index} kg"},
     }  # fmt: skip
 
 
 def test_shares_are_of_the_latest_table_only() -> None:
     old = [execution(i, "open loop", "tips over", "old") for i in range(8)]
     new = [execution(i, "open loop", "tips over" if i > 5 else "") for i in range(8)]
-    text = robustness_page.page([*old, *new])
-    assert "| stand | not run | 75.0 % of 8 (41 to 93) | not run |" in text
+    text = robustness_page.page([*old, *new], costs={"stand": 0.0594})
+    row = "| stand | not run | 75.0 % of 8 (41 to 93) | not run | 0.0594 | 2026-11-22 |"
+    assert row in text
     assert "- stand, twice, open loop: tips over (2)" in text
 
 

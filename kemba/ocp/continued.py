@@ -69,18 +69,27 @@ def from_scratch(found: Plan, why: str) -> Plan:
     return replace(found, sentence=sentence, continued=False)
 
 
-def with_air(planner: Planner, found: Plan) -> Plan:
-    """The plan solved again with the pulse that `landing.air` asks for.
+def with_air_and_grip(planner: Planner, found: Plan) -> Plan:
+    """The plan solved again with the pulse that `landing.air` asks for, and within `grip`.
 
-    Steps of the relaxed problem are too long for a pulse of some milliseconds, so that it comes
-    last. Where that fails, the plan without it is not what was asked.
+    Steps of the relaxed problem are too long for a pulse of some milliseconds, and which way a foot
+    pushes is decided there on all of the ground's friction; so both come last. Where that fails,
+    the plan without them is not what was asked.
     """
-    asked = tuple(planner.requirements)
-    name, model = "the plan without air", planner.model
-    origin = Origin(found.trajectory, model, asked, name, once=True, stages=found.stages)
+    task = planner.task
+    given = {"landing.air": task.landing.air is not None, "grip": task.grip < 1.0}
+    keys = " and ".join(f"`{key}`" for key, asked in given.items() if asked)
+    origin = Origin(
+        found.trajectory,
+        planner.model,
+        tuple(planner.requirements),
+        f"the plan without {keys}",
+        once=not given["grip"],
+        stages=found.stages,
+    )
     near, why = continued(planner, origin)
     if near is None:
-        what = f"`landing.air` is not kept ({why})"
+        what = f"{keys} is not kept ({why})"
         return replace(found, status=Status.ACCEPTABLE, sentence=f"{what}; {found.sentence}")
     wall, cpu = found.solve_s + near.solve_s, found.solve_cpu_s + near.solve_cpu_s
     return replace(near, continued=None, solve_s=wall, solve_cpu_s=cpu)

@@ -12,7 +12,7 @@ from kemba.errors import KembaError
 from kemba.model import Model
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.continuation.between import Origin
-from kemba.ocp.continued import continued, from_scratch, with_air
+from kemba.ocp.continued import continued, from_scratch, with_air_and_grip
 from kemba.ocp.infeasibility.checks import check_task
 from kemba.ocp.infeasibility.diagnostic import Diagnostic
 from kemba.ocp.infeasibility.explain import Explanation, explanation, refusal
@@ -61,8 +61,8 @@ def plan(
     found = searched(planner, refused is not None)
     if found.status is Status.SOLVED and task.refine == "radau":
         found = refined(planner, found)
-    if found.status is Status.SOLVED and task.landing.air:
-        found = with_air(planner, found)
+    if found.status is Status.SOLVED and (task.landing.air or task.grip < 1.0):
+        found = with_air_and_grip(planner, found)
     if found.status is Status.SOLVED and task.clearance:
         found = clear(found)
     if not found.status.plan and found.status is not Status.INTERRUPTED:
@@ -102,7 +102,7 @@ def _origin(entry: Entry, task: Task) -> Origin:
     model = task_model(own)
     asked = resolve(own, model, Document(own.model_dump()))
     name, dear = f"the shipped plan {entry.name}", "one from a guess (--cold) may take less"
-    return Origin(entry.plan, model, tuple(asked), name, dear, once=True)
+    return Origin(entry.plan, model, tuple(asked), name, dear, once=task.grip == 1.0)
 
 
 def plan_from(

@@ -53,11 +53,12 @@ def on_phases(planner: Planner, found: Plan) -> Plan:
     """The plan solved again on its own phases; where that fails, the same with the reason."""
     refining = Stopwatch()
     task, model = found.task, found.model
+    free = task.model_copy(update={"grip": 1.0})  # it comes last, from the plan that is found
     with refining.running():
         control = planner.session.control
         tell = planner.session.tell
         answer = refine(
-            model, task, found.requirements, found.trajectory, control=control, tell=tell
+            model, free, found.requirements, found.trajectory, control=control, tell=tell
         )
     planner.session.attempts.append(Attempt("phases", answer.ending, answer.iterations))
     found = replace(

@@ -11,10 +11,10 @@ from kemba.config import Document
 from kemba.ocp import Plan, Task, plan
 from kemba.ocp.continuation.between import Origin
 from kemba.ocp.known import compared
-from kemba.ocp.planning import plans_nearby
+from kemba.ocp.planning import plan_from, plans_nearby
 from kemba.ocp.starts import plan_best
 from kemba.report.judging.executed import Begun, Executed, executed
-from kemba.report.judging.matched import matched
+from kemba.report.judging.matched import matched, summed
 from kemba.report.listener import Listener
 from kemba.trajectory import Trajectory
 
@@ -64,9 +64,14 @@ def best_plan(
     best: Executed | None = None
     for one in _candidates(task, document, approach, listener):
         made = last = executed(*one, approach.replay, listener.tell, begun, place)
-        if not made.good and approach.replay:
-            for last in matched(made, task, document, listener, begun, approach.log, place):
+        if approach.replay and not made.good:
+            asked = one[0].task if task.robust else task
+            for last in matched(made, asked, document, listener, begun, approach.log, place):
                 made = max(made, last, key=lambda made: made.rank[:3])
+        if one[2] is not None and made.plan is not one[0]:
+            from kemba.report.robust import with_share
+
+            made = with_share(made)
         best = made if best is None else max(best, made, key=lambda made: made.rank)
         if best.good and approach.starts == 1:
             break
@@ -97,8 +102,15 @@ def _candidates(
     if approach.replay and task.robust > 0:
         from kemba.report.robust import most_robust  # loads SciPy, which most plans do not need
 
+        def changed(found: Plan, task: Task) -> Plan | None:
+            names = "the plan as asked", "other starts (--starts 4) may take less"
+            known = found.trajectory, found.model, found.requirements
+            origin = Origin(*known, *names, once=True, stages=found.stages)
+            new, _ = plan_from(origin, task, document, approach.log, **how)
+            return new and summed(found, new)
+
         found = most_robust(
-            task, lambda task: next(nearby(task), None) or solved(task), listener.tell
+            task, lambda task: next(nearby(task), None) or solved(task), changed, listener.tell
         )
         yield found.plan, found.table, found.share
         return

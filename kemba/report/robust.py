@@ -2,31 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 
+from kemba.model import Model
 from kemba.ocp import Plan, Task
 from kemba.ocp.certificate.status import Status
+from kemba.report.judging.executed import Executed
 from kemba.report.judging.judged import judged, plant_of, table_of
-from kemba.scenarios.draw import scenarios
+from kemba.report.robust_ways import WAYS, Changed, RobustSettings, variants
+from kemba.scenarios.draw import Scenario, scenarios
 from kemba.scenarios.share import Share, share
-from kemba.settings import Settings, setting
 from kemba.trajectory import Trajectory
 
-TRIALS = "tuned: by hand on jumps of 0.36 to 0.9 m (docs/tasks.md), no benchmark"
-
-
-class RobustSettings(Settings):
-    """Which plans are tried, and when one is good enough."""
-
-    enough: float = setting(0.98, "1", "share of scenarios at which no other plan is tried", TRIALS)
-    hold: float = setting(
-        0.3, "s", "hold of a plan whose task has none",
-        "derived: a robot that was put down askew has settled by then (docs/tasks.md)",
-    )  # fmt: skip
-    air: float = setting(0.3, "1", "cost of open valves of a candidate that has less", TRIALS)
-    noise: float = setting(0.1, "1", "guess noise of other starts", TRIALS)
-    starts: int = setting(1, "1", "other starts", "convention: three times a plain plan at most")
+Solve = Callable[[Task], Plan]
+Change = Callable[[Plan, Task], Plan | None]
+Way = Callable[[Plan, Sequence[Scenario]], Changed]
 
 
 @dataclass(frozen=True)
@@ -55,49 +46,79 @@ class RobustCandidate:
         return self.share.landed >= least * self.share.n
 
 
-def variants(task: Task) -> Iterator[tuple[str, Task]]:
-    """The task as asked for, then the same motion sought in other ways."""
-    settings = RobustSettings.current()
-    held = task.model_copy(update={"hold": max(task.hold, settings.hold)})
-    yield "as asked", task
-    if task.cost.get("air", 0.0) < settings.air:
-        yield "less air", held.model_copy(update={"cost": {**task.cost, "air": settings.air}})
-    for seed in range(1, settings.starts + 1):
-        guess = {"guess_noise": max(task.guess_noise, settings.noise), "seed": task.seed + seed}
-        yield f"start {seed + 1}", held.model_copy(update=guess)
-
-
 def most_robust(
-    task: Task, solve: Callable[[Task], Plan], tell: Callable[[str], None]
+    task: Task, solve: Solve, change: Change, tell: Callable[[str], None]
 ) -> RobustCandidate:
     """The plan that succeeds in most of `task.robust` scenarios of `task.uncertainties`.
 
-    Each plan is executed with its own hold and with a longer one. Where none is found, the first
-    failed one. Raises KembaError where the plant or the uncertainties are wrong.
+    `solve` plans a task; `change` continues a plan for a changed task, None where that fails. Each
+    plan is executed with its own hold and with a longer one. Where none is found, the first failed
+    one. Raises KembaError where the plant or the uncertainties are wrong.
     """
-    settings = RobustSettings.current()
     plant = plant_of(task)
-    cases = scenarios(task.uncertainties, plant, task.robust)
-    best: RobustCandidate | None = None
-    failed: Plan | None = None
+    search = _Search(plant, scenarios(task.uncertainties, plant, task.robust), tell)
+    first = solve(task)
+    search.take("as asked", first)
+    for way in WAYS if first.status.plan else ():
+        search.along(way, first, change)
     for name, variant in variants(task):
-        found = solve(variant)
-        if found.status is Status.INTERRUPTED or not found.status.plan:
-            failed = failed or found
-            if found.status is Status.INTERRUPTED:
-                break
-            continue
-        for hold in sorted({variant.hold, max(variant.hold, settings.hold)}):
-            held = replace(found, task=variant.model_copy(update={"hold": hold}))
+        if search.over:
+            break
+        search.take(name, solve(variant))
+    return search.best or RobustCandidate(first)
+
+
+@dataclass
+class _Search:
+    """The best candidate so far; `over` where no other is to be tried."""
+
+    plant: Model
+    cases: list[Scenario]
+    tell: Callable[[str], None]
+    best: RobustCandidate | None = field(default=None)
+    over: bool = False
+
+    def along(self, way: Sequence[Way], found: Plan, change: Change) -> None:
+        """Execute a plan after each change of a way that it needs, as far as that goes."""
+        for step in way:
+            changed = None if self.over else step(found, self.cases)
+            if changed is None:
+                continue
+            name, task = changed
+            new = change(found, task)
+            if new is None:
+                self.tell(f"{name}: no plan")
+                return
+            found = replace(new, sentence=f"{new.sentence}; {name}")
+            self.take(name, found)
+
+    def take(self, name: str, found: Plan) -> None:
+        """Execute a plan in all scenarios, with its own hold and with a longer one."""
+        self.over = found.status is Status.INTERRUPTED
+        if self.over or not found.status.plan:
+            return
+        own = found.task.hold
+        for hold in sorted({own, max(own, RobustSettings.current().hold)}):
+            held = replace(found, task=found.task.model_copy(update={"hold": hold}))
             table = table_of(held)
-            landed = share(held.model, held.trajectory, table, cases)
-            tell(f"{name}, hold {hold:g} s: {landed.sentence}")
-            one = RobustCandidate(held, table, landed, judged(held, table, plant).good)
-            if best is None or one.rank > best.rank:
-                best = one
-            if best.enough:
-                return best
-    if best is not None:
-        return best
-    assert failed is not None
-    return RobustCandidate(failed)
+            landed = share(held.model, held.trajectory, table, self.cases)
+            self.tell(f"{name}, hold {hold:g} s: {landed.sentence}")
+            one = RobustCandidate(held, table, landed, judged(held, table, self.plant).good)
+            if self.best is None or one.rank > self.best.rank:
+                self.best = one
+            if self.best.enough:
+                self.over = True
+                return
+
+
+def with_share(found: Executed) -> Executed:
+    """A plan that was made again after its share was taken, with its own; the same where it has no
+    table. Raises KembaError where the plant or the uncertainties are wrong."""
+    plan, table = found.plan, found.motions.table
+    if table is None:
+        return found
+    cases = scenarios(plan.task.uncertainties, plant_of(plan.task), plan.task.robust)
+    landed = share(plan.model, plan.trajectory, table, cases)
+    sentence = f"{found.result['sentence']}; {landed.sentence}"
+    result = {**found.result, "robust": landed.summary(), "sentence": sentence}
+    return replace(found, result=result)

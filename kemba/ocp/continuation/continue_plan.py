@@ -209,7 +209,8 @@ class Continuation:
         """The plan at `share` of the change from a trajectory, with a proximal `weight`."""
         model = model_between(self.origin.model, self.model, share)
         asked = requirements_between(self.origin.requirements, self.requirements, share)
-        refiner = Refiner(model, self.task, asked, start, reduction, self.control)
+        task = self.task.model_copy(update={"grip": 1.0 - share * (1.0 - self.task.grip)})
+        refiner = Refiner(model, task, asked, start, reduction, self.control)
         program, x = refiner.build(phases, start, RADAU5)
         if self.solution is not None:  # finer than the trajectory, which has no stages
             x = np.clip(self.solution[: x.size], program.lower, program.upper)

@@ -18,7 +18,7 @@ from kemba.ocp.phases.stretched import extending, rising, stretching
 from kemba.ocp.phases.view import View
 from kemba.ocp.task.requirement import SCALES
 from kemba.ocp.transcription.first_node import state_rows
-from kemba.ocp.transcription.unilateral import Constraint
+from kemba.ocp.transcription.unilateral import Constraint, Friction
 
 INF = np.inf
 LENGTH, SPEED = SCALES["m"], SCALES["m.s-1"]  # of gaps and their rates
@@ -100,7 +100,9 @@ def _held(program: PhaseProgram, view: View, i: int, constraint: Constraint) -> 
 
 
 def _friction(program: PhaseProgram, view: View, i: int, constraint: Constraint) -> None:
-    """Forces and impulses in the cone; on its edge while sliding."""
+    """Forces and impulses in the cone, that of the task's `grip` while sticking; on its edge while
+    sliding. A plan in a narrower cone is the same motion on any ground that has this much friction.
+    """
     if constraint.friction is None:
         return
     c, phases = program.columns, program.phases
@@ -112,10 +114,17 @@ def _friction(program: PhaseProgram, view: View, i: int, constraint: Constraint)
     edges = (("forward", constraint.friction.cone_forward, BACK),
              ("backward", constraint.friction.cone_backward, AHEAD))  # fmt: skip
     for way, cone, sliding in edges:
-        g = view.of(cone) / weight
-        for wanted, high in ((HELD, INF), (sliding, 0.0)):
+        most = ca.substitute(cone, _tangential(program, constraint.friction), ca.SX.zeros(2))
+        held = view.of(cone - (1.0 - program.task.grip) * most) / weight
+        for wanted, g, high in ((HELD, held, INF), (sliding, view.of(cone) / weight, 0.0)):
             where = [(p, lam) for p, lam in forces if phases[p].modes[i] == wanted]
             program.mode_constraint(i, f"cone {way}", view.z("lam"), g, 0.0, high, where)
+
+
+def _tangential(program: PhaseProgram, friction: Friction) -> ca.SX:
+    """Both parts (2,) of a contact's friction among the forces of the node."""
+    lam = program.model.node.lam
+    return ca.vertcat(lam[friction.forward], lam[friction.backward])
 
 
 def _start(

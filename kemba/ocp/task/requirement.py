@@ -25,6 +25,7 @@ SPECIAL = ("rest", "settled")
 SCALES = {"m": 0.1, "rad": 0.2, "m.s-1": 1.0, "rad.s-1": 5.0}
 FLIGHT = 0.7  # the part of the flight in which `clearance` holds; feet come down in the rest
 ROUND = 1e-9  # nodes; above rounding errors
+UNREFINED = "needs the refined plan, and this task says refine: none"
 MOMENTS = {"start": 0.0, "middle": 0.5, "end": 1.0}
 
 
@@ -137,6 +138,8 @@ def resolve(
                 errors.append(document.error((key,), f"{key}: {error}"))
     if task.landing.air and read and (what := air_fault(task, apex)):
         errors.append(document.error(("landing", "air"), f"landing.air: {what}"))
+    if task.grip < 1.0 and task.refine == "none":
+        errors.append(document.error(("grip",), f"grip: {UNREFINED}"))
     errors += cost_errors(task.cost, document)
     errors += option_errors(task.solver.options, document)
     if errors:
@@ -258,7 +261,7 @@ def feet_at_apex(task: Task, model: Model, apex: Requirement | None) -> list[Req
 def air_fault(task: Task, apex: Requirement | None) -> str | None:
     """Why a task cannot have air on its legs in the rise of its flight, or None."""
     if task.refine == "none":
-        return "needs the refined plan, and this task says refine: none"
+        return UNREFINED
     return None if apex else "needs a goal for body/z at the top of the flight"
 
 

@@ -127,6 +127,8 @@ class Task(Section):
     quantities to values; `rest: true` there means that all rates are zero,
     `settled: true` that every state of an effect is at its value at rest. `hold`: for so long
     before the plan the controller keeps the first pose, valves closed, so that the robot settles.
+    `grip`: the share of the ground's friction that sticking feet may use in the plan; its model and
+    the plant keep all of it.
     `folding`: whether legs may have to fold for `clearance`; if not, a low jump has what stretched
     legs leave.
     `height` is that of the body's centre, which stands above the feet by a leg; `feet` asks instead
@@ -150,6 +152,7 @@ class Task(Section):
     payload: Annotated[float, Param("kg", lower=0.0, doc="at the body's centre")] = 0.0
     clearance: Annotated[float, Param("m", lower=0.0, doc="of the feet in flight")] | None = None
     folding: bool = True
+    grip: Annotated[float, Param("1", lower=0.0, upper=1.0, doc="of the friction, at most")] = 1.0
     landing: Landing = Field(default_factory=Landing)
     hold: Annotated[float, Param("s", lower=0.0, upper=10.0, doc="before plan time 0")] = 0.0
     duration: Annotated[float, Param("s", lower=0.01, upper=20.0, doc="nominal")] = 0.5

@@ -60,7 +60,7 @@ def matched(
             return
         if not new.status.plan:
             continue
-        now = executed(_summed(now.plan, new), None, None, True, tell, begun, place)
+        now = executed(summed(now.plan, new), None, None, True, tell, begun, place)
         if fit is not None:
             now.result["fitted_air"] = fit.summary()
         now.result["sentence"] += remedies.remark
@@ -89,7 +89,7 @@ def _continued(
     return plan_from(origin, asked, document, **how)[0]
 
 
-def _summed(old: Plan, new: Plan) -> Plan:
+def summed(old: Plan, new: Plan) -> Plan:
     """The new plan with the solves and the times of both."""
     return replace(
         new,

@@ -1,0 +1,33 @@
+"""How much of the ground's friction a plan needs where its feet stick."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kemba.effects.mechanics.contact import Contact
+from kemba.model import Model
+from kemba.trajectory import Trajectory
+
+LOADED = 1e-3  # of the weight, or of its impulse in a second: less than that pushes nothing
+SLIDES = 1e-4  # m/s: a foot that slides uses all of its friction by itself
+
+
+def grip_of(model: Model, plan: Trajectory) -> float | None:
+    """The largest share of the friction cone, 0 to 1, that sticking feet and impacts need in
+    a plan; None on another ground, or where there is no load."""
+    ground = next((e for e in model.effects if isinstance(e, Contact)), None)
+    if ground is None or not ground.mu:
+        return None
+    shares = []
+    for leg in model.mechanism.legs:
+        for along, normal in (("Fx", "Fz"), ("impulse_x", "impulse_z")):
+            names = [f"{leg}/foot/{name}" for name in (along, normal)]
+            if not all(name in plan for name in names):
+                continue
+            push, load = (plan[name] for name in names)
+            on = load > LOADED * model.mechanism.weight
+            if f"{leg}/foot/slip" in plan:
+                on &= plan[f"{leg}/foot/slip"] < SLIDES
+            shares += [np.abs(push[on]) / (ground.mu * load[on])]
+    used = np.concatenate(shares) if shares else np.array([])
+    return float(used.max()) if len(used) else None

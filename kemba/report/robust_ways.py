@@ -1,0 +1,88 @@
+"""In which ways a motion is sought so that it succeeds more often."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from kemba.effects.mechanics.contact import Contact
+from kemba.model import Model
+from kemba.ocp import Plan, Task
+from kemba.ocp.certificate.grip import grip_of
+from kemba.scenarios.draw import Scenario
+from kemba.settings import Settings, setting
+
+Changed = tuple[str, Task] | None  # the changed task, and words for the sentence of its plan
+TRIALS = "tuned: by hand on jumps of 0.36 to 0.9 m (docs/tasks.md), no benchmark"
+
+
+class RobustSettings(Settings):
+    """Which plans are tried, and when one is good enough."""
+
+    enough: float = setting(0.98, "1", "share of scenarios at which no other plan is tried", TRIALS)
+    hold: float = setting(
+        0.3, "s", "hold of a plan whose task has none",
+        "derived: a robot that was put down askew has settled by then (docs/tasks.md)",
+    )  # fmt: skip
+    longer: float = setting(
+        0.15, "1", "more time for a plan that takes all it has, as a share",
+        "tuned: a jump of 0.9 m, which has 0.84 s, takes 0.91 s where it may",
+    )  # fmt: skip
+    full: float = setting(
+        1e-3, "1", "of the longest time, by which a plan that takes all of it is shorter at most",
+        "convention: IPOPT ends that near to a bound",
+    )  # fmt: skip
+    air: float = setting(0.3, "1", "cost of open valves of a candidate that has less", TRIALS)
+    noise: float = setting(0.1, "1", "guess noise of other starts", TRIALS)
+    starts: int = setting(1, "1", "other starts", "convention: three times a plain plan at most")
+
+
+def gripping(found: Plan, cases: Sequence[Scenario]) -> Changed:
+    """What a plan is continued for where it leans on more friction than the scenarios have."""
+    task, grip = found.task, least_grip(found.model, cases)
+    if (grip_of(found.model, found.trajectory) or 0.0) <= grip:
+        return None
+    return f"on {grip:.0%} of the ground's friction", task.model_copy(update={"grip": grip})
+
+
+def longer(found: Plan, cases: Sequence[Scenario]) -> Changed:
+    """What a plan is continued for where it takes all the time that its task has."""
+    task, settings = found.task, RobustSettings.current()
+    longest = task.duration * (1.0 + task.step_variation)
+    if found.trajectory.time[-1] < longest * (1.0 - settings.full):
+        return None
+    duration = task.duration * (1.0 + settings.longer)
+    words = f"with a duration of {duration:.3g} s instead of {task.duration:g} s"
+    return words, task.model_copy(update={"duration": duration})
+
+
+# in which order a plan is changed: first within its task, then with more time than that gives
+WAYS = ((gripping,), (longer, gripping))
+
+
+def variants(task: Task) -> Iterator[tuple[str, Task]]:
+    """The same motion sought anew."""
+    settings = RobustSettings.current()
+    held = task.model_copy(update={"hold": max(task.hold, settings.hold)})
+    if task.cost.get("air", 0.0) < settings.air:
+        yield "with less air", held.model_copy(update={"cost": {**task.cost, "air": settings.air}})
+    for seed in range(1, settings.starts + 1):
+        guess = {"guess_noise": max(task.guess_noise, settings.noise), "seed": task.seed + seed}
+        yield "from another start", held.model_copy(update=guess)
+
+
+def least_grip(model: Model, cases: Sequence[Scenario]) -> float:
+    """The share of the friction of `model` that the ground has in all scenarios but those that
+    need not succeed; 1 where it varies in none."""
+    own = _friction(model)
+    there = [f for f in (_friction(case.model) for case in cases) if f is not None]
+    if not own or not there:
+        return 1.0
+    sure = float(np.quantile(there, 1.0 - RobustSettings.current().enough))
+    return min(1.0, sure / own)
+
+
+def _friction(model: Model) -> float | None:
+    ground = next((e for e in model.effects if isinstance(e, Contact)), None)
+    return None if ground is None else float(ground.value("mu"))

@@ -1,0 +1,92 @@
+"""Robust planning: which plans are tried, and which is taken."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from kemba.ocp import Plan, Task, load_task
+from kemba.ocp.certificate.status import Status
+from kemba.ocp.planning import plans_nearby
+from kemba.report.judging.judged import plant_of
+from kemba.report.robust import most_robust
+from kemba.report.robust_ways import gripping, least_grip, longer
+from kemba.scenarios.draw import Scenario, scenarios
+
+
+@cache
+def planned(height: float) -> Plan:
+    task, document = load_task("jump.yaml", [f"height={height} m", "duration=0.7 s"])
+    return next(plans_nearby(task, document))
+
+
+def grounds(folder: Path, low: float, count: int = 50) -> list[Scenario]:
+    """Scenarios that differ by the friction of the ground alone."""
+    path = folder / "slippery.yaml"
+    text = f"name: slippery\nvary:\n  effects.contact.mu: {{low: {low}, high: 1}}\n"
+    path.write_text(text, encoding="utf-8")
+    return scenarios(path, plant_of(planned(0.5).task), count)
+
+
+def test_friction_is_counted_on_as_far_as_the_scenarios_have_it(tmp_path: Path) -> None:
+    model = planned(0.5).model
+    assert least_grip(model, grounds(tmp_path, 0.5)) == pytest.approx(0.51, abs=0.01)
+    assert least_grip(model, grounds(tmp_path, 0.8)) == pytest.approx(0.804, abs=0.01)
+
+
+def test_a_high_jump_leans_on_friction_and_takes_all_its_time(tmp_path: Path) -> None:
+    found, cases = planned(0.84), grounds(tmp_path, 0.5)
+    first, second = gripping(found, cases), longer(found, cases)
+    assert first is not None and first[0].endswith("of the ground's friction")
+    assert first[1] == found.task.model_copy(update={"grip": least_grip(found.model, cases)})
+    assert second is not None and "0.805 s instead of 0.7 s" in second[0]
+    assert second[1].duration == pytest.approx(0.805)
+    assert second[1].model_dump(exclude={"duration"}) == found.task.model_dump(exclude={"duration"})
+
+
+def test_a_low_jump_does_neither(tmp_path: Path) -> None:
+    found, cases = planned(0.5), grounds(tmp_path, 0.5)
+    assert gripping(found, cases) is None and longer(found, cases) is None
+
+
+def asked(height: float, count: int, file: Path) -> Task:
+    own = {"robust": count, "uncertainties": str(file)}
+    return planned(height).task.model_copy(update=own)
+
+
+def solving(height: float) -> tuple[list[Task], list[Task], object, object]:
+    """What was solved and what was changed, and functions that note it: a known plan, no other."""
+    solved: list[Task] = []
+    changed: list[Task] = []
+
+    def solve(task: Task) -> Plan:
+        solved.append(task)
+        status = Status.SOLVED if len(solved) == 1 else Status.INFEASIBLE
+        return replace(planned(height), task=task, status=status)
+
+    def change(found: Plan, task: Task) -> None:
+        changed.append(task)  # and cannot be solved
+
+    return solved, changed, solve, change
+
+
+def test_a_plan_that_succeeds_often_enough_is_taken_at_once(tmp_path: Path) -> None:
+    grounds(tmp_path, 0.6)
+    solved, changed, solve, change = solving(0.5)
+    found = most_robust(asked(0.5, 4, tmp_path / "slippery.yaml"), solve, change, lambda text: None)
+    assert found.enough and found.share.landed == 4
+    assert len(solved) == 1 and not changed
+
+
+def test_where_it_falls_other_plans_are_tried(tmp_path: Path) -> None:
+    grounds(tmp_path, 0.3)
+    solved, changed, solve, change = solving(0.84)
+    task = asked(0.84, 6, tmp_path / "slippery.yaml")
+    found = most_robust(task, solve, change, lambda text: None)
+    assert not found.enough and found.share.landed < 6
+    assert [t.duration for t in changed] == [0.7, pytest.approx(0.805)]
+    assert [t.seed for t in solved] == [0, 1], "as asked, then from another start"
+    assert found.plan.task == task, "the only plan there is"
