@@ -2,6 +2,7 @@
 """Blind test of `discover` on robot logs made by the second twin, on MuJoCo (tests/mujoco_twin).
 
     python benchmarks/blind/second.py --out second.jsonl --cases 20
+    python benchmarks/blind/second.py --only many --out benchmarks/blind/second.jsonl --write
 
 Single effects, faults of sensors, lengths, lever and mass split, three to five effects at once,
 effects outside the catalogue (a boom that bends among them), and nothing. Where nothing is hidden,
