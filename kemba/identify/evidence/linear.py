@@ -177,7 +177,8 @@ def priors(problem: Problem, theta: Theta, names: Iterable[str]) -> tuple[Array,
             continue
         parameter = problem.candidates[name.rsplit(".", 1)[0]].keys()[name]
         if is_shape(problem, name):
-            rows.append((np.log(theta[name]), np.log(parameter.typical), parameter.size))
+            usual = parameter.typical  # also of an effect that is absent
+            rows.append((np.log(theta.get(name, usual)), np.log(usual), parameter.size))
         else:
             rows.append((theta.get(name, parameter.off), parameter.off, parameter.size))
     at, mean, width = np.array(rows).T
