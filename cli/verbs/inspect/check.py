@@ -105,7 +105,7 @@ def _whole(kind: str, parsed: Any, document: Any) -> list[str]:
 
     if kind == "tasks":
         model, _ = check_feasible(parsed, document)
-        return model.remarks
+        return [*parsed.remarks, *model.remarks]
     if kind == "models":
         return load_model(document.source).remarks
     if kind == "robots":

@@ -108,7 +108,7 @@ def solve(
     built, _ = asked_of(resolved, document)
     if built.ignored:
         say(f"no plan can use {', '.join(built.ignored)}: it changes what is measured only", quiet)
-    for remark in built.remarks:
+    for remark in (*resolved.remarks, *built.remarks):
         say(remark, quiet)
     models = [path for name in (resolved.model, resolved.plant) for path in model_files(name)]
     inputs = [find_config(task, "tasks"), *dict.fromkeys(models), *BY_KIND.files]

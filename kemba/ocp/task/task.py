@@ -186,6 +186,17 @@ class Task(Section):
         """Nominal step [s]."""
         return self.duration / self.nodes
 
+    @property
+    def remarks(self) -> list[str]:
+        """Figures that are given, but change nothing."""
+        bounds = [
+            b for part in (self.start, self.end, self.bounds, self.goals) for b in part.values()
+        ]
+        named = {value for b in bounds for value in (b.equals, b.at_least, b.at_most)}
+        given = (n for n in ("height", "distance") if getattr(self, n) is not None)
+        hint = "changes nothing: no goal, bound, start or end refers to it"
+        return [f"`{name}` {hint}, as in `equals: {name}`" for name in given if name not in named]
+
 
 def _last_height(document: Document) -> Document:
     """The document without its own `height` where `feet` is set by an option, and the reverse."""

@@ -1,0 +1,25 @@
+"""Figures of a task that nothing in it refers to."""
+
+from __future__ import annotations
+
+import pytest
+
+from kemba.config import Document
+from kemba.ocp import load_task
+from kemba.ocp.task.task import parse_task
+
+
+@pytest.mark.parametrize("name", ["jump", "jump_forward", "hop", "drop", "stand", "max_jump"])
+def test_shipped_tasks_use_all_their_figures(name: str) -> None:
+    assert load_task(f"{name}.yaml")[0].remarks == []
+
+
+def test_a_height_that_no_goal_asks_for_is_told() -> None:
+    task = parse_task(Document({"name": "jump", "height": "600 m", "distance": "1 m"}))
+    height, distance = task.remarks
+    assert height.startswith("`height` changes nothing") and "`distance`" in distance
+
+
+def test_a_bound_is_enough() -> None:
+    bounded = {"height": "0.5 m", "bounds": {"body/z": {"at_most": "height"}}}
+    assert parse_task(Document(bounded)).remarks == []
