@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from kemba.config import parse
@@ -143,6 +143,7 @@ PLAIN = st.recursive(
 
 
 @given(PLAIN)
+@example({"<<": None})
 @settings(max_examples=300, deadline=None)
 def test_what_is_written_is_read_back(data: Any) -> None:
     assert read(dump_text({"a": data}))["a"] == data

@@ -63,6 +63,7 @@ def _float(dumper: Any, value: float) -> Any:
 
 
 def _text(dumper: Any, value: str) -> Any:
-    """A text; with escapes where it holds characters that only YAML reads as line ends."""
-    style = '"' if set(value) & set("\x85\u2028\u2029") else None
+    """A text; with escapes where it holds characters that only YAML reads as line ends, quoted
+    where it would merge groups."""
+    style = '"' if set(value) & set("\x85\u2028\u2029") or value == "<<" else None
     return dumper.represent_scalar("tag:yaml.org,2002:str", value, style=style)

@@ -10,8 +10,8 @@ import numpy as np
 from kemba.identify.answer import Ranked, Value
 from kemba.identify.doubt.cross_validation import left_out, left_out_error
 from kemba.identify.doubt.parsimony import Belief
-from kemba.identify.evidence.bounded import within_bounds
 from kemba.identify.evidence.linear import is_shape
+from kemba.identify.evidence.modes.bounded import within_bounds
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import (
     NULL,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from toy_problem import Toy
 
-from kemba.identify.evidence.bounded import within_bounds
+from kemba.identify.evidence.modes.bounded import within_bounds
 from kemba.identify.evidence.search import Search
 from kemba.identify.ranking import values
 

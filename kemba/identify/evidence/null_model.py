@@ -17,9 +17,9 @@ from kemba.identify.evidence.linear import (
     priors,
     within,
 )
+from kemba.identify.evidence.modes.small_effects import Mode, mode_of
 from kemba.identify.evidence.point import Division, LinearisationPoint
 from kemba.identify.evidence.refit import Fit, Frozen, refit
-from kemba.identify.evidence.small_effects import Mode, mode_of
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis, Ranker
 from kemba.identify.problem.problem import Array, Problem
 from kemba.settings import BY_HAND, Settings, setting
