@@ -92,3 +92,9 @@ def test_with_new_air_the_own_guess_comes_first() -> None:
 
 def test_a_plan_that_is_not_refined_has_no_remedy() -> None:
     assert not remedies().next(executed(0.05, replay=False, refined=False))
+
+
+def test_without_a_fit_a_plan_that_comes_true_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As with `fit_air: false`: what the plant does is no reason to plan otherwise."""
+    monkeypatch.setattr(module, "_fitted", lambda plan, task, earlier: None)
+    assert not remedies().next(executed(0.05))

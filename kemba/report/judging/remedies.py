@@ -15,7 +15,7 @@ from kemba.settings import Settings, setting
 
 
 class RemedySettings(Settings):
-    """The pulse that presses legs to their stops in flight, and when a fit is in vain."""
+    """The pulse that presses legs to their stops, and how often fits and guesses are tried."""
 
     air: float = setting(
         0.01, "s", "how long extending valves open", "convention: as in the shipped plans with it"
@@ -82,7 +82,8 @@ class Remedies:
             if other := self._other_air(plan):
                 self.fit = other
                 return "fit"
-        if self.guesses and plan.judged and plan.plan.refined:
+        worth = self.fit is not None or not comes_true(plan)
+        if worth and self.guesses and plan.judged and plan.plan.refined:
             self.guesses -= 1
             self.from_guess, self.ticks = True, False
             self.seeds += self.fit is self.guessed
