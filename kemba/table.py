@@ -64,7 +64,8 @@ def _check_headers(headers: list[str], path: str | Path) -> None:
         try:
             quantity = Quantity.from_header(header)
         except KembaError as error:
-            hint = map_hint(path) if column == 1 else ""
+            leave = "take the column out, or " if column > 1 else ""  # the others are kemba's
+            hint = leave + map_hint(path)
             raise KembaError(where, error.what, error.expected, hint) from None
         if not is_si(quantity.unit):
             what = f"'{header}' is not in SI units"

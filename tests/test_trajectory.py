@@ -124,6 +124,10 @@ def test_dialects_that_are_understood(tmp_path: Path, text: str) -> None:
             "t,z\n",
             ":1:1: column header 't' is malformed; 'path/symbol [unit]' was expected; for a log",
         ),
+        (
+            "time [s],note\n",
+            ":1:2: column header 'note' is malformed; 'path/symbol [unit]' was expected; take the",
+        ),
         ("time [s],z [m/s]\n", ":1:2: column header 'z [m/s]' has the malformed unit 'm/s'"),
         ("time [s],z [mm]\n", ":1:2: 'z [mm]' is not in SI units; SI inside the file was expected"),
         ("time [s],z [m],z [m]\n", ":1:3: column 'z' stands twice; it is column 2 already"),

@@ -43,7 +43,7 @@ def check_noise(
         written = Quantity.from_header(str(key)).unit if "[" in str(key) else unit
         if isinstance(value, Mapping):
             value, times[name] = _group(value, place)
-        sigma = _positive(value, written, unit, place)
+        sigma = _positive(value, written, unit, place, f"the column is '{name} [{unit}]'")
         found[name] = sigma
     return found, times
 
@@ -57,12 +57,12 @@ def _group(value: Mapping[str, Any], place: str) -> tuple[Any, float]:
     return value["sigma"], _positive(value["time"], "s", "s", f"{place}: time")
 
 
-def _positive(value: Any, written: str, unit: str, place: str) -> float:
-    """A number above 0 in `unit`, `written` in another one."""
+def _positive(value: Any, written: str, unit: str, place: str, hint: str = "") -> float:
+    """A number above 0 in `unit`, `written` in another one; `hint` where it is of another kind."""
     try:
         number = convert(to_si(value, written), written, unit)
     except ValueError as error:
-        raise KembaError(place, str(error)) from None
+        raise KembaError(place, str(error), hint=hint) from None
     if not number > 0.0:
         what = f"the value is {value}; no sensor is without noise"
         hint = "leave the line out: the noise is then learnt from the log"
