@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kemba.errors import KembaError
 from kemba.identify.evidence.linear import Linear, estimate, moved, priors
 from kemba.identify.evidence.spike_slab import Hypothesis, Ranker
 from kemba.identify.problem.problem import Array, Candidate, Labels, Problem, Theta
@@ -61,9 +62,12 @@ def mode_of(
     reached = _ranker(problem, at.linear).score(hypothesis).log_evidence
     for _ in range(0 if problem.moves else settings.rounds):
         theta = _possible(problem, hypothesis, at.linear)
-        at = _at(problem, hypothesis, theta, linear, jacobian, blocks)
+        try:
+            at = _at(problem, hypothesis, theta, linear, jacobian, blocks)
+        except KembaError:
+            break  # a linear estimate may point to where nothing can be simulated
         if not np.all(np.abs(at.residual) < settings.absurd):
-            break  # a linear estimate may point to where nothing can be predicted
+            break
         best = at if at.cost < best.cost else best
         before, reached = reached, _ranker(problem, at.linear).score(hypothesis).log_evidence
         if abs(reached - before) < settings.change:
