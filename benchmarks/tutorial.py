@@ -169,7 +169,7 @@ def times(page: str, room: Room) -> str:
     kinds = {"plans": " solve ", "logs": " simulate ", "`compare`": " compare "}
     kinds |= {"`discover`": " discover "}
     parts = [
-        f"{sum(cpu for command, cpu in spent if verb in command) / 60.0:.0f} min for {kind}"
+        f"{sum(cpu for command, cpu in spent if verb in command) / 60.0:.1f} min for {kind}"
         for kind, verb in kinds.items()
     ]
     total = sum(cpu for _, cpu in spent) / 60.0

@@ -15,7 +15,7 @@ from kemba.identify.doubt.run_consistency import drifting
 from kemba.identify.doubt.unexplained import Formula, look
 from kemba.identify.evidence.bootstrap import NullTest, bootstrap, smallest_detectable
 from kemba.identify.evidence.figures import Rebuilt, ahead, settled
-from kemba.identify.evidence.left_out_noise import left_out_noise
+from kemba.identify.evidence.left_out_noise import LeftOutNoiseSettings, left_out_noise
 from kemba.identify.evidence.linear import time_blocks
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.search_settings import SearchSettings
@@ -184,7 +184,9 @@ def null_test(search: Search) -> NullTest:
     linear = mode.linear
     blocks = time_blocks(search.problem, shortest=DiscoverSettings.current().fine)
     left = mode.residual + base.jacobian @ (base.flexible_fit() - linear.at)
-    noise = left_out_noise(base.jacobian, left, linear.width, blocks)
+    settings = LeftOutNoiseSettings.current()
+    power = settings.power_in_motion if search.problem.moves else settings.power
+    noise = left_out_noise(base.jacobian, left, linear.width, blocks, power)
     singles = [(name,) for name in search.problem.candidates]
     return bootstrap(base.ranker(linear), noise, singles)
 

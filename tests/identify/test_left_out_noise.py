@@ -65,3 +65,21 @@ def test_what_acts_in_one_block_only_is_not_all_noise() -> None:
     found = left_out_noise(jacobian, left, width, LABELS)
     assert found[3, 0] == pytest.approx(LeftOutNoiseSettings.current().most * own)
     assert abs(found[3, 0]) < 0.01 * (jacobian[:, 0] @ measured)
+
+
+def test_half_the_power_keeps_white_noise() -> None:
+    """With half the power of the enlargement the noise of six unlike blocks has its true size."""
+    true, half, full = [], [], []
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        loud = rng.uniform(0.2, 3.0, (BLOCKS, EFFECTS))[LABELS]  # motions that tell other effects
+        jacobian = loud * rng.standard_normal((BLOCKS * ROWS, EFFECTS))
+        noise, width = rng.standard_normal(BLOCKS * ROWS), np.full(EFFECTS, 100.0)
+        few = LABELS < 6
+        left = fitted(jacobian[few], noise[few], width, slice(None))
+        true.append(np.mean((jacobian[few].T @ noise[few]) ** 2))
+        for power, found in ((0.5, half), (1.0, full)):
+            pieces = left_out_noise(jacobian[few], left, width, LABELS[few], power)
+            found.append(np.mean(np.sum(pieces**2, axis=0)))
+    assert np.mean(half) == pytest.approx(np.mean(true), rel=0.15)
+    assert np.mean(full) > 1.2 * np.mean(true)
