@@ -82,17 +82,25 @@ def plans_nearby(
 ) -> Iterator[Plan]:
     """Plans of a task that begin from near shipped plans, the nearest one first.
 
-    Only solved ones; none where no shipped plan is near, or the task cannot be met.
-    Raises ConfigErrors as `plan` does.
+    Only solved ones; none where no shipped plan is near, or the task cannot be met. A plan that was
+    made with fitted air begins one with the same air. Raises ConfigErrors as `plan` does.
     """
-    job = _job(task, document, None, Control(_deadline(task), log, watch, stop), tell)
+    control = Control(_deadline(task), log, watch, stop)
+    job = _job(task, document, None, control, tell)
     if job.refused is not None:
         return
-    for near in neighbours(task, job.planner.model)[: Near.current().tried]:
-        found, _ = continued(job.planner, _origin(near.entry, task))
+    listed = neighbours(task, job.planner.model)
+    own = [n for n in listed if task.fit_air or not n.entry.effects]
+    for near in own[: Near.current().tried]:
+        if near.entry.effects:
+            asked = task.model_copy(update={"effects": {**task.effects, **near.entry.effects}})
+            job = _job(asked, document, None, control, tell)
+        found, _ = continued(job.planner, _origin(near.entry, job.planner.task))
         if found is not None and found.status is Status.SOLVED:
-            yield replace(found, continued=None, start=f"shipped: {near.entry.name}")
-        if job.planner.session.control.ended() is not None:
+            kept = near.entry
+            found = replace(found, continued=None, start=f"shipped: {kept.name}")
+            yield replace(found, fitted_air=kept.fitted_air)
+        if control.ended() is not None:
             return
 
 

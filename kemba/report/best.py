@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -64,10 +64,9 @@ def best_plan(
     best: Executed | None = None
     for one in _candidates(task, document, approach, listener):
         made = last = executed(*one, approach.replay, listener.tell, begun, place)
-        if approach.replay and not made.good:
-            asked = one[0].task if task.robust else task
-            for last in matched(made, asked, document, listener, begun, approach.log, place):
-                made = max(made, last, key=lambda made: made.rank[:3])
+        if approach.replay and not (made.fine or (made.good and one[2])):
+            asked = one[0].task.model_copy(update={"effects": task.effects})
+            made, last = improved(made, asked, document, listener, begun, approach.log, place)
         if one[2] is not None and made.plan is not one[0]:
             from kemba.report.robust import with_share
 
@@ -81,6 +80,23 @@ def best_plan(
     known, remark = compared(best.plan)
     best.result.update(best_known=known, sentence=best.result["sentence"] + remark)
     return best
+
+
+def improved(
+    first: Executed,
+    task: Task,
+    document: Document,
+    listener: Listener,
+    begun: Begun = lambda plan: None,
+    log: Path | None = None,
+    place: str = "",
+) -> tuple[Executed, Executed]:
+    """The plan that comes true best of a first one and those made after it (`matched`), whatever
+    they cost; and the last one that was executed."""
+    best = last = first
+    for last in matched(first, task, document, listener, begun, log, place):
+        best = max(best, last, key=lambda one: one.rank[:4])
+    return best, last
 
 
 def _candidates(
@@ -107,7 +123,7 @@ def _candidates(
             known = found.trajectory, found.model, found.requirements
             origin = Origin(*known, *names, once=True, stages=found.stages)
             new, _ = plan_from(origin, task, document, approach.log, **how)
-            return new and summed(found, new)
+            return new and replace(summed(found, new), fitted_air=found.fitted_air)
 
         found = most_robust(
             task, lambda task: next(nearby(task), None) or solved(task), changed, listener.tell

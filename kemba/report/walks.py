@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from kemba.config import Document
 from kemba.files import write_json
 from kemba.ocp import Plan, Task, load_task, plan
 from kemba.ocp.certificate.objective import objective
@@ -15,9 +17,12 @@ from kemba.ocp.continuation.between import Origin
 from kemba.ocp.planning import plan_from
 from kemba.ocp.reading import task_model
 from kemba.ocp.shipped.entry import read_plan, write_plan
-from kemba.ocp.shipped.kind import FIGURES, figures_of, kind_of
+from kemba.ocp.shipped.kind import FIGURES, figures_of
 from kemba.ocp.task.requirement import resolve
-from kemba.report.judging.judged import judged, table_of
+from kemba.report.best import Approach, best_plan, improved
+from kemba.report.judging.executed import Executed, executed
+from kemba.report.listener import Listener
+from kemba.stopwatch import silent
 
 PATIENT = "solver.time_limit=3600 s"
 
@@ -28,51 +33,89 @@ def walk(work: Mapping[str, Any]) -> dict[str, Any]:
     `task`: its name; `set`: overrides that stay; `figure`: what changes, through `values`. The
     first plan begins from `first`, the stem of a plan in `folder`, or from a guess where that is
     empty. Every solved plan is kept in `folder`, with what its executions say. A value that cannot
-    be reached is left out; the next one is tried from the last plan.
+    be reached is left out; the next one is tried from the last plan. `matched`: plans are changed
+    until their executions keep to the tolerances, as by `solve`, with air fitted to the plant.
     """
     folder = Path(work["folder"])
     folder.mkdir(parents=True, exist_ok=True)
-    origin = _kept(folder / f"{work['first']}.npz", work) if work["first"] else None
+    last = _kept(folder / f"{work['first']}.npz", work) if work["first"] else None
     told = []
     for value in work["values"]:
         own = [f"{work['figure']}={value}", PATIENT]  # the same plans on a slow machine
         task, document = load_task(work["task"], [*work["set"], *own])
-        if origin is None:
-            found: Plan | None = plan(task, document)
-        else:
-            found, _ = plan_from(origin, task, document)
-        if found is None or found.status is not Status.SOLVED:
+        made = _made(task, document, last, work.get("matched", False))
+        if made is None:
             told.append(f"{value}: none")
             continue
+        found = made.plan
         origin = Origin(found.trajectory, found.model, found.requirements, once=True)
-        facts = record(found) | {"task": work["task"], "set": list(work["set"]), "by": work["name"]}
+        last = Last(origin, found.task.effects, made.result.get("fitted_air"))
+        facts = record(made) | {"task": work["task"], "set": list(work["set"]), "by": work["name"]}
         told.append(f"{value}: {facts['cost']:.3g}{'' if facts['good'] else ' (bad)'}")
         name = f"{work['name']}-{1e3 * float(str(value).split()[0]):04.0f}"
-        write_plan(folder / f"{name}.npz", found.trajectory, found.model)
+        write_plan(folder / f"{name}.npz", found.trajectory, found.model, last.air)
         write_json(folder / f"{name}.json", facts)
     return {"status": "walked", "good": True, "sentence": "; ".join(told)}
 
 
-def record(found: Plan) -> dict[str, Any]:
-    """Kind, figures and cost of a plan, and whether its executions keep to the tolerances."""
+@dataclass(frozen=True)
+class Last:
+    """The plan before, with the `effects` of its fitted air and the fit, None where there was
+    none."""
+
+    origin: Origin
+    effects: Mapping[str, Mapping[str, Any]]
+    fitted_air: Mapping[str, Any] | None
+
+    @property
+    def air(self) -> dict[str, Any]:
+        """What is kept of the fit beside the plan."""
+        fit = {"effects": self.effects, "fitted_air": self.fitted_air}
+        return fit if self.fitted_air else {}
+
+
+def record(made: Executed) -> dict[str, Any]:
+    """Figures and cost of a plan, and whether its executions keep to the tolerances."""
+    found = made.plan
     task, model = found.task, found.model
-    done = judged(found, table_of(found))
     return {
-        "kind": kind_of(task, model),
         "figures": figures_of(task, model),
         "cost": objective(model, task, found.requirements, found.trajectory),
         **found.cost,
-        "plant": done.facts["plant_replay"],
-        "good": done.good,
+        "plant": made.result["plant_replay"],
+        "good": made.good,
     }
 
 
-def _kept(file: Path, work: Mapping[str, Any]) -> Origin:
+def _made(task: Task, document: Document, last: Last | None, match: bool) -> Executed | None:
+    """The plan of one value, executed; with `match` changed until it comes true, or made from a
+    guess where it does not."""
+    if last is None:
+        found: Plan | None = plan(task, document)
+    else:
+        asked = task.model_copy(update={"effects": {**task.effects, **last.air.get("effects", {})}})
+        found, _ = plan_from(last.origin, asked, document)
+        found = found and replace(found, fitted_air=last.fitted_air)
+    made = None
+    if found is not None and found.status is Status.SOLVED:
+        made = executed(found, None, None, True, silent, lambda plan: None)
+        if match:
+            made = improved(made, task, document, Listener())[0]
+    if match and (made is None or not made.good):
+        made = best_plan(task, document, Approach(cold=True), Listener())
+    return made if made is not None and made.plan.status is Status.SOLVED else None
+
+
+def _kept(file: Path, work: Mapping[str, Any]) -> Last:
     """A plan of an earlier walk, as the first of this one."""
     facts = json.loads(file.with_suffix(".json").read_text(encoding="utf-8"))
     task, document = load_task(facts["task"], list(facts["set"]))
+    kept = read_plan(file)
+    air = {"effects": kept.meta.get("effects", {})}
     own: Task = task.model_copy(update={k: facts["figures"].get(k) for k in FIGURES
-                                        if getattr(task, k) is not None})  # fmt: skip
+                                        if getattr(task, k) is not None} | air)  # fmt: skip
     model = task_model(own)
     asked = resolve(own, model, document)
-    return Origin(read_plan(file), model, tuple(asked), once=True)
+    return Last(
+        Origin(kept, model, tuple(asked), once=True), own.effects, kept.meta.get("fitted_air")
+    )

@@ -98,6 +98,18 @@ def test_stagnation_is_found_where_nothing_comes_nearer(
     assert stagnation.found is found
 
 
+@pytest.mark.parametrize(
+    ("last", "found"), [([1.0] * 50, False), ([8.0] * 4, False), ([8.0] * 6, True)]
+)
+def test_a_solve_is_given_up_once_long_iterations_have_cost_too_much(
+    last: list[float], found: bool
+) -> None:
+    stagnation = Stagnation(np.inf, 0.05, slow=40.0)
+    for clock in np.cumsum([1.0] * 6 + last):
+        stagnation.ends.append(float(clock))
+    assert stagnation.too_slow() is found
+
+
 @pytest.mark.parametrize("lift", ["5 cm", "50 cm"])
 def test_a_guess_flies_where_feet_must_leave_the_ground(lift: str) -> None:
     """So low that standing would reach it, and nothing else tells of a flight."""

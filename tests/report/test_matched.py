@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from typer.testing import CliRunner
@@ -11,7 +13,8 @@ from typer.testing import CliRunner
 from kemba.config import dump_yaml
 from kemba.ocp import load_task
 from kemba.plant.execution.fitted_air import FittedAir
-from kemba.report.judging.remedies import TriedAir, between
+from kemba.report.judging import matched
+from kemba.report.judging.remedies import Remedies, TriedAir, between
 from kemba_cli.main import app
 
 WEAK = {"kind": "chamber", "F_extend": [258, 291, 314], "F_retract": [239, 260, 291]}  # 10 % less
@@ -62,6 +65,24 @@ def test_on_one_side_the_air_is_fitted_again() -> None:
     assert between([TriedAir(None, 0.06)]) is None
     assert between([TriedAir(None, 0.06), TriedAir(fit(0.8), 0.02)]) is None
     assert between([TriedAir(None, 0.06), TriedAir(fit(0.8), 0.0)]) is None, "or nothing lands"
+
+
+@pytest.mark.parametrize(("times", "kept"), [(2.9, True), (3.1, False)])
+def test_a_continued_plan_that_costs_much_more_is_not_kept(
+    monkeypatch: pytest.MonkeyPatch, times: float, kept: bool
+) -> None:
+    """One from a guess is likely to cost less."""
+    task, document = load_task("jump.yaml")
+
+    def plan(cost: float) -> Any:
+        costs = {"torque_squared_integral": cost}
+        common = {"trajectory": None, "model": None, "requirements": (), "stages": None}
+        return SimpleNamespace(cost=costs, continued=None, start="guess", **common)
+
+    new = plan(times)
+    monkeypatch.setattr(matched, "plan_from", lambda *given, **how: (new, ""))
+    found = matched._continued(plan(1.0), task, document, Remedies(task), {})
+    assert (found is new) is kept
 
 
 def test_a_low_jump_lands_when_it_should(tmp_path: Path) -> None:

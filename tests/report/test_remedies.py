@@ -31,7 +31,13 @@ def executed(late: float, replay: bool = True, table: bool = True, refined: bool
         replays=replay and table,
         facts={"plant_replay": {"touchdown_error_s": late}},
     )
-    return SimpleNamespace(judged=judged, plan=SimpleNamespace(refined=refined), motions=None)
+    plan = SimpleNamespace(refined=refined)
+    return SimpleNamespace(judged=judged, plan=plan, motions=None, good=False)
+
+
+def good() -> Any:
+    """A good plan, whose table is a little off."""
+    return SimpleNamespace(**vars(executed(0.0)) | {"good": True})
 
 
 def remedies() -> Remedies:
@@ -53,6 +59,18 @@ def test_a_late_landing_is_fitted_pressed_and_fitted_again() -> None:
     assert names == ["fit", "press", "fit"]
     assert found.asked.landing.air == RemedySettings.current().air
     assert "legs are pressed to their stops in flight (landing.air: 10 ms)" in found.remark
+
+
+def test_an_early_landing_is_pressed_as_well_but_not_before_a_fit_of_its_own() -> None:
+    assert tried(remedies(), executed(-0.05), executed(-0.04)) == ["fit", "press"]
+    begun = Remedies(load_task("jump.yaml")[0], FITS[-1])  # from a shipped plan with fitted air
+    assert tried(begun, executed(-0.05), executed(-0.04)) == ["fit", "press"]
+
+
+def test_a_good_plan_gets_its_edges_on_ticks_and_nothing_else() -> None:
+    found = remedies()
+    assert tried(found, good()) == ["ticks"]
+    assert not found.next(good())
 
 
 def test_between_late_and_early_the_secant_comes_first() -> None:
@@ -80,6 +98,7 @@ def test_a_plan_that_fails_on_its_own_model_is_made_from_another_guess_twice() -
     while found.next(plan):
         assert found.now == "anew" and found.needed
         seeds.append(found.asked.seed)
+        found.guess_made()
     assert seeds == [1, 2]
     assert found.asked.guess_noise == 0.0, "only a plan that is to be made has another guess"
 
@@ -88,6 +107,9 @@ def test_with_new_air_the_own_guess_comes_first() -> None:
     found = remedies()
     tried(found, executed(0.05), executed(0.04, replay=False))
     assert found.now == "anew" and found.asked.seed == 0 and found.asked.guess_noise == 0.0
+    found.guess_made()
+    tried(found, executed(0.04, replay=False))
+    assert found.asked.seed == 1, "the same air, so another guess"
 
 
 def test_a_plan_that_is_not_refined_has_no_remedy() -> None:

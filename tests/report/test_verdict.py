@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from typer.testing import CliRunner
 
+from kemba.ocp.certificate.status import Status
 from kemba.ocp.task.task import Tolerances
-from kemba.report.judging.verdict import verdicts
+from kemba.report.judging.executed import Executed, Motions
+from kemba.report.judging.judged import Judged
+from kemba.report.judging.verdict import Verdict, verdicts
 from kemba_cli.main import app
 
 LANDED = {
@@ -69,6 +74,35 @@ def test_a_verdict_says_what_matches_or_what_fails(
 def test_what_cannot_be_started_confirms_nothing() -> None:
     found = verdicts({"replay": None}, Tolerances(), True)["replay"]
     assert (found.good, found.sentence) == (False, "the re-simulation cannot be started")
+
+
+@pytest.mark.parametrize(
+    ("facts", "share"),
+    [({}, 0.005), ({"touchdown_error_s": -0.004}, 2.0), (FELL, math.inf)],
+)
+def test_a_verdict_measures_the_largest_error(facts: dict[str, object], share: float) -> None:
+    found = verdicts({"replay": {**LANDED, **facts}}, Tolerances(), True)["replay"]
+    assert found.share == pytest.approx(share)
+
+
+def run(plant: float, table: float, good: bool) -> Executed:
+    """A plan whose executions miss by these shares of what is allowed."""
+    shares = {"replay": 0.0, "table_replay": table, "plant_replay": plant}
+    found = {key: Verdict(share <= 1.0, "", share) for key, share in shares.items()}
+
+    status = Status.SOLVED if good else Status.ACCEPTABLE
+    plan = SimpleNamespace(status=status, model=None, task=None, requirements=(), trajectory=None)
+    judged = Judged({}, found, None)
+    return Executed(plan, {"good": good}, Motions(), judged)  # type: ignore[arg-type]
+
+
+def test_of_plans_that_fail_the_nearest_is_best(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("kemba.report.judging.executed.objective", lambda *parts: 1.0)
+    far, near = run(7.6, 0.1, False), run(1.7, 0.1, False)
+    assert near.rank > far.rank
+    good, exact = run(0.9, 0.8, True), run(0.9, 0.1, True)
+    assert good.rank > near.rank and exact.rank > good.rank
+    assert exact.fine and not good.fine
 
 
 def test_tolerances_are_the_tasks() -> None:

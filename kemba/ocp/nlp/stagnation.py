@@ -9,14 +9,14 @@ import numpy as np
 
 from kemba.ocp.functions.settings import Newton
 
-USUAL = 5  # iterations by whose median time others are called slow
+USUAL = 5  # iterations by whose median time others are called long
 
 
 @dataclass
 class Stagnation:
     """A test that is `found` once the worst scaled violation has not fallen by a fifth within
-    `iterations`, unless it was below `small` before; or once one iteration takes `slow` times as
-    long as the first few: its linear systems are nearly singular, and more of them follow."""
+    `iterations`, unless it was below `small` before; or once long iterations have cost as much time
+    as `slow` usual ones: the linear systems are nearly singular, and more of them follow."""
 
     iterations: float
     small: float
@@ -32,10 +32,12 @@ class Stagnation:
         if violation < Newton.current().progress * self.best:
             self.best, self.since = violation, iteration
         stuck = self.best > self.small and iteration - self.since >= self.iterations
-        self.found = stuck or self._slow()
+        self.found = stuck or self.too_slow()
 
-    def _slow(self) -> bool:
+    def too_slow(self) -> bool:
+        """Whether long iterations have cost too much."""
         lasted = np.diff(self.ends)
         if len(lasted) <= USUAL:
             return False
-        return bool(lasted[-1] > self.slow * np.median(lasted[:USUAL]))
+        usual = float(np.median(lasted[:USUAL]))
+        return bool(lasted.sum() - len(lasted) * usual > self.slow * usual)

@@ -148,9 +148,8 @@ class Refining(Settings):
         1e-4, "1", "scaled violation from which the next solve may begin", HAND, decides=True
     )
     slow: float = setting(
-        20.0, "1", "times the first iterations that one may take; solves with slower ones ran into "
-        "their time limit", "tuned: jumps of 0.44 and 0.67 m, where they took 50 to 100 times",
-        decides=True,
+        40.0, "1", "usual iterations whose time long ones may cost together", "tuned: solves that "
+        "converged lost 21 at most, those that took a minute 50 to 300", decides=True,
     )  # fmt: skip
     second_start: float = setting(
         0.05, "1", "guess noise of the second start where the first plan does not refine", HAND,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -37,16 +38,32 @@ class Entry:
         return read_plan(self.file)
 
     @property
+    def effects(self) -> dict[str, dict[str, Any]]:
+        """The figures of fitted air with which it was made, as a task's `effects`; empty without
+        a fit."""
+        return dict(self.plan.meta.get("effects", {}))
+
+    @property
+    def fitted_air(self) -> dict[str, Any] | None:
+        """The fit itself, as certificates have it."""
+        return self.plan.meta.get("fitted_air")
+
+    @property
     def name(self) -> str:
         """The name of its file, without the ending."""
         return self.file.stem
 
 
-def write_plan(path: Path, plan: Trajectory, model: Model) -> None:
-    """Keep what a start needs: states, inputs and forces, in single precision, and the phases."""
+def write_plan(
+    path: Path, plan: Trajectory, model: Model, air: Mapping[str, Any] | None = None
+) -> None:
+    """Keep what a start needs: states, inputs and forces, in single precision, and the phases.
+
+    `air`: `effects` and `fitted_air` of a plan whose air was fitted.
+    """
     headers = [q.header for group in groups(model).values() for q in group]
     values = np.array([plan[q.name] for group in groups(model).values() for q in group])
-    notes = json.dumps({key: plan.meta[key] for key in KEPT})
+    notes = json.dumps({**{key: plan.meta[key] for key in KEPT}, **(air or {})})
     np.savez_compressed(
         path,
         time=plan.time,

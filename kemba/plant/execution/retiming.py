@@ -32,7 +32,7 @@ class RetimingSettings(Settings):
     fallen: float = setting(
         1e3, "1", "error of a robot that falls, in units of those", "convention: beyond any other"
     )
-    executions: int = setting(80, "1", "simulations at most", CHOSEN)
+    executions: int = setting(24, "1", "simulations at most", CHOSEN)
 
 
 def retimed(model: Model, plan: Trajectory, table: Trajectory) -> Trajectory:

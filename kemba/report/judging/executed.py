@@ -12,8 +12,10 @@ from kemba.ocp.certificate.objective import objective
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.report import answer, sentence_of
 from kemba.plant.execution.counterpart import another_robot
+from kemba.plant.execution.fitted_air import FittedAir
 from kemba.plant.execution.retiming import retimed
 from kemba.report.judging.judged import Judged, judged
+from kemba.settings import Settings, setting
 from kemba.stopwatch import Tell
 from kemba.trajectory import Trajectory
 
@@ -24,6 +26,15 @@ if TYPE_CHECKING:
     Candidate = tuple[Plan, Trajectory | None, Share | None]
 
 Begun = Callable[[Trajectory], None]
+
+
+class TableSettings(Settings):
+    """When the table of a good plan is worth another plan with valve edges on its ticks."""
+
+    well: float = setting(
+        0.5, "1", "of what is allowed: 1 mm of apex, 1.5 ms of touchdown by default",
+        "derived: apex within 1 mm is asked of tables from 0.36 to 0.9 m",
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -50,12 +61,29 @@ class Executed:
         return bool(self.result["good"])
 
     @property
-    def rank(self) -> tuple[bool, bool, bool, float]:
-        """Better ones are greater: good, a plan at all, true on its own model, by cost."""
+    def misses(self) -> float:
+        """The largest error in units of what is allowed; 0 where the plan is good and its table
+        well within that."""
+        if self.judged is None:
+            return 0.0
+        if not self.good:
+            return self.judged.share
+        table = self.judged.verdicts["table_replay"].share
+        return table if table > TableSettings.current().well else 0.0
+
+    @property
+    def fine(self) -> bool:
+        """Whether nothing is left to be improved."""
+        return self.good and self.misses == 0.0
+
+    @property
+    def rank(self) -> tuple[bool, bool, bool, float, float]:
+        """Better ones are greater: good, a plan at all, true on its own model; by what executions
+        miss; by cost."""
         found = self.plan
         cost = objective(found.model, found.task, found.requirements, found.trajectory)
         replays = self.judged is not None and self.judged.replays
-        return self.good, found.status.plan, replays, -cost
+        return self.good, found.status.plan, replays, -self.misses, -cost
 
 
 def executed(
@@ -87,6 +115,9 @@ def executed(
         result |= {**done.facts, **_confirmed(found, done)}
     except KembaError as error:  # a model that the simulator cannot execute still has its plan
         result |= _unconfirmed(found, f"it cannot be simulated: {error}")
+    if found.fitted_air:
+        fit = FittedAir(**found.fitted_air)
+        result |= {"fitted_air": fit.summary(), "sentence": f"{result['sentence']}; {fit.sentence}"}
     if share is not None:
         result |= {"robust": share.summary()}
         result["sentence"] += f"; {share.sentence}"

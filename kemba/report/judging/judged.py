@@ -32,6 +32,12 @@ class Judged:
         return all(verdict.good for verdict in self.verdicts.values())
 
     @property
+    def share(self) -> float:
+        """The largest error of all executions in units of what is allowed; infinite after a
+        fall."""
+        return max(verdict.share for verdict in self.verdicts.values())
+
+    @property
     def replays(self) -> bool:
         """Whether the executions on the plan's own model do."""
         return all(self.verdicts[name].good for name in ("replay", "table_replay"))

@@ -16,7 +16,10 @@ from kemba.config import Document
 from kemba.ocp import Plan, Task
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.continuation.between import Origin
+from kemba.ocp.continuation.continue_plan import Continuing
+from kemba.ocp.continued import TORQUE
 from kemba.ocp.planning import plan, plan_from
+from kemba.plant.execution.fitted_air import FittedAir
 from kemba.report.judging.executed import Begun, Executed, executed
 from kemba.report.judging.remedies import Remedies, comes_true
 from kemba.report.listener import Listener
@@ -40,14 +43,15 @@ def matched(
     log: Path | None = None,
     place: str = "",
 ) -> Iterator[Executed]:
-    """Plans of a task that come true better, each executed, until one is good or nothing is left to
-    try (`Remedies`). None where the first plan is not refined."""
+    """Plans of a task that come true better, each executed, until one is `fine` or nothing is left
+    to try (`Remedies`). None where the first plan is not refined."""
     tell = listener.tell
     how: dict[str, Any] = {"log": log, "tell": tell}
     how |= {"watch": listener.watch, "stop": listener.stop}
-    now, remedies = first, Remedies(task)
+    kept = first.plan.fitted_air
+    now, remedies = first, Remedies(task, FittedAir(**kept) if kept else None)
     for _ in range(RefitRounds.current().rounds):
-        if now.good or not (remedy := remedies.next(now)):
+        if now.fine or not (remedy := remedies.next(now)):
             return
         tell(remedy)
         asked, fit = remedies.asked, remedies.fit
@@ -55,16 +59,20 @@ def matched(
         if near is None and not remedies.needed:
             remedies.give_up()
             continue
+        if near is None:
+            remedies.guess_made()
         new = near or plan(asked, document, **how)
         if new.status is Status.INTERRUPTED:
             return
         if not new.status.plan:
             continue
-        now = executed(summed(now.plan, new), None, None, True, tell, begun, place)
+        before, now = now, executed(summed(now.plan, new), None, None, True, tell, begun, place)
         if fit is not None:
             now.result["fitted_air"] = fit.summary()
         now.result["sentence"] += remedies.remark
         yield now
+        if before.good:
+            return  # its table is as near as can be
         if fit is None and not comes_true(now):
             remedies.give_up()
             now = first
@@ -81,12 +89,14 @@ def _origin_of(old: Plan) -> str:
 def _continued(
     old: Plan, asked: Task, document: Document, remedies: Remedies, how: dict[str, Any]
 ) -> Plan | None:
-    """A plan continued for a task as the remedies ask; None where that fails."""
+    """A plan continued for a task as the remedies ask; None where that fails in one step, or where
+    it costs so much more that one from a guess is likely to cost less."""
     known = old.trajectory, old.model, old.requirements
     names = _origin_of(old), "other starts (--starts 4) may take less"
-    once = not remedies.needed
-    origin = Origin(*known, *names, once=once, ticks=remedies.ticks, stages=old.stages)
-    return plan_from(origin, asked, document, **how)[0]
+    origin = Origin(*known, *names, once=True, ticks=remedies.ticks, stages=old.stages)
+    near, _ = plan_from(origin, asked, document, **how)
+    dear = near and near.cost[TORQUE] > Continuing.current().dear * old.cost[TORQUE]
+    return None if dear else near
 
 
 def summed(old: Plan, new: Plan) -> Plan:

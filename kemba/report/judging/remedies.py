@@ -41,11 +41,12 @@ class TriedAir:
 class Remedies:
     """What has been changed so far, and what is next.
 
-    1. Where only the table misses on the plan's own model, valve edges are put on its `ticks`.
+    1. Where only the table misses on the plan's own model, or nearly does, valve edges are put on
+       its `ticks`.
     2. Where the plant misses, the air is fitted (`fit`); not where the task says `fit_air: false`,
        or its model has no first-order chambers.
-    3. Where it still lands late, legs are `pressed` to their stops in flight: vented ones stay
-       where friction leaves them, which no fit of the air can tell.
+    3. Where it still lands early or late, legs are `pressed` to their stops in flight: vented ones
+       stay where friction leaves them, which no fit of the air can tell.
     4. Where a plan does not come true on its own model, or other air fits no better, it is made
        anew `from_guess`: with the fitted air, or where that was tried, from another guess.
     """
@@ -70,9 +71,11 @@ class Remedies:
         return WORDS.get(self.now, "")
 
     def _chosen(self, plan: Executed) -> str:
-        if "ticks" not in self.done and table_misses(plan):
+        if "ticks" not in self.done and (plan.good or table_misses(plan)):
             self.ticks = True
             return "ticks"
+        if plan.good:
+            return ""
         if comes_true(plan):
             self.tried.append(TriedAir(self.fit, _late(plan)))
             if self._pressable and not between(self.tried):
@@ -87,11 +90,14 @@ class Remedies:
             self.guesses -= 1
             self.from_guess, self.ticks = True, False
             self.seeds += self.fit is self.guessed
-            self.guessed = self.fit
             self.done.discard("ticks")
             self.tried.clear()
             return "anew"
         return ""
+
+    def guess_made(self) -> None:
+        """A plan was made from a guess, with the air of now; the next one begins from another."""
+        self.guessed = self.fit
 
     def give_up(self) -> None:
         """The last change found no plan, or one that does not come true: it is taken back."""
@@ -129,10 +135,10 @@ class Remedies:
 
     @property
     def _pressable(self) -> bool:
-        """Whether a fit has left the touchdown late, in a task with a flight and no pulse yet."""
+        """Whether a fit was not enough, in a task with a flight and no pulse yet."""
         flies = self.task.height is not None or self.task.feet is not None
         untried = not self.task.landing.air and "press" not in self.done
-        return self.fit is not None and self.tried[-1].late > 0.0 and flies and untried
+        return "fit" in self.done and flies and untried
 
     def _other_air(self, plan: Executed) -> FittedAir | None:
         """Air that may fit better, None where there is none or the last fits were in vain."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -33,10 +34,14 @@ class Allowed:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Whether an execution is near enough to its plan, with a sentence."""
+    """Whether an execution is near enough to its plan, with a sentence.
+
+    `share`: its largest error in units of what is allowed; infinite where it falls.
+    """
 
     good: bool
     sentence: str
+    share: float = math.inf
 
 
 def verdicts(
@@ -68,13 +73,15 @@ def judge(who: str, facts: Facts | None, allowed: Allowed) -> Verdict:
     if allowed.final is not None:
         figures.append(_end(facts["final_error_m"], allowed.final))
     causes = [figure.miss for figure in figures if figure.share > 1.0]
-    if allowed.lands and not facts["landed"]:
+    worst = max(figures, key=lambda figure: figure.share)
+    falls = allowed.lands and not facts["landed"]
+    if falls:
         causes.insert(0, facts["fault"] or "does not land")
     if causes:
         *first, last = causes
-        return Verdict(False, f"the {who} {', '.join(first)}{' and ' if first else ''}{last}")
-    worst = max(figures, key=lambda figure: figure.share)
-    return Verdict(True, f"{who} matches the plan ({worst.match})")
+        sentence = f"the {who} {', '.join(first)}{' and ' if first else ''}{last}"
+        return Verdict(False, sentence, math.inf if falls else worst.share)
+    return Verdict(True, f"{who} matches the plan ({worst.match})", worst.share)
 
 
 @dataclass(frozen=True)
