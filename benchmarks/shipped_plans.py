@@ -20,6 +20,7 @@ from typing import Any
 
 from kemba.config import load_yaml, shipped_folder
 from kemba.ocp import load_task, task_model
+from kemba.ocp.shipped.entry import read_plan
 from kemba.ocp.shipped.kind import FIGURES, kind_of
 from kemba.ocp.shipped.shelf import INDEX
 from kemba.sweep.cases.case import Case
@@ -35,13 +36,13 @@ figures of this table, and only a little (`kemba/ocp/shipped/shelf.py` says how 
 [solving](solving.md#from-a-shipped-plan). They were continued from plans that were found from a
 guess. Of {tried} plans, the cheapest of each row was kept whose executions keep to the task's
 tolerances, also on the full plant. `of`: among how many. Errors are those on the plant. `air`:
-the [`landing.air`](tasks.md) with which a plan was made, a pulse on stretched legs.
-Heights of 0.44 to 0.46 m and 0.9 m and distances beyond 0.3 m have none: with the tables of the
-planning model no plan that was tried keeps to the plant. With
-[fitted air](solving.md#air-that-fits-the-plant) `solve` finds good ones at these heights
-([height by height](solving.md#height-by-height)) and at some of these distances.
-Facts of 28 plans were read again from their files when the page was written anew, so that `of` is
-too low at 0.64 to 0.72 m.
+the [`landing.air`](tasks.md) with which a plan was made, a pulse on stretched legs. `fitted`: it was
+made with [air that fits the plant](solving.md#air-that-fits-the-plant), because with the tables of
+the planning model no plan that was tried keeps to the plant; a task that begins from it has the
+same air. Heights of 0.44 to 0.46 m and 0.9 m have none
+([height by height](solving.md#height-by-height) says what `solve` finds there).
+Facts of earlier plans were read again from their files when the page was written anew, so that `of`
+is too low at 0.64 to 0.72 m.
 Written by `benchmarks/shipped_plans.py` on {machine}.
 
 """
@@ -77,7 +78,9 @@ def _case(walk: dict[str, Any], folder: Path) -> Case:
 def _facts(path: Path) -> dict[str, Any]:
     """What a walk noted about a plan, with the kind of its task as that is today."""
     facts = json.loads(path.read_text(encoding="utf-8"))
-    return {**facts, "path": path, "kind": _kind(facts["task"], tuple(facts["set"]))}
+    fitted = "fitted_air" in read_plan(path.with_suffix(".npz")).meta
+    kind = _kind(facts["task"], tuple(facts["set"]))
+    return {**facts, "path": path, "kind": kind, "fitted": fitted}
 
 
 @cache
@@ -115,7 +118,7 @@ def page(chosen: list[dict[str, Any]], tried: int) -> str:
     """The page for people."""
     text = HEAD.format(tried=tried, machine=f"{platform.processor() or platform.machine()}")
     columns = ["task", *(f"{k} [{UNITS[k]}]" for k in FIGURES)]
-    columns += ["air", "torque² [N².m².s]", "valves [s]", "cost", "of"]
+    columns += ["air", "fitted", "torque² [N².m².s]", "valves [s]", "cost", "of"]
     columns += ["apex [mm]", "touchdown [ms]", "end [mm]"]
     lines = ["| " + " | ".join(columns) + " |", "|---" * len(columns) + "|"]
     for row in chosen:
@@ -125,7 +128,7 @@ def page(chosen: list[dict[str, Any]], tried: int) -> str:
         errors = [f"{1e3 * plant['apex_error_m']:+.1f}", f"{1e3 * plant['final_error_m']:.1f}"]
         errors.insert(1, "" if late is None else f"{1e3 * late:+.1f}")
         air = [word.split("=")[1] for word in row["set"] if word.startswith("landing.air=")]
-        cost = ["".join(air)]
+        cost = ["".join(air), "yes" if row["fitted"] else ""]
         cost += [f"{row['torque_squared_integral']:.3g}", f"{row['valve_open_s']:.2f}"]
         cells = [row["task"], *figures, *cost, f"{row['cost']:.3g}", str(row["of"]), *errors]
         lines.append("| " + " | ".join(cells) + " |")
