@@ -32,7 +32,10 @@ class RetimingSettings(Settings):
     fallen: float = setting(
         1e3, "1", "error of a robot that falls, in units of those", "convention: beyond any other"
     )
-    executions: int = setting(24, "1", "simulations at most", CHOSEN)
+    executions: int = setting(
+        24, "1", "simulations at most", "derived: edges on ticks of the plan cost as much; tried "
+        "beside 80 at nine heights (docs/solving.md)",
+    )  # fmt: skip
 
 
 def retimed(model: Model, plan: Trajectory, table: Trajectory) -> Trajectory:
