@@ -36,8 +36,8 @@ figures of this table, and only a little (`kemba/ocp/shipped/shelf.py` says how 
 [solving](solving.md#from-a-shipped-plan). They were continued from plans that were found from a
 guess. Of {tried} plans, the cheapest of each row was kept whose executions keep to the task's
 tolerances, also on the full plant. `of`: among how many. Errors are those on the plant. `air`:
-the [`landing.air`](tasks.md) with which a plan was made, a pulse on stretched legs. `fitted`: it was
-made with [air that fits the plant](solving.md#air-that-fits-the-plant), because with the tables of
+the [`landing.air`](tasks.md) with which a plan was made, a pulse on stretched legs. `fitted`: made
+with [air that fits the plant](solving.md#air-that-fits-the-plant), because with the tables of
 the planning model no plan that was tried keeps to the plant; a task that begins from it has the
 same air. Heights of 0.44 and 0.45 m have none
 ([height by height](solving.md#height-by-height) says what `solve` finds there).
