@@ -14,6 +14,7 @@ from kemba.ocp import load_task, task_model
 from kemba.ocp.continuation.renoded import renoded
 from kemba.ocp.phases.modes import Phase
 from kemba.ocp.phases.notes import noted_phases
+from kemba.ocp.planning import plans_nearby
 from kemba.ocp.shipped.entry import Entry, read_plan, write_plan
 from kemba.ocp.shipped.kind import kind_of
 from kemba.ocp.shipped.shelf import Near, Neighbour, neighbours, shelf
@@ -125,3 +126,21 @@ def test_a_near_task_begins_from_a_shipped_plan(tmp_path: Path) -> None:
     assert answer["iterations"] < 150
     rows = (run / "trajectory.csv").read_text().splitlines()
     assert len(rows) == 82
+
+
+def test_a_plan_with_fitted_air_begins_one_with_the_same_air(tmp_path: Path) -> None:
+    words = ["solve", "jump_forward.yaml", "--set", "distance=0.52 m", "--no-figure", "--json"]
+    done = CliRunner().invoke(app, [*words, "--out", str(tmp_path / "run")])
+    answer = json.loads(done.stdout)
+    assert done.exit_code == 0, answer["sentence"]
+    entry = next(e for e in shelf(SHELF) if answer["start"] == f"shipped: {e.name}")
+    assert entry.effects and entry.fitted_air
+    assert "the air of its model is fitted to the simulated robot" in answer["sentence"]
+    assert answer["fitted_air"]["factors"] == entry.fitted_air["factors"]
+    assert load_task(tmp_path / "run" / "task.yaml")[0].effects == entry.effects
+
+
+def test_who_wants_the_tables_begins_from_none_with_fitted_air() -> None:
+    task, document = load_task("jump_forward.yaml", ["distance=0.52 m", "fit_air=false"])
+    assert neighbours(task, task_model(task)), "there are such plans"
+    assert next(plans_nearby(task, document), None) is None
