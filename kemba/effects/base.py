@@ -209,6 +209,11 @@ class Effect(BaseModel):
         """Scalar parameters of this effect by name."""
         return self.declared()
 
+    def tables(self) -> dict[str, tuple[float, ...]]:
+        """Figures of several numbers each that differ from machine to machine, by name."""
+        figures = {name: self.value(name) for name in self.nominal}
+        return {name: value for name, value in figures.items() if isinstance(value, tuple)}
+
     def tolerances(self) -> dict[str, float]:
         """1 sigma, as a share of the value, of figures that differ a little between machines of
         the same make; the entries of a table as `fill[0]`.

@@ -58,6 +58,23 @@ def test_models_that_differ_in_numbers_share_their_machine_code() -> None:
         same(run(variant, start, PUSH, 0.15), run(alone, start, PUSH, 0.15), within=1e-6)
 
 
+def test_models_that_differ_in_tables_share_their_machine_code() -> None:
+    """As fits of the air do."""
+    model = planning()
+    air = model.effect("chamber")
+    weak = air.model_copy(update={"F_extend": tuple(0.9 * F for F in air.F_extend)})
+    slow = air.model_copy(update={"fill": tuple(1.3 * tau for tau in air.fill)})
+    limp = model.effect("mode_damping").model_copy(update={"c_none": 60.0})
+    variants = [model.with_effects(list(e)) for e in ((), (weak,), (slow,), (weak, limp), (slow,))]
+    known = [equations_of(variant) for variant in variants]
+    assert known[3] is known[4] and known[3].free == ("mode_damping.c_none",)
+    scaled = {name.partition("[")[0] for name in known[3].scaled}
+    assert scaled == {f"chamber.{name}" for name in ("F_extend", "F_retract", "fill", "vent")}
+    for variant in variants:
+        alone = Model(variant.mechanism, variant.effects, variant.supply + 1e-9)
+        same(run(variant, {}, PUSH, 0.15), run(alone, {}, PUSH, 0.15), within=1e-6)
+
+
 def test_other_threads_run_while_one_simulates() -> None:
     """Python's own lock is free meanwhile: else this thread would hardly count."""
     condition = Condition(planning(), {"body/z": 2.0}, None, 1.0, 2e-5, 0.5)

@@ -24,22 +24,37 @@ from kemba.plant.stepping.imposed import impose
 from kemba.plant.stepping.pairs import PairTable
 
 
+def numbers_of(model: Model) -> dict[str, float]:
+    """The parameters of a model, and the entries of its tables as `chamber.fill[0]`."""
+    found = {name: value for name, (_, value) in model.parameters.items()}
+    for effect in model.effects:
+        for name, table in effect.tables().items():
+            found |= {f"{effect.name}.{name}[{i}]": entry for i, entry in enumerate(table)}
+    return found
+
+
 class Equations:
-    """What the plant knows of a model; `free` names its parameters that each run may change.
+    """What the plant knows of a model; `free` names its parameters that each run may change,
+    `scaled` the entries of its tables, by a factor each.
 
     `machine` is for the kernel. `now(q, v, s, u)`: M (n, n), F (n,), B (n, nl) and f (ns,) at a
     state. `driven`: a step of the effect states when the motion is imposed. `measure`: outputs.
     """
 
-    def __init__(self, model: Model, free: Sequence[str] = ()) -> None:
-        self.free = tuple(free)
-        self.node: Node = model.build(free) if free else model.node
+    def __init__(self, model: Model, free: Sequence[str] = (), scaled: Sequence[str] = ()) -> None:
+        self.free, self.scaled = tuple(free), tuple(scaled)
+        self.node: Node = model.build(free, scaled) if free or scaled else model.node
+        self._own = numbers_of(model)
         self.forms = Forms(self.node)
         self.pairs: PairTable = self.forms.pairs
 
     def values(self, model: Model) -> Array:
-        """The free parameters (np,) of a model that shares these equations."""
-        return np.array([model.parameters[name][1] for name in self.free], dtype=float)
+        """The free parameters and factors (np,) of a model that shares these equations."""
+        there = numbers_of(model)
+        factors = [
+            there[name] / self._own[name] if self._own[name] else 1.0 for name in self.scaled
+        ]
+        return np.array([*(there[name] for name in self.free), *factors], dtype=float)
 
     @cached_property
     def machine(self) -> KernelModel:

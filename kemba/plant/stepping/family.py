@@ -8,12 +8,13 @@ from typing import Any
 
 from kemba.mechanism import Mechanism
 from kemba.model import Model
-from kemba.plant.stepping.equations import Equations
+from kemba.plant.stepping.equations import Equations, numbers_of
 
 
 @dataclass
 class Family:
-    """Models of one mechanism with the same effects: `numbers` are those of the first of them."""
+    """Models of one mechanism with the same effects: `numbers` are those of the first of them,
+    parameters and entries of tables (`chamber.fill[0]`)."""
 
     structure: tuple[Any, ...]
     numbers: dict[str, float]
@@ -33,17 +34,26 @@ def equations_of(model: Model) -> Equations:
 
 
 def _find(model: Model) -> Equations:
-    structure = _structure(model)
-    numbers = {name: value for name, (_, value) in model.parameters.items()}
+    structure, numbers = _structure(model), numbers_of(model)
     families = _families(model.mechanism)
     for family in families:
         if family.structure == structure:
+            known = {*family.equations.free, *family.equations.scaled}
             new = {name for name, value in numbers.items() if value != family.numbers[name]}
-            if not new <= set(family.equations.free):
-                family.equations = Equations(model, sorted({*family.equations.free, *new}))
+            if not new <= known:
+                family.equations = _with_free(model, known | new)
             return family.equations
     families.append(Family(structure, numbers, Equations(model)))
     return families[-1].equations
+
+
+def _with_free(model: Model, names: set[str]) -> Equations:
+    """Equations in which `names` are free; of an effect one of whose tables is among them, all
+    tables, since a fit changes one after the other."""
+    entries = numbers_of(model).keys() - model.parameters.keys()
+    effects = {name.rpartition(".")[0] for name in names & entries}
+    scaled = sorted(name for name in entries if name.rpartition(".")[0] in effects)
+    return Equations(model, sorted(names - entries), scaled)
 
 
 def _families(mechanism: Mechanism) -> list[Family]:
@@ -55,10 +65,13 @@ def _families(mechanism: Mechanism) -> list[Family]:
 
 
 def _structure(model: Model) -> tuple[Any, ...]:
-    """What models must have in common to share equations: all but the numbers of the effects."""
+    """What models must have in common to share equations: all but the numbers of the effects, and
+    which entries of their tables are zero, since no factor changes these."""
     effects = []
     for effect in model.effects:
-        numbers = effect.parameters()
-        rest = {name: value for name, value in effect.model_dump().items() if name not in numbers}
-        effects.append((type(effect), repr(rest)))
+        tables = effect.tables()
+        apart = {*effect.parameters(), *tables}
+        rest = {name: value for name, value in effect.model_dump().items() if name not in apart}
+        zeros = [[entry == 0.0 for entry in table] for table in tables.values()]
+        effects.append((type(effect), repr((rest, zeros))))
     return (model.supply, *effects)
