@@ -23,9 +23,9 @@ class Origin:
 
     `name`: what sentences call it; `dear`: what to do where the new plan costs much more. `once`:
     where the whole change fails in one step, also from the earlier plan solved on its new
-    intervals, nothing else is tried. `ticks`: valve edges of the new
-    plan are on the controller's ticks. `stages`: the solved program of the plan, where it is at
-    hand.
+    intervals, nothing else is tried. `ticks`: valve edges of the new plan are on the controller's
+    ticks; where that fails at once, these ticks do not fit, and nothing else is tried. `stages`:
+    the solved program of the plan, where it is at hand.
     """
 
     plan: Trajectory

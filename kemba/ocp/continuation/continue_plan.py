@@ -106,7 +106,10 @@ class Continuation:
             found: Refined | None = None
             for meshed in self._meshes(start, reduction):
                 self.solution = None  # it was on other nodes
-                found = self._at_once(*meshed, reduction) or self._walk(*meshed, reduction)
+                found = self._at_once(*meshed, reduction)
+                if found is None and self.origin.ticks:
+                    return Refined(None, None, Ending.GAVE_UP, 0)
+                found = found or self._walk(*meshed, reduction)
                 if found.done:
                     return found
             if found is not None and (self.origin.once or self.task.landing.air):
