@@ -20,7 +20,7 @@ from kemba.mechanism import load_robot
 from kemba.plotting import Source, load_machine
 from kemba.report.review.events import events_of
 from kemba.report.review.lacking.found import answer_parts
-from kemba.report.review.limits.use import air_drawn, motor_share
+from kemba.report.review.limits.use import air_drawn, motor_share, supply_share
 from kemba.report.review.tracks import Track, gather, grid_of, on_grid
 from kemba.report.review.verdict import of_answer, of_logs, of_plan
 from kemba.runs import PLANT_RUN, load_run, newest_run
@@ -238,6 +238,17 @@ def test_air_is_counted_from_what_the_chambers_hold() -> None:
     track = Track("log", "log", Source("log", Trajectory(time, columns)))
     wanted = 6.0 * 101325.0 * cylinder.tube / (287.0 * 293.0)
     assert air_drawn(track, "front", cylinder) == pytest.approx(wanted, rel=1e-6)
+
+
+def test_the_supply_is_a_share_of_that_at_the_start() -> None:
+    """Gauge pressure; an overshoot above the start does not count as the start."""
+    time = np.linspace(0.0, 0.1, 101)
+    fall = np.interp(time, [0.0, 0.03, 0.05, 0.09, 0.1], [1.0, 1.0, 0.5, 1.1, 1.0])
+    gauge = Trajectory(time, {"supply/P [Pa]": 101325.0 + 7e5 * fall})
+    share = Trajectory(time, {"supply/line/s [1]": fall})
+    for measured in (gauge, share):
+        assert supply_share(measured) == pytest.approx(fall)
+    assert supply_share(Trajectory(time, {"body/z [m]": time})) is None
 
 
 def test_a_rig_has_its_page_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -72,7 +72,7 @@ def _ranking(answer: Facts) -> str:
     heads = ("effect", "probability", "parameters (95 %)", "error after", "cannot be told from")
     listed: Sequence[Facts] = answer.get("ranking") or []
     rows = [_ranked(one, answer.get("added") or ()) for one in listed[:RANKED]]
-    return table("Ranking: what else would explain the logs", heads, rows)
+    return table("Ranking: how likely each effect is among the missing ones", heads, rows)
 
 
 def _ranked(one: Facts, added: Collection[Any]) -> tuple[str, ...]:
