@@ -60,8 +60,7 @@ def use_of(track: Track, model: Model, machine: Machine, leg: str) -> Use:
     """What a motion uses of a leg's limits; NaN where a column is missing."""
     t = track.t
     nothing = np.full(len(t), np.nan)
-    name = f"{leg}/hip/tau"
-    torque = t[name] if name in t else nothing  # noqa: SIM401 - a trajectory has no get
+    torque = t.get(f"{leg}/hip/tau", nothing)
     speed = rate(track, f"{leg}/hip/w", f"{leg}/hip/q")
     motor = motor_of(model, leg)
     share = motor_share(motor, torque, speed) if motor else nothing
