@@ -14,7 +14,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from kemba.files import read_json
-from kemba.identify.answer import read_answer
+from kemba.identify.answer import ENDED, read_answer
 from kemba.identify.logs.clock import in_plans_clock, start_of
 from kemba.mechanism import load_robot
 from kemba.plotting import Source, load_machine
@@ -193,6 +193,11 @@ def test_every_verdict_gets_a_next_step(verdict: str, tmp_path: Path) -> None:
     assert (said.grade == "bad") == (verdict == "bad-data")
     text = "".join(answer_parts(answer, tmp_path, pictures=True))
     assert "2.80 before, 0.50 after" in text
+
+
+def test_a_search_that_the_time_ended_goes_on() -> None:
+    said = of_answer({"verdict": "unknown", "remarks": [ENDED]}, WORDS)
+    assert said.command == f"kemba-opt discover {WORDS['logs']} --time-limit 900"
 
 
 @pytest.mark.parametrize("text", ["[]", "{}", '{"verdict": 3}'])

@@ -8,12 +8,14 @@ from dataclasses import dataclass
 from html import escape
 from typing import Any, Literal
 
+from kemba.identify.answer import ENDED
 from kemba.identify.compare.compare import Comparison
 from kemba.report.review.events import Events
 from kemba.units import short
 
 Facts = Mapping[str, Any]
 Grade = Literal["good", "fair", "bad"]
+LONGER = 900  # s of a search for which the usual time was too short
 
 
 @dataclass(frozen=True)
@@ -185,6 +187,10 @@ def of_answer(answer: Facts, words: Mapping[str, str]) -> ReviewVerdict:
         )
     if verdict == "bad-data":
         return ReviewVerdict("bad", f"FAILED: {own}", "correct the logs, and run discover again.")
+    if verdict == "unknown" and ENDED in (answer.get("remarks") or ()):
+        logs = words.get("logs") or "LOG..."
+        command = f"kemba-opt discover {logs} --time-limit {LONGER}"
+        return ReviewVerdict("fair", own, "let the search go on for longer:", command)
     aim = "design the test that tells more:"
     return ReviewVerdict("fair", own, aim, f"kemba-opt experiment {folder}")
 
