@@ -142,7 +142,9 @@ def test_without_anything_the_newest_run_is_taken(
     shutil.copytree(jump, "runs/jump-1", ignore=shutil.ignore_patterns("review*.html"))
     Path("runs/jump-1/logs/review.html").touch()
     done = call("review")
-    assert "the newest run: runs/jump-1\nwith its newest logs: 2\n" in done.stderr
+    assert (
+        "the newest run: runs/jump-1\nwith its newest logs: 2 in runs/jump-1/logs\n" in done.stderr
+    )
     assert done.stdout == "runs/jump-1/logs/review-2.html\n"
     assert call("review", "--out", "runs/jump-1/logs/review.html").exit_code == 2
 
