@@ -18,8 +18,9 @@ from kemba.identify.answer import ENDED, read_answer
 from kemba.identify.logs.clock import in_plans_clock, start_of
 from kemba.mechanism import load_robot
 from kemba.plotting import Source, load_machine
-from kemba.report.review.events import events_of
+from kemba.report.review.events import Events, events_of
 from kemba.report.review.lacking.found import answer_parts
+from kemba.report.review.limits.summary import event_table
 from kemba.report.review.limits.use import air_drawn, motor_share, supply_share
 from kemba.report.review.tracks import Track, gather, grid_of, on_grid
 from kemba.report.review.verdict import of_answer, of_logs, of_plan
@@ -195,6 +196,24 @@ def test_every_verdict_gets_a_next_step(verdict: str, tmp_path: Path) -> None:
     assert (said.grade == "bad") == (verdict == "bad-data")
     text = "".join(answer_parts(answer, tmp_path, pictures=True))
     assert "2.80 before, 0.50 after" in text
+
+
+def test_a_formula_is_said_once(tmp_path: Path) -> None:
+    answer = {**ANSWER, "verdict": "unknown", "formula": "F = -3*v"}
+    for sentence in (
+        "Something is missing. A formula that fits: F = -3*v.",
+        "Something is missing.",
+    ):
+        text = "".join(answer_parts({**answer, "sentence": sentence}, tmp_path, pictures=False))
+        assert text.count("F = -3*v") == 1
+
+
+def test_only_with_a_plan_there_is_its_clock() -> None:
+    time = np.linspace(0.0, 1.0, 11)
+    body = Source("a", Trajectory(time, {"body/z [m]": 0.2 + 0.0 * time}))
+    flown = Events(0.5, 0.2, None, {}, None)
+    for role, said in (("plan", True), ("log", False)):
+        assert ("plan's clock" in event_table([Track(role, role, body)], [flown])) is said
 
 
 def test_a_search_that_the_time_ended_goes_on() -> None:

@@ -47,7 +47,8 @@ def event_table(tracks: Sequence[Track], events: Sequence[Events | None]) -> str
                 f"<b>{escape(e.fault)}</b>" if e.fault else "upright",
             ]
         )
-    title = "In the plan's clock. The apex is that of the body's centre, which is above the feet."
+    clock = "Times of the plan's clock. " if any(track.role == "plan" for track in tracks) else ""
+    title = f"{clock}The apex is that of the body's centre, which is above the feet."
     return table(title, heads, rows)
 
 
