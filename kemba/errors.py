@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import shlex
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 LISTED = 12  # a hint with more names than this does not help
 PART, FEW = 3, 4  # so many letters of a name tell it, where so few names have them
@@ -56,6 +56,11 @@ def map_hint(path: object) -> str:
     """What to do with the log of another program."""
     what = "for a log of another program, draft a column map"
     return f"{what}: kemba-opt map {shlex.quote(str(path))}"
+
+
+def enumerated(names: Sequence[str]) -> str:
+    """Names in a sentence: a, b and c."""
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
 def suggest(name: str, candidates: Iterable[str]) -> str:

@@ -66,6 +66,10 @@ class Trajectory:
         """The columns' names, so that `dict(trajectory)` holds all columns."""
         return self.names
 
+    def values(self) -> tuple[Array, ...]:
+        """The columns (n,) in the order of their names."""
+        return tuple(self._columns.values())
+
     def items(self) -> Iterator[tuple[str, Array]]:
         """Names and columns (n,)."""
         return iter(self._columns.items())

@@ -139,3 +139,42 @@ def workshop(log: Trajectory, path: Path) -> Path:
         table["_".join([*said, unit])] = log[name] * scale + (0.3 if unit == "V" else 0.0)
     pd.DataFrame(table).to_csv(path, sep=";", decimal=",", index=False)
     return path
+
+
+def camel(log: Trajectory, path: Path) -> Path:
+    """Words run together, one letter for a leg, units behind; valves say `on` and `off`."""
+    words = {
+        "body/x": "xBody_mm", "body/z": "zBody_mm", "body/pitch": "theta_deg",
+        "hip/q": "qHip{}_deg", "hip/tau": "tauHip{}_Nm", "piston/x": "cyl{}_mm",
+        "valve/extend": "u_ext_{}", "valve/retract": "u_ret_{}",
+    }  # fmt: skip
+    scales = {"m": 1e3, "rad": np.degrees(1), "N.m": 1.0}
+    table: dict[str, object] = {"t_ms": 1e3 * log.time}
+    for name in log.names:
+        word = next(word for part, word in words.items() if name.endswith(part))
+        header, unit = word.format("F" if name.startswith("front") else "R"), log.unit(name)
+        table[header] = (
+            np.where(log[name] > 0, "on", "off") if unit == "1" else log[name] * scales[unit]
+        )
+    pd.DataFrame(table).to_csv(path, index=False)
+    return path
+
+
+def units_below(log: Trajectory, path: Path) -> Path:
+    """German short forms between tabs, a remark above and the units in a row of their own."""
+    words = {
+        "body/x": "Vorschub", "body/z": "Hoehe", "body/pitch": "Nickwinkel", "hip/q": "Huefte",
+        "hip/tau": "Moment_Huefte", "piston/x": "Zyl", "valve/extend": "Ventil_aus",
+        "valve/retract": "Ventil_ein",
+    }  # fmt: skip
+    units = {"m": (1e3, "mm"), "rad": (np.degrees(1), "Grad"), "N.m": (1.0, "Nm"), "1": (1.0, "")}
+    head, below, table = ["Zeit"], ["ms"], [1e3 * log.time]
+    for name in log.names:
+        word = next(word for part, word in words.items() if name.endswith(part))
+        leg = {"front": "_vo", "rear": "_hi"}.get(name.split("/")[0], "")
+        scale, unit = units[log.unit(name)]
+        head, below, table = [*head, word + leg], [*below, unit], [*table, scale * log[name]]
+    with path.open("w", encoding="utf-8") as stream:
+        stream.write("# Messung 12\n" + "\t".join(head) + "\n" + "\t".join(below) + "\n")
+        np.savetxt(stream, np.column_stack(table), fmt="%.17g", delimiter="\t")
+    return path

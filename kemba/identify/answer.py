@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from kemba.errors import KembaError
+from kemba.errors import KembaError, enumerated
 from kemba.files import read_json
 from kemba.identify.settings import DiscoverSettings
 
@@ -100,6 +100,7 @@ class Answer:
         return {**asdict(self), **more, "probabilities": PROBABILITY}
 
 
+FEW = 2  # parameters of an effect that a sentence has room for
 ENDED = "the time limit ended the search; with a larger --time-limit it goes on"
 
 
@@ -125,7 +126,7 @@ def phrase(answer: Answer) -> str:
     if answer.verdict == "partly":
         return _partly(answer)
     parts = [r for r in answer.ranking if r.effect in answer.added]
-    named = " and ".join(_named(r) for r in parts)
+    named = enumerated([_named(r) for r in parts])
     before, after = f"{answer.error_before:.2f}", f"{answer.error_after:.2f}"
     falls = f"falls from {before} to {after}"
     if float(after) >= float(before):
@@ -140,9 +141,10 @@ def _partly(answer: Answer) -> str:
     likely = [r for r in answer.ranking if r.effect in unsure]
     parts = []
     if sure:
-        parts.append(f"Missing, among others: {' and '.join(map(_named, sure))}.")
+        parts.append(f"Missing, among others: {enumerated([_named(r) for r in sure])}.")
     if likely:
-        parts.append(f"Likely, but not sure: {' and '.join(map(_named, likely))}.{_doubt(likely)}")
+        names = enumerated([_named(r) for r in likely])
+        parts.append(f"Likely, but not sure: {names}.{_doubt(likely)}")
     share = 1.0 - answer.excess_after / max(answer.excess_before, 1e-9)
     before, after = f"{answer.error_before:.2f}", f"{answer.error_after:.2f}"
     parts.append(
@@ -155,6 +157,9 @@ def _partly(answer: Answer) -> str:
 
 
 def _named(ranked: Ranked) -> str:
+    """An effect with its figures; of many only how many, since the ranking lists them."""
+    if len(ranked.parameters) > FEW:
+        return f"{ranked.effect} ({len(ranked.parameters)} parameters)"
     values = ", ".join(f"{name} = {value}" for name, value in ranked.parameters.items())
     return f"{ranked.effect} ({values})"
 

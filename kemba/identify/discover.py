@@ -134,7 +134,9 @@ def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> 
     drift = drifting(search, best)
     if drift is not None and formula is not None and drift.nats > formula.gain:
         formula = None
-    doubts = Doubts() if formula else doubts_about(search, belief, drift, holdout, ended)
+    doubts = Doubts((ENDED,) if ended else ())
+    if formula is None:
+        doubts = doubts_about(search, belief, drift, holdout, ended)
     search.say("ranking the effects")
     ranking = ranked(search, belief, holdout)
     answer = _answer(search, best, p_value, test, ranking, formula, holdout, doubts)

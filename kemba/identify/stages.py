@@ -99,7 +99,7 @@ def unbuilt(answer: Answer, structure: str) -> Answer:
     """Such an answer: a part of one, from which no model can be written."""
     if answer.verdict not in ("missing", "partly"):
         return answer
-    remark = f"{structure} is there as a share only, beside the chambers of the model"
+    remark = f"{structure} explains only a part, beside the chambers of the model"
     left = answer.rest or f"a model with {structure} instead was not built, or explains less"
     found = replace(
         answer, verdict="partly", added=(), rest=left, remarks=[remark, *answer.remarks]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from kemba.errors import enumerated
 from kemba.identify.answer import ENDED, Ranked, Verdict, excess
 from kemba.identify.doubt.parsimony import Belief
 from kemba.identify.doubt.run_consistency import Drift
@@ -47,7 +48,7 @@ def doubts_about(
         least = 0.0  # however little it explains, nothing else could be asked
     if best and after > settings.whole and excess(after) > settings.whole_share * excess(before):
         reasons.append(
-            f"{' and '.join(best)} fits best, but leaves an error of {after:.3g} times the noise"
+            f"{enumerated(best)} fits best, but leaves an error of {after:.3g} times the noise"
         )
     if belief.rivals:
         others = ", ".join(" + ".join(h) for h in belief.rivals)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from kemba.errors import enumerated
+
 LACKS = {
     "partly": ", and something more that is not known",
     "missing": "",
@@ -25,10 +27,9 @@ def learnt(verdict: str, added: Sequence[str], before: float, after: float) -> s
     """What the model lacks; `before`, `after`: errors of `compare`, in units of the noise."""
     if verdict not in LACKS or not added:
         return ELSE.get(verdict, "nothing was added to the model")
-    names = " and ".join([", ".join(added[:-1]), added[-1]] if len(added) > 1 else added)
     them = "them" if len(added) > 1 else "it"
     falls = f"with {them} its error goes from {before:.2f} to {after:.2f} times the noise"
-    return f"the model lacks {names}{LACKS[verdict]}; {falls}"
+    return f"the model lacks {enumerated(added)}{LACKS[verdict]}; {falls}"
 
 
 def expected(error: float | None) -> str:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +15,7 @@ import kemba
 from kemba.api import Executions, Planned
 from kemba.errors import ConfigErrors, KembaError
 from kemba.trajectory import Trajectory
+from kemba_cli.main import app
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +58,11 @@ def test_executions_give_logs_that_compare_reads(done: Executions) -> None:
 
 def test_a_log_is_a_mapping_and_a_table(done: Executions) -> None:
     log = kemba.load_log(done.logs[0])
-    assert set(dict(log)) == set(log.names) and len(log) == len(log.time)
+    assert (
+        set(dict(log)) == set(log.names)
+        and len(log.values()) == len(log.names)
+        and len(log) == len(log.time)
+    )
     frame = log.to_pandas()
     assert list(frame.columns) == list(log.headers)
     assert np.array_equal(frame["body/z [m]"], log["body/z"])
@@ -89,3 +96,15 @@ def test_import_is_quick_and_names_are_listed() -> None:
     assert done.stdout.startswith("False False") and "'discover'" in done.stdout
     with pytest.raises(AttributeError, match="no attribute 'solv'"):
         _ = kemba.solv
+
+
+def test_every_verb_has_its_function() -> None:
+    """The page names one for each, and what it names exists."""
+    page = (Path(__file__).parents[2] / "docs/library.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| `(\w+)` \| (.+) \|$", page, flags=re.MULTILINE)
+    verbs = {command.name for command in app.registered_commands}
+    assert {verb for verb, _ in rows} | set(kemba.__all__) | {"solve"} >= verbs
+    for _, text in rows:
+        for name in re.findall(r"`(kemba(?:\.\w+)+)", text):
+            module, _, function = name.rpartition(".")
+            assert callable(getattr(import_module(module), function)), name

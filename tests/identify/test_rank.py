@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from toy_problem import Toy
 
-from kemba.identify.answer import ENDED, Answer, Ranked, phrase
+from kemba.identify.answer import ENDED, Answer, Ranked, Value, phrase
 from kemba.identify.discover import discover, material
 from kemba.identify.doubt.cross_validation import Gain, left_out, left_out_error
 from kemba.identify.doubt.parsimony import Belief
@@ -244,3 +244,13 @@ def test_an_effect_that_explains_nothing_costs_evidence() -> None:
         search = searched(Toy({}, seed))
         loss.append(search.points[()].log_evidence - search.points["kick",].log_evidence)
     assert 1.5 < np.mean(loss) < 3.5
+
+
+def test_a_sentence_names_many_effects_and_leaves_tables_to_the_ranking() -> None:
+    """Of an effect with many parameters only how many there are."""
+    mass = Value(3.0, 2.0, 4.0, "kg")
+    few, many = {"m": mass}, dict.fromkeys("abc", mass)
+    ranking = [Ranked("payload", 1.0, few), Ranked("tubes", 1.0, many), Ranked("rope", 1.0, few)]
+    found = Answer("missing", ranking=ranking, added=("payload", "tubes", "rope"))
+    named = f"payload (m = {mass}), tubes (3 parameters) and rope (m = {mass})"
+    assert phrase(found).startswith(f"Missing: {named}; ")

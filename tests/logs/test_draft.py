@@ -25,6 +25,8 @@ FILES = {
     "abbreviated": ("log.csv", foreign_files.abbreviated),
     "player": ("log.tsv", foreign_files.player),
     "workshop": ("log.csv", foreign_files.workshop),
+    "camel": ("log.csv", foreign_files.camel),
+    "units below": ("log.txt", foreign_files.units_below),
 }
 
 
@@ -85,6 +87,27 @@ def test_a_valve_that_never_switches_has_the_threshold_of_the_others(tmp_path: P
     still = log.with_columns({"rear/valve/retract [1]": np.zeros(len(log))})
     draft = draft_map(foreign_files.german(still, tmp_path / "log.csv"), LEGS)
     assert draft.columns["rear/valve/retract [1]"]["threshold"] == 12.0
+
+
+def test_units_that_nothing_tells_are_shared(tmp_path: Path) -> None:
+    """A jump on the spot has a small way forward and a small pitch, in the unit of the others."""
+    log = foreign_files.robot_log()
+    table = {"time": log.time}
+    for name in log.names:
+        scale = {"m": 1e3, "rad": np.degrees(1)}.get(log.unit(name), 1.0)
+        still = 0.01 if name in ("body/x", "body/pitch") else 1.0
+        table[name.replace("/", "_")] = still * scale * log[name]
+    path = tmp_path / "log.csv"
+    np.savetxt(
+        path,
+        np.column_stack(list(table.values())),
+        delimiter=",",
+        header=",".join(table),
+        comments="",
+    )
+    units = {header: source.get("unit") for header, source in draft_map(path, LEGS).columns.items()}
+    assert units["body/x [m]"] == units["body/z [m]"] == "mm"
+    assert units["body/pitch [rad]"] == units["front/hip/q [rad]"] == "deg"
 
 
 def test_a_drive_is_recognised(tmp_path: Path) -> None:

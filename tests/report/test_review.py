@@ -14,13 +14,14 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from kemba.files import read_json
-from kemba.identify.answer import read_answer
+from kemba.identify.answer import ENDED, read_answer
 from kemba.identify.logs.clock import in_plans_clock, start_of
 from kemba.mechanism import load_robot
 from kemba.plotting import Source, load_machine
-from kemba.report.review.events import events_of
+from kemba.report.review.events import Events, events_of
 from kemba.report.review.lacking.found import answer_parts
-from kemba.report.review.limits.use import air_drawn, motor_share
+from kemba.report.review.limits.summary import event_table
+from kemba.report.review.limits.use import air_drawn, motor_share, supply_share
 from kemba.report.review.tracks import Track, gather, grid_of, on_grid
 from kemba.report.review.verdict import of_answer, of_logs, of_plan
 from kemba.runs import PLANT_RUN, load_run, newest_run
@@ -142,7 +143,9 @@ def test_without_anything_the_newest_run_is_taken(
     shutil.copytree(jump, "runs/jump-1", ignore=shutil.ignore_patterns("review*.html"))
     Path("runs/jump-1/logs/review.html").touch()
     done = call("review")
-    assert "the newest run: runs/jump-1\nwith its newest logs: 2\n" in done.stderr
+    assert (
+        "the newest run: runs/jump-1\nwith its newest logs: 2 in runs/jump-1/logs\n" in done.stderr
+    )
     assert done.stdout == "runs/jump-1/logs/review-2.html\n"
     assert call("review", "--out", "runs/jump-1/logs/review.html").exit_code == 2
 
@@ -195,6 +198,29 @@ def test_every_verdict_gets_a_next_step(verdict: str, tmp_path: Path) -> None:
     assert "2.80 before, 0.50 after" in text
 
 
+def test_a_formula_is_said_once(tmp_path: Path) -> None:
+    answer = {**ANSWER, "verdict": "unknown", "formula": "F = -3*v"}
+    for sentence in (
+        "Something is missing. A formula that fits: F = -3*v.",
+        "Something is missing.",
+    ):
+        text = "".join(answer_parts({**answer, "sentence": sentence}, tmp_path, pictures=False))
+        assert text.count("F = -3*v") == 1
+
+
+def test_only_with_a_plan_there_is_its_clock() -> None:
+    time = np.linspace(0.0, 1.0, 11)
+    body = Source("a", Trajectory(time, {"body/z [m]": 0.2 + 0.0 * time}))
+    flown = Events(0.5, 0.2, None, {}, None)
+    for role, said in (("plan", True), ("log", False)):
+        assert ("clock" in event_table([Track(role, role, body)], [flown])) is said
+
+
+def test_a_search_that_the_time_ended_goes_on() -> None:
+    said = of_answer({"verdict": "unknown", "remarks": [ENDED]}, WORDS)
+    assert said.command == f"kemba-opt discover {WORDS['logs']} --time-limit 900"
+
+
 @pytest.mark.parametrize("text", ["[]", "{}", '{"verdict": 3}'])
 def test_what_is_no_answer_is_told(tmp_path: Path, text: str) -> None:
     (tmp_path / "answer.json").write_text(text)
@@ -238,6 +264,17 @@ def test_air_is_counted_from_what_the_chambers_hold() -> None:
     track = Track("log", "log", Source("log", Trajectory(time, columns)))
     wanted = 6.0 * 101325.0 * cylinder.tube / (287.0 * 293.0)
     assert air_drawn(track, "front", cylinder) == pytest.approx(wanted, rel=1e-6)
+
+
+def test_the_supply_is_a_share_of_that_at_the_start() -> None:
+    """Gauge pressure; an overshoot above the start does not count as the start."""
+    time = np.linspace(0.0, 0.1, 101)
+    fall = np.interp(time, [0.0, 0.03, 0.05, 0.09, 0.1], [1.0, 1.0, 0.5, 1.1, 1.0])
+    gauge = Trajectory(time, {"supply/P [Pa]": 101325.0 + 7e5 * fall})
+    share = Trajectory(time, {"supply/line/s [1]": fall})
+    for measured in (gauge, share):
+        assert supply_share(measured) == pytest.approx(fall)
+    assert supply_share(Trajectory(time, {"body/z [m]": time})) is None
 
 
 def test_a_rig_has_its_page_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

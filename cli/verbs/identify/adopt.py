@@ -13,7 +13,9 @@ from kemba_cli.common import Force, Json, OwnEffects, Quiet, print_json
 def adopt(
     answer: Annotated[Path, typer.Argument(help="Folder written by discover.")],
     effect: Annotated[str, typer.Argument(help="Effect of its ranking, such as seal_friction.")],
-    out: Annotated[Path | None, typer.Option(help="Model YAML to write.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Model YAML to write (model_EFFECT.yaml in the answer).")
+    ] = None,
     force: Force = False,
     own_effects: OwnEffects = None,
     json: Json = False,

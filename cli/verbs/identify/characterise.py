@@ -16,12 +16,16 @@ if TYPE_CHECKING:
 
 def characterise(
     logs: Annotated[
-        list[Path] | None, typer.Argument(help="Bench logs (CSV), or folders of them.")
+        list[Path] | None, typer.Argument(help="Bench logs, or folders of them.")
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="Model YAML to write.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Model YAML to write (else none).")] = None,
     figure: Annotated[
         bool | None,
-        typer.Option("--figure/--no-figure", help="Draw the paper's figure of each rig."),
+        typer.Option(
+            "--figure/--no-figure",
+            help="Draw the paper's figure of each rig.",
+            show_default="no-figure",
+        ),
     ] = None,
     figures: Annotated[
         Path | None,

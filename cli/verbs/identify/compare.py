@@ -16,11 +16,14 @@ SHOWN = 5
 
 
 def compare(
-    logs: Annotated[list[Path], typer.Argument(help="Logs (CSV) of one machine, any order.")],
+    logs: Annotated[list[Path], typer.Argument(help="Logs of one machine, in any order.")],
     model: Annotated[str, typer.Option(help="Model YAML to judge.")] = "planning",
     run: Annotated[Path | None, typer.Option(help="Run folder that was executed.")] = None,
     figure: Annotated[
-        bool | None, typer.Option("--figure/--no-figure", help="Draw where the model fails.")
+        bool | None,
+        typer.Option(
+            "--figure/--no-figure", help="Draw where the model fails.", show_default="no-figure"
+        ),
     ] = None,
     out: Annotated[
         Path | None, typer.Option(help="Figure to write: PNG, PDF or SVG (a new compare.png here).")

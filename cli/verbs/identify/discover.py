@@ -18,7 +18,7 @@ WRITTEN = ("answer.json", "model.yaml", "model_*.yaml", "experiment.yaml", "*.pn
 
 
 def discover(
-    logs: Annotated[list[Path], typer.Argument(help="Logs (CSV) of one machine, any order.")],
+    logs: Annotated[list[Path], typer.Argument(help="Logs of one machine, in any order.")],
     holdout: Annotated[
         list[Path] | None, typer.Option(help="A log kept for judging only; may be repeated.")
     ] = None,

@@ -28,7 +28,9 @@ class Place(str, Enum):
 
 def experiment(
     answer: Annotated[Path, typer.Argument(help="Folder written by discover.")],
-    out: Annotated[Path | None, typer.Option(help="Rig or task YAML to write.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Rig or task YAML to write (experiment.yaml in the answer).")
+    ] = None,
     on: Annotated[Place, typer.Option(help="A piston on a rig, or the robot.")] = Place.rig,
     certify: Annotated[
         bool, typer.Option(help="On the robot: plan the motion at once, until it is certified.")

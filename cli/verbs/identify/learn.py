@@ -22,7 +22,9 @@ def learn(
     target: Annotated[
         str | None, typer.Option(help="Task YAML to plan next; else that of the last run.")
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="Run folder to write.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Run folder to write (a new runs/TASK-N).")
+    ] = None,
     overrides: Annotated[
         list[str] | None, typer.Option("--set", help="Override a key: --set 'height=0.6 m'.")
     ] = None,

@@ -12,7 +12,7 @@ from kemba_cli.failures import BAD_INPUT
 
 
 def check(
-    files: Annotated[list[Path], typer.Argument(help="YAML files, and logs as CSV.")],
+    files: Annotated[list[Path], typer.Argument(help="YAML files and logs.")],
     column_map: Foreign = None,
     model: Annotated[
         str, typer.Option(help="Model YAML of the machine that the logs are from.")

@@ -13,9 +13,7 @@ from kemba_cli.failures import BAD_ANSWER
 
 def draft_map(
     log: Annotated[Path, typer.Argument(help="Log of another program, any text table or format.")],
-    out: Annotated[
-        Path | None, typer.Option(help="Map to write; LOG_map.yaml here without it.")
-    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Map to write (LOG_map.yaml here).")] = None,
     model: Annotated[str, typer.Option(help="Model YAML: its robot names the legs.")] = "planning",
     force: Force = False,
     own_effects: OwnEffects = None,

@@ -22,7 +22,9 @@ def solve(
     task: Annotated[
         str | None, typer.Argument(help="Task YAML, here or among the shipped ones.")
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="Run folder to write.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Run folder to write (a new runs/TASK-N).")
+    ] = None,
     overrides: Set = None,
     model: Annotated[str | None, typer.Option(help="Model YAML instead of the task's.")] = None,
     resume: Annotated[

@@ -56,7 +56,7 @@ def plot(
     window = open_window() if show else None
     logs = plotting.bench_logs(runs[0]) if len(runs) == 1 else {}
     if logs and animate:
-        raise typer.BadParameter("a rig does not move about", param_hint="--animate")
+        raise typer.BadParameter("bench logs have no motion to animate", param_hint="--animate")
     if logs:
         figure = plotting.plot_rig(logs, model or "planning", figure=window)
         names, beside = list(logs), runs[0] / "figure.png"

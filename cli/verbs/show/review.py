@@ -47,7 +47,8 @@ def review(
     if not logs and run is None and answer is None:
         run = newest(quiet, "certificate.json")
         logs = newest_logs(run)
-        say(f"with its newest logs: {len(logs)}" if logs else "it has no logs yet", quiet)
+        which = f"{len(logs)} in {logs[0].parent}" if logs else ""
+        say(f"with its newest logs: {which}" if logs else "it has no logs yet", quiet)
     with Progress(quiet or json, REVIEW) as progress:
         page, verdict = write(logs, run, answer, model, column_map, out, force, progress.tell)
     if json:

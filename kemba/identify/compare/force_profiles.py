@@ -47,7 +47,7 @@ class ForceProfileSettings(Settings):
         0.1, "1", "negligible force over a channel's usual force", BY_HAND, decides=True
     )
     sure: float = setting(
-        3.0, "1", "sigmas beyond which a bin's force is not nought", "convention: three sigmas"
+        3.0, "1", "sigmas beyond which a bin's force is not zero", "convention: three sigmas"
     )
     plain: float = setting(
         60.0,

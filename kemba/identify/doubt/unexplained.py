@@ -49,7 +49,7 @@ class UnexplainedSettings(Settings):
     )
     folds: int = setting(5, "1", "blocks of time that are left out in turn", "convention: five")
     no_force: float = setting(
-        1e-9, "1", "force, in sigmas, of a term that acts nowhere", "convention: nought"
+        1e-9, "1", "force, in sigmas, of a term that acts nowhere", "convention: zero"
     )
 
 

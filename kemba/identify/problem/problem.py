@@ -166,7 +166,7 @@ class Problem(ABC):
         """
         if switch.unit != "s":
             return switch.size
-        least = max(switch.lower - switch.off, 0.0)  # of a time constant, which is never nought
+        least = max(switch.lower - switch.off, 0.0)  # of a time constant, which is never zero
         return max(min(switch.size, self.interval), least)
 
     @cached_property

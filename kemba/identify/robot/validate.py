@@ -60,7 +60,7 @@ def contradictions(
         if worst and power[worst] > absurd and not sunk:
             yield KembaError(
                 log.name,
-                f"{worst} moves as no robot would: {power[worst]:.0f} times its noise off per row",
+                f"{worst} is off by {power[worst]:.0f} times its noise from one row to the next",
                 "motion that follows from the commands was expected",
                 "are columns swapped, a sign turned, or clocks apart?",
             )

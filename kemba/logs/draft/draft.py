@@ -13,13 +13,14 @@ import numpy as np
 from kemba.errors import KembaError
 from kemba.logs.columns import ColumnMap
 from kemba.logs.draft import ranges
-from kemba.logs.draft.layout import Layout, layout_of
+from kemba.logs.draft.layout import Layout, layout_of, units_below
 from kemba.logs.draft.matching import assigned
-from kemba.logs.draft.stamps import Stamp, joint_state_labels, numbers, stamp_of
+from kemba.logs.draft.stamps import Stamp, joint_state_labels, numbers, stamp_of, switches
 from kemba.logs.draft.targets import Target, bench_targets, drive_targets, robot_targets
-from kemba.logs.draft.words import Names
+from kemba.logs.draft.words import SPELT, Names
 from kemba.logs.opening import TEXTS, raw_columns
 from kemba.trajectory import TIME, Array
+from kemba.units import is_unit
 
 
 @dataclass(frozen=True)
@@ -54,25 +55,54 @@ def draft_map(path: Path, legs: Sequence[str]) -> Draft:
     layout = layout_of(path) if path.suffix.lower() in TEXTS else {}
     trial = ColumnMap.model_construct(**layout)
     raw, _ = raw_columns(path, trial)
-    names = Names(legs, {} if trial.header else joint_state_labels(raw))
+    labels = {} if trial.header else joint_state_labels(raw)
+    names = Names(legs, labels, _units_below(path, layout, list(raw)), switches(raw))
     values = numbers(raw, trial.decimal)
-    stamp = stamp_of(raw, values)
+    stamp = stamp_of(raw, values, names.below)
     if stamp is None:
         raise KembaError(str(path), "no column rises from row to row", "a time was expected")
     rest = {name: v for name, v in values.items() if name not in stamp.names}
     kind, targets = _kind(names, rest)
     pairs = assigned(names, rest, targets)
     columns = {TIME: stamp.source}
+    guessed = _guessed_units(names, pairs, rest)
     for target in targets:
         if target.header in pairs:
             name = pairs[target.header]
-            columns[target.header] = _source(target, name, names.unit(name), rest[name])
+            unit = names.unit(name) or guessed.get(ranges.alike(target.header))
+            columns[target.header] = _source(target, name, unit, rest[name])
     _share_level(columns, pairs, rest)
     used = {*pairs.values(), *stamp.names}
     missing = tuple(t.header for t in targets if t.needed and t.header not in pairs)
     return Draft(
         kind, layout | _origin(stamp), columns, missing, tuple(n for n in raw if n not in used)
     )
+
+
+def _units_below(path: Path, layout: Layout, names: Sequence[str]) -> dict[str, str]:
+    """The units in the row below the header; texts that are no units are left out."""
+    found = {}
+    for name, text in zip(names, units_below(path, layout), strict=False):
+        unit = SPELT.get(text, text)
+        if is_unit(unit):
+            found[name] = unit
+    return found
+
+
+def _guessed_units(
+    names: Names, pairs: Mapping[str, str], values: Mapping[str, Array]
+) -> dict[str, str]:
+    """The units of columns that are alike, where nothing tells them: those of the others in the
+    log, else by the size of all together, since a jump on the spot has small `x` and pitch."""
+    found: dict[str, str] = {}
+    for group in {ranges.alike(header) for header in pairs}:
+        own = {h: n for h, n in pairs.items() if ranges.alike(h) == group and "valve/" not in h}
+        told = {names.unit(name) for name in own.values()} - {None}
+        size = np.concatenate([values[name] for name in own.values()] or [np.zeros(0)])
+        unit = told.pop() if len(told) == 1 else ranges.guessed_unit(next(iter(own), "[1]"), size)
+        if unit is not None:
+            found[group] = unit
+    return found
 
 
 def _share_level(
@@ -113,7 +143,6 @@ def _source(target: Target, name: str, unit: str | None, values: Array) -> dict[
     if target.is_valve:
         level = ranges.valve_level(values)
         return source if level is None else {**source, "threshold": level}
-    unit = unit or ranges.guessed_unit(target.header, values)
     if unit and unit != target.unit:
         source["unit"] = unit
     return source | (ranges.gauge(values, unit) if target.unit == "Pa" else {})

@@ -28,11 +28,7 @@ def layout_of(path: Path) -> Layout:
     Of all separators and decimal signs, the one that gives most numbers. Raises KembaError where
     none gives a table of at least two columns.
     """
-    try:
-        with open(path, encoding=encoding(path), newline=None) as stream:
-            lines = [line.rstrip("\n") for line in islice(stream, LINES)]
-    except OSError as error:
-        raise KembaError(str(path), error.strerror or str(error)) from None
+    lines = _lines(path)
     found = [(_numbers(lines, *way), way) for way in WAYS]
     (score, begin, width), (separator, decimal) = max(found, key=lambda pair: pair[0][0])
     if not score or width < 2:
@@ -46,6 +42,23 @@ def layout_of(path: Path) -> Layout:
     layout |= {"skip_rows": above} if above else {}
     layout |= {"skip_below": below} if below else {}
     return layout | ({"header": False} if header is None else {})
+
+
+def units_below(path: Path, layout: Layout) -> list[str]:
+    """The cells of the row below the header, if it is no data: often the columns' units."""
+    if not layout.get("skip_below"):
+        return []
+    below = _lines(path)[layout.get("skip_rows", 0) + 1 :]
+    first = next((line for line in below if line.strip()), "")
+    return [cell.strip("[]() ") for cell in _cells(first, layout.get("separator", ","))]
+
+
+def _lines(path: Path) -> list[str]:
+    try:
+        with open(path, encoding=encoding(path), newline=None) as stream:
+            return [line.rstrip("\n") for line in islice(stream, LINES)]
+    except OSError as error:
+        raise KembaError(str(path), error.strerror or str(error)) from None
 
 
 def _cells(line: str, separator: str) -> list[str]:

@@ -46,8 +46,11 @@ def assigned(
     scores = np.full((len(targets), len(columns)), NOTHING)
     for j, name in enumerate(columns):
         for i, target in enumerate(targets):
-            if fits(target, names.unit(name), values[name]):
-                scores[i, j] = agreement(names.says(name), target)
+            unit = names.unit(name)
+            if name in names.switches and not target.is_valve:
+                continue
+            if fits(target, unit, values[name]):
+                scores[i, j] = agreement(by_unit(names.says(name), target, unit), target)
     rows, chosen = linear_sum_assignment(scores, maximize=True)
     pairs = zip(rows.tolist(), chosen.tolist(), strict=True)
     return {
@@ -68,6 +71,21 @@ def fits(target: Target, unit: str | None, values: Array) -> bool:
     except ValueError:
         return False
     return True
+
+
+def by_unit(says: Meaning, target: Target, unit: str | None) -> Meaning:
+    """What a name says where its `unit` is that of `target`: no other kind of quantity than the
+    unit's, as by the `F` of `cyl_F [mm]`; this kind also where the name says of what it is. A
+    length is no pitch, as by the `R` of `cyl_R [mm]`."""
+    kind = target.means.get("kind") or target.may.get("kind")
+    if unit is None or kind is None or target.is_valve:
+        return says
+    left = {group: found for group, found in says.items() if group != "kind"}
+    if target.unit != "rad" and left.get("direction") == {"pitch"}:
+        del left["direction"]
+    part = target.means.get("part")
+    told = kind in says.get("kind", ()) or part is None or part in says.get("part", ())
+    return {**left, "kind": {kind}} if told else left
 
 
 def agreement(says: Meaning, target: Target) -> float:

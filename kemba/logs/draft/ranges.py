@@ -22,7 +22,8 @@ ATMOSPHERE = "1.01325 bar"
 
 
 def guessed_unit(header: str, values: Array) -> str | None:
-    """The unit of a column (n,) by its size; None where it is ours or cannot be told."""
+    """The unit of a column by its values, or those of all that are `alike`; None where it is ours
+    or cannot be told."""
     unit = header[header.index("[") + 1 : -1]
     table = {"m": EXTENSION if "piston/" in header else LENGTH, "rad": ANGLE, "Pa": PRESSURE}
     size = float(np.nanmax(np.abs(values), initial=0.0))
@@ -30,6 +31,13 @@ def guessed_unit(header: str, values: Array) -> str | None:
         if size <= largest:
             return None if name == unit else name
     return None
+
+
+def alike(header: str) -> str:
+    """What columns have in common that one log gives in one unit: all angles, all pistons. Force
+    sensors are told apart: each has its own amplifier."""
+    unit = header[header.index("[") + 1 : -1]
+    return header if unit == "N" else f"piston {unit}" if "piston/" in header else unit
 
 
 def time_unit(values: Array) -> str:

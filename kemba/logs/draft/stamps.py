@@ -44,8 +44,20 @@ def numbers(raw: Raw, decimal: str) -> dict[str, Array]:
     return found
 
 
-def stamp_of(raw: Raw, values: Mapping[str, Array]) -> Stamp | None:
-    """The time: a column (n,) that rises and whose name says so, else the first one that rises."""
+def switches(raw: Raw) -> set[str]:
+    """The columns that say `on` and `off`, or `true` and `false`."""
+    words = {"on", "off", "true", "false"}
+    texts = {name: cells for name, cells in raw.items() if cells.dtype == object}
+    return {n for n, cells in texts.items() if {str(c).strip().lower() for c in cells} <= words}
+
+
+def stamp_of(
+    raw: Raw, values: Mapping[str, Array], below: Mapping[str, str] | None = None
+) -> Stamp | None:
+    """The time: a column (n,) that rises and whose name says so, else the first one that rises.
+
+    `below`: units in a row below the header.
+    """
     said = [name for name in values if "time" in _says(name)]
     parts = [name for name in values if "rest" in _says(name)]
     seconds = [name for name in said if name not in parts and _rises(values[name], strictly=False)]
@@ -55,7 +67,7 @@ def stamp_of(raw: Raw, values: Mapping[str, Array]) -> Stamp | None:
         return _two_parts("1", "2")
     rising = [name for name in values if _rises(values[name])]
     for name in [*(name for name in said if name in rising), *rising]:
-        unit = named_unit(name)[1] or ranges.time_unit(values[name])
+        unit = named_unit(name)[1] or (below or {}).get(name) or ranges.time_unit(values[name])
         from_first = ranges.is_stamp(values[name], unit)
         source = {"source": name, **({} if unit == "s" else {"unit": unit})}
         return Stamp(source, (name,), from_first)

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
 # Of one group a column has one meaning. English, the usual short forms, and a little German.
 WORDS: dict[str, dict[str, str]] = {
     "part": {
         "hip": "hip motor qdd huefte qm tm",
-        "piston": "piston cylinder cyl knee rod actuator kolben zylinder xp fp",
+        "piston": "piston cylinder cyl knee rod actuator kolben zylinder zyl xp fp",
         "body": "body base torso trunk com boom imu",
         "foot": "foot toe grf ground",
-        "valve": "valve valves sol solenoid ventil ue ur cmd",
+        "valve": "valve valves sol solenoid ventil u ue ur cmd",
         "supply": "supply tank reservoir feed regulator line",
         "axis": "axis drive slide carriage",
     },
@@ -29,7 +29,7 @@ WORDS: dict[str, dict[str, str]] = {
     "direction": {
         "x": "x horizontal forward vorschub vx ax fx dx ddx",
         "z": "z y height vertical hoehe altitude vz az fz fy dy dz ddy ddz",
-        "pitch": "pitch tilt nick r",
+        "pitch": "pitch tilt theta nick nickwinkel neigung r",
     },
     "side": {
         "extend": "extend ext extension ausfahren aus push out cap head ue 1 a",
@@ -39,12 +39,12 @@ WORDS: dict[str, dict[str, str]] = {
     "rest": {"nanoseconds": "nanosec nanosecs nsec nsecs nanoseconds"},
 }
 LEG_WORDS = {
-    "front": "front f fore fr vorn vorne",
-    "rear": "rear back hind b r h hinten",
+    "front": "front f fore fr vorn vorne vo",
+    "rear": "rear back hind b r h hinten hi",
     "left": "left l links",
     "right": "right r rechts",
 }
-SPELT = {"degrees": "deg", "degree": "deg", "Grad": "deg", "grad": "deg"}
+SPELT = {"degrees": "deg", "degree": "deg", "Grad": "deg", "grad": "deg", "°": "deg"}
 UNITS = "ns us µs ms s min mm cm m in deg rad bar mbar kPa MPa Pa psi kN N Nm N.m mN.m mV V".split()
 BRACKETED = re.compile(r"^(?P<name>.*?)\s*[\[(](?P<unit>[^\])]*)[\])]\s*$")
 WORD = re.compile(r"[A-Z]?[a-zµ°]+|[A-Z]+(?![a-z])|\d+")
@@ -53,14 +53,17 @@ Meaning = dict[str, set[str]]
 
 @dataclass(frozen=True)
 class Names:
-    """The names of a log's columns: the machine's legs, and what headerless columns are called."""
+    """The names of a log's columns: the machine's legs, what headerless columns are called, units
+    in a row below the header, and columns that say `on` and `off`."""
 
     legs: Sequence[str] = ()
     labels: Mapping[str, str] = field(default_factory=dict)
+    below: Mapping[str, str] = field(default_factory=dict)
+    switches: Collection[str] = ()
 
     def unit(self, name: str) -> str | None:
-        """The unit that a column's name tells."""
-        return named_unit(self.labels.get(name, name))[1]
+        """The unit that a column's name tells, else the row below the header."""
+        return named_unit(self.labels.get(name, name))[1] or self.below.get(name)
 
     def says(self, name: str) -> Meaning:
         """What a column's name may mean: per group, the candidates of its words."""

@@ -61,9 +61,10 @@ def verdicts(
 def judge(who: str, facts: Facts | None, allowed: Allowed) -> Verdict:
     """An execution against what is allowed.
 
-    The sentence of a good one gives the figure nearest to its limit: `re-simulation matches the
-    plan (apex 0.3 mm lower, 2 mm allowed)`. That of a bad one gives each cause: `the simulated
-    robot tips over`. Without `facts` nothing could be executed, which is no confirmation.
+    The sentence of a good one gives the figure nearest to its limit, if it is not zero in the
+    digits shown: `re-simulation matches the plan (apex 0.3 mm lower, 2 mm allowed)`. That of a bad
+    one gives each cause: `the simulated robot tips over`. Without `facts` nothing could be
+    executed, which is no confirmation.
     """
     if facts is None:
         return Verdict(False, f"the {who} cannot be started")
@@ -81,16 +82,21 @@ def judge(who: str, facts: Facts | None, allowed: Allowed) -> Verdict:
         *first, last = causes
         sentence = f"the {who} {', '.join(first)}{' and ' if first else ''}{last}"
         return Verdict(False, sentence, math.inf if falls else worst.share)
-    return Verdict(True, f"{who} matches the plan ({worst.match})", worst.share)
+    seen = f" ({worst.match})" if worst.seen else ""
+    return Verdict(True, f"{who} matches the plan{seen}", worst.share)
 
 
 @dataclass(frozen=True)
 class _Figure:
-    """One error: its `share` of what is allowed [1], and in words when it is within or beyond."""
+    """One error: its `share` of what is allowed [1], and in words when it is within or beyond.
+
+    `seen`: whether it is not zero in the digits of these words.
+    """
 
     share: float
     match: str
     miss: str
+    seen: bool
 
 
 def _apex(error: float, allowed: float) -> _Figure:
@@ -99,6 +105,7 @@ def _apex(error: float, allowed: float) -> _Figure:
         _share(error, allowed),
         f"apex {height} {'higher' if error >= 0 else 'lower'}, {limit}",
         f"reaches {height} {'above' if error >= 0 else 'below'} the planned apex ({limit})",
+        _seen(error),
     )
 
 
@@ -106,13 +113,22 @@ def _touchdown(late: float, allowed: float) -> _Figure:
     text = f"{abs(1e3 * late):.1f} ms {'late' if late >= 0 else 'early'}"
     limit = f"{1e3 * allowed:g} ms allowed"
     share = _share(late, allowed)
-    return _Figure(share, f"touchdown {text}, {limit}", f"touches down {text} ({limit})")
+    return _Figure(
+        share, f"touchdown {text}, {limit}", f"touches down {text} ({limit})", _seen(late)
+    )
 
 
 def _end(error: float, allowed: float) -> _Figure:
     text, limit = f"{1e3 * error:.1f} mm", f"{1e3 * allowed:g} mm allowed"
     share = _share(error, allowed)
-    return _Figure(share, f"end {text} away, {limit}", f"ends {text} from the plan ({limit})")
+    return _Figure(
+        share, f"end {text} away, {limit}", f"ends {text} from the plan ({limit})", _seen(error)
+    )
+
+
+def _seen(error: float) -> bool:
+    """Whether an error [m] or [s] is shown as more than 0.0 mm or ms."""
+    return f"{abs(1e3 * error):.1f}" != "0.0"
 
 
 def _share(error: float, allowed: float) -> float:

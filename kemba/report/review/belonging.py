@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from kemba.errors import enumerated
 from kemba.identify.logs.clock import in_plans_clock, start_of
 from kemba.policy.settings import PolicySettings
 from kemba.runs import Run
@@ -118,8 +119,7 @@ def _sentence(alike: Sequence[Stranger], run: Run) -> str:
     why = alike[0].why.replace("SHARE", most if len(names) == 1 else f"up to {most}")
     if len(names) == 1:
         return f"{names[0]} does not belong to {run.path}: {why}."
-    listed = " and ".join([", ".join(names[:-1]), names[-1]])
-    return f"{listed} do not belong to {run.path}; of each: {why}."
+    return f"{enumerated(names)} do not belong to {run.path}; of each: {why}."
 
 
 def _legs(table: Trajectory) -> tuple[str, ...]:

@@ -8,12 +8,15 @@ from dataclasses import dataclass
 from html import escape
 from typing import Any, Literal
 
+from kemba.errors import enumerated
+from kemba.identify.answer import ENDED
 from kemba.identify.compare.compare import Comparison
 from kemba.report.review.events import Events
 from kemba.units import short
 
 Facts = Mapping[str, Any]
 Grade = Literal["good", "fair", "bad"]
+LONGER = 900  # s of a search for which the usual time was too short
 
 
 @dataclass(frozen=True)
@@ -162,7 +165,7 @@ def of_answer(answer: Facts, words: Mapping[str, str]) -> ReviewVerdict:
     own = str(answer.get("sentence") or verdict).split(". ")[0].rstrip(".") + "."
     if verdict in ("missing", "partly"):
         added = [str(name) for name in answer.get("added") or ()]
-        names = _listed(added) or "an effect"
+        names = enumerated(added) or "an effect"
         before, after = answer.get("error_before"), answer.get("error_after")
         falls = ""
         if isinstance(before, int | float) and isinstance(after, int | float):
@@ -185,13 +188,12 @@ def of_answer(answer: Facts, words: Mapping[str, str]) -> ReviewVerdict:
         )
     if verdict == "bad-data":
         return ReviewVerdict("bad", f"FAILED: {own}", "correct the logs, and run discover again.")
+    if verdict == "unknown" and ENDED in (answer.get("remarks") or ()):
+        logs = words.get("logs") or "LOG..."
+        command = f"kemba-opt discover {logs} --time-limit {LONGER}"
+        return ReviewVerdict("fair", own, "let the search go on for longer:", command)
     aim = "design the test that tells more:"
     return ReviewVerdict("fair", own, aim, f"kemba-opt experiment {folder}")
-
-
-def _listed(names: Sequence[str]) -> str:
-    """Names in a sentence: a, b and c."""
-    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
 def _flown(events: Sequence[Events], plan: Events | None) -> str:

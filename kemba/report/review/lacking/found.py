@@ -21,8 +21,9 @@ RANKED = 8  # effects shown
 
 def answer_parts(answer: Facts, folder: Path, pictures: bool) -> list[str]:
     """The answer as HTML; with `pictures` the figures that discover drew."""
+    sentence, formula = str(answer.get("sentence", "")), str(answer.get("formula") or "")
     parts = [
-        f"<p>{escape(str(answer.get('sentence', '')))}</p>",
+        f"<p>{escape(sentence)}</p>",
         f'<div class="facts">{_before_after(answer)}{_ladder(answer)}</div>',
         _ranking(answer),
     ]
@@ -30,8 +31,8 @@ def answer_parts(answer: Facts, folder: Path, pictures: bool) -> list[str]:
     if remarks:
         listed = "".join(f"<li>{escape(str(remark))}</li>" for remark in remarks)
         parts.append(f"<ul>{listed}</ul>")
-    if answer.get("formula"):
-        parts.append(f"<p>A formula that fits: <code>{escape(str(answer['formula']))}</code></p>")
+    if formula and formula not in sentence:
+        parts.append(f"<p>A formula that fits: <code>{escape(formula)}</code></p>")
     if pictures:
         parts += [picture(folder / f"{name}.png", alt) for name, alt in PICTURES.items()]
     return parts
@@ -72,7 +73,7 @@ def _ranking(answer: Facts) -> str:
     heads = ("effect", "probability", "parameters (95 %)", "error after", "cannot be told from")
     listed: Sequence[Facts] = answer.get("ranking") or []
     rows = [_ranked(one, answer.get("added") or ()) for one in listed[:RANKED]]
-    return table("Ranking: what else would explain the logs", heads, rows)
+    return table("Ranking: how likely each effect is among the missing ones", heads, rows)
 
 
 def _ranked(one: Facts, added: Collection[Any]) -> tuple[str, ...]:

@@ -15,7 +15,15 @@ from kemba.report.review.events import Events, FootFlight
 from kemba.report.review.html import table
 from kemba.report.review.limits.energy import Energy, energy_of, put_in
 from kemba.report.review.limits.torque_speed import torque_speed
-from kemba.report.review.limits.use import NORMAL, Use, droop, full_for, motor_of, slides, use_of
+from kemba.report.review.limits.use import (
+    NORMAL,
+    Use,
+    full_for,
+    motor_of,
+    slides,
+    supply_share,
+    use_of,
+)
 from kemba.report.review.tracks import Track
 from kemba.trajectory import Array
 
@@ -39,7 +47,8 @@ def event_table(tracks: Sequence[Track], events: Sequence[Events | None]) -> str
                 f"<b>{escape(e.fault)}</b>" if e.fault else "upright",
             ]
         )
-    title = "In the plan's clock. The apex is that of the body's centre, which is above the feet."
+    clock = "Times of the plan's clock. " if any(track.role == "plan" for track in tracks) else ""
+    title = f"{clock}The apex is that of the body's centre, which is above the feet."
     return table(title, heads, rows)
 
 
@@ -74,8 +83,20 @@ def limit_parts(book: Book, model: Model, machine: Machine) -> list[str]:
                 for i, (track, use) in enumerate(zip(book.tracks, uses, strict=True))
             ]
             charts.append(book.add(Chart(f"{leg.title()} {title}", "%", lines, levels=(100.0,))))
+    charts.append(book.add(_supply_chart(book)))
     grid = f'<div class="grid legs">{"".join(planes)}{"".join(charts)}</div>'
     return [_limit_table(book.tracks, used, machine), grid]
+
+
+def _supply_chart(book: Book) -> Chart:
+    """How far the supply falls while the chambers draw on it."""
+    levels = [(i, track, supply_share(track.t)) for i, track in enumerate(book.tracks)]
+    lines = [
+        Curve(track.name, 100.0 * _onto(book.grid, track, level), i)
+        for i, track, level in levels
+        if level is not None
+    ]
+    return Chart("Supply pressure, of that at the start", "%", lines, least=10.0)
 
 
 def _limit_table(
@@ -85,6 +106,8 @@ def _limit_table(
     for i, track in enumerate(tracks):
         coordinates = machine.coordinates(track.t)
         points = machine.points(coordinates) if coordinates is not None else {}
+        supply = supply_share(track.t)
+        lowest = "-" if supply is None else f"{100 * float(np.nanmin(supply)):.0f} %"
         for leg, uses in used.items():
             foot = points[f"{leg}/foot"][:, 0] if points else None
             slid = slides(track, leg, machine.stance(track.t, leg), foot)
@@ -97,15 +120,16 @@ def _limit_table(
                     f"{1e3 * full_for(track, uses[i].motor):.0f} ms",
                     _largest(100 * uses[i].cone, "%", 0),
                     _or_dash(slid, 1e3, "mm", 1),
-                    _or_dash(droop(track.t), 100, "%", 0),
+                    lowest,
                 ]
             )
     heads = ["motion", "leg", "largest torque", "largest share of the limit", "time at the limit"]
-    heads += ["largest share of the friction cone", "foot slides", "lowest supply"]
+    heads += ["largest share of the friction cone", "foot slides", "lowest supply pressure"]
     note = (
         '<p class="soft">The limit is the torque that the motor gives at that speed. At 100 % of '
         "the friction cone a foot begins to slide; a measured foot may show more: its forces are "
-        "noisy, or the ground grips better than in the model.</p>"
+        "noisy, or the ground grips better than in the model. The supply is what reaches the "
+        "valves: its pressure above the atmosphere as a share of that at the start.</p>"
     )
     return table("Largest use of motors and ground", heads, rows) + note
 
@@ -118,8 +142,8 @@ def energy_parts(book: Book, machine: Machine, certificate: Mapping[str, Any]) -
         [escape(track.name), *_both(one.pistons), *_both(one.hips), _impacts(one), _air(one)]
         for track, one in zip(book.tracks, found, strict=True)
     ]
-    heads = ["motion", "pistons put in", "take out", "hips put in", "take out", "impacts take"]
-    text = table("Energy", [*heads, "air drawn"], rows)
+    heads = ["motion", "pistons put in", "pistons take out", "hips put in", "hips take out"]
+    text = table("Energy", [*heads, "impacts take", "air drawn"], rows)
     charts = []
     for title, name in (("Work of the pistons", "pistons"), ("Work of the hips", "hips")):
         lines = [

@@ -50,7 +50,7 @@ def torque_speed(leg: str, tracks: Sequence[Track], uses: Sequence[Use], motor: 
     title = f"{leg.title()} hip: torque against speed"
     alt = f"{title}; at most {100 * used:.0f} % of what the motor gives is used"
     return (
-        f"<figure><figcaption><b>{escape(title)}</b> [N.m, rad/s]</figcaption>"
+        f"<figure><figcaption><b>{escape(title)}</b> [N.m against rad/s]</figcaption>"
         f'<svg viewBox="0 0 {WIDE:g} {HIGH:g}" role="img" aria-label="{escape(alt)}">'
         f'<polyline points="{border}" fill="none" stroke="#8c8c8c" stroke-dasharray="4 3"/>'
         f'<polyline points="{at(low, 1.08 * motor.tau_peak)} {at(low, 0.0)} '

@@ -21,6 +21,7 @@ from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Array, Trajectory
 
 NORMAL = 1.204e-3  # kg in a litre of air at 20 deg C and one atmosphere
+AT_START = 20  # rows whose median is the pressure of the supply before valves open
 
 
 class UseSettings(Settings):
@@ -59,8 +60,7 @@ def use_of(track: Track, model: Model, machine: Machine, leg: str) -> Use:
     """What a motion uses of a leg's limits; NaN where a column is missing."""
     t = track.t
     nothing = np.full(len(t), np.nan)
-    name = f"{leg}/hip/tau"
-    torque = t[name] if name in t else nothing  # noqa: SIM401 - a trajectory has no get
+    torque = t.get(f"{leg}/hip/tau", nothing)
     speed = rate(track, f"{leg}/hip/w", f"{leg}/hip/q")
     motor = motor_of(model, leg)
     share = motor_share(motor, torque, speed) if motor else nothing
@@ -130,12 +130,14 @@ def slides(track: Track, leg: str, stands: Mask, foot: Array | None) -> float:
     return way
 
 
-def droop(t: Trajectory) -> float | None:
-    """The lowest level of the supply as a share of that at rest; None where it is not known."""
+def supply_share(t: Trajectory) -> Array | None:
+    """Pressure (rows,) [1] of the supply above the atmosphere, as a share of that at the start;
+    None where it is not known."""
     for name in ("supply/P", "supply/line/s", "supply/s"):
         if name in t and np.isfinite(t[name]).any():
             level = t[name] - (ATMOSPHERE if name.endswith("P") else 0.0)
-            return float(np.nanmin(level) / np.nanmax(level))
+            known = level[np.isfinite(level)]
+            return np.asarray(level / np.median(known[:AT_START]))
     return None
 
 
