@@ -10,7 +10,7 @@ import numpy as np
 
 from kemba.identify.answer import ENDED, Answer, Ranked, phrase
 from kemba.identify.doubt.cross_validation import left_out
-from kemba.identify.doubt.parsimony import Belief, simplest
+from kemba.identify.doubt.parsimony import Belief, likeliest_part, simplest
 from kemba.identify.doubt.run_consistency import drifting
 from kemba.identify.doubt.unexplained import Formula, look
 from kemba.identify.evidence.bootstrap import NullTest, bootstrap, smallest_detectable
@@ -208,8 +208,7 @@ def _believed(search: Search, best: Hypothesis, test: NullTest) -> Belief:
             if grave:
                 search.visit(grave)
             continue
-        smaller = [h for h in search.points if len(h) == len(best) - 1 and set(h) < set(best)]
-        against = max(smaller, key=lambda h: search.points[h].log_evidence, default=NULL)
+        against = likeliest_part(search, best)
         gain = left_out(search, best, against)
         if gain.refuted or (len(best) > 1 and not gain.pays):
             belief = belief.without(best, against)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from toy_problem import Toy
 
+from kemba.identify.doubt.cross_validation import within_tolerance
 from kemba.identify.evidence.modes.bounded import within_bounds
 from kemba.identify.evidence.search import Search
 from kemba.identify.ranking import values
@@ -57,3 +58,13 @@ def test_what_is_reported_fits_together() -> None:
     assert bend.value == pytest.approx(6.0, abs=1e-6) and bend.high <= 6.0
     assert drag.value > free + 0.3  # it has to do what bend may not
     assert drag.low < drag.value < drag.high
+
+
+def test_left_out_data_are_predicted_with_what_a_parameter_can_be() -> None:
+    """A fit to the other blocks that leaves the bounds would be judged for what it cannot do."""
+    for largest, expected in ((6.0, 6.0), (20.0, 8.0)):
+        search = searched(largest)
+        linear = search.points[BOTH].linear
+        found = within_tolerance(search, linear, BOTH)
+        assert found[linear.index("bend.a")] == pytest.approx(expected, abs=0.5)
+        assert found[linear.index("bend.a")] <= largest + 1e-9

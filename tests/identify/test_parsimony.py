@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from toy_problem import Toy
 
-from kemba.identify.discover import discover
-from kemba.identify.doubt.cross_validation import left_out, left_out_error
-from kemba.identify.doubt.parsimony import Belief, simplest
+from kemba.identify.discover import _believed, discover, null_test
+from kemba.identify.doubt.cross_validation import Gain, left_out, left_out_error
+from kemba.identify.doubt.parsimony import Belief, likeliest_part, simplest
 from kemba.identify.evidence.search import Search
+from kemba.identify.evidence.spike_slab import NULL, Hypothesis
 from kemba.identify.ranking import equivalents
 from kemba.identify.verdict import doubts_about, verdict_on
 
@@ -49,6 +51,32 @@ def test_an_effect_that_left_out_data_need_stays_however_small() -> None:
     search = searched(windowed({"kick.a": 9.0, "bend.a": 3.0}), "kick", "bend")
     belief = Belief(("bend", "kick"), 0.01)
     assert simplest(search, belief) == belief
+
+
+def test_an_answer_of_many_effects_is_compared_with_its_parts_and_not_with_nothing() -> None:
+    search, many = Search(windowed({"kick.a": 9.0})), ("hum", "kick", "wave")
+    search.start()
+    search.visit(many)
+    part = likeliest_part(search, many)
+    assert len(part) == 2 and "kick" in part
+    assert {("hum", "kick"), ("hum", "wave"), ("kick", "wave")} < set(search.points)
+    assert likeliest_part(search, ("kick",)) == NULL
+
+
+def test_effects_that_do_not_pay_leave_an_answer_one_by_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As after a search that began anew with many effects: none of its parts was refitted."""
+
+    def alone_pays(search: Search, hypothesis: Hypothesis, against: Hypothesis = NULL) -> Gain:
+        return Gain(100.0, 200.0 if len(hypothesis) > 1 else 10.0)
+
+    many = ("hum", "kick", "wave")
+    search = Search(windowed({"kick.a": 9.0, "hum.a": 3.0, "wave.a": 3.0}))
+    search.start()
+    search.visit(many)
+    monkeypatch.setattr("kemba.identify.discover.left_out", alone_pays)
+    assert _believed(search, many, null_test(search)).best == ("kick",)
 
 
 def test_rivals_that_left_out_data_cannot_tell_are_named() -> None:

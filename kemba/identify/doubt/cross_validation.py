@@ -8,6 +8,7 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from kemba.identify.evidence.linear import Linear
+from kemba.identify.evidence.modes.bounded import effect_bounds
 from kemba.identify.evidence.point import LinearisationPoint
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
@@ -96,7 +97,11 @@ def _powers(search: Search, point: LinearisationPoint, judged: Linear) -> Array:
 
 
 def within_tolerance(search: Search, linear: Linear, hypothesis: Hypothesis) -> Array:
-    """z (k,) of the best fit with the nominal figures within their tolerance."""
+    """z (k,) of the best fit with the nominal figures within their tolerance.
+
+    Effects of the hypothesis stay within their bounds, as in a refit: a delay that ends at its
+    bound would else be judged where no valve can be.
+    """
     settings = CrossValidationSettings.current()
     ranker = search.base.ranker(linear, spike=settings.none)
     width = ranker.widths(hypothesis, 1.0)
@@ -106,7 +111,10 @@ def within_tolerance(search: Search, linear: Linear, hypothesis: Hypothesis) -> 
     lower = np.linalg.cholesky(h)
     target = np.linalg.solve(lower, shift - width * slope)
     reach = np.where(ranker.nuisance, settings.tolerated, settings.free)
-    found = lsq_linear(lower.T, target, bounds=(shift - reach, shift + reach), method="bvls")
+    least, most = effect_bounds(search.problem, linear.names, hypothesis)
+    least = np.maximum((least - linear.at) / width, shift - reach)
+    most = np.minimum((most - linear.at) / width, shift + reach)
+    found = lsq_linear(lower.T, target, bounds=(least, most), method="bvls")
     return np.asarray(linear.at + width * found.x)
 
 

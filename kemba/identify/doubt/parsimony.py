@@ -56,10 +56,8 @@ def simplest(search: Search, belief: Belief) -> Belief:
     best, rest = belief.best, belief.best
     path = {best}
     while len(rest) > 1:
-        smaller = [tuple(e for e in rest if e != member) for member in rest]
-        for number, hypothesis in enumerate(smaller, start=1):
-            search.visit(hypothesis, number, len(smaller))
-        search.refresh()
+        smaller = parts_of(rest)
+        _visit(search, smaller)
         path |= set(smaller)
         powers = {h: left_out_powers(search, h) for h in path}
         least = min(powers, key=lambda h: powers[h].sum())
@@ -78,6 +76,30 @@ def simplest(search: Search, belief: Belief) -> Belief:
     count, parts = len(search.problem.candidates), [h for h in path if set(h) <= set(chosen)]
     chosen = max(parts, key=lambda h: search.points[h].log_evidence + log_prior(h, count))
     return _instead(search, belief, chosen)
+
+
+def parts_of(hypothesis: Hypothesis) -> list[Hypothesis]:
+    """All hypotheses with one effect less."""
+    return [tuple(e for e in hypothesis if e != member) for member in hypothesis]
+
+
+def likeliest_part(search: Search, hypothesis: Hypothesis) -> Hypothesis:
+    """The likeliest hypothesis with one effect less.
+
+    Where none was refitted, all are now: an answer of which one effect is not needed would else be
+    compared with nothing, and taken for nothing.
+    """
+    parts = parts_of(hypothesis)
+    if not any(part in search.points for part in parts):
+        _visit(search, parts)
+    known = (part for part in parts if part in search.points)
+    return max(known, key=lambda h: search.points[h].log_evidence)
+
+
+def _visit(search: Search, hypotheses: list[Hypothesis]) -> None:
+    for number, hypothesis in enumerate(hypotheses, start=1):
+        search.visit(hypothesis, number, len(hypotheses))
+    search.refresh()
 
 
 def overclaimed(search: Search, smaller: Hypothesis, larger: Hypothesis, powers: Powers) -> bool:

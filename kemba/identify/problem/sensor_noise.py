@@ -72,7 +72,10 @@ class ColourSettings(Settings):
         0.1, "1", "smallest share of the noise's sigma that is white", "convention: a sound filter"
     )
     slight: float = setting(
-        0.5, "1", "sigma of a lag, as a share of the noise's, below which it is left out", BY_HAND
+        0.5,
+        "1",
+        "sigma of a lag below which it is left out, as a share of what is as fast",
+        BY_HAND,
     )
     plain: float = setting(
         10.0, "1", "gain in chi2 per lag from which a channel is coloured", BY_HAND, decides=True
@@ -127,10 +130,23 @@ def chosen_noise(
 
 
 def _sound(white: float, lags: Sequence[tuple[float, float]], most: float) -> ChannelNoise:
-    """A channel's noise within what is believed; without lags it is as stated."""
+    """A channel's noise within what is believed; without lags it is as stated.
+
+    `lags`: the fastest first. Each is compared with the noise that changes as fast or faster: a
+    drift may be large, and colour beside it is what differs from row to row. Where the whole is
+    more than `most`, the slowest lag gives way, if it is not the only one.
+    """
     settings = ColourSettings.current()
     whole = ChannelNoise(white, tuple(lags)).spread
-    kept = [(s, memory) for s, memory in lags if s > settings.slight * max(whole, settings.least)]
+    if len(lags) > 1 and whole > most:
+        (slowest, memory), excess = lags[-1], whole**2 - most**2
+        lags = [*lags[:-1], (float(np.sqrt(max(slowest**2 - excess, 0.0))), memory)]
+        whole = ChannelNoise(white, tuple(lags)).spread
+    kept, power = [], white**2
+    for sigma, memory in lags:
+        power += sigma**2
+        if sigma > settings.slight * max(np.sqrt(power), settings.least):
+            kept.append((sigma, memory))
     if not kept:
         return ChannelNoise()
     scale = min(max(whole, settings.least), most) / max(whole, 1e-9)

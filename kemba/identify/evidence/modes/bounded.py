@@ -12,6 +12,7 @@ from scipy.optimize import lsq_linear
 
 from kemba.identify.evidence.linear import is_shape
 from kemba.identify.evidence.point import LinearisationPoint
+from kemba.identify.evidence.spike_slab import Hypothesis
 from kemba.identify.problem.problem import Array, Problem
 
 
@@ -19,7 +20,11 @@ def within_bounds(problem: Problem, point: LinearisationPoint) -> Array:
     """z (k,) of a refitted hypothesis where its density is largest within the bounds of its
     effects and of the nuisance parameters; shapes as logarithms, as in `Linear`."""
     z, covariance = point.score.z, point.score.covariance
-    lower, upper = bounds(problem, point)
+    names = point.linear.names
+    lower, upper = effect_bounds(problem, names, point.hypothesis)
+    for name in problem.nuisance:
+        i = names.index(name)
+        lower[i], upper[i] = problem.limits(name)
     if np.all((lower <= z) & (z <= upper)):
         return z
     sd = np.sqrt(np.diag(covariance))
@@ -30,16 +35,16 @@ def within_bounds(problem: Problem, point: LinearisationPoint) -> Array:
     return np.asarray(z + sd * found.x)
 
 
-def bounds(problem: Problem, point: LinearisationPoint) -> tuple[Array, Array]:
-    """Smallest and largest z (k,); infinite for effects that are small by their prior."""
-    names = point.linear.names
+def effect_bounds(
+    problem: Problem, names: tuple[str, ...], hypothesis: Hypothesis
+) -> tuple[Array, Array]:
+    """Smallest and largest z (k,) of `names`, by the effects of a hypothesis; infinite for all that
+    is no part of it."""
     lower, upper = np.full(len(names), -np.inf), np.full(len(names), np.inf)
-    for name in problem.nuisance:
-        i = point.linear.index(name)
-        lower[i], upper[i] = problem.limits(name)
-    for effect in point.hypothesis:
-        for name, parameter in problem.candidates[effect].keys().items():
-            i, ends = point.linear.index(name), np.array([parameter.lower, parameter.upper])
+    own = {k: p for effect in hypothesis for k, p in problem.candidates[effect].keys().items()}
+    for i, name in enumerate(names):
+        if name in own:
+            ends = np.array([own[name].lower, own[name].upper])
             if is_shape(problem, name):
                 with np.errstate(divide="ignore"):
                     ends = np.log(np.maximum(ends, 0.0))
