@@ -38,7 +38,15 @@ def table(head: list[str], rows: list[list[Any]]) -> str:
     return "\n".join("| " + " | ".join(str(cell) for cell in line) + " |" for line in lines)
 
 
-def fuzz(found: Counts) -> str:
+def of_code(commits: dict[str, list[str]]) -> str:
+    """Which code was tried."""
+    names = list(dict.fromkeys(name for part in commits.values() for name in part))
+    if not names:
+        return ""
+    return f" Code that was tried: commit {', '.join(f'`{name}`' for name in names)}."
+
+
+def fuzz(found: Counts, commits: dict[str, list[str]]) -> str:
     """Broken inputs: how many, and how many broke the rule."""
     rows = []
     for names, title in ((set(found) - set(LOGS), "YAML files"), (set(found) & set(LOGS), "logs")):
@@ -53,7 +61,9 @@ def fuzz(found: Counts) -> str:
 Files made from the JSON Schemas, shipped files with damage, and sound logs with damage, drawn by
 hypothesis (`tests/fuzz`). The rule: exit code 2 with the place of the mistake, or 1 with a reason,
 never "failed unexpectedly", never more than 10 s of CPU time (`compare` 60 s, `discover` 120 s).
-What is found is mended and kept in `tests/fuzz`; the counts are those of the first try.
+What is found is mended and kept in `tests/fuzz`; the counts are those of the first try.{
+        of_code(commits)
+    }
 
 {text}
 
@@ -61,18 +71,20 @@ More: `python benchmarks/fuzz.py --examples 1000 --seed 7`.
 """
 
 
-def faults(found: Counts) -> str:
+def faults(found: Counts, commits: dict[str, list[str]]) -> str:
     """Faults in the middle of work."""
-    keys = ("faults", "killed", "ended", "interrupted", "disk full", "clock back", "wrong")
+    keys = ("faults", "killed", "ended", "interrupted", "disk full", "clock back", "shut", "wrong")
     rows = [[f"`{name}`", *(part.get(key, 0) for key in keys)] for name, part in found.items()]
     rows.append(["all", *(sum(part.get(key, 0) for part in found.values()) for key in keys)])
-    head = ["verb", "faults", "SIGKILL", "SIGTERM", "SIGINT", "disk full", "clock back", "wrong"]
+    head = ["verb", "faults", "SIGKILL", "SIGTERM", "SIGINT", "disk full", "clock back"]
+    head += ["not writable", "wrong"]
     return f"""## Faults in the middle of work
 
-Signals at random moments, disks that fill up at random sizes, and a clock that goes back
-(`tests/faults`). After each: no half-written file under a final name; results whole, or clearly
+Signals at random moments, disks that fill up at random sizes, a clock that goes back, and folders
+that cannot be written (`tests/faults`; two commands in one folder and a user without a home are
+tested there, too). After each: no half-written file under a final name; results whole, or clearly
 partial and completed by the same command; the same results as without the fault. *wrong* counts the
-faults after which one of these did not hold.
+faults after which one of these did not hold.{of_code(commits)}
 
 {table(head, rows)}
 
@@ -241,11 +253,12 @@ failed before it was mended.
 
 def main() -> None:
     whole = load()
+    code = whole.get("code", {})
     parts = [
         HEAD,
         reached(whole),
-        fuzz(whole.get("fuzz", {})),
-        faults(whole.get("faults", {})),
+        fuzz(whole.get("fuzz", {}), code.get("fuzz", {})),
+        faults(whole.get("faults", {}), code.get("faults", {})),
         calibration(whole.get("calibration", {}), whole.get("redrawn noise", {})),
         mutants(whole.get("mutants", {}).get("all", {})),
         points(),
