@@ -22,7 +22,15 @@ from kemba.scenarios.rate import wilson
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "reliability-of-the-program.md"
 POINTS = Path(__file__).with_name("program_points.yaml")
-LOGS = ("sidecars", "bench logs", "mapped logs", "robot logs", "compare", "discover")
+LOGS = (
+    "sidecars",
+    "bench logs",
+    "mapped logs",
+    "other formats",
+    "robot logs",
+    "compare",
+    "discover",
+)
 HEAD = """# Reliability of the program
 
 Does the program answer every input, lose nothing when it is stopped, and claim only what is so?

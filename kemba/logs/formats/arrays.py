@@ -77,7 +77,10 @@ def read_npz(path: Path) -> Found:
     if "units" not in content or "time" not in content:
         return _vectors(content, path), {}
     names = [name for name in content if name not in ("time", "units", "meta")]
-    pairs = zip(names, content["units"].tolist(), strict=True)
+    units = np.atleast_1d(content["units"]).tolist()
+    if len(units) != len(names):
+        raise KembaError(str(path), f"has {len(units)} units for {len(names)} columns")
+    pairs = zip(names, units, strict=True)
     columns = {f"{name} [{unit}]": content[name] for name, unit in pairs}
     return {TIME: content["time"], **columns}, _meta(content.get("meta"))
 
