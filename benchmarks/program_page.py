@@ -130,7 +130,9 @@ uniform (Kolmogorov-Smirnov), at most 3 % are false alarms, and 93 to 97 % of th
 hold the truth (`tests/identify/test_p_value.py`).
 
 Bench logs of the twin of the tests, two of 2 s each (`benchmarks/calibration.py`; KS: p of
-Kolmogorov-Smirnov, below 0.05 the p-values are not uniform):
+Kolmogorov-Smirnov, below 0.05 the p-values are not uniform). p-values are multiples of 1/401, the
+share of 400 simulated logs: a step far below the 0.1 by which the distribution of 200 of them must
+be off to be noticed, so that the usual test of continuous values is used as it is.
 
 {table(alarms, [row for row in clean if row])}
 
@@ -225,11 +227,7 @@ def reached(whole: dict[str, dict[str, Any]]) -> str:
         ["broken YAML files", 5000, files],
         ["broken logs", 1500, logs],
         ["faults", 100, sum(part.get("faults", 0) for part in whole.get("faults", {}).values())],
-        [
-            "clean machines",
-            200,
-            len(known.get("clean imperfect", {})),
-        ],
+        ["clean machines, by today's test", 200, len(known.get("clean late", {}))],
         ["one-line bugs", 150, len(whole.get("mutants", {}).get("all", {}).get("outcomes", {}))],
     ]
     short = [[*row, "yes" if row[2] >= row[1] else "**no**"] for row in rows]

@@ -198,3 +198,13 @@ def test_damaged_compressed_bytes_are_told(tmp_path: Path) -> None:
         except KembaError as error:
             told += "damaged.npz" in str(error)
     assert told > 30
+
+
+def test_a_file_that_kills_its_reader_is_told(tmp_path: Path) -> None:
+    """SciPy's compiled reader trusts the type of an array, byte 145: SIGSEGV in SciPy 1.17."""
+    path, t = tmp_path / "log.mat", np.arange(30) * 1e-3
+    savemat(path, {"time": t, "x": t})
+    whole = path.read_bytes()
+    path.write_bytes(whole[:145] + b"\x0e" + whole[146:])
+    with pytest.raises(KembaError, match=r"log\.mat: is no MATLAB file that SciPy reads"):
+        open_log(path)
