@@ -7,6 +7,7 @@ the arrays as `a0`, `a1` and so on. Exit code 1 with the reason where SciPy cann
 
 import io
 import sys
+from typing import Any
 
 import numpy as np
 from scipy.io import loadmat
@@ -31,7 +32,7 @@ def main() -> int:
         print(f"{type(error).__name__}: {error}"[:200], file=sys.stderr)
         return 1
     stream = io.BytesIO()
-    numbered = {f"a{i}": array for i, array in enumerate(found.values())}
+    numbered: dict[str, Any] = {f"a{i}": array for i, array in enumerate(found.values())}
     np.savez(stream, names=np.array(list(found), dtype=str), **numbered)
     sys.stdout.buffer.write(stream.getvalue())
     return 0
