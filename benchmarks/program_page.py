@@ -47,11 +47,11 @@ def table(head: list[str], rows: list[list[Any]]) -> str:
 
 
 def of_code(commits: dict[str, list[str]]) -> str:
-    """Which code was tried."""
+    """Which code was tried last; older records name none."""
     names = list(dict.fromkeys(name for part in commits.values() for name in part))
     if not names:
         return ""
-    return f" Code that was tried: commit {', '.join(f'`{name}`' for name in names)}."
+    return f" The newest counts are of commit {', '.join(f'`{name}`' for name in names)}."
 
 
 def fuzz(found: Counts, commits: dict[str, list[str]]) -> str:
