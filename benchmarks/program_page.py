@@ -69,7 +69,9 @@ def fuzz(found: Counts, commits: dict[str, list[str]]) -> str:
 Files made from the JSON Schemas, shipped files with damage, and sound logs with damage, drawn by
 hypothesis (`tests/fuzz`). The rule: exit code 2 with the place of the mistake, or 1 with a reason,
 never "failed unexpectedly", never more than 10 s of CPU time (`compare` 60 s, `discover` 120 s).
-What is found is mended and kept in `tests/fuzz`; the counts are those of the first try.{
+What is found is mended and kept in `tests/fuzz`; the counts are those of the first try,
+but for logs in other formats than text: many of those crashed before their readers were mended, and
+only later tries are counted.{
         of_code(commits)
     }
 
