@@ -71,9 +71,7 @@ hypothesis (`tests/fuzz`). The rule: exit code 2 with the place of the mistake, 
 never "failed unexpectedly", never more than 10 s of CPU time (`compare` 60 s, `discover` 120 s).
 What is found is mended and kept in `tests/fuzz`; the counts are those of the first try,
 but for logs in other formats than text: many of those crashed before their readers were mended, and
-only later tries are counted.{
-        of_code(commits)
-    }
+only later tries are counted.{of_code(commits)}
 
 {text}
 
