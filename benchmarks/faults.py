@@ -3,10 +3,12 @@
     python benchmarks/faults.py                        # 5 faults of every verb
     python benchmarks/faults.py --faults 50 --seed 3   # more, others
     python benchmarks/faults.py --only solve
+    python benchmarks/faults.py --afresh               # drop the counts of older code first
 
-Signals (kill, end, interrupt) at random moments, full disks at random sizes, and a clock that goes
-back; tests/faults says what is checked. Counts are added to benchmarks/program.json, from which
-benchmarks/program_page.py writes its page. Exit code 1 when something was lost or mixed up.
+Signals (kill, end, interrupt) at random moments, full disks at random sizes, a clock that goes
+back, and folders that cannot be written; tests/faults says what is checked. Counts are added to
+benchmarks/program.json, from which benchmarks/program_page.py writes its page. Exit code 1 when
+something was lost or mixed up.
 """
 
 from __future__ import annotations
@@ -19,7 +21,7 @@ import tempfile
 from collections import Counter
 from pathlib import Path
 
-from program import add
+from program import add, forget
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
@@ -35,9 +37,11 @@ def drawn(rng: random.Random) -> Fault:
     if kind < 0.8:
         name = rng.choice(list(SIGNALS))
         return Fault(name, SIGNALS[name], rng.uniform(0.05, 1.0))
-    if kind < 0.95:
+    if kind < 0.92:
         return Fault("disk full", size=round(10 ** rng.uniform(0.0, 5.5)))
-    return Fault("clock back", clock=True)
+    if kind < 0.96:
+        return Fault("clock back", clock=True)
+    return Fault("shut", shut=True)
 
 
 def main() -> int:
@@ -45,9 +49,12 @@ def main() -> int:
     parser.add_argument("--faults", type=int, default=5, help="of each verb")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--only", action="append", choices=list(VERBS))
+    parser.add_argument("--afresh", action="store_true", help="forget earlier counts of a verb")
     arguments = parser.parse_args()
     bad = 0
     for name in arguments.only or VERBS:
+        if arguments.afresh:
+            forget("faults", name)
         rng, count = random.Random(f"{name} {arguments.seed}"), Counter[str]()
         with tempfile.TemporaryDirectory() as folder:
             usual = reference(VERBS[name], Path(folder) / "usual")

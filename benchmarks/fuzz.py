@@ -3,6 +3,7 @@
     python benchmarks/fuzz.py                             # 100 inputs of every kind
     python benchmarks/fuzz.py --examples 1000 --seed 7    # more, others
     python benchmarks/fuzz.py --only tasks --only sidecars
+    python benchmarks/fuzz.py --afresh                    # drop the counts of older code first
 
 The inputs and the rule stand in tests/fuzz. What breaks the rule is printed, the shortest input of
 each kind of break, and kept with --keep FOLDER. Counts are added to benchmarks/program.json,
@@ -22,7 +23,7 @@ from collections import Counter
 from pathlib import Path
 
 from hypothesis import HealthCheck, given, seed, settings
-from program import add
+from program import add, forget
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
@@ -76,12 +77,15 @@ def main() -> int:
     parser.add_argument("--examples", type=int, default=100, help="inputs of each kind")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--only", action="append", choices=list(TRIALS), help="of these kinds only")
+    parser.add_argument("--afresh", action="store_true", help="forget earlier counts of a kind")
     parser.add_argument("--keep", type=Path, help="folder for inputs that break the rule")
     arguments = parser.parse_args()
     warnings.simplefilter("error")
     wrong = 0
     for name in arguments.only or TRIALS:
         began = time.process_time()
+        if arguments.afresh:
+            forget("fuzz", name)
         with tempfile.TemporaryDirectory() as folder:
             count, broken = tried(name, arguments.examples, arguments.seed, Path(folder))
         said = ", ".join(f"{key} {n}" for key, n in count.items())

@@ -1,10 +1,15 @@
-"""Counts of what was really run against the program, kept in program.json."""
+"""Counts of what was really run against the program, kept in program.json.
+
+Beside them stand the commits of the code that was tried: `code`, by study and part.
+"""
 
 from __future__ import annotations
 
 import json
+import subprocess
 import tempfile
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +32,7 @@ def add(study: str, part: str, count: Mapping[str, int]) -> None:
         for key, number in count.items():
             slow = key.startswith("slowest")
             kept[key] = max(kept.get(key, 0), number) if slow else kept.get(key, 0) + number
+        _stamp(whole, study, part)
         _write(whole)
 
 
@@ -35,7 +41,35 @@ def put(study: str, part: str, facts: Mapping[str, Any]) -> None:
     with FileLock(LOCK):
         whole = load()
         whole.setdefault(study, {})[part] = dict(facts)
+        _stamp(whole, study, part)
         _write(whole)
+
+
+def forget(study: str, part: str) -> None:
+    """Drop the counts of a part: they were of older code."""
+    with FileLock(LOCK):
+        whole = load()
+        for known in (whole, whole.get("code", {})):
+            known.get(study, {}).pop(part, None)
+        _write(whole)
+
+
+def _stamp(whole: dict[str, dict[str, Any]], study: str, part: str) -> None:
+    """Add the commit of today's code to those of a part."""
+    commits = whole.setdefault("code", {}).setdefault(study, {}).setdefault(part, [])
+    if (commit := _commit()) and commit not in commits:
+        commits.append(commit)
+
+
+@cache
+def _commit() -> str | None:
+    """Of the working tree; None where there is no git."""
+    asked = ["git", "-C", str(FILE.parent), "rev-parse", "--short=10", "HEAD"]
+    try:
+        done = subprocess.run(asked, capture_output=True, text=True, check=True)
+    except (OSError, subprocess.CalledProcessError):
+        return None
+    return done.stdout.strip()
 
 
 def _write(whole: dict[str, dict[str, Any]]) -> None:

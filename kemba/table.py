@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from itertools import chain
 from pathlib import Path
 from typing import Any, TextIO
@@ -26,7 +26,7 @@ def read_table(path: str | Path) -> tuple[list[str], Table]:
     try:
         with open(path, encoding="utf-8-sig", newline=None) as stream:
             headers = _headers(stream, path)
-            _check_headers(headers, path)
+            check_headers(headers, path, lambda column: f"{path}:1:{column}")
             try:
                 table = _numbers(stream, len(headers))
             except ValueError as error:
@@ -57,10 +57,14 @@ def _headers(stream: TextIO, path: str | Path) -> list[str]:
     return [cell.strip() for cell in next(csv.reader([line]))]
 
 
-def _check_headers(headers: list[str], path: str | Path) -> None:
+def check_headers(headers: Iterable[str], path: str | Path, place: Callable[[int], str]) -> None:
+    """Check that headers of a log are well formed, in SI and different.
+
+    `place` of a column, from 1. Raises KembaError there.
+    """
     seen: dict[str, int] = {}
     for column, header in enumerate(headers, start=1):
-        where = f"{path}:1:{column}"
+        where = place(column)
         try:
             quantity = Quantity.from_header(header)
         except KembaError as error:

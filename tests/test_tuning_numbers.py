@@ -100,6 +100,8 @@ CONSTANTS = {  # file -> names, why
     "config/complaints.py": ("MOST SHOWN", "length of messages"),
     "config/document.py": ("WIDE", "length of messages"),
     "config/names.py": ("LONGEST NAME", "longest name"),
+    "logs/opening.py": ("LONGEST", "length of messages"),
+    "logs/formats/matlab.py": ("LONGEST", "time in which a file must be read"),
     "config/scalars.py": ("LONGEST_NUMBER", "longest text that is read"),
     "identify/design/courses.py": ("STEEPEST", "the shape of a cubic"),
     "identify/design/robot.py": ("STANDARD", "the motion that others are compared with"),

@@ -13,12 +13,14 @@ from kemba.logs.columns import ColumnMap
 from kemba.logs.foreign import mapped
 from kemba.logs.formats import MODULES, reader
 from kemba.logs.text import Raw, read_text
-from kemba.trajectory import TIME, Trajectory, check_times, sidecar
+from kemba.table import check_headers
+from kemba.trajectory import TIME, Array, Trajectory, check_times, sidecar
 
 TEXTS = (".csv", ".txt", ".tsv", ".dat")
 BINARY = tuple(f".{ending}" for ending in MODULES)
 ENDINGS = (*TEXTS, *BINARY)
 YAML = (".yaml", ".yml")
+LONGEST = 200  # characters of another program's message
 
 
 def open_log(path: Path, columns: ColumnMap | None = None, strict: bool = True) -> Trajectory:
@@ -46,7 +48,7 @@ def raw_columns(path: Path, layout: ColumnMap | None) -> tuple[Raw, dict[str, An
         raise KembaError(str(path), "is a folder" if path.is_dir() else "no such file")
     _no_yaml(path)
     if path.suffix.lower() in BINARY:
-        return reader(path)(path)
+        return _binary(path)
     if layout is None:
         raise KembaError(str(path), "a column map says how to read a text table")
     return read_text(path, layout), {}
@@ -58,13 +60,54 @@ def _no_yaml(path: Path) -> None:
         raise KembaError(str(path), "is a YAML file", f"a log was expected: {endings}")
 
 
+def _binary(path: Path) -> tuple[Raw, dict[str, Any]]:
+    """Columns (n,) of numbers or objects and the metadata of a file that may be damaged."""
+    try:
+        raw, meta = reader(path)(path)
+    except (KembaError, MemoryError):
+        raise
+    except Exception as error:  # what reads the formats of others raises anything on such bytes
+        reason = f"{type(error).__name__}: {error}"[:LONGEST]
+        what = f"is damaged, or no {path.suffix} file of a log: {reason}"
+        raise KembaError(str(path), what) from None
+    columns = {name: _cells(values) for name, values in raw.items()}
+    length = len(next(iter(columns.values()), ()))
+    for name, values in columns.items():
+        if values.shape != (length,):
+            what = f"'{name}' has the shape {values.shape}"
+            raise KembaError(str(path), what, f"({length},) as the first column was expected")
+    return columns, meta if isinstance(meta, dict) else {}
+
+
+def _cells(values: Any) -> np.ndarray[Any, Any]:
+    """Numbers as they are, dates and texts as texts."""
+    cells = np.atleast_1d(np.asarray(values))
+    return cells if cells.dtype.kind in "fiubO" else cells.astype(str).astype(object)
+
+
 def _own(raw: Raw, path: Path, meta: dict[str, Any]) -> Trajectory:
     if TIME not in raw:
         what = f"has no column '{TIME}'"
         raise KembaError(str(path), what, hint=map_hint(path))
-    texts = [name for name, values in raw.items() if values.dtype == object and name != TIME]
-    columns = {n: np.asarray(v, dtype=float) for n, v in raw.items() if n not in (TIME, *texts)}
-    return Trajectory(np.asarray(raw[TIME], dtype=float), columns, meta)
+    numbers = {name: found for name, v in raw.items() if (found := _numbers(v)) is not None}
+    if TIME not in numbers:
+        raise KembaError(str(path), f"'{TIME}' holds no numbers", hint=map_hint(path))
+    check_headers([TIME, *(n for n in numbers if n != TIME)], path, lambda _: str(path))
+    for name, values in numbers.items():
+        if np.isinf(values).any():
+            row = int(np.argmax(np.isinf(values))) + 1
+            raise KembaError(str(path), f"'{name}' is infinite in row {row}")
+    return Trajectory(numbers.pop(TIME), numbers, meta)
+
+
+def _numbers(values: np.ndarray[Any, Any]) -> Array | None:
+    """A column as numbers; None where it holds texts."""
+    if values.dtype == object and not all(isinstance(v, int | float) for v in values):
+        return None
+    try:
+        return np.asarray(values, dtype=float)
+    except OverflowError:
+        return None
 
 
 def _sidecar(path: Path) -> dict[str, Any]:

@@ -21,7 +21,12 @@ from fuzz.trial import TRIALS
 from kemba.trajectory import Trajectory
 
 CORPUS = sorted((Path(__file__).parent / "corpus").glob("[!.]*"))
-EXAMPLES = {"bench logs": 12, "mapped logs": 6, "sidecars": 6}  # of files 10 each
+EXAMPLES = {
+    "bench logs": 12,
+    "mapped logs": 6,
+    "sidecars": 6,
+    "other formats": 30,
+}  # of files 10 each
 SLOW = {"robot logs": 20, "compare": 20, "discover": 6}
 
 
@@ -109,10 +114,11 @@ def test_the_rule_sees_what_breaks_it(tmp_path: Path, monkeypatch: pytest.Monkey
         assert outcome("check", file).broken.startswith(said)
 
 
-def test_values_reach_the_inner_checks(tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["cylinders", "other formats"])
+def test_values_reach_the_inner_checks(name: str, tmp_path: Path) -> None:
     """Of files with small damage some must still be good, or only the outermost check is tried."""
     seen: set[int | None] = set()
-    inputs, run = TRIALS["cylinders"]
+    inputs, run = TRIALS[name]
 
     @settings(max_examples=40, deadline=None, derandomize=True, database=None)
     @given(inputs(), st.none())

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from fuzz import sound
 from fuzz.files import KINDS, yaml_text
+from fuzz.formats import as_file, odd_formats
 from fuzz.logs import cells, damaged_log, sidecar, text
 from fuzz.rule import Outcome, outcome
 
@@ -54,6 +55,10 @@ def _sidecar(content: str, folder: Path) -> Outcome:
     return outcome("check", file)
 
 
+def _format(content: str, folder: Path) -> Outcome:
+    return outcome("check", as_file(content, folder))
+
+
 def _bench() -> st.SearchStrategy[str]:
     return damaged_log(cells(sound.bench()))
 
@@ -68,6 +73,7 @@ TRIALS: dict[str, Trial] = {
     "sidecars": (lambda: sidecar(sound.bench().headers), _sidecar),
     "bench logs": (_bench, _log("check")),
     "mapped logs": (_bench, _foreign),
+    "other formats": (odd_formats, _format),
     "robot logs": (_robot, _log("check")),
     "compare": (_bench, _log("compare")),
     "discover": (_bench, _log("discover")),

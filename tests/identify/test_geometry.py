@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
+import numpy as np
 import pytest
 
 pytest.importorskip("numba")
@@ -12,10 +15,12 @@ from twin.catalogue import hidden
 from kemba.effects.mechanics.geometry import Geometry
 from kemba.identify.adopt import item
 from kemba.identify.discover import discover
+from kemba.identify.logs.gate import BadData
 from kemba.identify.robot.problem import RobotProblem, robot_problem
 from kemba.mechanism import robot_mechanism
 from kemba.model import Model, load_model
 from kemba.model.spec import ModelSpec
+from kemba.trajectory import Array, Trajectory
 
 SHORT = {"femur/length": 6.0e-3, "tibia/length": 20e-3, "piston/pin": 1.4e-3}
 
@@ -35,6 +40,30 @@ def test_standing_feet_show_a_wrong_length(part: str) -> None:
     found = problem.lengths.get(f"geometry:{part}.d", 0.0)
     assert found == pytest.approx(SHORT[part], abs=1.5e-3), problem.lengths
     problem.validate()  # a wrong length is to be found; it is not bad data
+
+
+def with_pitch(log: Trajectory, change: Callable[[Array], Array]) -> Trajectory:
+    return log.with_columns({"body/pitch [rad]": change(log["body/pitch"])})
+
+
+def test_a_pitch_of_the_other_sign_is_told_where_it_is_small() -> None:
+    """It moves feet by millimetres, and shorter legs would bring them to the ground."""
+    (log,), _ = hops(runs=1, seed=12, figures_off=0.01)
+    assert np.abs(log["body/pitch"]).max() < 0.07
+    problem = robot_problem([with_pitch(log, np.negative)], load_model("planning"))
+    assert problem.lengths == {}
+    with pytest.raises(BadData, match="hop0: body/pitch has the reversed sign"):
+        problem.validate()
+
+
+@pytest.mark.parametrize(
+    "change", [lambda p: p, lambda p: p + 0.03, lambda p: p - 0.03, lambda p: 1.1 * p]
+)
+def test_no_fault_of_the_sensor_is_taken_for_its_sign(change: Callable[[Array], Array]) -> None:
+    (log,), _ = hops(runs=1, seed=12, figures_off=0.01)
+    problem = robot_problem([with_pitch(log, change)], load_model("planning"))
+    assert not problem.standing.turned
+    problem.validate()
 
 
 @pytest.mark.slow

@@ -6,6 +6,8 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from foreign_files import robot_log
 from mcap.reader import make_reader
@@ -117,3 +119,92 @@ def test_a_mat_file_of_others_is_mapped(tmp_path: Path) -> None:
     assert log["piston/F"] == pytest.approx(35.15 * t**2)
     with pytest.raises(KembaError, match="kemba-opt map"):
         open_log(tmp_path / "drive.mat")
+
+
+def _npz(path: Path, **changes: object) -> None:
+    time = np.arange(3) * 1e-3
+    content = {"time": time, "units": np.array(["m"]), "meta": "{}", "piston/x": time}
+    np.savez(path, **{k: v for k, v in {**content, **changes}.items() if v is not None})
+
+
+def _parquet(path: Path, note: bytes = b"{}", **columns: object) -> None:
+    table = pa.table({"time [s]": [0.0, 0.001, 0.002], **columns})
+    pq.write_table(table.replace_schema_metadata({b"kemba": note}), path)
+
+
+def _mcap(path: Path, *messages: bytes, note: dict[str, str] | None = None) -> None:
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        channel = writer.register_channel("/piston", "json", 0)
+        for stamp, message in enumerate(messages):
+            writer.add_message(channel, stamp, message, stamp)
+        if note is not None:
+            writer.add_metadata("kemba", note)
+        writer.finish()
+
+
+NOTE = {"headers": '["piston/x [m]"]', "meta": "{}"}
+ODD = {
+    "units.npz": (_npz, {"units": np.array(["m", "N"])}, "2 units for 1 columns"),
+    "no-units.npz": (_npz, {"units": np.zeros(0)}, "0 units for 1 columns"),
+    "short.npz": (_npz, {"piston/x": np.zeros(2)}, r"'piston/x \[m\]' has the shape \(2,\)"),
+    "plane.npz": (_npz, {"time": np.zeros((3, 2))}, "has the shape"),
+    "infinite.npz": (_npz, {"piston/x": np.array([0, np.inf, 0])}, "is infinite in row 2"),
+    "not-si.npz": (_npz, {"units": np.array(["mm"])}, "is not in SI units"),
+    "words.npz": (_npz, {"time": np.array(["a", "b", "c"])}, "holds no numbers"),
+    "note.parquet": (_parquet, {"note": b"{"}, "are no JSON"),
+    "words.parquet": (_parquet, {"time [s]": ["", "a", "b"]}, "holds no numbers"),
+    "dates.parquet": (_parquet, {"time [s]": np.zeros(3, "datetime64[ns]")}, "holds no numbers"),
+    "header.parquet": (_parquet, {"x": [1.0, 2.0, 3.0]}, "is malformed"),
+}
+
+
+@pytest.mark.parametrize("name", ODD)
+def test_odd_content_is_told(name: str, tmp_path: Path) -> None:
+    make, changes, words = ODD[name]
+    make(tmp_path / name, **changes)
+    with pytest.raises(KembaError, match=words) as error:
+        open_log(tmp_path / name)
+    assert name in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("message", "note"),
+    [(b"{}", NOTE), (b"[]", NOTE), (b"{", None), (b"[" * 5000, None), (b'{"time": 0}', {}),
+     (b'{"time": 0}', {**NOTE, "meta": "["}), (b'{"time": 0, "x": "a"}', NOTE)],
+)  # fmt: skip
+def test_odd_messages_are_told(message: bytes, note: dict[str, str] | None, tmp_path: Path) -> None:
+    _mcap(tmp_path / "log.mcap", message, message, note=note)
+    with pytest.raises(KembaError, match=r"log\.mcap"):
+        read_log(tmp_path / "log.mcap")
+
+
+def test_whole_numbers_are_numbers_and_texts_are_left_alone(tmp_path: Path) -> None:
+    columns = {"valve/extend [1]": [0, 1, 1], "remark": ["", "late", ""]}
+    _parquet(tmp_path / "log.parquet", **columns)
+    log = open_log(tmp_path / "log.parquet")
+    assert log.names == ("valve/extend",) and log["valve/extend"].tolist() == [0.0, 1.0, 1.0]
+
+
+def test_damaged_compressed_bytes_are_told(tmp_path: Path) -> None:
+    """Every one of them; what is read nevertheless is the log."""
+    whole = export(robot_log(30), tmp_path / "log.npz").read_bytes()
+    path, told = tmp_path / "damaged.npz", 0
+    for at in range(0, len(whole), max(len(whole) // 60, 1)):
+        path.write_bytes(whole[:at] + bytes([whole[at] ^ 0xFF]) + whole[at + 1 :])
+        try:
+            open_log(path)
+        except KembaError as error:
+            told += "damaged.npz" in str(error)
+    assert told > 30
+
+
+def test_a_file_that_kills_its_reader_is_told(tmp_path: Path) -> None:
+    """SciPy's compiled reader trusts the type of an array, byte 145: SIGSEGV in SciPy 1.17."""
+    path, t = tmp_path / "log.mat", np.arange(30) * 1e-3
+    savemat(path, {"time": t, "x": t})
+    whole = path.read_bytes()
+    path.write_bytes(whole[:145] + b"\x0e" + whole[146:])
+    with pytest.raises(KembaError, match=r"log\.mat: is no MATLAB file that SciPy reads"):
+        open_log(path)

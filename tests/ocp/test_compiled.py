@@ -153,6 +153,31 @@ def test_a_damaged_library_is_made_anew(
     assert float(again(0.5)) == float(plain(0.5))
 
 
+HALF = """#!/bin/sh
+{compiler} "$@" || exit 1
+for word; do [ "$before" = -o ] && made=$word; before=$word; done
+head -c 6000 "$made" > "$made.half" && mv "$made.half" "$made"
+"""
+
+
+@compiler
+def test_what_cannot_be_loaded_is_not_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A compiler that writes half a library: its hash would be right, and loading it would kill."""
+    real = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))))
+    half = tmp_path / "cc"
+    half.write_text(HALF.format(compiler=real))
+    half.chmod(0o700)
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
+    monkeypatch.setenv("KEMBA_CACHE", str(tmp_path / "cache"))
+    monkeypatch.delenv("KEMBA_COMPILE", raising=False)
+    x = ca.SX.sym("x")
+    plain = ca.Function("f", [x], [ca.sin(x)])
+    assert compiled([plain], wait=True) == [plain]
+    assert list((tmp_path / "cache").iterdir()) == []
+    half.unlink()
+    assert is_compiled(compiled([plain], wait=True)[0])
+
+
 @compiler
 @pytest.mark.parametrize("mode", [0o777, 0o770, 0o1777])
 def test_a_folder_open_to_others_is_not_used(

@@ -1,18 +1,21 @@
 """Lengths of the legs from feet that stand: what needs no forces is found before any force.
 
 A foot that stands is at the height of the ground, whatever pushes it. Lengths that bring more rows
-of the logs to one height are believed where they do so much better than faults of sensors.
+of the logs to one height are believed where they do so much better than faults of sensors, and
+where the other sign of the body's pitch does not do better still.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field
 
 import casadi as ca
 import numpy as np
 from scipy.optimize import least_squares
 
+from kemba.errors import KembaError
 from kemba.identify.problem.types import Array, Candidate, Flags
 from kemba.identify.robot.dynamics.physics import Physics
 from kemba.identify.robot.dynamics.reference import Reference
@@ -65,15 +68,24 @@ class StandingSettings(Settings):
     gain: float = setting(
         6.0, "nats", "gain over faults of sensors alone from which lengths are believed", BY_HAND
     )
+    turned: float = setting(
+        12.0, "nats", "gain of the other sign of the pitch over any lengths, from which the sign "
+        "is said to be reversed", BY_HAND, decides=True,
+    )  # fmt: skip
+    pitch: float = setting(
+        0.05, "rad", "prior sigma of the zero of the pitch where its sign is judged: no zero is "
+        "taken for a sign", BY_HAND,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
 class StandingLengths:
     """Theta with the `lengths` [m] at which feet stand; `lever`: share by which a longer boom makes
-    them stand as well, 0 where none does."""
+    them stand as well, 0 where none does; `turned`: they stand with the other sign of the pitch."""
 
     lengths: Mapping[str, float] = field(default_factory=dict)
     lever: float = 0.0
+    turned: bool = False
 
 
 class Standing:
@@ -93,6 +105,13 @@ class Standing:
         y = physics.call("seen", q, 0 * q, p=physics.nominal)[0]
         self.samples = [ca.DM(q[:, : 3 + self.legs].T), ca.DM(y[:, -self.legs :].T)]
         self._map = self._function(physics).map(len(q))
+
+    def turned(self) -> Standing:
+        """The same with the other sign of the body's pitch."""
+        found, q = copy(self), ca.DM(self.samples[0])
+        q[2, :] *= -1
+        found.samples = [q, self.samples[1]]
+        return found
 
     def _function(self, physics: Physics) -> ca.Function:
         """(q without knees, pistons, x) -> heights (legs,) and their slopes along x."""
@@ -149,6 +168,8 @@ def standing_lengths(
             if count > most:
                 most, start = count, trial
     x, cost, rows = _refined(standing, start, width)
+    if _is_turned(standing, x, width, rows):
+        return StandingLengths(turned=True)
     _, without, _ = _only(standing, (), x, width, rows)
     if without - cost < settings.gain:
         return StandingLengths()
@@ -161,6 +182,17 @@ def standing_lengths(
     boom, by_boom, _ = _only(standing, (), x, free, rows)
     as_good = LEVER in candidates and by_boom - min(alone, cost) < settings.gain
     return StandingLengths(found, float(boom[-1]) if as_good else 0.0)
+
+
+def mistakes(found: StandingLengths, runs: Sequence[str]) -> Iterator[KembaError]:
+    """The sign of the pitch, where feet stand with the other one only."""
+    if found.turned:
+        yield KembaError(
+            ", ".join(runs),
+            "body/pitch has the reversed sign (nose up is positive)",
+            "corrected, feet stand on level ground; else legs of other lengths would be needed",
+            "correct it with `sign` in a column map (--map)",
+        )
 
 
 def remarks(found: StandingLengths) -> list[str]:
@@ -176,6 +208,21 @@ def remarks(found: StandingLengths) -> list[str]:
         return [f"{said}; contacts were read with that"]
     other = f"or if the boom is {100 * found.lever:+.1f} % longer than drawn"
     return [f"{said}, {other}; contacts were read with the former"]
+
+
+def _is_turned(standing: Standing, x: Array, width: Array, rows: Flags) -> bool:
+    """Whether feet stand better with the other sign of the pitch than with any lengths.
+
+    Judged by the samples (n, legs) that stand with either: `rows` with this sign, fitted by `x`.
+    """
+    loose, turned = width.copy(), standing.turned()
+    loose[len(standing.names)] = StandingSettings.current().pitch
+    drawn = loose.copy()
+    drawn[: len(standing.names)] *= StandingSettings.current().held
+    either = rows | _refined(turned, np.zeros(len(x)), drawn)[2]
+    _, best, _ = _refined(standing, x, loose, either)
+    _, other, _ = _refined(turned, np.zeros(len(x)), drawn, either)
+    return best - other > StandingSettings.current().turned
 
 
 def _only(

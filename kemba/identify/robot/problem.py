@@ -40,7 +40,7 @@ from kemba.identify.robot.dynamics.reference import first_reference
 from kemba.identify.robot.dynamics.settings import ForceDensity
 from kemba.identify.robot.force_channels import robot_force_channels
 from kemba.identify.robot.formulas import formula_columns
-from kemba.identify.robot.geometry import GEOMETRY, remarks, standing_lengths
+from kemba.identify.robot.geometry import GEOMETRY, mistakes, remarks, standing_lengths
 from kemba.identify.robot.labels import describe
 from kemba.identify.robot.missing import robot_missing
 from kemba.identify.robot.motion.batch import Batch
@@ -270,12 +270,9 @@ class RobotProblem(Problem):
     def validate(self) -> list[str]:
         """Which lengths make the feet stand, where they are not the model's. Raises BadData where
         a log contradicts itself or any model."""
-        faults = list(
-            contradictions(
-                self.state, self.rows(), self.residual(self.lengths), self._sensor_columns
-            )
-        )
-        if faults:
+        r = self.residual(self.lengths)
+        found = contradictions(self.state, self.rows(), r, self._sensor_columns)
+        if faults := list(mistakes(self.standing, self.runs)) or list(found):
             raise BadData(faults)
         return remarks(self.standing)
 

@@ -14,7 +14,7 @@ from kemba.trajectory import Trajectory
 Read = Callable[[Path], tuple[Raw, dict[str, Any]]]
 Write = Callable[[Trajectory, Path], None]
 
-MODULES = {"parquet": "parquet", "mcap": "mcap", "mat": "arrays", "npz": "arrays", "json": "arrays"}
+MODULES = {"parquet": "parquet", "mcap": "mcap", "mat": "matlab", "npz": "arrays", "json": "arrays"}
 
 
 def reader(path: Path) -> Read:

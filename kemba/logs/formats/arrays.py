@@ -1,9 +1,8 @@
-"""Logs as named arrays: MATLAB .mat, NumPy .npz and JSON."""
+"""Logs as named arrays: NumPy .npz and JSON."""
 
 from __future__ import annotations
 
 import json
-import re
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -18,43 +17,6 @@ from kemba.trajectory import TIME, Trajectory
 
 Found = tuple[Raw, dict[str, Any]]
 BROKEN = (ValueError, TypeError, KeyError, EOFError, NotImplementedError, zipfile.BadZipFile)
-
-
-def plain_name(name: str) -> str:
-    """A name that every language accepts: `front_hip_tau`."""
-    return re.sub(r"\W", "_", name)
-
-
-def write_mat(trajectory: Trajectory, path: Path) -> None:
-    """One array per column as `front_hip_tau`, and `units`, `headers` and `meta` (JSON)."""
-    from scipy.io import savemat
-
-    values = {plain_name(name): trajectory[name] for name in trajectory.names}
-    units = {plain_name(name): trajectory.unit(name) for name in trajectory.names}
-    headers = np.array([TIME, *trajectory.headers], dtype=object)
-    content = {"time": trajectory.time, **values, "units": {"time": "s", **units}}
-    content |= {"headers": headers, "meta": json.dumps(plain(trajectory.meta))}
-    with atomic_path(path) as temporary:
-        savemat(temporary, content, appendmat=False, oned_as="column", long_field_names=True)
-
-
-def read_mat(path: Path) -> Found:
-    """Our own .mat by its headers; else every vector of the length that most vectors have."""
-    from scipy.io import loadmat
-    from scipy.io.matlab import MatReadError
-
-    try:
-        content = loadmat(path, appendmat=False, squeeze_me=True)
-    except (*BROKEN, MatReadError, OSError) as error:
-        what = f"is no MATLAB file that SciPy reads: {error}"
-        raise KembaError(
-            str(path), what, "version 5 to 7.2 was expected: save(..., '-v7')"
-        ) from None
-    content = {key: value for key, value in content.items() if not key.startswith("__")}
-    if "headers" not in content:
-        return _vectors(content, path), {}
-    headers = [str(header) for header in np.atleast_1d(content["headers"])]
-    return _own(headers, content, path), _meta(content.get("meta"))
 
 
 def write_npz(trajectory: Trajectory, path: Path) -> None:
@@ -75,11 +37,14 @@ def read_npz(path: Path) -> Found:
     except (*BROKEN, OSError) as error:
         raise KembaError(str(path), f"is no .npz file of numbers: {error}") from None
     if "units" not in content or "time" not in content:
-        return _vectors(content, path), {}
+        return vectors(content, path), {}
     names = [name for name in content if name not in ("time", "units", "meta")]
-    pairs = zip(names, content["units"].tolist(), strict=True)
+    units = np.atleast_1d(content["units"]).tolist()
+    if len(units) != len(names):
+        raise KembaError(str(path), f"has {len(units)} units for {len(names)} columns")
+    pairs = zip(names, units, strict=True)
     columns = {f"{name} [{unit}]": content[name] for name, unit in pairs}
-    return {TIME: content["time"], **columns}, _meta(content.get("meta"))
+    return {TIME: content["time"], **columns}, metadata(content.get("meta"))
 
 
 def write_json(trajectory: Trajectory, path: Path) -> None:
@@ -94,26 +59,16 @@ def read_json(path: Path) -> Found:
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
         columns = content.get("columns", content)
-        vectors = {k: np.array(v, dtype=float) for k, v in columns.items() if isinstance(v, list)}
+        found = {k: np.array(v, dtype=float) for k, v in columns.items() if isinstance(v, list)}
     except OSError as error:
         raise KembaError(str(path), error.strerror or str(error)) from None
     except (ValueError, TypeError, AttributeError, RecursionError) as error:
         raise KembaError(str(path), f"is no JSON object of columns: {error}") from None
     meta = content.get("meta", {})
-    return _vectors(vectors, path), meta if isinstance(meta, dict) else {}
+    return vectors(found, path), meta if isinstance(meta, dict) else {}
 
 
-def _own(headers: list[str], content: dict[str, Any], path: Path) -> Raw:
-    found = {}
-    for header in headers:
-        name = plain_name(header.split(" [")[0])
-        if name not in content:
-            raise KembaError(str(path), f"has no array '{name}', which its headers name")
-        found[header] = np.atleast_1d(np.asarray(content[name], dtype=float))
-    return found
-
-
-def _vectors(content: dict[str, Any], path: Path) -> Raw:
+def vectors(content: dict[str, Any], path: Path) -> Raw:
     """The vectors of numbers that share the most frequent length."""
     arrays = {name: np.squeeze(np.asarray(value)) for name, value in content.items()}
     vectors = {n: a for n, a in arrays.items() if a.ndim == 1 and a.dtype.kind in "fiub"}
@@ -126,7 +81,8 @@ def _vectors(content: dict[str, Any], path: Path) -> Raw:
     return {name: np.asarray(a, dtype=float) for name, a in vectors.items() if len(a) == length}
 
 
-def _meta(text: Any) -> dict[str, Any]:
+def metadata(text: Any) -> dict[str, Any]:
+    """The metadata in a text of JSON; none where it is no such text."""
     try:
         found = json.loads(str(text))
     except ValueError:

@@ -77,10 +77,18 @@ def read_mcap(path: Path) -> tuple[Raw, dict[str, Any]]:
         raise KembaError(str(path), "has no messages in JSON", "record with the JSON encoding")
     if META not in known:
         return _joined(topics), {}
-    headers = json.loads(known[META]["headers"])
+    try:
+        return _own(topics, known[META])
+    except (ValueError, TypeError, KeyError, AttributeError):
+        what = "its metadata 'kemba' do not fit its messages"
+        raise KembaError(str(path), what, "what kemba-opt export writes was expected") from None
+
+
+def _own(topics: Messages, note: dict[str, str]) -> tuple[Raw, dict[str, Any]]:
+    """Columns in the order of the note, and the metadata."""
     time = [message["time"] for message in next(iter(topics.values()))[1]]
-    columns = {header: _field(topics, header) for header in headers}
-    return {TIME: np.array(time), **columns}, json.loads(known[META]["meta"])
+    columns = {header: _field(topics, header) for header in json.loads(note["headers"])}
+    return {TIME: np.array(time), **columns}, json.loads(note["meta"])
 
 
 def _messages(reader: Any) -> Messages:

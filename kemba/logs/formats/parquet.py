@@ -36,7 +36,10 @@ def read_parquet(path: Path) -> tuple[Raw, dict[str, Any]]:
         raise KembaError(str(path), error.strerror or str(error)) from None
     except pa.ArrowException as error:
         raise KembaError(str(path), f"is no Parquet file: {error}") from None
-    meta = json.loads((table.schema.metadata or {}).get(META, b"{}"))
+    try:
+        meta = json.loads((table.schema.metadata or {}).get(META, b"{}"))
+    except ValueError:
+        raise KembaError(str(path), "its metadata 'kemba' are no JSON") from None
     columns = zip(table.column_names, table.columns, strict=True)
     return {name: _values(column) for name, column in columns}, meta
 

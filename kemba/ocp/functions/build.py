@@ -14,7 +14,10 @@ from pathlib import Path
 
 
 def build(folder: Path, library: Path, manifest: Path, compiler: list[str]) -> None:
-    """Compile `functions.c` in `folder`, then move the library and its hash into the cache."""
+    """Compile `functions.c` in `folder`, then move the library and its hash into the cache.
+
+    A library is loaded by a process of its own first: what kills that one is not kept.
+    """
     os.umask(0o077)  # no one else may write what we shall load
     if hasattr(os, "nice"):
         os.nice(10)
@@ -23,6 +26,8 @@ def build(folder: Path, library: Path, manifest: Path, compiler: list[str]) -> N
     try:
         subprocess.run(command, check=True, stdin=subprocess.DEVNULL, capture_output=True)
         product.chmod(0o700)
+        load = [sys.executable, "-I", "-S", "-c", "import ctypes, sys; ctypes.CDLL(sys.argv[1])"]
+        subprocess.run([*load, str(product)], check=True, capture_output=True)
         facts.write_text(json.dumps({"sha256": hashlib.sha256(product.read_bytes()).hexdigest()}))
         manifest.unlink(missing_ok=True)
         product.replace(library)
