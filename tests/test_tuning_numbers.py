@@ -82,6 +82,7 @@ CONSTANTS = {  # file -> names, why
     "ocp/phases/radau.py": ("RADAU3 _R RADAU5", "coefficients of the integration schemes"),
     "identify/bench/rig_model.py": ("V_NODES V_MIDDLE", "nodes of a Gauss-Hermite formula"),
     "identify/bench/clocks.py": ("OWNERS", "signs of a rate, by whose clock it is"),
+    "identify/answer.py": ("FEW", "what a sentence has room for"),
     "identify/logs/settings.py": ("RANGES", "physical limits of channels, by name"),
     "identify/robot/force_channels.py": ("BODY", "places of channels among the coordinates"),
     "ocp/functions/constants.py": ("SHAPING", "numbers that CasADi simplifies"),
