@@ -52,9 +52,11 @@ def test_its_stages_meet_every_row_and_its_nodes_do_not(low: Plan) -> None:
 
 def test_other_figures_of_the_air_change_it_by_their_part(low: Plan) -> None:
     assert low.stages is not None
-    weaker = {"chamber": {"F_extend": [0.98 * F for F in low.model.effect("chamber").F_extend]}}
-    program, _ = built(low, low.task.model_copy(update={"effects": weaker}), low.stages.phases,
-                       RADAU5)  # fmt: skip
+    effects = low.task.effects  # of the shipped plan, whose air was fitted
+    weaker = [0.98 * F for F in low.model.effect("chamber").F_extend]
+    effects = {**effects, "chamber": {**effects.get("chamber", {}), "F_extend": weaker}}
+    task = low.task.model_copy(update={"effects": effects})
+    program, _ = built(low, task, low.stages.phases, RADAU5)
     start = low.stages.start(program)
     assert start is not None
     assert 1e-4 < violation(program, start) < 0.2
