@@ -39,7 +39,7 @@ tolerances, also on the full plant. `of`: among how many. Errors are those on th
 the [`landing.air`](tasks.md) with which a plan was made, a pulse on stretched legs. `fitted`: made
 with [air that fits the plant](solving.md#air-that-fits-the-plant), because with the tables of
 the planning model no plan that was tried keeps to the plant; a task that begins from it has the
-same air. Heights of 0.44 and 0.45 m have none
+same air. Heights of 0.44 to 0.46 m have none
 ([height by height](solving.md#height-by-height) says what `solve` finds there).
 Facts of earlier plans were read again from their files when the page was written anew, so that `of`
 is too low at 0.64 to 0.72 m.

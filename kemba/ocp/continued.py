@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from kemba.ocp.certificate.objective import costs
+from kemba.ocp.certificate.objective import costs, objective
 from kemba.ocp.certificate.status import Status, verdict
 from kemba.ocp.continuation.between import Origin
 from kemba.ocp.continuation.continue_plan import Continuation, Continuing
@@ -60,6 +60,13 @@ def continued(planner: Planner, origin: Origin) -> tuple[Plan | None, str]:
         stages=answer.stages,
     )
     return found, ""
+
+
+def dear(found: Plan, before: float) -> bool:
+    """Whether a plan costs so much more than `before`, by its task's own cost, that one from a
+    guess is likely to cost less."""
+    own = objective(found.model, found.task, found.requirements, found.trajectory)
+    return own > before + (Continuing.current().dear - 1.0) * abs(before)
 
 
 def from_scratch(found: Plan, why: str) -> Plan:

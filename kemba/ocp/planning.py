@@ -12,7 +12,7 @@ from kemba.errors import KembaError
 from kemba.model import Model
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.continuation.between import Origin
-from kemba.ocp.continued import continued, from_scratch, with_air_and_grip
+from kemba.ocp.continued import continued, dear, from_scratch, with_air_and_grip
 from kemba.ocp.infeasibility.checks import check_task
 from kemba.ocp.infeasibility.diagnostic import Diagnostic
 from kemba.ocp.infeasibility.explain import Explanation, explanation, refusal
@@ -82,8 +82,9 @@ def plans_nearby(
 ) -> Iterator[Plan]:
     """Plans of a task that begin from near shipped plans, the nearest one first.
 
-    Only solved ones; none where no shipped plan is near, or the task cannot be met. A plan that was
-    made with fitted air begins one with the same air. Raises ConfigErrors as `plan` does.
+    Only solved ones that do not cost much more than the plan they begin from; none where no
+    shipped plan is near, or the task cannot be met. A plan that was made with fitted air begins one
+    with the same air. Raises ConfigErrors as `plan` does.
     """
     control = Control(_deadline(task), log, watch, stop)
     job = _job(task, document, None, control, tell)
@@ -96,8 +97,8 @@ def plans_nearby(
             asked = task.model_copy(update={"effects": {**task.effects, **near.entry.effects}})
             job = _job(asked, document, None, control, tell)
         found, _ = continued(job.planner, _origin(near.entry, job.planner.task))
-        if found is not None and found.status is Status.SOLVED:
-            kept = near.entry
+        kept = near.entry
+        if found is not None and found.status is Status.SOLVED and not dear(found, kept.cost):
             found = replace(found, continued=None, start=f"shipped: {kept.name}")
             yield replace(found, fitted_air=kept.fitted_air)
         if control.ended() is not None:

@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from kemba.config import shipped_folder
-from kemba.ocp import load_task, task_model
+from kemba.ocp import load_task, planning, task_model
 from kemba.ocp.continuation.renoded import renoded
 from kemba.ocp.phases.modes import Phase
 from kemba.ocp.phases.notes import noted_phases
@@ -138,6 +138,16 @@ def test_a_plan_with_fitted_air_begins_one_with_the_same_air(tmp_path: Path) -> 
     assert "the air of its model is fitted to the simulated robot" in answer["sentence"]
     assert answer["fitted_air"]["factors"] == entry.fitted_air["factors"]
     assert load_task(tmp_path / "run" / "task.yaml")[0].effects == entry.effects
+
+
+def test_plans_of_a_dearer_minimum_are_passed_over(monkeypatch: pytest.MonkeyPatch) -> None:
+    """From 0.46 to 0.44 m one was found that costs 40 times as much; from a guess it is half."""
+    asked: list[float] = []
+    monkeypatch.setattr(planning, "dear", lambda found, before: asked.append(before) or True)
+    task, document = load_task("jump.yaml", ["height=0.51 m"])
+    assert next(plans_nearby(task, document), None) is None
+    own = [n.entry.cost for n in neighbours(task, task_model(task))]
+    assert asked == own[: Near.current().tried]
 
 
 def test_who_wants_the_tables_begins_from_none_with_fitted_air() -> None:

@@ -75,9 +75,11 @@ def test_a_continued_plan_that_costs_much_more_is_not_kept(
     task, document = load_task("jump.yaml")
 
     def plan(cost: float) -> Any:
-        costs = {"torque_squared_integral": cost}
-        common = {"trajectory": None, "model": None, "requirements": (), "stages": None}
-        return SimpleNamespace(cost=costs, continued=None, start="guess", **common)
+        common = {"task": task, "model": None, "requirements": (), "stages": None}
+        return SimpleNamespace(trajectory=cost, continued=None, start="guess", **common)
+
+    for place in ("kemba.ocp.continued", "kemba.report.judging.matched"):
+        monkeypatch.setattr(f"{place}.objective", lambda model, task, asked, cost: cost)
 
     new = plan(times)
     monkeypatch.setattr(matched, "plan_from", lambda *given, **how: (new, ""))

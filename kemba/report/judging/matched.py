@@ -14,10 +14,10 @@ from typing import Any
 
 from kemba.config import Document
 from kemba.ocp import Plan, Task
+from kemba.ocp.certificate.objective import objective
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.continuation.between import Origin
-from kemba.ocp.continuation.continue_plan import Continuing
-from kemba.ocp.continued import TORQUE
+from kemba.ocp.continued import dear
 from kemba.ocp.planning import plan, plan_from
 from kemba.plant.execution.fitted_air import FittedAir
 from kemba.report.judging.executed import Begun, Executed, executed
@@ -95,8 +95,8 @@ def _continued(
     names = _origin_of(old), "other starts (--starts 4) may take less"
     origin = Origin(*known, *names, once=True, ticks=remedies.ticks, stages=old.stages)
     near, _ = plan_from(origin, asked, document, **how)
-    dear = near and near.cost[TORQUE] > Continuing.current().dear * old.cost[TORQUE]
-    return None if dear else near
+    before = objective(old.model, asked, old.requirements, old.trajectory)
+    return None if near is not None and dear(near, before) else near
 
 
 def summed(old: Plan, new: Plan) -> Plan:
