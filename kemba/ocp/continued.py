@@ -66,7 +66,7 @@ def dear(found: Plan, before: float) -> bool:
     """Whether a plan costs so much more than `before`, by its task's own cost, that one from a
     guess is likely to cost less."""
     own = objective(found.model, found.task, found.requirements, found.trajectory)
-    return own > before + (Continuing.current().dear - 1.0) * abs(before)
+    return own > Continuing.current().most(before)
 
 
 def from_scratch(found: Plan, why: str) -> Plan:

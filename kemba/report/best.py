@@ -65,6 +65,7 @@ def best_plan(
     for one in _candidates(task, document, approach, listener):
         made = last = executed(*one, approach.replay, listener.tell, begun, place)
         if approach.replay and not (made.fine or (made.good and one[2])):
+            # without the air of a shipped start, which remedies add themselves
             asked = one[0].task.model_copy(update={"effects": task.effects})
             made, last = improved(made, asked, document, listener, begun, approach.log, place)
         if one[2] is not None and made.plan is not one[0]:

@@ -74,13 +74,17 @@ class Continuing(Settings):
         "convention: a plan from scratch costs about as much", decides=True,
     )  # fmt: skip
     dear: float = setting(
-        3.0, "1", "times the earlier plan's squared torque beyond which the user is told",
+        3.0, "1", "times the earlier plan's cost beyond which another minimum is likely",
         "convention: more than such a change usually asks for",
     )  # fmt: skip
     shortest: float = setting(
         0.1, "1", "of the way: a shorter step is not tried", "convention: ten steps at most",
         decides=True,
     )  # fmt: skip
+
+    def most(self, before: float) -> float:
+        """The most that a plan may cost which is continued from one that cost `before`."""
+        return before + (self.dear - 1.0) * abs(before)
 
 
 @dataclass
@@ -155,10 +159,9 @@ class Continuation:
             return found
         o = self.origin
         before = objective(o.model, self.task, o.requirements, o.plan)
-        most = before + (Continuing.current().dear - 1.0) * abs(before)
         measured = found.certificate
         kept = measured is not None and measured.within(self.task.tolerances)
-        if kept and self._cost(found) <= most:
+        if kept and self._cost(found) <= Continuing.current().most(before):
             return found
         self.solution = None
         return None

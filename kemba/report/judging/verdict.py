@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from kemba.errors import enumerated
 from kemba.ocp.task.task import Tolerances
 
 Facts = Mapping[str, Any]
@@ -79,9 +80,8 @@ def judge(who: str, facts: Facts | None, allowed: Allowed) -> Verdict:
     if falls:
         causes.insert(0, facts["fault"] or "does not land")
     if causes:
-        *first, last = causes
-        sentence = f"the {who} {', '.join(first)}{' and ' if first else ''}{last}"
-        return Verdict(False, sentence, math.inf if falls else worst.share)
+        share = math.inf if falls else worst.share
+        return Verdict(False, f"the {who} {enumerated(causes)}", share)
     seen = f" ({worst.match})" if worst.seen else ""
     return Verdict(True, f"{who} matches the plan{seen}", worst.share)
 
