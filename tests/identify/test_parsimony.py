@@ -8,7 +8,7 @@ from toy_problem import Toy
 
 from kemba.identify.discover import _believed, discover, null_test
 from kemba.identify.doubt.cross_validation import Gain, left_out, left_out_error
-from kemba.identify.doubt.parsimony import Belief, likeliest_part, simplest
+from kemba.identify.doubt.parsimony import Belief, likeliest_part, overclaimed, simplest
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
 from kemba.identify.ranking import equivalents
@@ -51,6 +51,26 @@ def test_an_effect_that_left_out_data_need_stays_however_small() -> None:
     search = searched(windowed({"kick.a": 9.0, "bend.a": 3.0}), "kick", "bend")
     belief = Belief(("bend", "kick"), 0.01)
     assert simplest(search, belief) == belief
+
+
+@pytest.mark.parametrize(("rows", "too_much"), [(-1.0, True), (1.0, False), (5.0, True)])
+def test_a_larger_answer_must_gain_in_left_out_rows_but_not_only_there(
+    rows: float, too_much: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its windows gain 0 nats, with a standard error of 2.3."""
+    powers = {("kick",): np.array([10.0, 12.0] * 2), ("bend", "kick"): np.array([12.0, 10.0] * 2)}
+    monkeypatch.setattr(
+        "kemba.identify.doubt.parsimony.left_out", lambda *of: Gain(rows, abs(rows))
+    )
+    search = Search(windowed({"kick.a": 9.0}))
+    assert overclaimed(search, ("kick",), ("bend", "kick"), powers) is too_much
+
+
+def test_parts_that_were_refitted_on_the_way_up_count(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("kemba.identify.doubt.parsimony._thin", lambda search, best: None)
+    many = ("bend", "hum", "kick", "wave")
+    search = searched(windowed({"kick.a": 9.0}), "kick", "bend", "hum", "wave")
+    assert simplest(search, Belief(many, 0.01)).best == ("kick",)
 
 
 def test_an_answer_of_many_effects_is_compared_with_its_parts_and_not_with_nothing() -> None:

@@ -80,6 +80,18 @@ def test_mcap_is_what_viewers_read(tmp_path: Path) -> None:
     assert set(json.loads(message.data)) == {"time", "q", "tau"}
 
 
+def test_an_mcap_has_the_summary_that_viewers_start_from(tmp_path: Path) -> None:
+    """PlotJuggler 3.9 gives up without a summary, statistics and a schema for every channel;
+    Foxglove wants schemas of objects, and seeks by the index of chunks."""
+    path = export(robot_log(20), tmp_path / "log.mcap")
+    with path.open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+    assert summary is not None and summary.statistics is not None and summary.chunk_indexes
+    assert summary.statistics.message_count == 20 * len(summary.channels)
+    for channel in summary.channels.values():
+        assert json.loads(summary.schemas[channel.schema_id].data)["type"] == "object"
+
+
 def test_an_mcap_of_others_becomes_columns(tmp_path: Path) -> None:
     """Topics at different rates: the slower one keeps its last value."""
     path = tmp_path / "other.mcap"

@@ -8,15 +8,17 @@ answer, and the windowed error of blocks that the fit has not seen may call for 
 
 - it is within one standard error of the least error: the rule of Breiman, Friedman, Olshen and
   Stone (1984), with the standard error of the paired difference, block by block; and
-- evidence claims too much: the rows of left-out blocks gain more nats by the larger answer than
-  their windows do, by more than one standard error. The first rule alone took true damping out of
-  an answer on logs of the full plant: a few logs cannot tell a small gain from none.
+- evidence claims too much: the rows of left-out blocks gain nothing by the larger answer, or more
+  nats than their windows do, by more than one standard error. The first rule alone took true
+  damping out of an answer on logs of the full plant: a few logs cannot tell a small gain from none.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+
+import numpy as np
 
 from kemba.identify.doubt.cross_validation import gained, left_out, left_out_powers
 from kemba.identify.evidence.bootstrap import BootstrapSettings
@@ -49,33 +51,42 @@ class Belief:
 def simplest(search: Search, belief: Belief) -> Belief:
     """The belief with the fewest effects that left-out data need.
 
-    Effects are taken out one by one, each time the one without which the error is smallest, for as
-    long as the error stays within one standard error of the smallest. A last effect stays: whether
-    there is any is asked by the bootstrap.
+    Among all parts of the answer that were refitted, on the way up to it or in `_thin`. A last
+    effect stays: whether there is any is asked by the bootstrap.
     """
-    best, rest = belief.best, belief.best
-    path = {best}
-    while len(rest) > 1:
-        smaller = parts_of(rest)
-        _visit(search, smaller)
-        path |= set(smaller)
-        powers = {h: left_out_powers(search, h) for h in path}
-        least = min(powers, key=lambda h: powers[h].sum())
-        rest = min(smaller, key=lambda h: powers[h].sum())
-        if not as_good(powers[rest], powers[least]):
-            break
-    if len(path) == 1:
-        return belief
-    equal = [h for h in path if as_good(powers[h], powers[least])]
+    best = belief.best
+    _thin(search, best)
+    powers = {h: left_out_powers(search, h) for h in _known_parts(search, best)}
+    least = min(powers.values(), key=np.sum)
+    equal = [h for h in powers if as_good(powers[h], least)]
     fine = [h for h in equal if overclaimed(search, h, best, powers)] or [best]
     few = [h for h in fine if len(h) == min(map(len, fine))]
     chosen = max(few, key=lambda h: search.points[h].log_evidence)
     if chosen == best:
         return belief
     # the evidence proposed this one as a part of the best only: alone it need not be the likeliest
-    count, parts = len(search.problem.candidates), [h for h in path if set(h) <= set(chosen)]
+    count, parts = len(search.problem.candidates), _known_parts(search, chosen)
     chosen = max(parts, key=lambda h: search.points[h].log_evidence + log_prior(h, count))
     return _instead(search, belief, chosen)
+
+
+def _thin(search: Search, best: Hypothesis) -> None:
+    """Refit the answer with ever fewer effects: each time without the one that is missed least, for
+    as long as the error stays within one standard error of the smallest."""
+    rest, least = best, left_out_powers(search, best)
+    while len(rest) > 1:
+        smaller = parts_of(rest)
+        _visit(search, smaller)
+        powers = {h: left_out_powers(search, h) for h in smaller}
+        rest = min(smaller, key=lambda h: powers[h].sum())
+        least = min(least, powers[rest], key=np.sum)
+        if not as_good(powers[rest], least):
+            break
+
+
+def _known_parts(search: Search, hypothesis: Hypothesis) -> list[Hypothesis]:
+    """The hypothesis and all refitted ones with some of its effects."""
+    return [h for h in search.points if h and set(h) <= set(hypothesis)]
 
 
 def parts_of(hypothesis: Hypothesis) -> list[Hypothesis]:
@@ -103,9 +114,11 @@ def _visit(search: Search, hypotheses: list[Hypothesis]) -> None:
 
 
 def overclaimed(search: Search, smaller: Hypothesis, larger: Hypothesis, powers: Powers) -> bool:
-    """Whether rows of left-out blocks gain more by the larger hypothesis than their windows do."""
+    """Whether rows of left-out blocks gain nothing by the larger hypothesis, or more than their
+    windows do."""
     windows = gained(0.5 * (powers[smaller] - powers[larger]))
-    return windows.nats + windows.error < left_out(search, larger, smaller).nats
+    rows = left_out(search, larger, smaller)
+    return rows.nats <= 0 or windows.nats + windows.error < rows.nats
 
 
 def _instead(search: Search, belief: Belief, chosen: Hypothesis) -> Belief:
