@@ -12,6 +12,8 @@ from kemba.identify.doubt.cross_validation import left_out, left_out_error
 from kemba.identify.doubt.parsimony import Belief
 from kemba.identify.evidence.linear import is_shape
 from kemba.identify.evidence.modes.bounded import within_bounds
+from kemba.identify.evidence.modes.settled import settled
+from kemba.identify.evidence.point import LinearisationPoint
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import (
     NULL,
@@ -20,7 +22,7 @@ from kemba.identify.evidence.spike_slab import (
     share_of,
 )
 from kemba.identify.evidence.windows import error_ratio
-from kemba.identify.problem.problem import Array, Candidate, Problem
+from kemba.identify.problem.problem import Array, Candidate, Parameter, Problem
 from kemba.identify.settings import RankingSettings
 
 
@@ -41,7 +43,7 @@ def ranked(search: Search, belief: Belief, holdout: Problem | None) -> list[Rank
     )
     shares = share_of(probability, problem.candidates)
     order = sorted(shares, key=lambda e: (e not in best, -strength(search, e, best), -shares[e]))
-    found = []
+    found, reached = [], settled(search.base, search.points[best]) if best else None
     before = error(search, NULL, holdout)
     for effect in order[: RankingSettings.current().shown]:
         hypothesis = best if effect in best else _likeliest_with(search, effect)
@@ -51,7 +53,7 @@ def ranked(search: Search, belief: Belief, holdout: Problem | None) -> list[Rank
             Ranked(
                 effect,
                 shares[effect],
-                values(search, hypothesis, effect),
+                values(search, hypothesis, effect, reached if effect in best else None),
                 equivalents(search, belief, effect) if effect in best else (),
                 before,
                 error(search, hypothesis, holdout),
@@ -101,29 +103,39 @@ def equivalents(search: Search, belief: Belief, effect: str) -> tuple[str, ...]:
     return tuple(sorted(found))
 
 
-def values(search: Search, hypothesis: Hypothesis, effect: str) -> dict[str, Value]:
+def values(
+    search: Search, hypothesis: Hypothesis, effect: str, reached: LinearisationPoint | None = None
+) -> dict[str, Value]:
     """Parameters of one effect with 95 % intervals.
 
     The model's own imperfection may add to an effect or hide some of it: as much, in one sigma, as
-    the spike of the prior allows.
+    the spike of the prior allows. `reached`: the same hypothesis with slopes that hold at its best
+    fit (`settled`); the interval is the one there, and reaches to the value.
     """
-    point, candidate = search.points[hypothesis], search.problem.candidates[effect]
-    found, imperfection = {}, SpikeSlabSettings.current().spike
-    z = within_bounds(search.problem, point)
+    problem, candidate = search.problem, search.problem.candidates[effect]
+    point, found = search.points[hypothesis], {}
+    z, there = within_bounds(problem, point), within_bounds(problem, reached or point)
+    covariance = (reached or point).score.covariance
     for key, parameter in candidate.keys().items():
         i = point.linear.index(key)
-        centre, sd = z[i], float(np.sqrt(point.score.covariance[i, i]))
-        step = 1.0 if is_shape(search.problem, key) else abs(centre - parameter.off)
-        sd = float(np.hypot(sd, imperfection * step))
-        low, high = centre - 1.96 * sd, centre + 1.96 * sd
-        triple = np.array([centre, low, high])
-        if is_shape(search.problem, key):
+        low, high = _interval(
+            there[i], covariance[i, i], None if is_shape(problem, key) else parameter
+        )
+        triple = np.array([z[i], min(low, z[i]), max(high, z[i])])
+        if is_shape(problem, key):
             triple = np.exp(np.clip(triple, -50, 50))
         triple = np.clip(triple, parameter.lower, parameter.upper)
         name, unit, triple = reported(candidate, parameter.name, parameter.unit, triple)
         value, low, high = (float(t) for t in triple)
         found[name] = Value(value, low, high, unit)
     return found
+
+
+def _interval(centre: float, variance: float, switch: Parameter | None) -> tuple[float, float]:
+    """95 % interval of an effect's `switch`, or of the logarithm of its shape (None)."""
+    step = 1.0 if switch is None else abs(centre - switch.off)
+    reach = 1.96 * float(np.hypot(np.sqrt(variance), SpikeSlabSettings.current().spike * step))
+    return centre - reach, centre + reach
 
 
 def reported(candidate: Candidate, name: str, unit: str, triple: Array) -> tuple[str, str, Array]:

@@ -9,9 +9,12 @@ import pytest
 
 from kemba.identify.discover import discover
 from kemba.identify.evidence.linear import linearise, time_blocks
+from kemba.identify.evidence.modes.settled import settled
 from kemba.identify.evidence.modes.small_effects import mode_of
+from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Ranker
 from kemba.identify.problem.problem import Array, Candidate, Parameter, Problem, Rows, Theta
+from kemba.identify.ranking import values
 
 ROW, RUNS = 1e-3, 3  # s
 EDGES = 0.0505 + 0.04 * np.arange(18)  # s, between two rows; up and down in turn
@@ -89,3 +92,22 @@ def test_what_cannot_be_negative_is_absent_at_the_mode() -> None:
     linear, jacobian, _ = linearise(problem, {}, time_blocks(problem))
     mode = mode_of(problem, NULL, [{}], linear, jacobian, time_blocks(problem))
     assert "drag.F" not in mode.theta
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_an_interval_is_taken_where_the_effects_act_together(seed: int) -> None:
+    """Edges that fall 3.6 ms late: the slope of `falls_late` is that of edges on time, four rows
+    earlier, until it is taken anew."""
+    truth = {"late.T": 3.1e-3, "falls_late.T": 5e-4}
+    search = Search(Late(truth, seed))
+    search.start()
+    before = search.visit(("late",))
+    point = settled(search.base, before)
+    i, j = (point.linear.index(name) for name in truth)
+    z, sd = point.score.z, np.sqrt(np.diag(point.score.covariance))
+    assert abs(z[i] - truth["late.T"]) < 3.0 * sd[i]
+    assert abs(before.score.z[i] - truth["late.T"]) > 1.5e-4 > abs(z[i] - truth["late.T"])
+    assert abs(z[j] - truth["falls_late.T"]) < 1e-4
+    value = values(search, ("late",), "late", point)["T"]
+    assert value.low <= truth["late.T"] <= value.high
+    assert value.low <= value.value <= value.high

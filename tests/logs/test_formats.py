@@ -81,7 +81,7 @@ def test_mcap_is_what_viewers_read(tmp_path: Path) -> None:
 
 
 def test_an_mcap_has_the_summary_that_viewers_start_from(tmp_path: Path) -> None:
-    """PlotJuggler 3.9 gives up without a summary, statistics and a schema for every channel;
+    """PlotJuggler gives up without a summary, statistics and a schema for every channel;
     Foxglove wants schemas of objects, and seeks by the index of chunks."""
     path = export(robot_log(20), tmp_path / "log.mcap")
     with path.open("rb") as stream:
