@@ -62,6 +62,8 @@ CONSTANTS = {  # file -> names, why
     "mechanism/own_rigs.py": ("GRAVITY", "of the earth"),
     "mechanism/knee.py": ("REACH", "rounding: the slope of an angle stays finite"),
     # formulas and formats
+    "logs/formats/__init__.py": ("LARGEST", "a limit, with its reason"),
+    "logs/formats/mat_child.py": ("MEMORY", "the same limit, with room to read"),
     "logs/formats/mcap.py": ("NS", "nanoseconds of a second"),
     "logs/draft/ranges.py": (
         "LENGTH EXTENSION ANGLE PRESSURE STEP STAMPED ABSOLUTE",

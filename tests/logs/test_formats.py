@@ -17,6 +17,7 @@ from scipy.io import savemat
 from kemba.errors import KembaError
 from kemba.identify.logs.reading import read_log
 from kemba.logs import ColumnMap, ColumnSource, open_log
+from kemba.logs.formats import matlab
 from kemba.report.export import export
 from kemba.trajectory import Trajectory
 
@@ -219,4 +220,29 @@ def test_a_file_that_kills_its_reader_is_told(tmp_path: Path) -> None:
     whole = path.read_bytes()
     path.write_bytes(whole[:145] + b"\x0e" + whole[146:])
     with pytest.raises(KembaError, match=r"log\.mat: is no MATLAB file that SciPy reads"):
+        open_log(path)
+
+
+@pytest.mark.parametrize("ending", ["npz", "parquet", "mcap"])
+def test_packed_logs_are_not_unpacked_into_more_than_is_allowed(
+    ending: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = export(robot_log(2000), tmp_path / f"log.{ending}")
+    monkeypatch.setattr("kemba.logs.formats.LARGEST", 100_000)
+    with pytest.raises(KembaError, match=r"unpacks to .* GB; .* are allowed.*cut it into logs"):
+        open_log(path)
+
+
+def test_packed_zeros_end_the_reader_of_matlab_files_and_nothing_else(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With less memory than the array would take; there are 8 MB in some kilobytes."""
+    child = Path(matlab.__file__).with_name("mat_child.py").read_text(encoding="utf-8")
+    other = tmp_path / "mat_child.py"
+    other.write_text(child.replace("MEMORY = 6_000_000_000", "MEMORY = 50_000_000"))
+    monkeypatch.setattr(matlab, "__file__", str(tmp_path / "matlab.py"))
+    path = tmp_path / "zeros.mat"
+    savemat(path, {"time": np.zeros(1_000_000)}, do_compression=True)
+    assert path.stat().st_size < 20_000
+    with pytest.raises(KembaError, match=r"is no MATLAB file that SciPy reads"):
         open_log(path)

@@ -14,6 +14,7 @@ from kemba.trajectory import Trajectory
 Read = Callable[[Path], tuple[Raw, dict[str, Any]]]
 Write = Callable[[Trajectory, Path], None]
 
+LARGEST = 2_000_000_000  # bytes of an unpacked log: 40 columns at 1 kHz for 1.7 hours
 MODULES = {"parquet": "parquet", "mcap": "mcap", "mat": "matlab", "npz": "arrays", "json": "arrays"}
 
 
@@ -27,6 +28,17 @@ def writer(path: Path) -> Write:
     """The function that writes a trajectory in the format of this ending."""
     found: Write = getattr(_module(path), f"write_{_ending(path)}")
     return found
+
+
+def check_size(path: Path, unpacked: int) -> None:
+    """Raises KembaError where a packed log would unpack to more bytes than a log may have: a few
+    kilobytes of zeros can be packed that fill any memory."""
+    if unpacked > LARGEST:
+        raise KembaError(
+            str(path),
+            f"unpacks to {unpacked / 1e9:.3g} GB; {LARGEST / 1e9:.0f} GB are allowed",
+            "cut it into logs of single runs",
+        )
 
 
 def _ending(path: Path) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 from kemba.errors import KembaError
 from kemba.files import atomic_path, plain
 from kemba.files import write_json as write_json_file
+from kemba.logs.formats import check_size
 from kemba.logs.text import Raw
 from kemba.trajectory import TIME, Trajectory
 
@@ -32,6 +33,8 @@ def write_npz(trajectory: Trajectory, path: Path) -> None:
 def read_npz(path: Path) -> Found:
     """Our own .npz by its units; else every vector of the length that most vectors have."""
     try:
+        with zipfile.ZipFile(path) as packed:
+            check_size(path, sum(member.file_size for member in packed.infolist()))
         with path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
             content = {name: file[name] for name in file.files}
     except (*BROKEN, OSError) as error:

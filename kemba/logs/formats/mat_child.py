@@ -5,12 +5,15 @@ Argument: the file. The arrays of numbers and texts go to the standard output as
 the arrays as `a0`, `a1` and so on. Exit code 1 with the reason where SciPy cannot read the file.
 """
 
+import contextlib
 import io
 import sys
 from typing import Any
 
 import numpy as np
 from scipy.io import loadmat
+
+MEMORY = 6_000_000_000  # bytes: an unpacked log of the size that is allowed, three times
 
 
 def arrays(path: str) -> dict[str, np.ndarray]:
@@ -25,7 +28,16 @@ def arrays(path: str) -> dict[str, np.ndarray]:
     return found
 
 
+def limit_memory() -> None:
+    """Let packed zeros end in a MemoryError of this process, where the system can."""
+    with contextlib.suppress(ImportError, ValueError, OSError):
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, resource.getrlimit(resource.RLIMIT_AS)[1]))
+
+
 def main() -> int:
+    limit_memory()
     try:
         found = arrays(sys.argv[1])
     except Exception as error:  # of damaged bytes SciPy raises anything

@@ -15,6 +15,7 @@ from mcap.writer import Writer
 
 from kemba.errors import KembaError
 from kemba.files import atomic_path, plain
+from kemba.logs.formats import check_size
 from kemba.logs.text import Raw
 from kemba.trajectory import TIME, Trajectory
 
@@ -67,6 +68,9 @@ def read_mcap(path: Path) -> tuple[Raw, dict[str, Any]]:
     try:
         with path.open("rb") as stream:
             reader = make_reader(stream)
+            summary = reader.get_summary()
+            chunks = summary.chunk_indexes if summary else ()
+            check_size(path, sum(chunk.uncompressed_size for chunk in chunks))
             known = {found.name: found.metadata for found in reader.iter_metadata()}
             topics = _messages(reader)
     except OSError as error:

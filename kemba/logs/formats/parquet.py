@@ -12,6 +12,7 @@ import pyarrow.parquet as pq
 
 from kemba.errors import KembaError
 from kemba.files import atomic_path, plain
+from kemba.logs.formats import check_size
 from kemba.logs.text import Raw
 from kemba.trajectory import TIME, Trajectory
 
@@ -31,6 +32,9 @@ def write_parquet(trajectory: Trajectory, path: Path) -> None:
 def read_parquet(path: Path) -> tuple[Raw, dict[str, Any]]:
     """The columns, numbers as floats and anything else as texts, and the metadata."""
     try:
+        with pq.ParquetFile(path) as file:
+            found = file.metadata
+        check_size(path, 8 * found.num_rows * found.num_columns)
         table = pq.read_table(path)
     except OSError as error:
         raise KembaError(str(path), error.strerror or str(error)) from None
