@@ -14,7 +14,7 @@ from kemba.identify.evidence.spike_slab import NULL, Hypothesis
 from kemba.identify.problem.problem import Problem
 from kemba.identify.ranking import error
 from kemba.identify.rest import pattern_left
-from kemba.identify.settings import VerdictSettings
+from kemba.identify.settings import DiscoverSettings, VerdictSettings
 
 
 @dataclass(frozen=True)
@@ -49,6 +49,12 @@ def doubts_about(
     if best and after > settings.whole and excess(after) > settings.whole_share * excess(before):
         reasons.append(
             f"{enumerated(best)} fits best, but leaves an error of {after:.3g} times the noise"
+        )
+    significant = belief.p_value <= DiscoverSettings.current().significant
+    if not best and significant and before > settings.whole:
+        reasons.append(
+            f"the model as it is leaves an error of {before:.3g} times the noise, and no effect "
+            "explains enough of it"
         )
     if belief.rivals:
         others = ", ".join(" + ".join(h) for h in belief.rivals)

@@ -13,7 +13,7 @@ from kemba.identify.discover import discover, material
 from kemba.identify.doubt.cross_validation import Gain, left_out, left_out_error
 from kemba.identify.doubt.parsimony import Belief
 from kemba.identify.evidence.search import Search
-from kemba.identify.evidence.spike_slab import SpikeSlabSettings, probabilities
+from kemba.identify.evidence.spike_slab import NULL, SpikeSlabSettings, probabilities
 from kemba.identify.ranking import values
 from kemba.identify.verdict import doubts_about, verdict_on
 
@@ -114,6 +114,21 @@ def test_an_answer_that_leaves_much_of_the_error_is_not_the_whole(
         (doubt,) = found.reasons
         left = re.fullmatch("kick fits best, but leaves an error of (.*) times the noise", doubt)
         assert left and float(left[1]) == pytest.approx(noise, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("p_value", "noise", "verdict"),
+    [(0.003, 3.0, "unknown"), (0.003, 1.2, "nothing"), (0.3, 3.0, "nothing")],
+)
+def test_a_significant_error_that_nothing_explains_is_not_called_small(
+    p_value: float, noise: float, verdict: str
+) -> None:
+    problem = Toy({}, seed=4)
+    problem.measured += np.sqrt(noise**2 - 1.0) * np.random.default_rng(5).standard_normal(
+        len(problem.measured)
+    )
+    found = doubts_about(searched(problem), Belief(NULL, p_value), None, None)
+    assert verdict_on(NULL, None, found) == verdict
 
 
 @pytest.mark.parametrize(

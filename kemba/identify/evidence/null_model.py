@@ -129,13 +129,24 @@ class Baseline:
         self.point = LinearisationPoint(NULL, fit, linear, windowed, mode, score)
 
     def judged(
-        self, hypothesis: Hypothesis, fit: Fit, names: Names, slopes: Array
+        self,
+        hypothesis: Hypothesis,
+        fit: Fit,
+        names: Names,
+        slopes: Array,
+        start: Mapping[str, float] | None = None,
     ) -> LinearisationPoint:
-        """The point of a refitted hypothesis with its slopes (n, k) along `names`."""
+        """The point of a refitted hypothesis with its slopes (n, k) along `names`; its mode is
+        sought from `start`, or from the fit."""
         r = self.problem.residual(fit.theta)
         linear, windowed = self.division.linear(fit.theta, names, slopes, r)
-        beside = () if self.problem.moves else (self._beside(fit.theta),)
-        mode = self._mode(hypothesis, (fit.theta, *beside), linear, slopes)
+        if start is not None:
+            starts = [start]
+        elif self.problem.moves:
+            starts = [fit.theta]
+        else:
+            starts = [fit.theta, self._beside(fit.theta)]
+        mode = self._mode(hypothesis, starts, linear, slopes)
         score = self.ranker(mode.linear).score(hypothesis)
         return LinearisationPoint(hypothesis, fit, linear, windowed, mode, score)
 

@@ -13,6 +13,8 @@ import numpy as np
 from kemba.identify.evidence.linear import is_shape
 from kemba.identify.evidence.null_model import Baseline
 from kemba.identify.evidence.point import LinearisationPoint
+from kemba.identify.evidence.spike_slab import SpikeSlabSettings
+from kemba.identify.problem.problem import Problem, Theta
 from kemba.settings import BY_HAND, Settings, setting
 
 
@@ -36,18 +38,44 @@ class SettledSettings(Settings):
 def settled(base: Baseline, point: LinearisationPoint) -> LinearisationPoint:
     """The refitted hypothesis of `point`, judged with slopes of every effect at its own mode.
 
+    A lag that is absent there has the slope of a lag of a whole row. So the mode is sought once
+    more, from all absent lags at what a model's usual imperfection allows; the likelier is taken.
     Where the motion depends on the model, slopes are those of the refitted hypothesis alone.
     """
-    settings, problem, names = SettledSettings.current(), base.problem, point.linear.names
+    here = point.mode.theta
+    if base.problem.moves:
+        return _from(base, point, here, 1)
+    rounds = SettledSettings.current().rounds
+    starts = [here] if not (lags := _lags(base.problem, here)) else [here, {**lags, **here}]
+    found = [_from(base, point, start, rounds) for start in starts]
+    return max(found, key=lambda one: one.log_evidence)
+
+
+def _lags(problem: Problem, theta: Theta) -> dict[str, float]:
+    """Every time that cannot be negative and is absent at theta, as large as the spike allows."""
+    spike = SpikeSlabSettings.current().spike
+    leads = {c.key: c.lead for c in problem.candidates.values() if not len(c.keys()) > 1}
+    return {
+        key: max(lead.off + spike * lead.size, lead.lower)
+        for key, lead in leads.items()
+        if lead.unit == "s" and not lead.signed and theta.get(key, lead.off) == lead.off
+    }
+
+
+def _from(
+    base: Baseline, point: LinearisationPoint, theta: Theta, rounds: int
+) -> LinearisationPoint:
+    """The hypothesis with slopes at theta, then at the mode that they lead to, until it stays."""
+    problem, names, still = base.problem, point.linear.names, SettledSettings.current().still
     own = [names.index(problem.candidates[effect].key) for effect in point.hypothesis]
-    for _ in range(1 if problem.moves else settings.rounds):
-        theta = point.mode.theta
+    for _ in range(rounds):
         slopes = problem.jacobian(theta, names)
         for i, name in enumerate(names):
             if is_shape(problem, name):
                 slopes[:, i] *= theta[name]
-        before, point = point.score.z, base.judged(point.hypothesis, point.fit, names, slopes)
-        sd = np.sqrt(np.diag(point.score.covariance))
-        if np.all(np.abs(point.score.z - before)[own] < settings.still * sd[own]):
+        before = point.score.z
+        point = base.judged(point.hypothesis, point.fit, names, slopes, theta)
+        theta, sd = point.mode.theta, np.sqrt(np.diag(point.score.covariance))
+        if np.all(np.abs(point.score.z - before)[own] < still * sd[own]):
             break
     return point
