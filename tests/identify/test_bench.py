@@ -108,6 +108,22 @@ def test_a_delay_has_a_slope(bench_log: BenchLog) -> None:
     assert np.linalg.norm(small - large) < 0.5 * np.linalg.norm(large)
 
 
+@pytest.mark.parametrize("shift", [-3e-4, 7e-5, 4e-4])
+def test_clocks_that_are_all_late_look_like_none(shift: float, bench_log: BenchLog) -> None:
+    """Valves that act earlier and sensors that show everything as much later, also by parts of a
+    row: what no log can tell apart must cost the same, or an interval would be too narrow."""
+    problem = bench_problem([bench_log(duration=1.5)], load_model(rig=True)).in_detail()
+    sensors = ("sensor_delay:piston/x.dt", "sensor_delay:piston/F.dt")
+    base = 0.5 * float(np.sum(problem.residual({}) ** 2))
+
+    def rises(*shifted: str) -> float:
+        theta = {"valve_delay.dt": -shift, **dict.fromkeys(shifted, shift)}
+        return 0.5 * float(np.sum(problem.residual(theta) ** 2)) - base
+
+    assert abs(rises(*sensors)) < 1.0  # nats
+    assert rises() > 10.0
+
+
 def test_switching_instants_merge_when_pulses_overlap() -> None:
     time = np.arange(100) / 1e3
     sent = ((time >= 0.010) & (time < 0.030) | (time >= 0.032)).astype(float)

@@ -29,7 +29,10 @@ class BenchPredictor:
     """Rigs of one model, each compiled once with the effects that theta switches on.
 
     `figures`: nominal numbers of the model that theta may scale, with factor and 1 sigma, by name.
+    `exact`: what a late force sensor shows is computed at its own times, not read off between rows.
     """
+
+    exact = False
 
     def __init__(self, model: Model, candidates: Mapping[str, Candidate]) -> None:
         self.model, self.candidates = model, candidates
@@ -51,13 +54,18 @@ class BenchPredictor:
     def predict(
         self, run: BenchLog, theta: Theta, start: Mapping[str, float] | None = None
     ) -> Prediction:
-        """What happens on the rig, before any sensor. `start`: by how much states differ from rest
-        when the log begins."""
+        """What happens on the rig, before any sensor; where `exact`, at the times that the force of
+        a row is of. `start`: by how much states differ from rest when the log begins."""
         rig = self.rig(theta)
         nominal = {name: factor for name, (factor, _) in self.figures.items()}
         values = {name: theta.get(name, nominal.get(name, 0.0)) for name in rig.names}
         sent = self.sent(run, theta)
-        return rig.predict(self.true_motion(run, theta), sent.commands, values, start or {})
+        late = self._shift(theta)
+        return rig.predict(self.true_motion(run, theta), sent.commands, values, start or {}, late)
+
+    def _shift(self, theta: Theta) -> float:
+        """Seconds before every row at which the rig is predicted."""
+        return self.sensors.lateness(theta, "piston/F") if self.exact else 0.0
 
     def sent(self, run: BenchLog, theta: Theta) -> BenchLog:
         """A run with its commands at the time when they were sent, at theta."""
@@ -81,15 +89,16 @@ class BenchPredictor:
         cylinder = self.model.mechanism.need_cylinder()
         for channel in PRESSURES:
             if channel in run.measured:
-                true = Series(run.motion.time, absolute_pressure(channel, p.states, cylinder))
-                value = self.sensors.shown(theta, channel, true).value
+                seen = Series(run.motion.time, absolute_pressure(channel, p.states, cylinder))
+                value = self.sensors.shown(theta, channel, seen.late(-self._shift(theta))).value
                 out[channel] = (value, run.variance(channel))
         return out
 
     def _force(self, p: Prediction, run: BenchLog, theta: Theta) -> tuple[Array, Array]:
         """The transducer's reading and its variance: sensor, velocity error, switching instants."""
-        time, late = run.motion.time, self.sensors.lateness(theta, "piston/F")
-        force = self.sensors.shown(theta, "piston/F", Series(time, p.force)).value
+        time, shown = run.motion.time, self.sensors.scaled if self.exact else self.sensors.shown
+        force = shown(theta, "piston/F", Series(time, p.force)).value
+        late = self.sensors.lateness(theta, "piston/F") - self._shift(theta)
         valve = Series(time, p.valve).late(late).value
         variance = run.variance("piston/F") + run.velocity_error**2
         variance = variance + np.sum(p.by_valve**2 * valve * (1 - valve), axis=1)

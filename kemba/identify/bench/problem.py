@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from copy import copy
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -215,6 +216,13 @@ class BenchProblem(Problem):
         forgotten."""
         found = copy(self)
         found.colour = {} if residual is None else self._learnt(residual, careful)
+        return found
+
+    def in_detail(self) -> Self:
+        """The same problem with nothing read off between rows."""
+        found, predictor = copy(self), copy(self.predicted.predictor)
+        predictor.exact = True
+        found.predicted = replace(self.predicted, predictor=predictor)
         return found
 
     def _learnt(self, residual: Array, careful: bool) -> dict[tuple[int, int], Colour]:

@@ -11,6 +11,7 @@ import casadi as ca
 import numpy as np
 
 from kemba.effects.pneumatics.switching import Pulse, delayed, instants, is_on
+from kemba.effects.series import Series
 from kemba.identify.bench.motion import SmoothedMotion
 from kemba.identify.problem.problem import Array
 from kemba.model.exponential import midpoint_step
@@ -82,26 +83,31 @@ class RigModel:
         commands: Pulses,
         values: Mapping[str, float],
         start: Mapping[str, float] | None = None,
+        late: float = 0.0,
     ) -> Prediction:
         """Integrate from rest (plus `start` by state name) with exact switching instants.
 
-        `values` holds every name this rig was compiled for.
+        `values` holds every name this rig was compiled for. `late` [s]: the samples are of what was
+        so much earlier. A late sensor is told from late valves by the motion alone: what falls
+        between two samples must look the same, so nothing is read off between them.
         """
         on, off = self.timing(values)
         valves = [delayed(c, on, off) for c in commands]
         p = np.array([values[name] for name in self.names])
-        times, at_sample = _breakpoints(motion.time, np.concatenate([instants(v) for v in valves]))
+        seen = motion.time - late
+        times, at_sample = _breakpoints(seen, np.concatenate([instants(v) for v in valves]))
         u = np.stack([is_on(v, times) for v in valves])
         s = self._integrate(times, motion, u, p, start or {})[:, at_sample]
-        blurred = np.stack([share(v, motion.time) for v in valves])
-        n = len(motion.time)
+        blurred = np.stack([share(v, seen) for v in valves])
+        n, moved = len(seen), Series(motion.time, motion.x, (motion.v, motion.a)).late(late)
+        x, (v0, a) = moved.value, moved.rates
         fixed = np.repeat(p[:, None], n, axis=1)
         states = dict(zip(self._state_names, s, strict=True))
-        out = self._mapped("output", n)(s, motion.x, motion.v, motion.a, blurred, fixed)
+        out = self._mapped("output", n)(s, x, v0, a, blurred, fixed)
         force = V_MIDDLE * out[0]
         for place, weight in V_NODES:
-            v = motion.v + place * motion.v_sigma
-            force += weight * self._mapped("force", n)(s, motion.x, v, motion.a, blurred, fixed)[0]
+            v = v0 + place * motion.v_sigma
+            force += weight * self._mapped("force", n)(s, x, v, a, blurred, fixed)[0]
         return Prediction(force, out[1], out[2:4].T, blurred.T, states)
 
     def _integrate(

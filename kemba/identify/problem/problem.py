@@ -195,6 +195,11 @@ class Problem(ABC):
 
     learns_colour: bool = False  # whether the colour of the noise is learnt from residuals
 
+    def in_detail(self) -> Self:
+        """This problem as intervals need it: what no log can tell apart must look the same to the
+        last bit. Default: this one."""
+        return self
+
     def recolour(self, residual: Array | None, careful: bool = False) -> Self:
         """This problem with the noise colour learnt from residuals (n,) of a problem without
         colour; None: without colour. `careful`: the model behind these residuals is good, so that

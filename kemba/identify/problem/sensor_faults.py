@@ -86,6 +86,10 @@ class SensorFaults:
         """The channel as its sensor shows it at theta, from its true values."""
         return as_measured(self.at(theta, channel), channel, true)
 
+    def scaled(self, theta: Theta, channel: str, read: Series) -> Series:
+        """The channel as its sensor shows it, from the values at the times that it shows."""
+        return as_measured([f for f in self.at(theta, channel) if not f.lateness], channel, read)
+
     def behind(self, theta: Theta, channel: str, measured: Series) -> Series:
         """The true channel behind what its sensor shows, at theta."""
         return as_true(self.at(theta, channel), channel, measured)

@@ -8,6 +8,8 @@ the delay is too narrow and may lie wrong. So slopes are taken anew at the mode,
 
 from __future__ import annotations
 
+from copy import copy
+
 import numpy as np
 
 from kemba.identify.evidence.linear import is_shape
@@ -40,9 +42,12 @@ def settled(base: Baseline, point: LinearisationPoint) -> LinearisationPoint:
 
     A lag that is absent there has the slope of a lag of a whole row. So the mode is sought once
     more, from all absent lags at what a model's usual imperfection allows; the likelier is taken.
-    Where the motion depends on the model, slopes are those of the refitted hypothesis alone.
+    Where the motion depends on the model, slopes are those of the refitted hypothesis alone. A
+    search reads what a late sensor shows off between rows, which makes valves that are early look
+    different from sensors that are all late: here it does not.
     """
-    here = point.mode.theta
+    base, here = copy(base), point.mode.theta
+    base.problem = base.problem.in_detail()
     if base.problem.moves:
         return _from(base, point, here, 1)
     rounds = SettledSettings.current().rounds
