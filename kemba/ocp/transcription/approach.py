@@ -28,8 +28,8 @@ def approach_rows(
 
     rate(y0) + gap(y) / step >= -speed, stops by the length of the leg (`felt`). Where the gap stays
     open by more than it closes within a `step` [s], the row asks for nothing. `of_state`: an
-    expression of the node in the stage's y. Feet on a ground that gives way have no rows: the ground
-    stops them, however fast they come.
+    expression of the node in the stage's y. Feet on a ground that gives way have no rows: it stops
+    them, however fast they come.
     """
     rows, labels = [], []
     for constraint in rigid_constraints(model, reduction):
