@@ -6,15 +6,18 @@ import numpy as np
 import pytest
 from ocp.runs import Solved, solved
 
-from kemba.config import load_yaml
+from kemba.config import Document, load_yaml
+from kemba.effects.mechanics.ground import GroundCompliance
 from kemba.errors import ConfigErrors, KembaError
-from kemba.model import load_model
+from kemba.model import Model, load_model
 from kemba.model.impact import felt
 from kemba.ocp import Task, load_task, task_model
 from kemba.ocp.certificate.grazing import grazes
 from kemba.ocp.phases.modes import HELD, OPEN, drop_grazes
 from kemba.ocp.task.height import longest_leg
 from kemba.ocp.task.requirement import Requirement, apex_node, resolve
+from kemba.ocp.transcription.symmetry import whole
+from kemba.ocp.transcription.transcribe import Transcription
 from kemba.trajectory import Trajectory
 
 
@@ -50,6 +53,21 @@ def test_a_goal_may_last() -> None:
 def test_goals_that_make_no_sense(goal: dict[str, object], told: str) -> None:
     with pytest.raises(ValueError, match=told):
         Task.model_validate({"goals": {"up": {"quantity": "body/z", **goal}}})
+
+
+def test_a_soft_landing_on_soft_ground_bounds_the_stops_only() -> None:
+    task, document = load_task("jump.yaml", ["landing.impact_speed=0.8 m/s"])
+    model = task_model(task)
+    assert len(_landing_rows(task, document, model)) == 6  # feet and both stops of two legs
+    soft = model.with_effects([GroundCompliance()])
+    rows = _landing_rows(task, document, soft)
+    assert len(rows) == 4 and not any("contact" in label for label in rows)
+
+
+def _landing_rows(task: Task, document: Document, model: Model) -> list[str]:
+    found = Transcription(model, task, resolve(task, model, document), whole(model.node), 8)
+    labels = (meaning.label for meaning in found.meanings)
+    return [label for label in dict.fromkeys(labels) if label.startswith("landing.")]
 
 
 def test_maximise_reaches_higher_than_at_least() -> None:

@@ -11,7 +11,7 @@ from kemba.model.impact import felt
 from kemba.ocp.task.requirement import SCALES
 from kemba.ocp.transcription.stage import INF, Interval, StageRows
 from kemba.ocp.transcription.symmetry import Reduction
-from kemba.ocp.transcription.unilateral import read_constraints
+from kemba.ocp.transcription.unilateral import rigid_constraints
 
 SPEED = SCALES["m.s-1"]
 
@@ -28,11 +28,11 @@ def approach_rows(
 
     rate(y0) + gap(y) / step >= -speed, stops by the length of the leg (`felt`). Where the gap stays
     open by more than it closes within a `step` [s], the row asks for nothing. `of_state`: an
-    expression of the node in the stage's y. Raises ValueError where a pair is neither a contact nor
-    a stop.
+    expression of the node in the stage's y. Feet on a ground that gives way have no rows: it stops
+    them, however fast they come.
     """
     rows, labels = [], []
-    for constraint in read_constraints(model, reduction):
+    for constraint in rigid_constraints(model, reduction):
         rate = ca.substitute(of_state(constraint.rate), stage.y, stage.y0)
         own = felt(model.mechanism, constraint.label)
         rows.append(own * (rate + of_state(constraint.gap) / step) / SPEED)

@@ -40,6 +40,15 @@ def read_constraints(model: Model, reduction: Reduction) -> list[Constraint]:
 
     Raises ValueError where a pair is neither a gap with a force nor the friction of one.
     """
+    found = rigid_constraints(model, reduction)
+    covered = sum(4 if c.friction else 1 for c in found)
+    if covered != len(reduction.pairs):
+        raise ValueError("has pairs other than rigid contacts and stops")
+    return found
+
+
+def rigid_constraints(model: Model, reduction: Reduction) -> list[Constraint]:
+    """Those of them that are gaps with a force: not the contacts of a ground that gives way."""
     node = model.node
     by_owner: dict[str, dict[str, int]] = {}
     for i in reduction.pairs:
@@ -55,9 +64,6 @@ def read_constraints(model: Model, reduction: Reduction) -> list[Constraint]:
             gap = node.pair_a[i]
             rate = ca.jtimes(gap, node.q, node.v)
             found.append(Constraint(f"{owner}:{name}", gap, rate, force, friction))
-    covered = sum(4 if c.friction else 1 for c in found)
-    if covered != len(reduction.pairs):
-        raise ValueError("has pairs other than rigid contacts and stops")
     return found
 
 
