@@ -14,8 +14,8 @@ from kemba.identify.problem.problem import (
     Problem,
     Rows,
     Theta,
-    mean_slope,
 )
+from kemba.identify.problem.slopes import mean_slope
 
 ROW = 1e-3  # s
 EDGES = (0.0505, 0.1205, 0.3105)  # s, between two rows

@@ -10,8 +10,9 @@ from typing_extensions import Self
 
 from kemba.identify.logs.gate import BadData
 from kemba.identify.problem.candidates import sensor_candidates
-from kemba.identify.problem.problem import Problem, mean_slope
+from kemba.identify.problem.problem import Problem
 from kemba.identify.problem.sensor_faults import SensorFaults, is_fault, is_straight
+from kemba.identify.problem.slopes import mean_slope
 from kemba.identify.problem.structure import (
     FIGURES,
     FREE_THEN,

@@ -1,0 +1,39 @@
+"""Finite differences of residuals: how far they go, and their mean slope."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from kemba.identify.problem.types import Array
+from kemba.settings import BY_HAND, Settings, setting
+
+
+class StepSettings(Settings):
+    """Steps of finite differences."""
+
+    nuisance: float = setting(
+        0.5, "1", "step of a nominal figure, in prior sigmas", BY_HAND, decides=True
+    )
+    parameter: float = setting(
+        0.05,
+        "1",
+        "step of a parameter that is on, as a share of its size or value",
+        BY_HAND,
+        decides=True,
+    )
+    absurd: float = setting(
+        1e5, "1", "residual in sigmas at which nothing can be predicted", "convention: beyond data"
+    )
+
+
+def mean_slope(base: Array, there: Sequence[Array], steps: Sequence[float]) -> Array:
+    """Mean slope, shaped as the residuals `base`, of finite `steps` that lead to the residuals
+    `there`; zero where every step leads to where nothing can be predicted: a rod that is driven
+    through its cylinder's end leaves no volume to the air."""
+    absurd = StepSettings.current().absurd
+    known = [i for i, r in enumerate(there) if np.all(np.abs(r) < absurd)]
+    if not known:
+        return np.zeros_like(base)
+    return np.asarray(np.mean([(there[i] - base) / steps[i] for i in known], axis=0))
