@@ -14,7 +14,7 @@ from kemba.identify.evidence.spike_slab import NULL, Hypothesis
 from kemba.identify.problem.problem import Problem
 from kemba.identify.ranking import error
 from kemba.identify.rest import pattern_left
-from kemba.identify.settings import DiscoverSettings, VerdictSettings
+from kemba.identify.settings import VerdictSettings
 
 
 @dataclass(frozen=True)
@@ -50,8 +50,7 @@ def doubts_about(
         reasons.append(
             f"{enumerated(best)} fits best, but leaves an error of {after:.3g} times the noise"
         )
-    significant = belief.p_value <= DiscoverSettings.current().significant
-    if not best and significant and before > settings.whole:
+    if not best and belief.p_value <= settings.unexplained and before > settings.whole:
         reasons.append(
             f"the model as it is leaves an error of {before:.3g} times the noise, and no effect "
             "explains enough of it"
