@@ -108,8 +108,8 @@ MACHINES = {
     "their mode",
     "late before": "the same with delays and lags; before",
     "late old slopes": "the same since then; before intervals were taken from slopes that hold",
-    "late": "the same since hypotheses are scored at their mode and intervals are taken from slopes "
-    "that hold, machines of other seeds",
+    "late": "the same since hypotheses are scored at their mode, and intervals are taken from "
+    "slopes that hold, machines of other seeds",
 }
 
 
