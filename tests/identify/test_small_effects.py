@@ -7,6 +7,7 @@ from collections.abc import Collection
 import numpy as np
 import pytest
 
+from kemba.errors import KembaError
 from kemba.identify.discover import discover
 from kemba.identify.evidence.linear import linearise, time_blocks
 from kemba.identify.evidence.modes.settled import settled
@@ -111,3 +112,20 @@ def test_an_interval_is_taken_where_the_effects_act_together(seed: int) -> None:
     value = values(search, ("late",), "late", point)["T"]
     assert value.low <= truth["late.T"] <= value.high
     assert value.low <= value.value <= value.high
+
+
+def test_slopes_that_lead_nowhere_leave_the_search_s_own() -> None:
+    class Broken(Late):
+        broken = False
+
+        def residual(self, theta: Theta, runs: Collection[int] | None = None) -> Array:
+            if self.broken:
+                raise KembaError("model", "cannot be simulated there")
+            return super().residual(theta, runs)
+
+    problem = Broken({"late.T": 3e-3})
+    search = Search(problem)
+    search.start()
+    found = search.visit(("late",))
+    problem.broken = True
+    assert settled(search.base, found) is found

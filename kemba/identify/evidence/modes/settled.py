@@ -12,6 +12,7 @@ from copy import copy
 
 import numpy as np
 
+from kemba.errors import KembaError
 from kemba.identify.evidence.linear import is_shape
 from kemba.identify.evidence.null_model import Baseline
 from kemba.identify.evidence.point import LinearisationPoint
@@ -53,13 +54,14 @@ def settled(base: Baseline, point: LinearisationPoint) -> LinearisationPoint:
     rounds = SettledSettings.current().rounds
     starts = [here] if not (lags := _lags(base.problem, here)) else [here, {**lags, **here}]
     found = [_from(base, point, start, rounds) for start in starts]
-    return max(found, key=lambda one: one.log_evidence)
+    anew = [one for one in found if one is not point]
+    return max(anew, key=lambda one: one.log_evidence, default=point)
 
 
 def _lags(problem: Problem, theta: Theta) -> dict[str, float]:
     """Every time that cannot be negative and is absent at theta, as large as the spike allows."""
     spike = SpikeSlabSettings.current().spike
-    leads = {c.key: c.lead for c in problem.candidates.values() if not len(c.keys()) > 1}
+    leads = {c.key: c.lead for c in problem.candidates.values() if len(c.keys()) == 1}
     return {
         key: max(lead.off + spike * lead.size, lead.lower)
         for key, lead in leads.items()
@@ -70,16 +72,20 @@ def _lags(problem: Problem, theta: Theta) -> dict[str, float]:
 def _from(
     base: Baseline, point: LinearisationPoint, theta: Theta, rounds: int
 ) -> LinearisationPoint:
-    """The hypothesis with slopes at theta, then at the mode that they lead to, until it stays."""
+    """The hypothesis with slopes at theta, then at the mode that they lead to, until it stays; as
+    far as that, where slopes lead to what cannot be predicted."""
     problem, names, still = base.problem, point.linear.names, SettledSettings.current().still
     own = [names.index(problem.candidates[effect].key) for effect in point.hypothesis]
     for _ in range(rounds):
-        slopes = problem.jacobian(theta, names)
-        for i, name in enumerate(names):
-            if is_shape(problem, name):
-                slopes[:, i] *= theta[name]
-        before = point.score.z
-        point = base.judged(point.hypothesis, point.fit, names, slopes, theta)
+        try:
+            slopes = problem.jacobian(theta, names)
+            for i, name in enumerate(names):
+                if is_shape(problem, name):
+                    slopes[:, i] *= theta[name]
+            before = point.score.z
+            point = base.judged(point.hypothesis, point.fit, names, slopes, theta)
+        except KembaError:
+            break
         theta, sd = point.mode.theta, np.sqrt(np.diag(point.score.covariance))
         if np.all(np.abs(point.score.z - before)[own] < still * sd[own]):
             break
