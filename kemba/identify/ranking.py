@@ -43,7 +43,8 @@ def ranked(search: Search, belief: Belief, holdout: Problem | None) -> list[Rank
     )
     shares = share_of(probability, problem.candidates)
     order = sorted(shares, key=lambda e: (e not in best, -strength(search, e, best), -shares[e]))
-    found, reached = [], settled(search.base, search.points[best]) if best else None
+    reached = settled(search.base, search.points[best]) if best else None
+    found = []
     before = error(search, NULL, holdout)
     for effect in order[: RankingSettings.current().shown]:
         hypothesis = best if effect in best else _likeliest_with(search, effect)

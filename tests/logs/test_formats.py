@@ -241,7 +241,9 @@ def test_packed_zeros_end_the_reader_of_matlab_files_and_nothing_else(
     other = tmp_path / "mat_child.py"
     other.write_text(child.replace("MEMORY = 6_000_000_000", "MEMORY = 50_000_000"))
     monkeypatch.setattr(matlab, "__file__", str(tmp_path / "matlab.py"))
-    path = tmp_path / "zeros.mat"
+    few, path = tmp_path / "few.mat", tmp_path / "zeros.mat"
+    savemat(few, {"time": np.zeros(100)})
+    assert len(matlab.read_mat(few)[0]["time"]) == 100
     savemat(path, {"time": np.zeros(1_000_000)}, do_compression=True)
     assert path.stat().st_size < 20_000
     with pytest.raises(KembaError, match=r"is no MATLAB file that SciPy reads"):

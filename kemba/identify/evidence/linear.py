@@ -97,13 +97,19 @@ def linearise(
 ) -> tuple[Linear, Array, Array]:
     """The problem at theta, with J (n, k) and the residual (n,); `blocks` (n,) labels the rows."""
     names = names_of(problem, theta) if names is None else tuple(names)
-    r = problem.residual(theta)
-    jacobian = problem.jacobian(theta, names)
+    r, jacobian = problem.residual(theta), slopes_at(problem, theta, names)
     at, mean, width = priors(problem, theta, names)
+    return condense(names, at, mean, width, jacobian, r, blocks), jacobian, r
+
+
+def slopes_at(problem: Problem, theta: Theta, names: Iterable[str]) -> Array:
+    """J (n, k) at theta, along the logarithm of every shape."""
+    names = tuple(names)
+    jacobian = problem.jacobian(theta, names)
     for i, name in enumerate(names):
         if is_shape(problem, name):
             jacobian[:, i] *= theta[name]
-    return condense(names, at, mean, width, jacobian, r, blocks), jacobian, r
+    return jacobian
 
 
 def condense(
