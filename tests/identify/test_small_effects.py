@@ -95,6 +95,21 @@ def test_what_cannot_be_negative_is_absent_at_the_mode() -> None:
     assert "drag.F" not in mode.theta
 
 
+def test_a_step_to_where_nothing_can_be_predicted_is_not_taken() -> None:
+    class Explodes(Late):
+        """Unstable as soon as it is late, as a stiff law far from its figures."""
+
+        def residual(self, theta: Theta, runs: Collection[int] | None = None) -> Array:
+            grown = 1e200 if theta.get("late.T") else 1.0
+            return grown * super().residual(theta, runs)
+
+    late, explodes = Late(SMALL), Explodes({})
+    explodes.measured = late.measured
+    linear, jacobian, _ = linearise(late, {}, time_blocks(late))
+    mode = mode_of(explodes, NULL, [{}], linear, jacobian, time_blocks(late))
+    assert mode.theta == {}
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_an_interval_is_taken_where_the_effects_act_together(seed: int) -> None:
     """Edges that fall 3.6 ms late: the slope of `falls_late` is that of edges on time, four rows

@@ -57,17 +57,19 @@ def mode_of(
     the motion depends on the model, the residual is as straight as its slopes: the start is kept.
     """
     settings = SmallEffectsSettings.current()
-    tried = [_at(problem, hypothesis, theta, linear, jacobian, blocks) for theta in starts]
+    slopes = linear, jacobian, blocks
+    tried = [_at(problem, hypothesis, theta, problem.residual(theta), slopes) for theta in starts]
     best = at = min(tried, key=lambda mode: mode.cost)
     reached = _ranker(problem, at.linear).score(hypothesis).log_evidence
     for _ in range(0 if problem.moves else settings.rounds):
         theta = _possible(problem, hypothesis, at.linear)
         try:
-            at = _at(problem, hypothesis, theta, linear, jacobian, blocks)
+            r = problem.residual(theta)
         except KembaError:
             break  # a linear estimate may point to where nothing can be simulated
-        if not np.all(np.abs(at.residual) < settings.absurd):
+        if not np.all(np.abs(r) < settings.absurd):
             break
+        at = _at(problem, hypothesis, theta, r, slopes)
         best = at if at.cost < best.cost else best
         before, reached = reached, _ranker(problem, at.linear).score(hypothesis).log_evidence
         if abs(reached - before) < settings.change:
@@ -79,13 +81,13 @@ def _at(
     problem: Problem,
     hypothesis: Hypothesis,
     theta: Theta,
-    linear: Linear,
-    jacobian: Array,
-    blocks: Labels,
+    r: Array,
+    slopes: tuple[Linear, Array, Labels],
 ) -> Mode:
-    """The problem about theta. What linear evidence promises beyond it may not be there: points are
-    compared by their `cost`."""
-    r, (z, mean, _) = problem.residual(theta), priors(problem, theta, linear.names)
+    """The problem about theta, where the residual is r (n,). What linear evidence promises beyond
+    it may not be there: points are compared by their `cost`."""
+    linear, jacobian, blocks = slopes
+    z, mean, _ = priors(problem, theta, linear.names)
     about = moved(linear, z, jacobian, r, blocks)
     pull = (z - mean) / _ranker(problem, about).widths(hypothesis, 1.0)
     return Mode(dict(theta), about, r, 0.5 * float(r @ r + pull @ pull))
