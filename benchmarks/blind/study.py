@@ -20,6 +20,7 @@ from kemba.identify.logs.gate import BadData
 from kemba.identify.problem.problem import Problem
 
 Setting = dict[str, Any]
+TIME_LIMIT = 300.0  # s, that of the command
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "discovery.md"
 
 
@@ -65,7 +66,7 @@ def answered(make: Callable[[], Problem]) -> dict[str, Any]:
     started = time.process_time()
     try:
         problem = make()
-        answer = discover(problem).answer
+        answer = discover(problem, time_limit=TIME_LIMIT).answer
         seconds = time.process_time() - started
         simple = baselines.all_of(problem)
     except Exception as error:

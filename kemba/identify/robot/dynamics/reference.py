@@ -93,6 +93,7 @@ def read_schedules(
                 y[:n, i, -legs:],
                 physics.mechanism.stroke,
                 ref.q[:n, i, :3],
+                batch.sigma[i, -legs:],
             )
         )
     return tuple(found)

@@ -39,6 +39,12 @@ class ContactSettings(Settings):
     near_stop: float = setting(
         0.6e-3, "m", "distance from a stop at which a piston may rest on it", BY_HAND
     )
+    stop_noise: float = setting(
+        5.0,
+        "1",
+        "the same in sigmas of the reading, where that is more",
+        "derived: the extreme readings lie 2.5 sigmas before the stop, others 2.5 behind it",
+    )
     stop_search: float = setting(
         2.5e-3, "m", "distance from an end of the stroke at which the stop may be", BY_HAND
     )
@@ -91,17 +97,18 @@ class ContactSchedule:
 
 
 def read_schedule(
-    time: Array, feet: Array, pistons: Array, stroke: float, body: Array
+    time: Array, feet: Array, pistons: Array, stroke: float, body: Array, noise: Array
 ) -> ContactSchedule:
     """The schedule of one run at `time` (n,) [s].
 
     `feet` (n, legs, [x, z]) [m], `pistons` (n, legs) [m], `stroke` [m], `body` (n, 3): x, z [m] and
-    pitch [rad].
+    pitch [rad]; `noise` (legs,): sigma of the pistons' readings [m].
     """
     limits, dt = ContactSettings.current(), max(float(np.median(np.diff(time))), 1e-4)
     feet_rate, piston_rate = slope(feet, dt), slope(pistons, dt)
     speed = np.abs(slope(body, dt)).max(axis=1)
     blur, settle = max(1, round(limits.blur / dt)), max(1, round(limits.settled / dt))
+    near_stop = np.maximum(limits.near_stop, limits.stop_noise * noise)
     legs: list[tuple[Any, ...]] = []
     for i in range(feet.shape[1]):
         z, vx, vz = feet[:, i, 1], feet_rate[:, i, 0], feet_rate[:, i, 1]
@@ -113,10 +120,8 @@ def read_schedule(
         slips = inner & touches & ~struck & (np.abs(vx) > limits.sliding)
         slides = np.where(slips, np.sign(vx), 0.0)
         bottom, top = stop_levels(pistons[:, i], stroke)
-        at_low, at_high = (
-            pistons[:, i] < bottom + limits.near_stop,
-            pistons[:, i] > top - limits.near_stop,
-        )
+        at_low = _closed(pistons[:, i] < bottom + near_stop[i], settle)
+        at_high = _closed(pistons[:, i] > top - near_stop[i], settle)
         rests = _erode(at_low | at_high, 3 * blur) & (
             np.abs(piston_rate[:, i]) < limits.slow_piston
         )
@@ -208,6 +213,11 @@ def stop_levels(x: Array, stroke: float) -> tuple[float, float]:
 
 def _dilate(flags: Flags, steps: int) -> Flags:
     return np.asarray(binary_dilation(flags, np.ones(2 * steps + 1, bool)))
+
+
+def _closed(flags: Flags, steps: int) -> Flags:
+    """Without gaps of up to 2 `steps` nodes: a reading that leaves the stop so shortly is noise."""
+    return _erode(_dilate(flags, steps), steps)
 
 
 def _erode(flags: Flags, steps: int) -> Flags:

@@ -1,0 +1,33 @@
+"""A piston that rests on its stop is read as resting there, however noisy its sensor is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from kemba.identify.robot.motion.contact import read_schedule
+
+STROKE, DT = 0.06, 1e-3  # m, s
+
+
+def wobble(keep: float, seed: int, rows: int = 2000) -> np.ndarray:
+    """AR(1) noise (rows,) of unit sigma, `keep` of which is left after each row."""
+    white = np.random.default_rng(seed).standard_normal(rows)
+    return np.asarray(lfilter([np.sqrt(1.0 - keep**2)], [1.0, -keep], white))
+
+
+@pytest.mark.parametrize("sigma", [5e-5, 1e-4, 2e-4])  # m
+@pytest.mark.parametrize("drift", [0.0, 1.0])  # in sigmas
+def test_a_resting_piston_stays_at_its_stop(sigma: float, drift: float) -> None:
+    time = DT * np.arange(2000)
+    lifted = 0.02 * np.clip(np.sin(np.pi * (time - 0.5) / 0.3), 0.0, 1.0) * (time < 1.4)
+    x = np.where(time > 0.5, lifted, 0.0)
+    noise = sigma * (wobble(0.7, 1) + drift * wobble(np.exp(-DT), 2))
+    feet = np.zeros((2000, 1, 2))
+    read = (x + noise)[:, None]
+    schedule = read_schedule(time, feet, read, STROKE, np.zeros((2000, 3)), np.array([sigma]))
+    rests = x < 1e-6
+    assert np.mean(schedule.low[rests]) > 0.98
+    away = x > 3e-3
+    assert not schedule.low[away].any()
