@@ -42,7 +42,7 @@ class ContactSettings(Settings):
     stop_noise: float = setting(
         5.0,
         "1",
-        "the same in sigmas of the reading, where that is more",
+        "the same in sigmas of the reading, where that is more; at most half of `stop_search`",
         "derived: the extreme readings lie 2.5 sigmas before the stop, others 2.5 behind it",
     )
     stop_search: float = setting(
@@ -108,7 +108,7 @@ def read_schedule(
     feet_rate, piston_rate = slope(feet, dt), slope(pistons, dt)
     speed = np.abs(slope(body, dt)).max(axis=1)
     blur, settle = max(1, round(limits.blur / dt)), max(1, round(limits.settled / dt))
-    near_stop = np.maximum(limits.near_stop, limits.stop_noise * noise)
+    near_stop = np.clip(limits.stop_noise * noise, limits.near_stop, limits.stop_search / 2)
     legs: list[tuple[Any, ...]] = []
     for i in range(feet.shape[1]):
         z, vx, vz = feet[:, i, 1], feet_rate[:, i, 0], feet_rate[:, i, 1]
