@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from kemba.identify.doubt.drifts import drift_columns
 from kemba.identify.evidence.linear import Linear, condense
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis, Ranker
@@ -131,6 +132,7 @@ def extended(
 ) -> tuple[Ranker, dict[str, str]]:
     """A ranker with these formulas as further candidates, and name of a candidate -> formula.
 
+    Beside them every sensor may drift: a formula is what no drift explains.
     `jacobian` (n, k) and `r` (n,) as in `linear`; `formulas`: columns (n,).
     """
     settings = UnexplainedSettings.current()
@@ -144,13 +146,15 @@ def extended(
     candidates = {
         n: Candidate(n, Parameter("c", size=float(w))) for n, w in zip(names, widths, strict=True)
     }
-    zeros = np.zeros(len(widths))
+    drifts, sigmas = drift_columns(search.problem)
+    zeros = np.zeros(len(widths) + len(sigmas))
+    keys = [*(c.key for c in candidates.values()), *(f"drift{i}" for i in range(len(sigmas)))]
     joined = condense(
-        (*linear.names, *(c.key for c in candidates.values())),
+        (*linear.names, *keys),
         np.concatenate([linear.at, zeros]),
         np.concatenate([linear.mean, zeros]),
-        np.concatenate([linear.width, widths]),
-        np.concatenate([jacobian, columns], axis=1),
+        np.concatenate([linear.width, widths, sigmas]),
+        np.concatenate([jacobian, columns, drifts], axis=1),
         r,
         search.base.division.blocks,
     )

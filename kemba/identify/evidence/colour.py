@@ -7,6 +7,20 @@ import numpy as np
 from kemba.identify.evidence.linear import Linear, is_on, linearise, time_blocks
 from kemba.identify.evidence.modes.small_effects import mode_of
 from kemba.identify.problem.problem import Array, Labels, Problem, Theta
+from kemba.identify.problem.sensor_faults import is_fault
+from kemba.settings import Settings, setting
+
+
+class DriftSettings(Settings):
+    """When the sensors are taken to drift."""
+
+    strong: float = setting(
+        3.0,
+        "nats",
+        "evidence from which sensors drift",
+        "literature: Kass and Raftery 1995, twenty to one",
+        decides=True,
+    )
 
 
 def with_learnt_colour(
@@ -19,7 +33,32 @@ def with_learnt_colour(
     """
     if not problem.learns_colour:
         return problem
-    return learnt_colour(problem, theta, blocks, careful)[0]
+    found = learnt_colour(problem, theta, blocks, careful)[0]
+    return _with_drift(found, theta) if careful and any(is_fault(name) for name in theta) else found
+
+
+def _with_drift(problem: Problem, theta: Theta) -> Problem:
+    """The problem with drifting sensors, where the logs are clearly likelier so.
+
+    A wrong sensor explains some of a drift. The drift itself explains more of it, and it is asked
+    for only where a sensor at theta is wrong: the question takes seconds.
+    """
+    drifting = problem.drifting()
+    if drifting is None:
+        return problem
+    gain = log_likelihood(drifting, theta) - log_likelihood(problem, theta)
+    return drifting if gain > DriftSettings.current().strong else problem
+
+
+def log_likelihood(problem: Problem, theta: Theta) -> float:
+    """Log likelihood [nats] of the logs, up to a constant, all effects free within their priors."""
+    linear, _, _ = linearise(problem, theta, time_blocks(problem))
+    gram, slope, power = linear.total
+    best = best_fit(linear)
+    step, off = best - linear.at, (best - linear.mean) / linear.width
+    h = gram * np.outer(linear.width, linear.width) + np.eye(len(off))
+    squares = power + 2.0 * slope @ step + step @ gram @ step + off @ off
+    return problem.log_density() - 0.5 * float(squares + np.linalg.slogdet(h)[1])
 
 
 def learnt_colour(

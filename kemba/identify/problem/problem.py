@@ -177,6 +177,16 @@ class Problem(ABC):
         spikes are no physics and get less weight."""
         return self
 
+    def drifting(self) -> Self | None:
+        """This problem with sensors that also drift slowly; None where none do, or all do already.
+        Default: none."""
+        return None
+
+    def log_density(self) -> float:
+        """Log density [nats] of the rows where every residual is zero, up to a constant: the
+        sharper the noise, the larger. Default: zero, for noise that stays as it is."""
+        return 0.0
+
     def heard_as(self, other: Problem) -> Self:
         """This problem with the noise colour that `other`, logs of the same sensors, has learnt."""
         return self

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from kemba.identify.problem.sensor_noise import ChannelNoise, ColourSettings
 from kemba.identify.problem.types import Array
 from kemba.identify.robot.motion.batch import Batch
+from kemba.identify.robot.motion.colour import Noise
 from kemba.identify.robot.motion.learnt import learnt_noise
 from kemba.identify.robot.state import LinearisedState
 from kemba.settings import BY_HAND, Settings, setting
@@ -33,6 +36,21 @@ def stated_noise(batch: Batch) -> tuple[ChannelNoise, ...]:
     return tuple(
         ChannelNoise(white, ((rest, float(memory)),)) if np.isfinite(memory) else ChannelNoise()
         for memory in batch.memory
+    )
+
+
+def with_drifts(noise: Noise, batch: Batch) -> tuple[ChannelNoise, ...]:
+    """The noise of each channel with a drift of one stated sigma, where it has none and no
+    correlation time is stated."""
+    fastest, slowest = min(ColourSettings.current().drifts), max(ColourSettings.current().drifts)
+    channels = noise or [ChannelNoise()] * len(batch.memory)
+
+    def drifts(channel: ChannelNoise) -> bool:
+        return any(memory >= fastest for _, memory in channel.lags)
+
+    return tuple(
+        c if drifts(c) or np.isfinite(memory) else replace(c, lags=(*c.lags, (1.0, slowest)))
+        for c, memory in zip(channels, batch.memory, strict=True)
     )
 
 

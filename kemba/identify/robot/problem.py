@@ -48,7 +48,7 @@ from kemba.identify.robot.motion.batch import Batch
 from kemba.identify.robot.motion.colour import Noise
 from kemba.identify.robot.motion.expected import expected_power, predicted_error
 from kemba.identify.robot.motion.resampled import resample
-from kemba.identify.robot.noise import learnt_from, stated_noise
+from kemba.identify.robot.noise import learnt_from, stated_noise, with_drifts
 from kemba.identify.robot.operating_point import changes, robot_operating_point
 from kemba.identify.robot.state import LinearisedState, linearise_at
 from kemba.identify.robot.validate import contradictions
@@ -165,6 +165,17 @@ class RobotProblem(Problem):
         if residual is None:
             return self._with_noise(stated_noise(self.batch))
         return self._with_noise(learnt_from(self.state, residual, drifts=careful))
+
+    def drifting(self) -> Self | None:
+        """The same problem with a drift, as large as the stated noise, at every sensor that has
+        none; None where all have one."""
+        noise = with_drifts(self.state.noise, self.batch)
+        return None if noise == self.state.noise else self._with_noise(noise)
+
+    def log_density(self) -> float:
+        """That of the innovations' whitener."""
+        sharp = np.diagonal(self.state.gain.whitener, axis1=2, axis2=3)
+        return float(np.log(sharp[self.state.mask]).sum())
 
     def heard_as(self, other: Problem) -> Self:
         """This problem with the noise that another one, of the same sensors, has learnt."""

@@ -12,7 +12,7 @@ from twin import catalogue, measure
 
 from kemba.identify.compare.compare import compare
 from kemba.identify.discover import discover
-from kemba.identify.evidence.colour import with_learnt_colour
+from kemba.identify.evidence.colour import DriftSettings, log_likelihood, with_learnt_colour
 from kemba.identify.problem.sensor_noise import ChannelNoise
 from kemba.identify.robot.motion.colour import coloured, simulated
 from kemba.identify.robot.problem import RobotProblem, robot_problem
@@ -83,6 +83,16 @@ def test_a_hidden_effect_is_named(name: str, sensors: measure.Sensors) -> None:
     logs = noisy(catalogue.hidden(name), sensors=sensors)
     answer = discover(robot_problem(logs, load_model("planning"))).answer
     assert answer.verdict == "missing" and answer.added == (name,), answer.sentence
+
+
+@pytest.mark.parametrize("drift", [0.0, 2.0])
+def test_logs_tell_whether_their_sensors_drift(drift: float) -> None:
+    sensors = measure.Sensors(keep=0.7, drift=drift)
+    found = with_learnt_colour(robot_problem(noisy(sensors=sensors), load_model("planning")), {})
+    drifting = found.drifting()
+    assert drifting is not None and drifting.drifting() is None
+    gain = log_likelihood(drifting, {}) - log_likelihood(found, {})
+    assert (gain > DriftSettings.current().strong) == (drift > 0.0)
 
 
 def test_white_noise_stays_as_it_is_stated() -> None:

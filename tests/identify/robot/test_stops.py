@@ -1,4 +1,4 @@
-"""A piston that rests on its stop is read as resting there, however noisy its sensor is."""
+"""Stops and ground are read from noisy sensors: what rests there is read as resting there."""
 
 from __future__ import annotations
 
@@ -31,3 +31,25 @@ def test_a_resting_piston_stays_at_its_stop(sigma: float, drift: float) -> None:
     assert np.mean(schedule.low[rests]) > 0.98
     away = x > 3e-3
     assert not schedule.low[away].any()
+
+
+@pytest.mark.parametrize("rises", [0.0, 0.012])  # m
+def test_a_foot_whose_reading_drifts_may_still_touch(rises: float) -> None:
+    time = DT * np.arange(2000)
+    hop = 0.3 * np.clip(np.sin(np.pi * (time - 0.5) / 0.5), 0.0, 1.0) * (time < 1.0)
+    drift = rises * np.clip((time - 0.5) / 0.5, 0.0, 1.0)
+    feet = np.zeros((2000, 1, 2))
+    feet[:, 0, 1] = hop + drift + 1e-3 * wobble(0.7, 3)
+    no = np.full((2000, 1), 0.03)
+    schedule = read_schedule(time, feet, no, STROKE, np.zeros((2000, 3)), np.array([1e-4]))
+    assert schedule.foot[hop == 0.0].all()
+    assert not schedule.foot[hop > 0.03].any()
+
+
+def test_a_foot_that_never_comes_down_touches_nothing() -> None:
+    time = DT * np.arange(2000)
+    feet = np.zeros((2000, 1, 2))
+    feet[:, 0, 1] = 0.2 + 0.05 * np.sin(8.0 * time)
+    no = np.full((2000, 1), 0.03)
+    schedule = read_schedule(time, feet, no, STROKE, np.zeros((2000, 3)), np.array([1e-4]))
+    assert not schedule.foot.any()

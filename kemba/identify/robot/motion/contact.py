@@ -11,7 +11,9 @@ from scipy.ndimage import (
     binary_erosion,
     binary_opening,
     gaussian_filter1d,
+    maximum_filter1d,
     minimum_filter1d,
+    uniform_filter1d,
 )
 
 from kemba.settings import BY_HAND, Settings, setting
@@ -31,6 +33,9 @@ class ContactSettings(Settings):
     )
     level_search: float = setting(
         20e-3, "m", "height of a resting foot that may mean the ground", BY_HAND
+    )
+    level_time: float = setting(
+        0.5, "s", "time over which the ground's reading may wander", "convention: half a hop"
     )
     level_rate: float = setting(0.03, "m.s-1", "vertical speed of a resting foot", BY_HAND)
     level_rows: int = setting(20, "1", "rows at rest that give the ground's height", BY_HAND)
@@ -113,7 +118,8 @@ def read_schedule(
     for i in range(feet.shape[1]):
         z, vx, vz = feet[:, i, 1], feet_rate[:, i, 0], feet_rate[:, i, 1]
         level = ground_level(z, vz)
-        near, touches = z < level + limits.may_touch, z < level + limits.touches
+        near = z < np.maximum(level, wandering_level(z, level, dt)) + limits.may_touch
+        touches = z < level + limits.touches
         may = _dilate(near, blur)
         inner = _erode(z < level + limits.stands, settle) & (np.abs(vz) < limits.slow_foot)
         struck = _after(may, limits.strike / dt)
@@ -199,6 +205,19 @@ def ground_level(z: Array, rate: Array) -> float:
         return 0.0
     low = float(np.quantile(resting, 0.1))
     return float(np.median(resting[resting < low + limits.stands]))
+
+
+def wandering_level(z: Array, level: float, dt: float) -> Array:
+    """Height (n,) [m] of the lowest readings around each row, where that may still be the ground.
+
+    Sensors that drift lift a standing foot by a centimetre, and more than that from its usual
+    `level` [m].
+    """
+    limits = ContactSettings.current()
+    width = max(3, round(limits.level_time / dt))
+    calm = uniform_filter1d(z, max(3, round(limits.rate_window / dt)), mode="nearest")
+    low = maximum_filter1d(minimum_filter1d(calm, width), width)
+    return np.where(np.abs(low - level) < limits.level_search, low, level)
 
 
 def stop_levels(x: Array, stroke: float) -> tuple[float, float]:
