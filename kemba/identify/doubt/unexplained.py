@@ -113,9 +113,11 @@ def unfinished(search: Search, best: Hypothesis) -> bool:
 class Formula:
     """A force as a sum of simple terms.
 
-    `coefficients`: value and sigma of each term; `gain` [nats]: log evidence that they add.
+    `candidates`: names of the `terms` in their ranker; `coefficients`: value and sigma of each
+    term; `gain` [nats]: log evidence that they add.
     """
 
+    candidates: Hypothesis
     terms: tuple[str, ...]
     coefficients: tuple[tuple[float, float], ...]
     gain: float
@@ -182,26 +184,28 @@ def look(search: Search, best: Hypothesis) -> Formula | None:
     ranker, names = extended(
         search, null.mode.linear, search.base.jacobian, null.mode.residual, formulas
     )
-    alone, ahead = _grow(ranker, names, ()), by_chance(len(names))
+    chosen = _matters(search, _formula(ranker, names, _grow(ranker, names)))
+    alone = _formula(ranker, names, chosen)
     catalogue = search.points[best].log_evidence - null.log_evidence
-    if alone is not None and alone.gain > catalogue + ahead and _matters(search, alone):
+    if chosen and alone.gain > catalogue + by_chance(len(names)):
         return replace(alone, gain=alone.gain - catalogue)
     return None
 
 
-def _matters(search: Search, formula: Formula) -> bool:
-    """Whether a formula is more than the imperfection that every model has."""
+def _matters(search: Search, formula: Formula) -> Hypothesis:
+    """Those terms of a formula that are more than the imperfection that every model has: a small
+    one beside a large one would let the formula look better than the effect that is there."""
     problem, theta = search.problem, search.points[NULL].fit.theta
-    parts = zip(formula.terms, formula.coefficients, strict=True)
+    parts = zip(formula.candidates, formula.terms, formula.coefficients, strict=True)
     least = UnexplainedSettings.current().matters
-    return any(problem.weight(theta, term, c) > least for term, (c, _) in parts)
+    return tuple(n for n, term, (c, _) in parts if problem.weight(theta, term, c) > least)
 
 
-def _grow(ranker: Ranker, names: Mapping[str, str], start: Hypothesis) -> Formula | None:
+def _grow(ranker: Ranker, names: Mapping[str, str]) -> Hypothesis:
     """Terms chosen one after the other; each must add enough evidence."""
     least, most = by_chance(len(names)), UnexplainedSettings.current().terms
-    base = ranker.score(start).log_evidence
-    chosen, reached = start, base
+    chosen: Hypothesis = ()
+    reached = ranker.score(chosen).log_evidence
     for _ in range(most):
         table = {n: ranker.score((*chosen, n)).log_evidence for n in names if n not in chosen}
         if not table:
@@ -210,10 +214,13 @@ def _grow(ranker: Ranker, names: Mapping[str, str], start: Hypothesis) -> Formul
         if table[name] < reached + least:
             break
         chosen, reached = (*chosen, name), table[name]
-    terms = tuple(n for n in chosen if n not in start)
-    if not terms:
-        return None
+    return chosen
+
+
+def _formula(ranker: Ranker, names: Mapping[str, str], chosen: Hypothesis) -> Formula:
+    """The formula of these candidates, fitted."""
     score = ranker.score(chosen)
-    at = [ranker.lead[n] for n in terms]
+    at = [ranker.lead[n] for n in chosen]
     values = tuple((float(score.z[i]), float(np.sqrt(score.covariance[i, i]))) for i in at)
-    return Formula(tuple(names[n] for n in terms), values, reached - base)
+    gain = score.log_evidence - ranker.score(()).log_evidence
+    return Formula(chosen, tuple(names[n] for n in chosen), values, gain)

@@ -135,9 +135,10 @@ class Baseline:
         names: Names,
         slopes: Array,
         start: Mapping[str, float] | None = None,
+        also: Mapping[str, float] | None = None,
     ) -> LinearisationPoint:
         """The point of a refitted hypothesis with its slopes (n, k) along `names`; its mode is
-        sought from `start`, or from the fit."""
+        sought from `start`, or from the fit and from `also`."""
         r = self.problem.residual(fit.theta)
         linear, windowed = self.division.linear(fit.theta, names, slopes, r)
         if start is not None:
@@ -145,7 +146,7 @@ class Baseline:
         elif self.problem.moves:
             starts = [fit.theta]
         else:
-            starts = [fit.theta, self._beside(fit.theta)]
+            starts = [fit.theta, self._beside(fit.theta), *([also] if also else [])]
         mode = self._mode(hypothesis, starts, linear, slopes)
         score = self.ranker(mode.linear).score(hypothesis)
         return LinearisationPoint(hypothesis, fit, linear, windowed, mode, score)
@@ -156,20 +157,13 @@ class Baseline:
         found = self.point.mode.theta.items()
         return {k: v for k, v in found if k.rsplit(".", 1)[0] not in on} | dict(theta)
 
-    def also_from(self, point: LinearisationPoint) -> bool:
-        """Whether the null fits better from the mode of another hypothesis, as where edges lie on
-        the other side of readings; it is judged there from now on."""
-        leads = [self.problem.candidates[effect].lead for effect in point.hypothesis]
-        if self.problem.moves or any(lead.unit != "s" for lead in leads):
-            return False
-        mode = self._mode(NULL, [point.mode.theta], self.point.linear, self.jacobian)
-        if mode.cost >= self.point.mode.cost:
-            return False
+    def begin_at(self, theta: Mapping[str, float]) -> None:
+        """Judge the null from theta on, and every single effect of the table beside it."""
+        mode = self._mode(NULL, [theta, self.point.mode.theta], self.point.linear, self.jacobian)
         score = self.ranker(mode.linear).score(NULL)
         self.point = replace(self.point, mode=mode, score=score)
         singles = self.ranker(mode.linear).table((1,))
         self.table |= {h: max(e, self.table[h]) for h, e in singles.items()}
-        return True
 
     def _mode(
         self,

@@ -10,6 +10,7 @@ import numpy as np
 
 from kemba.identify.evidence.colour import with_learnt_colour
 from kemba.identify.evidence.linear import estimate, names_of
+from kemba.identify.evidence.modes.shared import better_beginnings
 from kemba.identify.evidence.null_model import Baseline
 from kemba.identify.evidence.point import LinearisationPoint
 from kemba.identify.evidence.refit import Fit, refit
@@ -36,6 +37,7 @@ class Search:
     begin: Mapping[str, float] = field(default_factory=dict)
     base: Baseline = field(init=False)
     _thetas: dict[Hypothesis, dict[str, float]] = field(default_factory=dict)
+    _beginnings: dict[Hypothesis, dict[str, float]] = field(default_factory=dict)
     _stale: bool = False
 
     @property
@@ -143,7 +145,18 @@ class Search:
 
     def _round(self, given: Hypothesis, leaders: int, least: float = -np.inf) -> Hypothesis:
         """Refit `given` with one more effect, the likeliest ones whose linear evidence is `least`
-        or more; the best of all points so far."""
+        or more; the best of all points so far. Where a refit shows a better mode for all, once
+        more."""
+        self._refit_leaders(given, leaders, least)
+        if not self.problem.moves and self._share_modes():
+            self._refit_leaders(given, leaders, least)
+            self._share_modes()
+        if given == NULL and self.points[NULL].fitted_error > SearchSettings.current().structural:
+            for structure in sorted(self.problem.structures):
+                self.visit((structure,))
+        return self.best()
+
+    def _refit_leaders(self, given: Hypothesis, leaders: int, least: float) -> None:
         settings = SearchSettings.current()
         table = self._extensions(given)
         order = sorted(table, key=lambda h: -table[h])[:leaders]
@@ -160,10 +173,18 @@ class Search:
             if self.ended and (given or number > 1):
                 break
             self.visit(hypothesis, number, len(order))
-        if given == NULL and self.points[NULL].fitted_error > settings.structural:
-            for structure in sorted(self.problem.structures):
-                self.visit((structure,))
-        return self.best()
+
+    def _share_modes(self) -> bool:
+        """Judge every hypothesis from the best mode of all where it fits better there; whether any
+        did."""
+        found = better_beginnings(self.problem, self.points)
+        self._beginnings |= found
+        if NULL in found:
+            self.base.begin_at(found[NULL])
+            self.points[NULL] = self.base.point
+        for hypothesis in filter(None, found):
+            self.points[hypothesis] = self._point(hypothesis, self.points[hypothesis].fit)
+        return bool(found)
 
     def _singles(self) -> dict[Hypothesis, float]:
         """Linear evidence of every single effect."""
@@ -193,8 +214,6 @@ class Search:
             self._learn_secant(hypothesis, fit)
             self.points[hypothesis] = self._point(hypothesis, fit)
             self._thetas[hypothesis] = fit.theta
-            if len(hypothesis) == 1 and self.base.also_from(self.points[hypothesis]):
-                self._judge_again()
         return self.points[hypothesis]
 
     def _learn_secant(self, hypothesis: Hypothesis, fit: Fit) -> None:
@@ -236,7 +255,8 @@ class Search:
         columns = [
             fit.columns[n] if n in fit.columns else base.jacobian[:, known.index(n)] for n in names
         ]
-        return base.judged(hypothesis, fit, names, np.stack(columns, axis=1))
+        also = self._beginnings.get(hypothesis)
+        return base.judged(hypothesis, fit, names, np.stack(columns, axis=1), also=also)
 
     def _guess(self, hypothesis: Hypothesis) -> dict[str, float]:
         """Where a refit starts: at its last result, or at the linear estimate from the largest part

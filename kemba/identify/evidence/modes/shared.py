@@ -1,0 +1,75 @@
+"""What one hypothesis found, every other begins from as well.
+
+An edge of a valve falls between two readings, and the residual has a step where it crosses one. So
+a hypothesis may end in a poor minimum and lose more by that than its effects gain. The best mode
+that any hypothesis found shows where all others fit better, too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from kemba.errors import KembaError
+from kemba.identify.evidence.linear import priors
+from kemba.identify.evidence.point import LinearisationPoint
+from kemba.identify.evidence.spike_slab import Hypothesis, Ranker
+from kemba.identify.problem.problem import Problem, Theta
+from kemba.settings import Settings, setting
+
+Points = Mapping[Hypothesis, LinearisationPoint]
+
+
+class SharedSettings(Settings):
+    """When a hypothesis is judged again."""
+
+    least: float = setting(
+        3.0,
+        "nats",
+        "cost that a beginning must save",
+        "literature: Kass and Raftery 1995, less is no strong evidence",
+        decides=True,
+    )
+
+
+def better_beginnings(problem: Problem, points: Points) -> dict[Hypothesis, dict[str, float]]:
+    """Hypothesis -> theta from which its mode is to be sought again, where it costs less: the best
+    mode of all, as it is, or with the hypothesis's own effects beside or instead of its effects."""
+    best = min(points.values(), key=lambda point: point.mode.cost)
+    found = {}
+    for hypothesis, point in points.items():
+        if point is best:
+            continue
+        own = [_with_own(problem, point, best, keep) for keep in (True, False)]
+        starts = [best.mode.theta, *own]
+        costs = [_cost(problem, point, start) for start in starts]
+        if min(costs) < point.mode.cost - SharedSettings.current().least:
+            found[hypothesis] = dict(starts[int(np.argmin(costs))])
+    return found
+
+
+def _with_own(
+    problem: Problem, point: LinearisationPoint, other: LinearisationPoint, keep: bool
+) -> dict[str, float]:
+    """Theta of the other's mode with the effects of `point`; `keep`: with those of the other."""
+    own = _keys(problem, point.hypothesis)
+    dropped = own if keep else own | _keys(problem, other.hypothesis)
+    theta = {k: v for k, v in other.mode.theta.items() if k not in dropped}
+    return theta | {k: v for k, v in point.mode.theta.items() if k in own}
+
+
+def _keys(problem: Problem, hypothesis: Hypothesis) -> set[str]:
+    return {key for key in problem.parameters() if key.rpartition(".")[0] in hypothesis}
+
+
+def _cost(problem: Problem, point: LinearisationPoint, theta: Theta) -> float:
+    """Half a sum of squares of residual and priors at theta, as `Mode.cost`."""
+    ranker = Ranker(point.linear, problem.candidates, problem.nuisance)
+    try:
+        r = problem.residual(theta)
+    except KembaError:
+        return np.inf  # nothing can be simulated there
+    z, mean, _ = priors(problem, theta, point.linear.names)
+    pull = (z - mean) / ranker.widths(point.hypothesis, 1.0)
+    return 0.5 * float(r @ r + pull @ pull)
