@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from kemba.identify.compare.compare import Comparison, compare
-from kemba.identify.evidence.colour import with_learnt_colour
+from kemba.identify.evidence.noise.colour import with_learnt_colour
 from kemba.identify.evidence.windows import free_starts
 from kemba.identify.logs.reading import read_logs
 from kemba.identify.problem.problem import Problem

@@ -15,8 +15,8 @@ from kemba.identify.doubt.run_consistency import drifting
 from kemba.identify.doubt.unexplained import Formula, look
 from kemba.identify.evidence.bootstrap import NullTest, bootstrap, smallest_detectable
 from kemba.identify.evidence.figures import Rebuilt, ahead, settled
-from kemba.identify.evidence.left_out_noise import LeftOutNoiseSettings, left_out_noise
 from kemba.identify.evidence.linear import time_blocks
+from kemba.identify.evidence.noise.left_out_noise import LeftOutNoiseSettings, left_out_noise
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.search_settings import SearchSettings
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis

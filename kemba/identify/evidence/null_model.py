@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from kemba.identify.evidence.colour import best_fit, learnt_colour
 from kemba.identify.evidence.linear import (
     Linear,
     condense,
@@ -18,6 +17,7 @@ from kemba.identify.evidence.linear import (
     within,
 )
 from kemba.identify.evidence.modes.small_effects import Mode, mode_of
+from kemba.identify.evidence.noise.colour import best_fit, learnt_colour
 from kemba.identify.evidence.point import Division, LinearisationPoint
 from kemba.identify.evidence.refit import Fit, Frozen, refit
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis, Ranker

@@ -30,12 +30,7 @@ from kemba.identify.problem.types import (
     Rows,
     Theta,
 )
-from kemba.identify.robot.candidates import (
-    extended,
-    ground_of,
-    in_the_air,
-    robot_candidates,
-)
+from kemba.identify.robot.candidates import extended, ground_of, in_the_air, robot_candidates
 from kemba.identify.robot.dynamics.physics import Physics
 from kemba.identify.robot.dynamics.reference import first_reference
 from kemba.identify.robot.dynamics.settings import ForceDensity
@@ -110,10 +105,8 @@ class RobotProblem(Problem):
         noise = stated_noise(batch)
         reference = first_reference(physics, batch, physics.nominal)
         self.standing = standing_lengths(physics, batch, reference, self.candidates)
-        self.lengths = dict(self.standing.lengths)
-        self.state = linearise_at(
-            physics, batch, sensors, self.lengths, ground, self.unknown, noise
-        )
+        self.lengths = lengths = dict(self.standing.lengths)
+        self.state = linearise_at(physics, batch, sensors, lengths, ground, self.unknown, noise)
         self.nuisance = {**physics.nuisance, **sensors.nuisance, **physics.links}
 
     @property
@@ -174,8 +167,7 @@ class RobotProblem(Problem):
 
     def log_density(self) -> float:
         """That of the innovations' whitener."""
-        sharp = np.diagonal(self.state.gain.whitener, axis1=2, axis2=3)
-        return float(np.log(sharp[self.state.mask]).sum())
+        return float(np.log(np.diagonal(self.state.gain.whitener, 0, 2, 3)[self.state.mask]).sum())
 
     def heard_as(self, other: Problem) -> Self:
         """This problem with the noise that another one, of the same sensors, has learnt."""
