@@ -60,12 +60,14 @@ RIGS = (  # chambers of the rig and of the model, and whether their pressures ar
     ("first_order", False),
 )
 MODELS = {"first_order": "planning", "orifice": str(Path(__file__).parent / "orifice_rig.yaml")}
+NULLS = 70  # further machines in which nothing is missing, at the end: a hundred in all
 
 
 def cases() -> list[dict[str, Any]]:
-    """Settings of all cases; each kind is spread evenly over the whole order."""
+    """Settings of all cases; each kind is spread evenly over the order, before further nulls."""
     rng = np.random.default_rng(SEED)
     turns = study.spread(REPEATS, rng)
+    turns += [(None, turn) for turn in range(NULLS)]
     found = [_setting(effect, turn, SEED + i, rng) for i, (effect, turn) in enumerate(turns)]
     return [{**setting, "colour": study.colour(i)} for i, setting in enumerate(found)]
 

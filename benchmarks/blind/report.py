@@ -119,11 +119,17 @@ def table(records: Sequence[Record]) -> str:
         for name in ("single", "sensor", "shape", "pair", "many", "outside", "null")
     }
     known = [*groups["single"], *groups["sensor"]]
+    seen = [r for r in known if detectable(r, r["truth"][0])]
     errors, covered = parameters([*known, *groups["shape"], *groups["pair"], *groups["many"]])
     rows = [
         _row("right effect first", known, lambda r: among_first(r, 1)),
         _row("right effect first, physics", groups["single"], lambda r: among_first(r, 1)),
         _row("right effect first, sensors", groups["sensor"], lambda r: among_first(r, 1)),
+        _row(
+            "right effect first, where larger than the smallest size that the answer says it sees",
+            seen,
+            lambda r: among_first(r, 1),
+        ),
         _row("right effect first or second", known, lambda r: among_first(r, 2)),
         _row("exactly the right effect named", known, right),
         _row("in the named class, physics and sensors", known, in_class),

@@ -51,12 +51,14 @@ PAIRS = [
 REPEATS = ((EFFECTS, 4), (SENSORS, 1), (UNKNOWN, 2), (PAIRS, 2), ([None], 60))
 SEED = 3000  # cases of other seeds were looked at while the method was built
 SIZES, NOISES = (1.0, 0.7, 1.5), (1.0, 2.0, 0.5)
+NULLS = 40  # further machines in which nothing is missing, at the end: a hundred in all
 
 
 def cases() -> list[dict[str, Any]]:
-    """Settings of all cases; each kind is spread evenly over the whole order."""
+    """Settings of all cases; each kind is spread evenly over the order, before further nulls."""
     rng = np.random.default_rng(SEED)
     turns = study.spread(REPEATS, rng)
+    turns += [(None, turn) for turn in range(NULLS)]
     found = [_setting(effect, turn, SEED + i, rng) for i, (effect, turn) in enumerate(turns)]
     return [{**setting, "colour": study.colour(i)} for i, setting in enumerate(found)]
 

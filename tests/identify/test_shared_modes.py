@@ -30,15 +30,16 @@ def test_a_hypothesis_begins_where_another_one_fits_better(bench_log: BenchLog) 
     search = Search(bench_problem([bench_log(hidden, duration=1.2)], load_model(rig=True)))
     search.start()
     search.visit(FRICTION)
-    points = dict(search.points)
-    assert FRICTION not in better_beginnings(search.problem, points)
+    points, null = dict(search.points), search.points[NULL]
+    assert not search.share_modes()
+    assert FRICTION not in better_beginnings(search.problem, points, null)
 
     mode = points[FRICTION].mode
     poor = {**mode.theta, "valve_delay.dt": 0.01}
     points[FRICTION] = replace(points[FRICTION], mode=replace(mode, theta=poor, cost=1e6))
-    begin = better_beginnings(search.problem, points)[FRICTION]
+    begin = better_beginnings(search.problem, points, null)[FRICTION]
     assert begin["seal_friction.F_c"] > 5.0
-    assert begin["valve_delay.dt"] == points[NULL].mode.theta["valve_delay.dt"]
+    assert begin["valve_delay.dt"] == null.mode.theta["valve_delay.dt"]
 
 
 # cases of the blind study whose search ended in a poor minimum

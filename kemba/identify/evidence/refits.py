@@ -10,6 +10,7 @@ import numpy as np
 
 from kemba.identify.evidence.linear import estimate, names_of
 from kemba.identify.evidence.modes.shared import better_beginnings
+from kemba.identify.evidence.modes.small_effects import Mode
 from kemba.identify.evidence.null_model import Baseline
 from kemba.identify.evidence.point import LinearisationPoint
 from kemba.identify.evidence.refit import Fit, refit
@@ -37,6 +38,7 @@ class Refits:
     base: Baseline = field(init=False)
     _thetas: dict[Hypothesis, dict[str, float]] = field(default_factory=dict)
     _beginnings: dict[Hypothesis, dict[str, float]] = field(default_factory=dict)
+    _compared: dict[Hypothesis, Mode] = field(default_factory=dict)
     _stale: bool = False
 
     @property
@@ -119,7 +121,11 @@ class Refits:
     def share_modes(self) -> bool:
         """Judge every hypothesis from the best mode of all where it fits better there; whether any
         did."""
-        found = better_beginnings(self.problem, self.points)
+        best = min(self.points.values(), key=lambda point: point.mode.cost)
+        others = {h: p for h, p in self.points.items() if p is not best}
+        new = {h: p for h, p in others.items() if self._compared.get(h) is not best.mode}
+        found = better_beginnings(self.problem, new, best)
+        self._compared |= dict.fromkeys(new, best.mode)
         self._beginnings |= found
         if NULL in found:
             self.base.begin_at(found[NULL])

@@ -33,14 +33,13 @@ class SharedSettings(Settings):
     )
 
 
-def better_beginnings(problem: Problem, points: Points) -> dict[Hypothesis, dict[str, float]]:
-    """Hypothesis -> theta from which its mode is to be sought again, where it costs less: the best
-    mode of all, as it is, or with the hypothesis's own effects beside or instead of its effects."""
-    best = min(points.values(), key=lambda point: point.mode.cost)
+def better_beginnings(
+    problem: Problem, points: Points, best: LinearisationPoint
+) -> dict[Hypothesis, dict[str, float]]:
+    """Hypothesis -> theta from which its mode is to be sought again, where it costs less: the mode
+    of `best`, as it is, or with the hypothesis's own effects beside or instead of its effects."""
     found = {}
     for hypothesis, point in points.items():
-        if point is best:
-            continue
         own = [_with_own(problem, point, best, keep) for keep in (True, False)]
         starts = [best.mode.theta, *own]
         costs = [_cost(problem, point, start) for start in starts]
