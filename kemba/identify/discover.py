@@ -252,8 +252,9 @@ def _answer(
     before = error(search, NULL, holdout)
     after = error(search, best, holdout) if best else before
     verdict = verdict_on(best, formula, doubts)
-    named = tuple(r.effect for r in ranking if r.effect in best)
-    sure = tuple(r.effect for r in ranking if r.effect in named and is_sure(r))
+    rows = {r.effect: r for r in ranking}
+    named = tuple(effect for effect in rows if effect in best)
+    sure = tuple(r for r in named if not doubts.idle and is_sure(rows[r]))
     added = {"missing": named, "partly": sure}.get(verdict, ())
     ranker = search.base.ranker(search.points[NULL].linear)
     sizes = smallest_detectable(ranker, test.threshold)

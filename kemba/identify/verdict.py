@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from kemba.errors import enumerated
-from kemba.identify.answer import ENDED, Ranked, Verdict, excess
+from kemba.identify.answer import ENDED, IDLE, Ranked, Verdict, excess
+from kemba.identify.doubt.cross_validation import left_out_powers
 from kemba.identify.doubt.parsimony import Belief
 from kemba.identify.doubt.run_consistency import Drift
 from kemba.identify.doubt.unexplained import Formula, unfinished
+from kemba.identify.evidence.bootstrap import BootstrapSettings
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
 from kemba.identify.problem.problem import Problem
@@ -19,10 +21,12 @@ from kemba.identify.settings import VerdictSettings
 
 @dataclass(frozen=True)
 class Doubts:
-    """Why an answer is not complete. `part`: it explains enough of the error to be a part."""
+    """Why an answer is not complete. `part`: it explains enough of the error to be a part; `idle`:
+    left-out data are predicted as well without it."""
 
     reasons: tuple[str, ...] = ()
     part: bool = False
+    idle: bool = False
 
 
 def doubts_about(
@@ -59,7 +63,16 @@ def doubts_about(
         others = ", ".join(" + ".join(h) for h in belief.rivals)
         reasons.append(f"{others} would predict left-out data as well as {' + '.join(best)}")
     part = bool(best) and excess(after) <= (1.0 - least) * excess(before)
+    if best and not reasons and is_idle(search, best):
+        return Doubts((IDLE,), part=True, idle=True)
     return Doubts(tuple(reasons), part)
+
+
+def is_idle(search: Search, best: Hypothesis) -> bool:
+    """Whether left-out data, summed over aggregation windows, gain less by an answer than any
+    evidence is. Its p-value counts rows, whose noise may be slower than it is taken to be."""
+    gain = left_out_powers(search, NULL).sum() - left_out_powers(search, best).sum()
+    return bool(0.5 * gain < BootstrapSettings.current().least)
 
 
 def verdict_on(best: Hypothesis, formula: Formula | None, doubts: Doubts) -> Verdict:
