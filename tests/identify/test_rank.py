@@ -153,7 +153,7 @@ def test_a_part_of_an_answer_says_what_it_explains_and_what_is_left() -> None:
     assert answer.verdict == "partly" and answer.added == ("kick",) == answer.found
     assert answer.excess_before == pytest.approx(np.sqrt(answer.error_before**2 - 1.0))
     share = 1.0 - answer.excess_after / answer.excess_before
-    assert f"explain {100 * share:.0f} % of the error beyond the noise" in answer.sentence
+    assert f"explains {100 * share:.0f} % of the error beyond the noise" in answer.sentence
     assert answer.next and "Next: " in answer.sentence
     written = answer.json()
     assert written["excess_after"] == answer.excess_after and "100 %" in written["probabilities"]
