@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 from twin.cases import bench_case
@@ -42,14 +41,12 @@ def test_a_hypothesis_begins_where_another_one_fits_better(bench_log: BenchLog) 
     assert begin["valve_delay.dt"] == null.mode.theta["valve_delay.dt"]
 
 
-# cases of the blind study whose search ended in a poor minimum
-DELAY: dict[str, Any] = {"seed": 5148, "size": 1.5, "chambers": "first_order", "floor": 0.0}
-
-
 @pytest.mark.nightly
 def test_a_late_force_sensor_is_not_taken_for_inertia(tmp_path: Path) -> None:
-    sensors, usual = Sensors(), {"figures_off": 0.01, "runs": 4, "duration": 4.0}
-    paths, truth = bench_case(tmp_path, "sensor_delay:piston/F", sensors=sensors, **usual, **DELAY)
+    """A case of the blind study whose search ended in a poor minimum."""
+    usual = {"figures_off": 0.01, "floor": 0.0, "runs": 4, "duration": 4.0, "sensors": Sensors()}
+    case = {"seed": 5148, "size": 1.5, "chambers": "first_order", **usual}
+    paths, truth = bench_case(tmp_path, "sensor_delay:piston/F", **case)
     answer = discover(bench_problem(list(read_logs(paths)), load_model(rig=True))).answer
     assert answer.added == ("sensor_delay:piston/F",), answer.sentence
     (row,) = [r for r in answer.ranking if r.effect == "sensor_delay:piston/F"]

@@ -12,9 +12,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from kemba.errors import KembaError
-from kemba.identify.evidence.linear import priors
+from kemba.identify.evidence.modes.small_effects import cost_at
 from kemba.identify.evidence.point import LinearisationPoint
-from kemba.identify.evidence.spike_slab import Hypothesis, Ranker
+from kemba.identify.evidence.spike_slab import Hypothesis
 from kemba.identify.problem.problem import Problem, Theta
 from kemba.settings import Settings, setting
 
@@ -63,12 +63,9 @@ def _keys(problem: Problem, hypothesis: Hypothesis) -> set[str]:
 
 
 def _cost(problem: Problem, point: LinearisationPoint, theta: Theta) -> float:
-    """Half a sum of squares of residual and priors at theta, as `Mode.cost`."""
-    ranker = Ranker(point.linear, problem.candidates, problem.nuisance)
+    """Cost of theta under the hypothesis of `point`, as `Mode.cost`."""
     try:
         r = problem.residual(theta)
     except KembaError:
         return np.inf  # nothing can be simulated there
-    z, mean, _ = priors(problem, theta, point.linear.names)
-    pull = (z - mean) / ranker.widths(point.hypothesis, 1.0)
-    return 0.5 * float(r @ r + pull @ pull)
+    return cost_at(problem, point.hypothesis, theta, r, point.linear)

@@ -87,10 +87,17 @@ def _at(
     """The problem about theta, where the residual is r (n,). What linear evidence promises beyond
     it may not be there: points are compared by their `cost`."""
     linear, jacobian, blocks = slopes
+    about = moved(linear, priors(problem, theta, linear.names)[0], jacobian, r, blocks)
+    return Mode(dict(theta), about, r, cost_at(problem, hypothesis, theta, r, linear))
+
+
+def cost_at(
+    problem: Problem, hypothesis: Hypothesis, theta: Theta, r: Array, linear: Linear
+) -> float:
+    """Half a sum of squares of the residual r (n,) at theta and of the hypothesis's priors."""
     z, mean, _ = priors(problem, theta, linear.names)
-    about = moved(linear, z, jacobian, r, blocks)
-    pull = (z - mean) / _ranker(problem, about).widths(hypothesis, 1.0)
-    return Mode(dict(theta), about, r, 0.5 * float(r @ r + pull @ pull))
+    pull = (z - mean) / _ranker(problem, linear).widths(hypothesis, 1.0)
+    return 0.5 * float(r @ r + pull @ pull)
 
 
 def _ranker(problem: Problem, linear: Linear, absent: Collection[str] = ()) -> Ranker:
