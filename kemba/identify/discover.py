@@ -254,7 +254,7 @@ def _answer(
     verdict = verdict_on(best, formula, doubts)
     rows = {r.effect: r for r in ranking}
     named = tuple(effect for effect in rows if effect in best)
-    sure = tuple(r for r in named if not doubts.idle and is_sure(rows[r]))
+    sure = tuple(r for r in named if r not in doubts.unsure and is_sure(rows[r]))
     added = {"missing": named, "partly": sure}.get(verdict, ())
     ranker = search.base.ranker(search.points[NULL].linear)
     sizes = smallest_detectable(ranker, test.threshold)

@@ -14,6 +14,7 @@ from kemba.identify.evidence.bootstrap import BootstrapSettings
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
 from kemba.identify.problem.problem import Problem
+from kemba.identify.problem.sensor_faults import is_fault
 from kemba.identify.ranking import error
 from kemba.identify.rest import pattern_left
 from kemba.identify.settings import VerdictSettings
@@ -21,12 +22,12 @@ from kemba.identify.settings import VerdictSettings
 
 @dataclass(frozen=True)
 class Doubts:
-    """Why an answer is not complete. `part`: it explains enough of the error to be a part; `idle`:
-    left-out data are predicted as well without it."""
+    """Why an answer is not complete. `part`: it explains enough of the error to be a part;
+    `unsure`: effects of it that are likely at best, whatever their probability."""
 
     reasons: tuple[str, ...] = ()
     part: bool = False
-    idle: bool = False
+    unsure: Hypothesis = ()
 
 
 def doubts_about(
@@ -63,9 +64,13 @@ def doubts_about(
         others = ", ".join(" + ".join(h) for h in belief.rivals)
         reasons.append(f"{others} would predict left-out data as well as {' + '.join(best)}")
     part = bool(best) and excess(after) <= (1.0 - least) * excess(before)
+    # whether sensors drift instead of being wrong is asked last, and was not
+    faults = tuple(effect for effect in best if is_fault(effect)) if ended else ()
     if best and not reasons and is_idle(search, best):
-        return Doubts((IDLE,), part=True, idle=True)
-    return Doubts(tuple(reasons), part)
+        return Doubts((IDLE,), part=True, unsure=best)
+    if faults and not reasons:
+        return Doubts((ENDED,), part=True, unsure=faults)
+    return Doubts(tuple(reasons), part, faults)
 
 
 def is_idle(search: Search, best: Hypothesis) -> bool:

@@ -1,4 +1,5 @@
-"""An effect that left-out data do not need is likely at best, and no model is written with it."""
+"""Effects that are likely at best: what left-out data do not need, and a wrong sensor where the
+time limit ended the search."""
 
 from __future__ import annotations
 
@@ -7,10 +8,11 @@ from collections.abc import Callable
 import pytest
 
 from kemba.effects import BY_KIND
-from kemba.identify.answer import IDLE, Answer, Ranked, Value, phrase
+from kemba.identify.answer import ENDED, IDLE, Answer, Ranked, Value, phrase
 from kemba.identify.bench.problem import bench_problem
+from kemba.identify.doubt.parsimony import Belief
 from kemba.identify.evidence.search import Search
-from kemba.identify.verdict import Doubts, is_idle, verdict_on
+from kemba.identify.verdict import Doubts, doubts_about, is_idle, verdict_on
 from kemba.model.spec import load_model
 from kemba.trajectory import Trajectory
 
@@ -28,8 +30,22 @@ def test_an_effect_that_is_not_there_gains_nothing_on_left_out_data(
     assert is_idle(search, FRICTION) == (force == 0.0)
 
 
+@pytest.mark.parametrize("ended", [False, True])
+def test_a_search_that_the_limit_ended_is_not_sure_of_a_sensor(
+    bench_log: Callable[..., Trajectory], ended: bool
+) -> None:
+    log, scale = bench_log(duration=1.2), ("sensor_scale:piston/F",)
+    log = log.with_columns({"piston/F [N]": 1.1 * log["piston/F"]})
+    search = Search(bench_problem([log], load_model(rig=True)))
+    search.start()
+    search.visit(scale)
+    doubts = doubts_about(search, Belief(scale), None, None, ended)
+    said = (verdict_on(scale, None, doubts), doubts.reasons, doubts.unsure)
+    assert said == (("partly", (ENDED,), scale) if ended else ("missing", (), ()))
+
+
 def test_such_an_effect_is_said_to_be_likely_only() -> None:
-    assert verdict_on(FRICTION, None, Doubts((IDLE,), part=True, idle=True)) == "partly"
+    assert verdict_on(FRICTION, None, Doubts((IDLE,), part=True, unsure=FRICTION)) == "partly"
     friction = Ranked("seal_friction", 0.99, {"F_c": Value(1.0, 0.5, 1.5, "N")})
     answer = Answer("partly", ranking=(friction,), found=FRICTION, remarks=[IDLE])
     answer.error_before = answer.error_after = 1.09

@@ -100,10 +100,11 @@ def _residuals(found: Discovery) -> tuple[Rows, dict[str, Array]]:
 
 @paper_style
 def plot_residual(found: Discovery, figure: Figure | None = None) -> Figure:
-    """Whitened residual of the channel that was worst, before and after, in the worst seconds."""
+    """Whitened residual before and after, of the channel and in the seconds where the answer
+    explains most; where nothing was found, where the error is largest."""
     rows, residuals = _residuals(found)
-    before = residuals["before"]
-    own = _worst(rows, before)
+    squares = residuals["before"] ** 2 - residuals.get("after", np.zeros(1)) ** 2
+    own = _most(rows, squares)
     time = rows.time[own]
     figure = paper_figure(2.2, figure=figure)
     axes = figure.add_subplot()
@@ -118,9 +119,9 @@ def plot_residual(found: Discovery, figure: Figure | None = None) -> Figure:
     return figure
 
 
-def _worst(rows: Rows, r: Array) -> np.ndarray[Any, Any]:
-    """Rows of the channel, run and span of time with the largest mean square."""
-    score, best = -1.0, np.arange(len(r))
+def _most(rows: Rows, squares: Array) -> np.ndarray[Any, Any]:
+    """Rows of the channel, run and span of time with the largest mean of `squares`."""
+    score, best = -np.inf, np.arange(len(squares))
     for run in np.unique(rows.run):
         for channel in np.unique(rows.channel):
             own = np.flatnonzero((rows.run == run) & (rows.channel == channel))
@@ -129,7 +130,7 @@ def _worst(rows: Rows, r: Array) -> np.ndarray[Any, Any]:
             spans = ((rows.time[own] - rows.time[own][0]) / SHOWN).astype(int)
             for span in np.unique(spans):
                 part = own[spans == span]
-                power = float(np.mean(r[part] ** 2)) if len(part) >= FEWEST else -1.0
-                if power > score:
-                    score, best = power, part
+                mean = float(np.mean(squares[part]))
+                if len(part) >= FEWEST and mean > score:
+                    score, best = mean, part
     return best
