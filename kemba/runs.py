@@ -26,6 +26,7 @@ PLANT_RUN = "plant.csv"  # the motion of the simulated robot, in the plan's cloc
 TABLES = ("trajectory", "controller", "plant")
 REPLACED = (  # what a run consists of, and pages about it
     *("task.yaml", "certificate.json", "solver.log", "figure.png", "report.html", "view.html"),
+    "stages.npz",
     *(f"{name}.{kind}" for name in TABLES for kind in ("csv", "meta.yaml")),
 )
 LIBRARIES = ("casadi", "pin", "numpy")

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from kemba.ocp import load_task, task_model
 from kemba.ocp.continuation.between import Origin
+from kemba.ocp.continuation.kept import read_stages
 from kemba.ocp.task.requirement import resolve
 from kemba.runs import load_run
 
@@ -19,4 +20,5 @@ def origin_of(run: str | Path) -> Origin:
     plan = found.trajectory
     task, document = load_task(found.task)
     model = task_model(task)
-    return Origin(plan, model, tuple(resolve(task, model, document)))
+    requirements = tuple(resolve(task, model, document))
+    return Origin(plan, model, requirements, stages=read_stages(found.path))

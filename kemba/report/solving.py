@@ -12,6 +12,7 @@ from typing import Any
 from kemba.config import Document, dump_yaml
 from kemba.files import WriteError
 from kemba.ocp import Plan, Task
+from kemba.ocp.continuation.kept import write_stages
 from kemba.report.best import Approach, best_plan
 from kemba.report.drawing import Drawer, Here, Nowhere
 from kemba.report.judging.executed import Motions
@@ -82,5 +83,7 @@ def _write(found: Plan, result: dict[str, Any], motions: Motions, folder: Path) 
         return  # refused before solving: there is no motion to write
     found.trajectory.write(folder / "trajectory.csv")
     motions.table.write(folder / "controller.csv")
+    if found.stages is not None:
+        write_stages(folder, found.stages)
     if motions.plant is not None:
         motions.plant.write(folder / PLANT_RUN)

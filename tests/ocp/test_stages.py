@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
+import casadi as ca
 import numpy as np
 import pytest
 
-from kemba.ocp.nlp.ipopt import Control
+from kemba.ocp.certificate.objective import objective
+from kemba.ocp.continuation.between import Origin
+from kemba.ocp.continuation.continue_plan import Continuation
+from kemba.ocp.continuation.kept import FILE, read_stages, write_stages
+from kemba.ocp.nlp.ipopt import Control, Iterate
 from kemba.ocp.phases.modes import Phase
-from kemba.ocp.phases.program import PhaseProgram
+from kemba.ocp.phases.program import PhasePart, PhaseProgram
 from kemba.ocp.phases.radau import RADAU3, RADAU5, Scheme
 from kemba.ocp.phases.stages import Stages
 from kemba.ocp.planned import Plan
 from kemba.ocp.planning import plans_nearby
 from kemba.ocp.reading import load_task, task_model
 from kemba.ocp.refinement.refine import Refiner, reduction_of
+from kemba.ocp.task.requirement import resolve
 from kemba.ocp.task.task import Task
 
 
@@ -77,5 +84,66 @@ def test_stages_are_what_was_solved(low: Plan) -> None:
     program, _ = built(low, low.task, low.stages.phases, RADAU5)
     start = low.stages.start(program)
     assert start is not None
-    again = Stages.of(program, np.append(start, 7.0))  # with a variable of the solve behind it
+    again = Stages.of(program, Iterate(np.append(start, 7.0)))  # a variable of the solve behind it
     np.testing.assert_allclose(again.values, low.stages.values, atol=1e-9)
+
+
+def test_multipliers_find_their_rows_in_a_program_with_more(low: Plan) -> None:
+    assert low.stages is not None
+    program, x = built(low, low.task, low.stages.phases, RADAU5)
+    more, _ = built(low, low.task, low.stages.phases, RADAU5)
+    foot, node = more.columns.first["q"], 0
+    more.added.insert(0, PhasePart(("new",), *one_row(), 0.0, 1.0, foot[None, :1]))
+    begun, wider = low.stages.iterate(program, x), low.stages.iterate(more, x)
+    assert begun.lam_g is not None and wider.lam_g is not None
+    assert np.count_nonzero(begun.lam_g) > 100, "they are those of the solve"
+    new = [row.label == "new" for row in more.rows]
+    assert sum(new) == 1 and wider.lam_g[new] == 0.0 and more.rows[new.index(True)].node == node
+    np.testing.assert_array_equal(np.delete(wider.lam_g, new.index(True)), begun.lam_g)
+
+
+def one_row() -> tuple[ca.SX, ca.SX, ca.SX]:
+    z = ca.SX.sym("z")
+    return z, z, ca.SX(0)
+
+
+def test_a_run_keeps_them(low: Plan, tmp_path: Path) -> None:
+    assert low.stages is not None
+    write_stages(tmp_path, low.stages)
+    read = read_stages(tmp_path)
+    assert read is not None and (read.phases, read.stages) == (low.stages.phases, 3)
+    np.testing.assert_array_equal(read.values, low.stages.values)
+    np.testing.assert_array_equal(read.of_bounds, low.stages.of_bounds)
+    np.testing.assert_equal(read.of_rows, dict(low.stages.of_rows))
+
+
+@pytest.mark.parametrize("content", [None, b"", b"PK\x03\x04 cut", b"no archive"])
+def test_a_file_that_cannot_be_read_is_as_none(tmp_path: Path, content: bytes | None) -> None:
+    if content is not None:
+        (tmp_path / FILE).write_bytes(content)
+    assert read_stages(tmp_path) is None
+
+
+def test_a_kept_file_without_numbers_is_as_none(low: Plan, tmp_path: Path) -> None:
+    assert low.stages is not None
+    write_stages(tmp_path, replace(low.stages, values=np.full(3, np.nan)))
+    assert read_stages(tmp_path) is None
+    np.savez(tmp_path / FILE, values=np.zeros(3))
+    assert read_stages(tmp_path) is None
+
+
+def test_with_multipliers_the_changed_plan_takes_fewer_iterations(low: Plan) -> None:
+    task, document = load_task("jump.yaml", ["height=0.46 m"])
+    asked = tuple(resolve(task, low.model, document))
+    found = {}
+    assert low.stages is not None
+    without = replace(low.stages, of_bounds=np.zeros(0))
+    for name, stages in {"with": low.stages, "without": without}.items():
+        origin = Origin(low.trajectory, low.model, low.requirements, stages=stages)
+        found[name] = Continuation(low.model, task, asked, origin, Control()).run()
+    kept, plain = found["with"], found["without"]
+    assert kept.iterations < plain.iterations
+    costs = [
+        objective(low.model, task, asked, f.trajectory) for f in found.values() if f.trajectory
+    ]
+    assert costs[0] == pytest.approx(costs[1], rel=1e-3)

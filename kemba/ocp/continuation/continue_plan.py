@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
 from kemba.errors import KembaError
 from kemba.model import Model
 from kemba.ocp.certificate.objective import objective
@@ -18,8 +16,9 @@ from kemba.ocp.continuation.between import (
 )
 from kemba.ocp.continuation.impacts import with_impacts
 from kemba.ocp.continuation.renoded import renoded
+from kemba.ocp.nlp import ipopt
 from kemba.ocp.nlp.ending import Ending
-from kemba.ocp.nlp.ipopt import Control
+from kemba.ocp.nlp.ipopt import Control, Iterate
 from kemba.ocp.nlp.stagnation import Stagnation
 from kemba.ocp.phases.modes import Phase
 from kemba.ocp.phases.notes import noted_phases
@@ -69,6 +68,14 @@ class Continuing(Settings):
         1e3, "1", "how much rather impulses of the start change than its velocities, scaled",
         "convention: a trajectory says nothing of impulses",
     )  # fmt: skip
+    mu: float = setting(
+        1e-5, "1", "barrier parameter of a start with the multipliers of the earlier plan", TRIED,
+        decides=True,
+    )  # fmt: skip
+    push: float = setting(
+        1e-3, "1", "distance from the bounds of such a start, and least multiplier", TRIED,
+        decides=True,
+    )  # fmt: skip
     solves: int = setting(
         8, "1", "solves at most on the way to the changed figures",
         "convention: a plan from scratch costs about as much", decides=True,
@@ -99,7 +106,7 @@ class Continuation:
     tell: Callable[[str], None] = lambda text: None
     steps: list[Attempt] = field(default_factory=list)
     size: tuple[int, int] = (0, 0)  # variables and rows of the last program
-    solution: np.ndarray | None = None  # of the last program that was solved
+    solution: Stages | None = None  # of the last program that was solved
 
     def run(self) -> Refined:
         """The plan on the phases of the earlier one; where these do not fit, on phases read
@@ -218,28 +225,29 @@ class Continuation:
         task = self.task.model_copy(update={"grip": 1.0 - share * (1.0 - self.task.grip)})
         refiner = Refiner(model, task, asked, start, reduction, self.control)
         program, x = refiner.build(phases, start, RADAU5)
-        if self.solution is not None:  # finer than the trajectory, which has no stages
-            x = np.clip(self.solution[: x.size], program.lower, program.upper)
-        else:
-            kept = self.origin.stages.start(program) if self.origin.stages else None
-            x = with_impacts(program, x, Continuing.current().ease) if kept is None else kept
+        known = self.solution or self.origin.stages
+        kept = known.start(program) if known else None
+        x = with_impacts(program, x, Continuing.current().ease) if kept is None else kept
         program.keep_short(x, Elements.current().fair)
         if self.origin.ticks:
             on_ticks(program, x)
-        if weight:
-            x = program.proximal(x, weight)
         settings = Continuing.current()
-        most = min(settings.iterations, self.task.solver.max_iterations)
+        options = warm(min(settings.iterations, self.task.solver.max_iterations))
+        begin = Iterate(program.proximal(x, weight) if weight else x)
+        if known is not None and not weight:
+            begin = known.iterate(program, x)
+        if begin.lam_g is not None:
+            options |= ipopt.warm(settings.mu, settings.push)
         slow = Refining.current().slow
         stagnation = Stagnation(settings.patience, settings.underway, slow)
-        found = solve(program, x, warm(most), self.control, stagnation)
+        found = solve(program, begin, options, self.control, stagnation)
         assert found.ending is not None
         name = f"near the earlier plan, {share:.0%}" if weight else "from the earlier plan"
         self.steps.append(Attempt(name, found.ending, found.iterations))
         self.size = len(program.lower), len(program.rows)
         if found.solved:
-            self.solution = found.Y
-        return _ended(program, found.Y, found.ending, found.iterations)
+            self.solution = Stages.of(program, found)
+        return _ended(program, found)
 
     def _read_anew(self, start: Trajectory) -> Refined:
         self.tell(f"from {self.origin.name}: its phases read anew")
@@ -250,12 +258,13 @@ class Continuation:
         return found
 
 
-def _ended(program: PhaseProgram, x: np.ndarray, ending: Ending, iterations: int) -> Refined:
+def _ended(program: PhaseProgram, found: Iterate) -> Refined:
     """A solved program as a plan with what it violates; without them where it is not solved."""
+    assert found.ending is not None
     phases = tuple(program.phases)
-    if not ending.good:
-        return Refined(None, None, ending, iterations, phases)
-    trajectory = to_trajectory(program, x)
-    measured = certificate(program, x, trajectory)
-    own = Stages.of(program, x)
-    return Refined(trajectory, measured, ending, iterations, phases, stages=own)
+    if not found.solved:
+        return Refined(None, None, found.ending, found.iterations, phases)
+    trajectory = to_trajectory(program, found.Y)
+    measured = certificate(program, found.Y, trajectory)
+    own = Stages.of(program, found)
+    return Refined(trajectory, measured, found.ending, found.iterations, phases, stages=own)

@@ -6,10 +6,12 @@ single element can then not even be solved again for the same figures.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from kemba.ocp.nlp.ipopt import Iterate
 from kemba.ocp.phases.modes import Phase
 from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.transcription.layout import STEP
@@ -19,18 +21,29 @@ from kemba.ocp.transcription.layout import STEP
 class Stages:
     """Values of all variables of a program with these phases, schemes with `stages` stages.
 
-    `values` (size,): in SI units, impulses in N.s, steps in s.
+    `values` (size,): in SI units, impulses in N.s, steps in s. Multipliers of the scaled program,
+    in units of its cost: `of_bounds` (size,), and `of_rows`, by the label of rows (n, 2) the node
+    and the multiplier of each; empty where they are not known.
     """
 
     phases: tuple[Phase, ...]
     stages: int
     values: np.ndarray
+    of_bounds: np.ndarray
+    of_rows: Mapping[str, np.ndarray]
 
     @classmethod
-    def of(cls, program: PhaseProgram, x: np.ndarray) -> Stages:
-        """The solution x (size,) of a program, scaled there."""
+    def of(cls, program: PhaseProgram, found: Iterate) -> Stages:
+        """The solution of a program, scaled there."""
         scale = _scales(program)
-        return cls(tuple(program.phases), program.scheme.stages, x[: len(scale)] * scale)
+        values, of_bounds = found.Y[: len(scale)] * scale, np.zeros(0)
+        of_rows: dict[str, list[tuple[int, float]]] = {}
+        if found.lam_x is not None and found.lam_g is not None:
+            of_bounds = found.lam_x[: len(scale)]
+            for row, multiplier in zip(program.rows, found.lam_g, strict=True):
+                of_rows.setdefault(row.label, []).append((row.node, float(multiplier)))
+        tables = {label: np.array(table) for label, table in of_rows.items()}
+        return cls(tuple(program.phases), program.scheme.stages, values, of_bounds, tables)
 
     @property
     def nodes(self) -> int:
@@ -46,6 +59,19 @@ class Stages:
         lower, upper = program.lower[: len(scale)], program.upper[: len(scale)]
         found: np.ndarray = np.clip(self.values[: len(scale)] / scale, lower, upper)
         return found
+
+    def iterate(self, program: PhaseProgram, x: np.ndarray) -> Iterate:
+        """A start x (size,) of another program, with the multipliers where they are known: 0 for
+        rows that this one did not have. Nothing may be added to the program afterwards."""
+        if len(x) != len(self.of_bounds):
+            return Iterate(x)
+        known: dict[tuple[str, int], list[float]] = {}
+        for label, table in self.of_rows.items():
+            for node, multiplier in table:
+                known.setdefault((label, int(node)), []).append(multiplier)
+        own = {key: iter(multipliers) for key, multipliers in known.items()}
+        lam = [next(own.get((row.label, row.node), iter(())), 0.0) for row in program.rows]
+        return Iterate(x, self.of_bounds, np.array(lam))
 
 
 def _scales(program: PhaseProgram) -> np.ndarray:

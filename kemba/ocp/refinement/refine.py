@@ -222,7 +222,7 @@ class Refiner:
             return ended
         trajectory = to_trajectory(program, found.Y)
         measured = certificate(program, found.Y, trajectory)
-        own = Stages.of(program, found.Y)
+        own = Stages.of(program, found)
         return replace(ended, trajectory=trajectory, certificate=measured, stages=own)
 
     def build(
