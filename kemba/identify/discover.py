@@ -58,7 +58,7 @@ def discover(
     """
     started = time.monotonic()
     share = DiscoverSettings.current().searching
-    search = Search(problem, started + share * time_limit, say)
+    search = Search(problem, started + share * time_limit, say, due=started + time_limit)
     found = _discovered(search, search.first(), holdout)
     found.answer.runtime_s = time.monotonic() - started
     return found
@@ -102,7 +102,7 @@ def _built_anew(search: Search, other: Rebuilt, holdout: Problem | None) -> Disc
     (structure,) = search.problem.structures
     search.say(f"building the model anew with {structure}")
     search.visit((structure,))
-    second = Search(other.problem, search.deadline, search.say, begin=other.figures)
+    second = Search(other.problem, search.deadline, search.say, begin=other.figures, due=search.due)
     kept = holdout.rebuilt({}).relinearise(other.figures) if holdout else None
     found = judged(second, second.run(), kept)
     # one noise for all rungs: that of the model that explains more of the data
@@ -123,7 +123,7 @@ def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> 
     search.say("simulating logs in which nothing is missing")
     test, likeliest = null_test(search), best
     belief = _believed(search, likeliest, test)
-    best, p_value = belief.best, belief.p_value
+    best, p_value, ended = belief.best, belief.p_value, ended or search.late
     search.say("testing whether more is missing")
     holdout = holdout.heard_as(search.problem) if holdout else None
     if test.too_short:

@@ -64,13 +64,15 @@ def doubts_about(
         others = ", ".join(" + ".join(h) for h in belief.rivals)
         reasons.append(f"{others} would predict left-out data as well as {' + '.join(best)}")
     part = bool(best) and excess(after) <= (1.0 - least) * excess(before)
-    # whether sensors drift instead of being wrong is asked last, and was not
-    faults = tuple(effect for effect in best if is_fault(effect)) if ended else ()
+    unsure: Hypothesis = ()
+    if ended:  # smaller answers, and sensors that drift instead of being wrong, are asked last
+        asked_smaller = len(best) == 1 or not search.late
+        unsure = tuple(e for e in best if is_fault(e)) if asked_smaller else best
     if best and not reasons and is_idle(search, best):
         return Doubts((IDLE,), part=True, unsure=best)
-    if faults and not reasons:
-        return Doubts((ENDED,), part=True, unsure=faults)
-    return Doubts(tuple(reasons), part, faults)
+    if unsure and not reasons:
+        return Doubts((ENDED,), part=True, unsure=unsure)
+    return Doubts(tuple(reasons), part, unsure)
 
 
 def is_idle(search: Search, best: Hypothesis) -> bool:

@@ -44,6 +44,20 @@ def test_a_search_that_the_limit_ended_is_not_sure_of_a_sensor(
     assert said == (("partly", (ENDED,), scale) if ended else ("missing", (), ()))
 
 
+def test_of_several_effects_that_were_not_asked_one_by_one_none_is_sure(
+    bench_log: Callable[..., Trajectory],
+) -> None:
+    both = ("piston_damping", "seal_friction")
+    hidden = (BY_KIND["seal_friction"](F_c=8.0), BY_KIND["piston_damping"](c=15.0))
+    search = Search(bench_problem([bench_log(hidden, duration=1.2)], load_model(rig=True)), due=0.0)
+    search.start()
+    for answer in (FRICTION, both):
+        search.visit(answer)
+    doubts = doubts_about(search, Belief(both), None, None, ended=search.late)
+    assert ENDED in doubts.reasons and doubts.unsure == both
+    assert doubts_about(search, Belief(FRICTION), None, None, ended=search.late).unsure == ()
+
+
 def test_such_an_effect_is_said_to_be_likely_only() -> None:
     assert verdict_on(FRICTION, None, Doubts((IDLE,), part=True, unsure=FRICTION)) == "partly"
     friction = Ranked("seal_friction", 0.99, {"F_c": Value(1.0, 0.5, 1.5, "N")})

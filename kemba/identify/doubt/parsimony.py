@@ -72,9 +72,10 @@ def simplest(search: Search, belief: Belief) -> Belief:
 
 def _thin(search: Search, best: Hypothesis) -> None:
     """Refit the answer with ever fewer effects: each time without the one that is missed least, for
-    as long as the error stays within one standard error of the smallest."""
+    as long as the error stays within one standard error of the smallest, and until the answer is
+    due."""
     rest, least = best, left_out_powers(search, best)
-    while len(rest) > 1:
+    while len(rest) > 1 and not search.late:
         smaller = parts_of(rest)
         _visit(search, smaller)
         powers = {h: left_out_powers(search, h) for h in smaller}

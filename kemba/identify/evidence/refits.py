@@ -25,9 +25,9 @@ class Refits:
     """The null model, and every hypothesis that was refitted beside it.
 
     `problem`: the problem as it is now; it is replaced when its noise colour is learnt or its
-    motion found again. `deadline`: when to stop refitting, by `time.monotonic` [s]. `say`: told of
-    progress. `points`: every hypothesis that was refitted. `begin`: figures of the model as it is,
-    where a fit found them already. `base`: the null model.
+    motion found again. `deadline`: when to stop searching, `due`: when the answer is due, by
+    `time.monotonic` [s]. `say`: told of progress. `points`: every hypothesis that was refitted.
+    `begin`: figures of the model as it is, where a fit found them already. `base`: the null model.
     """
 
     problem: Problem
@@ -35,6 +35,7 @@ class Refits:
     say: Callable[[str], None] = lambda text: None
     points: dict[Hypothesis, LinearisationPoint] = field(default_factory=dict)
     begin: Mapping[str, float] = field(default_factory=dict)
+    due: float = np.inf
     base: Baseline = field(init=False)
     _thetas: dict[Hypothesis, dict[str, float]] = field(default_factory=dict)
     _beginnings: dict[Hypothesis, dict[str, float]] = field(default_factory=dict)
@@ -45,6 +46,11 @@ class Refits:
     def ended(self) -> bool:
         """Whether the time is over. A first effect is refitted all the same."""
         return time.monotonic() > self.deadline
+
+    @property
+    def late(self) -> bool:
+        """Whether the answer is due: nothing more is refitted to doubt it."""
+        return time.monotonic() > self.due
 
     def visit(self, hypothesis: Hypothesis, number: int = 1, of: int = 1) -> LinearisationPoint:
         """Refit a hypothesis, once, and score it there; `number` `of` so many, for who waits."""

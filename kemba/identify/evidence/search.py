@@ -178,6 +178,8 @@ class Search(Refits):
         for _ in range(settings.swapped):
             before = best
             for member in best if len(best) > 1 else ():
+                if self.ended:
+                    return self.best()
                 rest = tuple(h for h in best if h != member)
                 self.visit(rest)
                 least = self.points[best].log_evidence - settings.far

@@ -62,7 +62,8 @@ def contradictions(
                 log.name,
                 f"{worst} is off by {power[worst]:.0f} times its noise from one row to the next",
                 "motion that follows from the commands was expected",
-                "are columns swapped, a sign turned, or clocks apart?",
+                "are columns swapped, a sign turned, or clocks apart? or does a part swing that "
+                "the model holds rigid, such as the boom?",
             )
 
 
