@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from kemba.errors import enumerated
 from kemba.identify.answer import ENDED, IDLE, Ranked, Verdict, excess
 from kemba.identify.doubt.cross_validation import left_out_powers
-from kemba.identify.doubt.parsimony import Belief
+from kemba.identify.doubt.parsimony import Belief, as_good
 from kemba.identify.doubt.run_consistency import Drift
 from kemba.identify.doubt.unexplained import Formula, unfinished
-from kemba.identify.evidence.bootstrap import BootstrapSettings
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
 from kemba.identify.problem.problem import Problem
@@ -76,10 +75,9 @@ def doubts_about(
 
 
 def is_idle(search: Search, best: Hypothesis) -> bool:
-    """Whether left-out data, summed over aggregation windows, gain less by an answer than any
-    evidence is. Its p-value counts rows, whose noise may be slower than it is taken to be."""
-    gain = left_out_powers(search, NULL).sum() - left_out_powers(search, best).sum()
-    return bool(0.5 * gain < BootstrapSettings.current().least)
+    """Whether left-out data, summed over aggregation windows, gain no more by an answer than their
+    scatter. Its p-value counts rows, whose noise may be slower than it is taken to be."""
+    return as_good(left_out_powers(search, NULL), left_out_powers(search, best))
 
 
 def verdict_on(best: Hypothesis, formula: Formula | None, doubts: Doubts) -> Verdict:
