@@ -79,6 +79,8 @@ def best_plan(
     if best is not last and best.motions.table is not None:
         begun(best.plan.trajectory)
     known, remark = compared(best.plan)
+    if best.plan.continued is False and best.plan.start.startswith("shipped"):
+        remark += "; it begins from a shipped plan: the earlier plan could not be continued"
     best.result.update(best_known=known, sentence=best.result["sentence"] + remark)
     return best
 
@@ -107,13 +109,19 @@ def _candidates(
     how: dict[str, Any] = {"watch": listener.watch, "stop": listener.stop, "tell": listener.tell}
 
     def nearby(task: Task) -> Iterator[Plan]:
-        shelved = approach.free and not approach.cold
+        shelved = approach.start is None and not approach.cold
         return plans_nearby(task, document, approach.log, **how) if shelved else iter(())
 
     def solved(task: Task) -> Plan:
         a = approach
         if a.starts > 1 and a.free:
             return plan_best(task, document, a.starts, a.jobs, a.log, listener.tell)
+        if a.origin is not None:
+            near, _ = plan_from(replace(a.origin, once=True), task, document, a.log, **how)
+            if near is not None:
+                return near
+            for shipped in nearby(task):
+                return replace(shipped, continued=False)
         return plan(task, document, log=a.log, start=a.start, origin=a.origin, **how)
 
     if approach.replay and task.robust > 0:
@@ -126,10 +134,12 @@ def _candidates(
             new, _ = plan_from(origin, task, document, approach.log, **how)
             return new and replace(summed(found, new), fitted_air=found.fitted_air)
 
-        found = most_robust(
-            task, lambda task: next(nearby(task), None) or solved(task), changed, listener.tell
-        )
+        def first(task: Task) -> Plan | None:
+            return next(nearby(task), None) if approach.free else None
+
+        found = most_robust(task, lambda task: first(task) or solved(task), changed, listener.tell)
         yield found.plan, found.table, found.share
         return
-    yield from ((near, None, None) for near in nearby(task))
+    if approach.free:
+        yield from ((near, None, None) for near in nearby(task))
     yield solved(task), None, None

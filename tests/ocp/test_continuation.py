@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -88,6 +89,20 @@ def test_what_cannot_be_continued_is_made_from_scratch(hop: Path, tmp_path: Path
     )
 
 
+@pytest.mark.slow
+def test_a_change_too_far_begins_from_a_shipped_plan(tmp_path: Path) -> None:
+    """From 0.5 to 0.6 m the order of valves changes; one from scratch costs ten times as much."""
+    code, _ = solve("jump.yaml", "--no-figure", "--json", "--out", tmp_path / "first")
+    code, answer = solve("--from", tmp_path / "first", "--set", "height=0.6 m", "--no-figure",
+                         "--json", "--out", tmp_path / "second")  # fmt: skip
+    assert code == 0 and answer["continued"] is False and answer["good"]
+    said, start = str(answer["sentence"]), str(answer["start"])
+    assert "the earlier plan could not be continued" in said and start.startswith("shipped: ")
+    cost, known = answer["cost"], answer["best_known"]
+    assert isinstance(cost, dict) and isinstance(known, dict)
+    assert cost["torque_squared_integral"] < 1.5 * known["cost"]
+
+
 def test_from_and_resume_exclude_each_other(hop: Path) -> None:
     done = CliRunner().invoke(app, ["solve", "--from", str(hop), "--resume", str(hop)])
     assert done.exit_code == 2 and "exclude" in done.stderr
@@ -137,6 +152,9 @@ def test_between_two_tasks(hop: Path) -> None:
         [apex], [type(apex)(apex.location, apex.quantity, apex.at, 0.45, 0.45)], 0.25
     )[0]
     assert higher.lower == pytest.approx(0.75 * apex.lower + 0.25 * 0.45)
+    flight = replace(apex, at=None, during=(0.4, 0.6))
+    longer = requirements_between([flight], [replace(flight, during=(0.36, 0.68))], 0.5)[0]
+    assert longer.during == pytest.approx((0.38, 0.64))
 
 
 def test_columns_of_new_effects_are_filled(hop: Path) -> None:

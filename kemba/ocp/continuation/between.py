@@ -77,7 +77,8 @@ def _figure(first: Any, last: Any, share: float) -> Any:
 def requirements_between(
     old: Sequence[Requirement], new: Sequence[Requirement], share: float
 ) -> list[Requirement]:
-    """The new requirements with finite bounds at `share` of the way from the old ones."""
+    """The new requirements with finite bounds, and the times at which they hold, at `share` of
+    the way from the old ones."""
     before = {(r.location, r.quantity.name, r.at): r for r in old}
     found = []
     for asked in new:
@@ -85,7 +86,10 @@ def requirements_between(
         if was is not None and share < 1.0:
             lower = _between(was.lower, asked.lower, share)
             upper = _between(was.upper, asked.upper, share)
-            asked = replace(asked, lower=lower, upper=upper)
+            begin, end = (
+                _between(*ends, share) for ends in zip(was.during, asked.during, strict=True)
+            )
+            asked = replace(asked, lower=lower, upper=upper, during=(begin, end))
         found.append(asked)
     return found
 

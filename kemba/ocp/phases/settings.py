@@ -136,6 +136,12 @@ class Refining(Settings):
         1e-3, "1", "mumps_pivtol; IPOPT's 1e-6 counts wrong signs on three stages, and steps "
         "shrink", HAND,
     )  # fmt: skip
+    permuting: int = setting(
+        0, "1", "mumps_permuting_scaling, none; with it a solve that does not converge took 0.3 to "
+        "4 s an iteration, for pivots that are put off, instead of 0.02 s",
+        "tuned: by hand, jumps of 0.6 and 0.65 m continued from 0.5 m; others take as long as "
+        "before",
+    )  # fmt: skip
     hessian: float = setting(
         1e6, "1", "max_hessian_perturbation; beyond, tries cost a second an iteration and lead "
         "nowhere", HAND,

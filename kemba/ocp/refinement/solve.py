@@ -38,6 +38,7 @@ def exact() -> dict[str, Any]:
         "constr_viol_tol": settings.rows,
         "acceptable_iter": 0,
         "mumps_pivtol": settings.pivot,
+        "mumps_permuting_scaling": settings.permuting,
         "max_hessian_perturbation": settings.hessian,
     }
 
