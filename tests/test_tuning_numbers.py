@@ -53,8 +53,6 @@ CONSTANTS = {  # file -> names, why
     "plant/execution/sensors.py": ("ENCODERS", "steps of the robot's encoders"),
     "plant/execution/repeat.py": ("VALVE_SCATTER", "scatter of the robot's valves"),
     "plant/execution/controller.py": ("PERIOD", "rate of the robot's controller"),
-    "model/spec.py": ("MECHANISMS", "how many are kept"),
-    "plant/stepping/family.py": ("FAMILIES", "how many are kept"),
     "ocp/nlp/stagnation.py": ("USUAL", "iterations of which a median is taken"),
     "ocp/phases/stretched.py": ("PARTS", "of a phase: before the pulse, the pulse, after it"),
     "ocp/controller.py": ("PERIOD", "rate of the robot's controller"),

@@ -13,15 +13,12 @@ from kemba.effects import AnyEffect, Effect
 from kemba.effects.catalogue import CHAMBERS
 from kemba.effects.pneumatics.constants import ATMOSPHERE
 from kemba.errors import KembaError
-from kemba.mechanism import Mechanism, OwnRig, load_robot, rig_mechanism, robot_mechanism
-from kemba.mechanism.links import Robot
+from kemba.mechanism import OwnRig, load_robot, rig_mechanism, robot_mechanism
 from kemba.mechanism.robot_file import find_file, robot_files
 from kemba.model.model import Model
 from kemba.model.own_rig import own_model
 from kemba.quantity import Param
 
-MECHANISMS = 8  # robots whose mechanisms are kept for the next model of the process
-_MECHANISMS: dict[str, Mechanism] = {}  # by the robot's table
 Supply = Annotated[float, Param("Pa", 0.1e6, lower=ATMOSPHERE, doc="supply pressure")]
 
 
@@ -124,7 +121,7 @@ def build_model(
         expected = "robot: a robot's file, or base: a model that names one, was expected"
         raise KembaError(f"model {spec.name}", "robot: missing", expected)
     robot = load_robot(spec.robot)
-    mechanism = rig_mechanism(robot.cylinder) if rig else _shared(robot)
+    mechanism = rig_mechanism(robot.cylinder) if rig else robot_mechanism(robot)
     effects: list[Effect] = [*spec.effects, *CHAMBERS[spec.chambers or "first_order"]()]
     named = {e.name: e for e in (*effects, *spec.effects)}
     listed = [*named.values()]
@@ -132,17 +129,6 @@ def build_model(
         listed = [e for e in listed if set(e.ports) <= {"piston"} and e.kind != "end_stop"]
     named = {e.name: e for e in (*listed, *extra)}
     return Model(mechanism, named.values(), supply or spec.supply or 0.7e6, spec.name)
-
-
-def _shared(robot: Robot) -> Mechanism:
-    """The mechanism of a robot, the same object for all its models: what is made of it, such as the
-    plant's machine code, is then made once."""
-    key = robot.model_dump_json()
-    if key not in _MECHANISMS:
-        for oldest in [*_MECHANISMS][: 1 - MECHANISMS]:
-            del _MECHANISMS[oldest]
-        _MECHANISMS[key] = robot_mechanism(robot)
-    return _MECHANISMS[key]
 
 
 def load_model(

@@ -21,7 +21,6 @@ class Family:
     equations: Equations
 
 
-FAMILIES = 32  # of one mechanism that are kept, the last ones: equations take a megabyte
 _OF_MODEL: weakref.WeakKeyDictionary[Model, Equations] = weakref.WeakKeyDictionary()
 _FAMILIES: dict[int, list[Family]] = {}  # by the identity of the mechanism
 
@@ -45,7 +44,6 @@ def _find(model: Model) -> Equations:
                 family.equations = _with_free(model, known | new)
             return family.equations
     families.append(Family(structure, numbers, Equations(model)))
-    del families[:-FAMILIES]
     return families[-1].equations
 
 
