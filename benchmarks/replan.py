@@ -2,8 +2,9 @@
 
     python benchmarks/replan.py --write
 
-Both ways in turns in one process, which has made such a plan before; CPU seconds, medians. *Plan*
-is what `solve --from` does until the plan stands; *all* has its table and its executions as well.
+Both ways in turns in one process, which has made such a plan before; CPU seconds, the median of
+`--repeats` runs. *Plan* is what `solve --from` does until the plan stands; *all* has its table and
+its executions as well.
 """
 
 from __future__ import annotations
@@ -39,8 +40,8 @@ CHANGES = {
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "learn.md"
 BEGIN, END = "<!-- plans made anew: written by benchmarks/replan.py -->", "<!-- end of plans -->"
 HEAD = (
-    "| from the shipped task | good | iterations | CPU s: plan, all | cost "
-    "| from the nodes: iterations | CPU s: plan, all | cost |",
+    "| from the shipped task | good | iterations | CPU s: plan, all | squared torque "
+    "| from the nodes: iterations | CPU s: plan, all | squared torque |",
     "|---|---|---:|---:|---:|---:|---:|---:|",
 )
 
@@ -80,8 +81,8 @@ def rows(repeats: int, folder: Path) -> Iterator[str]:
         for change in changes:
             found: list[list[Taken]] = [[], []]
             for _ in range(1 + repeats):
-                for way, own in zip(ways, found, strict=True):
-                    own.append(made(task, change, way))
+                for way, taken in zip(ways, found, strict=True):
+                    taken.append(made(task, change, way))
             own, nodes = (_middle(taken[1:]) for taken in found)
             good = "yes" if own.made.good else "no"
             name = f"{resolved.name}, {change.replace('=', ' ')}"

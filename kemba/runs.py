@@ -23,10 +23,11 @@ __all__ = ["Run", "RunFolder", "load_run", "write_json"]
 
 MANIFEST = "manifest.json"
 PLANT_RUN = "plant.csv"  # the motion of the simulated robot, in the plan's clock
+STAGES = "stages.npz"  # the solved program, from which `solve --from` begins
 TABLES = ("trajectory", "controller", "plant")
 REPLACED = (  # what a run consists of, and pages about it
     *("task.yaml", "certificate.json", "solver.log", "figure.png", "report.html", "view.html"),
-    "stages.npz",
+    STAGES,
     *(f"{name}.{kind}" for name in TABLES for kind in ("csv", "meta.yaml")),
 )
 LIBRARIES = ("casadi", "pin", "numpy")

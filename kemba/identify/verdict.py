@@ -63,15 +63,19 @@ def doubts_about(
         others = ", ".join(" + ".join(h) for h in belief.rivals)
         reasons.append(f"{others} would predict left-out data as well as {' + '.join(best)}")
     part = bool(best) and excess(after) <= (1.0 - least) * excess(before)
-    unsure: Hypothesis = ()
-    if ended:  # smaller answers, and sensors that drift instead of being wrong, are asked last
-        asked_smaller = len(best) == 1 or not search.late
-        unsure = tuple(e for e in best if is_fault(e)) if asked_smaller else best
+    unsure = unasked(search, best) if ended else ()
     if best and not reasons and is_idle(search, best):
         return Doubts((IDLE,), part=True, unsure=best)
     if unsure and not reasons:
         return Doubts((ENDED,), part=True, unsure=unsure)
     return Doubts(tuple(reasons), part, unsure)
+
+
+def unasked(search: Search, best: Hypothesis) -> Hypothesis:
+    """Effects of an ended search's answer that nothing else was asked for: smaller answers, and
+    sensors that drift instead of being wrong, come last."""
+    asked_smaller = len(best) == 1 or not search.late
+    return tuple(e for e in best if is_fault(e)) if asked_smaller else best
 
 
 def is_idle(search: Search, best: Hypothesis) -> bool:

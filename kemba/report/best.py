@@ -12,6 +12,8 @@ from kemba.ocp import Plan, Task, plan
 from kemba.ocp.continuation.between import Origin
 from kemba.ocp.known import compared
 from kemba.ocp.planning import plan_from, plans_nearby
+from kemba.ocp.reading import task_model
+from kemba.ocp.shipped.shelf import neighbours
 from kemba.ocp.starts import plan_best
 from kemba.report.judging.executed import Begun, Executed, executed
 from kemba.report.judging.matched import matched, summed
@@ -108,21 +110,29 @@ def _candidates(
     """Plans of a task, made when they are asked for: those from shipped plans come first."""
     how: dict[str, Any] = {"watch": listener.watch, "stop": listener.stop, "tell": listener.tell}
 
-    def nearby(task: Task) -> Iterator[Plan]:
+    def shipped(task: Task) -> Iterator[Plan]:
         shelved = approach.start is None and not approach.cold
         return plans_nearby(task, document, approach.log, **how) if shelved else iter(())
+
+    def nearby(task: Task) -> Iterator[Plan]:
+        return shipped(task) if approach.free else iter(())
+
+    def again(task: Task, origin: Origin) -> Plan | None:
+        """Where shipped plans are near, one of them is tried before many steps from the origin."""
+        if approach.cold or not neighbours(task, task_model(task)):
+            return None
+        near, _ = plan_from(replace(origin, once=True), task, document, approach.log, **how)
+        if near is not None:
+            return near
+        begun = next(shipped(task), None)
+        return begun and replace(begun, continued=False)
 
     def solved(task: Task) -> Plan:
         a = approach
         if a.starts > 1 and a.free:
             return plan_best(task, document, a.starts, a.jobs, a.log, listener.tell)
-        if a.origin is not None:
-            near, _ = plan_from(replace(a.origin, once=True), task, document, a.log, **how)
-            if near is not None:
-                return near
-            for shipped in nearby(task):
-                return replace(shipped, continued=False)
-        return plan(task, document, log=a.log, start=a.start, origin=a.origin, **how)
+        found = again(task, a.origin) if a.origin is not None else None
+        return found or plan(task, document, log=a.log, start=a.start, origin=a.origin, **how)
 
     if approach.replay and task.robust > 0:
         from kemba.report.robust import most_robust  # loads SciPy, which most plans do not need
@@ -134,12 +144,10 @@ def _candidates(
             new, _ = plan_from(origin, task, document, approach.log, **how)
             return new and replace(summed(found, new), fitted_air=found.fitted_air)
 
-        def first(task: Task) -> Plan | None:
-            return next(nearby(task), None) if approach.free else None
-
-        found = most_robust(task, lambda task: first(task) or solved(task), changed, listener.tell)
+        found = most_robust(
+            task, lambda task: next(nearby(task), None) or solved(task), changed, listener.tell
+        )
         yield found.plan, found.table, found.share
         return
-    if approach.free:
-        yield from ((near, None, None) for near in nearby(task))
+    yield from ((near, None, None) for near in nearby(task))
     yield solved(task), None, None

@@ -8,7 +8,7 @@ from kemba.ocp import load_task, task_model
 from kemba.ocp.continuation.between import Origin
 from kemba.ocp.continuation.kept import read_stages
 from kemba.ocp.task.requirement import resolve
-from kemba.runs import load_run
+from kemba.runs import STAGES, load_run
 
 
 def origin_of(run: str | Path) -> Origin:
@@ -21,4 +21,4 @@ def origin_of(run: str | Path) -> Origin:
     task, document = load_task(found.task)
     model = task_model(task)
     requirements = tuple(resolve(task, model, document))
-    return Origin(plan, model, requirements, stages=read_stages(found.path))
+    return Origin(plan, model, requirements, stages=read_stages(found.path / STAGES))

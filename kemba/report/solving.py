@@ -17,7 +17,7 @@ from kemba.report.best import Approach, best_plan
 from kemba.report.drawing import Drawer, Here, Nowhere
 from kemba.report.judging.executed import Motions
 from kemba.report.listener import Listener
-from kemba.runs import PLANT_RUN, RunFolder, write_json
+from kemba.runs import PLANT_RUN, STAGES, RunFolder, write_json
 from kemba.trajectory import Trajectory
 
 
@@ -84,6 +84,6 @@ def _write(found: Plan, result: dict[str, Any], motions: Motions, folder: Path) 
     found.trajectory.write(folder / "trajectory.csv")
     motions.table.write(folder / "controller.csv")
     if found.stages is not None:
-        write_stages(folder, found.stages)
+        write_stages(folder / STAGES, found.stages)
     if motions.plant is not None:
         motions.plant.write(folder / PLANT_RUN)

@@ -124,7 +124,7 @@ def solution(
         program, x = source.built(task, model)
         if weight:
             x = program.proximal(x, weight)
-        point = solve(program, x, options, control or Control())
+        point = solve(program, Iterate(x), options, control or Control())
         if point.solved:
             return Solution(source, program, point)
     assert point.ending is not None

@@ -12,7 +12,7 @@ import pytest
 from kemba.ocp.certificate.objective import objective
 from kemba.ocp.continuation.between import Origin
 from kemba.ocp.continuation.continue_plan import Continuation
-from kemba.ocp.continuation.kept import FILE, read_stages, write_stages
+from kemba.ocp.continuation.kept import read_stages, write_stages
 from kemba.ocp.nlp.ipopt import Control, Iterate
 from kemba.ocp.phases.modes import Phase
 from kemba.ocp.phases.program import PhasePart, PhaseProgram
@@ -24,6 +24,7 @@ from kemba.ocp.reading import load_task, task_model
 from kemba.ocp.refinement.refine import Refiner, reduction_of
 from kemba.ocp.task.requirement import resolve
 from kemba.ocp.task.task import Task
+from kemba.runs import STAGES
 
 
 @pytest.fixture(scope="module")
@@ -109,8 +110,8 @@ def one_row() -> tuple[ca.SX, ca.SX, ca.SX]:
 
 def test_a_run_keeps_them(low: Plan, tmp_path: Path) -> None:
     assert low.stages is not None
-    write_stages(tmp_path, low.stages)
-    read = read_stages(tmp_path)
+    write_stages(tmp_path / STAGES, low.stages)
+    read = read_stages(tmp_path / STAGES)
     assert read is not None and (read.phases, read.stages) == (low.stages.phases, 3)
     np.testing.assert_array_equal(read.values, low.stages.values)
     np.testing.assert_array_equal(read.of_bounds, low.stages.of_bounds)
@@ -120,16 +121,16 @@ def test_a_run_keeps_them(low: Plan, tmp_path: Path) -> None:
 @pytest.mark.parametrize("content", [None, b"", b"PK\x03\x04 cut", b"no archive"])
 def test_a_file_that_cannot_be_read_is_as_none(tmp_path: Path, content: bytes | None) -> None:
     if content is not None:
-        (tmp_path / FILE).write_bytes(content)
-    assert read_stages(tmp_path) is None
+        (tmp_path / STAGES).write_bytes(content)
+    assert read_stages(tmp_path / STAGES) is None
 
 
 def test_a_kept_file_without_numbers_is_as_none(low: Plan, tmp_path: Path) -> None:
     assert low.stages is not None
-    write_stages(tmp_path, replace(low.stages, values=np.full(3, np.nan)))
-    assert read_stages(tmp_path) is None
-    np.savez(tmp_path / FILE, values=np.zeros(3))
-    assert read_stages(tmp_path) is None
+    write_stages(tmp_path / STAGES, replace(low.stages, values=np.full(3, np.nan)))
+    assert read_stages(tmp_path / STAGES) is None
+    np.savez(tmp_path / STAGES, values=np.zeros(3))
+    assert read_stages(tmp_path / STAGES) is None
 
 
 def test_with_multipliers_the_changed_plan_takes_fewer_iterations(low: Plan) -> None:

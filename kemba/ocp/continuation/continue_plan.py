@@ -220,25 +220,11 @@ class Continuation:
         weight: float,
     ) -> Refined:
         """The plan at `share` of the change from a trajectory, with a proximal `weight`."""
-        model = model_between(self.origin.model, self.model, share)
-        asked = requirements_between(self.origin.requirements, self.requirements, share)
-        task = self.task.model_copy(update={"grip": 1.0 - share * (1.0 - self.task.grip)})
-        refiner = Refiner(model, task, asked, start, reduction, self.control)
-        program, x = refiner.build(phases, start, RADAU5)
-        known = self.solution or self.origin.stages
-        kept = known.start(program) if known else None
-        x = with_impacts(program, x, Continuing.current().ease) if kept is None else kept
-        program.keep_short(x, Elements.current().fair)
-        if self.origin.ticks:
-            on_ticks(program, x)
-        settings = Continuing.current()
+        program, begin = self._program(share, start, phases, reduction, weight)
+        settings, slow = Continuing.current(), Refining.current().slow
         options = warm(min(settings.iterations, self.task.solver.max_iterations))
-        begin = Iterate(program.proximal(x, weight) if weight else x)
-        if known is not None and not weight:
-            begin = known.iterate(program, x)
         if begin.lam_g is not None:
             options |= ipopt.warm(settings.mu, settings.push)
-        slow = Refining.current().slow
         stagnation = Stagnation(settings.patience, settings.underway, slow)
         found = solve(program, begin, options, self.control, stagnation)
         assert found.ending is not None
@@ -248,6 +234,33 @@ class Continuation:
         if found.solved:
             self.solution = Stages.of(program, found)
         return _ended(program, found)
+
+    def _program(
+        self,
+        share: float,
+        start: Trajectory,
+        phases: list[Phase],
+        reduction: Reduction,
+        weight: float,
+    ) -> tuple[PhaseProgram, Iterate]:
+        """The program at `share` of the change, and where it begins: at the stages and multipliers
+        that are known for these phases, else at the nodes of a trajectory."""
+        model = model_between(self.origin.model, self.model, share)
+        asked = requirements_between(self.origin.requirements, self.requirements, share)
+        task = self.task.model_copy(update={"grip": 1.0 - share * (1.0 - self.task.grip)})
+        refiner = Refiner(model, task, asked, start, reduction, self.control)
+        program, x = refiner.build(phases, start, RADAU5)
+        known = self.solution or self.origin.stages
+        kept = known.start(program) if known is not None else None
+        x = with_impacts(program, x, Continuing.current().ease) if kept is None else kept
+        program.keep_short(x, Elements.current().fair)
+        if self.origin.ticks:
+            on_ticks(program, x)
+        if weight:
+            return program, Iterate(program.proximal(x, weight))
+        if known is None or kept is None:
+            return program, Iterate(x)
+        return program, known.iterate(program, x)
 
     def _read_anew(self, start: Trajectory) -> Refined:
         self.tell(f"from {self.origin.name}: its phases read anew")

@@ -6,6 +6,7 @@ single element can then not even be solved again for the same figures.
 
 from __future__ import annotations
 
+from collections import defaultdict, deque
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -65,13 +66,12 @@ class Stages:
         rows that this one did not have. Nothing may be added to the program afterwards."""
         if len(x) != len(self.of_bounds):
             return Iterate(x)
-        known: dict[tuple[str, int], list[float]] = {}
+        known: defaultdict[tuple[str, int], deque[float]] = defaultdict(deque)
         for label, table in self.of_rows.items():
             for node, multiplier in table:
-                known.setdefault((label, int(node)), []).append(multiplier)
-        own = {key: iter(multipliers) for key, multipliers in known.items()}
-        lam = [next(own.get((row.label, row.node), iter(())), 0.0) for row in program.rows]
-        return Iterate(x, self.of_bounds, np.array(lam))
+                known[label, int(node)].append(multiplier)
+        rows = [known[row.label, row.node] for row in program.rows]
+        return Iterate(x, self.of_bounds, np.array([own.popleft() if own else 0.0 for own in rows]))
 
 
 def _scales(program: PhaseProgram) -> np.ndarray:

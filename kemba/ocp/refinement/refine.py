@@ -248,7 +248,7 @@ class Refiner:
 
     def _solve(self, program: PhaseProgram, start: np.ndarray, options: dict[str, Any]) -> Iterate:
         options = {**options, "max_iter": max(0, min(options["max_iter"], self.left))}
-        found = solve(program, start, options, self.control)
+        found = solve(program, Iterate(start), options, self.control)
         self.iterations += found.iterations
         return found
 

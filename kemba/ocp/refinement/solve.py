@@ -14,19 +14,18 @@ from kemba.ocp.phases.settings import Refining
 
 def solve(
     program: PhaseProgram,
-    start: np.ndarray | Iterate,
+    start: Iterate,
     options: dict[str, Any],
     control: Control,
     stagnation: Stagnation | None = None,
 ) -> Iterate:
-    """The program solved from `start`, (size,) or with multipliers; given up where the violation
-    stagnates, by default as the settings say."""
+    """The program solved from `start`; given up where the violation stagnates, by default as the
+    settings say."""
     settings = Refining.current()
     own = {**program.task.solver.options, **exact(), **options}
     elastic = program.elastic > 0.0  # such a program has a solution
     longest = np.inf if elastic else settings.stagnation_iterations
     stagnation = stagnation or Stagnation(longest, settings.stagnation_near, settings.slow)
-    start = start if isinstance(start, Iterate) else Iterate(start)
     return Ipopt(program, own, control).solve(start, stagnation=stagnation)
 
 
