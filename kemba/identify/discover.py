@@ -13,6 +13,7 @@ from kemba.identify.doubt.cross_validation import left_out
 from kemba.identify.doubt.parsimony import Belief, likeliest_part, simplest
 from kemba.identify.doubt.run_consistency import drifting
 from kemba.identify.doubt.unexplained import Formula, look
+from kemba.identify.doubt.wanting import fuller, wanted
 from kemba.identify.evidence.bootstrap import NullTest, bootstrap, smallest_detectable
 from kemba.identify.evidence.figures import Rebuilt, ahead, settled
 from kemba.identify.evidence.linear import time_blocks
@@ -194,12 +195,12 @@ def null_test(search: Search) -> NullTest:
 
 
 def _believed(search: Search, best: Hypothesis, test: NullTest) -> Belief:
-    """The best hypothesis without what is not significant, too small, refuted by left-out data or
-    of no use there."""
+    """The best hypothesis with what left-out data ask for besides; without what is not significant,
+    too small, refuted by left-out data or of no use there."""
     p_value = test.p_value(_best_gain(search))
     if not best or p_value > DiscoverSettings.current().significant:
         return Belief(NULL, p_value)
-    belief = Belief(best, p_value)
+    belief = Belief(fuller(search, best), p_value)
     while belief.best:
         best = belief.best
         grave = material(search, best)
@@ -221,8 +222,8 @@ def _believed(search: Search, best: Hypothesis, test: NullTest) -> Belief:
 
 
 def material(search: Search, hypothesis: Hypothesis) -> Hypothesis:
-    """Those effects of a hypothesis that are larger than a model's usual imperfection, and whose
-    intervals exclude that they are absent."""
+    """Those effects of a hypothesis that are larger than a model's usual imperfection, or smaller
+    and asked for by left-out data, and whose intervals exclude that they are absent."""
     score, linear = search.points[hypothesis].score, search.points[hypothesis].linear
     settings = DiscoverSettings.current()
     least = settings.matters if len(hypothesis) == 1 else settings.matters_too
@@ -234,8 +235,9 @@ def material(search: Search, hypothesis: Hypothesis) -> Hypothesis:
         return float(step / c.lead.size) if step > settings.apart * sd else 0.0
 
     strongest = max(hypothesis, key=lambda e: strength(search, e, hypothesis))
-    wanted = {e: settings.matters if e == strongest else least for e in hypothesis}
-    return tuple(e for e in hypothesis if share(e) >= wanted[e])
+    shares = {e: share(e) for e in hypothesis}
+    large = {e for e in shares if shares[e] >= (settings.matters if e == strongest else least)}
+    return tuple(e for e in shares if e in large or wanted(search, hypothesis, e, shares[e]))
 
 
 def _answer(

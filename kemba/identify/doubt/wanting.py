@@ -1,0 +1,59 @@
+"""Small effects that an answer wants: left-out data are predicted worse without them.
+
+Evidence lets every effect that a hypothesis does not name be there with a small share of its size,
+and such shares may imitate one effect more. A model that is written has none of them: what imitated
+an effect there is no longer in it, and its own figures are wrong (on logs of one jump of the full
+plant 25 N.s/m of piston damping instead of 15, without the 5 N of friction).
+"""
+
+from __future__ import annotations
+
+from kemba.identify.doubt.cross_validation import left_out, left_out_powers
+from kemba.identify.doubt.parsimony import as_good
+from kemba.identify.evidence.search import Search
+from kemba.identify.evidence.spike_slab import Hypothesis
+from kemba.settings import Settings, setting
+
+
+class WantingSettings(Settings):
+    """When left-out data ask for more than evidence does."""
+
+    least: float = setting(
+        0.15,
+        "1",
+        "share of its size from which left-out data may keep an effect",
+        "derived: three sigmas of the small share that every effect may have",
+        decides=True,
+    )
+
+
+def fuller(search: Search, best: Hypothesis) -> Hypothesis:
+    """The best hypothesis with the further effects that left-out data ask for most.
+
+    Of those that were refitted and that evidence prefers as well, but for the prior, by which every
+    further effect is unlikely.
+    """
+    least = search.points[best].log_evidence
+    larger = [h for h in search.points if set(best) < set(h)]
+    likely = [h for h in larger if search.points[h].log_evidence > least]
+    asked = [h for h in likely if is_asked(search, h, best)]
+    return min(asked, key=lambda h: left_out_powers(search, h).sum(), default=best)
+
+
+def wanted(search: Search, hypothesis: Hypothesis, effect: str, share: float) -> bool:
+    """Whether left-out data ask for an effect of a hypothesis that has a small `share` of its
+    size."""
+    rest = tuple(e for e in hypothesis if e != effect)
+    if not rest or share < WantingSettings.current().least:
+        return False
+    if rest not in search.points and search.late:
+        return False
+    search.visit(rest)
+    return is_asked(search, hypothesis, rest)
+
+
+def is_asked(search: Search, larger: Hypothesis, smaller: Hypothesis) -> bool:
+    """Whether left-out data speak for the larger hypothesis by more than their scatter, in rows and
+    summed over aggregation windows."""
+    powers = left_out_powers(search, smaller), left_out_powers(search, larger)
+    return left_out(search, larger, smaller).pays and not as_good(*powers)

@@ -1,0 +1,52 @@
+"""Small effects beside a strong one: named where left-out data are predicted worse without them."""
+
+from __future__ import annotations
+
+import pytest
+from toy_problem import Toy
+
+from kemba.identify.discover import discover, material
+from kemba.identify.doubt.wanting import fuller, wanted
+from kemba.identify.evidence.search import Search
+
+BOTH = ("drag", "kick")  # sizes that matter are 10 N
+
+
+def searched(truth: dict[str, float]) -> Search:
+    search = Search(Toy(truth))
+    search.start()
+    search.visit(("kick",))
+    search.visit(BOTH)
+    return search
+
+
+def test_a_small_effect_that_left_out_data_need_is_named() -> None:
+    """Without it the model that is written would be wrong where the hum acts."""
+    answer = discover(Toy({"kick.a": 9.0, "hum.a": 1.8})).answer
+    assert (answer.verdict, set(answer.added)) == ("missing", {"hum", "kick"})
+
+
+@pytest.mark.parametrize(("size", "found"), [(1.8, BOTH), (1.2, ("kick",))])
+def test_less_than_three_small_shares_is_never_named(size: float, found: tuple[str, ...]) -> None:
+    search = searched({"kick.a": 9.0, "drag.a": size})
+    assert material(search, BOTH) == found
+
+
+@pytest.mark.parametrize(("size", "found"), [(1.6, BOTH), (1.0, ("kick",)), (0.0, ("kick",))])
+def test_left_out_data_overrule_the_prior_and_not_the_evidence(
+    size: float, found: tuple[str, ...]
+) -> None:
+    """A second effect is unlikely from the first: evidence for 1.6 N of drag does not make up for
+    that."""
+    search = searched({"kick.a": 9.0, "drag.a": size})
+    assert search.best() == ("kick",)
+    assert fuller(search, ("kick",)) == found
+
+
+def test_when_the_answer_is_due_nothing_is_refitted_for_a_small_effect() -> None:
+    search = Search(Toy({"kick.a": 9.0, "drag.a": 1.8}))
+    search.start()
+    search.visit(BOTH)
+    search.due = 0.0
+    assert not wanted(search, BOTH, "drag", 0.18)
+    assert ("kick",) not in search.points
