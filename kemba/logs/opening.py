@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,24 @@ BINARY = tuple(f".{ending}" for ending in MODULES)
 ENDINGS = (*TEXTS, *BINARY)
 YAML = (".yaml", ".yml")
 LONGEST = 200  # characters of another program's message
+
+
+def log_files(paths: Iterable[str | Path]) -> list[Path]:
+    """Logs; a folder stands for its CSV files, in the order of their names.
+
+    Raises KembaError for a folder without any.
+    """
+    found: list[Path] = []
+    for path in map(Path, paths):
+        if not path.is_dir():
+            found.append(path)
+            continue
+        inside = sorted(path.glob("*.csv"))
+        if not inside:
+            hint = "kemba-opt simulate RUN --noise writes some"
+            raise KembaError(str(path), "is a folder without logs", "CSV files were expected", hint)
+        found += inside
+    return found
 
 
 def open_log(path: Path, columns: ColumnMap | None = None, strict: bool = True) -> Trajectory:

@@ -16,7 +16,7 @@ from scipy.io import savemat
 
 from kemba.errors import KembaError
 from kemba.identify.logs.reading import read_log
-from kemba.logs import ColumnMap, ColumnSource, open_log
+from kemba.logs import ColumnMap, ColumnSource, log_files, open_log
 from kemba.logs.formats import matlab
 from kemba.report.export import export
 from kemba.trajectory import Trajectory
@@ -248,3 +248,13 @@ def test_packed_zeros_end_the_reader_of_matlab_files_and_nothing_else(
     assert path.stat().st_size < 20_000
     with pytest.raises(KembaError, match=r"is no MATLAB file that SciPy reads"):
         open_log(path)
+
+
+def test_a_folder_stands_for_its_logs(tmp_path: Path) -> None:
+    for name in ("b.csv", "a.csv", "a.meta.yaml"):
+        (tmp_path / name).touch()
+    (tmp_path / "empty").mkdir()
+    alone = tmp_path / "other.parquet"
+    assert log_files([alone, tmp_path]) == [alone, tmp_path / "a.csv", tmp_path / "b.csv"]
+    with pytest.raises(KembaError, match="is a folder without logs"):
+        log_files([tmp_path / "empty"])

@@ -62,6 +62,7 @@ def characterise(
             raise typer.BadParameter(what, param_hint="--figure")
         _own_rig(logs, model, out, force, json, quiet)
         return
+    from kemba.logs import log_files
     from kemba.plant.rig.characterise import characterise as fit
     from kemba.plant.rig.tables import as_json
     from kemba.trajectory import Trajectory
@@ -70,13 +71,12 @@ def characterise(
     if out:
         fresh(out, force)
     folder = _folder(figure, figures, out)
-    files = [f for item in logs for f in (sorted(item.glob("*.csv")) if item.is_dir() else [item])]
-    read = {str(file): Trajectory.read(file) for file in files}
+    read = {str(file): Trajectory.read(file) for file in log_files(logs)}
     found = fit(read, load_model(model, rig=True).mechanism.need_cylinder())
     if out:
         found.write_model(out, out.stem)
     drawn = _draw(found, read, folder, model) if folder else []
-    answer: dict[str, Any] = {"logs": len(files), **as_json(found), "model": out and str(out)}
+    answer: dict[str, Any] = {"logs": len(read), **as_json(found), "model": out and str(out)}
     answer["figures"] = drawn
     if json:
         print_json(answer)

@@ -16,7 +16,9 @@ SHOWN = 5
 
 
 def compare(
-    logs: Annotated[list[Path], typer.Argument(help="Logs of one machine, in any order.")],
+    logs: Annotated[
+        list[Path], typer.Argument(help="Logs of one machine, or folders of logs, in any order.")
+    ],
     model: Annotated[str, typer.Option(help="Model YAML to judge.")] = "planning",
     run: Annotated[Path | None, typer.Option(help="Run folder that was executed.")] = None,
     figure: Annotated[
@@ -40,6 +42,7 @@ def compare(
     """
     from kemba.folders import place_for
     from kemba.identify.compare_logs import compare_logs
+    from kemba.logs import log_files
     from kemba_cli.course import COMPARE
     from kemba_cli.next_steps import after_compare, say_next
     from kemba_cli.progress import Progress
@@ -51,6 +54,7 @@ def compare(
         from kemba.plotting.style import figure_name
 
         path = figure_name(place_for(out, Path("compare.png"), force))
+    logs = log_files(logs)
     with Progress(quiet or json, COMPARE) as progress:
         found, _ = compare_logs(logs, model, column_map, run, progress.tell)
     if path is not None:

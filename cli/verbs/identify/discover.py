@@ -18,7 +18,9 @@ WRITTEN = ("answer.json", "model.yaml", "model_*.yaml", "experiment.yaml", "*.pn
 
 
 def discover(
-    logs: Annotated[list[Path], typer.Argument(help="Logs of one machine, in any order.")],
+    logs: Annotated[
+        list[Path], typer.Argument(help="Logs of one machine, or folders of logs, in any order.")
+    ],
     holdout: Annotated[
         list[Path] | None, typer.Option(help="A log kept for judging only; may be repeated.")
     ] = None,
@@ -45,14 +47,16 @@ def discover(
     """
     from kemba.folders import claimed
     from kemba.identify.workflow import discover_logs, write_answer
+    from kemba.logs import log_files
     from kemba_cli.course import DISCOVER
     from kemba_cli.next_steps import after_discover, say_next
     from kemba_cli.progress import Progress
 
+    logs, holdout = log_files(logs), log_files(holdout or [])
     with claimed(out, "answer", "answer.json", force) as folder:
         with Progress(quiet or json, DISCOVER, time_limit) as progress:
             answer, found = discover_logs(
-                logs, holdout or [], model, column_map, time_limit, progress.tell
+                logs, holdout, model, column_map, time_limit, progress.tell
             )
         try:
             for old in (file for name in WRITTEN for file in folder.glob(name)):

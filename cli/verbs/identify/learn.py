@@ -99,14 +99,15 @@ def _told_apart(runs: list[Path], logs: list[Path]) -> tuple[list[Path], list[Pa
 
     Raises KembaError where a log does not exist.
     """
+    from kemba.errors import KembaError
+    from kemba.logs import log_files
+
     folders = [path for path in runs if path.is_dir() or path.suffix != ".csv"]
     listed: list[Path] = []
     for path in [*logs, *(path for path in runs if path not in folders)]:
         if not path.exists():
-            from kemba.errors import KembaError
-
             raise KembaError(str(path), "no such file or folder", "logs of the run were expected")
-        listed += sorted(path.glob("*.csv")) if path.is_dir() else [path]
+        listed += log_files([path])
     return folders, listed
 
 

@@ -68,6 +68,8 @@ def _told_apart(
     paths: list[Path], run: Path | None, answer: Path | None
 ) -> tuple[list[Path], Path | None, Path | None]:
     """Logs, run and answer: folders among the arguments are taken for what they hold."""
+    from kemba.logs import log_files
+
     logs: list[Path] = []
     for path in paths:
         if (path / "manifest.json").is_file() and run is None:
@@ -75,5 +77,5 @@ def _told_apart(
         elif (path / "answer.json").is_file() and answer is None:
             answer = path
         else:
-            logs += sorted(path.glob("*.csv")) if path.is_dir() else [path]
+            logs += log_files([path])
     return logs, run, answer

@@ -9,7 +9,7 @@ from kemba.identify.logs.excerpt import excerpts
 from kemba.identify.logs.gate import check_logs
 from kemba.identify.logs.reading import read_logs, taken_on
 from kemba.identify.rigs.characterise import RigFit, fit_rig
-from kemba.logs import load_map
+from kemba.logs import load_map, log_files
 from kemba.model import load_model
 
 
@@ -20,9 +20,7 @@ def characterise_logs(
 
     Raises KembaError; BadData where the logs cannot be right.
     """
-    files = [f for item in map(Path, logs)
-             for f in (sorted(item.glob("*.csv")) if item.is_dir() else [item])]  # fmt: skip
-    read = read_logs(files, load_map(column_map) if column_map else None)
+    read = read_logs(log_files(logs), load_map(column_map) if column_map else None)
     built = load_model(model)
     taken_on(read, built.mechanism)
     check_logs(read)
