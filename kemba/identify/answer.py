@@ -101,7 +101,6 @@ class Answer:
 
 
 FEW = 2  # parameters of an effect that a sentence has room for
-IDLE = "left-out data are predicted as well without it, and it may be chance"
 ENDED = "the time limit ended the search; with a larger --time-limit it goes on"
 
 
@@ -147,13 +146,10 @@ def _partly(answer: Answer) -> str:
         names = enumerated([_named(r) for r in likely])
         parts.append(f"Likely, but not sure: {names}.{_doubt(likely)}")
     goes = f"held-out error goes from {answer.error_before:.2f} to {answer.error_after:.2f}"
-    if IDLE in answer.remarks:
-        parts.append(f"The {goes} times the noise: {IDLE}.")
-    else:
-        share = 1.0 - answer.excess_after / max(answer.excess_before, 1e-9)
-        together = "Together they explain" if len(answer.found) > 1 else "It explains"
-        explained = f"{100 * max(share, 0.0):.0f} % of the error beyond the noise"
-        parts.append(f"{together} {explained} (the {goes} times the noise).")
+    share = 1.0 - answer.excess_after / max(answer.excess_before, 1e-9)
+    together = "Together they explain" if len(answer.found) > 1 else "It explains"
+    explained = f"{100 * max(share, 0.0):.0f} % of the error beyond the noise"
+    parts.append(f"{together} {explained} (the {goes} times the noise).")
     parts += [f"Still unexplained: {answer.rest}." if answer.rest else ""]
     parts += [f"Next: {answer.next}." if answer.next else ""]
     return " ".join(part for part in parts if part)

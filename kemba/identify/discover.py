@@ -10,7 +10,7 @@ import numpy as np
 
 from kemba.identify.answer import ENDED, Answer, Ranked, phrase
 from kemba.identify.doubt.cross_validation import left_out
-from kemba.identify.doubt.parsimony import Belief, likeliest_part, simplest
+from kemba.identify.doubt.parsimony import Belief, is_idle, likeliest_part, none_of, simplest
 from kemba.identify.doubt.run_consistency import drifting
 from kemba.identify.doubt.unexplained import Formula, look
 from kemba.identify.doubt.wanting import fuller, wanted
@@ -216,7 +216,7 @@ def _believed(search: Search, best: Hypothesis, test: NullTest) -> Belief:
             continue
         simpler = simplest(search, belief)
         if simpler.best == best:
-            return simpler
+            return none_of(simpler) if is_idle(search, best) else simpler
         belief = simpler
     return belief
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from kemba.errors import enumerated
-from kemba.identify.answer import ENDED, IDLE, Ranked, Verdict, excess
-from kemba.identify.doubt.cross_validation import left_out_powers
-from kemba.identify.doubt.parsimony import Belief, as_good
+from kemba.identify.answer import ENDED, Ranked, Verdict, excess
+from kemba.identify.doubt.parsimony import Belief
 from kemba.identify.doubt.run_consistency import Drift
 from kemba.identify.doubt.unexplained import Formula, unfinished
 from kemba.identify.evidence.search import Search
@@ -64,8 +63,6 @@ def doubts_about(
         reasons.append(f"{others} would predict left-out data as well as {' + '.join(best)}")
     part = bool(best) and excess(after) <= (1.0 - least) * excess(before)
     unsure = unasked(search, best) if ended else ()
-    if best and not reasons and is_idle(search, best):
-        return Doubts((IDLE,), part=True, unsure=best)
     if unsure and not reasons:
         return Doubts((ENDED,), part=True, unsure=unsure)
     return Doubts(tuple(reasons), part, unsure)
@@ -76,12 +73,6 @@ def unasked(search: Search, best: Hypothesis) -> Hypothesis:
     sensors that drift instead of being wrong, come last."""
     asked_smaller = len(best) == 1 or not search.late
     return tuple(e for e in best if is_fault(e)) if asked_smaller else best
-
-
-def is_idle(search: Search, best: Hypothesis) -> bool:
-    """Whether left-out data, summed over aggregation windows, gain no more by an answer than their
-    scatter. Its p-value counts rows, whose noise may be slower than it is taken to be."""
-    return as_good(left_out_powers(search, NULL), left_out_powers(search, best))
 
 
 def verdict_on(best: Hypothesis, formula: Formula | None, doubts: Doubts) -> Verdict:

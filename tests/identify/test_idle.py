@@ -1,18 +1,21 @@
-"""Effects that are likely at best: what left-out data do not need, and a wrong sensor where the
-time limit ended the search."""
+"""Effects that are not named, or not for sure: what left-out data do not need, and what the time
+limit kept from being asked."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
 import pytest
+from toy_problem import Toy
 
 from kemba.effects import BY_KIND
-from kemba.identify.answer import ENDED, IDLE, Answer, Ranked, Value, phrase
+from kemba.identify.answer import ENDED
 from kemba.identify.bench.problem import bench_problem
-from kemba.identify.doubt.parsimony import Belief
+from kemba.identify.discover import discover
+from kemba.identify.doubt.parsimony import Belief, is_idle
 from kemba.identify.evidence.search import Search
-from kemba.identify.verdict import Doubts, doubts_about, is_idle, verdict_on
+from kemba.identify.verdict import doubts_about, verdict_on
 from kemba.model.spec import load_model
 from kemba.trajectory import Trajectory
 
@@ -58,11 +61,13 @@ def test_of_several_effects_that_were_not_asked_one_by_one_none_is_sure(
     assert doubts_about(search, Belief(FRICTION), None, None, ended=search.late).unsure == ()
 
 
-def test_such_an_effect_is_said_to_be_likely_only() -> None:
-    assert verdict_on(FRICTION, None, Doubts((IDLE,), part=True, unsure=FRICTION)) == "partly"
-    friction = Ranked("seal_friction", 0.99, {"F_c": Value(1.0, 0.5, 1.5, "N")})
-    answer = Answer("partly", ranking=(friction,), found=FRICTION, remarks=[IDLE])
-    answer.error_before = answer.error_after = 1.09
-    said = phrase(answer)
-    assert said.startswith("Likely, but not sure: seal_friction (F_c = 1 N (0.5 to 1.5)).")
-    assert IDLE in said and "explain" not in said
+def test_what_left_out_data_do_not_need_is_not_named() -> None:
+    """An effect that is there in the rows alone, whose sign changes from row to row."""
+    problem = Toy({})
+    problem.window = 20
+    problem._shapes["wave"] = np.where(np.arange(len(problem.measured)) % 2, 1.0, -1.0)
+    problem.measured = problem.measured + 4.0 * problem._shapes["wave"]
+    answer = discover(problem).answer
+    assert (answer.verdict, answer.added) == ("nothing", ())
+    assert answer.sentence.startswith("What differs is too small to matter (p = 0.00")
+    assert any("wave would fit these readings better" in remark for remark in answer.remarks)

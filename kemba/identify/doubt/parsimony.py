@@ -146,6 +146,22 @@ def _instead(search: Search, belief: Belief, chosen: Hypothesis) -> Belief:
     )
 
 
+def is_idle(search: Search, best: Hypothesis) -> bool:
+    """Whether left-out data, summed over aggregation windows, gain no more by an answer than their
+    scatter. Its p-value counts rows, whose noise may be slower than it is taken to be."""
+    return as_good(left_out_powers(search, NULL), left_out_powers(search, best))
+
+
+def none_of(belief: Belief) -> Belief:
+    """The belief in nothing, where the best hypothesis is idle."""
+    remark = (
+        f"{' and '.join(belief.best)} would fit these readings better, but left-out data are "
+        "predicted as well without: it may be chance"
+    )
+    none = belief.without(belief.best, NULL)
+    return replace(none, remarks=(*belief.remarks, remark))
+
+
 def as_good(powers: Array, least: Array) -> bool:
     """Whether left-out sums of squares (b,) are within one standard error of the `least` ones, or
     less than any evidence is between them."""
