@@ -37,13 +37,16 @@ class RobustCandidate:
         landed = self.share.landed if self.share else 0
         return solved, self.good, landed, -self.plan.cost["torque_squared_integral"]
 
-    @property
-    def enough(self) -> bool:
-        """Whether it succeeds so often that no other plan is tried."""
-        least = RobustSettings.current().enough
+    def succeeds(self, least: float) -> bool:
+        """Whether it is solved and good, and succeeds in a share of `least` or more."""
         if self.share is None or not self.rank[0] or not self.good:
             return False
         return self.share.landed >= least * self.share.n
+
+    @property
+    def enough(self) -> bool:
+        """Whether it succeeds so often that no plan is sought anew."""
+        return self.succeeds(RobustSettings.current().enough)
 
 
 def most_robust(
@@ -62,7 +65,7 @@ def most_robust(
     for way in WAYS if first.status.plan else ():
         search.along(way, first, change)
     for name, variant in variants(task):
-        if search.over:
+        if search.over or (search.best and search.best.enough):
             break
         search.take(name, solve(variant))
     return search.best or RobustCandidate(first)
@@ -106,7 +109,7 @@ class _Search:
             one = RobustCandidate(held, table, landed, judged(held, table, self.plant).good)
             if self.best is None or one.rank > self.best.rank:
                 self.best = one
-            if self.best.enough:
+            if self.best.succeeds(1.0):  # continued plans take seconds
                 self.over = True
                 return
 

@@ -13,7 +13,7 @@ from kemba.ocp.certificate.status import Status
 from kemba.ocp.planning import plans_nearby
 from kemba.report.judging.judged import plant_of
 from kemba.report.robust import most_robust
-from kemba.report.robust_ways import gripping, least_grip, longer
+from kemba.report.robust_ways import gripping, least_grip, lifted, longer
 from kemba.scenarios.draw import Scenario, scenarios
 
 
@@ -52,6 +52,16 @@ def test_a_low_jump_does_neither(tmp_path: Path) -> None:
     assert gripping(found, cases) is None and longer(found, cases) is None
 
 
+def test_legs_are_lifted_where_the_task_keeps_them_off_the_ground(tmp_path: Path) -> None:
+    found, cases = planned(0.5), grounds(tmp_path, 0.5)
+    changed = lifted(found, cases)
+    assert changed is not None and changed[0] == "with 5 cm more room under knees and hips"
+    least = {name: bound.at_least for name, bound in changed[1].bounds.items()}
+    assert least == {"body/z": None, "*/knee/z": pytest.approx(0.1), "*/hip/z": pytest.approx(0.08)}
+    free = found.task.model_copy(update={"bounds": {}})
+    assert lifted(replace(found, task=free, requirements=()), cases) is None
+
+
 def asked(height: float, count: int, file: Path) -> Task:
     own = {"robust": count, "uncertainties": str(file)}
     return planned(height).task.model_copy(update=own)
@@ -87,6 +97,7 @@ def test_where_it_falls_other_plans_are_tried(tmp_path: Path) -> None:
     task = asked(0.84, 6, tmp_path / "slippery.yaml")
     found = most_robust(task, solve, change, lambda text: None)
     assert not found.enough and found.share.landed < 6
-    assert [t.duration for t in changed] == [0.7, pytest.approx(0.805)]
+    assert [t.duration for t in changed] == [0.7, 0.7, pytest.approx(0.805)]
+    assert changed[1].bounds != task.bounds, "legs that keep off the ground by more"
     assert [t.seed for t in solved] == [0, 1], "as asked, then from another start"
     assert found.plan.task == task, "the only plan there is"
