@@ -47,7 +47,7 @@ PLANS, DOCS = ROOT / "configs" / "plans", ROOT / "docs" / "discovery.md"
 SETS = (  # plans that are learnt from, and plans to judge by
     (("hop-0350", "low-0400", "up-0500"), ("up-0540", "low-0430")),
     (("up-0560", "near-0200", "mid-0760"), ("up-0580", "near-0150")),
-    (("high-0800", "ahead-0300", "low-0420"), ("high-0820", "near-0250")),
+    (("high-0800", "back-0300", "low-0420"), ("high-0820", "back-0250")),
     (("low-0360", "up-0600", "up-0740"), ("low-0380", "up-0620")),
 )
 LIKELY = (
