@@ -77,8 +77,9 @@ def longer(found: Plan, cases: Sequence[Scenario]) -> Changed:
     return words, task.model_copy(update={"duration": duration})
 
 
-# in which order a plan is changed: first within its task, then with more time than that gives
-WAYS = ((gripping,), (lifted, gripping), (longer, gripping))
+# in which order a plan is changed: first what takes least time and changes it least (of
+# jump_forward 12 s and 23 s by hand), at last with more time than the task gives
+WAYS = ((lifted, gripping), (gripping,), (longer, gripping))
 
 
 def variants(task: Task) -> Iterator[tuple[str, Task]]:

@@ -98,6 +98,6 @@ def test_where_it_falls_other_plans_are_tried(tmp_path: Path) -> None:
     found = most_robust(task, solve, change, lambda text: None)
     assert not found.enough and found.share.landed < 6
     assert [t.duration for t in changed] == [0.7, 0.7, pytest.approx(0.805)]
-    assert changed[1].bounds != task.bounds, "legs that keep off the ground by more"
+    assert changed[0].bounds != task.bounds, "first legs that keep off the ground by more"
     assert [t.seed for t in solved] == [0, 1], "as asked, then from another start"
     assert found.plan.task == task, "the only plan there is"
