@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from toy_problem import Toy
 
 from kemba.identify.discover import discover, material
-from kemba.identify.doubt.wanting import fuller, wanted
+from kemba.identify.doubt.cross_validation import left_out, left_out_error
+from kemba.identify.doubt.wanting import fuller, is_asked, wanted
 from kemba.identify.evidence.search import Search
 
 BOTH = ("drag", "kick")  # sizes that matter are 10 N
@@ -50,3 +52,16 @@ def test_when_the_answer_is_due_nothing_is_refitted_for_a_small_effect() -> None
     search.due = 0.0
     assert not wanted(search, BOTH, "drag", 0.18)
     assert ("kick",) not in search.points
+
+
+def test_left_out_data_that_no_answer_explains_ask_for_nothing() -> None:
+    """A step that no effect has: what imitates a part of it is not named for that."""
+    problem = Toy({"kick.a": 9.0, "drag.a": 1.6})
+    problem.measured = problem.measured + 8.0 * np.sign(problem.rows().time - 0.4)
+    search = Search(problem)
+    search.start()
+    for hypothesis in (("kick",), BOTH):
+        search.visit(hypothesis)
+    assert left_out(search, BOTH, ("kick",)).pays
+    assert left_out_error(search, BOTH) > 1.5
+    assert not is_asked(search, BOTH, ("kick",))
