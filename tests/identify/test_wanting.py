@@ -56,8 +56,8 @@ def test_when_the_answer_is_due_nothing_is_refitted_for_a_small_effect() -> None
 
 def test_left_out_data_that_no_answer_explains_ask_for_nothing() -> None:
     """A step that no effect has: what imitates a part of it is not named for that."""
-    problem = Toy({"kick.a": 9.0, "drag.a": 1.6})
-    problem.measured = problem.measured + 8.0 * np.sign(problem.rows().time - 0.4)
+    problem = Toy({"kick.a": 9.0, "drag.a": 5.0})
+    problem.measured = problem.measured + 4.0 * np.sign(problem.rows().time - 0.4)
     search = Search(problem)
     search.start()
     for hypothesis in (("kick",), BOTH):
