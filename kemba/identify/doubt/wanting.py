@@ -17,20 +17,7 @@ from kemba.identify.doubt.parsimony import as_good
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import Hypothesis
 from kemba.identify.problem.sensor_faults import is_fault
-from kemba.identify.settings import VerdictSettings
-from kemba.settings import Settings, setting
-
-
-class WantingSettings(Settings):
-    """When left-out data ask for more than evidence does."""
-
-    least: float = setting(
-        0.15,
-        "1",
-        "share of its size from which left-out data may keep an effect",
-        "derived: three sigmas of the small share that every effect may have",
-        decides=True,
-    )
+from kemba.identify.settings import DiscoverSettings, VerdictSettings
 
 
 def fuller(search: Search, best: Hypothesis) -> Hypothesis:
@@ -47,10 +34,10 @@ def fuller(search: Search, best: Hypothesis) -> Hypothesis:
 
 
 def wanted(search: Search, hypothesis: Hypothesis, effect: str, share: float) -> bool:
-    """Whether left-out data ask for an effect of a hypothesis that has a small `share` of its
-    size."""
+    """Whether left-out data ask for an effect of a hypothesis, whose `share` of its size would
+    matter alone but is small beside a stronger one."""
     rest = tuple(e for e in hypothesis if e != effect)
-    if not rest or share < WantingSettings.current().least:
+    if not rest or share < DiscoverSettings.current().matters:
         return False
     if rest not in search.points and search.late:
         return False
