@@ -23,7 +23,7 @@ from kemba.identify.evidence.search_settings import SearchSettings
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
 from kemba.identify.evidence.windows import error_ratio
 from kemba.identify.problem.problem import Problem
-from kemba.identify.ranking import error, ladder, ranked, strength
+from kemba.identify.ranking import error, fitted_errors, ladder, ranked, strength
 from kemba.identify.rest import rest_of
 from kemba.identify.settings import DiscoverSettings, VerdictSettings
 from kemba.identify.stages import is_mixture, joined, structure_row, unbuilt
@@ -36,15 +36,14 @@ Talk = Callable[[str], None]
 class Discovery:
     """A finished search and what was made of it.
 
-    `earlier`: errors on the fitted logs of the model as it was, where `search` is that of a model
-    built anew with another structure.
+    `fitted`: errors on the fitted logs at every step of the answer's `ladder`.
     """
 
     answer: Answer
     search: Search
     best: Hypothesis
     holdout: Problem | None = None
-    earlier: tuple[float, ...] = ()
+    fitted: tuple[float, ...] = ()
 
 
 def discover(
@@ -115,7 +114,8 @@ def _built_anew(search: Search, other: Rebuilt, holdout: Problem | None) -> Disc
     answer = joined(row, null_test(search).p_value(gain), found.answer, second, found.best)
     first_error = search.points[NULL].fitted_error
     search.say(f"built anew, the error is {answer.error_after:.2f} times the noise")
-    return Discovery(answer, second, found.best, found.holdout, (first_error,))
+    fitted = (first_error, *found.fitted)
+    return Discovery(answer, second, found.best, found.holdout, fitted)
 
 
 def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> Discovery:
@@ -144,7 +144,7 @@ def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> 
     answer.remarks = [*answer.remarks, *belief.remarks]
     if ended and ENDED not in answer.remarks:
         answer.remarks = [*answer.remarks, ENDED]
-    return Discovery(answer, search, best, holdout)
+    return Discovery(answer, search, best, holdout, fitted_errors(search, best))
 
 
 def _undecided(search: Search, test: NullTest, holdout: Problem | None) -> Discovery:
@@ -161,7 +161,7 @@ def _undecided(search: Search, test: NullTest, holdout: Problem | None) -> Disco
     if doubts.reasons:
         answer.next = f"record at least {(test.needed + 1) * DiscoverSettings.current().fine:.1f} s"
         answer.sentence = phrase(answer)
-    return Discovery(answer, search, NULL, holdout)
+    return Discovery(answer, search, NULL, holdout, fitted_errors(search, NULL))
 
 
 def _best_gain(search: Search) -> float:

@@ -163,3 +163,8 @@ def ladder(search: Search, best: Hypothesis, holdout: Problem | None) -> list[tu
     for before, after in pairwise(steps):
         names.append(" + ".join(e for e in after if e not in before))
     return [(n, error(search, step, holdout)) for n, step in zip(names, steps, strict=True)]
+
+
+def fitted_errors(search: Search, best: Hypothesis) -> tuple[float, ...]:
+    """Error on the fitted logs at every rung of the ladder."""
+    return tuple(search.points[step].fitted_error for step in rungs(search, best))

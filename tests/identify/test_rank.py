@@ -16,6 +16,7 @@ from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, SpikeSlabSettings, probabilities
 from kemba.identify.ranking import values
 from kemba.identify.verdict import doubts_about, verdict_on
+from kemba.plotting.study.discovery import plot_steps
 
 
 def test_the_right_effect_is_named_with_its_value() -> None:
@@ -48,6 +49,13 @@ def test_as_many_effects_are_found_as_the_data_carry() -> None:
         value = row.parameters["a"]
         assert value.low < hidden[row.effect] < value.high
     assert answer.excess_after < 0.2 * answer.excess_before
+
+
+def test_the_figure_of_an_answer_does_not_depend_on_what_is_refitted_later() -> None:
+    found = discover(Toy({"kick.a": -9.0, "wave.a": 7.0}))
+    del found.search.points["kick",]
+    plot_steps(found)
+    assert len(found.fitted) == len(found.answer.ladder)
 
 
 def test_an_effect_beside_others_must_pay_on_left_out_data() -> None:

@@ -14,7 +14,6 @@ from kemba.identify.discover import Discovery
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
 from kemba.identify.evidence.windows import free_starts
 from kemba.identify.problem.problem import Array, Rows
-from kemba.identify.ranking import rungs
 from kemba.plotting.bands import plot_bands, plot_ladder
 from kemba.plotting.heat import plot_heat_map
 from kemba.plotting.study.comparison import bands_of, in_words, place_of
@@ -82,11 +81,8 @@ def plot_explained(found: Discovery) -> Figure:
 
 def plot_steps(found: Discovery) -> Figure:
     """Errors of fitted and held-out data as effects are added: the numbers of the answer."""
-    names = [name for name, _ in found.answer.ladder]
-    fitted = [found.search.points[step].fitted_error for step in rungs(found.search, found.best)]
-    return plot_ladder(
-        names, [*found.earlier, *fitted], [error for _, error in found.answer.ladder]
-    )
+    names, unseen = zip(*found.answer.ladder, strict=True)
+    return plot_ladder(names, found.fitted, unseen)
 
 
 def _residuals(found: Discovery) -> tuple[Rows, dict[str, Array]]:
