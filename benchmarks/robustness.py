@@ -39,11 +39,11 @@ from kemba.plant.execution.repeat import plant_of
 from kemba.plant.execution.replay import ends_standing
 from kemba.policy.execute import execute_policy
 from kemba.policy.player import Policy
-from kemba.policy.write import FILE, write_policy
+from kemba.policy.write import FILE
 from kemba.runs import Run, load_run, sha256
 from kemba.scenarios.conditions import standing
 from kemba.scenarios.draw import Scenario, scenarios
-from kemba.scenarios.expected import executions_of
+from kemba.scenarios.feedback import policy_of
 from kemba.scenarios.share import fault_of
 from kemba.sweep.workers.machine import machine
 
@@ -52,8 +52,6 @@ WAYS = {  # how a table is executed, under which uncertainties
     "usual": ("usual", "open loop"),
     "twice": ("twice", "open loop"),
     "feedback": ("twice", "feedback"),
-    "hips": ("twice", "hips"),
-    "edges": ("twice", "edges"),
 }
 CARD = Path(__file__).resolve().parent.parent / "docs" / "robustness.md"
 UNITS = {"height": "m", "distance": "m", "supply": "Pa", "payload": "kg", "duration": "s"}
@@ -106,8 +104,7 @@ def executed(bench: Bench, case: Scenario, way: str, seed: int) -> Execution:
     rest, start = rest_after(bench.model, plan, table), standing(case.model, table, case.start)
     if way == "open loop":
         return execute(table, case.model, extra=rest, start=start)
-    hips, retime = (way in ("feedback", part) for part in ("hips", "edges"))
-    policy = Policy(bench.run.path / FILE, retime, hips)
+    policy = Policy(bench.run.path / FILE)
     return execute_policy(table, policy, case.model, rest, start, noise=True, seed=seed)
 
 
@@ -116,9 +113,7 @@ def records(
 ) -> Iterator[dict[str, Any]]:
     """What happens in those of the `drawn` executions that are not known yet."""
     lands = bool(ends_standing(bench.model, bench.run.trajectory))
-    policy = bench.run.path / FILE
-    if way != "open loop" and not policy.is_file():
-        write_policy(bench.model, bench.run.controller, policy, executions_of(bench.run.path))
+    policy = bench.run.path / FILE if way == "open loop" else policy_of(bench.run.path)
     parts = [bench.table, shipped_folder("uncertainties") / f"{file}.yaml"]
     parts += [policy] if way != "open loop" else []
     what = "".join(sha256(part)[:8] for part in parts)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from kemba.model import Model
-from kemba.ocp import load_task, task_model
 from kemba.plant.execution.controller import PERIOD, Execution, condition_of, later, read_controller
 from kemba.plant.execution.repeat import VALVE_SCATTER, Play
 from kemba.plant.execution.sensors import Sensors
@@ -18,8 +17,6 @@ from kemba.plant.simulation.simulate import simulate_one
 from kemba.policy.modes import Array
 from kemba.policy.player import Policy
 from kemba.policy.settings import PolicySettings
-from kemba.policy.write import FILE, write_policy
-from kemba.runs import load_run
 from kemba.trajectory import Trajectory
 
 
@@ -107,20 +104,9 @@ def _sent(table: Trajectory, policy: Policy, commands: list[Array]) -> Trajector
     return table.with_columns({headers[n]: rows[:, i] for i, n in enumerate(policy.valves)})
 
 
-def player_of(
-    run: str | Path, executions: Callable[[], Sequence[Trajectory]] | None = None
-) -> Play:
-    """How `repeat_run` executes a run with its policy, which is made where it is missing.
-
-    The policy is made with the model of the run's task and with what `executions` of the table
-    under various conditions do. Raises KembaError where the run has no task, or no policy can be
-    made.
-    """
-    folder = Path(run) if Path(run).is_dir() else Path(run).parent
-    file, table = folder / FILE, read_controller(run)
-    if not file.is_file() or file.stat().st_mtime < (folder / "controller.csv").stat().st_mtime:
-        task = load_task(load_run(folder).task)[0]
-        write_policy(task_model(task), table, file, executions() if executions else ())
+def player_of(file: str | Path, run: str | Path) -> Play:
+    """How `repeat_run` executes a run with a policy file. Raises KembaError without a table."""
+    table = read_controller(run)
 
     def play(model: Model, sample: Array, seed: list[int], noise: bool) -> Execution:
         scatter = VALVE_SCATTER if noise else 0.0

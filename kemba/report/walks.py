@@ -48,7 +48,9 @@ def walk(work: Mapping[str, Any]) -> dict[str, Any]:
             told.append(f"{value}: none")
             continue
         found = made.plan
-        origin = Origin(found.trajectory, found.model, found.requirements, once=True)
+        origin = Origin(
+            found.trajectory, found.model, found.requirements, once=True, stages=found.stages
+        )
         last = Last(origin, found.task.effects, made.result.get("fitted_air"))
         facts = record(made) | {"task": work["task"], "set": list(work["set"]), "by": work["name"]}
         told.append(f"{value}: {facts['cost']:.3g}{'' if facts['good'] else ' (bad)'}")

@@ -12,7 +12,6 @@ from kemba_cli.common import Force, Json, OwnEffects, Quiet, newest, print_json,
 
 if TYPE_CHECKING:
     from kemba.plant.rig.rigs import Rig
-    from kemba.trajectory import Trajectory
 
 
 def simulate(
@@ -85,16 +84,13 @@ def _run(
     from kemba.plant.execution.repeat import plant_of, repeat_run
 
     plant = plant_of(source, model)
-    play = None
+    play, fed_back = None, ""
     if policy:
         from kemba.policy.execute import player_of
+        from kemba.scenarios.feedback import policy_of, words_of
 
-        def executions() -> list[Trajectory]:
-            from kemba.scenarios.expected import executions_of
-
-            return executions_of(source)
-
-        play = player_of(source, executions)
+        file = policy_of(source, tell)
+        play, fed_back = player_of(file, source), f"; {words_of(file)}"
     repeats = repeat_run(source, plant, out, repeat, noise, seed, play=play, tell=tell)
     runs = [r.summary for r in repeats]
     apex = ", ".join(f"{r['apex_m']:.3f}" for r in runs)
@@ -103,6 +99,7 @@ def _run(
         worst = max((abs(r["apex_error_m"]) for r in runs), default=0.0)
         landed = sum(r["landed"] for r in runs)
         sentence += f", off the plan by at most {1e3 * worst:.0f} mm; {landed} of {repeat} landed"
+    sentence += fed_back
     return {
         "model": plant.name,
         "folder": str(out),
