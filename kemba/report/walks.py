@@ -14,6 +14,7 @@ from kemba.ocp import Plan, Task, load_task, plan
 from kemba.ocp.certificate.objective import objective
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.continuation.between import Origin
+from kemba.ocp.continuation.kept import read_stages, write_stages
 from kemba.ocp.planning import plan_from
 from kemba.ocp.reading import task_model
 from kemba.ocp.shipped.entry import read_plan, write_plan
@@ -32,9 +33,10 @@ def walk(work: Mapping[str, Any]) -> dict[str, Any]:
 
     `task`: its name; `set`: overrides that stay; `figure`: what changes, through `values`. The
     first plan begins from `first`, the stem of a plan in `folder`, or from a guess where that is
-    empty. Every solved plan is kept in `folder`, with what its executions say. A value that cannot
-    be reached is left out; the next one is tried from the last plan. `matched`: plans are changed
-    until their executions keep to the tolerances, as by `solve`, with air fitted to the plant.
+    empty. Every solved plan is kept in `folder`, with its solved program and what its executions
+    say. A value that cannot be reached is left out; the next one is tried from the last plan.
+    `matched`: plans are changed until their executions keep to the tolerances, as by `solve`, with
+    air fitted to the plant.
     """
     folder = Path(work["folder"])
     folder.mkdir(parents=True, exist_ok=True)
@@ -56,6 +58,8 @@ def walk(work: Mapping[str, Any]) -> dict[str, Any]:
         told.append(f"{value}: {facts['cost']:.3g}{'' if facts['good'] else ' (bad)'}")
         name = f"{work['name']}-{1e3 * float(str(value).split()[0]):04.0f}"
         write_plan(folder / f"{name}.npz", found.trajectory, found.model, last.air)
+        if found.stages is not None:
+            write_stages(folder / f"{name}.stages", found.stages)
         write_json(folder / f"{name}.json", facts)
     return {"status": "walked", "good": True, "sentence": "; ".join(told)}
 
@@ -118,6 +122,6 @@ def _kept(file: Path, work: Mapping[str, Any]) -> Last:
                                         if getattr(task, k) is not None} | air)  # fmt: skip
     model = task_model(own)
     asked = resolve(own, model, document)
-    return Last(
-        Origin(kept, model, tuple(asked), once=True), own.effects, kept.meta.get("fitted_air")
-    )
+    stages = read_stages(file.with_suffix(".stages"))
+    origin = Origin(kept, model, tuple(asked), once=True, stages=stages)
+    return Last(origin, own.effects, kept.meta.get("fitted_air"))
