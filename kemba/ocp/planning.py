@@ -111,7 +111,8 @@ def _origin(entry: Entry, task: Task) -> Origin:
     model = task_model(own)
     asked = resolve(own, model, Document(own.model_dump()))
     name, dear = f"the shipped plan {entry.name}", "one from a guess (--cold) may take less"
-    return Origin(entry.plan, model, tuple(asked), name, dear, once=task.grip == 1.0)
+    once, stages = task.grip == 1.0, entry.stages
+    return Origin(entry.plan, model, tuple(asked), name, dear, once=once, stages=stages)
 
 
 def plan_from(

@@ -14,7 +14,7 @@ from kemba.ocp import Plan, Task, load_task, plan
 from kemba.ocp.certificate.objective import objective
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.continuation.between import Origin
-from kemba.ocp.continuation.kept import read_stages, write_stages
+from kemba.ocp.continuation.kept import read_stages
 from kemba.ocp.planning import plan_from
 from kemba.ocp.reading import task_model
 from kemba.ocp.shipped.entry import read_plan, write_plan
@@ -57,9 +57,8 @@ def walk(work: Mapping[str, Any]) -> dict[str, Any]:
         facts = record(made) | {"task": work["task"], "set": list(work["set"]), "by": work["name"]}
         told.append(f"{value}: {facts['cost']:.3g}{'' if facts['good'] else ' (bad)'}")
         name = f"{work['name']}-{1e3 * float(str(value).split()[0]):04.0f}"
-        write_plan(folder / f"{name}.npz", found.trajectory, found.model, last.air)
-        if found.stages is not None:
-            write_stages(folder / f"{name}.stages", found.stages)
+        kept = folder / f"{name}.npz"
+        write_plan(kept, found.trajectory, found.model, last.air, found.stages)
         write_json(folder / f"{name}.json", facts)
     return {"status": "walked", "good": True, "sentence": "; ".join(told)}
 
@@ -122,6 +121,5 @@ def _kept(file: Path, work: Mapping[str, Any]) -> Last:
                                         if getattr(task, k) is not None} | air)  # fmt: skip
     model = task_model(own)
     asked = resolve(own, model, document)
-    stages = read_stages(file.with_suffix(".stages"))
-    origin = Origin(kept, model, tuple(asked), once=True, stages=stages)
+    origin = Origin(kept, model, tuple(asked), once=True, stages=read_stages(file))
     return Last(origin, own.effects, kept.meta.get("fitted_air"))

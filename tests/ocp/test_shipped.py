@@ -91,7 +91,7 @@ def test_other_robots_have_none() -> None:
 def test_what_is_kept_of_a_plan(tmp_path: Path) -> None:
     entry = shelf(SHELF)[0]
     model = task_model(load_task("jump")[0])
-    write_plan(tmp_path / "again.npz", entry.plan, model)
+    write_plan(tmp_path / "again.npz", entry.plan, model, stages=entry.stages)
     assert (tmp_path / "again.npz").read_bytes() == entry.file.read_bytes()
     assert read_plan(tmp_path / "again.npz").meta == entry.plan.meta
 

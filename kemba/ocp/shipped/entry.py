@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 
 from kemba.model import Model
+from kemba.ocp.continuation.kept import packed, read_stages
+from kemba.ocp.phases.stages import Stages
 from kemba.ocp.transcription.solution import groups
 from kemba.trajectory import Trajectory
 
@@ -38,6 +40,11 @@ class Entry:
         return read_plan(self.file)
 
     @property
+    def stages(self) -> Stages | None:
+        """Its solved program; None where it was not kept."""
+        return read_stages(self.file)
+
+    @property
     def effects(self) -> dict[str, dict[str, Any]]:
         """The figures of fitted air with which it was made, as a task's `effects`; empty without
         a fit."""
@@ -55,9 +62,14 @@ class Entry:
 
 
 def write_plan(
-    path: Path, plan: Trajectory, model: Model, air: Mapping[str, Any] | None = None
+    path: Path,
+    plan: Trajectory,
+    model: Model,
+    air: Mapping[str, Any] | None = None,
+    stages: Stages | None = None,
 ) -> None:
-    """Keep what a start needs: states, inputs and forces, in single precision, and the phases.
+    """Keep what a start needs in single precision: states, inputs and forces, the phases, and the
+    solved program (`stages`).
 
     `air`: `effects` and `fitted_air` of a plan whose air was fitted.
     """
@@ -70,6 +82,7 @@ def write_plan(
         values=values.astype(np.float32),
         headers=np.array(headers),
         notes=np.array(notes),
+        **(packed(stages, small=True) if stages else {}),
     )
 
 
