@@ -34,8 +34,8 @@ stays upright. The intervals are Wilson's, of 95 %.
 torque of the plan [N².m².s].
 
 *Open loop*: hips follow the table by eq. 10, valves switch by the clock. *Feedback*: the
-[policy](policy.md) with noisy sensors, with those of its parts that land most often in 40 other
-draws.
+[policy](policy.md) with noisy sensors, with those of its parts with which most of 40 other
+draws land and end in place.
 """
 
 

@@ -1,8 +1,9 @@
-"""The feedback policy of a run: those of its parts with which most executions succeed.
+"""The feedback policy of a run: those of its parts with which most executions come out.
 
 Gains come from linear maps, which do not hold where a landing is a matter of which foot comes down
 first. Of a jump of 0.1 m ahead at twice the usual uncertainty the table alone lands in all of 240
-executions, with corrections of hips and edges in 195; so parts are tried before they are used.
+executions, with corrections of hips and edges in 195; 0.4 m ahead both parts keep 16 of 16 upright,
+but 10 of them end more than 5 cm from their place, and with edges alone one (by hand).
 """
 
 from __future__ import annotations
@@ -27,16 +28,17 @@ from kemba.scenarios.conditions import standing
 from kemba.scenarios.draw import Scenario, scenarios
 from kemba.scenarios.expected import FILE as UNCERTAINTIES
 from kemba.scenarios.expected import executions_of
-from kemba.scenarios.share import fault_of, share
+from kemba.scenarios.share import fault_of
 from kemba.settings import Settings, setting
 from kemba.stopwatch import Stage, Tell, silent
 
 NEITHER = "neither"
+KEPT = ("tried", "succeeded", "ended", "of")  # arrays of the file
 WAYS = {  # which parts act: retimed edges, torques of the hips
     "edges and hips": (True, True),
-    NEITHER: (False, False),
-    "hips": (False, True),
     "edges": (True, False),
+    "hips": (False, True),
+    NEITHER: (False, False),
 }
 
 
@@ -67,43 +69,48 @@ def policy_of(run: str | Path, tell: Tell = silent) -> Path:
 
 
 def words_of(file: Path) -> str:
-    """Which parts of a policy act, and in how many executions each way succeeded."""
+    """Which parts of a policy act, and what came of each way."""
     with np.load(file, allow_pickle=False) as data:
         if "tried" not in data:
             return "feedback whose parts were not tried"
-        ways, succeeded, of = list(data["tried"]), list(data["succeeded"]), int(data["of"])
-    counts = ", ".join(f"{way} {n}" for way, n in zip(ways, succeeded, strict=True))
-    return f"feedback by {ways[int(np.argmax(succeeded))]} (of {of} executions succeed: {counts})"
+        ways, succeeded, ended, of = (data[key].tolist() for key in KEPT)
+    best = ways[int(np.argmax(np.add(succeeded, ended)))]
+    counts = ", ".join(
+        f"{way} {n} and {m}" for way, n, m in zip(ways, succeeded, ended, strict=True)
+    )
+    return f"feedback by {best} (of {of} executions succeed, and end in place: {counts})"
 
 
 def _choose(run: Run, model: Model, file: Path, tell: Tell) -> None:
-    """Try the whole policy, then its parts where some executions fail; the gains of what is not
-    kept are set to zero in the file."""
+    """Try the whole policy, then its parts; the gains of what is not kept are set to zero in the
+    file."""
     cases = scenarios(UNCERTAINTIES, plant_of(run.path), TrialSettings.current().count)
-    succeeded: dict[str, int] = {}
+    found: dict[str, tuple[int, int]] = {}
     for number, way in enumerate(WAYS, start=1):
         tell(Stage("trying feedback", number, len(WAYS)))
-        succeeded[way] = _successes(run, model, file, way, cases)
-        if succeeded[way] == len(cases):
+        found[way] = _tried(run, model, file, way, cases)
+        if min(found[way]) == len(cases):
             break
-    edges, hips = WAYS[max(succeeded, key=lambda way: succeeded[way])]
+    edges, hips = WAYS[max(found, key=lambda way: sum(found[way]))]
+    succeeded, ended = zip(*found.values(), strict=True)
     with np.load(file, allow_pickle=False) as data:
         arrays = dict(data)
     arrays["edge_gain"] *= edges
     arrays["hip_gains"] *= hips
-    arrays["tried"], arrays["of"] = np.array(list(succeeded)), np.array(len(cases))
-    arrays["succeeded"] = np.array(list(succeeded.values()))
+    told = zip(KEPT, (list(found), succeeded, ended, len(cases)), strict=True)
+    arrays |= {key: np.array(value) for key, value in told}
     with file.open("wb") as stream:
         np.savez_compressed(stream, **arrays)
 
 
-def _successes(run: Run, model: Model, file: Path, way: str, cases: Sequence[Scenario]) -> int:
-    """In how many scenarios the plan on `model` succeeds, played with noisy sensors."""
-    plan, table = run.trajectory, run.controller
-    if way == NEITHER:
-        return share(model, plan, table, cases).landed
+def _tried(
+    run: Run, model: Model, file: Path, way: str, cases: Sequence[Scenario]
+) -> tuple[int, int]:
+    """In how many scenarios the plan on `model` succeeds, played with noisy sensors; and in how
+    many of these its end is where the task's tolerance has it."""
+    plan, table, task = run.trajectory, run.controller, load_task(run.task)[0]
     rest, lands = rest_after(model, plan, table), bool(ends_standing(model, plan))
-    good = 0
+    succeeded = ended = 0
     for seed, case in enumerate(cases):
         policy, start = Policy(file, *WAYS[way]), standing(case.model, table, case.start)
         try:
@@ -112,5 +119,8 @@ def _successes(run: Run, model: Model, file: Path, way: str, cases: Sequence[Sce
             )
         except KembaError:
             continue  # it cannot be simulated
-        good += not fault_of(done.against(case.model, plan), lands)
-    return good
+        replay = done.against(case.model, plan)
+        good = not fault_of(replay, lands)
+        succeeded += good
+        ended += good and replay.final_error_m <= task.tolerances.plant_final
+    return succeeded, ended
