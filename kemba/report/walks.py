@@ -22,10 +22,14 @@ from kemba.ocp.shipped.kind import FIGURES, figures_of
 from kemba.ocp.task.requirement import resolve
 from kemba.report.best import Approach, best_plan, improved
 from kemba.report.judging.executed import Executed, executed
+from kemba.report.judging.judged import plant_of
 from kemba.report.listener import Listener
+from kemba.scenarios.draw import scenarios
+from kemba.scenarios.share import share
 from kemba.stopwatch import silent
 
 PATIENT = "solver.time_limit=3600 s"
+SCENARIOS = 60  # in which a plan is executed before it is shipped
 
 
 def walk(work: Mapping[str, Any]) -> dict[str, Any]:
@@ -80,15 +84,18 @@ class Last:
 
 
 def record(made: Executed) -> dict[str, Any]:
-    """Figures and cost of a plan, and whether its executions keep to the tolerances."""
+    """Figures and cost of a plan, whether its executions keep to the tolerances, and in how many of
+    `SCENARIOS` at twice the usual uncertainty it lands."""
     found = made.plan
-    task, model = found.task, found.model
+    task, model, table = found.task, found.model, made.motions.table
+    cases = scenarios("twice", plant_of(task), SCENARIOS)
     return {
         "figures": figures_of(task, model),
         "cost": objective(model, task, found.requirements, found.trajectory),
         **found.cost,
         "plant": made.result["plant_replay"],
         "good": made.good,
+        "landed": share(model, found.trajectory, table, cases).landed if table is not None else 0,
     }
 
 
