@@ -26,6 +26,7 @@ DRAWN = (
 CONSTANTS = {  # file -> names, why
     # physics
     "effects/pneumatics/constants.py": ("ATMOSPHERE KAPPA GAS TEMPERATURE", "constants of air"),
+    "report/walks.py": ("SCENARIOS", "of a plan that is shipped: 3 s of a core"),
     "effects/pneumatics/flow.py": (
         "CHOKED SUBSONIC SOFT",
         "the critical pressure ratio; smoothing",
