@@ -109,7 +109,12 @@ class Run:
     @cached_property
     def controller(self) -> Trajectory:
         """The commands for the robot, at the controller's rate."""
-        return Trajectory.read(self._file("controller.csv"))
+        return Trajectory.read(self.table)
+
+    @property
+    def table(self) -> Path:
+        """The file of these commands."""
+        return self._file("controller.csv")
 
     @cached_property
     def certificate(self) -> dict[str, Any]:

@@ -26,7 +26,6 @@ DRAWN = (
 CONSTANTS = {  # file -> names, why
     # physics
     "effects/pneumatics/constants.py": ("ATMOSPHERE KAPPA GAS TEMPERATURE", "constants of air"),
-    "report/walks.py": ("SCENARIOS", "of a plan that is shipped: 3 s of a core"),
     "effects/pneumatics/flow.py": (
         "CHOKED SUBSONIC SOFT",
         "the critical pressure ratio; smoothing",
@@ -114,6 +113,7 @@ CONSTANTS = {  # file -> names, why
     "folders.py": ("PROBE MANY", "free space that a run takes; length of messages"),
     "ocp/refinement/refine.py": ("SOLVES", "a count that progress shows"),
     "ocp/refinement/sample.py": ("WORST", "violations that a report lists"),
+    "report/walks.py": ("SCENARIOS", "of a plan that is shipped: 3 s of a core"),
     "sweep/workers/farm.py": ("ENVIRONMENT", "environment of workers"),
     "units.py": ("ALIASES USUAL", "powers and sizes of units"),
 }

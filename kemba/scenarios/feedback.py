@@ -32,13 +32,12 @@ from kemba.scenarios.share import fault_of
 from kemba.settings import Settings, setting
 from kemba.stopwatch import Stage, Tell, silent
 
-NEITHER = "neither"
 KEPT = ("tried", "succeeded", "ended", "of")  # arrays of the file
 WAYS = {  # which parts act: retimed edges, torques of the hips
     "edges and hips": (True, True),
     "edges": (True, False),
     "hips": (False, True),
-    NEITHER: (False, False),
+    "neither": (False, False),
 }
 
 
@@ -56,14 +55,13 @@ def policy_of(run: str | Path, tell: Tell = silent) -> Path:
 
     Raises KembaError where the run has no task or no plan, or no policy can be made.
     """
-    folder = Path(run) if Path(run).is_dir() else Path(run).parent
-    file, table = folder / FILE, folder / "controller.csv"
-    if not file.is_file() or file.stat().st_mtime < table.stat().st_mtime:
-        own = load_run(folder)
+    own = load_run(run)
+    file, made = own.path / FILE, own.table.stat().st_mtime
+    if not file.is_file() or file.stat().st_mtime < made:
         model = task_model(load_task(own.task)[0])
         with atomic_path(file) as path:
             tell("executing under uncertainty")
-            write_policy(model, own.controller, path, executions_of(folder))
+            write_policy(model, own.controller, path, executions_of(own.path))
             _choose(own, model, path, tell)
     return file
 

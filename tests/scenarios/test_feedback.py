@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from kemba.errors import KembaError
 from kemba.scenarios import feedback
 from kemba.scenarios.feedback import TrialSettings, policy_of, words_of
 from kemba.settings import changed
@@ -65,3 +67,10 @@ def test_a_policy_is_made_once_and_succeeds_where_it_says(run: Path) -> None:
     with np.load(file) as data:
         assert max(data["succeeded"]) == 4, "the shipped drop lands with or without feedback"
         assert (data["ended"] <= data["succeeded"]).all()
+
+
+def test_a_run_without_a_table_says_so(run: Path, tmp_path: Path) -> None:
+    for name in ("manifest.json", "task.yaml"):
+        shutil.copy(run / name, tmp_path)
+    with pytest.raises(KembaError, match="has no controller"):
+        policy_of(tmp_path)
