@@ -45,12 +45,12 @@ from kemba.trajectory import Trajectory
 ROOT = Path(__file__).parents[1]
 PLANS, DOCS = ROOT / "configs" / "plans", ROOT / "docs" / "discovery.md"
 SETS = (  # plans that are learnt from, and plans to judge by
-    (("hop-0350", "low-rise-0400", "up-0500"), ("up-0540", "low-rise-0430")),
+    (("hop-0350", "low-rise-0400", "up-0500"), ("up-0540", "low-down-0430")),
     (
         ("stretched-down-0560", "nearer-0200", "stretched-up-0760"),
         ("stretched-down-0580", "nearer-0150"),
     ),
-    (("stretched-up-0800", "sunk-0500", "low-rise-0420"), ("stretched-up-0820", "nearer-0250")),
+    (("stretched-up-0800", "sunk-0500", "low-down-0420"), ("stretched-up-0820", "nearer-0250")),
     (("low-0360", "stretched-down-0600", "stretched-up-0740"), ("low-0380", "stretched-down-0620")),
 )
 LIKELY = (
