@@ -66,12 +66,19 @@ def test_shipped_plans_can_be_read(entry: Entry) -> None:
 
 def test_near_tasks_have_neighbours() -> None:
     found = near("jump.yaml", "height=0.51 m", "supply=0.68 MPa", "nodes=60", "hold=0 s")
-    assert found and found[0].away == max(
+    away = (
         abs(0.51 - found[0].entry.figures["height"]) / Near.current().height,
         0.02e6 / Near.current().supply,
     )
-    assert [n.away for n in found] == sorted(n.away for n in found)
-    assert near("jump_forward.yaml", "distance=0.32 m")
+    assert (found[0].away, found[0].apart) == pytest.approx((max(away), np.hypot(*away)))
+    assert [n.apart for n in found] == sorted(n.apart for n in found)
+    assert all(n.away <= 1.0 for n in found)
+
+
+def test_a_payload_does_not_hide_which_plan_is_nearest() -> None:
+    """All plans of the shelf are equally far from a payload; height and distance decide."""
+    first = near("jump_forward.yaml", "height=0.48 m", "distance=0.3 m", "payload=0.4 kg")[0]
+    assert (first.entry.figures["height"], first.entry.figures["distance"]) == (0.48, 0.3)
 
 
 @pytest.mark.parametrize(

@@ -37,21 +37,22 @@ class Near(Settings):
         "convention: neighbours on the shelf differ by less",
     )  # fmt: skip
 
-    def away(self, asked: Mapping[str, float], there: Mapping[str, float]) -> float:
-        """The largest difference of two tasks' figures, in units of these settings; infinite where
-        one task lacks a figure of the other."""
+    def away(self, asked: Mapping[str, float], there: Mapping[str, float]) -> np.ndarray:
+        """Differences of two tasks' figures, in units of these settings; infinite where one task
+        lacks a figure of the other."""
         if asked.keys() != there.keys():
-            return np.inf
-        away = (abs(asked[name] - there[name]) / float(getattr(self, name)) for name in asked)
-        return max(away, default=0.0)
+            return np.array([np.inf])
+        return np.array([abs(asked[n] - there[n]) / float(getattr(self, n)) for n in asked])
 
 
 @dataclass(frozen=True)
 class Neighbour:
-    """A plan near a task; `away`: how far, 1 at most."""
+    """A plan near a task. `away`: its largest difference, 1 at most; `apart`: all of them, by the
+    root of the sum of their squares."""
 
     entry: Entry
     away: float
+    apart: float
 
 
 def neighbours(task: Task, model: Model, folder: Path | None = None) -> list[Neighbour]:
@@ -66,8 +67,13 @@ def neighbours(task: Task, model: Model, folder: Path | None = None) -> list[Nei
     kept = shelf(folder or shipped_folder("plans"))
     kind = kind_of(task, model) if kept else ""
     asked, near = figures_of(task, model), Near.current()
-    found = [Neighbour(e, near.away(asked, e.figures)) for e in kept if e.kind == kind]
-    return sorted((n for n in found if n.away <= 1.0), key=lambda n: (n.away, n.entry.name))
+    found = []
+    for entry in kept:
+        away = near.away(asked, entry.figures)
+        if entry.kind == kind and away.max(initial=0.0) <= 1.0:
+            apart = float(np.linalg.norm(away))
+            found.append(Neighbour(entry, float(away.max(initial=0.0)), apart))
+    return sorted(found, key=lambda n: (n.apart, n.entry.name))
 
 
 @cache
