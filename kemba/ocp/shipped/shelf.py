@@ -37,7 +37,7 @@ class Near(Settings):
         "convention: neighbours on the shelf differ by less",
     )  # fmt: skip
 
-    def away(self, asked: Mapping[str, float], there: Mapping[str, float]) -> np.ndarray:
+    def differences(self, asked: Mapping[str, float], there: Mapping[str, float]) -> np.ndarray:
         """Differences of two tasks' figures, in units of these settings; infinite where one task
         lacks a figure of the other."""
         if asked.keys() != there.keys():
@@ -47,12 +47,20 @@ class Near(Settings):
 
 @dataclass(frozen=True)
 class Neighbour:
-    """A plan near a task. `away`: its largest difference, 1 at most; `apart`: all of them, by the
-    root of the sum of their squares."""
+    """A plan near a task, and its differences from it, in units of `Near`."""
 
     entry: Entry
-    away: float
-    apart: float
+    differences: np.ndarray
+
+    @property
+    def away(self) -> float:
+        """The largest difference."""
+        return float(self.differences.max(initial=0.0))
+
+    @property
+    def apart(self) -> float:
+        """All differences: the root of the sum of their squares."""
+        return float(np.linalg.norm(self.differences))
 
 
 def neighbours(task: Task, model: Model, folder: Path | None = None) -> list[Neighbour]:
@@ -67,13 +75,8 @@ def neighbours(task: Task, model: Model, folder: Path | None = None) -> list[Nei
     kept = shelf(folder or shipped_folder("plans"))
     kind = kind_of(task, model) if kept else ""
     asked, near = figures_of(task, model), Near.current()
-    found = []
-    for entry in kept:
-        away = near.away(asked, entry.figures)
-        if entry.kind == kind and away.max(initial=0.0) <= 1.0:
-            apart = float(np.linalg.norm(away))
-            found.append(Neighbour(entry, float(away.max(initial=0.0)), apart))
-    return sorted(found, key=lambda n: (n.apart, n.entry.name))
+    found = [Neighbour(e, near.differences(asked, e.figures)) for e in kept if e.kind == kind]
+    return sorted((n for n in found if n.away <= 1.0), key=lambda n: (n.apart, n.entry.name))
 
 
 @cache
