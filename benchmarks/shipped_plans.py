@@ -38,9 +38,9 @@ figures of this table, and only a little (`kemba/ocp/shipped/shelf.py` says how 
 guess, each with its solved program. Of {tried} plans those count whose executions keep to the
 task's tolerances, also on the full plant; of a row's the one was kept with the smallest cost per
 landing, in 60 scenarios at twice the usual uncertainty (the last column). `of`: among how many.
-Errors are those on the plant. `air`:
-the [`landing.air`](tasks.md) with which a plan was made, a pulse on stretched legs. `fitted`: made
-with [air that fits the plant](solving.md#air-that-fits-the-plant); a task that begins from it has the
+Errors are those on the plant. `air`: the [`landing.air`](tasks.md) with which a plan was made, a
+pulse on stretched legs. `fitted`: made with
+[air that fits the plant](solving.md#air-that-fits-the-plant); a task that begins from it has the
 same air. [Height by height](solving.md#height-by-height) says what `solve` finds.
 Facts of earlier plans were read again from their files when the page was written anew, so that `of`
 is too low there; their programs were solved again on their own nodes, from the nodes.

@@ -6,6 +6,7 @@ Verb modules import typer only; numpy, casadi and the like belong inside their f
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 from typing import Annotated
@@ -97,6 +98,7 @@ def main() -> None:
         app(prog_name="kemba-opt")
     finally:
         _flush()
+        gc.freeze()  # or Python would take all objects apart before the process ends
 
 
 def _flush() -> None:

@@ -69,7 +69,8 @@ def best_plan(
         if approach.replay and not (made.fine or (made.good and one[2])):
             # without the air of a shipped start, which remedies add themselves
             asked = one[0].task.model_copy(update={"effects": task.effects})
-            made, last = improved(made, asked, document, listener, begun, approach.log, place)
+            how = asked, document, listener, begun, approach.log, place
+            made, last = improved(made, *how, guess=not _shelved(one, approach))
         if one[2] is not None and made.plan is not one[0]:
             from kemba.report.robust import with_share
 
@@ -95,13 +96,20 @@ def improved(
     begun: Begun = lambda plan: None,
     log: Path | None = None,
     place: str = "",
+    guess: bool = True,
 ) -> tuple[Executed, Executed]:
     """The plan that comes true best of a first one and those made after it (`matched`), whatever
     they cost; and the last one that was executed."""
     best = last = first
-    for last in matched(first, task, document, listener, begun, log, place):
+    for last in matched(first, task, document, listener, begun, log, place, guess):
         best = max(best, last, key=lambda one: one.rank[:4])
     return best, last
+
+
+def _shelved(one: Candidate, approach: Approach) -> bool:
+    """Whether a candidate begins from a shipped plan, so that others come after it, at last one
+    from a guess."""
+    return approach.free and one[2] is None and one[0].start.startswith("shipped")
 
 
 def _candidates(

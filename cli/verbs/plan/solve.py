@@ -78,6 +78,7 @@ def solve(
     from kemba.ocp import load_task
     from kemba.ocp.nlp.interrupt import Interrupt
     from kemba.ocp.reading import asked_of
+    from kemba.plant.simulation.loading import load_meanwhile
     from kemba.report import Approach, Listener, solve_into
     from kemba.report.drawing import drawer
     from kemba.runs import RunFolder
@@ -115,6 +116,8 @@ def solve(
     models = [path for name in (resolved.model, resolved.plant) for path in model_files(name)]
     inputs = [find_config(task, "tasks"), *dict.fromkeys(models), *BY_KIND.files]
     folder = RunFolder.create(out, resolved.name, inputs, force=force)
+    if replay:
+        load_meanwhile()
     with (
         drawer(figure) as drawing,
         Progress(quiet or json, SOLVE) as progress,

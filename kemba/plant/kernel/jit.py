@@ -99,3 +99,12 @@ def find_folder() -> str | None:
 
 
 FOLDER = find_folder()
+
+
+def load() -> None:
+    """Have numba load what it needs for its first call; as much again as its import."""
+    entry(_nothing)()
+
+
+def _nothing() -> int:
+    return 0

@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 from matplotlib.lines import Line2D
+from matplotlib.transforms import ScaledTranslation
 
 from kemba.errors import KembaError
 from kemba.plotting.panels import DEGREES, MILLIMETRES, Panel, Trace, draw_panel, shade, widen
@@ -42,6 +43,7 @@ LEG = (
     ),
 )
 STRIP = WIDTH - 0.75  # in, between the labels and the margin
+LABEL = 0.42  # in, of an axis' name from the axis, so that numbers such as -1000 fit between
 
 
 @paper_style
@@ -137,5 +139,6 @@ def _name_legs(axes: list[list[Axes]], rows: list[list[Panel]], legs: tuple[str,
         ax.set_xlabel("time [s]")
     figure = axes[0][0].get_figure()
     if figure is not None:
-        left = [row[0] for row in axes]
-        figure.align_ylabels(left)
+        beside = ScaledTranslation(-LABEL, 0.0, figure.dpi_scale_trans)
+        for row in axes:  # `align_ylabels` would lay out everything to find the place
+            row[0].yaxis.set_label_coords(0.0, 0.5, transform=row[0].transAxes + beside)

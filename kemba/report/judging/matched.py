@@ -42,14 +42,16 @@ def matched(
     begun: Begun,
     log: Path | None = None,
     place: str = "",
+    guess: bool = True,
 ) -> Iterator[Executed]:
     """Plans of a task that come true better, each executed, until one is `fine` or nothing is left
-    to try (`Remedies`). None where the first plan is not refined."""
+    to try (`Remedies`), without `guess` only continued ones. None where the first plan is not
+    refined."""
     tell = listener.tell
     how: dict[str, Any] = {"log": log, "tell": tell}
     how |= {"watch": listener.watch, "stop": listener.stop}
     kept = first.plan.fitted_air
-    now, remedies = first, Remedies(task, FittedAir(**kept) if kept else None)
+    now, remedies = first, Remedies(task, FittedAir(**kept) if kept else None, guess)
     for _ in range(RefitRounds.current().rounds):
         if now.fine or not (remedy := remedies.next(now)):
             return

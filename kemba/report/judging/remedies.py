@@ -48,11 +48,13 @@ class Remedies:
     3. Where it still lands early or late, legs are `pressed` to their stops in flight: vented ones
        stay where friction leaves them, which no fit of the air can tell.
     4. Where a plan does not come true on its own model, or other air fits no better, it is made
-       anew `from_guess`: with the fitted air, or where that was tried, from another guess.
+       anew `from_guess`: with the fitted air, or where that was tried, from another guess. Not
+       without `guess`.
     """
 
     task: Task
     fit: FittedAir | None = None
+    guess: bool = True
     ticks: bool = False
     pressed: bool = False
     from_guess: bool = False
@@ -86,7 +88,7 @@ class Remedies:
                 self.fit = other
                 return "fit"
         worth = self.fit is not None or not comes_true(plan)
-        if worth and self.guesses and plan.judged and plan.plan.refined:
+        if self.guess and worth and self.guesses and plan.judged and plan.plan.refined:
             self.guesses -= 1
             self.from_guess, self.ticks = True, False
             self.seeds += self.fit is self.guessed
@@ -109,7 +111,7 @@ class Remedies:
     @property
     def needed(self) -> bool:
         """Whether a plan is made from a guess where the last one cannot be continued."""
-        return self.now in ("fit", "anew")
+        return self.guess and self.now in ("fit", "anew")
 
     @property
     def asked(self) -> Task:
