@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
 
 from kemba.config import Document
@@ -24,7 +25,7 @@ from kemba.ocp.reading import asked_of, task_model
 from kemba.ocp.refined import refined
 from kemba.ocp.relaxation.session import Session
 from kemba.ocp.shipped.entry import Entry
-from kemba.ocp.shipped.shelf import Near, neighbours
+from kemba.ocp.shipped.shelf import Near, neighbours, ways
 from kemba.ocp.task.requirement import Requirement, resolve
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.symmetry import whole
@@ -80,7 +81,7 @@ def plans_nearby(
     watch: Watch | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> Iterator[Plan]:
-    """Plans of a task that begin from near shipped plans, the nearest one first.
+    """Plans of a task that begin from near shipped plans, the nearest one of each way (`ways`).
 
     Only solved ones that do not cost much more than the plan they begin from; none where no
     shipped plan is near, or the task cannot be met. A plan that was made with fitted air begins one
@@ -92,7 +93,7 @@ def plans_nearby(
         return
     listed = neighbours(task, job.planner.model)
     own = [n for n in listed if task.fit_air or not n.entry.effects]
-    for near in own[: Near.current().tried]:
+    for near in islice(ways(own), Near.current().tried):
         if near.entry.effects:
             asked = task.model_copy(update={"effects": {**task.effects, **near.entry.effects}})
             job = _job(asked, document, None, control, tell)

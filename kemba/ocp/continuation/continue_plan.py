@@ -115,12 +115,16 @@ class Continuation:
             start = completed(self.origin.plan, self.model)
             reduction = reduction_of(self.model, self.task, self.requirements, start)
             found: Refined | None = None
-            for meshed in self._meshes(start, reduction):
-                self.solution = None  # it was on other nodes
+            meshes = list(self._meshes(start, reduction))
+            for meshed in meshes:
                 found = self._at_once(*meshed, reduction)
-                if found is None and self.origin.ticks:
+                if found is not None:
+                    return found
+                if self.origin.ticks:
                     return Refined(None, None, Ending.GAVE_UP, 0)
-                found = found or self._walk(*meshed, reduction)
+            for meshed in meshes:
+                self.solution = None  # it was on other nodes
+                found = self._walk(*meshed, reduction)
                 if found.done:
                     return found
             if found is not None and (self.origin.once or self.task.landing.air):

@@ -56,6 +56,13 @@ class Entry:
         return self.plan.meta.get("fitted_air")
 
     @property
+    def way(self) -> str:
+        """The order of its valves and contacts and its fitted air: what a plan has in common with
+        one that begins from it."""
+        modes = [str(phase).partition(" ")[2] for phase in self.plan.meta["phases"]]
+        return json.dumps([modes, self.effects], sort_keys=True)
+
+    @property
     def name(self) -> str:
         """The name of its file, without the ending."""
         return self.file.stem

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -29,7 +29,7 @@ class Near(Settings):
     supply: float = setting(0.1e6, "Pa", "supply pressure", TRIED)
     payload: float = setting(0.5, "kg", "at the body's centre", TRIED)
     duration: float = setting(0.15, "s", "nominal", TRIED)
-    tried: int = setting(2, "1", "shipped plans from which a task is begun, at most",
+    tried: int = setting(3, "1", "shipped plans from which a task is begun, at most",
                          "convention: a plan from a guess costs about as much")  # fmt: skip
 
     dear: float = setting(
@@ -77,6 +77,17 @@ def neighbours(task: Task, model: Model, folder: Path | None = None) -> list[Nei
     asked, near = figures_of(task, model), Near.current()
     found = [Neighbour(e, near.differences(asked, e.figures)) for e in kept if e.kind == kind]
     return sorted((n for n in found if n.away <= 1.0), key=lambda n: (n.apart, n.entry.name))
+
+
+def ways(near: Sequence[Neighbour]) -> Iterator[Neighbour]:
+    """The nearest neighbours of each order of valves and contacts and each fitted air: from others
+    of the same a task ends in the same plan."""
+    met = set()
+    for neighbour in near:
+        way = neighbour.entry.way
+        if way not in met:
+            yield neighbour
+        met.add(way)
 
 
 @cache
