@@ -82,7 +82,7 @@ def rows(repeats: int, folder: Path) -> Iterator[str]:
             found: list[list[Taken]] = [[], []]
             for _ in range(1 + repeats):
                 for way, taken in zip(ways, found, strict=True):
-                    taken.append(made(task, change, way))
+                    taken.append(made(str(run.path / "task.yaml"), change, way))
             own, nodes = (_middle(taken[1:]) for taken in found)
             good = "yes" if own.made.good else "no"
             name = f"{resolved.name}, {change.replace('=', ' ')}"

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from kemba.config import Document
 from kemba.ocp import Plan, Task, plan
 from kemba.ocp.continuation.between import Origin
+from kemba.ocp.continued import from_scratch
 from kemba.ocp.known import compared
 from kemba.ocp.planning import plan_from, plans_nearby
 from kemba.ocp.reading import task_model
@@ -21,7 +22,7 @@ from kemba.report.listener import Listener
 from kemba.trajectory import Trajectory
 
 if TYPE_CHECKING:
-    from kemba.report.judging.executed import Candidate
+    from kemba.scenarios.share import Share
 
 
 @dataclass(frozen=True)
@@ -49,6 +50,17 @@ class Approach:
         return self.start is None and self.origin is None
 
 
+@dataclass(frozen=True)
+class Candidate:
+    """A plan to execute, with its table and its share of successes where it was executed in
+    scenarios. `last`: no other one comes after it."""
+
+    plan: Plan
+    table: Trajectory | None = None
+    share: Share | None = None
+    last: bool = False
+
+
 def best_plan(
     task: Task,
     document: Document,
@@ -65,13 +77,14 @@ def best_plan(
     begun = begun or (lambda plan: None)
     best: Executed | None = None
     for one in _candidates(task, document, approach, listener):
-        made = last = executed(*one, approach.replay, listener.tell, begun, place)
-        if approach.replay and not (made.fine or (made.good and one[2])):
+        how = approach.replay, listener.tell, begun, place
+        made = last = executed(one.plan, one.table, one.share, *how)
+        if approach.replay and not (made.fine or (made.good and one.share)):
             # without the air of a shipped start, which remedies add themselves
-            asked = one[0].task.model_copy(update={"effects": task.effects})
-            how = asked, document, listener, begun, approach.log, place
-            made, last = improved(made, *how, guess=not _shelved(one, approach))
-        if one[2] is not None and made.plan is not one[0]:
+            asked = one.plan.task.model_copy(update={"effects": task.effects})
+            words = asked, document, listener, begun, approach.log, place
+            made, last = improved(made, *words, guess=one.last)
+        if one.share is not None and made.plan is not one.plan:
             from kemba.report.robust import with_share
 
             made = with_share(made)
@@ -83,7 +96,7 @@ def best_plan(
         begun(best.plan.trajectory)
     known, remark = compared(best.plan)
     if best.plan.continued is False and best.plan.start.startswith("shipped"):
-        remark += "; it begins from a shipped plan: the earlier plan could not be continued"
+        remark += "; it begins from a shipped plan: none that continues the earlier one comes true"
     best.result.update(best_known=known, sentence=best.result["sentence"] + remark)
     return best
 
@@ -106,41 +119,33 @@ def improved(
     return best, last
 
 
-def _shelved(one: Candidate, approach: Approach) -> bool:
-    """Whether a candidate begins from a shipped plan, so that others come after it, at last one
-    from a guess."""
-    return approach.free and one[2] is None and one[0].start.startswith("shipped")
-
-
 def _candidates(
     task: Task, document: Document, approach: Approach, listener: Listener
 ) -> Iterator[Candidate]:
-    """Plans of a task, made when they are asked for: those from shipped plans come first."""
+    """Plans of a task, made when they are asked for: from the earlier plan, from shipped plans, at
+    last from a guess, or from the earlier plan in many steps."""
     how: dict[str, Any] = {"watch": listener.watch, "stop": listener.stop, "tell": listener.tell}
 
-    def shipped(task: Task) -> Iterator[Plan]:
+    def plans(task: Task) -> Iterator[Candidate]:
+        origin = approach.origin
         shelved = approach.start is None and not approach.cold
-        return plans_nearby(task, document, approach.log, **how) if shelved else iter(())
+        if origin is not None and shelved and neighbours(task, task_model(task)):
+            once = replace(origin, once=True)
+            near, _ = plan_from(once, task, document, approach.log, **how)
+            if near is not None:
+                yield Candidate(near)
+                origin = None
+        for one in plans_nearby(task, document, approach.log, **how) if shelved else ():
+            yield Candidate(one if approach.free else replace(one, continued=False))
+        yield Candidate(solved(task, origin), last=True)
 
-    def nearby(task: Task) -> Iterator[Plan]:
-        return shipped(task) if approach.free else iter(())
-
-    def again(task: Task, origin: Origin) -> Plan | None:
-        """Where shipped plans are near, one of them is tried before many steps from the origin."""
-        if approach.cold or not neighbours(task, task_model(task)):
-            return None
-        near, _ = plan_from(replace(origin, once=True), task, document, approach.log, **how)
-        if near is not None:
-            return near
-        begun = next(shipped(task), None)
-        return begun and replace(begun, continued=False)
-
-    def solved(task: Task) -> Plan:
+    def solved(task: Task, origin: Origin | None) -> Plan:
         a = approach
         if a.starts > 1 and a.free:
             return plan_best(task, document, a.starts, a.jobs, a.log, listener.tell)
-        found = again(task, a.origin) if a.origin is not None else None
-        return found or plan(task, document, log=a.log, start=a.start, origin=a.origin, **how)
+        found = plan(task, document, log=a.log, start=a.start, origin=origin, **how)
+        left = a.origin is not None and origin is None
+        return from_scratch(found, "the simulated robot does not follow it") if left else found
 
     if approach.replay and task.robust > 0:
         from kemba.report.robust import most_robust  # loads SciPy, which most plans do not need
@@ -152,10 +157,7 @@ def _candidates(
             new, _ = plan_from(origin, task, document, approach.log, **how)
             return new and replace(summed(found, new), fitted_air=found.fitted_air)
 
-        found = most_robust(
-            task, lambda task: next(nearby(task), None) or solved(task), changed, listener.tell
-        )
-        yield found.plan, found.table, found.share
+        found = most_robust(task, lambda task: next(plans(task)).plan, changed, listener.tell)
+        yield Candidate(found.plan, found.table, found.share, last=True)
         return
-    yield from ((near, None, None) for near in nearby(task))
-    yield solved(task), None, None
+    yield from plans(task)

@@ -22,9 +22,6 @@ from kemba.trajectory import Trajectory
 if TYPE_CHECKING:
     from kemba.scenarios.share import Share
 
-    # a plan; where it was executed in scenarios, with its table and its share of successes
-    Candidate = tuple[Plan, Trajectory | None, Share | None]
-
 Begun = Callable[[Trajectory], None]
 
 
