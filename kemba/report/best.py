@@ -14,7 +14,8 @@ from kemba.ocp.continued import from_scratch
 from kemba.ocp.known import compared
 from kemba.ocp.planning import plan_from, plans_nearby
 from kemba.ocp.reading import task_model
-from kemba.ocp.shipped.shelf import neighbours
+from kemba.ocp.shipped.kind import figures_of
+from kemba.ocp.shipped.shelf import Near, neighbours
 from kemba.ocp.starts import plan_best
 from kemba.report.judging.executed import Begun, Executed, executed
 from kemba.report.judging.matched import matched, summed
@@ -96,7 +97,7 @@ def best_plan(
         begun(best.plan.trajectory)
     known, remark = compared(best.plan)
     if best.plan.continued is False and best.plan.start.startswith("shipped"):
-        remark += "; it begins from a shipped plan: none that continues the earlier one comes true"
+        remark += "; it begins from a shipped plan: the earlier one is far, or does not come true"
     best.result.update(best_known=known, sentence=best.result["sentence"] + remark)
     return best
 
@@ -119,6 +120,14 @@ def improved(
     return best, last
 
 
+def _tried_first(origin: Origin, task: Task) -> bool:
+    """Whether an earlier plan is tried in one step, before shipped plans that are near the task:
+    where it is near itself."""
+    model = task_model(task)
+    away = Near.current().differences(figures_of(task, model), origin.figures)
+    return bool(neighbours(task, model)) and bool(away.max(initial=0.0) <= 1.0)
+
+
 def _candidates(
     task: Task, document: Document, approach: Approach, listener: Listener
 ) -> Iterator[Candidate]:
@@ -129,7 +138,7 @@ def _candidates(
     def plans(task: Task) -> Iterator[Candidate]:
         origin = approach.origin
         shelved = approach.start is None and not approach.cold
-        if origin is not None and shelved and neighbours(task, task_model(task)):
+        if origin is not None and shelved and _tried_first(origin, task):
             once = replace(origin, once=True)
             near, _ = plan_from(once, task, document, approach.log, **how)
             if near is not None:

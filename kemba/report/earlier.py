@@ -7,6 +7,7 @@ from pathlib import Path
 from kemba.ocp import load_task, task_model
 from kemba.ocp.continuation.between import Origin
 from kemba.ocp.continuation.kept import read_stages
+from kemba.ocp.shipped.kind import figures_of
 from kemba.ocp.task.requirement import resolve
 from kemba.runs import STAGES, load_run
 
@@ -21,4 +22,5 @@ def origin_of(run: str | Path) -> Origin:
     task, document = load_task(found.task)
     model = task_model(task)
     requirements = tuple(resolve(task, model, document))
-    return Origin(plan, model, requirements, stages=read_stages(found.path / STAGES))
+    stages, figures = read_stages(found.path / STAGES), figures_of(task, model)
+    return Origin(plan, model, requirements, stages=stages, figures=figures)

@@ -235,9 +235,9 @@ class Continuation:
         name = f"near the earlier plan, {share:.0%}" if weight else "from the earlier plan"
         self.steps.append(Attempt(name, found.ending, found.iterations))
         self.size = len(program.lower), len(program.rows)
-        if found.solved:
-            self.solution = Stages.of(program, found)
-        return _ended(program, found)
+        ended = _ended(program, found)
+        self.solution = ended.stages or self.solution
+        return ended
 
     def _program(
         self,
