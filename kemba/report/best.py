@@ -52,7 +52,7 @@ class Approach:
 
 
 @dataclass(frozen=True)
-class Candidate:
+class PlanCandidate:
     """A plan to execute, with its table and its share of successes where it was executed in
     scenarios. `last`: no other one comes after it."""
 
@@ -130,23 +130,23 @@ def _tried_first(origin: Origin, task: Task) -> bool:
 
 def _candidates(
     task: Task, document: Document, approach: Approach, listener: Listener
-) -> Iterator[Candidate]:
+) -> Iterator[PlanCandidate]:
     """Plans of a task, made when they are asked for: from the earlier plan, from shipped plans, at
     last from a guess, or from the earlier plan in many steps."""
     how: dict[str, Any] = {"watch": listener.watch, "stop": listener.stop, "tell": listener.tell}
 
-    def plans(task: Task) -> Iterator[Candidate]:
+    def plans(task: Task) -> Iterator[PlanCandidate]:
         origin = approach.origin
         shelved = approach.start is None and not approach.cold
         if origin is not None and shelved and _tried_first(origin, task):
             once = replace(origin, once=True)
             near, _ = plan_from(once, task, document, approach.log, **how)
             if near is not None:
-                yield Candidate(near)
+                yield PlanCandidate(near)
                 origin = None
         for one in plans_nearby(task, document, approach.log, **how) if shelved else ():
-            yield Candidate(one if approach.free else replace(one, continued=False))
-        yield Candidate(solved(task, origin), last=True)
+            yield PlanCandidate(one if approach.free else replace(one, continued=False))
+        yield PlanCandidate(solved(task, origin), last=True)
 
     def solved(task: Task, origin: Origin | None) -> Plan:
         a = approach
@@ -167,6 +167,6 @@ def _candidates(
             return new and replace(summed(found, new), fitted_air=found.fitted_air)
 
         found = most_robust(task, lambda task: next(plans(task)).plan, changed, listener.tell)
-        yield Candidate(found.plan, found.table, found.share, last=True)
+        yield PlanCandidate(found.plan, found.table, found.share, last=True)
         return
     yield from plans(task)
