@@ -76,7 +76,7 @@ def test_near_tasks_have_neighbours() -> None:
 
 
 def test_a_payload_does_not_hide_which_plan_is_nearest() -> None:
-    """All plans of the shelf are equally far from a payload; height and distance decide."""
+    """Plans at these heights have no payload, so that height and distance decide."""
     first = near("jump_forward.yaml", "height=0.48 m", "distance=0.3 m", "payload=0.4 kg")[0]
     assert (first.entry.figures["height"], first.entry.figures["distance"]) == (0.48, 0.3)
 

@@ -80,8 +80,8 @@ def neighbours(task: Task, model: Model, folder: Path | None = None) -> list[Nei
 
 
 def ways(near: Sequence[Neighbour]) -> Iterator[Neighbour]:
-    """The nearest neighbours of each order of valves and contacts and each fitted air: from others
-    of the same a task ends in the same plan."""
+    """The nearest neighbour of each order of valves and contacts and each fitted air: from another
+    of the same a task mostly ends in the same plan."""
     met = set()
     for neighbour in near:
         way = neighbour.entry.way
