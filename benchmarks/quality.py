@@ -97,12 +97,19 @@ def study(starts: int, limit: float) -> Iterator[Callable[[], dict[str, Any]]]:
         yield from left(asked, "default", 0, default)
     for few in (range(1, 6), range(6, 11), range(11, 16), range(16, 21)):
         for asked in tasks():
+            name = " ".join(asked)
+            if few[0] > 1 and not _solved(known, name):
+                continue  # no plan from five starts: probably there is none
             for seed in (s for s in few if s <= starts):
                 yield from left(asked, "start", seed, started)
-            name = " ".join(asked)
-            ours = [r for key, r in known.items() if key[:2] == (name, "start") and r["cost"]]
+            ours = _solved(known, name)
             for row in sorted(ours, key=lambda r: r["cost"])[:REFINED]:
                 yield from left(asked, "refined", row["seed"], refined)
+
+
+def _solved(known: dict[tuple[str, str, int], dict[str, Any]], task: str) -> list[dict[str, Any]]:
+    """Starts of a task that gave a plan."""
+    return [row for key, row in known.items() if key[:2] == (task, "start") and row["cost"]]
 
 
 def main() -> None:

@@ -85,18 +85,25 @@ class Last:
 
 def record(made: Executed) -> dict[str, Any]:
     """Figures and cost of a plan, whether its executions keep to the tolerances, and in how many of
-    `SCENARIOS` at twice the usual uncertainty it lands."""
+    `SCENARIOS` it lands: `usual`, and `landed` at twice the usual uncertainty."""
     found = made.plan
-    task, model, table = found.task, found.model, made.motions.table
-    cases = scenarios("twice", plant_of(task), SCENARIOS)
+    task, model = found.task, found.model
     return {
         "figures": figures_of(task, model),
         "cost": objective(model, task, found.requirements, found.trajectory),
         **found.cost,
         "plant": made.result["plant_replay"],
         "good": made.good,
-        "landed": share(model, found.trajectory, table, cases).landed if table is not None else 0,
+        "usual": _landed(made, "usual"),
+        "landed": _landed(made, "twice"),
     }
+
+
+def _landed(made: Executed, uncertainties: str) -> int:
+    """In how many scenarios a plan lands; 0 where it has no table."""
+    found, table = made.plan, made.motions.table
+    cases = scenarios(uncertainties, plant_of(found.task), SCENARIOS)
+    return share(found.model, found.trajectory, table, cases).landed if table is not None else 0
 
 
 def _made(task: Task, document: Document, last: Last | None, match: bool) -> Executed | None:
