@@ -13,7 +13,7 @@ from kemba.errors import KembaError
 from kemba.model import Model
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.continuation.between import Origin
-from kemba.ocp.continued import continued, dear, from_scratch, with_air_and_grip
+from kemba.ocp.continued import continued, from_scratch, with_air_and_grip
 from kemba.ocp.infeasibility.checks import check_task
 from kemba.ocp.infeasibility.diagnostic import Diagnostic
 from kemba.ocp.infeasibility.explain import Explanation, explanation, refusal
@@ -80,12 +80,12 @@ def plans_nearby(
     tell: Tell = silent,
     watch: Watch | None = None,
     stop: Callable[[], bool] | None = None,
-) -> Iterator[Plan]:
-    """Plans of a task that begin from near shipped plans, the nearest one of each way (`ways`).
+) -> Iterator[tuple[Plan, Entry]]:
+    """Plans of a task and the near shipped plans from which they begin, the nearest of each way
+    (`ways`).
 
-    Only solved ones that do not cost much more than the plan they begin from; none where no
-    shipped plan is near, or the task cannot be met. A plan that was made with fitted air begins one
-    with the same air. Raises ConfigErrors as `plan` does.
+    Only solved ones; none where no shipped plan is near, or the task cannot be met. A plan that was
+    made with fitted air begins one with the same air. Raises ConfigErrors as `plan` does.
     """
     control = Control(_deadline(task), log, watch, stop)
     job = _job(task, document, None, control, tell)
@@ -99,9 +99,9 @@ def plans_nearby(
             job = _job(asked, document, None, control, tell)
         found, _ = continued(job.planner, _origin(near.entry, job.planner.task))
         kept = near.entry
-        if found is not None and found.status is Status.SOLVED and not dear(found, kept.cost):
+        if found is not None and found.status is Status.SOLVED:
             found = replace(found, continued=None, start=f"shipped: {kept.name}")
-            yield replace(found, fitted_air=kept.fitted_air)
+            yield replace(found, fitted_air=kept.fitted_air), kept
         if control.ended() is not None:
             return
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from kemba.config import Document
 from kemba.ocp import Plan, Task, plan
 from kemba.ocp.continuation.between import Origin
-from kemba.ocp.continued import from_scratch
+from kemba.ocp.continued import dear, from_scratch
 from kemba.ocp.known import compared
 from kemba.ocp.planning import plan_from, plans_nearby
 from kemba.ocp.reading import task_model
@@ -54,7 +54,7 @@ class Approach:
 @dataclass(frozen=True)
 class PlanCandidate:
     """A plan to execute, with its table and its share of successes where it was executed in
-    scenarios. `last`: no other one comes after it."""
+    scenarios. `last`: it may be made again from a guess."""
 
     plan: Plan
     table: Trajectory | None = None
@@ -95,7 +95,7 @@ def best_plan(
     assert best is not None
     if best is not last and best.motions.table is not None:
         begun(best.plan.trajectory)
-    known, remark = compared(best.plan)
+    known, remark = compared(best.plan, task)
     if best.plan.continued is False and best.plan.start.startswith("shipped"):
         remark += "; it begins from a shipped plan: the earlier one is far, or does not come true"
     best.result.update(best_known=known, sentence=best.result["sentence"] + remark)
@@ -131,8 +131,9 @@ def _tried_first(origin: Origin, task: Task) -> bool:
 def _candidates(
     task: Task, document: Document, approach: Approach, listener: Listener
 ) -> Iterator[PlanCandidate]:
-    """Plans of a task, made when they are asked for: from the earlier plan, from shipped plans, at
-    last from a guess, or from the earlier plan in many steps."""
+    """Plans of a task, made when asked for: from the earlier plan, from shipped plans, from
+    a guess or from the earlier plan in many steps; last are those that cost so much more than the
+    shipped plans they begin from that a guess is likely to cost less."""
     how: dict[str, Any] = {"watch": listener.watch, "stop": listener.stop, "tell": listener.tell}
 
     def plans(task: Task) -> Iterator[PlanCandidate]:
@@ -144,9 +145,15 @@ def _candidates(
             if near is not None:
                 yield PlanCandidate(near)
                 origin = None
-        for one in plans_nearby(task, document, approach.log, **how) if shelved else ():
-            yield PlanCandidate(one if approach.free else replace(one, continued=False))
+        late = []
+        for one, entry in plans_nearby(task, document, approach.log, **how) if shelved else ():
+            candidate = PlanCandidate(one if approach.free else replace(one, continued=False))
+            if dear(one, entry.cost):
+                late.append(candidate)
+            else:
+                yield candidate
         yield PlanCandidate(solved(task, origin), last=True)
+        yield from late
 
     def solved(task: Task, origin: Origin | None) -> Plan:
         a = approach

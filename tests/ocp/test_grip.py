@@ -22,7 +22,7 @@ from kemba.report.judging.judged import judged, plant_of, table_of
 def high(grip: float) -> Plan:
     """A jump of 0.84 m from a shipped plan, which leans on the friction as far as it goes."""
     task, document = load_task("jump.yaml", ["height=0.84 m", "duration=0.7 s", f"grip={grip}"])
-    return next(plans_nearby(task, document))
+    return next(plans_nearby(task, document))[0]
 
 
 def test_a_plan_keeps_to_its_share_of_the_friction() -> None:

@@ -33,7 +33,7 @@ def off_ticks(model: Model, plan: Plan) -> float:
 
 def test_a_plan_on_ticks_has_its_edges_there() -> None:
     task, document = load_task("jump.yaml", ["height=0.54 m"])
-    old = next(plans_nearby(task, document))
+    old = next(plans_nearby(task, document))[0]
     known = (old.trajectory, old.model, old.requirements)
     new, why = plan_from(Origin(*known, once=True, ticks=True, stages=old.stages), task, document)
     assert new is not None, why

@@ -20,7 +20,7 @@ from kemba.scenarios.draw import Scenario, scenarios
 @cache
 def planned(height: float) -> Plan:
     task, document = load_task("jump.yaml", [f"height={height} m", "duration=0.7 s"])
-    return next(plans_nearby(task, document))
+    return next(plans_nearby(task, document))[0]
 
 
 def grounds(folder: Path, low: float, count: int = 50) -> list[Scenario]:
