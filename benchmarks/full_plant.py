@@ -35,7 +35,8 @@ from kemba.identify.discover import discover
 from kemba.identify.robot.problem import robot_problem
 from kemba.identify.workflow import write_answer
 from kemba.model import load_model
-from kemba.ocp.shipped.entry import read_plan
+from kemba.ocp import load_task, task_model
+from kemba.ocp.shipped.shelf import neighbours
 from kemba.plant import Commands, Profile, run
 from kemba.plant.execution.controller import Gains
 from kemba.plant.execution.sensors import Sensors, take_log
@@ -43,15 +44,21 @@ from kemba.plant.simulation.commands import JointControl
 from kemba.trajectory import Trajectory
 
 ROOT = Path(__file__).parents[1]
-PLANS, DOCS = ROOT / "configs" / "plans", ROOT / "docs" / "discovery.md"
-SETS = (  # plans that are learnt from, and plans to judge by
-    (("hop-0350", "low-rise-0400", "up-0500"), ("up-0540", "low-down-0430")),
+DOCS = ROOT / "docs" / "discovery.md"
+SETS = (  # tasks whose shipped plans are learnt from, and tasks to judge by
+    (("hop", "jump height=0.4 m", "jump"), ("jump height=0.54 m", "jump height=0.43 m")),
     (
-        ("stretched-down-0560", "nearer-0200", "stretched-up-0760"),
-        ("stretched-down-0580", "nearer-0150"),
+        ("jump height=0.56 m", "jump_forward distance=0.2 m", "jump height=0.76 m"),
+        ("jump height=0.58 m", "jump_forward distance=0.15 m"),
     ),
-    (("stretched-up-0800", "sunk-0500", "low-down-0420"), ("stretched-up-0820", "nearer-0250")),
-    (("low-0360", "stretched-down-0600", "stretched-up-0740"), ("low-0380", "stretched-down-0620")),
+    (
+        ("jump height=0.8 m", "jump_forward", "jump height=0.42 m"),
+        ("jump height=0.82 m", "jump_forward distance=0.25 m"),
+    ),
+    (
+        ("jump height=0.36 m", "jump height=0.6 m", "jump height=0.74 m"),
+        ("jump height=0.38 m", "jump height=0.62 m"),
+    ),
 )
 LIKELY = (
     *("chambers:orifice", "supply_scale", "rise_time_scale", "supply_droop", "hose_lag"),
@@ -72,10 +79,13 @@ def followed(plan: Trajectory) -> JointControl:
     return JointControl(joints, times, np.moveaxis(wanted, -1, 0), limits, gains.K_p, gains.K_d)
 
 
-def plant_log(name: str, rest: float = 0.2) -> Trajectory:
-    """A log of the full plant that plays a plan of configs/plans, and `rest` [s] after it."""
-    rng = np.random.default_rng([7, *name.encode()])
-    plan = read_plan(PLANS / f"{name}.npz")
+def plant_log(asked: str, rest: float = 0.2) -> Trajectory:
+    """A log of the full plant that plays the shipped plan of a task, and `rest` [s] after it."""
+    name, _, change = asked.partition(" ")
+    task, _ = load_task(f"{name}.yaml", [change] if change else [])
+    entry = neighbours(task, task_model(task))[0].entry
+    rng = np.random.default_rng([7, *entry.name.encode()])
+    plan = entry.plan
     time = plan.time - plan.time[0]
     valves = {n: Profile.of(time, np.round(plan[n])) for n in plan.names if "/valve/" in n}
     placed = ("body/x", "body/z", "body/pitch", *(n for n in plan.names if n.endswith("/q")))
@@ -84,13 +94,15 @@ def plant_log(name: str, rest: float = 0.2) -> Trajectory:
     commands, times = Commands(valves, followed(plan)), sensors.times(duration, rng)
     truth = run(load_model("plant"), start, commands, duration, None, times).trajectory
     log = take_log(truth, sensors, rng)
-    log.meta["name"] = name
+    log.meta["name"] = entry.name
     return log
 
 
 def written(folder: Path, number: int) -> tuple[list[Path], list[Path]]:
     """Files of a set: logs to learn from, and logs to judge by."""
-    files = {name: folder / f"{name}.csv" for names in SETS[number] for name in names}
+    files = {
+        name: folder / f"{name.replace(' ', '-')}.csv" for names in SETS[number] for name in names
+    }
     for name, path in files.items():
         plant_log(name).write(path)
     fitted, kept = ([files[name] for name in names] for names in SETS[number])

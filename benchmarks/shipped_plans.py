@@ -20,7 +20,7 @@ from typing import Any
 
 from kemba.config import load_yaml, shipped_folder
 from kemba.ocp import load_task, task_model
-from kemba.ocp.shipped.entry import read_plan
+from kemba.ocp.shipped.entry import kept_fit, read_plan
 from kemba.ocp.shipped.kind import FIGURES, kind_of
 from kemba.ocp.shipped.shelf import INDEX
 from kemba.report.walks import SCENARIOS
@@ -28,6 +28,7 @@ from kemba.sweep.cases.case import Case
 from kemba.sweep.workers.farm import run_cases
 
 UNITS = {"height": "m", "distance": "m", "supply": "Pa", "payload": "kg", "duration": "s"}
+TABLE = 1e-3  # m, of apex by which an execution of the table may miss the plan
 SURE = 59  # usual landings of SCENARIOS: 98 % or more are asked of plans
 PAGE = Path(__file__).parents[1] / "docs" / "shipped-plans.md"
 HEAD = """\
@@ -37,7 +38,8 @@ HEAD = """\
 figures of this table, and only a little (`kemba/ocp/shipped/shelf.py` says how much). See
 [solving](solving.md#from-a-shipped-plan). They were continued from plans that were found from a
 guess, each with its solved program. Of {tried} plans those count whose executions keep to the
-task's tolerances, also on the full plant. Of a row's the one was kept with the smallest cost per
+task's tolerances, also on the full plant, and whose table gives the planned apex within 1 mm (where
+that was noted). Of a row's the one was kept with the smallest cost per
 landing, in 60 scenarios at twice the usual uncertainty (the last column), or a cheaper one that
 lands in {sure} of 60 usual scenarios or more. `of`: among how many.
 Errors are those on the plant. `air`: the [`landing.air`](tasks.md) with which a plan was made, a
@@ -81,7 +83,7 @@ def _case(walk: dict[str, Any], folder: Path) -> Case:
 def _facts(path: Path) -> dict[str, Any]:
     """What a walk noted about a plan, with the kind of its task as that is today."""
     facts = json.loads(path.read_text(encoding="utf-8"))
-    fitted = "fitted_air" in read_plan(path.with_suffix(".npz")).meta
+    fitted = kept_fit(read_plan(path.with_suffix(".npz"))) is not None
     kind = _kind(facts["task"], tuple(facts["set"]))
     return {**facts, "path": path, "kind": kind, "fitted": fitted}
 
@@ -100,10 +102,15 @@ def best(found: list[dict[str, Any]]) -> list[dict[str, Any]]:
         same[facts["kind"], figures].append(facts)
     chosen = []
     for plans in same.values():
-        good = [facts for facts in plans if facts["good"]]
+        good = [facts for facts in plans if facts["good"] and _exact(facts)]
         if good:
             chosen.append({**own_of(good), "of": len(plans)})
     return sorted(chosen, key=lambda c: (c["task"], *(c["figures"].get(k, 0.0) for k in FIGURES)))
+
+
+def _exact(facts: dict[str, Any]) -> bool:
+    """Whether its table gives the planned apex on the plan's model, as far as that was noted."""
+    return abs(facts.get("table", {}).get("apex_error_m", 0.0)) <= TABLE
 
 
 def own_of(good: list[dict[str, Any]]) -> dict[str, Any]:

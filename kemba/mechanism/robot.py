@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 import casadi as ca
@@ -35,16 +36,26 @@ def robot_mechanism(
     `offsets` [m or kg]: lengths, and mass between body and legs, that differ from those of the
     table `drawn`. `symbols`: the same
     offsets in expressions, where these depend on parameters. Raises KembaError where the knee
-    cannot close with these lengths.
+    cannot close with these lengths. Without either, the same table gives the same object.
     """
-    offsets = dict(offsets or {})
+    if offsets or symbols:
+        return _mechanism(drawn, dict(offsets or {}), symbols or {})
+    return _nominal(drawn.model_dump_json())
+
+
+@lru_cache(maxsize=8)
+def _nominal(table: str) -> Mechanism:
+    return _mechanism(Robot.model_validate_json(table), {}, {})
+
+
+def _mechanism(drawn: Robot, offsets: Offsets, symbols: Offsets) -> Mechanism:
     robot = _closed(altered(drawn, offsets), offsets)
     coordinates, velocities = _coordinates(robot)
     n = len(coordinates)
     q, v, a = ca.SX.sym("q", n), ca.SX.sym("v", n), ca.SX.sym("a", n)
-    shape = altered(drawn, {**offsets, **(symbols or {})})
+    shape = altered(drawn, {**offsets, **symbols})
     drawn_joints = read_joints(build_pin_model(robot))
-    joints = _placed(drawn_joints, shape, weighed=SPLIT in (symbols or {}))
+    joints = _placed(drawn_joints, shape, weighed=SPLIT in symbols)
     tree = tree_angles(shape, q)
     tree_v = ca.jtimes(tree, q, v)
     tree_a = ca.jtimes(tree_v, q, v) + ca.jtimes(tree, q, a)

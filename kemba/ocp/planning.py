@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import islice
 from pathlib import Path
 
@@ -132,12 +133,22 @@ def plan_from(
 
 @dataclass(frozen=True)
 class _Job:
-    """A task that was checked, and what solves it."""
+    """A task, and what solves it."""
 
     document: Document
     planner: Planner
-    diagnostics: Sequence[Diagnostic]
-    refused: Explanation | None
+
+    @cached_property
+    def diagnostics(self) -> Sequence[Diagnostic]:
+        """What certainly cannot be met; found when it is asked for."""
+        p = self.planner
+        with p.session.building.running():
+            return check_task(p.task, p.model, p.requirements, self.document)
+
+    @property
+    def refused(self) -> Explanation | None:
+        """Why there is no plan to be sought."""
+        return refusal(self.diagnostics)
 
 
 def _job(
@@ -152,10 +163,8 @@ def _job(
     building = Stopwatch()
     with building.running():
         built, requirements = asked_of(task, document, model)
-        diagnostics = check_task(task, built, requirements, document)
     session = Session(control, tell, building=building)
-    planner = Planner(task, built, requirements, session, start)
-    return _Job(document, planner, diagnostics, refusal(diagnostics))
+    return _Job(document, Planner(task, built, requirements, session, start))
 
 
 def _deadline(task: Task) -> float:

@@ -17,6 +17,7 @@ from kemba.ocp.reading import task_model
 from kemba.ocp.shipped.kind import figures_of
 from kemba.ocp.shipped.shelf import Near, neighbours
 from kemba.ocp.starts import plan_best
+from kemba.report.earlier import fit_of, without_fit
 from kemba.report.judging.executed import Begun, Executed, executed
 from kemba.report.judging.matched import matched, summed
 from kemba.report.listener import Listener
@@ -77,12 +78,13 @@ def best_plan(
     """
     begun = begun or (lambda plan: None)
     best: Executed | None = None
+    bare = without_fit(task, fit_of(task, approach.origin))
     for one in _candidates(task, document, approach, listener):
         how = approach.replay, listener.tell, begun, place
         made = last = executed(one.plan, one.table, one.share, *how)
         if approach.replay and not (made.fine or (made.good and one.share)):
-            # without the air of a shipped start, which remedies add themselves
-            asked = one.plan.task.model_copy(update={"effects": task.effects})
+            # without fitted air, which remedies add themselves
+            asked = one.plan.task.model_copy(update={"effects": bare.effects})
             words = asked, document, listener, begun, approach.log, place
             made, last = improved(made, *words, guess=one.last)
         if one.share is not None and made.plan is not one.plan:
@@ -95,7 +97,7 @@ def best_plan(
     assert best is not None
     if best is not last and best.motions.table is not None:
         begun(best.plan.trajectory)
-    known, remark = compared(best.plan, task)
+    known, remark = compared(best.plan, bare)
     if best.plan.continued is False and best.plan.start.startswith("shipped"):
         remark += "; it begins from a shipped plan: the earlier one is far, or does not come true"
     best.result.update(best_known=known, sentence=best.result["sentence"] + remark)
@@ -135,18 +137,19 @@ def _candidates(
     a guess or from the earlier plan in many steps; last are those that cost so much more than the
     shipped plans they begin from that a guess is likely to cost less."""
     how: dict[str, Any] = {"watch": listener.watch, "stop": listener.stop, "tell": listener.tell}
+    fit = fit_of(task, approach.origin)
 
     def plans(task: Task) -> Iterator[PlanCandidate]:
-        origin = approach.origin
+        origin, bare = approach.origin, without_fit(task, fit)
         shelved = approach.start is None and not approach.cold
-        if origin is not None and shelved and _tried_first(origin, task):
+        if origin is not None and shelved and _tried_first(origin, bare):
             once = replace(origin, once=True)
             near, _ = plan_from(once, task, document, approach.log, **how)
             if near is not None:
-                yield PlanCandidate(near)
+                yield PlanCandidate(replace(near, fitted_air=fit))
                 origin = None
         late = []
-        for one, entry in plans_nearby(task, document, approach.log, **how) if shelved else ():
+        for one, entry in plans_nearby(bare, document, approach.log, **how) if shelved else ():
             candidate = PlanCandidate(one if approach.free else replace(one, continued=False))
             if dear(one, entry.cost):
                 late.append(candidate)
@@ -160,6 +163,7 @@ def _candidates(
         if a.starts > 1 and a.free:
             return plan_best(task, document, a.starts, a.jobs, a.log, listener.tell)
         found = plan(task, document, log=a.log, start=a.start, origin=origin, **how)
+        found = replace(found, fitted_air=fit)
         left = a.origin is not None and origin is None
         return from_scratch(found, "the simulated robot does not follow it") if left else found
 

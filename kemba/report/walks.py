@@ -93,6 +93,7 @@ def record(made: Executed) -> dict[str, Any]:
         "cost": objective(model, task, found.requirements, found.trajectory),
         **found.cost,
         "plant": made.result["plant_replay"],
+        "table": made.result["table_replay"],
         "good": made.good,
         "usual": _landed(made, "usual"),
         "landed": _landed(made, "twice"),

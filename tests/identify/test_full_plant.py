@@ -26,7 +26,7 @@ LIKELY = (LINE, "seal_friction", "supply_droop", "both_mode_loss", "payload")
 def test_orifices_a_line_and_friction_explain_the_full_plant() -> None:
     fitted, kept = (
         robot_problem([plant_log(name) for name in names], load_model("planning"))
-        for names in (("hop-0350", "up-0500"), ("up-0540",))
+        for names in (("hop", "jump height=0.74 m"), ("jump height=0.64 m",))
     )
     usual = error_ratio(kept.rebuilt({}))
     built, figures = settled(fitted.rebuilt({}))

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from kemba.config import shipped_folder
 from kemba.errors import ConfigErrors
 from kemba.mechanism.knee import extension
 from kemba.model import Model
@@ -19,6 +20,7 @@ from kemba.ocp.planning import plan_from
 from kemba.ocp.refinement.refine import reduction_of
 from kemba.ocp.shipped.entry import read_plan
 from kemba.ocp.shipped.kind import kind_of
+from kemba.ocp.shipped.shelf import neighbours
 from kemba.ocp.task.requirement import resolve
 from kemba.ocp.transcription.unilateral import Constraint, read_constraints
 from kemba.plant.execution.controller import execute
@@ -28,11 +30,11 @@ from kemba.trajectory import Trajectory
 AIR = 0.01
 
 
-def kept(name: str) -> tuple[Trajectory, list[Phase], list[Constraint], list[bool]]:
-    """A shipped plan of `jump`, its phases, their constraints, and which valves extend."""
-    plan = read_plan(shipped_folder("plans") / f"{name}.npz")
-    task, document = load_task("jump.yaml")
+def kept(*options: str) -> tuple[Trajectory, list[Phase], list[Constraint], list[bool]]:
+    """The shipped plan of `jump`, its phases, their constraints, and which valves extend."""
+    task, document = load_task("jump.yaml", options)
     model = task_model(task)
+    plan = neighbours(task, model)[0].entry.plan
     reduction = reduction_of(model, task, resolve(task, model, document), plan)
     constraints, extends = read_constraints(model, reduction), extending(model, reduction)
     phases = noted_phases(plan.meta, constraints, len(extends), len(plan) - 1)
@@ -47,7 +49,7 @@ def pulses(plan: Trajectory, phases: list[Phase], air: list[int], extends: list[
 
 
 def test_a_pulse_is_put_where_the_legs_rest_on_their_stops() -> None:
-    plan, phases, constraints, extends = kept("up-0500")
+    plan, phases, constraints, extends = kept("height=0.74 m")
     found, now = stretched(plan, phases, constraints, extends, 50, AIR)
     assert len(now) == len(phases) + 2
     assert now[-1].last == len(found) - 1 == len(plan) - 1
@@ -63,7 +65,7 @@ def test_a_pulse_is_put_where_the_legs_rest_on_their_stops() -> None:
 
 
 def test_a_robot_that_stays_on_the_ground_has_no_pulse() -> None:
-    plan, phases, constraints, extends = kept("low-rise-0400")
+    plan, phases, constraints, extends = kept("height=0.4 m")
     assert stretched(plan, phases, constraints, extends, 50, AIR) == (plan, phases)
 
 
@@ -71,7 +73,7 @@ def test_the_pulse_stretches_the_legs_of_the_plant() -> None:
     """Without it, pistons fly 1 to 2 cm short of their stops, so that the feet come down late."""
     task, _ = load_task("jump.yaml", ["height=0.7 m"])
     model = task_model(task)
-    plan = with_pistons(read_plan(shipped_folder("plans") / "stretched-0700.npz"), model)
+    plan = with_pistons(read_plan(Path(__file__).parent / "plans" / "stretched-0700.npz"), model)
     table = controller_table(model, plan, task.hold)
     plant = counterpart(task.model, task.payload, task.supply, task.plant)
     assert plant is not None
@@ -129,11 +131,11 @@ def test_plans_with_and_without_begin_each_other() -> None:
 @pytest.mark.slow
 def test_a_longer_pulse_is_kept() -> None:
     """15 ms are more than a valve's shortest time, so that the row of its own holds."""
-    task, document = load_task("jump.yaml", ["height=0.54 m"])
+    task, document = load_task("jump.yaml", ["height=0.74 m"])
     model = task_model(task)
     asked = tuple(resolve(task, model, document))
-    plan = read_plan(shipped_folder("plans") / "up-0540.npz")
-    new, document = load_task("jump.yaml", ["height=0.54 m", "landing.air=15 ms"])
+    plan = neighbours(task, model)[0].entry.plan
+    new, document = load_task("jump.yaml", ["height=0.74 m", "landing.air=15 ms"])
     found, why = plan_from(Origin(plan, model, asked, once=True), new, document)
     assert found is not None, why
     assert found.status is Status.SOLVED

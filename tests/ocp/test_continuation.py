@@ -11,7 +11,6 @@ import pytest
 from plain_task import plain_task
 from typer.testing import CliRunner
 
-from kemba.config import shipped_folder
 from kemba.effects.mechanics.friction import SealFriction
 from kemba.effects.mechanics.load import Payload
 from kemba.model import load_model
@@ -23,7 +22,7 @@ from kemba.ocp.phases.notes import noted_phases, phase_notes
 from kemba.ocp.phases.radau import RADAU3
 from kemba.ocp.reading import asked_of, load_task
 from kemba.ocp.refinement.refine import Refiner, reduction_of, valve_columns
-from kemba.ocp.shipped.entry import read_plan
+from kemba.ocp.shipped.shelf import neighbours
 from kemba.ocp.transcription.symmetry import whole
 from kemba.ocp.transcription.unilateral import read_constraints
 from kemba.report.earlier import origin_of
@@ -176,7 +175,7 @@ def test_impacts_of_a_start_are_met() -> None:
     """A trajectory has no velocities after impacts; the start of a continuation has."""
     task, document = load_task("jump.yaml")
     model, asked = asked_of(task, document)
-    plan = read_plan(shipped_folder("plans") / "up-0500.npz")
+    plan = neighbours(task, model)[0].entry.plan
     half = reduction_of(model, task, asked, plan)
     constraints = read_constraints(model, half)
     valves = len(valve_columns(model, half))

@@ -31,7 +31,7 @@ from kemba.runs import STAGES
 def low() -> Plan:
     """A jump of 0.45 m from a shipped plan: it has phases of a single element."""
     task, document = load_task("jump.yaml", ["height=0.45 m"])
-    return next(plans_nearby(task, document))
+    return next(plans_nearby(task, document))[0]
 
 
 def built(

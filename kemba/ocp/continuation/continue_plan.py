@@ -115,8 +115,9 @@ class Continuation:
             start = completed(self.origin.plan, self.model)
             reduction = reduction_of(self.model, self.task, self.requirements, start)
             found: Refined | None = None
-            meshes = list(self._meshes(start, reduction))
-            for meshed in meshes:
+            meshes = []
+            for meshed in self._meshes(start, reduction):
+                meshes.append(meshed)
                 found = self._at_once(*meshed, reduction)
                 if found is not None:
                     return found

@@ -77,12 +77,11 @@ class Stages:
 def _scales(program: PhaseProgram) -> np.ndarray:
     """What one of each variable is (size,); without variables that were added for a solve."""
     c, layout = program.columns, program.layout
-    scale, own = np.ones(c.size), 0
+    scale, known = np.ones(c.size), np.zeros(c.size, dtype=bool)
 
     def put(index: np.ndarray, group: str, times: float = 1.0) -> None:
-        nonlocal own
         scale[index] = layout.scale[layout.slices[group]] * times
-        own = max(own, int(index.max(initial=-1)) + 1)
+        known[index] = True
 
     for state in (c.first, *(stage for stages in c.stages for stage in stages)):
         for group in state:
@@ -92,5 +91,5 @@ def _scales(program: PhaseProgram) -> np.ndarray:
     for p in c.after:
         put(c.after[p], "v")
         put(c.impulse[p], "lam", STEP)
-    scale[c.h] = STEP
-    return scale[: max(own, int(c.h.max()) + 1)]
+    scale[c.h], known[c.h] = STEP, True
+    return scale[: int(np.flatnonzero(known)[-1]) + 1]

@@ -52,7 +52,12 @@ def start_vector(program: PhaseProgram, plan: Trajectory) -> np.ndarray:
 
 
 def _between(times: np.ndarray, rows: np.ndarray, now: float) -> np.ndarray:
-    return np.array([np.interp(now, times, column) for column in rows.T])
+    """Rows (k, n) at rising times (k,), interpolated to one time; the ends beyond them."""
+    i = int(np.searchsorted(times, now))
+    if i in (0, len(times)):
+        return np.asarray(rows[min(i, len(times) - 1)])
+    share = (now - times[i - 1]) / (times[i] - times[i - 1])
+    return np.asarray(rows[i - 1] + share * (rows[i] - rows[i - 1]))
 
 
 def carried(program: PhaseProgram, coarse: PhaseProgram, x: np.ndarray) -> np.ndarray:

@@ -48,12 +48,12 @@ class Entry:
     def effects(self) -> dict[str, dict[str, Any]]:
         """The figures of fitted air with which it was made, as a task's `effects`; empty without
         a fit."""
-        return dict(self.plan.meta.get("effects", {}))
+        return dict(self.plan.meta["effects"]) if self.fitted_air else {}
 
     @property
     def fitted_air(self) -> dict[str, Any] | None:
-        """The fit itself, as certificates have it."""
-        return self.plan.meta.get("fitted_air")
+        """The fit itself, as certificates have it; None also where it changes nothing."""
+        return kept_fit(self.plan)
 
     @property
     def way(self) -> str:
@@ -66,6 +66,12 @@ class Entry:
     def name(self) -> str:
         """The name of its file, without the ending."""
         return self.file.stem
+
+
+def kept_fit(plan: Trajectory) -> dict[str, Any] | None:
+    """The fit of a kept plan's air; None where there is none, or no factor differs from 1."""
+    fit: dict[str, Any] | None = plan.meta.get("fitted_air")
+    return fit if fit and any(factor != 1.0 for factor in fit["factors"].values()) else None
 
 
 def write_plan(
