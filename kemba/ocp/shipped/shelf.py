@@ -66,8 +66,9 @@ class Neighbour:
 def neighbours(task: Task, model: Model, folder: Path | None = None) -> list[Neighbour]:
     """The shipped plans near a task, the nearest first; none for another robot or kind of task.
 
-    A task that asks for its own start (`guess_noise`, `seed`), another method or no refinement
-    has none. `folder`: where other plans are.
+    Of those with the same figures the cheapest comes first; for a `robust` task the one that lands
+    most often. A task that asks for its own start (`guess_noise`, `seed`), another method or no
+    refinement has none. `folder`: where other plans are.
     """
     own = task.method == "relaxation" and task.refine == "radau"
     if not own or task.guess_noise or task.seed or task.guess != "automatic":
@@ -76,7 +77,12 @@ def neighbours(task: Task, model: Model, folder: Path | None = None) -> list[Nei
     kind = kind_of(task, model) if kept else ""
     asked, near = figures_of(task, model), Near.current()
     found = [Neighbour(e, near.differences(asked, e.figures)) for e in kept if e.kind == kind]
-    return sorted((n for n in found if n.away <= 1.0), key=lambda n: (n.apart, n.entry.name))
+    close = (n for n in found if n.away <= 1.0)
+
+    def order(n: Neighbour) -> tuple[float, float]:
+        return n.apart, -n.entry.landed if task.robust else n.entry.cost
+
+    return sorted(close, key=order)
 
 
 def ways(near: Sequence[Neighbour]) -> Iterator[Neighbour]:
@@ -102,4 +108,5 @@ def shelf(folder: Path) -> Sequence[Entry]:
 
 def _entry(folder: Path, row: Mapping[str, str]) -> Entry:
     figures = {name: float(row[name]) for name in FIGURES if row[name]}
-    return Entry(folder / row["file"], row["kind"], figures, float(row["cost"]), int(row["of"]))
+    cost, of, landed = float(row["cost"]), int(row["of"]), int(row["landed"])
+    return Entry(folder / row["file"], row["kind"], figures, cost, of, landed)
