@@ -66,6 +66,18 @@ def test_shipped_plans_can_be_read(entry: Entry) -> None:
     assert np.all(np.diff(plan.time) > 0.0)
 
 
+def test_the_cheapest_comes_first_and_for_a_robust_task_the_one_that_lands_most_often() -> None:
+    cheap, robust = (
+        near("jump.yaml", "height=0.6 m"),
+        near("jump.yaml", "height=0.6 m", "robust=60"),
+    )
+    assert {n.entry.name for n in cheap} == {n.entry.name for n in robust}
+    first, second = (n.entry for n in cheap[:2])
+    assert first.figures == second.figures == robust[0].entry.figures
+    assert robust[0].entry == second != first
+    assert first.cost < second.cost < 1.5 * first.cost and first.landed < second.landed
+
+
 def test_near_tasks_have_neighbours() -> None:
     found = near("jump.yaml", "height=0.51 m", "supply=0.68 MPa", "nodes=60", "hold=0 s")
     away = (
