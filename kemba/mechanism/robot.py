@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any
@@ -36,11 +37,13 @@ def robot_mechanism(
     `offsets` [m or kg]: lengths, and mass between body and legs, that differ from those of the
     table `drawn`. `symbols`: the same
     offsets in expressions, where these depend on parameters. Raises KembaError where the knee
-    cannot close with these lengths. Without either, the same table gives the same object.
+    cannot close with these lengths.
     """
     if offsets or symbols:
         return _mechanism(drawn, dict(offsets or {}), symbols or {})
-    return _nominal(drawn.model_dump_json())
+    # an object of its own: models of one mechanism share machine code in the plant, which must
+    # not depend on what else was loaded before
+    return copy(_nominal(drawn.model_dump_json()))
 
 
 @lru_cache(maxsize=8)

@@ -74,7 +74,7 @@ def test_feet_begin_from_the_same_shipped_plans_and_come_so_high() -> None:
     other = load_task("jump.yaml", [f"height={with_height(task, model).height}"])[0]
     near = [n.entry.name for n in neighbours(task, model)]
     assert near and near == [n.entry.name for n in neighbours(other, model)]
-    found = next(plans_nearby(task, document))
+    found, _ = next(plans_nearby(task, document))
     assert found.status is Status.SOLVED
     top = int(np.argmax(found.trajectory["body/z"]))
     assert all(found.trajectory[f"{leg}/foot/z"][top] >= 0.08 - 1e-6 for leg in ("front", "rear"))

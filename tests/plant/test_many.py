@@ -75,6 +75,14 @@ def test_models_that_differ_in_tables_share_their_machine_code() -> None:
         same(run(variant, {}, PUSH, 0.15), run(alone, {}, PUSH, 0.15), within=1e-6)
 
 
+def test_machine_code_does_not_depend_on_what_was_simulated_before() -> None:
+    limp = planning().effect("mode_damping").model_copy(update={"c_none": 60.0})
+    first = planning()
+    shared = [equations_of(first), equations_of(first.with_effects([limp]))]
+    assert shared[-1].free == ("mode_damping.c_none",)
+    assert equations_of(planning()).free == ()
+
+
 def test_other_threads_run_while_one_simulates() -> None:
     """Python's own lock is free meanwhile: else this thread would hardly count."""
     condition = Condition(planning(), {"body/z": 2.0}, None, 1.0, 2e-5, 0.5)
