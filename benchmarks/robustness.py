@@ -3,14 +3,13 @@
 Plans each task as `kemba-opt solve` does, draws conditions from `configs/uncertainties`, and
 executes the plan's table on the full plant: open loop, and with its feedback policy. Every
 execution is kept in a record; what is there of the same table is not executed again, so that an
-interrupted run continues. A task may carry changes: "jump height=0.6 m, supply=0.6 MPa"; `--grid`
-adds all figures of the shipped plans. The page, docs/robustness.md, is written from the record.
+interrupted run continues. A task may carry changes: "jump height=0.6 m, supply=0.6 MPa". The page,
+docs/robustness.md, is written from the record.
 """
 
 from __future__ import annotations
 
 import argparse
-import csv
 import json
 import os
 import shutil
@@ -54,7 +53,6 @@ WAYS = {  # how a table is executed, under which uncertainties
     "feedback": ("twice", "feedback"),
 }
 CARD = Path(__file__).resolve().parent.parent / "docs" / "robustness.md"
-UNITS = {"height": "m", "distance": "m", "supply": "Pa", "payload": "kg", "duration": "s"}
 KEYS = ("task", "conditions", "way", "of", "drawn", "index")  # what names an execution
 SOLVE = "from kemba_cli.main import main; main()"
 
@@ -141,18 +139,9 @@ def records(
         }
 
 
-def grid() -> Iterator[str]:
-    """Every task of the shipped plans that is none of the shipped tasks."""
-    with (shipped_folder("plans") / "plans.csv").open(encoding="utf-8", newline="") as stream:
-        for row in csv.DictReader(stream):
-            changes = [f"{key}={row[key]} {unit}" for key, unit in UNITS.items() if row[key]]
-            yield f"{row['task'].removesuffix('.yaml')} {', '.join(changes)}"
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("tasks", nargs="*", default=list(TASKS))
-    parser.add_argument("--grid", action="store_true", help="also the figures of shipped plans")
     parser.add_argument("--ways", nargs="*", choices=WAYS, default=list(WAYS)[:3])
     parser.add_argument("--drawn", type=int, default=240, help="conditions that are drawn")
     parser.add_argument("--cases", type=int, help="of these so many are executed; all of them")
@@ -166,8 +155,7 @@ def main() -> None:
     rows = _read(kept)
     if not asked.page:
         known = {tuple(row[key] for key in KEYS) for row in rows}
-        names = [*asked.tasks, *(grid() if asked.grid else ())]
-        for name in names:
+        for name in asked.tasks:
             bench = planned(name, asked.folder, asked.replan)
             for way in asked.ways:
                 cases = range(asked.cases or asked.drawn)

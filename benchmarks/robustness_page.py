@@ -30,8 +30,8 @@ stays upright. The intervals are Wilson's, of 95 %.
 - **twice** (`twice.yaml`): payload 0 to 1 kg, supply ±10 %, delay 1 ms, pitch 2 deg; the rest as
   above.
 
-`robust=60` is a plan chosen in 60 scenarios of usual ([robust](tasks.md)). torque²: the squared
-torque of the plan [N².m².s].
+`robust=60` is a plan chosen in 60 scenarios of usual, or of twice where the task says
+`uncertainties=twice` ([robust](tasks.md)). torque²: the squared torque of the plan [N².m².s].
 
 *Open loop*: hips follow the table by eq. 10, valves switch by the clock. *Feedback*: the
 [policy](policy.md) with noisy sensors, with those of its parts with which most of 40 other

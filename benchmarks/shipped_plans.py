@@ -43,11 +43,10 @@ guess, each with its solved program. Of {tried} plans those count whose executio
 task's tolerances, also on the full plant, and whose table gives the planned apex within 1 mm (where
 that was noted). Of the same figures the one was kept with the smallest cost per landing, in 60
 scenarios at twice the usual uncertainty (the last column), or a cheaper one that lands in {sure} of
-60 usual scenarios or more. Beside it there is the one that lands most often, where that is {clear} of
-60 more at least and it costs at most {dear:g} times as much: from that `--robust` begins. `of`: among
-how many.
-Errors are those on the plant. `air`: the [`landing.air`](tasks.md) with which a plan was made, a
-pulse on stretched legs. `fitted`: made with
+60 usual scenarios or more. Beside it there is the one that lands most often, where that is {clear}
+of 60 more at least and it costs at most {dear:g} times as much: from that `--robust` begins. `of`:
+among how many. Errors are those on the plant. `air`: the [`landing.air`](tasks.md) with which a
+plan was made, a pulse on stretched legs. `fitted`: made with
 [air that fits the plant](solving.md#air-that-fits-the-plant); a task that begins from it has the
 same air. [Height by height](solving.md#height-by-height) says what `solve` finds.
 Facts of earlier plans were read again from their files when the page was written anew, so that `of`
@@ -144,7 +143,11 @@ def write_index(path: Path, chosen: list[dict[str, Any]]) -> None:
 def page(chosen: list[dict[str, Any]], tried: int) -> str:
     """The page for people."""
     text = HEAD.format(
-        tried=tried, sure=SURE, clear=CLEAR, dear=DEAR, machine=platform.processor() or platform.machine()
+        tried=tried,
+        sure=SURE,
+        clear=CLEAR,
+        dear=DEAR,
+        machine=platform.processor() or platform.machine(),
     )
     columns = ["task", *(f"{k} [{UNITS[k]}]" for k in FIGURES)]
     columns += ["air", "fitted", "torque² [N².m².s]", "valves [s]", "cost", "of"]

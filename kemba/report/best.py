@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from kemba.config import Document
 from kemba.ocp import Plan, Task, plan
 from kemba.ocp.continuation.between import Origin
@@ -130,6 +132,13 @@ def _tried_first(origin: Origin, task: Task) -> bool:
     return bool(neighbours(task, model)) and bool(away.max(initial=0.0) <= 1.0)
 
 
+def shelf_is_nearer(found: Plan, task: Task) -> bool:
+    """Whether a shipped plan has figures nearer to those of a task than a found plan has."""
+    model, near = task_model(task), Near.current()
+    own = near.differences(figures_of(task, model), figures_of(found.task, found.model))
+    return any(n.apart < np.linalg.norm(own) for n in neighbours(task, model))
+
+
 def _candidates(
     task: Task, document: Document, approach: Approach, listener: Listener
 ) -> Iterator[PlanCandidate]:
@@ -171,6 +180,10 @@ def _candidates(
         from kemba.report.robust import most_robust  # loads SciPy, which most plans do not need
 
         def changed(found: Plan, task: Task) -> Plan | None:
+            bare = without_fit(task, found.fitted_air)
+            if shelf_is_nearer(found, bare):
+                for one, _ in plans_nearby(bare, document, approach.log, **how):
+                    return replace(summed(found, one), start=one.start)
             names = "the plan as asked", "other starts (--starts 4) may take less"
             known = found.trajectory, found.model, found.requirements
             origin = Origin(*known, *names, once=True, stages=found.stages)

@@ -11,6 +11,7 @@ import pytest
 from kemba.ocp import Plan, Task, load_task
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.planning import plans_nearby
+from kemba.report.best import shelf_is_nearer
 from kemba.report.judging.judged import plant_of
 from kemba.report.robust import most_robust
 from kemba.report.robust_ways import gripping, least_grip, lifted, longer
@@ -45,6 +46,13 @@ def test_a_high_jump_leans_on_friction_and_takes_all_its_time(tmp_path: Path) ->
     assert second is not None and "0.805 s instead of 0.7 s" in second[0]
     assert second[1].duration == pytest.approx(0.805)
     assert second[1].model_dump(exclude={"duration"}) == found.task.model_dump(exclude={"duration"})
+
+
+def test_a_shipped_plan_with_more_time_is_nearer_than_the_plan_without(tmp_path: Path) -> None:
+    found, cases = planned(0.84), grounds(tmp_path, 0.5)
+    first, second = gripping(found, cases), longer(found, cases)
+    assert first is not None and not shelf_is_nearer(found, first[1])
+    assert second is not None and shelf_is_nearer(found, second[1])
 
 
 def test_a_low_jump_does_neither(tmp_path: Path) -> None:
