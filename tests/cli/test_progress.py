@@ -35,7 +35,7 @@ def test_a_stage_is_a_text_and_a_count() -> None:
     assert (stage.name, stage.part, stage.parts) == ("refitting valve_delay", 2, 8)
 
 
-COURSES = [SOLVE, NEAR, COMPARE, DISCOVER, LEARN, REVIEW, courses.SENSITIVITY]
+COURSES = [SOLVE, NEAR, courses.ROBUST, COMPARE, DISCOVER, LEARN, REVIEW, courses.SENSITIVITY]
 
 
 @pytest.mark.parametrize("course", COURSES)
@@ -75,6 +75,20 @@ def test_a_plan_from_another_one_takes_its_own_time(clock: Clock) -> None:
     assert left.share == NEAR["from the"] and left.seconds == pytest.approx(18.0)
     left.enter("relax (half robot, 50 nodes)")
     assert left.words == ""
+
+
+def test_how_many_plans_a_robust_task_tries_is_not_guessed(clock: Clock) -> None:
+    left = Left(SOLVE)
+    clock.now += 2.0
+    left.enter("from the shipped plan up-0500: the best one")
+    assert left.words
+    clock.now += 2.0
+    left.enter("as asked, hold 0.3 s: 57 of 60 scenarios succeed (95 %: 86 to 98 %)")
+    left.enter("from the plan as asked: the best one")
+    assert left.words == ""
+    clock.now += 16.0
+    left.enter("replay: controller.csv (2 of 3)")
+    assert left.words == "about 1 s left"
 
 
 def test_a_limit_bounds_the_time_left(clock: Clock) -> None:
