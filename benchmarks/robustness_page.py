@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -65,7 +66,15 @@ def page(rows: Sequence[Row], repeats: str = "", costs: Mapping[str, float] | No
 
 
 def _tasks(rows: Sequence[Row]) -> list[str]:
-    return list(dict.fromkeys(r["task"] for r in rows))
+    """The tasks in a reader's order: each with its changes behind it, by their figures."""
+    names = list(dict.fromkeys(r["task"] for r in rows))
+    first = list(dict.fromkeys(name.split(" ")[0] for name in names))
+
+    def order(name: str) -> tuple[int, float, str]:
+        figures = re.findall(r"[\d.]+", name)
+        return first.index(name.split(" ")[0]), float(figures[0]) if figures else 0.0, name
+
+    return sorted(names, key=order)
 
 
 def _of(rows: Sequence[Row], task: str, column: tuple[str, str]) -> list[Row]:

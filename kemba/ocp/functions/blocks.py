@@ -59,7 +59,8 @@ class BlockProblem:
     @cached_property
     def g(self) -> ca.Function:
         """(x, p) -> every row."""
-        rows = [b.code.rows_at(len(b.columns))(*self._local(b)) for b in self.blocks]
+        each = zip(self.blocks, self._locals, strict=True)
+        rows = [b.code.rows_at(len(b.columns))(*here) for b, here in each]
         at = [self.x, self.parameter]
         return ca.Function("g", at, [ca.vertcat(*map(ca.vec, rows))], ["x", "p"], ["g"])
 
@@ -67,8 +68,7 @@ class BlockProblem:
     def nlp(self) -> dict[str, ca.MX]:
         """x, p, f and g as expressions."""
         f, g = ca.MX(0), []
-        for block, (cost, value, *_) in self._each:
-            here = self._local(block)
+        for _, here, (cost, value, *_) in self._each:
             f += ca.sum2(cost(*here))
             g.append(ca.vec(value(*here)))
         return {"x": self.x, "p": self.parameter, "f": f, "g": ca.vertcat(*g)}
@@ -77,8 +77,8 @@ class BlockProblem:
     def grad_f(self) -> ca.Function:
         """(x, p) -> f and its gradient."""
         f, gradients = ca.MX(0), []
-        for block, (_, _, slope, _, _) in self._each:
-            cost, gradient = slope(*self._local(block))
+        for block, here, (_, _, slope, _, _) in self._each:
+            cost, gradient = slope(*here)
             f += ca.sum2(cost)
             gradients.append((ca.vec(gradient), block.columns.ravel()))
         return self._named("grad_f", [f, _gather_gradient(gradients, self.size)], "f", "grad_f_x")
@@ -87,8 +87,8 @@ class BlockProblem:
     def jac_g(self) -> ca.Function:
         """(x, p) -> g and its Jacobian."""
         g, parts, row = [], [], 0
-        for block, (_, _, _, first, _) in self._each:
-            values, nonzeros = first(*self._local(block))
+        for block, here, (_, _, _, first, _) in self._each:
+            values, nonzeros = first(*here)
             g.append(ca.vec(values))
             parts.append(_place_jacobian(block, nonzeros, row))
             row += values.numel()
@@ -100,10 +100,10 @@ class BlockProblem:
         """(x, p, lam_f, lam_g) -> upper triangle of the Lagrangian's Hessian."""
         lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", self.rows)
         parts, row = [], 0
-        for block, (*_, second) in self._each:
+        for block, here, (*_, second) in self._each:
             m, n = block.code.g.numel(), len(block.columns)
             multipliers = ca.reshape(lam_g[row : row + m * n], m, n)
-            nonzeros = second(*self._local(block), lam_f, multipliers)
+            nonzeros = second(*here, lam_f, multipliers)
             parts.append(_place_hessian(block, nonzeros))
             row += m * n
         at = {"x": self.x, "p": self.parameter, "lam_f": lam_f, "lam_g": lam_g}
@@ -114,15 +114,20 @@ class BlockProblem:
     def _named(self, name: str, results: list[ca.MX], *names: str) -> ca.Function:
         return ca.Function(name, [self.x, self.parameter], results, ["x", "p"], list(names))
 
-    def _local(self, block: PlacedBlock) -> tuple[ca.MX, ca.MX]:
-        """Local variables of every repeat, side by side; parameters and constants of all."""
-        given = ca.vertcat(self.parameter, ca.DM(block.code.numbers))
-        return _gather(self.x, block.columns), given
+    @cached_property
+    def _locals(self) -> list[tuple[ca.MX, ca.MX]]:
+        """Of every block the local variables of its repeats, side by side; and parameters and
+        constants of all of them."""
+        return [
+            (_gather(self.x, b.columns), ca.vertcat(self.parameter, ca.DM(b.code.numbers)))
+            for b in self.blocks
+        ]
 
     @cached_property
-    def _each(self) -> list[tuple[PlacedBlock, list[ca.Function]]]:
-        """Every block with its functions over its repeats."""
-        return [(block, block.functions) for block in self.blocks]
+    def _each(self) -> list[tuple[PlacedBlock, tuple[ca.MX, ca.MX], list[ca.Function]]]:
+        """Every block, its local variables, and its functions over its repeats."""
+        each = zip(self.blocks, self._locals, strict=True)
+        return [(block, here, block.functions) for block, here in each]
 
 
 def _gather(x: ca.MX, columns: np.ndarray) -> ca.MX:

@@ -46,14 +46,13 @@ def _gaps(program: PhaseProgram, view: View, i: int, constraint: Constraint) -> 
     settings = ModeConstraints.current()
     closing = {phases[p].first: p for p in program.impacts if program.closes(p, i)}
     closed = np.array([phases[p].active(i) for p in c.phase_of])
+    away = np.convolve(closed, np.ones(2 * settings.away + 1), "same") < 1  # of a closed element
     g = view.of(constraint.gap) / LENGTH
     for clear in (False, True):
         apart: Where = [
-            (c.phase_of[e], c.stages[e][stage]["q"])
-            for e in np.flatnonzero(~closed)
-            for stage in range(len(c.stages[e]))
-            if not (stage == len(c.stages[e]) - 1 and e + 1 in closing)
-            and clear != closed[max(e - settings.away, 0) : e + settings.away + 1].any()
+            (c.phase_of[e], stage["q"])
+            for e in np.flatnonzero(~closed & (away == clear))
+            for stage in (c.stages[e][:-1] if e + 1 in closing else c.stages[e])
         ]
         low = settings.clear / LENGTH if clear else 0.0
         program.mode_constraint(i, "gap", view.z("q"), g, low, INF, apart)

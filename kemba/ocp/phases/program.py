@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -54,8 +55,7 @@ class PhasePart:
     soft: Soft | None = None
 
 
-@dataclass(frozen=True)
-class PhaseRow:
+class PhaseRow(NamedTuple):
     """One row of the program: its meaning, the node it is about, its bounds."""
 
     label: str
@@ -263,9 +263,9 @@ class PhaseProgram:
         """What every row means and where it holds."""
         nodes = self.columns.nodes()
         return [
-            PhaseRow(label, int(nodes[columns].max()), part.lower, part.upper)
+            PhaseRow(label, node, part.lower, part.upper)
             for part in self.parts
-            for columns in part.columns
+            for node in nodes[part.columns].max(axis=1).tolist()
             for label in part.labels
         ]
 

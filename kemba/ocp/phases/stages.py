@@ -38,13 +38,12 @@ class Stages:
         """The solution of a program, scaled there."""
         scale = _scales(program)
         values, of_bounds = found.Y[: len(scale)] * scale, np.zeros(0)
-        of_rows: dict[str, list[tuple[int, float]]] = {}
+        of_rows: dict[str, np.ndarray] = {}
         if found.lam_x is not None and found.lam_g is not None:
             of_bounds = found.lam_x[: len(scale)]
-            for row, multiplier in zip(program.rows, found.lam_g, strict=True):
-                of_rows.setdefault(row.label, []).append((row.node, float(multiplier)))
-        tables = {label: np.array(table) for label, table in of_rows.items()}
-        return cls(tuple(program.phases), program.scheme.stages, values, of_bounds, tables)
+            for label, (rows, nodes) in _by_label(program).items():
+                of_rows[label] = np.column_stack([nodes, found.lam_g[rows]])
+        return cls(tuple(program.phases), program.scheme.stages, values, of_bounds, of_rows)
 
     @property
     def nodes(self) -> int:
@@ -66,12 +65,32 @@ class Stages:
         rows that this one did not have. Nothing may be added to the program afterwards."""
         if len(x) != len(self.of_bounds):
             return Iterate(x)
-        known: defaultdict[tuple[str, int], deque[float]] = defaultdict(deque)
-        for label, table in self.of_rows.items():
-            for node, multiplier in table:
-                known[label, int(node)].append(multiplier)
-        rows = [known[row.label, row.node] for row in program.rows]
-        return Iterate(x, self.of_bounds, np.array([own.popleft() if own else 0.0 for own in rows]))
+        lam_g = np.zeros(len(program.rows))
+        for label, (rows, nodes) in _by_label(program).items():
+            if label in self.of_rows:
+                lam_g[rows] = _at_nodes(self.of_rows[label], nodes)
+        return Iterate(x, self.of_bounds, lam_g)
+
+
+def _by_label(program: PhaseProgram) -> dict[str, tuple[list[int], list[int]]]:
+    """The rows of each label, and their nodes."""
+    found: dict[str, tuple[list[int], list[int]]] = {}
+    for i, row in enumerate(program.rows):
+        rows, nodes = found.setdefault(row.label, ([], []))
+        rows.append(i)
+        nodes.append(row.node)
+    return found
+
+
+def _at_nodes(table: np.ndarray, nodes: list[int]) -> np.ndarray:
+    """Multipliers of a table (n, 2) at nodes (m,), one after the other where several rows are at
+    one; 0 where there is none."""
+    if np.array_equal(table[:, 0], nodes):
+        return np.asarray(table[:, 1])
+    known: defaultdict[int, deque[float]] = defaultdict(deque)
+    for node, multiplier in table:
+        known[int(node)].append(multiplier)
+    return np.array([known[node].popleft() if known[node] else 0.0 for node in nodes])
 
 
 def _scales(program: PhaseProgram) -> np.ndarray:

@@ -36,27 +36,25 @@ def start_vector(program: PhaseProgram, plan: Trajectory) -> np.ndarray:
         a, b = phase.first, phase.last
         h = (t[b] - t[a]) / phase.elements
         x[c.h[p]] = h / STEP
-        for e in range(a, b):
-            x[c.u[e]] = _between(t[a + 1 : b + 1], Y[a + 1 : b + 1, layout.slices["u"]],
-                                 t[a] + (e - a + 1) * h)  # fmt: skip
-            for i, stage in enumerate(c.stages[e]):
-                now = t[a] + (e - a + program.scheme.points[i]) * h
-                for g, index in stage.items():
-                    first = a + int(g == "lam" or (g == "v" and p in c.after))
-                    rows = slice(first, b + 1)
-                    x[index] = _between(t[rows], Y[rows, layout.slices[g]], now)
+        begins, rows = t[a] + np.arange(b - a) * h, slice(a + 1, b + 1)
+        x[c.u[a:b]] = _between(t[rows], Y[rows, layout.slices["u"]], begins + h)
+        for i, point in enumerate(program.scheme.points):
+            for g in (*STATE, "lam"):
+                rows = slice(a + int(g == "lam" or (g == "v" and p in c.after)), b + 1)
+                index = np.array([c.stages[e][i][g] for e in range(a, b)])
+                x[index] = _between(t[rows], Y[rows, layout.slices[g]], begins + point * h)
         if p in c.after:
             x[c.after[p]] = Y[a + 1, layout.slices["v"]]
             x[c.impulse[p]] = Y[a + 1, layout.slices["lam"]] * (t[a + 1] - t[a]) / STEP
     return np.clip(x, program.lower, program.upper)
 
 
-def _between(times: np.ndarray, rows: np.ndarray, now: float) -> np.ndarray:
-    """Rows (k, n) at rising times (k,), interpolated to one time; the ends beyond them."""
-    i = int(np.searchsorted(times, now))
-    if i in (0, len(times)):
-        return np.asarray(rows[min(i, len(times) - 1)])
-    share = (now - times[i - 1]) / (times[i] - times[i - 1])
+def _between(times: np.ndarray, rows: np.ndarray, now: np.ndarray) -> np.ndarray:
+    """Rows (k, n) at rising times (k,), interpolated to other times (m,); the ends beyond them."""
+    if len(times) == 1:
+        return np.repeat(rows, len(now), axis=0)
+    i = np.clip(np.searchsorted(times, now), 1, len(times) - 1)
+    share = np.clip((now - times[i - 1]) / (times[i] - times[i - 1]), 0.0, 1.0)[:, None]
     return np.asarray(rows[i - 1] + share * (rows[i] - rows[i - 1]))
 
 
