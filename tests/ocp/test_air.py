@@ -49,7 +49,7 @@ def pulses(plan: Trajectory, phases: list[Phase], air: list[int], extends: list[
 
 
 def test_a_pulse_is_put_where_the_legs_rest_on_their_stops() -> None:
-    plan, phases, constraints, extends = kept("height=0.74 m")
+    plan, phases, constraints, extends = kept("height=0.5 m")
     found, now = stretched(plan, phases, constraints, extends, 50, AIR)
     assert len(now) == len(phases) + 2
     assert now[-1].last == len(found) - 1 == len(plan) - 1
@@ -65,7 +65,7 @@ def test_a_pulse_is_put_where_the_legs_rest_on_their_stops() -> None:
 
 
 def test_a_robot_that_stays_on_the_ground_has_no_pulse() -> None:
-    plan, phases, constraints, extends = kept("height=0.4 m")
+    plan, phases, constraints, extends = kept("height=0.5 m")
     assert stretched(plan, phases, constraints, extends, 50, AIR) == (plan, phases)
 
 
