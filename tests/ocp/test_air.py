@@ -65,7 +65,7 @@ def test_a_pulse_is_put_where_the_legs_rest_on_their_stops() -> None:
 
 
 def test_a_robot_that_stays_on_the_ground_has_no_pulse() -> None:
-    plan, phases, constraints, extends = kept("height=0.5 m")
+    plan, phases, constraints, extends = kept("height=0.4 m")
     assert stretched(plan, phases, constraints, extends, 50, AIR) == (plan, phases)
 
 
