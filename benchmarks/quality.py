@@ -1,6 +1,7 @@
 """How good is the default? Forty tasks, each as `solve` plans it and from random starts.
 
     python benchmarks/quality.py [--starts 20] [--limit 600]   # goes on where the record ends
+    python benchmarks/quality.py --part 1/2                   # every second task, for two cores
     python benchmarks/quality.py --save docs/solving.md       # writes the table
 
 A random start has guess noise 0.25 and a seed, as those of `--starts`. It is planned without
@@ -16,7 +17,7 @@ import itertools
 import json
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -78,8 +79,8 @@ def _executed(asked: tuple[str, ...], limit: float, settings: tuple[str, ...]) -
             "status": str(found.status)}  # fmt: skip
 
 
-def study(starts: int, limit: float) -> Iterator[Callable[[], dict[str, Any]]]:
-    """What is left to do: the defaults, then a few starts of each task, then the others."""
+def study(asked_for: Sequence[tuple[str, ...]], starts: int, limit: float) -> Iterator[Any]:
+    """Rows of what is left to do: the defaults, then a few starts of each task, then the others."""
     done = RECORD.read_text(encoding="utf-8").splitlines() if RECORD.is_file() else []
     known = {(r["task"], r["kind"], r["seed"]): r for r in map(json.loads, done)}
 
@@ -93,10 +94,10 @@ def study(starts: int, limit: float) -> Iterator[Callable[[], dict[str, Any]]]:
         known[key] = {"task": key[0], "kind": kind, "seed": seed, **answer, "cpu_s": cpu}
         yield known[key]
 
-    for asked in tasks():
+    for asked in asked_for:
         yield from left(asked, "default", 0, default)
     for few in (range(1, 6), range(6, 11), range(11, 16), range(16, 21)):
-        for asked in tasks():
+        for asked in asked_for:
             name = " ".join(asked)
             if few[0] > 1 and not _solved(known, name):
                 continue  # no plan from five starts: probably there is none
@@ -116,12 +117,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--starts", type=int, default=20)
     parser.add_argument("--limit", type=float, default=600.0, help="seconds of one plan")
+    parser.add_argument("--part", default="1/1", help="which share of the tasks")
     parser.add_argument("--save", type=Path, help="write the table of what is recorded to a page")
     asked = parser.parse_args()
     if asked.save is not None:
         written(asked.save)
         return
-    for row in study(asked.starts, asked.limit):
+    part, parts = map(int, asked.part.split("/"))
+    for row in study(tasks()[part - 1 :: parts], asked.starts, asked.limit):
         with RECORD.open("a", encoding="utf-8") as stream:
             stream.write(json.dumps(row) + "\n")
         print(row, flush=True)

@@ -233,6 +233,8 @@ def _events(text: str) -> Iterator[Any]:
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         what = f"is not valid YAML: {error.problem or error.context}"
+        if "nesting depth" in str(error.problem):  # libyaml reads ahead, to a limit of its own
+            what = f"is nested deeper than {YamlLimits.current().depth} levels"
         raise YamlError(what, (mark.line, mark.column) if mark else None) from None
     except (yaml.YAMLError, ValueError) as error:
         raise YamlError(f"is not valid YAML: {str(error).splitlines()[0]}") from None
