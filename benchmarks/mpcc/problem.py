@@ -13,7 +13,7 @@ import numpy as np
 import yaml
 
 from kemba.effects.formula import evaluate, names_of, parse_formula
-from kemba.ocp.functions.blocks import BlockProblem, RowBlock
+from kemba.ocp.functions.blocks import RowBlock, block_problem
 
 FOLDER = Path(__file__).parent
 INF = np.inf
@@ -56,7 +56,7 @@ class Mpcc:
         self.g_lower = np.concatenate([np.zeros(equal + more), last + low])
         self.g_upper = np.concatenate([np.zeros(equal), np.full(more, INF), last])
         columns = np.arange(parts.x.numel())[None, :]
-        self.problem = BlockProblem([RowBlock(parts.x, g, parts.f, columns)], columns.size, p)
+        self.problem = block_problem([RowBlock(parts.x, g, parts.f, columns)], columns.size, p)
 
     def nearest(self, x: np.ndarray) -> tuple[bool, ...]:
         """Which side of each pair is smaller at x (n,): True for the first."""

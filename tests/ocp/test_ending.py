@@ -12,7 +12,7 @@ import pytest
 
 import kemba.ocp
 from kemba.ocp.certificate.status import Status
-from kemba.ocp.functions.blocks import BlockProblem, RowBlock
+from kemba.ocp.functions.blocks import RowBlock, block_problem
 from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.nlp.ipopt import Control, Ipopt, Iterate
 
@@ -23,7 +23,7 @@ class Parabola:
     def __init__(self, least: float = 0.0, most: float = 1.0) -> None:
         x = ca.SX.sym("x", 2)
         block = RowBlock(x, ca.sum1(x), ca.sumsqr(x - 3.0), np.array([[0, 1]]))
-        self.problem = BlockProblem([block], 2, ca.SX(0, 1))
+        self.problem = block_problem([block], 2, ca.SX(0, 1))
         self.lower, self.upper = np.full((1, 2), -1.0), np.full((1, 2), 1.0)
         self.g_lower, self.g_upper = np.array([least]), np.array([most])
 

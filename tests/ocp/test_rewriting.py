@@ -8,7 +8,7 @@ import pytest
 
 from kemba.model import load_model
 from kemba.ocp import load_task
-from kemba.ocp.functions.blocks import BlockProblem, RowBlock
+from kemba.ocp.functions.blocks import BlockProblem, RowBlock, block_problem
 from kemba.ocp.functions.code import Code, code_of
 from kemba.ocp.functions.proximal import Proximal
 from kemba.ocp.functions.regularised import regularised_hessian
@@ -87,7 +87,7 @@ def test_a_proximal_term_adds_half_the_squared_way() -> None:
     z = ca.SX.sym("z", 2)
     columns = np.array([[0, 1], [1, 2]])
     block = RowBlock(z, ca.vertcat(z[0] * z[1]), z[0] ** 3 - z[1], columns)
-    problem = BlockProblem([block], 3, ca.SX(0, 1))
+    problem = block_problem([block], 3, ca.SX(0, 1))
     near, rng = Proximal(problem), np.random.default_rng(0)
     x, start, weight = rng.normal(size=3), rng.normal(size=3), 0.7
     p, lam = [weight, *start], [0.3, -2.0]
@@ -105,7 +105,7 @@ def test_a_proximal_term_adds_half_the_squared_way() -> None:
 def test_damping_adds_the_same_curvature_everywhere() -> None:
     z = ca.SX.sym("z", 2)
     block = RowBlock(z, ca.vertcat(z[0] * z[1]), z[0] ** 3 - z[1], np.array([[0, 1], [1, 2]]))
-    plain = BlockProblem([block], 3, ca.SX(0, 1)).hess_lag
+    plain = block_problem([block], 3, ca.SX(0, 1)).hess_lag
     at = (np.random.default_rng(0).normal(size=3), [], 1.5, [0.3, -2.0])
     added = np.array(regularised_hessian(plain)(*at) - plain(*at))
     assert added == pytest.approx(Newton.current().regularisation * np.eye(3), abs=1e-15)
@@ -131,3 +131,20 @@ def test_only_so_many_blocks_are_kept() -> None:
         for k in range(3):
             code_of(z, p, z, z + 2.5 + k, worth_compiling=True)
         assert code_of(z, p, z, z + 1.5, worth_compiling=True) is not first
+
+
+def test_problems_that_differ_by_bounds_only_are_made_once() -> None:
+    def problem(factor: float, last: int = 2) -> BlockProblem:
+        z = ca.SX.sym("z", 2)
+        block = RowBlock(z, ca.sin(factor * z[1]), z[0] ** 2, np.array([[0, 1], [1, last]]))
+        return block_problem([block], 4, ca.SX(0, 1), worth_compiling=True)
+
+    problem(2.7).hess_lag(0, 0, 1, 1)  # its functions are made, and compiled once they are large
+    kept = problem(2.7)
+    assert problem(2.7) is kept
+    others = problem(2.7, last=3), problem(2.8)
+    assert kept not in others
+    x = [0.5, 0.2, 0.3, 0.4]
+    values = [np.array(p.g(x, [])).ravel().tolist() for p in (kept, *others)]
+    assert values == [np.sin(f * np.array(y)).tolist() for f, y in
+                      ((2.7, (0.2, 0.3)), (2.7, (0.2, 0.4)), (2.8, (0.2, 0.3)))]  # fmt: skip

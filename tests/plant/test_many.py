@@ -83,6 +83,15 @@ def test_machine_code_does_not_depend_on_what_was_simulated_before() -> None:
     assert equations_of(load_model("planning")).free == ()
 
 
+def test_equal_models_have_their_machine_code_once() -> None:
+    first, again = load_model("planning"), load_model("planning")
+    assert first.mechanism is not again.mechanism
+    assert equations_of(first) is equations_of(again)
+    others = load_model("planning", [Payload(m=0.3)]), load_model("planning", supply=0.6e6)
+    assert equations_of(first) not in [equations_of(other) for other in others]
+    same(run(again, {}, PUSH, 0.15), run(first, {}, PUSH, 0.15))
+
+
 def test_other_threads_run_while_one_simulates() -> None:
     """Python's own lock is free meanwhile: else this thread would hardly count."""
     condition = Condition(planning(), {"body/z": 2.0}, None, 1.0, 2e-5, 0.5)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -10,6 +11,7 @@ import casadi as ca
 import numpy as np
 
 from kemba.ocp.functions.code import Code, code_of
+from kemba.ocp.functions.settings import Functions
 
 Entries = tuple[ca.MX, np.ndarray, np.ndarray]  # nonzeros, their rows, their columns
 
@@ -44,17 +46,13 @@ class BlockProblem:
     """min sum f, g stacked block by block, with Jacobian and Hessian given exactly.
 
     `nlp`, `grad_f`, `jac_g`, `hess_lag` are what `ca.nlpsol` asks for, made when first asked for,
-    as compiled code where `worth_compiling` (many solves ahead); `g`: (x, p) -> (rows,).
+    as compiled code where that is worth while; `g`: (x, p) -> (rows,).
     """
 
-    def __init__(
-        self, blocks: Sequence[RowBlock], size: int, p: ca.SX, worth_compiling: bool = False
-    ) -> None:
-        codes = [code_of(b.z, p, b.f, b.g, worth_compiling) for b in blocks]
-        self.blocks = [PlacedBlock(c, b.columns) for c, b in zip(codes, blocks, strict=True)]
-        self.size = size
-        self.rows = sum(len(b.columns) * b.g.numel() for b in blocks)
-        self.x, self.parameter = ca.MX.sym("x", size), ca.MX.sym("p", p.numel())
+    def __init__(self, blocks: Sequence[PlacedBlock], size: int, parameters: int) -> None:
+        self.blocks, self.size = list(blocks), size
+        self.rows = sum(len(b.columns) * b.code.g.numel() for b in blocks)
+        self.x, self.parameter = ca.MX.sym("x", size), ca.MX.sym("p", parameters)
 
     @cached_property
     def g(self) -> ca.Function:
@@ -128,6 +126,31 @@ class BlockProblem:
         """Every block, its local variables, and its functions over its repeats."""
         each = zip(self.blocks, self._locals, strict=True)
         return [(block, here, block.functions) for block, here in each]
+
+
+_kept: OrderedDict[tuple[object, ...], BlockProblem] = OrderedDict()  # by code and columns
+
+
+def block_problem(
+    blocks: Sequence[RowBlock], size: int, p: ca.SX, worth_compiling: bool = False
+) -> BlockProblem:
+    """The problem of `blocks` in `size` variables, with parameters p.
+
+    `worth_compiling`: many solves are ahead. Then a problem that differs from an earlier one of the
+    process by bounds only, such as a jump to another height, is that one.
+    """
+    codes = [code_of(b.z, p, b.f, b.g, worth_compiling) for b in blocks]
+    placed = [PlacedBlock(c, b.columns) for c, b in zip(codes, blocks, strict=True)]
+    if not worth_compiling:
+        return BlockProblem(placed, size, p.numel())
+    parts = ((b.code, b.code.made, b.columns.shape, b.columns.tobytes()) for b in placed)
+    key = (size, p.numel(), *parts)
+    if key not in _kept:
+        _kept[key] = BlockProblem(placed, size, p.numel())
+    _kept.move_to_end(key)
+    while len(_kept) > Functions.current().problems:
+        _kept.popitem(last=False)
+    return _kept[key]
 
 
 def _gather(x: ca.MX, columns: np.ndarray) -> ca.MX:

@@ -36,6 +36,7 @@ class Code:
     numbers: np.ndarray
     worth_compiling: bool
     _mapped: dict[tuple[int, str], list[ca.Function]] = field(default_factory=dict)
+    _compiled: list[ca.Function] = field(default_factory=list)  # once there is a library
 
     @cached_property
     def multipliers(self) -> tuple[ca.SX, ca.SX]:
@@ -65,11 +66,25 @@ class Code:
     def at(self, points: int) -> list[ca.Function]:
         """At `points` side by side: cost, rows, the cost's slope, the rows' Jacobian, the
         Lagrangian's Hessian; see `_functions` for one point."""
-        functions = self._functions
-        large = functions[-1].n_instructions() > Functions.current().large
-        if self.worth_compiling and large:  # the compiler may have finished since the last program
-            functions = functions[:2] + compiled(functions[2:])
+        functions = self._best
         return self._at(points, functions[-1].class_name(), functions)
+
+    @property
+    def made(self) -> str:
+        """Which kind of functions there is by now, "" for none: that of an equal block may be
+        compiled meanwhile."""
+        return str(self._best[-1].class_name()) if "_functions" in self.__dict__ else ""
+
+    @property
+    def _best(self) -> list[ca.Function]:
+        """The functions for one point, compiled where there is a library by now."""
+        plain = functions = self._functions
+        large = plain[-1].n_instructions() > Functions.current().large
+        if self.worth_compiling and large:
+            functions = self._compiled or plain[:2] + compiled(plain[2:])
+            if functions[-1] is not plain[-1]:
+                self._compiled[:] = functions
+        return functions
 
     def _at(self, points: int, name: str, functions: list[ca.Function]) -> list[ca.Function]:
         if (points, name) not in self._mapped:

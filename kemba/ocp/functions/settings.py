@@ -43,6 +43,10 @@ class Functions(Settings):
         600.0, "s", "age of an unfinished compilation that is thought dead",
         "convention: ten minutes",
     )  # fmt: skip
+    problems: int = setting(
+        8, "1", "programs that are kept for equal ones of the process",
+        "convention: twice those of a plan that is continued",
+    )  # fmt: skip
     kept: int = setting(
         400, "1", "blocks whose functions are kept for the next program of the process",
         "convention: twice the blocks of all programs of a jump",

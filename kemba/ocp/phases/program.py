@@ -11,7 +11,7 @@ import casadi as ca
 import numpy as np
 
 from kemba.model import Model
-from kemba.ocp.functions.blocks import BlockProblem, RowBlock
+from kemba.ocp.functions.blocks import BlockProblem, RowBlock, block_problem
 from kemba.ocp.phases.columns import Columns
 from kemba.ocp.phases.modes import OPEN, Phase
 from kemba.ocp.phases.radau import STATE, Scheme, element, impact
@@ -240,7 +240,7 @@ class PhaseProgram:
     def problem(self) -> BlockProblem:
         """The functions for IPOPT."""
         blocks = [RowBlock(part.z, part.g, part.f, part.columns) for part in self.parts]
-        return BlockProblem(blocks, self.columns.size, ca.SX(0, 1), worth_compiling=True)
+        return block_problem(blocks, self.columns.size, ca.SX(0, 1), worth_compiling=True)
 
     @cached_property
     def parts(self) -> list[PhasePart]:

@@ -26,7 +26,7 @@ import casadi as ca
 import numpy as np
 
 from kemba.model import Model
-from kemba.ocp.functions.blocks import BlockProblem, RowBlock
+from kemba.ocp.functions.blocks import RowBlock, block_problem
 from kemba.ocp.task.requirement import Requirement, apex_node, quantity_expression
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.approach import approach_rows
@@ -97,7 +97,7 @@ class Transcription:
             g_bounds += [(rows.lower, rows.upper)] * len(where) * len(rows.labels)
         self.meanings = meanings
         self.g_lower, self.g_upper = (np.array(b) for b in zip(*g_bounds, strict=True))
-        self.problem = BlockProblem(blocks, index.size, p, worth_compiling=True)
+        self.problem = block_problem(blocks, index.size, p, worth_compiling=True)
 
     def _rest_before_start(self) -> None:
         """Inputs and forces of node 0 are fixed at zero and its step at the nominal one."""

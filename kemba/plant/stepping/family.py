@@ -3,12 +3,24 @@
 from __future__ import annotations
 
 import weakref
+from collections import OrderedDict
 from dataclasses import dataclass
 from typing import Any
 
 from kemba.mechanism import Mechanism
 from kemba.model import Model
+from kemba.plant.kernel.settings import StepLength
 from kemba.plant.stepping.equations import Equations, numbers_of
+from kemba.settings import Settings, setting
+
+
+class Kept(Settings):
+    """What a process keeps for the next plan."""
+
+    models: int = setting(
+        8, "1", "models whose machine code is kept",
+        "convention: twice those of a plan: its model and its plant, each with fitted air",
+    )  # fmt: skip
 
 
 @dataclass
@@ -23,6 +35,7 @@ class Family:
 
 _OF_MODEL: weakref.WeakKeyDictionary[Model, Equations] = weakref.WeakKeyDictionary()
 _FAMILIES: dict[int, list[Family]] = {}  # by the identity of the mechanism
+_PLAIN: OrderedDict[tuple[Any, ...], Equations] = OrderedDict()  # by what a model consists of
 
 
 def equations_of(model: Model) -> Equations:
@@ -43,8 +56,25 @@ def _find(model: Model) -> Equations:
             if not new <= known:
                 family.equations = _with_free(model, known | new)
             return family.equations
-    families.append(Family(structure, numbers, Equations(model)))
+    families.append(Family(structure, numbers, _plain(model, structure, numbers)))
     return families[-1].equations
+
+
+def _plain(model: Model, structure: tuple[Any, ...], numbers: dict[str, float]) -> Equations:
+    """Equations without free numbers. They are the same for equal models, whatever was simulated
+    before, so that a process that plans again and again makes them once."""
+    mechanism = model.mechanism
+    if mechanism.drawn is None:
+        return Equations(model)
+    lengths = tuple(sorted(mechanism.offsets.items()))
+    robot = mechanism.drawn.model_dump_json(), lengths
+    key = (robot, structure, tuple(numbers.items()), StepLength.current())
+    if key not in _PLAIN:
+        _PLAIN[key] = Equations(model)
+    _PLAIN.move_to_end(key)
+    while len(_PLAIN) > Kept.current().models:
+        _PLAIN.popitem(last=False)
+    return _PLAIN[key]
 
 
 def _with_free(model: Model, names: set[str]) -> Equations:
