@@ -14,6 +14,7 @@ import json
 import platform
 import shutil
 from collections import defaultdict
+from collections.abc import Iterable, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -56,10 +57,10 @@ Written by `benchmarks/shipped_plans.py` on {machine}.
 """
 
 
-def walked(jobs: int | None, folder: Path) -> None:
-    """Every walk that is not done yet, round by round."""
+def walked(jobs: int | None, folder: Path, names: Sequence[str] = ()) -> None:
+    """Every walk that is not done yet, or those of these `names`, round by round."""
     for walks in load_yaml(shipped_folder("plans") / "walks.yaml").data["rounds"]:
-        cases = [_case(walk, folder) for walk in walks]
+        cases = [_case(w, folder) for w in walks if not names or w["name"] in names]
         run_cases(cases, folder, jobs=jobs, tell=lambda case, record: print(
             case.values["name"], record["sentence"], f"{record['cpu_s']:.0f} s", flush=True
         ))  # fmt: skip
@@ -68,13 +69,13 @@ def walked(jobs: int | None, folder: Path) -> None:
 def choose(folder: Path) -> None:
     """The best plans to the shelf, its index and its page."""
     shelf = shipped_folder("plans")
-    found = [_facts(path) for path in sorted((folder / "plans").glob("*.json"))]
+    found = [facts_of(path) for path in sorted((folder / "plans").glob("*.json"))]
     chosen = best(found)
     for old in shelf.glob("*.npz"):
         old.unlink()
     for row in chosen:
         shutil.copy(row["path"].with_suffix(".npz"), shelf / f"{row['path'].stem}.npz")
-    write_index(shelf / INDEX, chosen)
+    write_index(shelf / INDEX, map(index_row, chosen))
     PAGE.write_text(page(chosen, len(found)), encoding="utf-8")
 
 
@@ -83,7 +84,7 @@ def _case(walk: dict[str, Any], folder: Path) -> Case:
     return Case("walks", 0, {"name": walk["name"]}, "kemba.report.walks:walk", work)
 
 
-def _facts(path: Path) -> dict[str, Any]:
+def facts_of(path: Path) -> dict[str, Any]:
     """What a walk noted about a plan, with the kind of its task as that is today."""
     facts = json.loads(path.read_text(encoding="utf-8"))
     fitted = kept_fit(read_plan(path.with_suffix(".npz"))) is not None
@@ -128,16 +129,19 @@ def own_of(good: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return [own, most] if most["landed"] >= own["landed"] + CLEAR else [own]
 
 
-def write_index(path: Path, chosen: list[dict[str, Any]]) -> None:
+def write_index(path: Path, rows: Iterable[Sequence[str]]) -> None:
     """The table that `kemba.ocp.shipped.shelf` reads."""
     with path.open("w", encoding="utf-8", newline="") as stream:
-        rows = csv.writer(stream, lineterminator="\n")
-        rows.writerow(["file", "kind", *FIGURES, "cost", "of", "landed"])
-        for row in chosen:
-            figures = [f"{row['figures'][k]:.9g}" if k in row["figures"] else "" for k in FIGURES]
-            name = f"{row['path'].stem}.npz"
-            facts = f"{row['cost']:.6g}", row["of"], row["landed"]
-            rows.writerow([name, row["kind"], *figures, *facts])
+        table = csv.writer(stream, lineterminator="\n")
+        table.writerow(["file", "kind", *FIGURES, "cost", "of", "landed"])
+        table.writerows(rows)
+
+
+def index_row(row: dict[str, Any]) -> list[str]:
+    """The line of the index about a plan."""
+    figures = [f"{row['figures'][k]:.9g}" if k in row["figures"] else "" for k in FIGURES]
+    facts = f"{row['cost']:.6g}", str(row["of"]), str(row["landed"])
+    return [f"{row['path'].stem}.npz", row["kind"], *figures, *facts]
 
 
 def page(chosen: list[dict[str, Any]], tried: int) -> str:
@@ -153,19 +157,21 @@ def page(chosen: list[dict[str, Any]], tried: int) -> str:
     columns += ["air", "fitted", "torque² [N².m².s]", "valves [s]", "cost", "of"]
     columns += ["apex [mm]", "touchdown [ms]", "end [mm]", f"lands, of {SCENARIOS}"]
     lines = ["| " + " | ".join(columns) + " |", "|---" * len(columns) + "|"]
-    for row in chosen:
-        figures = [f"{row['figures'][k]:g}" if k in row["figures"] else "" for k in FIGURES]
-        plant = row["plant"]
-        late = plant["touchdown_error_s"]
-        errors = [f"{1e3 * plant['apex_error_m']:+.1f}", f"{1e3 * plant['final_error_m']:.1f}"]
-        errors.insert(1, "" if late is None else f"{1e3 * late:+.1f}")
-        air = [word.split("=")[1] for word in row["set"] if word.startswith("landing.air=")]
-        cost = ["".join(air), "yes" if row["fitted"] else ""]
-        cost += [f"{row['torque_squared_integral']:.3g}", f"{row['valve_open_s']:.2f}"]
-        cells = [row["task"], *figures, *cost, f"{row['cost']:.3g}", str(row["of"]), *errors]
-        cells.append(str(row["landed"]))
-        lines.append("| " + " | ".join(cells) + " |")
-    return text + "\n".join(lines) + "\n"
+    return text + "\n".join([*lines, *map(page_line, chosen)]) + "\n"
+
+
+def page_line(row: dict[str, Any]) -> str:
+    """The line of the page about a plan."""
+    figures = [f"{row['figures'][k]:g}" if k in row["figures"] else "" for k in FIGURES]
+    plant = row["plant"]
+    late = plant["touchdown_error_s"]
+    errors = [f"{1e3 * plant['apex_error_m']:+.1f}", f"{1e3 * plant['final_error_m']:.1f}"]
+    errors.insert(1, "" if late is None else f"{1e3 * late:+.1f}")
+    air = [word.split("=")[1] for word in row["set"] if word.startswith("landing.air=")]
+    cost = ["".join(air), "yes" if row["fitted"] else ""]
+    cost += [f"{row['torque_squared_integral']:.3g}", f"{row['valve_open_s']:.2f}"]
+    cells = [row["task"], *figures, *cost, f"{row['cost']:.3g}", str(row["of"]), *errors]
+    return "| " + " | ".join([*cells, str(row["landed"])]) + " |"
 
 
 if __name__ == "__main__":
