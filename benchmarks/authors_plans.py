@@ -19,7 +19,7 @@ from typing import Any
 from block import put_block
 
 from kemba.config import dump_yaml, load_yaml
-from kemba.config.shipped import find_config
+from kemba.config.parsing import find_config
 from kemba.ocp import load_task
 from kemba.report.best import Approach, Listener, best_plan
 from kemba.sweep import machine
@@ -40,7 +40,7 @@ def like_terms(name: str, height: float, duration: float, folder: Path) -> Path:
     task["bounds"] |= {"*/knee/z": {"at_least": 0.03}}
     task["goals"]["apex"].pop("maximise", None)
     path = folder / f"{name}_{height}.yaml"
-    path.write_text(dump_yaml(task), encoding="utf-8")
+    dump_yaml(task, path)
     return path
 
 
