@@ -48,7 +48,8 @@ def planned(path: Path, starts: int, boom: dict[str, Any]) -> tuple[float, float
     """Torque-squared integral [N2.m2.s] of the cheapest of some starts, and its air [s]."""
     task, document = load_task(str(path))
     asked = task.model_copy(update={"effects": boom})
-    found = best_plan(asked, document, Approach(starts=starts), Listener()).plan
+    approach = Approach(starts=starts, replay=False)  # the cheapest, whatever the plant does
+    found = best_plan(asked, document, approach, Listener()).plan
     if not found.refined:
         return float("nan"), float("nan")
     return found.cost["torque_squared_integral"], found.cost["valve_open_s"]

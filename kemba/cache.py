@@ -1,10 +1,17 @@
-"""Where code that was compiled on this machine is kept, and who could have written it."""
+"""What is kept: compiled code on this machine, where nobody else could have written it, and what
+a process made lately."""
 
 from __future__ import annotations
 
 import os
 import stat
+from collections import OrderedDict
+from collections.abc import Callable, Hashable
 from pathlib import Path
+from typing import Generic, TypeVar
+
+K = TypeVar("K", bound=Hashable)
+V = TypeVar("V")
 
 BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 
@@ -44,3 +51,19 @@ def is_mine(facts: os.stat_result) -> bool:
     """Whether a file with these facts is the user's, no link, and nobody else may write it."""
     linked = stat.S_ISLNK(facts.st_mode)
     return not linked and facts.st_uid == os.geteuid() and not facts.st_mode & BY_OTHERS
+
+
+class Recent(Generic[K, V]):
+    """The last things made, by their keys."""
+
+    def __init__(self) -> None:
+        self._kept: OrderedDict[K, V] = OrderedDict()
+
+    def get(self, key: K, make: Callable[[], V], most: int) -> V:
+        """What is kept under `key`, or else made; `most` are kept, the last used ones."""
+        if key not in self._kept:
+            self._kept[key] = make()
+        self._kept.move_to_end(key)
+        while len(self._kept) > most:
+            self._kept.popitem(last=False)
+        return self._kept[key]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -10,6 +9,7 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
+from kemba.cache import Recent
 from kemba.ocp.functions.code import Code, code_of
 from kemba.ocp.functions.settings import Functions
 
@@ -128,7 +128,7 @@ class BlockProblem:
         return [(block, here, block.functions) for block, here in each]
 
 
-_kept: OrderedDict[tuple[object, ...], BlockProblem] = OrderedDict()  # by code and columns
+_kept: Recent[tuple[object, ...], BlockProblem] = Recent()  # by code and columns
 
 
 def block_problem(
@@ -141,16 +141,13 @@ def block_problem(
     """
     codes = [code_of(b.z, p, b.f, b.g, worth_compiling) for b in blocks]
     placed = [PlacedBlock(c, b.columns) for c, b in zip(codes, blocks, strict=True)]
-    if not worth_compiling:
+
+    def make() -> BlockProblem:
         return BlockProblem(placed, size, p.numel())
+
     parts = ((b.code, b.code.made, b.columns.shape, b.columns.tobytes()) for b in placed)
     key = (size, p.numel(), *parts)
-    if key not in _kept:
-        _kept[key] = BlockProblem(placed, size, p.numel())
-    _kept.move_to_end(key)
-    while len(_kept) > Functions.current().problems:
-        _kept.popitem(last=False)
-    return _kept[key]
+    return _kept.get(key, make, Functions.current().problems) if worth_compiling else make()
 
 
 def _gather(x: ca.MX, columns: np.ndarray) -> ca.MX:

@@ -7,13 +7,13 @@ most of the time of building a program, so it is done once for each expression.
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import casadi as ca
 import numpy as np
 
+from kemba.cache import Recent
 from kemba.ocp.functions.compiled import compiled
 from kemba.ocp.functions.constants import parameterised
 from kemba.ocp.functions.settings import Functions
@@ -106,7 +106,7 @@ class Code:
         ]
 
 
-_kept: OrderedDict[str, Code] = OrderedDict()  # by the text of a block's functions
+_kept: Recent[str, Code] = Recent()  # by the text of a block's functions
 
 
 def code_of(z: ca.SX, p: ca.SX, f: ca.SX, g: ca.SX, worth_compiling: bool) -> Code:
@@ -120,15 +120,13 @@ def code_of(z: ca.SX, p: ca.SX, f: ca.SX, g: ca.SX, worth_compiling: bool) -> Co
     if not worth_compiling:
         return Code(z, p, f, g, np.zeros(0), False)
     text = ca.Function("block", [z, p], [f, g]).serialize()
-    if text in _kept:
-        _kept.move_to_end(text)
-        return _kept[text]
+    return _kept.get(text, lambda: _rewritten(z, p, f, g), Functions.current().kept)
+
+
+def _rewritten(z: ca.SX, p: ca.SX, f: ca.SX, g: ca.SX) -> Code:
     (f, g), constants, numbers = parameterised([z, p], [f, g])
     f, g = canonical_signs([z, p, constants], [f, g])
-    code = _kept[text] = Code(z, ca.vertcat(p, constants), f, g, numbers, True)
-    while len(_kept) > Functions.current().kept:
-        _kept.popitem(last=False)
-    return code
+    return Code(z, ca.vertcat(p, constants), f, g, numbers, True)
 
 
 def _column(matrix: ca.SX) -> ca.SX:

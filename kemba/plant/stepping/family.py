@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import weakref
-from collections import OrderedDict
 from dataclasses import dataclass
 from typing import Any
 
+from kemba.cache import Recent
 from kemba.mechanism import Mechanism
 from kemba.model import Model
 from kemba.plant.kernel.settings import StepLength
@@ -35,7 +35,7 @@ class Family:
 
 _OF_MODEL: weakref.WeakKeyDictionary[Model, Equations] = weakref.WeakKeyDictionary()
 _FAMILIES: dict[int, list[Family]] = {}  # by the identity of the mechanism
-_PLAIN: OrderedDict[tuple[Any, ...], Equations] = OrderedDict()  # by what a model consists of
+_PLAIN: Recent[tuple[Any, ...], Equations] = Recent()  # by what a model consists of
 
 
 def equations_of(model: Model) -> Equations:
@@ -69,12 +69,7 @@ def _plain(model: Model, structure: tuple[Any, ...], numbers: dict[str, float]) 
     lengths = tuple(sorted(mechanism.offsets.items()))
     robot = mechanism.drawn.model_dump_json(), lengths
     key = (robot, structure, tuple(numbers.items()), StepLength.current())
-    if key not in _PLAIN:
-        _PLAIN[key] = Equations(model)
-    _PLAIN.move_to_end(key)
-    while len(_PLAIN) > Kept.current().models:
-        _PLAIN.popitem(last=False)
-    return _PLAIN[key]
+    return _PLAIN.get(key, lambda: Equations(model), Kept.current().models)
 
 
 def _with_free(model: Model, names: set[str]) -> Equations:
