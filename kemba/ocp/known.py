@@ -38,14 +38,19 @@ def compared(found: Plan, task: Task) -> tuple[dict[str, Any] | None, str]:
 
 
 def _with_more_time(near: Sequence[Neighbour], asked: Mapping[str, float], own: float) -> str:
-    """A remark where a shipped plan of the same figures, but with more time, costs much less than
-    `own`; "" where none does."""
+    """A remark where the cheapest shipped plan of the same figures, but with more time, costs much
+    less than `own`; "" where none does."""
+    longer = [n.entry for n in near if _has_more_time(n.entry.figures, asked)]
+    best = min(longer, key=lambda entry: entry.cost, default=None)
+    if best is None or Near.current().dear * best.cost >= own:
+        return ""
+    time = f"{best.figures['duration']:g} s"
+    told = f"a shipped plan costs {best.cost:.3g} instead of {own:.3g}"
+    return f'; with more time, --set "duration={time}", {told}'
+
+
+def _has_more_time(figures: Mapping[str, float], asked: Mapping[str, float]) -> bool:
+    """Whether a plan differs from what is asked by a longer duration alone."""
     rest = asked.keys() - {"duration"}
-    for entry in (n.entry for n in near):
-        same = all(math.isclose(entry.figures[name], asked[name]) for name in rest)
-        longer = entry.figures["duration"] > asked["duration"]
-        if same and longer and Near.current().dear * entry.cost < own:
-            time = f"{entry.figures['duration']:g} s"
-            told = f"a shipped plan costs {entry.cost:.3g} instead of {own:.3g}"
-            return f'; with more time, --set "duration={time}", {told}'
-    return ""
+    same = all(math.isclose(figures[name], asked[name]) for name in rest)
+    return same and figures["duration"] > asked["duration"]

@@ -189,7 +189,7 @@ def test_plans_of_a_dearer_minimum_come_after_a_guess(monkeypatch: pytest.Monkey
 
 
 def test_what_more_time_would_save_is_said() -> None:
-    """At 0.9 m a plan of 0.76 s costs a quarter; at 0.72 m more time saves little, not told."""
+    """At 0.9 m a plan of 0.8 s costs a fifth; at 0.72 m more time saves little, not told."""
 
     def remark(*options: str) -> str:
         task, document = load_task("jump.yaml", list(options))
