@@ -65,6 +65,20 @@ def new_plans(rows: list[Row], folder: Path) -> list[dict[str, Any]]:
     return [f for f in best(found) if f["cost"] < same.get(tuple(index_row(f)[1:-3]), float("inf"))]
 
 
+def shelved(rows: list[Row], new: list[dict[str, Any]]) -> None:
+    """Index and page written with the new plans, whose files are copied to the shelf."""
+    for facts in new:
+        shutil.copy(facts["path"].with_suffix(".npz"), shipped_folder("plans"))
+    rows = sorted([*rows, *((index_row(f), page_line(f)) for f in new)], key=sorted_by)
+    write_index(shipped_folder("plans") / INDEX, (index for index, _ in rows))
+    text = PAGE.read_text(encoding="utf-8")
+    text = re.sub(r"Of (\d+) plans", lambda m: f"Of {int(m[1]) + len(new)} plans", text)
+    title, *_ = (line for line in text.splitlines() if line.startswith("| "))
+    around = [line for line in text.splitlines() if not line.startswith("| ")]
+    around.insert(len(around) - 1, title)  # the last line is the rule below the title
+    PAGE.write_text("\n".join([*around, *(line for _, line in rows)]) + "\n", encoding="utf-8")
+
+
 def main() -> None:
     """The command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -76,16 +90,7 @@ def main() -> None:
     given(rows, plans)
     walked(asked.jobs, asked.folder, asked.walks)
     new = new_plans(rows, plans)
-    for facts in new:
-        shutil.copy(facts["path"].with_suffix(".npz"), shipped_folder("plans"))
-    rows = sorted([*rows, *((index_row(f), page_line(f)) for f in new)], key=sorted_by)
-    write_index(shipped_folder("plans") / INDEX, (index for index, _ in rows))
-    text = PAGE.read_text(encoding="utf-8")
-    head = re.sub(r"Of (\d+) plans", lambda m: f"Of {int(m[1]) + len(new)} plans", text)
-    kept = [line for line in head.splitlines() if not line.startswith("| ")]
-    title = next(line for line in text.splitlines() if line.startswith("| "))
-    kept.insert(len(kept) - 1, title)
-    PAGE.write_text("\n".join([*kept, *(line for _, line in rows)]) + "\n", encoding="utf-8")
+    shelved(rows, new)
     print("\n".join(f"added: {f['path'].stem}, {f['cost']:.3g}" for f in new) or "nothing added")
 
 
