@@ -29,6 +29,7 @@ from kemba.identify.design.menu import JudgedRig
 from kemba.identify.design.rig import design_rig_test
 from kemba.identify.design.settings import ExperimentSettings
 from kemba.model.spec import load_model
+from kemba.scenarios.rate import wilson
 
 DOCS = ROOT / "docs" / "experiment.md"
 PAIRS = (  # what is there, and what it is taken for
@@ -97,7 +98,7 @@ def table(records: list[dict[str, Any]]) -> str:
     count = len(records)
     hits = sum(r["designed"]["measured"] >= clear and _share(r) <= HALF for r in records)
     faster = sum(_pace(r["designed"]) > _pace(r["standard"]) for r in records)
-    low, high = report.wilson(hits, count)
+    low, high = wilson(hits, count)
     seconds = sorted(r["seconds"] for r in records)[count // 2]
     return (
         "\n".join(rows) + f"\n\n{count} of {2 * len(PAIRS)} cases have run. Evidence in nats. "

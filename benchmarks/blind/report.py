@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
-import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+from blind.comparison import comparison
 from blind.kinds import SHAPES, Record, hidden, kind, likely, named
+from kemba.files import atomic_text
+from kemba.scenarios.rate import wilson
 
 SURE = 0.95
 FALLS = 5.0  # times that the error beyond the noise has to fall where several effects are hidden
@@ -24,19 +26,19 @@ def read(path: Path) -> list[Record]:
 
 def append(path: Path, record: Record) -> None:
     """One more record; NumPy numbers become plain."""
-    text = json.dumps(record, default=lambda o: o.tolist() if hasattr(o, "tolist") else str(o))
     with path.open("a", encoding="utf-8") as stream:
-        stream.write(text + "\n")
+        stream.write(_line(record))
 
 
-def wilson(hits: int, count: int) -> tuple[float, float]:
-    """95 % interval of a share."""
-    if not count:
-        return 0.0, 1.0
-    z, p = 1.96, hits / count
-    middle = (p + z * z / (2 * count)) / (1 + z * z / count)
-    half = z / (1 + z * z / count) * math.sqrt(p * (1 - p) / count + z * z / (4 * count**2))
-    return max(middle - half, 0.0), min(middle + half, 1.0)
+def rewrite(path: Path, records: Iterable[Record]) -> None:
+    """All records anew, in the place of those in the file."""
+    with atomic_text(path) as stream:
+        stream.writelines(map(_line, records))
+
+
+def _line(record: Record) -> str:
+    plain = json.dumps(record, default=lambda o: o.tolist() if hasattr(o, "tolist") else str(o))
+    return plain + "\n"
 
 
 def in_class(record: Record) -> bool:
@@ -168,27 +170,10 @@ def table(records: Sequence[Record]) -> str:
         f"| median CPU seconds of discover | {_median([r['seconds'] for r in records]):.0f} "
         f"| {len(records)} |",
     ]
-    for name, label in (
-        ("one_by_bic", "one term by BIC"),
-        ("all_by_least_squares", "all by least squares"),
-    ):
-        rows.append(
-            _row(
-                f"baseline, {label}: right first",
-                known,
-                lambda r, n=name: r["baselines"][n] in hidden(r),
-            )
-        )
-        rows.append(
-            _row(
-                f"baseline, {label}: false alarms",
-                groups["null"],
-                lambda r, n=name: r["baselines"][n] is not None,
-            )
-        )
     head = ["| | share (95 % Wilson) | of |", "|---|---|---|"]
     shown = [row for row in rows if not row.endswith(("| none | 0 |", "nan % | 0 |"))]
-    return "\n".join([*head, *shown, "", *misses(records)])
+    others = comparison(records)
+    return "\n".join([*head, *shown, "", *others, *([""] if others else []), *misses(records)])
 
 
 def _shapes(records: Sequence[Record]) -> list[str]:
@@ -291,9 +276,10 @@ def _row(label: str, records: Sequence[Record], test: Any) -> str:
 
 
 def _share(label: str, hits: int, count: int) -> str:
-    low, high = wilson(hits, count)
-    share = f"{100 * hits / count:.0f} % ({100 * low:.0f} to {100 * high:.0f})" if count else "none"
-    return f"| {label} | {share} | {count} |"
+    if not count:
+        return f"| {label} | none | 0 |"
+    low, high = (100 * end for end in wilson(hits, count))
+    return f"| {label} | {100 * hits / count:.0f} % ({low:.0f} to {high:.0f}) | {count} |"
 
 
 def _median(values: Sequence[float]) -> float:

@@ -84,8 +84,8 @@ def logs_of(setting: dict[str, Any], folder: Path) -> tuple[list[Path], dict[str
     return _standing(folder, setting["effect"], sensors=sensors, **options)
 
 
-def run(setting: dict[str, Any]) -> dict[str, Any]:
-    """One case: logs made, answered, and compared with the truth."""
+def prepared(setting: dict[str, Any]) -> study.Prepared:
+    """The truth about a case, and how its problem is made from logs that are made here."""
     with tempfile.TemporaryDirectory() as folder:
         paths, truth = logs_of(setting, Path(folder))
         logs = read_logs(paths)
@@ -96,7 +96,7 @@ def run(setting: dict[str, Any]) -> dict[str, Any]:
         found.validate()
         return found
 
-    return {"case": setting, "truth": truth["effects"], **study.answered(problem)}
+    return truth["effects"], problem
 
 
 def _standing(folder: Path, effect: Any, size: float, **options: Any) -> tuple[list[Path], Any]:
@@ -110,4 +110,4 @@ def _standing(folder: Path, effect: Any, size: float, **options: Any) -> tuple[l
 
 
 if __name__ == "__main__":
-    study.main("robot", __doc__, cases(), run)
+    study.main("robot", __doc__, cases(), prepared)

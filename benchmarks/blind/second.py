@@ -95,8 +95,8 @@ def logs_of(setting: dict[str, Any], folder: Path) -> tuple[list[Path], dict[str
     return robot_case(folder, effects, size, sensors=sensors, **options)
 
 
-def run(setting: dict[str, Any]) -> dict[str, Any]:
-    """One case: logs made, answered, and compared with the truth."""
+def prepared(setting: dict[str, Any]) -> study.Prepared:
+    """The truth about a case, and how its problem is made from logs that are made here."""
     with tempfile.TemporaryDirectory() as folder:
         paths, truth = logs_of(setting, Path(folder))
         logs = read_logs(paths)
@@ -107,8 +107,8 @@ def run(setting: dict[str, Any]) -> dict[str, Any]:
         found.validate()
         return found
 
-    return {"case": setting, "truth": truth["effects"], **study.answered(problem)}
+    return truth["effects"], problem
 
 
 if __name__ == "__main__":
-    study.main("second", __doc__, cases(), run)
+    study.main("second", __doc__, cases(), prepared)

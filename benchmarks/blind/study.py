@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from blind import baselines, report
+from blind import other_methods, report
 from blind.kinds import kind_of
 from kemba.identify.answer import Answer
 from kemba.identify.discover import discover
@@ -20,6 +20,8 @@ from kemba.identify.logs.gate import BadData
 from kemba.identify.problem.problem import Problem
 
 Setting = dict[str, Any]
+Prepared = tuple[list[dict[str, Any]], Callable[[], Problem]]  # what is hidden, and the problem
+Prepare = Callable[[Setting], Prepared]
 TIME_LIMIT = 300.0  # s, that of the command
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "discovery.md"
 
@@ -57,28 +59,42 @@ def spread(
     return [(effect, turn) for _, effect, turn in placed]
 
 
-def answered(make: Callable[[], Problem]) -> dict[str, Any]:
-    """What `discover` and the baselines say of a problem, and the CPU seconds of the former.
+def run(setting: Setting, prepare: Prepare) -> report.Record:
+    """One case: what is hidden, what `discover` and other methods say, CPU seconds of the former.
 
     Whatever goes wrong counts as a miss: a study goes on.
     """
-    simple: dict[str, Any] = dict.fromkeys(baselines.NAMES)
+    truth, make = prepare(setting)
+    others: dict[str, Any] = {}
     started = time.process_time()
     try:
         problem = make()
         answer = discover(problem, time_limit=TIME_LIMIT).answer
         seconds = time.process_time() - started
-        simple = baselines.all_of(problem)
+        others = other_methods.all_of(problem)
     except Exception as error:
         if not isinstance(error, BadData):
             traceback.print_exc()
         answer, seconds = Answer("bad-data", sentence=str(error)), time.process_time() - started
-    return {"answer": answer.json(), "seconds": seconds, "baselines": simple}
+    told = {"answer": answer.json(), "seconds": seconds, "others": others}
+    return {"case": setting, "truth": truth, **told}
 
 
-def main(
-    name: str, text: str | None, cases: Sequence[Setting], run: Callable[[Setting], dict[str, Any]]
-) -> None:
+def compared(records: list[report.Record], prepare: Prepare, out: Path) -> None:
+    """Other methods asked where the file has no answers of all of them; the file is kept up."""
+    for record in records:
+        known = record.get("others", {})
+        if "left_out" in record or record["answer"]["verdict"] == "bad-data":
+            continue
+        if all(name in known for name in other_methods.METHODS):
+            continue
+        _, make = prepare(record["case"])
+        record["others"] = other_methods.all_of(make())
+        report.rewrite(out, records)
+        print(f"{record['case']['effect']}: {record['others']}", flush=True)
+
+
+def main(name: str, text: str | None, cases: Sequence[Setting], prepare: Prepare) -> None:
     """The command line of a study: run what is not yet in the file, then print the report."""
     parser = argparse.ArgumentParser(description=text)
     parser.add_argument("--cases", type=int, default=None, help="so many of the beginning only")
@@ -87,10 +103,15 @@ def main(
     parser.add_argument("--part", default="1/1", help="i/n: every n-th case, from the i-th on")
     parser.add_argument("--write", action="store_true", help="put the report into the docs")
     parser.add_argument("--report", action="store_true", help="run nothing, only report the file")
+    parser.add_argument(
+        "--others", action="store_true", help="ask only other methods, about what is in the file"
+    )
     options = parser.parse_args()
-    for setting in () if options.report else _pending(cases, options):
+    if options.others:
+        compared(report.read(options.out), prepare, options.out)
+    for setting in () if options.report or options.others else _pending(cases, options):
         try:
-            record = run(setting)
+            record = run(setting, prepare)
         except RuntimeError as error:  # the twin cannot do this case, as when every motion topples
             report.append(options.out, {"case": setting, "left_out": str(error)})
             print(f"left out: {setting['effect']} {setting['seed']}: {error}", flush=True)
