@@ -50,6 +50,7 @@ MANY = [
     ["rise_time_scale", "boom_inertia", "hip_friction", "sensor_bias:body/pitch"],
 ]
 REPEATS = ((SINGLES, 3), (SHAPES, 4), (SENSORS, 2), (UNKNOWN, 4), (MANY, 4), ([None], 40))
+MORE = 6  # further machines of each of MANY, at the end: sixty with several effects in all
 SEED = 7000
 SIZES, NOISES = (1.0, 0.7, 1.5), (1.0, 2.0, 0.5)
 AIR = ("first_order", "first_order", "orifice", "first_order")
@@ -60,6 +61,7 @@ def cases() -> list[dict[str, Any]]:
     """Settings of all cases; each kind is spread evenly over the whole order."""
     rng = np.random.default_rng(SEED)
     turns = study.spread(REPEATS, rng)
+    turns += [(effect, turn) for turn in range(MORE) for effect in MANY]
     return [
         {
             "effect": effect,
