@@ -12,7 +12,7 @@ from kemba.report.judging.executed import Executed
 from kemba.report.judging.judged import judged, plant_of, table_of
 from kemba.report.robust_ways import WAYS, Changed, RobustSettings, variants
 from kemba.scenarios.draw import Scenario, scenarios
-from kemba.scenarios.share import Share, share
+from kemba.scenarios.share import Share, outcomes, share, share_of
 from kemba.trajectory import Trajectory
 
 Solve = Callable[[Task], Plan]
@@ -44,6 +44,11 @@ class RobustCandidate:
         return self.share.landed >= least * self.share.n
 
     @property
+    def poor(self) -> bool:
+        """Whether it was executed and seldom succeeds."""
+        return self.share is not None and is_poor(self.share)
+
+    @property
     def enough(self) -> bool:
         """Whether it succeeds so often that no plan is sought anew."""
         return self.succeeds(RobustSettings.current().enough)
@@ -62,13 +67,13 @@ def most_robust(
     search = _Search(plant, scenarios(task.uncertainties, plant, task.robust), tell)
     first = solve(task)
     search.take("as asked", first)
-    for way in WAYS if first.status.plan else ():
+    for way in search.ways if first.status.plan else ():
         search.along(way, first, change)
     for name, variant in variants(task):
         if search.over or (search.best and search.best.enough):
             break
         search.take(name, solve(variant))
-    return search.best or RobustCandidate(first)
+    return search.whole() or RobustCandidate(first)
 
 
 @dataclass
@@ -80,6 +85,11 @@ class _Search:
     tell: Callable[[str], None]
     best: RobustCandidate | None = field(default=None)
     over: bool = False
+
+    @property
+    def ways(self) -> Sequence[Sequence[Way]]:
+        """In which order a plan is changed: one that seldom succeeds by what changes most first."""
+        return WAYS[::-1] if self.best and self.best.poor else WAYS
 
     def along(self, way: Sequence[Way], found: Plan, change: Change) -> None:
         """Execute a plan after each change of a way that it needs, as far as that goes."""
@@ -104,7 +114,7 @@ class _Search:
         for hold in sorted({own, max(own, RobustSettings.current().hold)}):
             held = replace(found, task=found.task.model_copy(update={"hold": hold}))
             table = table_of(held)
-            landed = share(held.model, held.trajectory, table, self.cases)
+            landed = self._share(held, table)
             self.tell(f"{name}, hold {hold:g} s: {landed.sentence}")
             one = RobustCandidate(held, table, landed, judged(held, table, self.plant).good)
             if self.best is None or one.rank > self.best.rank:
@@ -112,6 +122,29 @@ class _Search:
             if self.best.succeeds(1.0):  # continued plans take seconds
                 self.over = True
                 return
+
+    def _share(self, found: Plan, table: Trajectory) -> Share:
+        """The share of scenarios in which a table succeeds; of the first few where it is poor."""
+        few = RobustSettings.current().few
+        done = outcomes(found.model, found.trajectory, table, self.cases[:few])
+        if not is_poor(share_of(done)):
+            done += outcomes(found.model, found.trajectory, table, self.cases[few:])
+        return share_of(done)
+
+    def whole(self) -> RobustCandidate | None:
+        """The best candidate, with its share of all scenarios."""
+        best = self.best
+        if best is None or best.table is None or best.share is None:
+            return best
+        if best.share.n == len(self.cases):
+            return best
+        landed = share(best.plan.model, best.plan.trajectory, best.table, self.cases)
+        return replace(best, share=landed)
+
+
+def is_poor(found: Share) -> bool:
+    """Whether a plan succeeds so seldom that no more scenarios are worth their time."""
+    return found.landed < RobustSettings.current().poor * found.n
 
 
 def with_share(found: Executed) -> Executed:

@@ -49,6 +49,16 @@ class Share:
         return f"{self.landed} of {self.n} scenarios succeed (95 %: {low:.0f} to {high:.0f} %)"
 
 
+@dataclass(frozen=True)
+class ScenarioOutcome:
+    """What a table does in one scenario: how far its apex [m] is from the plan's, and what goes
+    wrong, "" where nothing does. The apex is -inf where the scenario cannot be simulated."""
+
+    case: Scenario
+    apex: float
+    fault: str
+
+
 def share(
     model: Model,
     plan: Trajectory,
@@ -57,29 +67,40 @@ def share(
     jobs: int | None = None,
 ) -> Share:
     """The share of scenarios in which the controller's table of a plan on `model` succeeds."""
+    return share_of(outcomes(model, plan, table, cases, jobs))
+
+
+def outcomes(
+    model: Model,
+    plan: Trajectory,
+    table: Trajectory,
+    cases: Sequence[Scenario],
+    jobs: int | None = None,
+) -> list[ScenarioOutcome]:
+    """What the controller's table of a plan on `model` does in each scenario."""
     rest = rest_after(model, plan, table)
     asked = [
         {"model": c.model, "extra": rest, "start": standing(c.model, table, c.start)} for c in cases
     ]
     lands = bool(ends_standing(model, plan))
-    apexes, faults = [], []
+    told = []
     for case, done in zip(cases, execute_many(table, asked, jobs), strict=True):
         if isinstance(done, KembaError):
-            apexes.append(-np.inf)
-            faults.append("cannot be simulated")
+            told.append(ScenarioOutcome(case, -np.inf, "cannot be simulated"))
             continue
         found = done.against(case.model, plan)
-        apexes.append(found.apex_error_m)
-        faults.append(fault_of(found, lands))
-    good = sum(not fault for fault in faults)
-    errors = np.array(apexes)
-    rank = [(bool(fault), abs(error)) for fault, error in zip(faults, apexes, strict=True)]
-    worst = max(range(len(cases)), key=lambda i: rank[i])
-    what = faults[worst] or f"apex {1e3 * apexes[worst]:+.0f} mm"
-    told = f"{what}: {cases[worst].sentence}"
-    flown = errors[np.isfinite(errors)]
-    sigma = float(np.std(flown)) if len(flown) else 0.0
-    return Share(len(cases), good, wilson(good, len(cases)), told, sigma)
+        told.append(ScenarioOutcome(case, found.apex_error_m, fault_of(found, lands)))
+    return told
+
+
+def share_of(done: Sequence[ScenarioOutcome]) -> Share:
+    """The share of scenarios that succeeded, and the worst of them."""
+    good = sum(not one.fault for one in done)
+    worst = max(done, key=lambda one: (bool(one.fault), abs(one.apex)))
+    what = worst.fault or f"apex {1e3 * worst.apex:+.0f} mm"
+    flown = [one.apex for one in done if np.isfinite(one.apex)]
+    sigma = float(np.std(flown)) if flown else 0.0
+    return Share(len(done), good, wilson(good, len(done)), f"{what}: {worst.case.sentence}", sigma)
 
 
 def fault_of(found: Replay, lands: bool) -> str:

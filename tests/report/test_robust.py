@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -16,6 +17,7 @@ from kemba.report.judging.judged import plant_of
 from kemba.report.robust import most_robust
 from kemba.report.robust_ways import gripping, least_grip, lifted, longer
 from kemba.scenarios.draw import Scenario, scenarios
+from kemba.scenarios.share import ScenarioOutcome, outcomes
 
 
 @cache
@@ -99,13 +101,31 @@ def test_a_plan_that_succeeds_often_enough_is_taken_at_once(tmp_path: Path) -> N
     assert len(solved) == 1 and not changed
 
 
+def test_a_plan_that_seldom_succeeds_is_executed_in_a_few_scenarios_first(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    grounds(tmp_path, 0.3)
+    counts = []
+
+    def noted(*given: Any) -> list[ScenarioOutcome]:
+        counts.append(len(given[3]))
+        return outcomes(*given)
+
+    monkeypatch.setattr("kemba.report.robust.outcomes", noted)
+    _, _, solve, change = solving(0.84)
+    task = asked(0.84, 20, tmp_path / "slippery.yaml")
+    found = most_robust(task, solve, change, lambda text: None)
+    assert counts == [15], "the others only if it succeeds in 12 of these"
+    assert found.poor and found.share.n == 20, "what is said is of all"
+
+
 def test_where_it_falls_other_plans_are_tried(tmp_path: Path) -> None:
     grounds(tmp_path, 0.3)
     solved, changed, solve, change = solving(0.84)
     task = asked(0.84, 6, tmp_path / "slippery.yaml")
     found = most_robust(task, solve, change, lambda text: None)
     assert not found.enough and found.share.landed < 6
-    assert [t.duration for t in changed] == [0.7, 0.7, pytest.approx(0.805)]
-    assert changed[0].bounds != task.bounds, "first legs that keep off the ground by more"
+    assert [t.duration for t in changed] == [pytest.approx(0.805), 0.7, 0.7]
+    assert changed[2].bounds != task.bounds, "at last legs that keep off the ground by more"
     assert [t.seed for t in solved] == [0, 1], "as asked, then from another start"
     assert found.plan.task == task, "the only plan there is"
