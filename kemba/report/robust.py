@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from kemba.model import Model
 from kemba.ocp import Plan, Task
 from kemba.ocp.certificate.status import Status
+from kemba.plant.stepping.family import share_equations
 from kemba.report.judging.executed import Executed
 from kemba.report.judging.judged import judged, plant_of, table_of
 from kemba.report.robust_ways import WAYS, Changed, RobustSettings, variants
@@ -64,7 +65,9 @@ def most_robust(
     one. Raises KembaError where the plant or the uncertainties are wrong.
     """
     plant = plant_of(task)
-    search = _Search(plant, scenarios(task.uncertainties, plant, task.robust), tell)
+    cases = scenarios(task.uncertainties, plant, task.robust)
+    share_equations(case.model for case in cases)  # few of them are executed first
+    search = _Search(plant, cases, tell)
     first = solve(task)
     search.take("as asked", first)
     for way in search.ways if first.status.plan else ():

@@ -58,6 +58,14 @@ def test_models_that_differ_in_numbers_share_their_machine_code() -> None:
         same(run(variant, start, PUSH, 0.15), run(alone, start, PUSH, 0.15), within=1e-6)
 
 
+def test_models_that_are_simulated_together_share_it_from_the_beginning() -> None:
+    model = planning()
+    variants = [model.with_effects([GroundFriction(mu=mu)]) for mu in (0.3, 0.5, 0.9)]
+    run_many([Condition(variant, {}, PUSH, 0.05) for variant in variants])
+    known = [equations_of(variant) for variant in variants]
+    assert known[0] is known[1] is known[2] and "ground_friction.mu" in known[0].free
+
+
 def test_models_that_differ_in_tables_share_their_machine_code() -> None:
     """As fits of the air do."""
     model = planning()

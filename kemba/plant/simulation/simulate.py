@@ -18,7 +18,7 @@ from kemba.plant.simulation.record import Impact, trajectory
 from kemba.plant.simulation.start import initial_values
 from kemba.plant.simulation.valves import delayed
 from kemba.plant.stepping.arrays import Array
-from kemba.plant.stepping.family import equations_of
+from kemba.plant.stepping.family import equations_of, share_equations
 from kemba.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -95,6 +95,8 @@ def run_many(
     code. A simulation that fails gives its error; the others go on. Raises KembaError as
     `simulate` does where a condition makes no sense.
     """
+    conditions = list(conditions)
+    share_equations(condition.model for condition in conditions)
     with ThreadPoolExecutor(jobs or os.cpu_count()) as pool:
         waiting = [pool.submit(_tried, _player(c), c) for c in conditions]
         return [future.result() for future in waiting]

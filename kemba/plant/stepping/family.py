@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import weakref
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -41,12 +42,20 @@ _PLAIN: Recent[tuple[Any, ...], Equations] = Recent()  # by what a model consist
 def equations_of(model: Model) -> Equations:
     """The equations of a model. Models that differ in numbers only share them: what differs is a
     parameter of the machine code then, see `Equations.values`."""
-    if model not in _OF_MODEL:
-        _OF_MODEL[model] = _find(model)
+    share_equations([model])
     return _OF_MODEL[model]
 
 
-def _find(model: Model) -> Equations:
+def share_equations(models: Iterable[Model]) -> None:
+    """Make the equations of models that are simulated together: all that differs among those of a
+    family is free at once, so that its machine code is made once."""
+    found = [(model, _family(model)) for model in models if model not in _OF_MODEL]
+    for model, family in found:
+        _OF_MODEL[model] = family.equations
+
+
+def _family(model: Model) -> Family:
+    """The family of a model, in whose equations all is free in which this one differs."""
     structure, numbers = _structure(model), numbers_of(model)
     families = _families(model.mechanism)
     for family in families:
@@ -55,9 +64,9 @@ def _find(model: Model) -> Equations:
             new = {name for name, value in numbers.items() if value != family.numbers[name]}
             if not new <= known:
                 family.equations = _with_free(model, known | new)
-            return family.equations
+            return family
     families.append(Family(structure, numbers, _plain(model, structure, numbers)))
-    return families[-1].equations
+    return families[-1]
 
 
 def _plain(model: Model, structure: tuple[Any, ...], numbers: dict[str, float]) -> Equations:
