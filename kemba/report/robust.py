@@ -137,16 +137,14 @@ class _Search:
     def whole(self) -> RobustCandidate | None:
         """The best candidate, with its share of all scenarios."""
         best = self.best
-        if best is None or best.table is None or best.share is None:
-            return best
-        if best.share.n == len(self.cases):
+        if not best or not best.table or not best.share or best.share.n == len(self.cases):
             return best
         landed = share(best.plan.model, best.plan.trajectory, best.table, self.cases)
         return replace(best, share=landed)
 
 
 def is_poor(found: Share) -> bool:
-    """Whether a plan succeeds so seldom that no more scenarios are worth their time."""
+    """Whether a plan succeeds so seldom that no further scenario is worth its time."""
     return found.landed < RobustSettings.current().poor * found.n
 
 

@@ -28,7 +28,7 @@ class RobustSettings(Settings):
     poor: float = setting(
         0.8, "1", "share of these below which it is not executed in the others, and more time is "
         "tried before what changes a plan less", "tuned: of jumps of 0.85 and 0.9 m in 0.84 s "
-        "65 and 37 % land; they land with more time only",
+        "65 and 37 % land, with more time all",
     )  # fmt: skip
     hold: float = setting(
         0.3, "s", "hold of a plan whose task has none",
