@@ -73,7 +73,7 @@ class At(Protocol):
     leg, then at the robot.
     """
 
-    supply: float  # Pa
+    supply: Any  # Pa; a symbol in simulations that share their equations, see `at_supply`
     gravity: float  # m.s-2
     body_mass: float  # kg, of the body link alone
     sign_speed: float  # m.s-1 or rad.s-1; the sign of a piston's or an axis' rate is smooth within

@@ -16,6 +16,8 @@ from kemba.model.node import Node, Row
 from kemba.model.scene import Instance, Key, Scene, full_name, place_effects, port_name
 from kemba.quantity import Param, Quantity
 
+SUPPLY = "supply"  # its name beside those of parameters
+
 
 class Model:
     """A mechanism with effects; the order of the list does not matter.
@@ -111,18 +113,20 @@ class Model:
         Every number named in `scaled` is multiplied by a symbol; it may be a whole table
         (`chamber.F_extend`) or one entry of it (`chamber.fill[0]`). In the parameters p these
         factors follow the free parameters. Where effects stand once per leg, the name of their kind
-        stands for all of them. Raises KembaError where the model has no such parameter.
+        stands for all of them; `supply` in `free` is the pressure [Pa] at which tables are read.
+        Raises KembaError where the model has no such parameter.
         """
         free, scaled = list(free), list(scaled)
-        for name in free:
+        own = [name for name in free if name != SUPPLY]
+        for name in own:
             if any(f"{e}.{_field(name)}" not in self.parameters for e in self._meant(name)):
                 hint = suggest(name, self.parameters)
                 raise KembaError(self.name, f"no parameter '{name}'", hint=hint)
         p = ca.SX.sym("p", len(free) + len(scaled))
         bound: dict[str, dict[str, Any]] = {}
-        for i, name in enumerate(free):
+        for name in own:
             for effect in self._meant(name):
-                bound.setdefault(effect, {})[_field(name)] = p[i]
+                bound.setdefault(effect, {})[_field(name)] = p[free.index(name)]
         for i, name in enumerate(scaled, start=len(free)):
             for effect in self._meant(name):
                 _scale(self, bound, f"{effect}.{_field(name)}", p[i])
@@ -131,7 +135,8 @@ class Model:
         ]
         free_lengths = lengths(i.effect for i in instances if i.effect.name in bound)
         mechanism = reshaped(self.mechanism, self.mechanism.offsets, free_lengths)
-        return _assemble(self, mechanism, instances, p)
+        supply = p[free.index(SUPPLY)] if SUPPLY in free else self.supply
+        return _assemble(self, mechanism, instances, p, supply)
 
     def _meant(self, name: str) -> list[str]:
         """Names of the effects that `effect.field` is about: that effect, or all of that kind."""
@@ -176,14 +181,15 @@ def _symbols(prefix: str, quantities: Mapping[Key, Quantity]) -> tuple[ca.SX, di
     return vector, {key: vector[i] for i, key in enumerate(quantities)}
 
 
-def _assemble(model: Model, mechanism: Mechanism, instances: list[Instance], p: ca.SX) -> Node:
+def _assemble(
+    model: Model, mechanism: Mechanism, instances: list[Instance], p: ca.SX, supply: Any
+) -> Node:
     s, states = _symbols("s", model.states)
     lam, forces = _symbols("lam", model.forces)
     u, inputs = _symbols("u", model.inputs)
     sd = ca.SX.sym("sd", s.numel())
-    scene = Scene(
-        mechanism, instances, {**states, **forces, **inputs}, set(model.inputs), model.supply
-    )
+    values = {**states, **forces, **inputs}
+    scene = Scene(mechanism, instances, values, set(model.inputs), supply)
     parts = [(instance, scene.contribution(i)) for i, instance in enumerate(instances)]
 
     efforts: dict[str, Any] = {}

@@ -120,7 +120,7 @@ class Scene:
         instances: list[Instance],
         values: Mapping[Key, ca.SX],
         inputs: set[Key],
-        supply: float,
+        supply: Any,
     ) -> None:
         self.mechanism, self.instances, self.supply = mechanism, instances, supply
         self.values, self.inputs = values, inputs

@@ -8,10 +8,12 @@ from statistics import NormalDist
 from zlib import crc32
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kemba.scenarios.schema import Draws, Spread, Value
 from kemba.units import read_si
 
+Array = NDArray[np.float64]
 Values = dict[str, Value]
 
 
@@ -29,9 +31,7 @@ def _draws(block: Draws, rng: np.random.Generator) -> list[Values]:
     if not width:
         return [{}]
     if block.sampling == "latin_hypercube":
-        from scipy.stats import qmc  # half a second, and most callers draw nothing
-
-        table = qmc.LatinHypercube(width, seed=rng).random(block.cases)
+        table = latin_hypercube(rng, block.cases, width)
     else:
         table = rng.random((block.cases, width))
     spreads = block.vary.items()
@@ -39,6 +39,19 @@ def _draws(block: Draws, rng: np.random.Generator) -> list[Values]:
         {key: drawn(spread, float(u)) for (key, spread), u in zip(spreads, row, strict=True)}
         for row in table
     ]
+
+
+def latin_hypercube(rng: np.random.Generator, count: int, width: int) -> Array:
+    """Points (count, width) in [0, 1), in every column one in each of `count` equal parts.
+
+    The points of `scipy.stats.qmc.LatinHypercube`, whose import takes half a second of a plan.
+    """
+    own = rng.spawn(1)[0]
+    within = own.random((count, width))
+    parts = np.tile(np.arange(1, count + 1), (width, 1))
+    for column in parts:
+        own.shuffle(column)
+    return np.asarray((parts.T - within) / count)
 
 
 def drawn(spread: Spread, u: float) -> Value:

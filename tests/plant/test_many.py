@@ -50,9 +50,8 @@ def test_models_that_differ_in_numbers_share_their_machine_code() -> None:
     known = [equations_of(variant) for variant in variants]
     assert known[2] is known[3]
     assert set(known[3].free) == {"ground_friction.mu", "boom.mass"}
-    for i, variant in enumerate(variants):
-        other = variant.supply + 1e-9 * (1 + i)  # another structure, and nothing else
-        alone = Model(variant.mechanism, variant.effects, other)
+    for variant in variants:
+        alone = Model(load_model("planning").mechanism, variant.effects, variant.supply)
         assert equations_of(alone).free == ()
         start = {"body/vx": 0.5}
         same(run(variant, start, PUSH, 0.15), run(alone, start, PUSH, 0.15), within=1e-6)
@@ -66,9 +65,21 @@ def test_models_that_are_simulated_together_share_it_from_the_beginning() -> Non
     assert known[0] is known[1] is known[2] and "ground_friction.mu" in known[0].free
 
 
+def test_models_with_other_supplies_share_their_machine_code() -> None:
+    """Also beyond the pressures of their tables."""
+    model = planning()
+    variants = [Model(model.mechanism, model.effects, p) for p in (0.7e6, 0.55e6, 0.66e6, 0.9e6)]
+    known = [equations_of(variant) for variant in variants]
+    assert known[1] is known[2] is known[3] and known[3].free == ("supply",)
+    for variant in variants:
+        alone = Model(load_model("planning").mechanism, variant.effects, variant.supply)
+        assert equations_of(alone).free == ()
+        same(run(variant, {}, PUSH, 0.15), run(alone, {}, PUSH, 0.15), within=1e-6)
+
+
 def test_models_that_differ_in_tables_share_their_machine_code() -> None:
     """As fits of the air do."""
-    model = planning()
+    model = load_model("planning")
     air = model.effect("chamber")
     weak = air.model_copy(update={"F_extend": tuple(0.9 * F for F in air.F_extend)})
     slow = air.model_copy(update={"fill": tuple(1.3 * tau for tau in air.fill)})
@@ -79,7 +90,7 @@ def test_models_that_differ_in_tables_share_their_machine_code() -> None:
     scaled = {name.partition("[")[0] for name in known[3].scaled}
     assert scaled == {f"chamber.{name}" for name in ("F_extend", "F_retract", "fill", "vent")}
     for variant in variants:
-        alone = Model(variant.mechanism, variant.effects, variant.supply + 1e-9)
+        alone = Model(load_model("planning").mechanism, variant.effects, variant.supply)
         same(run(variant, {}, PUSH, 0.15), run(alone, {}, PUSH, 0.15), within=1e-6)
 
 

@@ -49,7 +49,7 @@ class ModeDamping(Effect):
     def remarks(self, supply: float) -> list[str]:
         return beyond(self, supply, MODES)
 
-    def c_d(self, u_e: Any, u_r: Any, supply: float) -> Any:
+    def c_d(self, u_e: Any, u_r: Any, supply: Any) -> Any:
         """Damping [N.s.m-1] in a valve mode at a supply pressure [Pa] (eq. 6)."""
         extend, retract, both = (at_supply(self, mode, supply) for mode in MODES)
         c0 = self.value("c_none")

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
 
+import casadi as ca
 import numpy as np
 
 from kemba.effects.base import Effect
@@ -34,8 +35,8 @@ def filled(effect: E, cylinder: Cylinder, names: Sequence[str], tables: Sequence
     return found
 
 
-def at_supply(effect: Effect, table: str, supply: float) -> Any:
-    """A table of an effect, whose entries may be symbols, at a supply pressure [Pa].
+def at_supply(effect: Effect, table: str, supply: Any) -> Any:
+    """A table of an effect at a supply pressure [Pa]; entries and pressure may be symbols.
 
     Piecewise linear; extrapolated from the last two entries beyond the pressures of the table.
     A table of one entry holds at every pressure.
@@ -43,6 +44,8 @@ def at_supply(effect: Effect, table: str, supply: float) -> Any:
     values, pressures = effect.value(table), np.asarray(effect.value("pressures"))
     if len(pressures) == 1:
         return values[0]
+    if isinstance(supply, ca.SX):
+        return ca.pw_lin(supply, pressures, ca.vertcat(*values))
     i = int(np.clip(np.searchsorted(pressures, supply) - 1, 0, len(pressures) - 2))
     share = float((supply - pressures[i]) / (pressures[i + 1] - pressures[i]))
     return (1 - share) * values[i] + share * values[i + 1]

@@ -13,7 +13,7 @@ import casadi as ca
 import numpy as np
 
 from kemba.machine_code import Native
-from kemba.model import Model
+from kemba.model import SUPPLY, Model
 from kemba.model.node import Node
 from kemba.plant.kernel.machine import KernelModel
 from kemba.plant.kernel.settings import StepLength
@@ -25,8 +25,9 @@ from kemba.plant.stepping.pairs import PairTable
 
 
 def numbers_of(model: Model) -> dict[str, float]:
-    """The parameters of a model, and the entries of its tables as `chamber.fill[0]`."""
-    found = {name: value for name, (_, value) in model.parameters.items()}
+    """The supply of a model, its parameters, and the entries of its tables as `chamber.fill[0]`."""
+    found = {SUPPLY: model.supply}
+    found |= {name: value for name, (_, value) in model.parameters.items()}
     for effect in model.effects:
         for name, table in effect.tables().items():
             found |= {f"{effect.name}.{name}[{i}]": entry for i, entry in enumerate(table)}

@@ -9,7 +9,7 @@ from typing import Any
 
 from kemba.cache import Recent
 from kemba.mechanism import Mechanism
-from kemba.model import Model
+from kemba.model import SUPPLY, Model
 from kemba.plant.kernel.settings import StepLength
 from kemba.plant.stepping.equations import Equations, numbers_of
 from kemba.settings import Settings, setting
@@ -26,8 +26,7 @@ class Kept(Settings):
 
 @dataclass
 class Family:
-    """Models of one mechanism with the same effects: `numbers` are those of the first of them,
-    parameters and entries of tables (`chamber.fill[0]`)."""
+    """Models of one mechanism with the same effects: `numbers` are those of the first of them."""
 
     structure: tuple[Any, ...]
     numbers: dict[str, float]
@@ -84,7 +83,7 @@ def _plain(model: Model, structure: tuple[Any, ...], numbers: dict[str, float]) 
 def _with_free(model: Model, names: set[str]) -> Equations:
     """Equations in which `names` are free; of an effect one of whose tables is among them, all
     tables, since a fit changes one after the other."""
-    entries = numbers_of(model).keys() - model.parameters.keys()
+    entries = numbers_of(model).keys() - model.parameters.keys() - {SUPPLY}
     effects = {name.rpartition(".")[0] for name in names & entries}
     scaled = sorted(name for name in entries if name.rpartition(".")[0] in effects)
     return Equations(model, sorted(names - entries), scaled)
@@ -108,4 +107,4 @@ def _structure(model: Model) -> tuple[Any, ...]:
         rest = {name: value for name, value in effect.model_dump().items() if name not in apart}
         zeros = [[entry == 0.0 for entry in table] for table in tables.values()]
         effects.append((type(effect), repr((rest, zeros))))
-    return (model.supply, *effects)
+    return tuple(effects)
