@@ -13,7 +13,7 @@ from kemba.report.judging.executed import Executed
 from kemba.report.judging.judged import judged, plant_of, table_of
 from kemba.report.robust_ways import WAYS, Changed, RobustSettings, variants
 from kemba.scenarios.draw import Scenario, scenarios
-from kemba.scenarios.share import Share, outcomes, share, share_of
+from kemba.scenarios.share import ScenarioOutcome, Share, outcomes, share, share_of
 from kemba.trajectory import Trajectory
 
 Solve = Callable[[Task], Plan]
@@ -23,36 +23,34 @@ Way = Callable[[Plan, Sequence[Scenario]], Changed]
 
 @dataclass(frozen=True)
 class RobustCandidate:
-    """A plan; with its controller table and the share of scenarios in which it succeeds, if it was
-    executed. `good`: its executions keep to the task's tolerances."""
+    """A plan; if it was executed, with the controller's table and what that did in the scenarios so
+    far. `good`: its executions keep to the task's tolerances."""
 
     plan: Plan
+    name: str = ""
     table: Trajectory | None = None
-    share: Share | None = None
+    done: Sequence[ScenarioOutcome] = ()
     good: bool = False
 
     @property
-    def rank(self) -> tuple[bool, bool, int, float]:
+    def share(self) -> Share | None:
+        """The share of scenarios in which it succeeds, of those in which it was executed."""
+        return share_of(self.done) if self.done else None
+
+    @property
+    def landed(self) -> float:
+        """That share as a number."""
+        return self.share.landed / self.share.n if self.share else 0.0
+
+    @property
+    def rank(self) -> tuple[bool, bool, float, float]:
         """Better candidates are greater: solved, good on the plant, then by share, by cost."""
-        solved = self.plan.status is Status.SOLVED
-        landed = self.share.landed if self.share else 0
-        return solved, self.good, landed, -self.plan.cost["torque_squared_integral"]
+        solved, cost = self.plan.status is Status.SOLVED, self.plan.cost["torque_squared_integral"]
+        return solved, self.good, self.landed, -cost
 
     def succeeds(self, least: float) -> bool:
         """Whether it is solved and good, and succeeds in a share of `least` or more."""
-        if self.share is None or not self.rank[0] or not self.good:
-            return False
-        return self.share.landed >= least * self.share.n
-
-    @property
-    def poor(self) -> bool:
-        """Whether it was executed and seldom succeeds."""
-        return self.share is not None and is_poor(self.share)
-
-    @property
-    def enough(self) -> bool:
-        """Whether it succeeds so often that no plan is sought anew."""
-        return self.succeeds(RobustSettings.current().enough)
+        return self.rank[0] and self.good and self.landed >= least
 
 
 def most_robust(
@@ -70,36 +68,32 @@ def most_robust(
     search = _Search(plant, cases, tell)
     first = solve(task)
     search.take("as asked", first)
-    for way in search.ways if first.status.plan else ():
+    for way in WAYS if first.status.plan else ():
         search.along(way, first, change)
     for name, variant in variants(task):
-        if search.over or (search.best and search.best.enough):
+        best = search.best()
+        if search.over or (best and best.succeeds(RobustSettings.current().enough)):
             break
         search.take(name, solve(variant))
-    return search.whole() or RobustCandidate(first)
+    return search.best() or RobustCandidate(first)
 
 
 @dataclass
 class _Search:
-    """The best candidate so far; `over` where no other is to be tried."""
+    """The candidates so far; `over` where no other is to be tried."""
 
     plant: Model
     cases: list[Scenario]
     tell: Callable[[str], None]
-    best: RobustCandidate | None = field(default=None)
+    candidates: list[RobustCandidate] = field(default_factory=list)
     over: bool = False
 
-    @property
-    def ways(self) -> Sequence[Sequence[Way]]:
-        """In which order a plan is changed: one that seldom succeeds by what changes most first."""
-        return WAYS[::-1] if self.best and self.best.poor else WAYS
-
     def along(self, way: Sequence[Way], found: Plan, change: Change) -> None:
-        """Execute a plan after each change of a way that it needs, as far as that goes."""
+        """Execute a plan after each change of a way, as far as it needs them."""
         for step in way:
             changed = None if self.over else step(found, self.cases)
             if changed is None:
-                continue
+                return
             name, task = changed
             new = change(found, task)
             if new is None:
@@ -109,43 +103,44 @@ class _Search:
             self.take(name, found)
 
     def take(self, name: str, found: Plan) -> None:
-        """Execute a plan in all scenarios, with its own hold and with a longer one."""
+        """Execute a plan in the first few scenarios, and in the others if it succeeds in all of
+        these, with its own hold and with a longer one."""
         self.over = found.status is Status.INTERRUPTED
         if self.over or not found.status.plan:
             return
-        own = found.task.hold
-        for hold in sorted({own, max(own, RobustSettings.current().hold)}):
+        own, settings = found.task.hold, RobustSettings.current()
+        for hold in sorted({own, max(own, settings.hold)}):
             held = replace(found, task=found.task.model_copy(update={"hold": hold}))
             table = table_of(held)
-            landed = self._share(held, table)
-            self.tell(f"{name}, hold {hold:g} s: {landed.sentence}")
-            one = RobustCandidate(held, table, landed, judged(held, table, self.plant).good)
-            if self.best is None or one.rank > self.best.rank:
-                self.best = one
-            if self.best.succeeds(1.0):  # continued plans take seconds
+            good = judged(held, table, self.plant).good
+            one = RobustCandidate(held, f"{name}, hold {hold:g} s", table, (), good)
+            one = self._executed(one, settings.few)
+            if one.landed == 1.0:
+                one = self._executed(one, len(self.cases))
+            self.candidates.append(one)
+            if one.succeeds(1.0):  # continued plans take seconds
                 self.over = True
                 return
 
-    def _share(self, found: Plan, table: Trajectory) -> Share:
-        """The share of scenarios in which a table succeeds; of the first few where it is poor."""
-        few = RobustSettings.current().few
-        done = outcomes(found.model, found.trajectory, table, self.cases[:few])
-        if not is_poor(share_of(done)):
-            done += outcomes(found.model, found.trajectory, table, self.cases[few:])
-        return share_of(done)
+    def best(self) -> RobustCandidate | None:
+        """The best candidate, executed in all scenarios."""
+        while self.candidates:
+            ranks = [one.rank for one in self.candidates]
+            i = ranks.index(max(ranks))
+            best = self.candidates[i]
+            if len(best.done) == len(self.cases):
+                return best
+            self.candidates[i] = self._executed(best, len(self.cases))
+        return None
 
-    def whole(self) -> RobustCandidate | None:
-        """The best candidate, with its share of all scenarios."""
-        best = self.best
-        if not best or not best.table or not best.share or best.share.n == len(self.cases):
-            return best
-        landed = share(best.plan.model, best.plan.trajectory, best.table, self.cases)
-        return replace(best, share=landed)
-
-
-def is_poor(found: Share) -> bool:
-    """Whether a plan succeeds so seldom that no further scenario is worth its time."""
-    return found.landed < RobustSettings.current().poor * found.n
+    def _executed(self, one: RobustCandidate, until: int) -> RobustCandidate:
+        """A candidate that is executed in the scenarios up to `until`."""
+        left, plan = self.cases[len(one.done) : until], one.plan
+        if not left or one.table is None:
+            return one
+        done = (*one.done, *outcomes(plan.model, plan.trajectory, one.table, left))
+        self.tell(f"{one.name}: {share_of(done).sentence}")
+        return replace(one, done=done)
 
 
 def with_share(found: Executed) -> Executed:
