@@ -49,10 +49,30 @@ def kind_of(document: Document) -> str:
     folder = Path(document.source).resolve().parent.name
     if folder in SCHEMAS:
         return folder
-    keys: set[Any] = set(document.data if isinstance(document.data, dict) else ())
-    known = {kind: set(schema_of(kind).model_fields) for kind in SCHEMAS}
+    keys, known = _keys(document), {kind: set(schema_of(kind).model_fields) for kind in SCHEMAS}
     best = max(SCHEMAS, key=lambda kind: (len(keys & known[kind]), -len(known[kind])))
     if not keys & known[best]:
         expected = f"keys of one of these were expected: {', '.join(SCHEMAS)}"
         raise KembaError(document.source, "is no kind of file that kemba knows", expected)
     return best
+
+
+def called(kind: str) -> str:
+    """What a file of a kind is called in messages."""
+    return CALLED.get(kind, f"{kind.removesuffix('s')} file")
+
+
+def strays(document: Document, kind: str) -> list[KembaError]:
+    """Which keys of a document are those of another kind of file than the one it was taken for."""
+    left = _keys(document) - set(schema_of(kind).model_fields)
+    others = [other for other in SCHEMAS if left & set(schema_of(other).model_fields)]
+    if not others:
+        return []
+    names = " or ".join(f"a {called(other)}" for other in others)
+    what = f"was checked as a {called(kind)}, but has keys of {names}"
+    expected = "a file of one kind was expected, best in a folder of that name"
+    return [KembaError(document.source, what, f"{expected} ({', '.join([kind, *others])})")]
+
+
+def _keys(document: Document) -> set[Any]:
+    return set(document.data if isinstance(document.data, dict) else ())

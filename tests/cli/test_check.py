@@ -93,6 +93,14 @@ def test_files_of_no_known_kind() -> None:
     assert done.stderr.startswith("x.yaml: is no kind of file that kemba knows; keys of one of")
 
 
+def test_a_file_with_keys_of_two_kinds() -> None:
+    """As of someone who expects that tasks are based on others, like models."""
+    Path("x.yaml").write_text("base: jump.yaml\nheight: 0.6 m\n")
+    told = run("check", "x.yaml").stderr
+    assert "x.yaml:2:1: height: unknown key" in told
+    assert "x.yaml: was checked as a model file, but has keys of a task file; a file of" in told
+
+
 def test_schemas_for_editors() -> None:
     assert "body" in json.loads(run("schema", "robots").stdout)["properties"]
     assert run("schema", "robos").stderr == (

@@ -84,15 +84,18 @@ def _is_measured(file: Path) -> bool:
 
 def _yaml(file: Path) -> dict[str, Any]:
     from kemba.config import load_yaml, locate, parse
+    from kemba.errors import ConfigErrors, KembaError, listed_errors
     from kemba.ocp.reading import read_task
-    from kemba_cli.schemas import CALLED, SCHEMAS, kind_of, schema_of
+    from kemba_cli.schemas import SCHEMAS, called, kind_of, schema_of, strays
 
     document = load_yaml(locate(file, SCHEMAS))
     kind = kind_of(document)
-    parsed = read_task(document) if kind == "tasks" else parse(document, schema_of(kind))
+    try:
+        parsed = read_task(document) if kind == "tasks" else parse(document, schema_of(kind))
+    except KembaError as error:
+        raise ConfigErrors([*listed_errors(error), *strays(document, kind)]) from None
     remarks = _whole(kind, parsed, document)
-    called = CALLED.get(kind, f"{kind.removesuffix('s')} file")
-    sentence = "; ".join([f"valid {called}", *remarks])
+    sentence = "; ".join([f"valid {called(kind)}", *remarks])
     return {"kind": kind, "sentence": sentence, "remarks": remarks}
 
 
