@@ -65,6 +65,7 @@ CHECKS = (
     Check(physics.off_is_absent, _switched),
     Check(physics.dissipates, _dissipative),
     Check(physics.order_does_not_matter),
+    Check(physics.supply_can_be_left_open),
     Check(physics.keeps_the_mirror, _on_legs),
     Check(physics.one_leg_only, _on_one_leg),
     Check(measuring.sensor_fault_can_be_undone, measuring.measures),

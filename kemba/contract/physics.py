@@ -16,7 +16,7 @@ from kemba.contract.cases import (
 )
 from kemba.contract.settings import ContractSettings
 from kemba.effects.sensors import SensorEffect
-from kemba.model import Model
+from kemba.model import SUPPLY, Model
 
 
 def finite(placed: Placed) -> None:
@@ -130,6 +130,20 @@ def order_does_not_matter(placed: Placed) -> None:
         for part, value in values_of(model, point).items():
             if not same(values_of(turned, point)[part], value, 1e-12, 0.0):
                 raise Broken(f"the {part} depends on the order of the list")
+
+
+def supply_can_be_left_open(placed: Placed) -> None:
+    """With the supply as a symbol, as in simulations that share equations, nothing changes.
+
+    Raises Broken where it is not so.
+    """
+    model = placed.model
+    node = model.build([SUPPLY])
+    for point in points(model, 2):
+        found = node.residual(**point, p=[model.supply])
+        for part, value in values_of(model, point).items():
+            if not same(np.asarray(found[part]).ravel(), value, 1e-9, 1e-9):
+                raise Broken(f"the {part} is another where the supply is a symbol")
 
 
 def keeps_the_mirror(placed: Placed) -> None:

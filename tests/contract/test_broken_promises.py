@@ -138,6 +138,14 @@ class NotUndone(Gain):
         return measured.times(1 / (1 + 0.5 * self.k))
 
 
+class BranchingOnSupply(Drag):
+    """Decides by the number of a supply that may be a symbol."""
+
+    def evaluate(self, at: At) -> Contribution:
+        gain = 1.0 if float(at.supply) > 0.5e6 else 2.0
+        return Contribution(effort={"piston": -gain * self.c * at.piston.v})
+
+
 class NoSuchFigure(Drag):
     """Has a tolerance for a figure that is not there."""
 
@@ -160,6 +168,7 @@ BREAKS = {
     "off is absent": AlwaysThere,
     "dissipates": Driving,
     "order does not matter": Counting,
+    "supply can be left open": BranchingOnSupply,
     "keeps the mirror": OneSided,
     "one leg only": Everywhere,
     "sensor fault can be undone": NotUndone,
