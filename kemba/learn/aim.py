@@ -13,7 +13,8 @@ from kemba.learn.flight import FlownJump, flight_of
 from kemba.model import Model
 from kemba.plant.execution.certificate import rest_after
 from kemba.plant.execution.controller import execute, read_controller
-from kemba.plant.execution.retiming import RetimingSettings, neighbours
+from kemba.plant.execution.moved_edges import edges_of, neighbours
+from kemba.plant.execution.retiming import RetimingSettings
 from kemba.plotting.robot.machine import Machine
 from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Trajectory
@@ -105,15 +106,13 @@ class Aim:
         return (miss if isfinite(miss) else RetimingSettings.current().fallen), lands
 
 
-def _edges(table: Trajectory) -> dict[str, np.ndarray]:
-    names = [name for name in table.names if "/valve/" in name]
-    return {name: np.flatnonzero(np.diff(table[name], prepend=0.0)) for name in names}
-
-
 def _moved(first: Trajectory, table: Trajectory) -> dict[str, list[int]]:
     """By how many ticks each edge moved, by column."""
-    before, after = _edges(first), _edges(table)
-    return {name: (after[name] - before[name]).tolist() for name in before}
+    after = edges_of(table)
+    return {
+        name: [new - old for new, old in zip(after[name], ticks, strict=True)]
+        for name, ticks in edges_of(first).items()
+    }
 
 
 def _within(first: Trajectory, table: Trajectory, most: int) -> bool:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from ocp.runs import solved
 
-from kemba.ocp import controller_table
+from kemba.ocp import controller_table, load_task
+from kemba.ocp.planning import plans_nearby
 from kemba.plant import execute
-from kemba.plant.execution.retiming import RetimingSettings, retimed
+from kemba.plant.execution.moved_edges import edges_of, moves, shared_edges, with_moved
+from kemba.plant.execution.retiming import RetimingSettings, execution_errors, retimed
 from kemba.settings import changed
 from kemba.trajectory import Trajectory
 
@@ -31,6 +35,43 @@ def test_a_table_with_a_late_valve_comes_nearer_to_its_plan() -> None:
     errors = [execute(t, run.model).against(run.model, run.plan) for t in (spoilt, mended)]
     assert abs(errors[1].apex_error_m) < 0.7 * abs(errors[0].apex_error_m)
     assert mended.headers == spoilt.headers
+
+
+def test_two_late_edges_of_all_legs_are_found_in_few_executions(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """No single move makes them good."""
+    found = next(plans_nearby(*load_task("jump.yaml")))[0]
+    table = controller_table(found.model, found.trajectory)
+    spoilt = with_moved(table, shared_edges(table)[:2], (1, 1))
+    assert spoilt is not None
+    errors = []
+
+    def noted(*given: Any, **named: Any) -> tuple[np.ndarray, float]:
+        executed = execution_errors(*given, **named)
+        errors.append(executed[1])
+        return executed
+
+    monkeypatch.setattr("kemba.plant.execution.retiming.execution_errors", noted)
+    mended = retimed(found.model, found.trajectory, spoilt)
+    assert errors[0] > 2.0 and errors[-1] <= 1.0
+    assert len(errors) <= 2 + len(shared_edges(table))
+    assert mended is not spoilt
+
+
+def test_moves_are_all_different_and_move_something() -> None:
+    found = moves(6)
+    assert len(np.unique(found, axis=0)) == len(found)
+    assert np.abs(found).sum(axis=1).min() == 1 and np.abs(found).max() == 2
+    assert (found != 0).sum(axis=1).max() == 4
+    assert (moves(40) != 0).sum(axis=1).max() == 2, "more at once would be too many"
+
+
+def test_edges_that_would_meet_do_not_move() -> None:
+    table = controller_table(solved("jump").model, solved("jump").plan)
+    column, (opens, closes, *_) = next((c, t) for c, t in edges_of(table).items() if len(t) > 1)
+    assert with_moved(table, [[(column, 0)]], [closes - opens]) is None
+    assert with_moved(table, [[(column, 0)]], [-1 - opens]) is None, "before the table begins"
 
 
 def test_a_table_that_is_near_enough_stays() -> None:

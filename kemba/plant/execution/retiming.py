@@ -6,7 +6,8 @@ rounding is best depends on the whole motion, so the table is simulated with oth
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -15,12 +16,11 @@ from kemba.errors import KembaError
 from kemba.model import Model
 from kemba.plant.execution.certificate import rest_after
 from kemba.plant.execution.controller import execute
+from kemba.plant.execution.moved_edges import Group, moves, shared_edges, single_edges, with_moved
 from kemba.plant.execution.replay import ends_standing
 from kemba.plant.stepping.arrays import Array
 from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Trajectory
-
-Edges = dict[str, list[int]]  # by valve column: ticks at which it opens, closes, opens ...
 
 
 class RetimingSettings(Settings):
@@ -33,75 +33,136 @@ class RetimingSettings(Settings):
         1e3, "1", "error of a robot that falls, in units of those", "convention: beyond any other"
     )
     executions: int = setting(
-        24, "1", "simulations at most", "derived: edges on ticks of the plan cost as much; tried "
-        "beside 80 at nine heights (docs/solving.md)",
+        24, "1", "simulations at most", "derived: edges on ticks of the plan cost as much; of 30 "
+        "tables 15 needed 2 to 24 (benchmarks/retiming.py)",
+    )  # fmt: skip
+    sure: float = setting(
+        0.7, "1", "predicted error, in the same units, at which a table is tried before the "
+        "effects of all edges are known", "convention: below 1 by what predictions miss",
+    )  # fmt: skip
+    price: float = setting(
+        0.03, "1", "predicted error that a tick counts as", "convention: small beside `sure`; of "
+        "equal predictions the one with fewer ticks is surer",
     )  # fmt: skip
 
 
 def retimed(model: Model, plan: Trajectory, table: Trajectory) -> Trajectory:
-    """The table, or a neighbour of it whose execution on `model` comes nearer to the plan.
+    """The table, or one with edges some ticks away whose execution on `model` is nearer to the
+    plan.
 
-    Edges move by single ticks, one alone or the same edge of all legs together, as long as the
-    largest error falls, in units of `RetimingSettings`.
+    The effect of each edge on apex and touchdown is seen by an execution with it moved by a tick.
+    What several would do together is the sum of these; the best sums are executed. Errors are in
+    units of `RetimingSettings`.
     """
-    error = partial(_error, model, plan, extra=rest_after(model, plan, table))
-    best, executions = error(table), iter(range(RetimingSettings.current().executions))
-    while best > 1.0:
-        trials = ((error(t), t) for _, t in zip(executions, neighbours(table), strict=False))
-        nearer = next((trial for trial in trials if trial[0] < best), None)
-        if nearer is None:
-            break
-        best, table = nearer
-    return table
+    errors = partial(execution_errors, model, plan, extra=rest_after(model, plan, table))
+    search = _Roundings(errors, RetimingSettings.current().executions)
+    best = search.tried(table)
+    before = np.inf
+    while 1.0 < best.error < before and search.left > 0:
+        before = best.error
+        for groups in filter(None, (shared_edges(table), single_edges(table))):
+            best = search.around(best, groups)
+    return best.table
 
 
-def _error(model: Model, plan: Trajectory, table: Trajectory, extra: float) -> float:
-    """Largest error of the executed table in units of what needs no search."""
+@dataclass(frozen=True)
+class _Tried:
+    """An executed table: its errors (2,) of apex and touchdown, and the largest of all errors."""
+
+    table: Trajectory
+    signed: Array
+    error: float
+
+    @property
+    def lands(self) -> bool:
+        """Whether it can be compared with others: it was simulated, and falls only where the plan
+        does."""
+        return self.error < RetimingSettings.current().fallen
+
+
+@dataclass
+class _Roundings:
+    """Executes tables as long as executions are left."""
+
+    errors: Callable[[Trajectory], tuple[Array, float]]
+    left: int
+
+    def tried(self, table: Trajectory) -> _Tried:
+        """A table with its errors."""
+        self.left -= 1
+        return _Tried(table, *self.errors(table))
+
+    def around(self, start: _Tried, groups: Sequence[Group]) -> _Tried:
+        """The best table that differs from `start` by ticks of some groups of edges."""
+        best, effects = start, _Effects(len(groups), start.signed)
+        unknown = list(range(len(groups)))
+        while best.error > 1.0 and self.left > 0:
+            ticks, alone = effects.promising(unknown, best.error), None
+            if ticks is None:
+                if not unknown:
+                    break
+                alone = unknown.pop(0)
+                ticks = np.eye(len(groups), dtype=int)[alone]
+            effects.done(ticks)
+            table = with_moved(start.table, groups, ticks)
+            found = self.tried(table) if table is not None else None
+            if found is None or not found.lands:
+                continue
+            if start.lands:
+                effects.seen(ticks, found.signed, alone)
+            if found.error < best.error:
+                best = found
+        return best
+
+
+class _Effects:
+    """What a tick of each group of edges does to apex and touchdown, as far as it was seen."""
+
+    def __init__(self, count: int, start: Array) -> None:
+        self.moves, self.slopes = moves(count), np.zeros((count, 2))
+        self.open = np.ones(len(self.moves), dtype=bool)
+        self.nearest, self.there = start, np.zeros(count, dtype=int)
+        self.start = start
+
+    def promising(self, unknown: Sequence[int], error: float) -> Array | None:
+        """The ticks (groups,) that were not tried and are predicted to come nearest to the plan;
+        None where that is not near enough: `sure` as long as effects are `unknown`, then below
+        `error`."""
+        settings = RetimingSettings.current()
+        useless = np.abs(self.slopes).max(axis=1) <= settings.price
+        possible = self.open & ~self.moves[:, useless].any(axis=1)
+        away = self.nearest + (self.moves - self.there) @ self.slopes
+        predicted = np.abs(away).max(axis=1) + settings.price * np.abs(self.moves).sum(axis=1)
+        predicted[~possible] = np.inf
+        best = int(predicted.argmin())
+        near = settings.sure if unknown else error
+        return np.asarray(self.moves[best]) if predicted[best] < near else None
+
+    def done(self, ticks: Array) -> None:
+        """These ticks (groups,) are not proposed again."""
+        self.open &= (self.moves != ticks).any(axis=1)
+
+    def seen(self, ticks: Array, signed: Array, alone: int | None) -> None:
+        """Errors (2,) with these ticks (groups,); `alone`: of one group that moves alone for the
+        first time."""
+        if alone is not None:
+            self.slopes[alone] = signed - self.start
+        if np.abs(signed).max() < np.abs(self.nearest).max():
+            self.nearest, self.there = signed, ticks
+
+
+def execution_errors(
+    model: Model, plan: Trajectory, table: Trajectory, extra: float
+) -> tuple[Array, float]:
+    """Errors (2,) of apex and touchdown of the executed table, and the largest with that of the
+    end, in units of what needs no search."""
     limits = RetimingSettings.current()
     try:
         facts = execute(table, model, extra=extra).against(model, plan)
     except KembaError:
-        return np.inf
-    errors = [facts.apex_error_m / limits.apex, facts.final_error_m / limits.final]
-    errors.append((facts.touchdown_error_s or 0.0) / limits.touchdown)
+        return np.full(2, np.inf), np.inf
+    late = facts.touchdown_error_s or 0.0
+    signed = np.array([facts.apex_error_m / limits.apex, late / limits.touchdown])
+    error = float(max(np.abs(signed).max(), abs(facts.final_error_m) / limits.final))
     falls = not facts.landed and bool(ends_standing(model, plan))
-    return float(np.max(np.abs(errors))) + (limits.fallen if falls else 0.0)
-
-
-def neighbours(table: Trajectory) -> Iterator[Trajectory]:
-    """Tables with one edge, or the same edge of all legs, a tick earlier or later."""
-    edges = _edges(table)
-    groups = [[(name, k)] for name, ticks in edges.items() for k in range(len(ticks))]
-    for side in ("extend", "retract"):
-        legs = [name for name in edges if name.endswith(side)]
-        counts = {len(edges[name]) for name in legs}
-        if len(legs) > 1 and len(counts) == 1:
-            groups[:0] = [[(name, k) for name in legs] for k in range(counts.pop())]
-    for group in groups:
-        for shift in (-1, 1):
-            moved = {name: list(ticks) for name, ticks in edges.items()}
-            for name, k in group:
-                moved[name][k] += shift
-            if all(_possible(ticks, len(table)) for ticks in moved.values()):
-                yield _with(table, moved)
-
-
-def _edges(table: Trajectory) -> Edges:
-    names = [name for name in table.names if "/valve/" in name]
-    return {name: np.flatnonzero(np.diff(table[name], prepend=0.0)).tolist() for name in names}
-
-
-def _possible(ticks: list[int], rows: int) -> bool:
-    return all(0 <= tick < rows for tick in ticks) and bool(np.all(np.diff(ticks) > 0))
-
-
-def _with(table: Trajectory, edges: Edges) -> Trajectory:
-    """The table with these edges of its valves; columns keep their order."""
-    columns: dict[str, Array] = {}
-    for header, name in zip(table.headers, table.names, strict=True):
-        columns[header] = table[name]
-        if name in edges:
-            columns[header] = np.zeros(len(table))
-            for i, tick in enumerate(edges[name]):
-                columns[header][tick:] = float(i % 2 == 0)
-    return Trajectory(table.time, columns, table.meta)
+    return signed, error + (limits.fallen if falls else 0.0)
