@@ -68,10 +68,6 @@ class Continuing(Settings):
         1e3, "1", "how much rather impulses of the start change than its velocities, scaled",
         "convention: a trajectory says nothing of impulses",
     )  # fmt: skip
-    mu: float = setting(
-        1e-5, "1", "barrier parameter of a solve that starts with the multipliers of the earlier "
-        "plan, and the least of these: that of a bound at distance 1", TRIED, decides=True,
-    )  # fmt: skip
     push: float = setting(
         1e-3, "1", "distance from the bounds of such a start", TRIED, decides=True
     )  # fmt: skip
@@ -228,9 +224,9 @@ class Continuation:
         settings, slow = Continuing.current(), Refining.current().slow
         options = warm(min(settings.iterations, self.task.solver.max_iterations))
         if begin.lam_g is not None:
-            # held at `mu`: to lower it costs iterations, and the plan changes by 0.1 % at most
-            held = {"mu_target": settings.mu, "warm_start_mult_bound_push": settings.mu}
-            options |= ipopt.warm(settings.mu, settings.push, **held)
+            mu = ipopt.last_barrier(Refining.current().tol)
+            # a multiplier is at least that of a bound at distance 1
+            options |= ipopt.warm(mu, settings.push, warm_start_mult_bound_push=mu)
         stagnation = Stagnation(settings.patience, settings.underway, slow)
         found = solve(program, begin, options, self.control, stagnation)
         assert found.ending is not None

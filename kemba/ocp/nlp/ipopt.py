@@ -95,6 +95,12 @@ def warm(mu: float, push: float | None = None, **more: Any) -> dict[str, Any]:
     return {"warm_start_init_point": "yes", **pushed, "mu_init": mu, **more}
 
 
+def last_barrier(tol: float) -> float:
+    """The barrier parameter at which IPOPT ends with its tolerance `tol` (its documentation, option
+    barrier_tol_factor). A solve that begins there need not lower it."""
+    return tol / (10.0 + 1.0)
+
+
 class Ipopt:
     """Solves a program, again and again with other parameters, bounds and options.
 
