@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from typing import Any
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
@@ -35,14 +36,14 @@ def tasks() -> Iterator[tuple[str, list[str]]]:
 def main() -> None:
     """Print the table."""
     errors: list[float] = []
-    execute = retiming.execution_errors
+    execute = retiming.executed_table
 
-    def noted(*given: object, **named: object) -> tuple[np.ndarray, float]:
-        found = execute(*given, **named)  # type: ignore[arg-type]
-        errors.append(found[1])
+    def noted(*given: Any, **named: Any) -> retiming.ExecutedTable:
+        found = execute(*given, **named)
+        errors.append(found.error)
         return found
 
-    retiming.execution_errors = noted
+    retiming.executed_table = noted
     print("| task | as rounded | as written | executions |\n|---|---:|---:|---:|")
     counts = []
     for name, changes in tasks():

@@ -111,9 +111,9 @@ class _Search:
         own, settings = found.task.hold, RobustSettings.current()
         for hold in sorted({own, max(own, settings.hold)}):
             held = replace(found, task=found.task.model_copy(update={"hold": hold}))
-            table = table_of(held)
-            good = judged(held, table, self.plant).good
-            one = RobustCandidate(held, f"{name}, hold {hold:g} s", table, (), good)
+            near = table_of(held)
+            good = judged(held, near.table, self.plant, known=near.replay).good
+            one = RobustCandidate(held, f"{name}, hold {hold:g} s", near.table, (), good)
             one = self._executed(one, settings.few)
             if one.landed == 1.0:
                 one = self._executed(one, len(self.cases))

@@ -37,7 +37,7 @@ def test_it_is_planned_and_judged_on_the_ground_of_its_model() -> None:
     found = high(0.5)
     assert found.model.effect("contact").value("mu") == 1.0
     assert plant_of(found.task).effect("contact").value("mu") == 1.0
-    assert judged(found, table_of(found)).replays
+    assert judged(found, table_of(found).table).replays
 
 
 @pytest.mark.parametrize(("grip", "slips"), [(1.0, True), (0.5, False)])
@@ -45,7 +45,7 @@ def test_it_does_not_slip_where_the_ground_has_no_more(grip: float, slips: bool)
     """On the planning model with half the friction, up to the take-off."""
     found = high(grip)
     ground = found.model.effect("contact").bind({"mu": 0.52})
-    done = execute(table_of(found), found.model.with_effects([ground])).trajectory
+    done = execute(table_of(found).table, found.model.with_effects([ground])).trajectory
     push = (done.time > 0.0) & (done.time < 0.14)
     feet = np.concatenate([done[f"{leg}/foot/vx"][push] for leg in ("front", "rear")])
     assert (np.abs(feet).max() > 0.05) == slips

@@ -12,7 +12,7 @@ from kemba.ocp import controller_table, load_task
 from kemba.ocp.planning import plans_nearby
 from kemba.plant import execute
 from kemba.plant.execution.moved_edges import edges_of, moves, shared_edges, with_moved
-from kemba.plant.execution.retiming import RetimingSettings, execution_errors, retimed
+from kemba.plant.execution.retiming import ExecutedTable, RetimingSettings, executed_table, retimed
 from kemba.settings import changed
 from kemba.trajectory import Trajectory
 
@@ -31,7 +31,7 @@ def test_a_table_with_a_late_valve_comes_nearer_to_its_plan() -> None:
     run = solved("jump")
     spoilt = late(controller_table(run.model, run.plan), 2)
     with changed(RetimingSettings, executions=80):
-        mended = retimed(run.model, run.plan, spoilt)
+        mended = retimed(run.model, run.plan, spoilt).table
     errors = [execute(t, run.model).against(run.model, run.plan) for t in (spoilt, mended)]
     assert abs(errors[1].apex_error_m) < 0.7 * abs(errors[0].apex_error_m)
     assert mended.headers == spoilt.headers
@@ -47,16 +47,16 @@ def test_two_late_edges_of_all_legs_are_found_in_few_executions(
     assert spoilt is not None
     errors = []
 
-    def noted(*given: Any, **named: Any) -> tuple[np.ndarray, float]:
-        executed = execution_errors(*given, **named)
-        errors.append(executed[1])
-        return executed
+    def noted(*given: Any, **named: Any) -> ExecutedTable:
+        done = executed_table(*given, **named)
+        errors.append(done.error)
+        return done
 
-    monkeypatch.setattr("kemba.plant.execution.retiming.execution_errors", noted)
+    monkeypatch.setattr("kemba.plant.execution.retiming.executed_table", noted)
     mended = retimed(found.model, found.trajectory, spoilt)
     assert errors[0] > 2.0 and errors[-1] <= 1.0
     assert len(errors) <= 2 + len(shared_edges(table))
-    assert mended is not spoilt
+    assert mended.table is not spoilt and mended.error == errors[-1]
 
 
 def test_moves_are_all_different_and_move_something() -> None:
@@ -78,11 +78,11 @@ def test_a_table_that_is_near_enough_stays() -> None:
     run = solved("jump")
     table = controller_table(run.model, run.plan)
     with changed(RetimingSettings, apex=1.0, touchdown=1.0, final=1.0):
-        assert retimed(run.model, run.plan, table) is table
+        assert retimed(run.model, run.plan, table).table is table
 
 
 @pytest.mark.parametrize("column", ["front/valve/extend", "rear/valve/retract"])
 def test_valves_stay_zero_or_one(column: str) -> None:
     run = solved("jump")
-    mended = retimed(run.model, run.plan, late(controller_table(run.model, run.plan), 3))
+    mended = retimed(run.model, run.plan, late(controller_table(run.model, run.plan), 3)).table
     assert set(np.unique(mended[column])) <= {0.0, 1.0}

@@ -42,8 +42,10 @@ def executions(
     controller: Trajectory,
     plant: str | Model | None = PLANT,
     tell: Tell = silent,
+    table: Replay | None = None,
 ) -> dict[str, Replay | None]:
-    """What `replays` sums up, with the motions. `tell` gets the name of each execution."""
+    """What `replays` sums up, with the motions. `tell` gets the name of each execution; `table` is
+    that of the controller's table on `model`, where it was executed before."""
     full = load_model(plant) if isinstance(plant, str) else plant
     rest = rest_after(model, plan, controller)
 
@@ -53,7 +55,7 @@ def executions(
     tell(Stage("replay: the plan's inputs", 1, 3))
     own = _tried(lambda: replay(model, plan))
     tell(Stage("replay: controller.csv", 2, 3))
-    table = on(model)
+    table = table or on(model)
     tell(Stage("replay: controller.csv on the simulated robot", 3, 3))
     return {"replay": own, "table_replay": table, "plant_replay": on(full) if full else None}
 

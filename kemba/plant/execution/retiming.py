@@ -17,7 +17,7 @@ from kemba.model import Model
 from kemba.plant.execution.certificate import rest_after
 from kemba.plant.execution.controller import execute
 from kemba.plant.execution.moved_edges import Group, moves, shared_edges, single_edges, with_moved
-from kemba.plant.execution.replay import ends_standing
+from kemba.plant.execution.replay import Replay, ends_standing
 from kemba.plant.stepping.arrays import Array
 from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Trajectory
@@ -46,30 +46,13 @@ class RetimingSettings(Settings):
     )  # fmt: skip
 
 
-def retimed(model: Model, plan: Trajectory, table: Trajectory) -> Trajectory:
-    """The table, or one with edges some ticks away whose execution on `model` is nearer to the
-    plan.
-
-    The effect of each edge on apex and touchdown is seen by an execution with it moved by a tick.
-    What several would do together is the sum of these; the best sums are executed. Errors are in
-    units of `RetimingSettings`.
-    """
-    errors = partial(execution_errors, model, plan, extra=rest_after(model, plan, table))
-    search = _Roundings(errors, RetimingSettings.current().executions)
-    best = search.tried(table)
-    before = np.inf
-    while 1.0 < best.error < before and search.left > 0:
-        before = best.error
-        for groups in filter(None, (shared_edges(table), single_edges(table))):
-            best = search.around(best, groups)
-    return best.table
-
-
 @dataclass(frozen=True)
-class _Tried:
-    """An executed table: its errors (2,) of apex and touchdown, and the largest of all errors."""
+class ExecutedTable:
+    """A table; its execution, None where it cannot be simulated; errors (2,) of apex and touchdown
+    and the largest of all errors, in units of `RetimingSettings`."""
 
     table: Trajectory
+    replay: Replay | None
     signed: Array
     error: float
 
@@ -80,19 +63,38 @@ class _Tried:
         return self.error < RetimingSettings.current().fallen
 
 
+def retimed(model: Model, plan: Trajectory, table: Trajectory) -> ExecutedTable:
+    """The table, or one with edges some ticks away whose execution on `model` is nearer to the
+    plan; with that execution.
+
+    The effect of each edge on apex and touchdown is seen by an execution with it moved by a tick.
+    What several would do together is the sum of these; the best sums are executed. Errors are in
+    units of `RetimingSettings`.
+    """
+    run = partial(executed_table, model, plan, extra=rest_after(model, plan, table))
+    search = _Roundings(run, RetimingSettings.current().executions)
+    best = search.tried(table)
+    before = np.inf
+    while 1.0 < best.error < before and search.left > 0:
+        before = best.error
+        for groups in filter(None, (shared_edges(table), single_edges(table))):
+            best = search.around(best, groups)
+    return best
+
+
 @dataclass
 class _Roundings:
     """Executes tables as long as executions are left."""
 
-    errors: Callable[[Trajectory], tuple[Array, float]]
+    run: Callable[[Trajectory], ExecutedTable]
     left: int
 
-    def tried(self, table: Trajectory) -> _Tried:
-        """A table with its errors."""
+    def tried(self, table: Trajectory) -> ExecutedTable:
+        """A table, executed."""
         self.left -= 1
-        return _Tried(table, *self.errors(table))
+        return self.run(table)
 
-    def around(self, start: _Tried, groups: Sequence[Group]) -> _Tried:
+    def around(self, start: ExecutedTable, groups: Sequence[Group]) -> ExecutedTable:
         """The best table that differs from `start` by ticks of some groups of edges."""
         best, effects = start, _Effects(len(groups), start.signed)
         unknown = list(range(len(groups)))
@@ -151,18 +153,17 @@ class _Effects:
             self.nearest, self.there = signed, ticks
 
 
-def execution_errors(
+def executed_table(
     model: Model, plan: Trajectory, table: Trajectory, extra: float
-) -> tuple[Array, float]:
-    """Errors (2,) of apex and touchdown of the executed table, and the largest with that of the
-    end, in units of what needs no search."""
+) -> ExecutedTable:
+    """A table of a plan executed on `model`; its last commands stay for `extra` [s]."""
     limits = RetimingSettings.current()
     try:
         facts = execute(table, model, extra=extra).against(model, plan)
     except KembaError:
-        return np.full(2, np.inf), np.inf
+        return ExecutedTable(table, None, np.full(2, np.inf), np.inf)
     late = facts.touchdown_error_s or 0.0
     signed = np.array([facts.apex_error_m / limits.apex, late / limits.touchdown])
     error = float(max(np.abs(signed).max(), abs(facts.final_error_m) / limits.final))
     falls = not facts.landed and bool(ends_standing(model, plan))
-    return signed, error + (limits.fallen if falls else 0.0)
+    return ExecutedTable(table, facts, signed, error + (limits.fallen if falls else 0.0))

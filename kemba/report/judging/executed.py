@@ -104,11 +104,13 @@ def executed(
     if table is None or not replay or not found.status.plan:
         return Executed(found, result, Motions(table))
     tell("replay: the times of controller.csv")
+    known = None
     if share is None:
-        table = retimed(found.model, found.trajectory, table)
+        near = retimed(found.model, found.trajectory, table)
+        table, known = near.table, near.replay
     done: Judged | None = None
     try:
-        done = judged(found, table, tell=tell)
+        done = judged(found, table, tell=tell, known=known)
         result |= {**done.facts, **_confirmed(found, done)}
     except KembaError as error:  # a model that the simulator cannot execute still has its plan
         result |= _unconfirmed(found, f"it cannot be simulated: {error}")

@@ -10,8 +10,8 @@ from kemba.model import Model
 from kemba.ocp import Plan, Task, controller_table
 from kemba.plant.execution.certificate import executions, plant_run, summaries
 from kemba.plant.execution.counterpart import counterpart
-from kemba.plant.execution.replay import ends_standing
-from kemba.plant.execution.retiming import retimed
+from kemba.plant.execution.replay import Replay, ends_standing
+from kemba.plant.execution.retiming import ExecutedTable, retimed
 from kemba.report.judging.verdict import Verdict, verdicts
 from kemba.stopwatch import Tell, silent
 from kemba.trajectory import Trajectory
@@ -48,21 +48,26 @@ def plant_of(task: Task) -> Model:
     return counterpart(task.model, task.payload, task.supply, task.plant, changes=task.effects)
 
 
-def table_of(found: Plan) -> Trajectory:
+def table_of(found: Plan) -> ExecutedTable:
     """The controller's table of a plan, its valve edges moved by ticks where that helps."""
     table = controller_table(found.model, found.trajectory, found.task.hold)
     return retimed(found.model, found.trajectory, table)
 
 
 def judged(
-    found: Plan, table: Trajectory, plant: Model | None = None, tell: Tell = silent
+    found: Plan,
+    table: Trajectory,
+    plant: Model | None = None,
+    tell: Tell = silent,
+    known: Replay | None = None,
 ) -> Judged:
     """Execute a plan and its table, on its model and on the plant, and judge them by its task.
 
-    `plant`: that of the task when None. Raises KembaError where the plant cannot be built.
+    `plant`: that of the task when None. `known`: the table's execution on the plan's model, where
+    there was one. Raises KembaError where the plant cannot be built.
     """
     model, plan, task = found.model, found.trajectory, found.task
-    done = executions(model, plan, table, plant or plant_of(task), tell)
+    done = executions(model, plan, table, plant or plant_of(task), tell, known)
     facts = summaries(model, done)
     there = done["plant_replay"]
     lands = bool(ends_standing(model, plan))
