@@ -55,7 +55,7 @@ def test_the_example_of_the_page_passes_every_check(own: Path) -> None:
     assert done.exit_code == 0, done.output
     assert "seal_hysteresis: off is absent: good" in done.stdout
     told = json.loads(kemba("effects", "--test", own, "--json").stdout)
-    assert told["good"] and len(told["checks"]) == 11
+    assert told["good"] and len(told["checks"]) == 12
 
 
 def test_the_rest_of_the_page_runs(own: Path) -> None:
