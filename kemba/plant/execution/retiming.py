@@ -16,8 +16,15 @@ from kemba.errors import KembaError
 from kemba.model import Model
 from kemba.plant.execution.certificate import rest_after
 from kemba.plant.execution.controller import execute
-from kemba.plant.execution.moved_edges import Group, moves, shared_edges, single_edges, with_moved
-from kemba.plant.execution.replay import Replay, ends_standing
+from kemba.plant.execution.moved_edges import (
+    Group,
+    edges_of,
+    moves,
+    shared_edges,
+    single_edges,
+    with_moved,
+)
+from kemba.plant.execution.replay import LandingSettings, Replay, ends_standing, touches
 from kemba.plant.stepping.arrays import Array
 from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Trajectory
@@ -27,6 +34,10 @@ class RetimingSettings(Settings):
     """How long other roundings of a table are tried, and how near is near enough."""
 
     apex: float = setting(0.5e-3, "m", "apex error that needs no search", CHOSEN)
+    ahead: float = setting(
+        1e-3, "m", "error of the place ahead, at the planned apex's time, that needs no search",
+        CHOSEN,
+    )  # fmt: skip
     touchdown: float = setting(1e-3, "s", "touchdown error that needs no search", "derived: a tick")
     final: float = setting(0.01, "m", "error of the end that needs no search", CHOSEN)
     fallen: float = setting(
@@ -34,7 +45,7 @@ class RetimingSettings(Settings):
     )
     executions: int = setting(
         24, "1", "simulations at most", "derived: edges on ticks of the plan cost as much; of 30 "
-        "tables 15 needed 2 to 24 (benchmarks/retiming.py)",
+        "tables 17 took 2 to 24 (benchmarks/retiming.py)",
     )  # fmt: skip
     sure: float = setting(
         0.7, "1", "predicted error, in the same units, at which a table is tried before the "
@@ -48,8 +59,8 @@ class RetimingSettings(Settings):
 
 @dataclass(frozen=True)
 class ExecutedTable:
-    """A table; its execution, None where it cannot be simulated; errors (2,) of apex and touchdown
-    and the largest of all errors, in units of `RetimingSettings`."""
+    """A table; its execution, None where it cannot be simulated; errors (3,) of apex, touchdown and
+    place ahead, and the largest of all errors, in units of `RetimingSettings`."""
 
     table: Trajectory
     replay: Replay | None
@@ -67,18 +78,21 @@ def retimed(model: Model, plan: Trajectory, table: Trajectory) -> ExecutedTable:
     """The table, or one with edges some ticks away whose execution on `model` is nearer to the
     plan; with that execution.
 
-    The effect of each edge on apex and touchdown is seen by an execution with it moved by a tick.
+    What an edge does to apex, touchdown and place ahead is seen by an execution with it moved by a
+    tick.
     What several would do together is the sum of these; the best sums are executed. Errors are in
     units of `RetimingSettings`.
     """
     run = partial(executed_table, model, plan, extra=rest_after(model, plan, table))
     search = _Roundings(run, RetimingSettings.current().executions)
     best = search.tried(table)
-    before = np.inf
+    last, before = _landing(model, plan), np.inf
     while 1.0 < best.error < before and search.left > 0:
         before = best.error
-        for groups in filter(None, (shared_edges(table), single_edges(table))):
-            best = search.around(best, groups)
+        for edges in (shared_edges(table), single_edges(table)):
+            groups = [group for group in edges if _earliest(table, group) < last]
+            if groups:
+                best = search.around(best, groups)
     return best
 
 
@@ -118,10 +132,11 @@ class _Roundings:
 
 
 class _Effects:
-    """What a tick of each group of edges does to apex and touchdown, as far as it was seen."""
+    """What a tick of each group of edges does to the errors (3,) of `start`, as far as it was
+    seen."""
 
     def __init__(self, count: int, start: Array) -> None:
-        self.moves, self.slopes = moves(count), np.zeros((count, 2))
+        self.moves, self.slopes = moves(count), np.zeros((count, len(start)))
         self.open = np.ones(len(self.moves), dtype=bool)
         self.nearest, self.there = start, np.zeros(count, dtype=int)
         self.start = start
@@ -145,7 +160,7 @@ class _Effects:
         self.open &= (self.moves != ticks).any(axis=1)
 
     def seen(self, ticks: Array, signed: Array, alone: int | None) -> None:
-        """Errors (2,) with these ticks (groups,); `alone`: of one group that moves alone for the
+        """Errors (3,) with these ticks (groups,); `alone`: of one group that moves alone for the
         first time."""
         if alone is not None:
             self.slopes[alone] = signed - self.start
@@ -161,9 +176,33 @@ def executed_table(
     try:
         facts = execute(table, model, extra=extra).against(model, plan)
     except KembaError:
-        return ExecutedTable(table, None, np.full(2, np.inf), np.inf)
-    late = facts.touchdown_error_s or 0.0
-    signed = np.array([facts.apex_error_m / limits.apex, late / limits.touchdown])
+        return ExecutedTable(table, None, np.full(3, np.inf), np.inf)
+    late, ahead = facts.touchdown_error_s or 0.0, _ahead(plan, facts.trajectory)
+    signed = np.array([facts.apex_error_m, late, ahead])
+    signed /= [limits.apex, limits.touchdown, limits.ahead]
     error = float(max(np.abs(signed).max(), abs(facts.final_error_m) / limits.final))
     falls = not facts.landed and bool(ends_standing(model, plan))
     return ExecutedTable(table, facts, signed, error + (limits.fallen if falls else 0.0))
+
+
+def _ahead(plan: Trajectory, real: Trajectory) -> float:
+    """How far [m] the body is ahead of its plan at the time of the planned apex."""
+    top = int(np.argmax(plan["body/z"]))
+    there = np.interp(plan.time[top] - plan.time[0], real.time, real["body/x"])
+    return float(there - plan["body/x"][top])
+
+
+def _landing(model: Model, plan: Trajectory) -> float:
+    """When [s] the plan touches down, or is highest where it does not land: no later edge changes
+    what is compared."""
+    clock = plan.time - plan.time[0]
+    apex = float(clock[np.argmax(plan["body/z"])])
+    low, weight = LandingSettings.current().touches, model.mechanism.weight
+    landed = [time for time, carries in touches(plan, clock, apex, low, weight) if carries]
+    return min(landed, default=apex)
+
+
+def _earliest(table: Trajectory, group: Group) -> float:
+    """When [s] the first edge of a group comes."""
+    edges = edges_of(table)
+    return float(min(table.time[edges[name][k]] for name, k in group))
