@@ -118,7 +118,7 @@ class _Search:
             if one.landed == 1.0:
                 one = self._executed(one, len(self.cases))
             self.candidates.append(one)
-            if one.succeeds(1.0):  # continued plans take seconds
+            if one.succeeds(settings.enough):
                 self.over = True
                 return
 

@@ -20,7 +20,9 @@ TRIALS = "tuned: by hand on jumps of 0.36 to 0.9 m (docs/tasks.md), no benchmark
 class RobustSettings(Settings):
     """Which plans are tried, and when one is good enough."""
 
-    enough: float = setting(0.98, "1", "share of scenarios at which no plan is sought anew", TRIALS)
+    enough: float = setting(
+        0.98, "1", "share of scenarios at which no other plan is sought", TRIALS
+    )
     few: int = setting(
         15, "1", "scenarios in which a plan is executed first; in the others at once only if it "
         "succeeds in all of these", "derived: one that succeeds in 98 % does so three times in "
