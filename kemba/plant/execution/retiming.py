@@ -79,9 +79,8 @@ def retimed(model: Model, plan: Trajectory, table: Trajectory) -> ExecutedTable:
     plan; with that execution.
 
     What an edge does to apex, touchdown and place ahead is seen by an execution with it moved by a
-    tick.
-    What several would do together is the sum of these; the best sums are executed. Errors are in
-    units of `RetimingSettings`.
+    tick. What several would do together is the sum of these; the best sums are executed. Errors are
+    in units of `RetimingSettings`.
     """
     run = partial(executed_table, model, plan, extra=rest_after(model, plan, table))
     search = _Roundings(run, RetimingSettings.current().executions)
@@ -193,8 +192,8 @@ def _ahead(plan: Trajectory, real: Trajectory) -> float:
 
 
 def _landing(model: Model, plan: Trajectory) -> float:
-    """When [s] the plan touches down, or is highest where it does not land: no later edge changes
-    what is compared."""
+    """When [s] the plan touches down, or is highest where it does not land: later edges change
+    neither apex nor touchdown."""
     clock = plan.time - plan.time[0]
     apex = float(clock[np.argmax(plan["body/z"])])
     low, weight = LandingSettings.current().touches, model.mechanism.weight
