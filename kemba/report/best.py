@@ -101,7 +101,7 @@ def best_plan(
         begun(best.plan.trajectory)
     known, remark = compared(best.plan, bare)
     if best.plan.continued is False and best.plan.start.startswith("shipped"):
-        remark += "; it begins from a shipped plan: the earlier one is far, or does not come true"
+        remark += "; it begins from a shipped plan: the earlier one is further, or does not come true"
     best.result.update(best_known=known, sentence=best.result["sentence"] + remark)
     return best
 
@@ -126,10 +126,10 @@ def improved(
 
 def _tried_first(origin: Origin, task: Task) -> bool:
     """Whether an earlier plan is tried in one step, before shipped plans that are near the task:
-    where it is near itself."""
+    where none of them is nearer."""
     model = task_model(task)
-    away = Near.current().differences(figures_of(task, model), origin.figures)
-    return bool(neighbours(task, model)) and bool(away.max(initial=0.0) <= 1.0)
+    own = Near.current().differences(figures_of(task, model), origin.figures)
+    return any(np.linalg.norm(own) <= n.apart for n in neighbours(task, model)[:1])
 
 
 def shelf_is_nearer(found: Plan, task: Task) -> bool:
