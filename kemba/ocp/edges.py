@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
 from math import ceil, exp, floor
+
+import numpy as np
 
 from kemba.settings import Settings, setting
 
@@ -42,14 +43,43 @@ class ValveEdges:
 
 
 @dataclass(frozen=True)
-class _Choice:
-    """Ticks chosen so far, their cost, the latest tick of each valve and the impulse error of each
-    leg, in ticks of one chamber's force."""
+class _Choices:
+    """Ticks chosen so far (n, edges), their cost (n,), the latest tick of each valve (n, valves)
+    and the impulse error of each leg (n, legs), in ticks of one chamber's force."""
 
-    cost: float
-    ticks: tuple[int, ...]
-    latest: tuple[int, ...]
-    impulse: tuple[float, ...]
+    cost: np.ndarray
+    ticks: np.ndarray
+    latest: np.ndarray
+    impulse: np.ndarray
+
+    def lasting(self, time: float, limits: EdgeSettings) -> _Choices:
+        """The choices after `time` without an edge."""
+        own = self.impulse**2
+        i, j = np.triu_indices(self.impulse.shape[1], 1)
+        turning = (self.impulse[:, i] - self.impulse[:, j]) ** 2
+        spent = (1.0 - exp(-time / limits.moves)) * (own.sum(axis=1) + turning.sum(axis=1))
+        impulse = exp(-time / limits.forget) * self.impulse
+        return replace(self, cost=self.cost + spent, impulse=impulse)
+
+    def of(self, which: np.ndarray) -> _Choices:
+        """Some of the choices, by their indices or a mask."""
+        found = (self.cost, self.ticks, self.latest, self.impulse)
+        return _Choices(*(values[which] for values in found))
+
+    def at(self, tick: int, valve: int, leg: int, pushed: float, cost: float) -> _Choices:
+        """The choices with one more edge, of `valve`, that pushes a leg too much by `pushed`."""
+        latest, impulse = self.latest.copy(), self.impulse.copy()
+        latest[:, valve] = tick
+        impulse[:, leg] += pushed
+        ticks = np.column_stack([self.ticks, np.full(len(self.cost), tick)])
+        return _Choices(self.cost + cost, ticks, latest, impulse)
+
+    def best(self, kept: int) -> _Choices:
+        """The cheapest of those that are alike in what is still to come, `kept` of them."""
+        order = np.argsort(self.cost, kind="stable")
+        alike = np.column_stack([self.latest, np.round(self.impulse, 3)])[order]
+        first = np.unique(alike, axis=0, return_index=True)[1]
+        return self.of(order[np.sort(first)[:kept]])
 
 
 def rounded(valves: Sequence[ValveEdges]) -> list[list[int]]:
@@ -71,47 +101,35 @@ def rounded(valves: Sequence[ValveEdges]) -> list[list[int]]:
     wanted = [_apart(valve.edges) for valve in valves]
     order = sorted((time, v, k) for v, edges in enumerate(wanted) for k, time in enumerate(edges))
     legs = 1 + max((valve.leg for valve in valves), default=0)
-    best, now = [_Choice(0.0, (), (-1,) * len(valves), (0.0,) * legs)], 0.0
+    none = np.zeros((1, 0), int), np.full((1, len(valves)), -1), np.zeros((1, legs))
+    best, now = _Choices(np.zeros(1), *none), 0.0
     at = [-1.0] * len(valves)  # when the latest edge of each valve was wanted
     for time, v, k in order:
         sign = valves[v].force * (-1.0 if k % 2 == 0 else 1.0)  # opening late takes, closing adds
         earlier = [u for u, before in enumerate(at) if u == v or before < time - limits.snap]
-        found: dict[tuple[tuple[int, ...], tuple[float, ...]], _Choice] = {}
-        for choice in best:
-            waited = _lasting(choice, time - now, limits)
-            low = max(choice.latest[u] + (u == v) for u in earlier)
-            for tick in sorted({floor(time + limits.snap), ceil(time - limits.snap)}):
-                if tick >= low:
-                    new = _with(waited, tick, v, valves[v].leg, tick - time, sign, limits.shift)
-                    key = new.latest, tuple(round(p, 3) for p in new.impulse)
-                    if key not in found or new.cost < found[key].cost:
-                        found[key] = new
-        best, now, at[v] = sorted(found.values(), key=lambda c: c.cost)[: limits.kept], time, time
-    chosen = min((_lasting(choice, limits.forget, limits) for choice in best), key=lambda c: c.cost)
+        waited = best.lasting(time - now, limits)
+        low = (waited.latest + (np.arange(len(valves)) == v))[:, earlier].max(axis=1)
+        new = [
+            waited.of(tick >= low).at(
+                tick, v, valves[v].leg, sign * (tick - time), limits.shift * (tick - time) ** 2
+            )
+            for tick in sorted({floor(time + limits.snap), ceil(time - limits.snap)})
+        ]
+        best, now, at[v] = _joined(new).best(limits.kept), time, time
+    chosen = best.lasting(limits.forget, limits)
     ticks: list[list[int]] = [[0] * len(edges) for edges in wanted]
-    for (_, v, k), tick in zip(order, chosen.ticks, strict=True):
-        ticks[v][k] = tick
+    for (_, v, k), tick in zip(order, chosen.ticks[np.argmin(chosen.cost)], strict=True):
+        ticks[v][k] = int(tick)
     return ticks
 
 
-def _lasting(choice: _Choice, time: float, limits: EdgeSettings) -> _Choice:
-    """The choice after `time` without an edge."""
-    own = sum(p**2 for p in choice.impulse)
-    turning = sum((p - q) ** 2 for p, q in combinations(choice.impulse, 2))
-    cost = choice.cost + (1.0 - exp(-time / limits.moves)) * (own + turning)
-    impulse = tuple(exp(-time / limits.forget) * p for p in choice.impulse)
-    return replace(choice, cost=cost, impulse=impulse)
-
-
-def _with(
-    choice: _Choice, tick: int, v: int, leg: int, error: float, sign: float, shift: float
-) -> _Choice:
-    """The choice with one more edge, of valve v, at `tick`."""
-    impulse, latest = list(choice.impulse), list(choice.latest)
-    impulse[leg] += sign * error
-    latest[v] = tick
-    cost = choice.cost + shift * error**2
-    return _Choice(cost, (*choice.ticks, tick), tuple(latest), tuple(impulse))
+def _joined(choices: Sequence[_Choices]) -> _Choices:
+    return _Choices(
+        np.concatenate([c.cost for c in choices]),
+        np.concatenate([c.ticks for c in choices]),
+        np.concatenate([c.latest for c in choices]),
+        np.concatenate([c.impulse for c in choices]),
+    )
 
 
 def _apart(edges: Sequence[float]) -> list[float]:

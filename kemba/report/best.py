@@ -101,7 +101,9 @@ def best_plan(
         begun(best.plan.trajectory)
     known, remark = compared(best.plan, bare)
     if best.plan.continued is False and best.plan.start.startswith("shipped"):
-        remark += "; it begins from a shipped plan: the earlier one is further, or does not come true"
+        remark += (
+            "; it begins from a shipped plan: the earlier one is further, or does not come true"
+        )
     best.result.update(best_known=known, sentence=best.result["sentence"] + remark)
     return best
 
