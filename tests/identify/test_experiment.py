@@ -63,6 +63,13 @@ def test_the_designed_test_is_short_and_better_per_second(
     assert facts["nats"] == facts["designed"]["nats"] and facts["rivals"][1] == "piston_damping"
 
 
+def test_late_valves_are_told_from_a_late_sensor(tmp_path: Path, short_search: None) -> None:
+    """Tests are looked for at half the rows of a log, but their valves switch when they say."""
+    rows = ("valve_delay", "dt", 0.002), ("sensor_delay:piston/F", "dt", 0.002)
+    found = propose(answer(tmp_path, *rows), tmp_path / "next.yaml", bounded=False)
+    assert found.nats > 5
+
+
 @pytest.mark.slow
 def test_the_verb_writes_the_test_and_says_what_to_type(
     tmp_path: Path, short_search: None, monkeypatch: pytest.MonkeyPatch

@@ -102,10 +102,13 @@ class BenchLog:
         return np.asarray(slope * self.motion.v_sigma + 0.5 * usual.friction * (high - low))
 
 
-def prepare(name: str, log: Trajectory, noise: ChannelNoise | None = None) -> BenchLog:
+def prepare(
+    name: str, log: Trajectory, noise: ChannelNoise | None = None, on_rows: bool = False
+) -> BenchLog:
     """Smooth the motion and learn each channel's white noise from its fastest differences.
 
-    `noise` of the position sensor, in sigmas of its white noise; None: white.
+    `noise` of the position sensor, in sigmas of its white noise; None: white. `on_rows`: valves
+    switch at the rows that show it, however slow the log is, as where rows of a test are left out.
     """
     speed = {"v": log["piston/v"]} if "piston/v" in log else {}
     motion = smooth_motion(log.time, log["piston/x"], noise=noise, **speed)
@@ -115,7 +118,7 @@ def prepare(name: str, log: Trajectory, noise: ChannelNoise | None = None) -> Be
     on = [(u > 0.5).astype(int).astype(str) for u in sent]
     known = ~unpredictable(log.time, np.isfinite(log["piston/x"]), np.stack(sent))
     keep = {c: np.isfinite(y) & known & telling(y, sigma[c]) for c, y in measured.items()}
-    within = _seen_within(log.time)
+    within = 0.0 if on_rows else _seen_within(log.time)
     # a change that a row shows happened since the row before
     seen = np.concatenate([log.time[:1], 0.5 * (log.time[1:] + log.time[:-1])])
     extend, retract = (pulses(seen if within else log.time, u) for u in sent)

@@ -35,7 +35,7 @@ class VirtualBench:
         """The problem of a rig's tests, the first few of them."""
         tests = rig.tests(np.random.default_rng(0), self.stroke)
         logs = [
-            prepare(test.name, virtual_log(test, self.rows, i))
+            prepare(test.name, virtual_log(test, self.rows, i), on_rows=True)
             for i, test in enumerate(islice(tests, ExperimentSettings.current().tests))
         ]
         if len(logs) > 1:
