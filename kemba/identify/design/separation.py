@@ -14,9 +14,10 @@ from typing import Any
 
 import numpy as np
 
+from kemba.errors import KembaError
 from kemba.identify.design.rivals import Rivals
 from kemba.identify.design.settings import ExperimentSettings, SeparationSettings
-from kemba.identify.evidence.linear import is_shape, priors, within
+from kemba.identify.evidence.linear import LinearSettings, is_shape, priors, within
 from kemba.identify.problem.problem import Array, Problem, Theta
 
 
@@ -93,10 +94,14 @@ class _Side:
         gap, z = self.at - truth, np.zeros(len(self.names))
         h = np.eye(len(z)) + self.columns.T @ self.columns
         least = 0.5 * float(gap @ gap)
+        figures = np.array([name in self.problem.nuisance for name in self.names])
+        far = np.where(figures, LinearSettings.current().widths, np.inf)
         for _ in range(SeparationSettings.current().steps):
-            z = z - np.linalg.solve(h, self.columns.T @ gap + z)
-            gap = self.problem.residual(self._moved(z)) - truth
-            figures = np.array([name in self.problem.nuisance for name in self.names])
+            z = np.clip(z - np.linalg.solve(h, self.columns.T @ gap + z), -far, far)
+            try:
+                gap = self.problem.residual(self._moved(z)) - truth
+            except KembaError:  # so far from the nominal figures that nothing can be predicted
+                break
             least = min(least, 0.5 * float(gap @ gap + z[figures] @ z[figures]))
         return least
 
