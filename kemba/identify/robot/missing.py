@@ -22,7 +22,7 @@ class RobotMissingSettings(Settings):
     """The missing force of robot logs. Its strength (1 sigma) is learnt per channel."""
 
     memory: float = setting(0.025, "s", "correlation time of the missing force", BY_HAND)
-    rounds: int = setting(6, "1", "rounds in which its strength is learnt", BY_HAND)
+    rounds: int = setting(4, "1", "rounds in which its strength is learnt", BY_HAND)
     body: float = setting(5.0, "N", "strength with which learning begins", BY_HAND)
     pitch: float = setting(0.5, "N.m", "the same of the moment on the body", BY_HAND)
     hip: float = setting(0.5, "N.m", "the same of the torque at a hip", BY_HAND)
@@ -52,7 +52,9 @@ def robot_missing(
         system = with_forces(state, quiet, sigma)
         x, variance = smooth_with_band(system, gains(system), y, g)
         power = (x[..., -k:] ** 2 + variance[..., -k:])[valid].mean(axis=0)
-        used, sigma = sigma, np.maximum(np.sqrt(power), least)
+        ratio = np.sqrt(power) / sigma
+        # towards nothing such rounds creep, so that their steps are doubled
+        used, sigma = sigma, np.maximum(sigma * np.where(ratio < 1.0, ratio**2, ratio), least)
     units = tuple("N.m" if kind in ("pitch", "hip") else "N" for kind in kinds)
     found = []
     for i, log in enumerate(state.batch.resampled):

@@ -15,6 +15,7 @@ import numpy as np
 
 from kemba.errors import KembaError
 from kemba.identify.robot.dynamics.physics import Array, Flags, Physics
+from kemba.identify.robot.motion.local_fit import derivative
 from kemba.identify.robot.motion.resampled import ResampledLog
 from kemba.settings import BY_HAND, Settings, setting
 
@@ -108,9 +109,7 @@ def _rows(log: ResampledLog) -> Indices:
     if len(log.time) < 4 * half + 1 or good.sum() < 4 * half + 1:
         return np.empty(0, dtype=int)
     z = np.interp(log.time, log.time[good], log.y[good, 1])
-    from scipy.signal import savgol_filter  # it takes half a second
-
-    fall = savgol_filter(z, 2 * half + 1, 2, deriv=2, delta=step)
+    fall = derivative(z, half, 2, step)
     rows = np.arange(half, len(z) - half, max(1, round(limits.row / step)))
     known = np.asarray(good[rows] & good[rows - half] & good[rows + half])
     carried = np.asarray(fall[rows] > -limits.carried)

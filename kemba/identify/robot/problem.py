@@ -106,7 +106,9 @@ class RobotProblem(Problem):
         reference = first_reference(physics, batch, physics.nominal)
         self.standing = standing_lengths(physics, batch, reference, self.candidates)
         self.lengths = lengths = dict(self.standing.lengths)
-        self.state = linearise_at(physics, batch, sensors, lengths, ground, self.unknown, noise)
+        first = None if lengths else reference
+        given = lengths, ground, self.unknown, noise, first
+        self.state = linearise_at(physics, batch, sensors, *given)
         self.nuisance = {**physics.nuisance, **sensors.nuisance, **physics.links}
 
     @property

@@ -120,11 +120,11 @@ class LinearisedState:
 
     def pushed(self, g: Array) -> Array:
         """Whitened residuals (n, L, m, c) that accelerations g (n, L, k, c) make."""
-        return self.whitened(np.zeros((*self.motion.system.R.shape, g.shape[-1])), g)
+        return self.whitened(None, g)
 
-    def whitened(self, y: Array, g: Array) -> Array:
-        """Predicted minus measured (n, L, m, c), whitened, of columns y (n, L, m, c) and
-        accelerations g (n, L, k, c)."""
+    def whitened(self, y: Array | None, g: Array) -> Array:
+        """Predicted minus measured (n, L, m, c), whitened, of columns y (n, L, m, c), None for
+        zero, and accelerations g (n, L, k, c)."""
         _, errors = innovations(self.motion.system, self.gain, y, self.motion.extend(g))
         return -(self.gain.whitener @ errors)
 
@@ -164,13 +164,16 @@ def linearise_at(
     ground: Mapping[str, float],
     unknown: ForceDensity,
     noise: Noise = (),
+    first: Reference | None = None,
 ) -> LinearisedState:
     """The logs smoothed with the model at `base`, and the model linearised along that motion.
 
-    `unknown`: density of the forces that no model explains; `noise` of the sensors.
+    `unknown`: density of the forces that no model explains; `noise` of the sensors; `first`: the
+    motion smoothed without the model's forces, where it is known.
     """
     p = values_at(physics, base)[0]
-    reference = _without_delays(physics, batch, sensors, base, first_reference(physics, batch, p))
+    first = first or first_reference(physics, batch, p)
+    reference = _without_delays(physics, batch, sensors, base, first)
     schedules = read_schedules(physics, batch, reference, p)
     dt = float(np.median(batch.h[batch.valid]))
     for _ in range(StateSettings.current().rounds):

@@ -16,6 +16,7 @@ from scipy.ndimage import (
     uniform_filter1d,
 )
 
+from kemba.identify.robot.motion.local_fit import derivative
 from kemba.settings import BY_HAND, Settings, setting
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -188,10 +189,8 @@ def steady_while(values: Array, acts: Flags, dt: float) -> Array:
 def slope(values: Array, dt: float) -> Array:
     """Rate of a noisy signal (n, ...) over a few hundredths of a second."""
     width = ContactSettings.current().rate_window
-    window = min(2 * max(2, round(width / dt / 2)) + 1, (len(values) - 1) // 2 * 2 + 1)
-    from scipy.signal import savgol_filter  # it takes half a second
-
-    return np.asarray(savgol_filter(values, window, 2, deriv=1, delta=dt, axis=0))
+    half = min(max(2, round(width / dt / 2)), (len(values) - 1) // 2)
+    return derivative(values, half, 1, dt)
 
 
 def ground_level(z: Array, rate: Array) -> float:

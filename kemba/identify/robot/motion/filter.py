@@ -44,12 +44,13 @@ class System:
 @dataclass(frozen=True)
 class FilterGains:
     """What the filter makes of a System: gains, whiteners of the innovations, predicted P, and
-    what becomes of a predicted state in a step that corrects it."""
+    what becomes of a predicted state and of a measurement in a step that corrects the state."""
 
     K: Array
     whitener: Array
     P: Array
     turn: Array
+    carry: Array
 
 
 def gains(system: System) -> FilterGains:
@@ -61,41 +62,47 @@ def gains(system: System) -> FilterGains:
         known, s.R, FilterSettings.current().missing * np.nanmax(np.where(known, s.R, 0.0))
     )
     noise = s.G @ s.W @ s.G.swapaxes(-1, -2)
-    Ft, Ht = s.F.swapaxes(-1, -2), s.H.swapaxes(-1, -2)
-    eye, diagonal = np.eye(d), np.arange(m)
-    K = np.empty((n, runs, d, m))
-    S_all = np.empty((n, runs, m, m))
-    P_all = np.empty((n, runs, d, d))
+    Ht, diagonal = s.H.swapaxes(-1, -2), np.arange(m)
+    spread = np.zeros((n, runs, m, m))
+    spread[..., diagonal, diagonal] = R
+    K, carry = np.empty((n, runs, d, m)), np.empty((n, runs, d, m))
+    turn, P_all, S_all = np.empty_like(s.F), np.empty_like(s.F), np.empty_like(spread)
     P = s.P0.copy()
     for k in range(n):
         P_all[k] = P
         PHt = P @ Ht[k]
-        S = s.H[k] @ PHt
-        S[:, diagonal, diagonal] += R[k]
-        S_all[k] = S
-        # Joseph's form keeps P positive where a row is a thousand times sharper than the state
+        S = S_all[k] = s.H[k] @ PHt + spread[k]
         K[k] = np.linalg.solve(S, PHt.swapaxes(-1, -2)).swapaxes(-1, -2)
-        A = eye - K[k] @ s.H[k]
-        P = A @ P @ A.swapaxes(-1, -2) + (K[k] * R[k][:, None, :]) @ K[k].swapaxes(-1, -2)
-        P = s.F[k] @ P @ Ft[k] + noise[k]
+        c = carry[k] = s.F[k] @ K[k]
+        t = turn[k] = s.F[k] - c @ s.H[k]
+        # Joseph's form keeps P positive where a row is a thousand times sharper than the state
+        P = t @ P @ t.swapaxes(-1, -2) + (c * R[k][:, None, :]) @ c.swapaxes(-1, -2) + noise[k]
         P = 0.5 * (P + P.swapaxes(-1, -2))
     whitener = np.asarray(np.linalg.inv(np.linalg.cholesky(S_all)), dtype=float)
-    return FilterGains(K, whitener, P_all, s.F @ (eye - K @ s.H))
+    return FilterGains(K, whitener, P_all, turn, carry)
 
 
-def innovations(system: System, gain: FilterGains, y: Array, g: Array) -> tuple[Array, Array]:
-    """(predicted x (n, L, d, c), innovations (n, L, m, c)) of columns y (n, L, m, c), g."""
+def innovations(
+    system: System, gain: FilterGains, y: Array | None, g: Array | None
+) -> tuple[Array, Array]:
+    """(predicted x (n, L, d, c), innovations (n, L, m, c)) of columns y (n, L, m, c), g; None is
+    zero."""
     s = system
     n, runs, _, d = s.H.shape
-    y = np.where(np.isfinite(y) & np.isfinite(s.R)[..., None], y, 0.0)
+    given = [a.shape[-1] for a in (y, g) if a is not None]
+    states = np.zeros((n, runs, d, given[0]))
     # one step at a time only what must be: x' = F (1 - K H) x + (F K y + G g)
-    push = s.F @ (gain.K @ y) + s.G @ g
-    states = np.empty((n, runs, d, y.shape[-1]))
-    states[0] = 0.0
+    if y is not None:
+        y = np.where(np.isfinite(y) & np.isfinite(s.R)[..., None], y, 0.0)
+        np.matmul(gain.carry[:-1], y[:-1], out=states[1:])
+    if g is not None:
+        states[1:] += s.G[:-1] @ g[:-1]
+    turned = np.empty(states.shape[1:])
     for k in range(n - 1):
-        np.matmul(gain.turn[k], states[k], out=states[k + 1])
-        states[k + 1] += push[k]
-    return states, y - s.H @ states
+        np.matmul(gain.turn[k], states[k], out=turned)
+        states[k + 1] += turned
+    seen = s.H @ states
+    return states, (-seen if y is None else y - seen)
 
 
 def smooth(system: System, gain: FilterGains, y: Array, g: Array) -> tuple[Array, Array]:

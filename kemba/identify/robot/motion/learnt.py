@@ -50,16 +50,16 @@ def learnt_noise(
     kinds: list[Kind] = []
     columns: list[Array] = []
     memories = (0.0, *settings.memories, *(settings.drifts if drifts else ()))
-    draws, j, m = settings.draws, system.G.shape[-1], system.H.shape[2]
+    j, m = system.G.shape[-1], system.H.shape[2]
     for channel in range(channels):
         y = np.concatenate([_channel_noise(t, channel, sigma, h, m) for t in memories], axis=-1)
-        seen = _through(system, gain, y, np.zeros((*h.shape, j, y.shape[-1])))
+        seen = _through(system, gain, y, None)
         parts = np.split(seen, len(memories), axis=-1)
         columns += [covariances(part, errors)[0] for part in parts]
         kinds += [Kind(channel, memory) for memory in memories]
     for i, push in enumerate(pushes):
         g = _force_noise(settings.force, push, h, j)
-        seen = _through(system, gain, np.zeros((*h.shape, m, draws)), g)
+        seen = _through(system, gain, None, g)
         columns.append(covariances(seen, errors)[0])
         kinds.append(Kind(channels + i, settings.force))
     return chosen_noise(*weighted(columns, measured, counts), kinds, most, known)
@@ -83,8 +83,8 @@ def _force_noise(memory: float, push: Array, h: Array, j: int) -> Array:
     return g
 
 
-def _through(system: System, gain: FilterGains, y: Array, g: Array) -> Array:
+def _through(system: System, gain: FilterGains, y: Array | None, g: Array | None) -> Array:
     """Whitened errors (n, L, m, c) that noise of the sensors `y` (n, L, m, c) and accelerations `g`
-    (n, L, j, c) make."""
+    (n, L, j, c) make; None is zero."""
     _, found = innovations(system, gain, y, g)
     return np.asarray(gain.whitener @ found)
