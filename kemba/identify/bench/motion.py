@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.linalg import toeplitz
 
+from kemba.identify.logs.local_fit import local_fit, weights
 from kemba.identify.problem.noise import difference_sigma
 from kemba.identify.problem.problem import Array
 from kemba.identify.problem.sensor_noise import ChannelNoise
@@ -93,8 +94,8 @@ def _adaptive(
     for width in MotionSettings.current().half_widths:
         if 2 * width + 1 > n:
             break
-        x, v = local_fit(values, width, step, 3)
-        _, finer = local_fit(values, width, step, 5)
+        x, v = (local_fit(values, width, step, 3, k) for k in (0, 1))
+        finer = local_fit(values, width, step, 5, 1)
         gain, finer_gain = (_gains(n, width, step, order, colour) for order in (3, 5))
         noise = (sigma * gain) ** 2
         bias = _mean((finer - v) ** 2, max(width // 2, 2)) - (sigma * finer_gain) ** 2 + noise
@@ -103,25 +104,6 @@ def _adaptive(
         position[better], rate[better], half[better] = x[better], v[better], width
         best[better] = risk[better]
     return position, _mean(rate, 1), np.sqrt(best), half
-
-
-def local_fit(values: Array, width: int, step: float, order: int) -> tuple[Array, Array]:
-    """Value and slope (n,) of the polynomial through 2 width + 1 samples of values (n,).
-
-    At the ends the window stays inside and is read off its centre.
-    """
-    n = len(values)
-    smooth, slope = _weights(width, order)
-    x = np.convolve(values, smooth[::-1, width], mode="valid")
-    v = np.convolve(values, slope[::-1, width], mode="valid") / step
-    x, v = np.pad(x, width), np.pad(v, width)
-    head, tail = values[: 2 * width + 1], values[n - 2 * width - 1 :]
-    x[:width], v[:width] = head @ smooth[:, :width], head @ slope[:, :width] / step
-    x[n - width :], v[n - width :] = (
-        tail @ smooth[:, width + 1 :],
-        tail @ slope[:, width + 1 :] / step,
-    )
-    return x, v
 
 
 def _gains(n: int, width: int, step: float, order: int, colour: ChannelNoise) -> Array:
@@ -133,22 +115,11 @@ def _gains(n: int, width: int, step: float, order: int, colour: ChannelNoise) ->
 @lru_cache(maxsize=256)
 def _slope_sigma(width: int, step: float, order: int, colour: ChannelNoise) -> Array:
     """The same (2 width + 1,) at each place of the window."""
-    _, slope = _weights(width, order)
+    slope = weights(width, order, 1)
     if not colour.lags:
-        return np.asarray(colour.white * np.linalg.norm(slope, axis=0) / step)
+        return np.asarray(colour.white * np.linalg.norm(slope, axis=1) / step)
     covariance = toeplitz(colour.covariance(step * np.arange(2.0 * width + 1.0)))
-    return np.asarray(np.sqrt(np.einsum("ij,ij->j", slope, covariance @ slope)) / step)
-
-
-@lru_cache(maxsize=64)
-def _weights(width: int, order: int) -> tuple[Array, Array]:
-    """Columns: weights of the samples for value and slope at each place of the window."""
-    s = np.arange(-width, width + 1) / width
-    powers = np.arange(order + 1)
-    basis = s[:, None] ** powers
-    slope = powers * s[:, None] ** np.maximum(powers - 1, 0) / width
-    pinv = np.linalg.pinv(basis)
-    return (basis @ pinv).T, (slope @ pinv).T
+    return np.asarray(np.sqrt(np.einsum("ij,ij->i", slope, slope @ covariance)) / step)
 
 
 def _weigh_in(

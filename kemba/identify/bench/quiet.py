@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 
-from kemba.identify.bench.motion import MotionSettings, even_grid, local_fit
+from kemba.identify.bench.motion import MotionSettings, even_grid
+from kemba.identify.logs.local_fit import local_fit
 from kemba.identify.problem.noise import difference_sigma
 from kemba.identify.problem.sensor_noise import (
     ChannelNoise,
@@ -20,6 +21,7 @@ from kemba.identify.problem.sensor_noise import (
     Kind,
     chosen_noise,
     covariances,
+    pairs,
     weighted,
 )
 from kemba.identify.problem.types import Array, Flags
@@ -62,7 +64,8 @@ def position_noise(logs: Sequence[tuple[Array, Array]]) -> ChannelNoise:
     step = float(np.median([q.step for q in quiet]))
     memories = (0.0, *settings.memories)
     columns = [_expected(memory, step) for memory in memories]
-    measured, counts = covariances(np.nan_to_num(errors)[..., None], errors)
+    counts = pairs(errors)
+    measured = covariances(np.nan_to_num(errors)[..., None], errors, counts)
     kinds = [Kind(0, memory) for memory in memories]
     most = np.array([QuietSettings.current().most])
     a, b = weighted(columns, measured, counts)
@@ -76,7 +79,7 @@ def _quiet(time: Array, x: Array) -> _Quiet | None:
     grid, values, step = even_grid(time, x)
     if len(grid) < 2 * width + 1:
         return None
-    smooth, v = local_fit(values, width, step, 3)
+    smooth, v = (local_fit(values, width, step, 3, k) for k in (0, 1))
     rest = maximum_filter1d(np.abs(v), 2 * width + 1) < settings.rest
     rest[:width] = rest[-width:] = False
     sigma = max(difference_sigma(x[np.isfinite(x)]), MotionSettings.current().finest)
@@ -88,7 +91,7 @@ def _expected(memory: float, step: float) -> Array:
     [s], on an even grid of this `step` [s]."""
     width, lags = QuietSettings.current().width, np.array(ColourSettings.current().lags)
     left = np.eye(1, 4 * width + 1, 2 * width)[0]
-    left = left - local_fit(left, width, 1.0, 3)[0]  # the filter's answer to one reading
+    left = left - local_fit(left, width, 1.0, 3)  # the filter's answer to one reading
     reach = np.convolve(left, left[::-1])
     apart = np.arange(len(reach)) - len(left) + 1
     noise = ChannelNoise(0.0, ((1.0, memory),)) if memory else ChannelNoise()

@@ -173,17 +173,17 @@ def lag_noise(memory: float, h: Array, draws: int, rng: np.random.Generator) -> 
     return np.asarray(out)
 
 
-def covariances(columns: Array, errors: Array) -> tuple[Array, Array]:
+def pairs(errors: Array) -> Array:
+    """How many pairs of rows (m, lags) so many apart are known of errors (n, L, m)."""
+    good, lags = np.isfinite(errors), ColourSettings.current().lags
+    found = [(good[: len(good) - lag] & good[lag:]).sum(axis=(0, 1)) for lag in lags]
+    return np.stack(found, axis=1).astype(float)
+
+
+def covariances(columns: Array, errors: Array, counts: Array) -> Array:
     """Mean product (m, lags) of rows so many apart, of columns (n, L, m, c), where `errors`
-    (n, L, m) are known; and how many such pairs of rows there are (m, lags)."""
+    (n, L, m) are known; `counts` (m, lags): such pairs of rows."""
+    z = np.where(np.isfinite(errors)[..., None], columns, 0.0)
     lags = ColourSettings.current().lags
-    good = np.isfinite(errors)
-    z = np.where(good[..., None], columns, 0.0)
-    total, count = [], []
-    for lag in lags:
-        end = len(z) - lag
-        pairs = (good[:end] & good[lag:]).sum(axis=(0, 1))
-        product = np.einsum("nlmc,nlmc->m", z[:end], z[lag:]) / z.shape[-1]
-        total.append(product / np.maximum(pairs, 1))
-        count.append(pairs)
-    return np.stack(total, axis=1), np.stack(count, axis=1).astype(float)
+    total = [np.einsum("nlmc,nlmc->m", z[: len(z) - lag], z[lag:]) for lag in lags]
+    return np.asarray(np.stack(total, axis=1) / z.shape[-1] / np.maximum(counts, 1.0))

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from kemba.errors import KembaError
+from kemba.identify.logs.local_fit import local_fit
 from kemba.identify.robot.dynamics.physics import Array, Flags, Physics
-from kemba.identify.robot.motion.local_fit import derivative
 from kemba.identify.robot.motion.resampled import ResampledLog
 from kemba.settings import BY_HAND, Settings, setting
 
@@ -109,7 +109,7 @@ def _rows(log: ResampledLog) -> Indices:
     if len(log.time) < 4 * half + 1 or good.sum() < 4 * half + 1:
         return np.empty(0, dtype=int)
     z = np.interp(log.time, log.time[good], log.y[good, 1])
-    fall = derivative(z, half, 2, step)
+    fall = local_fit(z, half, step, 2, 2)
     rows = np.arange(half, len(z) - half, max(1, round(limits.row / step)))
     known = np.asarray(good[rows] & good[rows - half] & good[rows + half])
     carried = np.asarray(fall[rows] > -limits.carried)

@@ -102,12 +102,10 @@ class RobotProblem(Problem):
         sigma = dict(zip(physics.channels, np.median(batch.sigma, axis=0).tolist(), strict=True))
         self.candidates: dict[str, Candidate] = {**found, **sensor_candidates(sigma, model)}
         sensors = SensorFaults(model.effects)
-        noise = stated_noise(batch)
         reference = first_reference(physics, batch, physics.nominal)
         self.standing = standing_lengths(physics, batch, reference, self.candidates)
         self.lengths = lengths = dict(self.standing.lengths)
-        first = None if lengths else reference
-        given = lengths, ground, self.unknown, noise, first
+        given = lengths, ground, self.unknown, stated_noise(batch), None if lengths else reference
         self.state = linearise_at(physics, batch, sensors, *given)
         self.nuisance = {**physics.nuisance, **sensors.nuisance, **physics.links}
 

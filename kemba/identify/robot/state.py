@@ -136,6 +136,8 @@ class LinearisedState:
 
     def with_noise(self, noise: Noise) -> LinearisedState:
         """The same logs and motion, filtered with this noise of the sensors."""
+        if tuple(noise) == tuple(self.noise):
+            return self
         motion = self.motion.with_noise(noise, self.batch)
         return replace(self, motion=motion, gain=gains(motion.system), noise=tuple(noise))
 

@@ -16,7 +16,7 @@ from scipy.ndimage import (
     uniform_filter1d,
 )
 
-from kemba.identify.robot.motion.local_fit import derivative
+from kemba.identify.logs.local_fit import local_fit
 from kemba.settings import BY_HAND, Settings, setting
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -190,7 +190,7 @@ def slope(values: Array, dt: float) -> Array:
     """Rate of a noisy signal (n, ...) over a few hundredths of a second."""
     width = ContactSettings.current().rate_window
     half = min(max(2, round(width / dt / 2)), (len(values) - 1) // 2)
-    return derivative(values, half, 1, dt)
+    return local_fit(values, half, dt, 2, 1)
 
 
 def ground_level(z: Array, rate: Array) -> float:

@@ -18,6 +18,7 @@ from kemba.identify.problem.sensor_noise import (
     chosen_noise,
     covariances,
     lag_noise,
+    pairs,
     weighted,
 )
 from kemba.identify.robot.motion.filter import FilterGains, System, innovations
@@ -43,7 +44,8 @@ def learnt_noise(
     drifts are looked for as well; only where the model is good, for what it lacks is slow, too.
     """
     settings, channels = ColourSettings.current(), sigma.shape[1]
-    measured, counts = covariances(errors[..., None], errors)
+    counts = pairs(errors)
+    measured = covariances(errors[..., None], errors, counts)
     known = counts[:channels, 0] >= settings.fewest
     if not known.any():
         return tuple(ChannelNoise() for _ in range(channels))
@@ -55,12 +57,12 @@ def learnt_noise(
         y = np.concatenate([_channel_noise(t, channel, sigma, h, m) for t in memories], axis=-1)
         seen = _through(system, gain, y, None)
         parts = np.split(seen, len(memories), axis=-1)
-        columns += [covariances(part, errors)[0] for part in parts]
+        columns += [covariances(part, errors, counts) for part in parts]
         kinds += [Kind(channel, memory) for memory in memories]
     for i, push in enumerate(pushes):
         g = _force_noise(settings.force, push, h, j)
         seen = _through(system, gain, None, g)
-        columns.append(covariances(seen, errors)[0])
+        columns.append(covariances(seen, errors, counts))
         kinds.append(Kind(channels + i, settings.force))
     return chosen_noise(*weighted(columns, measured, counts), kinds, most, known)
 
