@@ -17,3 +17,12 @@ def put_block(page: Path, begin: str, end: str, lines: Iterable[str]) -> None:
     _, after = rest.split(end)
     with atomic_text(page) as stream:
         stream.write("\n".join([before + begin, "", *lines, "", end]) + after)
+
+
+def printed(lines: Iterable[str]) -> list[str]:
+    """All lines, each printed as soon as it comes."""
+    found = []
+    for line in lines:
+        print(line, flush=True)
+        found.append(line)
+    return found

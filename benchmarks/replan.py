@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from block import put_block
+from block import printed, put_block
 
 from kemba.ocp import load_task
 from kemba.ocp.continuation.between import Origin
@@ -100,13 +100,10 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=3, help="of which the median is shown")
     parser.add_argument("--write", action="store_true", help="put the table into docs/learn.md")
     options = parser.parse_args()
-    lines = [*HEAD]
     with tempfile.TemporaryDirectory() as folder:
-        for line in rows(options.repeats, Path(folder)):
-            print(line, flush=True)
-            lines.append(line)
+        lines = printed(rows(options.repeats, Path(folder)))
     if options.write:
-        put_block(PAGE, BEGIN, END, [*lines, "", f"On {machine()}."])
+        put_block(PAGE, BEGIN, END, [*HEAD, *lines, "", f"On {machine()}."])
 
 
 if __name__ == "__main__":

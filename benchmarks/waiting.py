@@ -25,7 +25,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "benchmarks")]
 
-from block import put_block
+from block import printed, put_block
 from mujoco_twin.cases import robot_case
 
 from kemba.sweep import machine
@@ -84,10 +84,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--write", action="store_true", help="put the table into the docs")
     options = parser.parse_args()
-    lines = []
-    for line in rows():
-        print(line, flush=True)
-        lines.append(line)
+    lines = printed(rows())
     if options.write:
         put_block(PAGE, BEGIN, END, [*lines, "", f"On {machine()}."])
 

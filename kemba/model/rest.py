@@ -60,9 +60,8 @@ class Rest:
             return
         x, p = ca.SX.sym("x", s.numel()), ca.SX(ca.vertcat(*held))
         scaled = ca.substitute(rate, s, x * self._scale) / self._scale
-        self._rate = ca.Function("rate", [x, p], [ca.densify(scaled)])
         slope = ca.densify(ca.jacobian(scaled, x))
-        self._slope = ca.Function("slope", [x, p], [ca.densify(scaled), slope])
+        self._changes = ca.Function("changes", [x, p], [ca.densify(scaled), slope])
         settings = RestSettings.current()
         options = {"abstol": settings.tolerance, "reltol": settings.tolerance}
         equation = {"x": x, "p": p, "ode": scaled}
@@ -74,7 +73,7 @@ class Rest:
         if not len(self._start):
             return np.empty(0)
         x, p = self._start / self._scale, ca.vertcat(*(ca.DM(h) for h in held))
-        moving = np.asarray(self._rate(x, p)).ravel()
+        moving = np.asarray(self._changes(x, p)[0])
         if np.all(np.abs(moving) <= RestSettings.current().still):
             return np.array(self._start)
         settled = self._settled(x, p)
@@ -92,7 +91,7 @@ class Rest:
         it finds no such place, or a state would get there after the wait only."""
         settings = RestSettings.current()
         for _ in range(settings.steps):
-            moving, slope = (np.asarray(a) for a in self._slope(x, p))
+            moving, slope = (np.asarray(a) for a in self._changes(x, p))
             if not (np.isfinite(moving).all() and np.isfinite(slope).all()):
                 return None
             if np.abs(moving).max() <= settings.still:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -129,16 +129,14 @@ def improved(
 def _tried_first(origin: Origin, task: Task) -> bool:
     """Whether an earlier plan is tried in one step, before shipped plans that are near the task:
     where none of them is nearer."""
-    model = task_model(task)
-    own = Near.current().differences(figures_of(task, model), origin.figures)
-    return any(np.linalg.norm(own) <= n.apart for n in neighbours(task, model)[:1])
+    return bool(neighbours(task, task_model(task))) and not shelf_is_nearer(origin.figures, task)
 
 
-def shelf_is_nearer(found: Plan, task: Task) -> bool:
-    """Whether a shipped plan has figures nearer to those of a task than a found plan has."""
+def shelf_is_nearer(figures: Mapping[str, float], task: Task) -> bool:
+    """Whether a shipped plan has figures nearer to those of a task than `figures` are."""
     model, near = task_model(task), Near.current()
-    own = near.differences(figures_of(task, model), figures_of(found.task, found.model))
-    return any(n.apart < np.linalg.norm(own) for n in neighbours(task, model))
+    own = np.linalg.norm(near.differences(figures_of(task, model), figures))
+    return any(n.apart < own for n in neighbours(task, model))
 
 
 def _candidates(
@@ -183,7 +181,7 @@ def _candidates(
 
         def changed(found: Plan, task: Task) -> Plan | None:
             bare = without_fit(task, found.fitted_air)
-            if shelf_is_nearer(found, bare):
+            if shelf_is_nearer(figures_of(found.task, found.model), bare):
                 for one, _ in plans_nearby(bare, document, approach.log, **how):
                     return replace(summed(found, one), start=one.start)
             names = "the plan as asked", "other starts (--starts 4) may take less"
