@@ -26,7 +26,7 @@ from kemba.ocp.reading import asked_of, task_model
 from kemba.ocp.refined import refined
 from kemba.ocp.relaxation.session import Session
 from kemba.ocp.shipped.entry import Entry
-from kemba.ocp.shipped.shelf import Near, neighbours, ways
+from kemba.ocp.shipped.shelf import Near, Neighbour, neighbours, relatives, ways
 from kemba.ocp.task.requirement import Requirement, resolve
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.symmetry import whole
@@ -92,28 +92,30 @@ def plans_nearby(
     job = _job(task, document, None, control, tell)
     if job.refused is not None:
         return
-    listed = neighbours(task, job.planner.model)
+    model = job.planner.model
+    listed = neighbours(task, model) or relatives(task, model)
     own = [n for n in listed if task.fit_air or not n.entry.effects]
     for near in islice(ways(own), Near.current().tried):
-        if near.entry.effects:
-            asked = task.model_copy(update={"effects": {**task.effects, **near.entry.effects}})
-            job = _job(asked, document, None, control, tell)
-        found, _ = continued(job.planner, _origin(near.entry, job.planner.task))
-        kept = near.entry
+        kept, fit = near.entry, {}
+        if near.task.model == task.model:  # else this model has air of its own
+            fit = kept.effects
+        asked = task.model_copy(update={"effects": {**task.effects, **fit}})
+        planner = _job(asked, document, None, control, tell).planner if fit else job.planner
+        found, _ = continued(planner, _origin(near))
         if found is not None and found.status is Status.SOLVED:
             found = replace(found, continued=None, start=f"shipped: {kept.name}")
-            yield replace(found, fitted_air=kept.fitted_air), kept
+            yield replace(found, fitted_air=kept.fitted_air if fit else None), kept
         if control.ended() is not None:
             return
 
 
-def _origin(entry: Entry, task: Task) -> Origin:
-    """A shipped plan with its model and what was asked of it: the task with its figures."""
-    own = task.model_copy(update={**entry.figures, "feet": None})
+def _origin(near: Neighbour) -> Origin:
+    """A shipped plan with its model and what was asked of it."""
+    entry, own = near.entry, near.asked()
     model = task_model(own)
     asked = resolve(own, model, Document(own.model_dump()))
     name, dear = f"the shipped plan {entry.name}", "one from a guess (--cold) may take less"
-    once, stages = task.grip == 1.0, entry.stages
+    once, stages = own.grip == 1.0, entry.stages
     return Origin(entry.plan, model, tuple(asked), name, dear, once=once, stages=stages)
 
 

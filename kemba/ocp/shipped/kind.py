@@ -41,6 +41,12 @@ def kind_of(task: Task, model: Model) -> str:
     return sha256(_text([asked, physics]).encode()).hexdigest()[:LETTERS]
 
 
+def as_asked_by(shipped: Task, task: Task) -> Task:
+    """What a shipped task asks, with the robot, figures and cost of another."""
+    asked = set(Task.model_fields) - {*FIGURES, *APART, "cost"}
+    return task.model_copy(update={name: getattr(shipped, name) for name in asked})
+
+
 def figures_of(task: Task, model: Model) -> dict[str, float]:
     """The figures of a task; those that it does not have are left out."""
     asked = with_height(task, model)

@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 
-from kemba.config import shipped_folder
+from kemba.config import load_yaml, shipped_folder
 from kemba.model import Model
+from kemba.ocp.reading import task_model
 from kemba.ocp.shipped.entry import Entry
-from kemba.ocp.shipped.kind import FIGURES, figures_of, kind_of
-from kemba.ocp.task.task import Task
+from kemba.ocp.shipped.kind import FIGURES, as_asked_by, figures_of, kind_of
+from kemba.ocp.task.task import Task, parse_task
 from kemba.settings import Settings, setting
 
 TRIED = "tuned: continuation of jump and jump_forward (docs/shipped-plans.md)"
 INDEX = "plans.csv"
+MODEL = {"model", "effects"}  # what names the model of a task
 
 
 class Near(Settings):
@@ -47,10 +49,14 @@ class Near(Settings):
 
 @dataclass(frozen=True)
 class Neighbour:
-    """A plan near a task, and its differences from it, in units of `Near`."""
+    """A plan near a task, and its differences from it, in units of `Near`.
+
+    `task`: what was asked of the plan, and its model, but for its figures and fitted air.
+    """
 
     entry: Entry
     differences: np.ndarray
+    task: Task
 
     @property
     def away(self) -> float:
@@ -62,6 +68,13 @@ class Neighbour:
         """All differences: the root of the sum of their squares."""
         return float(np.linalg.norm(self.differences))
 
+    def asked(self) -> Task:
+        """What was asked of the plan, and its model."""
+        effects = {**self.task.effects, **self.entry.effects}
+        return self.task.model_copy(
+            update={**self.entry.figures, "feet": None, "effects": effects}
+        )
+
 
 def neighbours(task: Task, model: Model, folder: Path | None = None) -> list[Neighbour]:
     """The shipped plans near a task, the nearest first; none for another robot or kind of task.
@@ -70,19 +83,47 @@ def neighbours(task: Task, model: Model, folder: Path | None = None) -> list[Nei
     most often. A task that asks for its own start (`guess_noise`, `seed`), another method or no
     refinement has none. `folder`: where other plans are.
     """
-    own = task.method == "relaxation" and task.refine == "radau"
-    if not own or task.guess_noise or task.seed or task.guess != "automatic":
+    if not _may_begin(task):
         return []
     kept = shelf(folder or shipped_folder("plans"))
     kind = kind_of(task, model) if kept else ""
     asked, near = figures_of(task, model), Near.current()
-    found = [Neighbour(e, near.differences(asked, e.figures)) for e in kept if e.kind == kind]
+    found = (
+        Neighbour(e, near.differences(asked, e.figures), task) for e in kept if e.kind == kind
+    )
     close = (n for n in found if n.away <= 1.0)
 
     def order(n: Neighbour) -> tuple[float, float]:
         return n.apart, -n.entry.landed if task.robust else n.entry.cost
 
     return sorted(close, key=order)
+
+
+def relatives(task: Task, model: Model) -> list[Neighbour]:
+    """The plans near a task that no shipped one is like: those of the shipped task with the nearest
+    plans. First of tasks with the same model, which ask something else, as another pose at the
+    start or another bound; then of tasks with a shipped model of the same robot."""
+    if not _may_begin(task):
+        return []
+    alike = [(as_asked_by(shipped, task), shipped) for shipped in _shipped_tasks()]
+    near = _nearest((own, model) for own, _ in alike)
+    if near:
+        return near
+    others = [own.model_copy(update=shipped.model_dump(include=MODEL)) for own, shipped in alike]
+    models = ((own, task_model(own)) for own in others)
+    robot = model.mechanism.robot
+    return _nearest((own, m) for own, m in models if m.mechanism.robot == robot)
+
+
+def _nearest(tasks: Iterable[tuple[Task, Model]]) -> list[Neighbour]:
+    found = (neighbours(task, model) for task, model in tasks)
+    return min((near for near in found if near), key=lambda near: near[0].apart, default=[])
+
+
+def _may_begin(task: Task) -> bool:
+    """Whether a task may begin from a shipped plan: it asks for no start or method of its own."""
+    own = task.method == "relaxation" and task.refine == "radau"
+    return own and not task.guess_noise and not task.seed and task.guess == "automatic"
 
 
 def ways(near: Sequence[Neighbour]) -> Iterator[Neighbour]:
@@ -94,6 +135,12 @@ def ways(near: Sequence[Neighbour]) -> Iterator[Neighbour]:
         if way not in met:
             yield neighbour
         met.add(way)
+
+
+@cache
+def _shipped_tasks() -> Sequence[Task]:
+    files = sorted(shipped_folder("tasks").glob("*.yaml"))
+    return tuple(parse_task(load_yaml(file)) for file in files)
 
 
 @cache
