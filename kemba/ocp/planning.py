@@ -92,13 +92,17 @@ def plans_nearby(
     job = _job(task, document, None, control, tell)
     if job.refused is not None:
         return
-    model = job.planner.model
-    listed = neighbours(task, model) or relatives(task, model)
+    model, tried = job.planner.model, Near.current().tried
+    listed = neighbours(task, model)
+    if not listed:
+        listed = relatives(task, model)
+        if next(job.planner.reductions()).symmetric:
+            tried = 1  # a plan of half the robot from a guess takes little longer
     own = [n for n in listed if task.fit_air or not n.entry.effects]
-    for near in islice(ways(own), Near.current().tried):
-        kept, fit = near.entry, {}
-        if near.task.model == task.model:  # else this model has air of its own
-            fit = kept.effects
+    for near in islice(ways(own), tried):
+        kept, fit = near.entry, near.entry.effects
+        if near.task.model != task.model or task.effects.keys() & fit.keys():
+            fit = {}  # this model has air of its own
         asked = task.model_copy(update={"effects": {**task.effects, **fit}})
         planner = _job(asked, document, None, control, tell).planner if fit else job.planner
         found, _ = continued(planner, _origin(near))

@@ -20,7 +20,7 @@ from kemba.ocp.phases.notes import noted_phases
 from kemba.ocp.planning import plans_nearby
 from kemba.ocp.shipped.entry import Entry, read_plan, write_plan
 from kemba.ocp.shipped.kind import kind_of
-from kemba.ocp.shipped.shelf import Near, Neighbour, neighbours, shelf, ways
+from kemba.ocp.shipped.shelf import Near, Neighbour, neighbours, relatives, shelf, ways
 from kemba.ocp.transcription.symmetry import find_symmetry
 from kemba.ocp.transcription.unilateral import read_constraints
 from kemba.report import Approach, Listener, best
@@ -117,8 +117,38 @@ def test_other_tasks_have_none(option: str) -> None:
     assert not near("jump.yaml", option)
 
 
+def kin(name: str, *options: str) -> list[Neighbour]:
+    task, document = load_task(name, list(options))
+    return relatives(task, task_model(task, document=document))
+
+
 def test_other_robots_have_none() -> None:
-    assert not near("jump.yaml", "model=hound")
+    assert not near("jump.yaml", "model=hound") and not kin("jump.yaml", "model=hound")
+
+
+@pytest.mark.parametrize("option", ["seed=1", "refine=none", "method=penalty", "cost.air=0.1"])
+def test_no_plan_of_another_cost_or_method_begins_a_task(option: str) -> None:
+    assert not kin("jump.yaml", option)
+
+
+def test_a_task_that_asks_something_else_has_relatives_of_the_same_figures() -> None:
+    plain = near("jump_forward.yaml")
+    for option in ("start.front/hip/q=-1.2 rad", "clearance=1 cm", "effects.contact.mu=0.5"):
+        assert not near("jump_forward.yaml", option)
+        found = kin("jump_forward.yaml", option)
+        assert [n.entry.file for n in found] == [n.entry.file for n in plain]
+        assert all(n.asked().start == load_task("jump_forward.yaml")[0].start for n in found)
+
+
+def test_fitted_air_is_not_written_over_that_of_another_model(tmp_path: Path) -> None:
+    learnt = tmp_path / "learnt.yaml"
+    learnt.write_text("base: planning\neffects:\n  - {kind: boom_force, F: 1 N}\n")
+    for option, fitted in (("start.body/x=1 cm", True), (f"model={learnt}", False)):
+        task, document = load_task("jump_forward.yaml", [option])
+        own = kin("jump_forward.yaml", option)[0]
+        assert own.entry.effects and own.entry.effects.items() <= own.asked().effects.items()
+        found, entry = next(plans_nearby(task, document))
+        assert bool(found.fitted_air) == fitted and entry == own.entry
 
 
 def test_what_is_kept_of_a_plan(tmp_path: Path) -> None:
@@ -159,6 +189,16 @@ def test_a_near_task_begins_from_a_shipped_plan(tmp_path: Path) -> None:
     assert answer["iterations"] < 150
     rows = (run / "trajectory.csv").read_text().splitlines()
     assert len(rows) == 82
+
+
+def test_from_another_pose_it_begins_there_as_well(tmp_path: Path) -> None:
+    words = ["solve", "jump.yaml", "--set", "height=0.6 m", "--no-figure", "--json"]
+    words += ["--set", "start.front/hip/q=-1.1 rad", "--set", "start.rear/hip/q=1.1 rad"]
+    done = CliRunner().invoke(app, [*words, "--out", str(tmp_path / "run")])
+    answer = json.loads(done.stdout)
+    assert done.exit_code == 0, answer["sentence"]
+    assert answer["start"].startswith("shipped: ") and answer["best_known"] is None
+    assert answer["iterations"] < 150
 
 
 def test_a_plan_with_fitted_air_begins_one_with_the_same_air(tmp_path: Path) -> None:

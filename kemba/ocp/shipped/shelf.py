@@ -71,9 +71,7 @@ class Neighbour:
     def asked(self) -> Task:
         """What was asked of the plan, and its model."""
         effects = {**self.task.effects, **self.entry.effects}
-        return self.task.model_copy(
-            update={**self.entry.figures, "feet": None, "effects": effects}
-        )
+        return self.task.model_copy(update={**self.entry.figures, "feet": None, "effects": effects})
 
 
 def neighbours(task: Task, model: Model, folder: Path | None = None) -> list[Neighbour]:
@@ -88,9 +86,7 @@ def neighbours(task: Task, model: Model, folder: Path | None = None) -> list[Nei
     kept = shelf(folder or shipped_folder("plans"))
     kind = kind_of(task, model) if kept else ""
     asked, near = figures_of(task, model), Near.current()
-    found = (
-        Neighbour(e, near.differences(asked, e.figures), task) for e in kept if e.kind == kind
-    )
+    found = (Neighbour(e, near.differences(asked, e.figures), task) for e in kept if e.kind == kind)
     close = (n for n in found if n.away <= 1.0)
 
     def order(n: Neighbour) -> tuple[float, float]:
