@@ -86,7 +86,7 @@ def main() -> None:
     parser.add_argument("--tasks", type=int, default=None, help="so many of the list")
     parser.add_argument("--write", action="store_true", help="into docs/solving.md")
     asked = parser.parse_args()
-    table = [*HEAD, *printed(rows(asked.tasks)), "", machine()]
+    table = [*HEAD, *printed(rows(asked.tasks)), "", f"On {machine()}."]
     if asked.write:
         put_block(PAGE, BEGIN, END, table)
 

@@ -21,13 +21,13 @@ from kemba.identify.settings import DiscoverSettings, RankingSettings, VerdictSe
 
 
 def fuller(search: Search, best: Hypothesis) -> Hypothesis:
-    """The best hypothesis with the further effects that left-out data ask for most.
-
-    Of those that were refitted.
-    """
-    larger = [h for h in search.points if set(best) < set(h)]
+    """The best hypothesis with the further effects that left-out data ask for most, one by one, of
+    those that were refitted."""
+    larger = [h for h in search.points if set(best) < set(h) and len(h) == len(best) + 1]
     asked = [h for h in larger if is_asked(search, h, best)]
-    return min(asked, key=lambda h: left_out_powers(search, h).sum(), default=best)
+    if not asked:
+        return best
+    return fuller(search, min(asked, key=lambda h: left_out_powers(search, h).sum()))
 
 
 def wanted(search: Search, hypothesis: Hypothesis, effect: str, share: float) -> bool:
