@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+
+import numpy as np
 
 from kemba.ocp.certificate.objective import costs, objective
 from kemba.ocp.certificate.status import Status, verdict
@@ -11,7 +14,9 @@ from kemba.ocp.continuation.continue_plan import Continuation, Continuing
 from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.planned import Plan
 from kemba.ocp.planner import Planner
+from kemba.ocp.task.requirement import Requirement
 from kemba.stopwatch import Stopwatch
+from kemba.trajectory import Trajectory
 
 TORQUE = "torque_squared_integral"
 
@@ -34,6 +39,9 @@ def continued(planner: Planner, origin: Origin) -> tuple[Plan | None, str]:
         return None, answer.sentence
     if not certificate.within(task.tolerances):
         return None, "its result misses the task's tolerances"
+    against = valves_against(planner.requirements, new)
+    if against:
+        return None, f"it keeps the order of its valves, which `{against}` rules out"
     status, sentence = verdict(task, certificate, new, answer.ending)
     facts = f"{sentence}, refined on {len(answer.phases)} phases from {origin.name}"
     cost, before = costs(model, new), costs(origin.model, origin.plan)
@@ -60,6 +68,16 @@ def continued(planner: Planner, origin: Origin) -> tuple[Plan | None, str]:
         stages=answer.stages,
     )
     return found, ""
+
+
+def valves_against(requirements: Sequence[Requirement], plan: Trajectory) -> str:
+    """The first requirement on a valve that a plan does not meet; "" where it meets all. Phases
+    keep the valves as they are, so that no row of their program says so."""
+    for asked in (r for r in requirements if r.quantity.binary and r.quantity.name in plan):
+        opened = plan[asked.quantity.name][asked.nodes(len(plan) - 1, first=1)]
+        if np.any((opened < asked.lower) | (opened > asked.upper)):
+            return asked.text
+    return ""
 
 
 def dear(found: Plan, before: float) -> bool:

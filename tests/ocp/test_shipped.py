@@ -201,6 +201,13 @@ def test_from_another_pose_it_begins_there_as_well(tmp_path: Path) -> None:
     assert answer["iterations"] < 150
 
 
+def test_a_plan_whose_valves_are_ruled_out_begins_no_task() -> None:
+    """Phases keep their valves: no row of the program would say that they must stay closed."""
+    task, document = load_task("jump.yaml", ["bounds.*/valve/*=0"])
+    assert kin("jump.yaml", "bounds.*/valve/*=0")
+    assert not list(plans_nearby(task, document))
+
+
 def test_a_plan_with_fitted_air_begins_one_with_the_same_air(tmp_path: Path) -> None:
     words = ["solve", "jump_forward.yaml", "--set", "distance=0.52 m", "--no-figure", "--json"]
     done = CliRunner().invoke(app, [*words, "--out", str(tmp_path / "run")])
