@@ -15,15 +15,15 @@ from kemba.model import Model
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.continuation.between import Origin
 from kemba.ocp.continued import continued, from_scratch, with_air_and_grip
+from kemba.ocp.finer import found_and_refined
 from kemba.ocp.infeasibility.checks import check_task
 from kemba.ocp.infeasibility.diagnostic import Diagnostic
 from kemba.ocp.infeasibility.explain import Explanation, explanation, refusal
 from kemba.ocp.nlp.ipopt import Control
 from kemba.ocp.nlp.watcher import Watch
 from kemba.ocp.planned import Plan, clear, explained
-from kemba.ocp.planner import Planner, searched
+from kemba.ocp.planner import Planner
 from kemba.ocp.reading import asked_of, task_model
-from kemba.ocp.refined import refined
 from kemba.ocp.relaxation.session import Session
 from kemba.ocp.shipped.entry import Entry
 from kemba.ocp.shipped.shelf import Near, Neighbour, neighbours, relatives, ways
@@ -60,9 +60,7 @@ def plan(
         near, failed = continued(planner, origin)
         if near is not None:
             return near
-    found = searched(planner, refused is not None)
-    if found.status is Status.SOLVED and task.refine == "radau":
-        found = refined(planner, found)
+    found = found_and_refined(planner, refused is not None)
     if found.status is Status.SOLVED and (task.landing.air or task.grip < 1.0):
         found = with_air_and_grip(planner, found)
     if found.status is Status.SOLVED and task.clearance:

@@ -15,6 +15,7 @@ from kemba.ocp.continuation.between import (
     requirements_between,
 )
 from kemba.ocp.continuation.impacts import with_impacts
+from kemba.ocp.continuation.multipliers import with_multipliers
 from kemba.ocp.continuation.renoded import renoded
 from kemba.ocp.nlp import ipopt
 from kemba.ocp.nlp.ending import Ending
@@ -31,6 +32,7 @@ from kemba.ocp.phases.ticks import on_ticks
 from kemba.ocp.refinement.refine import Refined, Refiner, reduction_of, refine, valve_columns
 from kemba.ocp.refinement.sample import certificate, to_trajectory
 from kemba.ocp.refinement.solve import solve, warm
+from kemba.ocp.refinement.start import on_elements
 from kemba.ocp.relaxation.session import Attempt
 from kemba.ocp.task.requirement import Requirement, apex_node
 from kemba.ocp.task.task import Task
@@ -135,8 +137,9 @@ class Continuation:
     def _meshes(
         self, start: Trajectory, reduction: Reduction
     ) -> Iterator[tuple[Trajectory, list[Phase]]]:
-        """The earlier plan on its own nodes, where its stages are known; then on the task's nodes,
-        shared among its phases by how long they last. Nothing where its notes do not fit."""
+        """The earlier plan on the task's nodes: in proportion to those of its phases, where its
+        stages are known; then shared by how long phases last. Nothing where its notes do not
+        fit."""
         constraints = read_constraints(self.model, reduction)
         valves = len(valve_columns(self.model, reduction))
         phases = noted_phases(start.meta, constraints, valves, len(start) - 1)
@@ -147,13 +150,13 @@ class Continuation:
             extends = extending(self.model, reduction)
             air = self.task.landing.air
             start, phases = stretched(start, phases, constraints, extends, apex, air)
-        stages = self.origin.stages
-        if stages is not None and (tuple(phases), stages.nodes) == (stages.phases, self.task.nodes):
-            yield start, phases
         marks = [r.at for r in self.requirements if r.at is not None]
-        shared = renoded(start, phases, self.task.nodes, marks)
-        if shared is not None:
-            yield shared
+        stages, nodes = self.origin.stages, self.task.nodes
+        known = stages is not None and tuple(phases) == stages.phases
+        for even in [False] * known + [True]:
+            meshed = renoded(start, phases, nodes, marks, even)
+            if meshed is not None:
+                yield meshed
 
     def _at_once(
         self, start: Trajectory, phases: list[Phase], reduction: Reduction
@@ -253,7 +256,7 @@ class Continuation:
         refiner = Refiner(model, task, asked, start, reduction, self.control)
         program, x = refiner.build(phases, start, RADAU5)
         known = self.solution or self.origin.stages
-        kept = known.start(program) if known is not None else None
+        kept = on_elements(program, known) if known is not None else None
         x = with_impacts(program, x, Continuing.current().ease) if kept is None else kept
         program.keep_short(x, Elements.current().fair)
         if self.origin.ticks:
@@ -262,7 +265,7 @@ class Continuation:
             return program, Iterate(program.proximal(x, weight))
         if known is None or kept is None:
             return program, Iterate(x)
-        return program, known.iterate(program, x)
+        return program, with_multipliers(program, known, x)
 
     def _read_anew(self, start: Trajectory) -> Refined:
         self.tell(f"from {self.origin.name}: its phases read anew")

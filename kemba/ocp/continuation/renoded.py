@@ -13,9 +13,15 @@ from kemba.trajectory import Array, Trajectory
 
 
 def renoded(
-    plan: Trajectory, phases: Sequence[Phase], nodes: int, marks: Sequence[float]
+    plan: Trajectory,
+    phases: Sequence[Phase],
+    nodes: int,
+    marks: Sequence[float],
+    even: bool = True,
 ) -> tuple[Trajectory, list[Phase]] | None:
-    """The plan on `nodes` intervals and its phases there, each with intervals by how long it lasts.
+    """The plan on `nodes` intervals and its phases there, each with intervals by how long it lasts;
+    without `even` in proportion to those it has, so that what the task asks at nodes stays at the
+    same moments.
 
     `marks`: fractions of the nodes at which the task asks for something; phases end there, before
     and after. None where a phase would be left without an interval.
@@ -30,7 +36,9 @@ def renoded(
         if not inside or inside[0].first != a or inside[-1].last != b:
             return None
         lasting = [float(plan.time[p.last] - plan.time[p.first]) for p in inside]
-        share = _shared(lasting, fixed[b] - fixed[a])
+        share = _shared(
+            lasting if even else [float(p.elements) for p in inside], fixed[b] - fixed[a]
+        )
         if share is None:
             return None
         counts += share
@@ -42,7 +50,7 @@ def renoded(
 
 
 def _shared(lasting: Sequence[float], total: int) -> list[int] | None:
-    """`total` intervals shared in proportion to durations, at least one each."""
+    """`total` intervals shared in proportion to `lasting`, at least one each."""
     if total < len(lasting):
         return None
     wanted = np.array(lasting) * total / sum(lasting)

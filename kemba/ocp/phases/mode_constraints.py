@@ -46,7 +46,8 @@ def _gaps(program: PhaseProgram, view: View, i: int, constraint: Constraint) -> 
     settings = ModeConstraints.current()
     closing = {phases[p].first: p for p in program.impacts if program.closes(p, i)}
     closed = np.array([phases[p].active(i) for p in c.phase_of])
-    away = np.convolve(closed, np.ones(2 * settings.away + 1), "same") < 1  # of a closed element
+    near = max(settings.away, round(settings.away_share * program.nodes))
+    away = np.convolve(closed, np.ones(2 * near + 1), "same") < 1  # of a closed element
     g = view.of(constraint.gap) / LENGTH
     for clear in (False, True):
         apart: Where = [

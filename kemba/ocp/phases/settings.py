@@ -44,6 +44,10 @@ class ModeConstraints(Settings):
         3, "1", "elements before and after a touch in which gaps may be smaller", TRIALS,
         decides=True,
     )  # fmt: skip
+    away_share: float = setting(
+        0.03, "1", "of all elements, where that is more: what must stay apart is then the same on "
+        "finer grids", "derived: 3 of 100 elements, where the trials were made", decides=True,
+    )  # fmt: skip
     lands: float = setting(
         0.1, "m.s-1", "least speed at which a foot comes down; a slower one touches at no certain "
         "time", TRIALS, decides=True,

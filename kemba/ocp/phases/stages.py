@@ -6,16 +6,16 @@ single element can then not even be solved again for the same figures.
 
 from __future__ import annotations
 
-from collections import defaultdict, deque
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from kemba.ocp.nlp.ipopt import Iterate
+from kemba.ocp.phases.columns import Columns
 from kemba.ocp.phases.modes import Phase
 from kemba.ocp.phases.program import PhaseProgram
-from kemba.ocp.transcription.layout import STEP
+from kemba.ocp.transcription.layout import STEP, Layout
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Stages:
     @classmethod
     def of(cls, program: PhaseProgram, found: Iterate) -> Stages:
         """The solution of a program, scaled there."""
-        scale = _scales(program)
+        scale = _scales(program.columns, program.layout)
         values, of_bounds = found.Y[: len(scale)] * scale, np.zeros(0)
         of_rows: dict[str, np.ndarray] = {}
         if found.lam_x is not None and found.lam_g is not None:
@@ -52,7 +52,7 @@ class Stages:
 
     def start(self, program: PhaseProgram) -> np.ndarray | None:
         """Scaled variables (size,) of another program; None where its phases are others."""
-        scale = _scales(program)
+        scale = _scales(program.columns, program.layout)
         same = tuple(program.phases) == self.phases and program.scheme.stages == self.stages
         if not same or len(scale) > len(self.values):
             return None
@@ -60,16 +60,17 @@ class Stages:
         found: np.ndarray = np.clip(self.values[: len(scale)] / scale, lower, upper)
         return found
 
-    def iterate(self, program: PhaseProgram, x: np.ndarray) -> Iterate:
-        """A start x (size,) of another program, with the multipliers where they are known: 0 for
-        rows that this one did not have. Nothing may be added to the program afterwards."""
-        if len(x) != len(self.of_bounds):
-            return Iterate(x)
-        lam_g = np.zeros(len(program.rows))
-        for label, (rows, nodes) in _by_label(program).items():
-            if label in self.of_rows:
-                lam_g[rows] = _at_nodes(self.of_rows[label], nodes)
-        return Iterate(x, self.of_bounds, lam_g)
+    def scaled(self, program: PhaseProgram) -> tuple[Columns, np.ndarray] | None:
+        """Columns and scaled variables (size,) on the own elements, for a program of the same
+        phases on others; None where its phases are others."""
+        same = [(p.modes, p.valves) for p in self.phases]
+        if same != [(p.modes, p.valves) for p in program.phases]:
+            return None
+        columns = Columns(program.layout, self.phases, program.impacts, self.stages)
+        scale = _scales(columns, program.layout)
+        if program.scheme.stages != self.stages or len(scale) > len(self.values):
+            return None
+        return columns, self.values[: len(scale)] / scale
 
 
 def _by_label(program: PhaseProgram) -> dict[str, tuple[list[int], list[int]]]:
@@ -82,20 +83,8 @@ def _by_label(program: PhaseProgram) -> dict[str, tuple[list[int], list[int]]]:
     return found
 
 
-def _at_nodes(table: np.ndarray, nodes: list[int]) -> np.ndarray:
-    """Multipliers of a table (n, 2) at nodes (m,), one after the other where several rows are at
-    one; 0 where there is none."""
-    if np.array_equal(table[:, 0], nodes):
-        return np.asarray(table[:, 1])
-    known: defaultdict[int, deque[float]] = defaultdict(deque)
-    for node, multiplier in table:
-        known[int(node)].append(multiplier)
-    return np.array([known[node].popleft() if known[node] else 0.0 for node in nodes])
-
-
-def _scales(program: PhaseProgram) -> np.ndarray:
+def _scales(c: Columns, layout: Layout) -> np.ndarray:
     """What one of each variable is (size,); without variables that were added for a solve."""
-    c, layout = program.columns, program.layout
     scale, known = np.ones(c.size), np.zeros(c.size, dtype=bool)
 
     def put(index: np.ndarray, group: str, times: float = 1.0) -> None:

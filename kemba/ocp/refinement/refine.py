@@ -215,7 +215,9 @@ class Refiner:
         self.tell(Stage("phases: the best plan, more exactly", 3, SOLVES))
         settings = Refining.current()
         program, _ = self.build(coarser.phases, self.plan, RADAU5)
-        start = program.proximal(carried(program, coarser, x), settings.near_fine)
+        start = program.proximal(
+            carried(program, coarser.columns, coarser.scheme.points, x), settings.near_fine
+        )
         found = self._solve(program, start, warm(settings.rough_iterations))
         ended = self._ended(program, found)
         if not found.solved:

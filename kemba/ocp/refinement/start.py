@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
+from kemba.ocp.phases.columns import Columns
 from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.radau import STATE
+from kemba.ocp.phases.stages import Stages
 from kemba.ocp.transcription.layout import STEP
 from kemba.ocp.transcription.solution import arrays
 from kemba.trajectory import Trajectory
@@ -58,33 +62,52 @@ def _between(times: np.ndarray, rows: np.ndarray, now: np.ndarray) -> np.ndarray
     return np.asarray(rows[i - 1] + share * (rows[i] - rows[i - 1]))
 
 
-def carried(program: PhaseProgram, coarse: PhaseProgram, x: np.ndarray) -> np.ndarray:
-    """The scaled variables (size,) of `program` from a solution `x` (coarse size,) of the same
-    phases by another scheme."""
-    c, old = program.columns, coarse.columns
-    y = np.zeros(c.size)
-    knots = np.concatenate([[0.0], coarse.scheme.points])
-    states = _lagrange(knots, program.scheme.points)
-    forces = _lagrange(knots[1:], program.scheme.points)
+def carried(program: PhaseProgram, old: Columns, points: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """The scaled variables (size,) of `program` from a solution `x` of the same phases.
+
+    Its variables are at the columns `old`, by a scheme with stages at `points`; the number of its
+    elements may be another. States and forces are read off the polynomials of its elements, inputs
+    in the middle of each new one.
+    """
+    c, y = program.columns, np.zeros(program.columns.size)
+    knots = np.concatenate([[0.0], points])
     for g in STATE:
         y[c.first[g]] = x[old.first[g]]
-    for e in range(program.nodes):
-        begin, stages = old.begin(e), old.stages[e]
-        for g in STATE:
-            values = states @ np.array([x[begin[g]], *(x[stage[g]] for stage in stages)])
-            for stage, value in zip(c.stages[e], values, strict=True):
-                y[stage[g]] = value
-        values = forces @ np.array([x[stage["lam"]] for stage in stages])
-        for stage, value in zip(c.stages[e], values, strict=True):
-            y[stage["lam"]] = value
-        y[c.u[e]] = x[old.u[e]]
-    y[c.h] = x[old.h]
+    for p, (phase, before) in enumerate(zip(program.phases, old.phases, strict=True)):
+        ratio = before.elements / phase.elements
+        y[c.h[p]] = x[old.h[p]] * ratio
+        for k in range(phase.elements):
+            e = phase.first + k
+            y[c.u[e]] = x[old.u[before.first + int((k + 0.5) * ratio)]]
+            for stage, point in zip(c.stages[e], program.scheme.points, strict=True):
+                at, share = _element((k + point) * ratio)
+                begin, stages = old.begin(before.first + at), old.stages[before.first + at]
+                states, forces = _lagrange(knots, share), _lagrange(points, share)
+                for g in STATE:
+                    y[stage[g]] = states @ np.array([x[begin[g]], *(x[s[g]] for s in stages)])
+                y[stage["lam"]] = forces @ np.array([x[s["lam"]] for s in stages])
     for p in program.impacts:
         y[c.after[p]], y[c.impulse[p]] = x[old.after[p]], x[old.impulse[p]]
     return np.clip(y, program.lower, program.upper)
 
 
-def _lagrange(knots: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Matrix from values at knots to values of their polynomial at points."""
+def on_elements(program: PhaseProgram, solved: Stages) -> np.ndarray | None:
+    """The program's scaled variables (size,) from a solution, on its elements or others of the same
+    phases; None where its phases are others."""
+    kept = solved.start(program)
+    if kept is not None:
+        return kept
+    others = solved.scaled(program)
+    return None if others is None else carried(program, others[0], program.scheme.points, others[1])
+
+
+def _element(time: float) -> tuple[int, float]:
+    """The element that a time [elements] is in, and its share of that element in (0, 1]."""
+    at = max(0, math.ceil(time - 1e-9) - 1)
+    return at, min(1.0, time - at)
+
+
+def _lagrange(knots: np.ndarray, point: float) -> np.ndarray:
+    """Weights (knots,) of values at knots in the value of their polynomial at a point."""
     powers = np.arange(len(knots))
-    return np.asarray(points[:, None] ** powers @ np.linalg.inv(knots[:, None] ** powers))
+    return np.asarray(np.linalg.solve(knots ** powers[:, None], point**powers))
