@@ -1,7 +1,7 @@
 """Plans on many nodes: sought on fewer, where it takes seconds, then solved on all of them.
 
-Contacts and valves of a plan are decided on the coarser grid; its refined plan starts the finer
-program with states and multipliers, so that only a few iterations are made on many nodes.
+Contacts and valves of a plan are decided on the coarser grid. Its refined plan starts the finer
+program near the solution, so that only a few iterations are made on many nodes.
 """
 
 from __future__ import annotations

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from kemba.ocp.certificate.objective import objective
-from kemba.ocp.continuation.multipliers import with_multipliers
 from kemba.ocp.continuation.renoded import renoded
 from kemba.ocp.nlp.ipopt import Control
 from kemba.ocp.phases.program import PhaseProgram
@@ -55,12 +54,6 @@ def test_the_same_elements_are_the_same_point(coarse: Plan) -> None:
     program, solved = on(100, coarse)
     start = on_elements(program, solved)
     assert start is not None and errors(program, start) < 1e-6
-    begun = with_multipliers(program, solved, start)
-    assert begun.lam_x is not None and begun.lam_g is not None
-    np.testing.assert_array_equal(begun.lam_x, solved.of_bounds)
-    for label, table in solved.of_rows.items():
-        rows = [i for i, row in enumerate(program.rows) if row.label == label]
-        np.testing.assert_array_equal(begun.lam_g[rows], table[:, 1])
 
 
 def test_finer_elements_read_the_polynomials_of_the_coarser(coarse: Plan) -> None:
@@ -76,21 +69,6 @@ def test_finer_elements_read_the_polynomials_of_the_coarser(coarse: Plan) -> Non
         assert old is not None
         ends = c.end(phase.last)["q"], old[0].end(before.last)["q"]
         np.testing.assert_allclose(start[ends[0]], old[1][ends[1]], atol=1e-9)
-
-
-def test_multipliers_say_what_the_cost_would_save(coarse: Plan) -> None:
-    """The sum over a stretch of time is the same on twice as many elements."""
-    program, solved = on(200, coarse)
-    start = on_elements(program, solved)
-    assert start is not None
-    begun = with_multipliers(program, solved, start)
-    assert begun.lam_g is not None
-    gaps = [label for label in solved.of_rows if label.endswith("gap gap")]
-    for label in [*gaps, "duration"]:
-        fine = sum(
-            m for m, row in zip(begun.lam_g, program.rows, strict=True) if row.label == label
-        )
-        assert fine == pytest.approx(float(solved.of_rows[label][:, 1].sum()), rel=0.1, abs=1e-6)
 
 
 def test_what_must_stay_apart_is_the_same_on_finer_grids(coarse: Plan) -> None:

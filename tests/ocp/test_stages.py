@@ -13,7 +13,6 @@ from kemba.ocp.certificate.objective import objective
 from kemba.ocp.continuation.between import Origin
 from kemba.ocp.continuation.continue_plan import Continuation
 from kemba.ocp.continuation.kept import packed, read_stages, write_stages
-from kemba.ocp.continuation.multipliers import with_multipliers
 from kemba.ocp.nlp.ipopt import Control, Iterate
 from kemba.ocp.phases.modes import Phase
 from kemba.ocp.phases.program import PhasePart, PhaseProgram
@@ -96,8 +95,7 @@ def test_multipliers_find_their_rows_in_a_program_with_more(low: Plan) -> None:
     more, _ = built(low, low.task, low.stages.phases, RADAU5)
     foot, node = more.columns.first["q"], 0
     more.added.insert(0, PhasePart(("new",), *one_row(), 0.0, 1.0, foot[None, :1]))
-    begun = with_multipliers(program, low.stages, x)
-    wider = with_multipliers(more, low.stages, x)
+    begun, wider = low.stages.iterate(program, x), low.stages.iterate(more, x)
     assert begun.lam_g is not None and wider.lam_g is not None
     assert np.count_nonzero(begun.lam_g) > 100, "they are those of the solve"
     new = [row.label == "new" for row in more.rows]

@@ -15,7 +15,6 @@ from kemba.ocp.continuation.between import (
     requirements_between,
 )
 from kemba.ocp.continuation.impacts import with_impacts
-from kemba.ocp.continuation.multipliers import with_multipliers
 from kemba.ocp.continuation.renoded import renoded
 from kemba.ocp.nlp import ipopt
 from kemba.ocp.nlp.ending import Ending
@@ -223,13 +222,15 @@ class Continuation:
         weight: float,
     ) -> Refined:
         """The plan at `share` of the change from a trajectory, with a proximal `weight`."""
-        program, begin = self._program(share, start, phases, reduction, weight)
+        program, begin, known = self._program(share, start, phases, reduction, weight)
         settings, slow = Continuing.current(), Refining.current().slow
         options = warm(min(settings.iterations, self.task.solver.max_iterations))
+        mu = ipopt.last_barrier(Refining.current().tol)
         if begin.lam_g is not None:
-            mu = ipopt.last_barrier(Refining.current().tol)
             # a multiplier is at least that of a bound at distance 1
             options |= ipopt.warm(mu, settings.push, warm_start_mult_bound_push=mu)
+        elif known and not weight:
+            options |= ipopt.central(mu, Refining.current().push)
         stagnation = Stagnation(settings.patience, settings.underway, slow)
         found = solve(program, begin, options, self.control, stagnation)
         assert found.ending is not None
@@ -247,25 +248,27 @@ class Continuation:
         phases: list[Phase],
         reduction: Reduction,
         weight: float,
-    ) -> tuple[PhaseProgram, Iterate]:
-        """The program at `share` of the change, and where it begins: at the stages and multipliers
-        that are known for these phases, else at the nodes of a trajectory."""
+    ) -> tuple[PhaseProgram, Iterate, bool]:
+        """The program at `share` of the change, and where it begins: at the stages, and with the
+        multipliers where they are known for these elements, else at the nodes of a trajectory.
+        True where it begins at stages."""
         model = model_between(self.origin.model, self.model, share)
         asked = requirements_between(self.origin.requirements, self.requirements, share)
         task = self.task.model_copy(update={"grip": 1.0 - share * (1.0 - self.task.grip)})
         refiner = Refiner(model, task, asked, start, reduction, self.control)
         program, x = refiner.build(phases, start, RADAU5)
-        known = self.solution or self.origin.stages
-        kept = on_elements(program, known) if known is not None else None
+        stages = self.solution or self.origin.stages
+        kept = on_elements(program, stages) if stages is not None else None
         x = with_impacts(program, x, Continuing.current().ease) if kept is None else kept
         program.keep_short(x, Elements.current().fair)
         if self.origin.ticks:
             on_ticks(program, x)
+        known = kept is not None
         if weight:
-            return program, Iterate(program.proximal(x, weight))
-        if known is None or kept is None:
-            return program, Iterate(x)
-        return program, with_multipliers(program, known, x)
+            return program, Iterate(program.proximal(x, weight)), known
+        if stages is None or stages.phases != tuple(phases):
+            return program, Iterate(x), known
+        return program, stages.iterate(program, x), known
 
     def _read_anew(self, start: Trajectory) -> Refined:
         self.tell(f"from {self.origin.name}: its phases read anew")

@@ -95,6 +95,17 @@ def warm(mu: float, push: float | None = None, **more: Any) -> dict[str, Any]:
     return {"warm_start_init_point": "yes", **pushed, "mu_init": mu, **more}
 
 
+def central(mu: float, push: float) -> dict[str, Any]:
+    """IPOPT options of a start near a solution with barrier parameter `mu` whose multipliers are
+    not known: of bounds they are mu over the distance, of rows those of least squares."""
+    return {
+        "mu_init": mu,
+        "bound_mult_init_method": "mu-based",
+        "slack_bound_push": push,
+        "slack_bound_frac": push,
+    }
+
+
 def last_barrier(tol: float) -> float:
     """The barrier parameter at which IPOPT ends with its tolerance `tol` (its documentation, option
     barrier_tol_factor). A solve that begins there need not lower it."""

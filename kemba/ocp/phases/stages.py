@@ -6,6 +6,7 @@ single element can then not even be solved again for the same figures.
 
 from __future__ import annotations
 
+from collections import defaultdict, deque
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -72,6 +73,17 @@ class Stages:
             return None
         return columns, self.values[: len(scale)] / scale
 
+    def iterate(self, program: PhaseProgram, x: np.ndarray) -> Iterate:
+        """A start x (size,) of another program, with the multipliers where they are known: 0 for
+        rows that this one did not have. Nothing may be added to the program afterwards."""
+        if len(x) != len(self.of_bounds):
+            return Iterate(x)
+        lam_g = np.zeros(len(program.rows))
+        for label, (rows, nodes) in _by_label(program).items():
+            if label in self.of_rows:
+                lam_g[rows] = _at_nodes(self.of_rows[label], nodes)
+        return Iterate(x, self.of_bounds, lam_g)
+
 
 def _by_label(program: PhaseProgram) -> dict[str, tuple[list[int], list[int]]]:
     """The rows of each label, and their nodes."""
@@ -81,6 +93,17 @@ def _by_label(program: PhaseProgram) -> dict[str, tuple[list[int], list[int]]]:
         rows.append(i)
         nodes.append(row.node)
     return found
+
+
+def _at_nodes(table: np.ndarray, nodes: list[int]) -> np.ndarray:
+    """Multipliers of a table (n, 2) at nodes (m,), one after the other where several rows are at
+    one; 0 where there is none."""
+    if np.array_equal(table[:, 0], nodes):
+        return np.asarray(table[:, 1])
+    known: defaultdict[int, deque[float]] = defaultdict(deque)
+    for node, multiplier in table:
+        known[int(node)].append(multiplier)
+    return np.array([known[node].popleft() if known[node] else 0.0 for node in nodes])
 
 
 def _scales(c: Columns, layout: Layout) -> np.ndarray:
