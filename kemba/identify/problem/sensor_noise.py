@@ -183,7 +183,9 @@ def pairs(errors: Array) -> Array:
 def covariances(columns: Array, errors: Array, counts: Array) -> Array:
     """Mean product (m, lags) of rows so many apart, of columns (n, L, m, c), where `errors`
     (n, L, m) are known; `counts` (m, lags): such pairs of rows."""
-    z = np.where(np.isfinite(errors)[..., None], columns, 0.0)
+    known = np.where(np.isfinite(errors)[..., None], columns, 0.0)
+    # a channel's rows one after the other, so that a lag is a shift and a sum of products BLAS
+    z = np.ascontiguousarray(np.moveaxis(known, 2, 0)).reshape(errors.shape[2], len(errors), -1)
     lags = ColourSettings.current().lags
-    total = [np.einsum("nlmc,nlmc->m", z[: len(z) - lag], z[lag:]) for lag in lags]
-    return np.asarray(np.stack(total, axis=1) / z.shape[-1] / np.maximum(counts, 1.0))
+    total = [[np.vdot(one[: len(one) - lag], one[lag:]) for lag in lags] for one in z]
+    return np.asarray(np.array(total) / columns.shape[-1] / np.maximum(counts, 1.0))
