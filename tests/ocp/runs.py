@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import atexit
+import shutil
 import tempfile
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -51,7 +53,9 @@ class Solved:
 @lru_cache(maxsize=16)
 def solved(name: str, *options: str, nodes: int = 40) -> Solved:
     """A shipped task solved through the command line, on a coarse grid."""
-    folder = Path(tempfile.mkdtemp(prefix=f"kemba-test-{name}-")) / "run"
+    made = Path(tempfile.mkdtemp(prefix=f"kemba-test-{name}-"))
+    atexit.register(shutil.rmtree, made, ignore_errors=True)
+    folder = made / "run"
     words = ["solve", f"{name}.yaml", "--set", f"nodes={nodes}", "--no-figure", "-q"]
     words += ["--no-replay", "--set", "refine=none"]  # what implicit Euler itself gives
     for option in options:

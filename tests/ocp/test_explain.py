@@ -135,7 +135,7 @@ def test_a_value_outside_its_range_is_told() -> None:
     assert "body/z stays within 0 m to 3 m" in found.sentence
 
 
-def test_two_wishes_on_rates_that_exclude_each_other() -> None:
+def test_two_requirements_on_rates_that_exclude_each_other() -> None:
     (found,) = diagnostics("jump", "start.body/vz=1 m/s")
     assert found.certain and "`start.rest`" in found.sentence
     assert "`start.body/vz`" in found.sentence
@@ -145,6 +145,14 @@ def test_poses_that_a_chain_cannot_hold() -> None:
     """Feet on the ground, pistons retracted, body level: the knees cannot be straight too."""
     (found,) = diagnostics("jump", "start.front/knee/q=50 deg")
     assert found.certain and found.relax and "no pose" in found.sentence
+
+
+def test_a_pose_with_more_equalities_than_variables_prints_nothing(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    (found,) = diagnostics("jump_forward", "start.body/z=30 cm", "start.*/hip/q=0.5 rad")
+    assert found.certain and "no pose" in found.sentence
+    assert capfd.readouterr() == ("", ""), "CasADi warns of such programs by itself"
 
 
 def test_small_gaps_are_told_with_digits_enough() -> None:

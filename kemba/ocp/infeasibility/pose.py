@@ -21,6 +21,7 @@ def silent() -> dict[str, Any]:
     return {
         "print_time": False,
         "error_on_fail": False,
+        "inputs_check": False,  # CasADi would print that a pose has more equalities than variables
         "ipopt.print_level": 0,
         "ipopt.sb": "yes",
         "ipopt.tol": settings.tol,
