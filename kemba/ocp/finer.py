@@ -11,6 +11,7 @@ from dataclasses import replace
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.continuation.between import Origin
 from kemba.ocp.continued import continued
+from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.planned import Plan
 from kemba.ocp.planner import Planner, searched
 from kemba.ocp.refined import refined
@@ -42,23 +43,31 @@ def found_and_refined(planner: Planner, refused: bool) -> Plan:
 
 def _from_fewer(planner: Planner) -> Plan | None:
     """The plan on the task's nodes from one on fewer; None where they are few, or where there is
-    none or it cannot be solved on all of them."""
+    none or it cannot be solved on all of them. Where time is up before that, what there is."""
     task, fewer = planner.task, Sought.current().nodes
     if task.nodes <= fewer:
         return None
     coarse = replace(planner, task=task.model_copy(update={"nodes": fewer}))
     found = refined(coarse, searched(coarse, False))
-    if found.status is Status.INTERRUPTED:
-        return found
     if not found.refined:
-        return None
+        return None if planner.session.control.ended() is None else found
     plain = {"grip": 1.0, "landing": task.landing.model_copy(update={"air": None})}
     name = f"the plan on {fewer} nodes"
     origin = Origin(
         found.trajectory, found.model, found.requirements, name, once=True, stages=found.stages
     )
     near, _ = continued(replace(planner, task=task.model_copy(update=plain)), origin)
-    if near is None:
-        return None
-    wall, cpu = found.solve_s + near.solve_s, found.solve_cpu_s + near.solve_cpu_s
-    return replace(near, task=task, continued=None, solve_s=wall, solve_cpu_s=cpu)
+    if near is not None:
+        wall, cpu = found.solve_s + near.solve_s, found.solve_cpu_s + near.solve_cpu_s
+        return replace(near, task=task, continued=None, solve_s=wall, solve_cpu_s=cpu)
+    ended = planner.session.control.ended()
+    return None if ended is None else _kept(found, task.nodes, ended)
+
+
+def _kept(found: Plan, nodes: int, ended: Ending) -> Plan:
+    """A plan on fewer nodes than were asked for, because there was no time for more."""
+    interrupted = ended is Ending.INTERRUPTED
+    why = "interrupted" if interrupted else "the time limit came"
+    what = f"{why} before it was solved on {nodes} nodes, {found.task.nodes} are kept"
+    status = Status.INTERRUPTED if interrupted else Status.ACCEPTABLE
+    return replace(found, status=status, sentence=f"{found.sentence}; {what}")

@@ -92,3 +92,16 @@ def test_no_solve_from_a_guess_is_made_on_many_nodes() -> None:
     fewer = plan(*load_task("jump.yaml", ["nodes=100"]))
     costs = [objective(f.model, f.task, f.requirements, f.trajectory) for f in (found, fewer)]
     assert costs[0] < 1.1 * costs[1]
+
+
+@pytest.mark.slow
+def test_the_coarser_plan_is_kept_where_a_user_stops_on_many_nodes() -> None:
+    task, document = load_task("jump.yaml", ["nodes=160"])
+    told: list[str] = []
+
+    def stop() -> bool:
+        return bool(told) and "from the plan on 100 nodes" in told[-1]
+
+    found = plan(task, document, tell=lambda text: told.append(str(text)), stop=stop)
+    assert found.status == "interrupted" and found.refined and len(found.trajectory) == 101
+    assert "interrupted before it was solved on 160 nodes, 100 are kept" in found.sentence

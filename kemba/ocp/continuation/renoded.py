@@ -35,10 +35,9 @@ def renoded(
         inside = [p for p in phases if a <= p.first and p.last <= b]
         if not inside or inside[0].first != a or inside[-1].last != b:
             return None
-        lasting = [float(plan.time[p.last] - plan.time[p.first]) for p in inside]
-        share = _shared(
-            lasting if even else [float(p.elements) for p in inside], fixed[b] - fixed[a]
-        )
+        t = plan.time
+        weights = [float(t[p.last] - t[p.first] if even else p.elements) for p in inside]
+        share = _shared(weights, fixed[b] - fixed[a])
         if share is None:
             return None
         counts += share
@@ -49,11 +48,11 @@ def renoded(
     return _resampled(plan, phases, counts), found
 
 
-def _shared(lasting: Sequence[float], total: int) -> list[int] | None:
-    """`total` intervals shared in proportion to `lasting`, at least one each."""
-    if total < len(lasting):
+def _shared(weights: Sequence[float], total: int) -> list[int] | None:
+    """`total` intervals shared in proportion to `weights`, at least one each."""
+    if total < len(weights):
         return None
-    wanted = np.array(lasting) * total / sum(lasting)
+    wanted = np.array(weights) * total / sum(weights)
     counts = np.maximum(1, np.round(wanted)).astype(int)
     while counts.sum() != total:
         sign = 1 if counts.sum() < total else -1
