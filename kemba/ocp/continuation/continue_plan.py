@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 from kemba.errors import KembaError
 from kemba.model import Model
@@ -90,6 +91,14 @@ class Continuing(Settings):
         return before + (self.dear - 1.0) * abs(before)
 
 
+class Mesh(NamedTuple):
+    """An earlier plan on the task's nodes, and the solved program to begin with, if one fits."""
+
+    start: Trajectory
+    phases: list[Phase]
+    stages: Stages | None
+
+
 @dataclass
 class Continuation:
     """From an earlier plan to the one that is asked; `steps` collects how its solves ended."""
@@ -102,7 +111,7 @@ class Continuation:
     tell: Callable[[str], None] = lambda text: None
     steps: list[Attempt] = field(default_factory=list)
     size: tuple[int, int] = (0, 0)  # variables and rows of the last program
-    solution: Stages | None = None  # of the last program that was solved
+    solution: Stages | None = None  # to begin with: the last one that was solved on these nodes
 
     def run(self) -> Refined:
         """The plan on the phases of the earlier one; where these do not fit, on phases read
@@ -112,16 +121,15 @@ class Continuation:
             reduction = reduction_of(self.model, self.task, self.requirements, start)
             found: Refined | None = None
             meshes = []
-            for meshed in self._meshes(start, reduction):
-                meshes.append(meshed)
-                found = self._at_once(*meshed, reduction)
+            for mesh in self._meshes(start, reduction):
+                meshes.append(mesh)
+                found = self._at_once(mesh, reduction)
                 if found is not None:
                     return found
                 if self.origin.ticks:
                     return Refined(None, None, Ending.GAVE_UP, 0)
-            for meshed in meshes:
-                self.solution = None  # it was on other nodes
-                found = self._walk(*meshed, reduction)
+            for mesh in meshes:
+                found = self._walk(mesh, reduction)
                 if found.done:
                     return found
             if found is not None and (self.origin.once or self.task.landing.air):
@@ -133,12 +141,10 @@ class Continuation:
         except ValueError as error:
             return Refined(None, None, Ending.UNSUITABLE, 0, reason=f"the model {error}")
 
-    def _meshes(
-        self, start: Trajectory, reduction: Reduction
-    ) -> Iterator[tuple[Trajectory, list[Phase]]]:
+    def _meshes(self, start: Trajectory, reduction: Reduction) -> Iterator[Mesh]:
         """The earlier plan on the task's nodes: in proportion to those of its phases, where its
-        stages are known; then shared by how long phases last. Nothing where its notes do not
-        fit."""
+        stages are known and on no more; then shared by how long phases last. Nothing where its
+        notes do not fit."""
         constraints = read_constraints(self.model, reduction)
         valves = len(valve_columns(self.model, reduction))
         phases = noted_phases(start.meta, constraints, valves, len(start) - 1)
@@ -151,19 +157,20 @@ class Continuation:
             start, phases = stretched(start, phases, constraints, extends, apex, air)
         marks = [r.at for r in self.requirements if r.at is not None]
         stages, nodes = self.origin.stages, self.task.nodes
-        known = stages is not None and tuple(phases) == stages.phases
-        for even in [False] * known + [True]:
-            meshed = renoded(start, phases, nodes, marks, even)
-            if meshed is not None:
-                yield meshed
+        if stages is not None and tuple(phases) == stages.phases and stages.nodes <= nodes:
+            finer = renoded(start, phases, nodes, marks, even=False)
+            if finer is not None:
+                yield Mesh(*finer, stages)
+        shared = renoded(start, phases, nodes, marks)
+        if shared is not None:
+            yield Mesh(*shared, None)
 
-    def _at_once(
-        self, start: Trajectory, phases: list[Phase], reduction: Reduction
-    ) -> Refined | None:
+    def _at_once(self, mesh: Mesh, reduction: Reduction) -> Refined | None:
         """The best plan in one solve; None where it does not converge or misses the tolerances, or
         costs so much more than the earlier plan that another minimum is likely."""
         self.tell(f"from {self.origin.name}: the best one")
-        found = self._solved(1.0, start, phases, reduction, 0.0)
+        self.solution = mesh.stages
+        found = self._solved(1.0, mesh.start, mesh.phases, reduction, 0.0)
         if found.ending.cut_short:
             return found
         o = self.origin
@@ -172,13 +179,12 @@ class Continuation:
         kept = measured is not None and measured.within(self.task.tolerances)
         if kept and self._cost(found) <= Continuing.current().most(before):
             return found
-        self.solution = None
         return None
 
-    def _walk(self, start: Trajectory, phases: list[Phase], reduction: Reduction) -> Refined:
+    def _walk(self, mesh: Mesh, reduction: Reduction) -> Refined:
         """In one step if it converges; else from the earlier plan solved on these intervals, in one
         step again, then in halves. At last the best plan for what is asked."""
-        settings = Continuing.current()
+        settings, (start, phases, self.solution) = Continuing.current(), mesh
         done, step, settled = 0.0, 1.0, False
         found = Refined(None, None, Ending.GAVE_UP, 0)
         whole = 3  # solves: the change, none of it, the change again
@@ -257,7 +263,7 @@ class Continuation:
         task = self.task.model_copy(update={"grip": 1.0 - share * (1.0 - self.task.grip)})
         refiner = Refiner(model, task, asked, start, reduction, self.control)
         program, x = refiner.build(phases, start, RADAU5)
-        stages = self.solution or self.origin.stages
+        stages = self.solution
         kept = on_elements(program, stages) if stages is not None else None
         x = with_impacts(program, x, Continuing.current().ease) if kept is None else kept
         program.keep_short(x, Elements.current().fair)
