@@ -184,7 +184,7 @@ def covariances(columns: Array, errors: Array, counts: Array) -> Array:
     """Mean product (m, lags) of rows so many apart, of columns (n, L, m, c), where `errors`
     (n, L, m) are known; `counts` (m, lags): such pairs of rows."""
     known = np.where(np.isfinite(errors)[..., None], columns, 0.0)
-    # a channel's rows one after the other, so that a lag is a shift and a sum of products BLAS
+    # a channel's rows one after the other: each lag is one dot product, which BLAS takes
     z = np.ascontiguousarray(np.moveaxis(known, 2, 0)).reshape(errors.shape[2], len(errors), -1)
     lags = ColourSettings.current().lags
     total = [[np.vdot(one[: len(one) - lag], one[lag:]) for lag in lags] for one in z]

@@ -53,12 +53,11 @@ class Stages:
 
     def start(self, program: PhaseProgram) -> np.ndarray | None:
         """Scaled variables (size,) of another program; None where its phases are others."""
-        scale = _scales(program.columns, program.layout)
-        same = tuple(program.phases) == self.phases and program.scheme.stages == self.stages
-        if not same or len(scale) > len(self.values):
+        kept = self.scaled(program) if tuple(program.phases) == self.phases else None
+        if kept is None:
             return None
-        lower, upper = program.lower[: len(scale)], program.upper[: len(scale)]
-        found: np.ndarray = np.clip(self.values[: len(scale)] / scale, lower, upper)
+        x = kept[1]
+        found: np.ndarray = np.clip(x, program.lower[: len(x)], program.upper[: len(x)])
         return found
 
     def scaled(self, program: PhaseProgram) -> tuple[Columns, np.ndarray] | None:

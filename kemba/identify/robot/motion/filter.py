@@ -94,7 +94,7 @@ def innovations(
     # one step at a time only what must be: x' = F (1 - K H) x + (F K y + G g)
     if y is not None:
         y = np.where(np.isfinite(y) & np.isfinite(s.R)[..., None], y, 0.0)
-        y = np.ascontiguousarray(y)  # BLAS multiplies nothing else
+        y = np.ascontiguousarray(y)  # NumPy hands only such arrays to BLAS
         np.matmul(gain.carry[:-1], y[:-1], out=states[1:])
     if g is not None:
         states[1:] += s.G[:-1] @ np.ascontiguousarray(g[:-1])
