@@ -22,7 +22,7 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "benchmarks")]
 
 import numpy as np
-from twin.cases import robot_case
+from twin.cases import SHOWING, robot_case
 from twin.catalogue import CATALOGUE
 from twin.measure import Sensors, fault_channels
 
@@ -49,7 +49,7 @@ PAIRS = [
     ["sensor_delay:body/z", "seal_friction"],
 ]
 REPEATS = ((EFFECTS, 4), (SENSORS, 1), (UNKNOWN, 2), (PAIRS, 2), ([None], 60))
-SEED = 3000  # cases of other seeds were looked at while the method was built
+SEED = 11000  # cases of other seeds were looked at while the method was built
 SIZES, NOISES = (1.0, 0.7, 1.5), (1.0, 2.0, 0.5)
 NULLS = 40  # further machines in which nothing is missing, at the end: a hundred in all
 
@@ -64,8 +64,6 @@ def cases() -> list[dict[str, Any]]:
 
 
 def _setting(effect: Any, turn: int, seed: int, rng: np.random.Generator) -> dict[str, Any]:
-    # what drifts from run to run is seen only where runs can show it
-    runs = (4, 5) if effect == "temperature_drift" else (3, 4, 5)
     return {
         "effect": effect,
         "seed": seed,
@@ -73,7 +71,7 @@ def _setting(effect: Any, turn: int, seed: int, rng: np.random.Generator) -> dic
         "noise": NOISES[(turn + turn // 3) % 3],
         "figures_off": float(rng.choice([0.01, 0.02, 0.03])),
         "floor": float(rng.choice([0.0, 0.03])),
-        "runs": int(rng.choice(runs)),
+        "runs": int(rng.choice((4, 5))),
     }
 
 
@@ -103,10 +101,10 @@ def _standing(folder: Path, effect: Any, size: float, **options: Any) -> tuple[l
     """Logs of the case, the effect made smaller for as long as it topples the robot at once."""
     for _ in range(4):
         try:
-            return robot_case(folder, effect, size=size, **options)
+            return robot_case(folder, effect, size=size, motions=SHOWING, **options)
         except RuntimeError:
             size *= 0.6
-    return robot_case(folder, effect, size=size, **options)
+    return robot_case(folder, effect, size=size, motions=SHOWING, **options)
 
 
 if __name__ == "__main__":

@@ -26,6 +26,8 @@ ROBOT_MOTIONS = ("jump", "swing", "heave", "forward", "drop", "squat", "sway", "
 BENCH_TESTS = ("random", "slow", "locked", "opposed", "random")
 # Coloured forces that no model has: sigma on x, z (N), pitch, hips (N m), rods (N); memory (s).
 DISTURBANCE, MEMORY = np.array([0.3, 0.3, 0.02, 0.03, 0.03, 0.5, 0.5]), 0.03
+# one motion more than jumps and squats, so that every effect of the catalogue shows in some log
+SHOWING = ("jump", "slide", "swing", "heave", "forward", "drop", "squat", "sway")
 REPEATS = 2  # of the first motion, with the same command
 MOTION_SEEDS = 40  # so that a benchmark of many cases finds its motions already planned
 

@@ -28,7 +28,7 @@ _KERNELS = (
     "loads",
     "machine",
 )
-_PLANNERS = ("layout", "motions", "plan", "run", "scripts", "valves")
+_PLANNERS = ("layout", "motions", "plan", "run", "scripts", "sliding", "valves")
 
 
 def _fingerprint(*names: str) -> str:

@@ -20,6 +20,7 @@ from .scripts import (
     on_feet,
     script,
 )
+from .sliding import slide
 
 FALL = 10.7  # m/s2, robot and boom in flight
 _X = np.linspace(0.0, 0.07, 141)
@@ -277,4 +278,5 @@ MOTIONS = {
     "swing": swing,
     "drop": drop,
     "sway": sway,
+    "slide": slide,
 }

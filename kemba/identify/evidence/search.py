@@ -12,6 +12,7 @@ from kemba.identify.evidence.null_model import Baseline
 from kemba.identify.evidence.refits import Refits
 from kemba.identify.evidence.search_settings import SearchSettings
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis, log_prior
+from kemba.identify.evidence.strain import stand_ins
 
 
 @dataclass
@@ -124,6 +125,8 @@ class Search(Refits):
         if not self.problem.moves and self.share_modes():
             self._refit_leaders(given, leaders, least)
             self.share_modes()
+        if given == NULL:
+            self._try_stand_ins()
         if given == NULL and self.points[NULL].fitted_error > SearchSettings.current().structural:
             for structure in sorted(self.problem.structures):
                 self.visit((structure,))
@@ -146,6 +149,15 @@ class Search(Refits):
             if self.ended and (given or number > 1):
                 break
             self.visit(hypothesis, number, len(order))
+
+    def _try_stand_ins(self) -> None:
+        """Refit the effects that may stand behind nominal figures which the null moves too far."""
+        for hypothesis, start in stand_ins(self.points[NULL], self.problem).items():
+            if self.ended:
+                break
+            if hypothesis not in self.points:
+                self._thetas.setdefault(hypothesis, start)
+                self.visit(hypothesis)
 
     def _extensions(self, given: Hypothesis) -> dict[Hypothesis, float]:
         """Linear evidence of `given` plus one effect. The members of a pair that is much better

@@ -222,12 +222,13 @@ def rigid_forces(
     (n, L, k, c) with the smallest norm, each channel weighted by the `density` (n, L, c) of its
     unknown force.
     """
-    stopped = ContactForceSettings.current().stopped
+    settings = ContactForceSettings.current()
     weighted = channels * density[..., None, :]
     S = weighted @ channels.swapaxes(-1, -2)
     S = S + 1e-9 * np.eye(k)
     share = (weighted.swapaxes(-1, -2) @ np.linalg.solve(S, force[..., None]))[..., 0]
-    least = np.array([stopped] * legs + [0.0] * 2 * legs)
+    # along the ground a sliding foot has its friction: what is beyond that is an error to be seen
+    least = np.array([settings.stopped] * legs + [settings.slipping, 0.0] * legs)
     return share[..., k - legs :], density[..., k - legs :] > least
 
 
