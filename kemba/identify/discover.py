@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kemba.identify.answer import ENDED, Answer, Ranked, phrase
-from kemba.identify.doubt.cross_validation import left_out
+from kemba.identify.doubt.cross_validation import left_out, one_part_shows
 from kemba.identify.doubt.parsimony import Belief, is_idle, likeliest_part, none_of, simplest
 from kemba.identify.doubt.run_consistency import drifting
 from kemba.identify.doubt.unexplained import Formula, look
@@ -120,7 +120,7 @@ def _built_anew(search: Search, other: Rebuilt, holdout: Problem | None) -> Disc
 
 def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> Discovery:
     """What the finished `search` with its `best` hypothesis allows to say."""
-    ended = search.ended
+    ended, search.in_pieces = search.ended, one_part_shows(search, best)
     search.say("simulating logs in which nothing is missing")
     test, likeliest = null_test(search), best
     belief = _believed(search, likeliest, test)
@@ -251,6 +251,7 @@ def _answer(
     doubts: Doubts,
 ) -> Answer:
     problem = search.problem
+    whole = len(problem.runs) > 3 and not search.in_pieces
     before = error(search, NULL, holdout)
     after = error(search, best, holdout) if best else before
     verdict = verdict_on(best, formula, doubts)
@@ -272,7 +273,7 @@ def _answer(
             effect: {problem.candidates[effect].lead.name: size} for effect, size in sizes.items()
         },
         formula=str(formula) if formula else None,
-        split_by="held-out logs" if holdout else "runs" if len(problem.runs) > 3 else "time blocks",
+        split_by="held-out logs" if holdout else "runs" if whole else "time blocks",
         ladder=ladder(search, best, holdout),
     )
     answer.remarks = list(doubts.reasons)

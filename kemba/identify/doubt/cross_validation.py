@@ -34,6 +34,14 @@ class CrossValidationSettings(Settings):
         "convention: three sigmas",
         decides=True,
     )
+    alone: float = setting(
+        0.9,
+        "1",
+        "share of what the logs tell of an effect, in one run, from which quarters of runs are left "
+        "out instead of runs",
+        BY_HAND,
+        decides=True,
+    )
     none: float = setting(
         1e-6, "1", "width of the spike of absent effects", "convention: none, but not singular"
     )
@@ -60,6 +68,18 @@ class Gain:
         return self.nats > self.error
 
 
+def one_part_shows(search: Search, hypothesis: Hypothesis) -> bool:
+    """Whether an effect shows in one part of the logs alone, so that what remains without that part
+    says nothing of it."""
+    linear, parts = search.points[hypothesis].linear, search.base.division.parts
+    for effect in hypothesis:
+        i = linear.index(search.problem.candidates[effect].key)
+        shown = np.bincount(parts, linear.gram[:, i, i])
+        if shown.max() > CrossValidationSettings.current().alone * shown.sum():
+            return True
+    return False
+
+
 def left_out(search: Search, hypothesis: Hypothesis, against: Hypothesis = NULL) -> Gain:
     """Gain of one hypothesis over another, each block predicted from all others."""
     ours = _predicted(search, search.points[hypothesis])
@@ -80,19 +100,19 @@ def _predicted(search: Search, point: LinearisationPoint) -> Array:
 
 
 def _powers(search: Search, point: LinearisationPoint, judged: Linear) -> Array:
-    """Sum of squares (b,) that `judged` has of each block under the fit to all others.
+    """Sum of squares (b,) that `judged` has of each part of the logs under the fit to all others.
 
-    A left-out block judges the hypothesis alone: all other effects are absent, and no nominal
+    A left-out part judges the hypothesis alone: all other effects are absent, and no nominal
     figure may leave its tolerance to imitate an effect. How a log begins is taken from all blocks:
     only the first ones show it.
     """
     linear, found = point.linear, []
-    for block in range(len(linear.count)):
-        mask = np.arange(len(linear.count)) == block
+    for part in np.unique(search.parts):
+        mask = search.parts == part
         fit = within_tolerance(search, linear.without(mask), point.hypothesis)
         step = begun(linear, fit) - linear.at
-        one = judged.only(mask)
-        found.append(one.power[0] + 2 * one.slope[0] @ step + step @ one.gram[0] @ step)
+        gram, slope, power = judged.only(mask).total
+        found.append(power + 2 * slope @ step + step @ gram @ step)
     return np.array(found)
 
 

@@ -31,6 +31,7 @@ class LinearSettings(Settings):
     blocks: int = setting(
         4, "1", "fewest blocks: fewer runs are cut in time", "convention: for leaving out a quarter"
     )
+    pieces: int = setting(4, "1", "pieces of a run that are told apart", "convention: quarters")
 
 
 @dataclass(frozen=True)

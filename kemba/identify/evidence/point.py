@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kemba.identify.evidence.linear import Linear, condense, priors, time_blocks
+from kemba.identify.evidence.linear import Linear, LinearSettings, condense, priors, time_blocks
 from kemba.identify.evidence.modes.small_effects import Mode
 from kemba.identify.evidence.refit import Fit
 from kemba.identify.evidence.spike_slab import Hypothesis, Score
@@ -43,12 +43,18 @@ class LinearisationPoint:
 
 
 class Division:
-    """The rows of a problem divided into time blocks (n,) and into aggregation windows."""
+    """The rows of a problem divided into time blocks (n,), quarters of runs, and into aggregation
+    windows; `parts` (b,): which blocks are left out together, as a rule all those of a run."""
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
-        self.blocks: Labels = time_blocks(problem)
         self.windows: Windows = windows_of(problem)
+        usual = time_blocks(problem)
+        fine = time_blocks(problem, LinearSettings.current().pieces * len(problem.runs))
+        windows = np.unique(fine[self.windows.first])
+        short = len(windows) <= fine.max()  # a piece in which no window begins
+        self.blocks: Labels = usual if short else fine
+        self.parts: Labels = usual[np.unique(self.blocks, return_index=True)[1]]
 
     def linear(
         self, theta: Mapping[str, float], names: tuple[str, ...], jacobian: Array, r: Array

@@ -119,12 +119,15 @@ def read_schedule(
     for i in range(feet.shape[1]):
         z, vx, vz = feet[:, i, 1], feet_rate[:, i, 0], feet_rate[:, i, 1]
         level = ground_level(z, vz)
-        near = z < np.maximum(level, wandering_level(z, level, dt)) + limits.may_touch
+        ground = np.maximum(level, wandering_level(z, level, dt))
+        near = z < ground + limits.may_touch
         touches = z < level + limits.touches
         may = _dilate(near, blur)
-        inner = _erode(z < level + limits.stands, settle) & (np.abs(vz) < limits.slow_foot)
+        slow = np.abs(vz) < limits.slow_foot
+        inner = _erode(z < level + limits.stands, settle) & slow
         struck = _after(may, limits.strike / dt)
-        slips = inner & touches & ~struck & (np.abs(vx) > limits.sliding)
+        on_ground = _erode(z < ground + limits.stands, settle) & slow & ~struck
+        slips = on_ground & (np.abs(vx) > limits.sliding)
         slides = np.where(slips, np.sign(vx), 0.0)
         bottom, top = stop_levels(pistons[:, i], stroke)
         at_low = _closed(pistons[:, i] < bottom + near_stop[i], settle)
@@ -148,6 +151,9 @@ def read_schedule(
         )
     *parts, touches, impact = (np.stack(part, axis=1) for part in zip(*legs, strict=True))
     may, settled, struck, slides, low, high, rests, sticks = parts
+    hit = [_after(at_stop, limits.strike / dt) for at_stop in (low | high).T]
+    # an impact shakes all loads: what a foot carries then is not known well enough to be judged
+    slides[struck.any(axis=1) | np.any(hit, axis=0)] = 0.0
     count = touches.sum(axis=1)
     phase = np.array(["flight", "stance1", "stance2"], dtype=object)[np.minimum(count, 2)]
     phase[(count == feet.shape[1]) & (speed < limits.slow_body)] = "rest"
