@@ -21,6 +21,7 @@ from kemba.identify.evidence.noise.left_out_noise import LeftOutNoiseSettings, l
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.search_settings import SearchSettings
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
+from kemba.identify.evidence.strain import strained
 from kemba.identify.evidence.windows import error_ratio
 from kemba.identify.problem.problem import Problem
 from kemba.identify.ranking import error, fitted_errors, ladder, ranked, strength
@@ -168,12 +169,12 @@ def _best_gain(search: Search) -> float:
     """Evidence [nats] of the best single effect over nothing, as in the simulated logs: by the
     slopes about the null's mode. A refit, with shapes of its own, finds more than any of theirs.
 
-    Where the motion depends on the model, slopes along the null's motion tell too little: of the
-    refitted single effects; of the smallest sets that were refitted, where no single effect was. A
-    larger set is one of many more than the simulated logs are searched for, and would look rarer
-    than it is.
+    Where the motion depends on the model, or the null's figures are not believed, slopes there tell
+    too little: of the refitted single effects; of the smallest sets that were refitted, where no
+    single effect was. A larger set is one of many more than the simulated logs are searched for,
+    and would look rarer than it is.
     """
-    if not search.problem.moves:
+    if not search.problem.moves and not strained(search.points[NULL], search.problem).any():
         return search.base.best_gain()
     sizes = [len(h) for h in search.points if h]
     null = search.points[NULL].log_evidence

@@ -2,7 +2,8 @@
 
 A foot that stands is at the height of the ground, whatever pushes it. Lengths that bring more rows
 of the logs to one height are believed where they do so much better than faults of sensors, and
-where the other sign of the body's pitch does not do better still.
+where the other sign of the body's pitch does not do better still. Soft ground, into which a foot
+sinks as it is loaded, is no fault of lengths either: the load is taken from the body's acceleration.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from kemba.identify.problem.types import Array, Candidate, Flags
 from kemba.identify.robot.dynamics.physics import Physics
 from kemba.identify.robot.dynamics.reference import Reference
 from kemba.identify.robot.motion.batch import Batch
+from kemba.identify.robot.motion.contact import steady
 from kemba.mechanism.knee import flexion_of
 from kemba.mechanism.links import altered
 from kemba.settings import BY_HAND, Settings, setting
@@ -57,6 +59,10 @@ class StandingSettings(Settings):
     body: float = setting(3e-3, "m", "prior sigma of the zero of the body's height", BY_HAND)
     angle: float = setting(4e-3, "rad", "prior sigma of the zeros of pitch and hips", BY_HAND)
     piston: float = setting(6e-4, "m", "prior sigma of the zero of a piston", BY_HAND)
+    sink: float = setting(3e-3, "m", "prior sigma of how deep a foot sinks at rest", BY_HAND)
+    soft: float = setting(
+        5e-4, "m", "the same from which feet have no one height that could tell of lengths", BY_HAND
+    )
     lever: float = setting(0.04, "1", "prior sigma of the boom's lever", "derived: two sizes")
     held: float = setting(
         1e-6, "1", "width of what is not free, as a share", "convention: as good as none"
@@ -91,8 +97,9 @@ class StandingLengths:
 class Standing:
     """Heights of the feet at samples of a motion, for any lengths of the legs.
 
-    `names`: the lengths, as they are called in theta; zeros of pitch, height, hips and pistons, and
-    the share by which the boom is longer than drawn follow them in every vector x (k,).
+    `names`: the lengths, as they are called in theta; zeros of pitch, height, hips and pistons, how
+    deep a foot sinks at rest, and the share by which the boom is longer than drawn follow them in
+    every vector x (k,).
     """
 
     def __init__(
@@ -103,23 +110,27 @@ class Standing:
         step = max(1, round(StandingSettings.current().every / dt))
         q = batch.flat(reference.q)[::step]
         y = physics.call("seen", q, 0 * q, p=physics.nominal)[0]
-        self.samples = [ca.DM(q[:, : 3 + self.legs].T), ca.DM(y[:, -self.legs :].T)]
+        lift = steady(reference.a[..., 1:2], dt) / physics.mechanism.need_robot().gravity
+        load = np.maximum(1.0 + batch.flat(lift)[::step, 0], 0.0)
+        self.samples = [
+            ca.DM(a.T) for a in (q[:, : 3 + self.legs], y[:, -self.legs :], load[:, None])
+        ]
         self._map = self._function(physics).map(len(q))
 
     def turned(self) -> Standing:
         """The same with the other sign of the body's pitch."""
         found, q = copy(self), ca.DM(self.samples[0])
         q[2, :] *= -1
-        found.samples = [q, self.samples[1]]
+        found.samples = [q, *self.samples[1:]]
         return found
 
     def _function(self, physics: Physics) -> ca.Function:
-        """(q without knees, pistons, x) -> heights (legs,) and their slopes along x."""
+        """(q without knees, pistons, load, x) -> heights (legs,) and their slopes along x."""
         node, legs, robot = physics.node, self.legs, physics.mechanism.need_robot()
-        x = ca.SX.sym("x", len(self.names) + 3 + 2 * legs)
+        x = ca.SX.sym("x", len(self.names) + 4 + 2 * legs)
         lengths = {n: x[i] for i, n in enumerate(self.names)}
         zeros = x[len(self.names) :]
-        body, pistons = ca.SX.sym("q", 3 + legs), ca.SX.sym("s", legs)
+        body, pistons, load = ca.SX.sym("q", 3 + legs), ca.SX.sym("s", legs), ca.SX.sym("load")
         shape = altered(robot, {n.removeprefix(GEOMETRY).removesuffix(".d"): d
                                 for n, d in lengths.items()})  # fmt: skip
         extension = pistons - zeros[2 + legs : 2 + 2 * legs]
@@ -134,7 +145,8 @@ class Standing:
         p = ca.vertcat(*(lengths.get(n, ca.SX(value)) for n, value in nominal))
         feet = ca.vertcat(*(node.outputs[f"{leg}/foot/z"] for leg in physics.legs))
         heights = ca.substitute(feet, ca.vertcat(node.q, node.p), ca.vertcat(q, p))
-        return ca.Function("standing", [body, pistons, x], [heights, ca.jacobian(heights, x)])
+        heights += load * zeros[-2]
+        return ca.Function("standing", [body, pistons, load, x], [heights, ca.jacobian(heights, x)])
 
     def heights(self, x: Array) -> tuple[Array, Array]:
         """Heights (n, legs) [m] of the feet, and their slopes (n, legs, k)."""
@@ -155,7 +167,7 @@ def standing_lengths(
     standing = Standing(physics, batch, reference, tuple(sizes))
     settings, legs = StandingSettings.current(), standing.legs
     zeros = [settings.angle, settings.body, *[settings.angle] * legs, *[settings.piston] * legs]
-    lengths = [settings.prior * size for size in sizes.values()]
+    lengths, zeros = [settings.prior * size for size in sizes.values()], [*zeros, settings.sink]
     free = np.array([*lengths, *zeros, settings.lever])
     width = np.array([*lengths, *zeros, settings.lever * settings.held])
     start = np.zeros(len(width))
@@ -171,7 +183,7 @@ def standing_lengths(
     if _is_turned(standing, x, width, rows):
         return StandingLengths(turned=True)
     _, without, _ = _only(standing, (), x, width, rows)
-    if without - cost < settings.gain:
+    if without - cost < settings.gain or x[-2] > settings.soft:
         return StandingLengths()
     singles = [_only(standing, (i,), x, width, rows) for i in range(len(sizes))]
     one, alone, _ = min(singles, key=lambda fit: fit[1])

@@ -1,0 +1,42 @@
+"""Which parts of the logs are left out: runs, or quarters of runs where one run alone shows it."""
+
+from __future__ import annotations
+
+import pytest
+from toy_problem import Toy
+
+from kemba.identify.discover import discover
+from kemba.identify.doubt.cross_validation import CrossValidationSettings
+from kemba.identify.evidence.search import Search
+
+
+def one_run_hums(size: float) -> Toy:
+    """Four runs; what `hum` is a force of acts in the third one only."""
+    problem = Toy({}, runs=4)
+    problem._shapes["hum"] = problem._shapes["hum"] * (problem.rows().run == 2)
+    problem.measured = problem.measured + size * problem._shapes["hum"]
+    return problem
+
+
+def test_runs_are_left_out_whole() -> None:
+    search = Search(Toy({"kick.a": 8.0}, runs=4))
+    best = search.run()
+    assert len(search.parts) == 16 and len(set(search.parts.tolist())) == 4
+    assert search.points[best].linear.count.sum() == len(search.problem.rows())
+    assert discover(Toy({"kick.a": 8.0}, runs=4)).answer.split_by == "runs"
+
+
+def test_what_one_run_alone_shows_is_found() -> None:
+    answer = discover(one_run_hums(8.0)).answer
+    assert answer.verdict == "missing" and answer.added == ("hum",)
+    assert answer.split_by == "time blocks"
+
+
+def test_left_out_whole_that_run_could_not_confirm_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = CrossValidationSettings(alone=1.0)
+    monkeypatch.setattr(CrossValidationSettings, "current", classmethod(lambda cls: whole))
+    assert discover(one_run_hums(8.0)).answer.added == ()
+
+
+def test_what_one_run_alone_shows_is_not_found_where_it_is_not() -> None:
+    assert discover(one_run_hums(0.0)).answer.verdict == "nothing"
