@@ -42,6 +42,13 @@ def test_standing_feet_show_a_wrong_length(part: str) -> None:
     problem.validate()  # a wrong length is to be found; it is not bad data
 
 
+@pytest.mark.parametrize("k", [12e3, 30e3])
+def test_feet_that_sink_into_soft_ground_are_no_fault_of_lengths(k: float) -> None:
+    """Under the load of a push or a landing they sink several times as deep as at rest."""
+    logs, _ = hops(hidden("ground_compliance", k=k), runs=3, seed=3)
+    assert robot_problem(logs, load_model("planning")).lengths == {}
+
+
 def with_pitch(log: Trajectory, change: Callable[[Array], Array]) -> Trajectory:
     return log.with_columns({"body/pitch [rad]": change(log["body/pitch"])})
 

@@ -13,7 +13,7 @@ RISE, SINK = 0.07, 0.24  # s, of a push and of the way down
 
 
 class Slides:
-    """Goal: strides of the feet towards each other, each of its own width, then rises of the knees."""
+    """Goal: strides of the feet towards each other, each of its own width, then rises of knees."""
 
     def __init__(self, rng, strides: int = 3, rises: int = 2):
         self.widths = rng.uniform(0.25, 0.4, strides)

@@ -2,8 +2,8 @@
 
 A foot that stands is at the height of the ground, whatever pushes it. Lengths that bring more rows
 of the logs to one height are believed where they do so much better than faults of sensors, and
-where the other sign of the body's pitch does not do better still. Soft ground, into which a foot
-sinks as it is loaded, is no fault of lengths either: the load is taken from the body's acceleration.
+where the other sign of the body's pitch does not do better still. Nor where the ground is soft: a
+foot sinks into it as it is loaded, and its load goes with the body's acceleration.
 """
 
 from __future__ import annotations
