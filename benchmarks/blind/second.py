@@ -51,7 +51,7 @@ MANY = [
 ]
 REPEATS = ((SINGLES, 3), (SHAPES, 4), (SENSORS, 2), (UNKNOWN, 4), (MANY, 4), ([None], 40))
 MORE = 6  # further machines of each of MANY, at the end: sixty with several effects in all
-SEED = 7000
+SEED = 13000  # cases of other seeds were looked at while the method was built
 SIZES, NOISES = (1.0, 0.7, 1.5), (1.0, 2.0, 0.5)
 AIR = ("first_order", "first_order", "orifice", "first_order")
 MODELS = {"first_order": "planning", "orifice": str(Path(__file__).parent / "orifice_robot.yaml")}
@@ -69,7 +69,7 @@ def cases() -> list[dict[str, Any]]:
             "size": SIZES[turn % 3],
             "noise": NOISES[(turn + turn // 3) % 3],
             "figures_off": float(rng.choice([0.01, 0.02])),
-            "runs": 5 if isinstance(effect, list) else 3,
+            "runs": 5 if isinstance(effect, list) else 4,
             "air": str(rng.choice(AIR)),
             "colour": study.colour(i),
         }

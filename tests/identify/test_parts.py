@@ -6,7 +6,7 @@ import pytest
 from toy_problem import Toy
 
 from kemba.identify.discover import discover
-from kemba.identify.doubt.cross_validation import CrossValidationSettings
+from kemba.identify.doubt.cross_validation import CrossValidationSettings, window_powers
 from kemba.identify.evidence.search import Search
 
 
@@ -21,7 +21,10 @@ def one_run_hums(size: float) -> Toy:
 def test_runs_are_left_out_whole() -> None:
     search = Search(Toy({"kick.a": 8.0}, runs=4))
     best = search.run()
-    assert len(search.parts) == 16 and len(set(search.parts.tolist())) == 4
+    parts = search.base.division.parts
+    assert len(parts) == 16 and len(set(parts.tolist())) == 4
+    assert len(window_powers(search, best)) == 4
+    assert len(window_powers(search, best, fine=True)) == 16
     assert search.points[best].linear.count.sum() == len(search.problem.rows())
     assert discover(Toy({"kick.a": 8.0}, runs=4)).answer.split_by == "runs"
 

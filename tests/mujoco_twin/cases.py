@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 from twin import logs
-from twin.cases import DISTURBANCE, ROBOT_MOTIONS, coloured
+from twin.cases import DISTURBANCE, SHOWING, coloured
 from twin.catalogue import CATALOGUE, SENSOR_KINDS, SENSOR_SIZES, hidden
 from twin.repertoire import motion
 
@@ -78,7 +78,7 @@ def robot_case(
     filters = sensors.filters(np.random.default_rng([seed, 6]))
     paths = []
     for i in range(runs):
-        name = ROBOT_MOTIONS[0 if i < 2 else i - 1]
+        name = SHOWING[0 if i < 2 else i - 1]
         number = int(seed % MOTION_SEEDS if i < 2 else rng.integers(MOTION_SEEDS))
         done, group = _survivor(made, name, number, [seed, 2, i], disturbance, filters)
         columns = sensors.columns(done, made.read, faults, [seed, 3, i])

@@ -1,7 +1,12 @@
-"""Does it hold on data it was not fitted to? Each block of time is predicted from the others."""
+"""Does it hold on data it was not fitted to? Each part of the logs is predicted from the others.
+
+Parts are runs, or quarters of runs where one run alone shows the effect that is judged: the others
+say nothing of it.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,11 +73,11 @@ class Gain:
         return self.nats > self.error
 
 
-def one_part_shows(search: Search, hypothesis: Hypothesis) -> bool:
-    """Whether an effect shows in one part of the logs alone, so that what remains without that part
-    says nothing of it."""
-    linear, parts = search.points[hypothesis].linear, search.base.division.parts
-    for effect in hypothesis:
+def one_part_shows(search: Search, effects: Iterable[str]) -> bool:
+    """Whether one of the effects shows in one part of the logs alone, so that what remains without
+    that part says nothing of it."""
+    linear, parts = search.points[NULL].linear, search.base.division.parts
+    for effect in effects:
         i = linear.index(search.problem.candidates[effect].key)
         shown = np.bincount(parts, linear.gram[:, i, i])
         if shown.max() > CrossValidationSettings.current().alone * shown.sum():
@@ -81,11 +86,18 @@ def one_part_shows(search: Search, hypothesis: Hypothesis) -> bool:
 
 
 def left_out(search: Search, hypothesis: Hypothesis, against: Hypothesis = NULL) -> Gain:
-    """Gain of one hypothesis over another, each block predicted from all others."""
-    ours = _predicted(search, search.points[hypothesis])
-    theirs = _predicted(search, search.points[against])
-    gains = ours - theirs
-    return gained(gains)
+    """Gain of one hypothesis over another, row by row, each part predicted from all others."""
+    fine = one_part_shows(search, set(hypothesis) ^ set(against))
+    ours, theirs = (search.points[h] for h in (hypothesis, against))
+    worse = _powers(search, theirs, theirs.linear, fine)
+    return gained(0.5 * (worse - _powers(search, ours, ours.linear, fine)))
+
+
+def window_gain(search: Search, hypothesis: Hypothesis, against: Hypothesis) -> Gain:
+    """The same of the rows summed over aggregation windows."""
+    fine = one_part_shows(search, set(hypothesis) ^ set(against))
+    ours, theirs = (window_powers(search, h, fine) for h in (hypothesis, against))
+    return gained(0.5 * (theirs - ours))
 
 
 def gained(gains: Array) -> Gain:
@@ -94,21 +106,18 @@ def gained(gains: Array) -> Gain:
     return Gain(float(gains.sum()), float(np.sqrt(count) * gains.std(ddof=1)) if count > 1 else 0.0)
 
 
-def _predicted(search: Search, point: LinearisationPoint) -> Array:
-    """Log likelihood (b,) of each block under the fit to all others."""
-    return -0.5 * _powers(search, point, point.linear)
-
-
-def _powers(search: Search, point: LinearisationPoint, judged: Linear) -> Array:
-    """Sum of squares (b,) that `judged` has of each part of the logs under the fit to all others.
+def _powers(search: Search, point: LinearisationPoint, judged: Linear, fine: bool = False) -> Array:
+    """Sum of squares (p,) that `judged` has of each part of the logs under the fit to all others.
+    The parts are runs, as a rule; `fine`: quarters of runs.
 
     A left-out part judges the hypothesis alone: all other effects are absent, and no nominal
     figure may leave its tolerance to imitate an effect. How a log begins is taken from all blocks:
     only the first ones show it.
     """
-    linear, found = point.linear, []
-    for part in np.unique(search.parts):
-        mask = search.parts == part
+    linear, division, found = point.linear, search.base.division, []
+    parts = np.arange(len(division.parts)) if fine else division.parts
+    for part in np.unique(parts):
+        mask = parts == part
         fit = within_tolerance(search, linear.without(mask), point.hypothesis)
         step = begun(linear, fit) - linear.at
         gram, slope, power = judged.only(mask).total
@@ -153,14 +162,15 @@ def begun(linear: Linear, z: Array) -> Array:
 
 
 def left_out_error(search: Search, hypothesis: Hypothesis) -> float:
-    """RMS of whitened residuals summed over aggregation windows, as `error_ratio`, each block of
-    time predicted from all others."""
-    point = search.points[hypothesis]
-    power = float(left_out_powers(search, hypothesis).sum())
-    return float(np.sqrt(max(power, 0.0) / point.windowed.count.sum()))
+    """RMS of whitened residuals summed over aggregation windows, as `error_ratio`, each part of the
+    logs predicted from all others."""
+    power = float(window_powers(search, hypothesis, search.in_pieces).sum())
+    return float(np.sqrt(max(power, 0.0) / search.points[hypothesis].windowed.count.sum()))
 
 
-def left_out_powers(search: Search, hypothesis: Hypothesis) -> Array:
-    """Sum of squares (b,) behind this error, of each block."""
+def window_powers(search: Search, hypothesis: Hypothesis, fine: bool = False) -> Array:
+    """Sum of squares (p,) behind this error, of each part; `fine`: of quarters of runs."""
     point = search.points[hypothesis]
-    return _powers(search, point, point.windowed)
+    if fine not in point.left_out:
+        point.left_out[fine] = _powers(search, point, point.windowed, fine)
+    return point.left_out[fine]

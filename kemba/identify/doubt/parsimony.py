@@ -15,18 +15,12 @@ answer, and the windowed error of blocks that the fit has not seen may call for 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-import numpy as np
-
-from kemba.identify.doubt.cross_validation import gained, left_out, left_out_powers
+from kemba.identify.doubt.cross_validation import left_out, window_gain, window_powers
 from kemba.identify.evidence.bootstrap import BootstrapSettings
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis, log_prior
-from kemba.identify.problem.problem import Array
-
-Powers = Mapping[Hypothesis, Array]  # left-out sum of squares (b,) of every block
 
 
 @dataclass(frozen=True)
@@ -56,10 +50,10 @@ def simplest(search: Search, belief: Belief) -> Belief:
     """
     best = belief.best
     _thin(search, best)
-    powers = {h: left_out_powers(search, h) for h in _known_parts(search, best)}
-    least = min(powers.values(), key=np.sum)
-    equal = [h for h in powers if as_good(powers[h], least)]
-    fine = [h for h in equal if overclaimed(search, h, best, powers)] or [best]
+    known = _known_parts(search, best)
+    least = min(known, key=lambda h: window_powers(search, h).sum())
+    equal = [h for h in known if as_good(search, h, least)]
+    fine = [h for h in equal if overclaimed(search, h, best)] or [best]
     few = [h for h in fine if len(h) == min(map(len, fine))]
     chosen = max(few, key=lambda h: search.points[h].log_evidence)
     if chosen == best:
@@ -74,14 +68,13 @@ def _thin(search: Search, best: Hypothesis) -> None:
     """Refit the answer with ever fewer effects: each time without the one that is missed least, for
     as long as the error stays within one standard error of the smallest, and until the answer is
     due."""
-    rest, least = best, left_out_powers(search, best)
+    rest = least = best
     while len(rest) > 1 and not search.late:
         smaller = parts_of(rest)
         _visit(search, smaller)
-        powers = {h: left_out_powers(search, h) for h in smaller}
-        rest = min(smaller, key=lambda h: powers[h].sum())
-        least = min(least, powers[rest], key=np.sum)
-        if not as_good(powers[rest], least):
+        rest = min(smaller, key=lambda h: window_powers(search, h).sum())
+        least = min(least, rest, key=lambda h: window_powers(search, h).sum())
+        if not as_good(search, rest, least):
             break
 
 
@@ -114,10 +107,10 @@ def _visit(search: Search, hypotheses: list[Hypothesis]) -> None:
     search.refresh()
 
 
-def overclaimed(search: Search, smaller: Hypothesis, larger: Hypothesis, powers: Powers) -> bool:
+def overclaimed(search: Search, smaller: Hypothesis, larger: Hypothesis) -> bool:
     """Whether rows of left-out blocks gain nothing by the larger hypothesis, or more than their
     windows do."""
-    windows = gained(0.5 * (powers[smaller] - powers[larger]))
+    windows = window_gain(search, larger, smaller)
     rows = left_out(search, larger, smaller)
     return rows.nats <= 0 or windows.nats + windows.error < rows.nats
 
@@ -127,14 +120,13 @@ def _instead(search: Search, belief: Belief, chosen: Hypothesis) -> Belief:
     one standard error, are its rivals, whatever their evidence is, which was not believed of the
     larger one either; those that predict worse are dismissed, and so are larger ones that predict
     no better."""
-    own, rivals, dismissed = left_out_powers(search, chosen), [], {belief.best, *belief.dismissed}
+    rivals, dismissed = [], {belief.best, *belief.dismissed}
     for other in search.points:
         if len(other) < len(chosen) or other == chosen:
             continue
-        powers = left_out_powers(search, other)
-        if len(other) == len(chosen) and as_good(powers, own):
+        if len(other) == len(chosen) and as_good(search, other, chosen):
             rivals.append(other)
-        elif as_good(own, powers):
+        elif as_good(search, chosen, other):
             dismissed.add(other)
     remark = _remark(search, belief.best, chosen)
     return replace(
@@ -149,7 +141,7 @@ def _instead(search: Search, belief: Belief, chosen: Hypothesis) -> Belief:
 def is_idle(search: Search, best: Hypothesis) -> bool:
     """Whether left-out data, summed over aggregation windows, gain no more by an answer than their
     scatter. Its p-value counts rows, whose noise may be slower than it is taken to be."""
-    return as_good(left_out_powers(search, NULL), left_out_powers(search, best))
+    return as_good(search, NULL, best)
 
 
 def none_of(belief: Belief) -> Belief:
@@ -162,10 +154,10 @@ def none_of(belief: Belief) -> Belief:
     return replace(none, remarks=(*belief.remarks, remark))
 
 
-def as_good(powers: Array, least: Array) -> bool:
-    """Whether left-out sums of squares (b,) are within one standard error of the `least` ones, or
-    less than any evidence is between them."""
-    gain = gained(0.5 * (powers - least))
+def as_good(search: Search, hypothesis: Hypothesis, best: Hypothesis) -> bool:
+    """Whether a hypothesis predicts left-out data as well as the `best`: within one standard error
+    of it, or with less than any evidence between them."""
+    gain = window_gain(search, best, hypothesis)
     return not gain.pays or gain.nats < BootstrapSettings.current().least
 
 

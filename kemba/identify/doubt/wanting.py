@@ -12,7 +12,7 @@ for whatever imitates that: of a foreign plan, with 2.9 times the noise left, th
 
 from __future__ import annotations
 
-from kemba.identify.doubt.cross_validation import left_out, left_out_error, left_out_powers
+from kemba.identify.doubt.cross_validation import left_out, left_out_error, window_powers
 from kemba.identify.doubt.parsimony import as_good
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import Hypothesis
@@ -27,7 +27,7 @@ def fuller(search: Search, best: Hypothesis) -> Hypothesis:
     asked = [h for h in larger if is_asked(search, h, best)]
     if not asked:
         return best
-    return fuller(search, min(asked, key=lambda h: left_out_powers(search, h).sum()))
+    return fuller(search, min(asked, key=lambda h: window_powers(search, h).sum()))
 
 
 def wanted(search: Search, hypothesis: Hypothesis, effect: str, share: float) -> bool:
@@ -56,5 +56,4 @@ def is_asked(search: Search, larger: Hypothesis, smaller: Hypothesis) -> bool:
     faulty = any(is_fault(effect) for effect in larger if effect not in smaller)
     if faulty or left_out_error(search, larger) > VerdictSettings.current().whole:
         return False
-    powers = left_out_powers(search, smaller), left_out_powers(search, larger)
-    return left_out(search, larger, smaller).pays and not as_good(*powers)
+    return left_out(search, larger, smaller).pays and not as_good(search, smaller, larger)

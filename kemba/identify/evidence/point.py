@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -21,7 +21,7 @@ class LinearisationPoint:
 
     `linear`: by rows; `windowed`: by sums over aggregation windows; in both of them effects that it
     does not name are absent. `mode`: its best fit, where they may be there a little.
-    `score`: evidence of the hypothesis.
+    `score`: evidence of the hypothesis. `left_out`: errors that are computed already.
     """
 
     hypothesis: Hypothesis
@@ -30,6 +30,7 @@ class LinearisationPoint:
     windowed: Linear
     mode: Mode
     score: Score
+    left_out: dict[bool, Array] = field(default_factory=dict, compare=False)
 
     @property
     def log_evidence(self) -> float:

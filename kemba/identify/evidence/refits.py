@@ -16,7 +16,7 @@ from kemba.identify.evidence.point import LinearisationPoint
 from kemba.identify.evidence.refit import Fit, refit
 from kemba.identify.evidence.search_settings import SearchSettings
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis, log_prior, probabilities
-from kemba.identify.problem.problem import Labels, Problem
+from kemba.identify.problem.problem import Problem
 from kemba.stopwatch import Stage
 
 
@@ -28,7 +28,7 @@ class Refits:
     motion found again. `deadline`: when to stop searching, `due`: when the answer is due, by
     `time.monotonic` [s]. `say`: told of progress. `points`: every hypothesis that was refitted.
     `begin`: figures of the model as it is, where a fit found them already. `base`: the null model.
-    `in_pieces`: quarters of runs are left out, and not whole runs.
+    `in_pieces`: the error that is told is of quarters of runs left out, and not of whole runs.
     """
 
     problem: Problem
@@ -53,12 +53,6 @@ class Refits:
     def late(self) -> bool:
         """Whether the answer is due: nothing more is refitted to doubt it."""
         return time.monotonic() > self.due
-
-    @property
-    def parts(self) -> Labels:
-        """Which blocks (b,) of the logs are left out together."""
-        parts = self.base.division.parts
-        return np.arange(len(parts)) if self.in_pieces else parts
 
     def visit(self, hypothesis: Hypothesis, number: int = 1, of: int = 1) -> LinearisationPoint:
         """Refit a hypothesis, once, and score it there; `number` `of` so many, for who waits."""
