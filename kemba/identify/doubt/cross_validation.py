@@ -6,7 +6,7 @@ say nothing of it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +18,7 @@ from kemba.identify.evidence.point import LinearisationPoint
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
 from kemba.identify.evidence.windows import START
-from kemba.identify.problem.problem import Array
+from kemba.identify.problem.problem import Array, Labels
 from kemba.settings import BY_HAND, Settings, setting
 
 
@@ -57,7 +57,7 @@ class CrossValidationSettings(Settings):
 
 @dataclass(frozen=True)
 class Gain:
-    """Log likelihood gained on left-out data [nats], and its standard error over blocks."""
+    """Log likelihood gained on left-out data [nats], and its standard error over their parts."""
 
     nats: float
     error: float
@@ -76,34 +76,59 @@ class Gain:
 def one_part_shows(search: Search, effects: Iterable[str]) -> bool:
     """Whether one of the effects shows in one part of the logs alone, so that what remains without
     that part says nothing of it."""
-    linear, parts = search.points[NULL].linear, search.base.division.parts
-    for effect in effects:
-        i = linear.index(search.problem.candidates[effect].key)
-        shown = np.bincount(parts, linear.gram[:, i, i])
-        if shown.max() > CrossValidationSettings.current().alone * shown.sum():
-            return True
-    return False
+    alone = CrossValidationSettings.current().alone
+    shown = (_shown(search, [effect]) for effect in effects)
+    return any(each.max() > alone * each.sum() for each in shown)
+
+
+def _shown(search: Search, effects: Iterable[str], fine: bool = False) -> Array:
+    """How much each part of the logs (p,) tells of effects of their usual size."""
+    linear, parts = search.points[NULL].linear, parts_of(search, fine)
+    leads = [search.problem.candidates[effect] for effect in effects]
+    at = [linear.index(c.key) for c in leads]
+    power = linear.gram[:, at, at] @ np.array([c.lead.size**2 for c in leads])
+    return np.asarray(np.bincount(parts, power), dtype=float)
+
+
+def parts_of(search: Search, fine: bool) -> Labels:
+    """Which blocks (b,) of the logs are left out together: runs, as a rule; `fine`: quarters."""
+    parts = search.base.division.parts
+    return np.arange(len(parts)) if fine else parts
 
 
 def left_out(search: Search, hypothesis: Hypothesis, against: Hypothesis = NULL) -> Gain:
     """Gain of one hypothesis over another, row by row, each part predicted from all others."""
-    fine = one_part_shows(search, set(hypothesis) ^ set(against))
-    ours, theirs = (search.points[h] for h in (hypothesis, against))
-    worse = _powers(search, theirs, theirs.linear, fine)
-    return gained(0.5 * (worse - _powers(search, ours, ours.linear, fine)))
+    effects = set(hypothesis) ^ set(against)
+    fine = one_part_shows(search, effects)
+    points = (search.points[h] for h in (hypothesis, against))
+    ours, theirs = (_powers(search, point, point.linear, fine) for point in points)
+    return _gained(search, theirs - ours, effects, fine)
 
 
 def window_gain(search: Search, hypothesis: Hypothesis, against: Hypothesis) -> Gain:
     """The same of the rows summed over aggregation windows."""
-    fine = one_part_shows(search, set(hypothesis) ^ set(against))
+    effects = set(hypothesis) ^ set(against)
+    fine = one_part_shows(search, effects)
     ours, theirs = (window_powers(search, h, fine) for h in (hypothesis, against))
-    return gained(0.5 * (theirs - ours))
+    return _gained(search, theirs - ours, effects, fine)
 
 
-def gained(gains: Array) -> Gain:
-    """Sum of gains (b,) [nats] of blocks, and its standard error."""
-    count = len(gains)
-    return Gain(float(gains.sum()), float(np.sqrt(count) * gains.std(ddof=1)) if count > 1 else 0.0)
+def _gained(search: Search, powers: Array, effects: Collection[str], fine: bool) -> Gain:
+    """The gain by which sums of squares (p,) of parts fall."""
+    return gained(0.5 * powers, _shown(search, effects, fine))
+
+
+def gained(gains: Array, shown: Array) -> Gain:
+    """Sum of gains (p,) [nats] of parts, and its standard error.
+
+    That of a ratio estimator (Cochran 1977, 6.4): a part is expected to gain as much as it has
+    `shown` (p,) of what is judged. Where all gain alike, it is the usual standard error; a swing
+    that alone shows a motor's torque is no scatter beside jumps that cannot.
+    """
+    total, count = float(gains.sum()), len(gains)
+    share = shown / shown.sum() if shown.sum() > 0 else np.full(count, 1.0 / count)
+    scatter = float(np.sum((gains - share * total) ** 2))
+    return Gain(total, float(np.sqrt(count / (count - 1) * scatter)) if count > 1 else 0.0)
 
 
 def _powers(search: Search, point: LinearisationPoint, judged: Linear, fine: bool = False) -> Array:
@@ -114,8 +139,7 @@ def _powers(search: Search, point: LinearisationPoint, judged: Linear, fine: boo
     figure may leave its tolerance to imitate an effect. How a log begins is taken from all blocks:
     only the first ones show it.
     """
-    linear, division, found = point.linear, search.base.division, []
-    parts = np.arange(len(division.parts)) if fine else division.parts
+    linear, parts, found = point.linear, parts_of(search, fine), []
     for part in np.unique(parts):
         mask = parts == part
         fit = within_tolerance(search, linear.without(mask), point.hypothesis)
