@@ -2,12 +2,31 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from toy_problem import Toy
 
 from kemba.identify.discover import discover
-from kemba.identify.doubt.cross_validation import CrossValidationSettings, window_powers
+from kemba.identify.doubt.cross_validation import (
+    CrossValidationSettings,
+    gained,
+    window_powers,
+)
 from kemba.identify.evidence.search import Search
+
+
+def test_parts_that_gain_alike_have_the_usual_standard_error() -> None:
+    gains = np.array([3.0, -1.0, 2.0, 4.0])
+    gain = gained(gains, np.ones(4))
+    assert gain.nats == 8.0
+    assert gain.error == pytest.approx(2.0 * gains.std(ddof=1))
+    assert gained(gains, np.zeros(4)) == gain  # nothing is shown anywhere
+
+
+def test_parts_that_gain_what_they_can_show_do_not_scatter() -> None:
+    shown = np.array([1.0, 0.0, 8.0, 1.0])
+    assert gained(2.0 * shown, shown).error == pytest.approx(0.0, abs=1e-12)
+    assert gained(2.0 * shown[::-1], shown).error > 10.0
 
 
 def one_run_hums(size: float) -> Toy:
