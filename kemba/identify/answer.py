@@ -104,12 +104,12 @@ FEW = 2  # parameters of an effect that a sentence has room for
 ENDED = "the time limit ended the search; with a larger --time-limit it goes on"
 
 
-def phrase(answer: Answer) -> str:
-    """The verdict in one plain sentence."""
+def phrase(answer: Answer, idle: bool = False) -> str:
+    """The verdict in one plain sentence; `idle`: left-out data gained nothing by what would fit."""
     if answer.verdict == "nothing":
         what = "Nothing is missing as far as these data can tell"
         if answer.p_value_nothing <= DiscoverSettings.current().significant:
-            what = "What differs is too small to matter"
+            what = f"What differs {'may be chance' if idle else 'is too small to matter'}"
         return (
             f"{what} (p = {answer.p_value_nothing:.2g}); "
             f"the error is {answer.error_after:.2f} times the noise."

@@ -143,6 +143,8 @@ def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> 
     ranking = ranked(search, belief, holdout)
     answer = _answer(search, best, p_value, test, ranking, formula, holdout, doubts)
     answer.remarks = [*answer.remarks, *belief.remarks]
+    if belief.idle and answer.verdict == "nothing":
+        answer.sentence = phrase(answer, idle=True)
     if ended and ENDED not in answer.remarks:
         answer.remarks = [*answer.remarks, ENDED]
     return Discovery(answer, search, best, holdout, fitted_errors(search, best))

@@ -69,5 +69,5 @@ def test_what_left_out_data_do_not_need_is_not_named() -> None:
     problem.measured = problem.measured + 4.0 * problem._shapes["wave"]
     answer = discover(problem).answer
     assert (answer.verdict, answer.added) == ("nothing", ())
-    assert answer.sentence.startswith("What differs is too small to matter (p = 0.00")
+    assert answer.sentence.startswith("What differs may be chance (p = 0.00")
     assert any("wave would fit these readings better" in remark for remark in answer.remarks)

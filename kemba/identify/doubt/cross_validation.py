@@ -83,14 +83,14 @@ def one_part_shows(search: Search, effects: Iterable[str]) -> bool:
 
 def _shown(search: Search, effects: Iterable[str], fine: bool = False) -> Array:
     """How much each part of the logs (p,) tells of effects of their usual size."""
-    linear, parts = search.points[NULL].linear, parts_of(search, fine)
+    linear, parts = search.points[NULL].linear, folds(search, fine)
     leads = [search.problem.candidates[effect] for effect in effects]
     at = [linear.index(c.key) for c in leads]
     power = linear.gram[:, at, at] @ np.array([c.lead.size**2 for c in leads])
     return np.asarray(np.bincount(parts, power), dtype=float)
 
 
-def parts_of(search: Search, fine: bool) -> Labels:
+def folds(search: Search, fine: bool) -> Labels:
     """Which blocks (b,) of the logs are left out together: runs, as a rule; `fine`: quarters."""
     parts = search.base.division.parts
     return np.arange(len(parts)) if fine else parts
@@ -139,7 +139,7 @@ def _powers(search: Search, point: LinearisationPoint, judged: Linear, fine: boo
     figure may leave its tolerance to imitate an effect. How a log begins is taken from all blocks:
     only the first ones show it.
     """
-    linear, parts, found = point.linear, parts_of(search, fine), []
+    linear, parts, found = point.linear, folds(search, fine), []
     for part in np.unique(parts):
         mask = parts == part
         fit = within_tolerance(search, linear.without(mask), point.hypothesis)

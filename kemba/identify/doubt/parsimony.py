@@ -29,6 +29,7 @@ class Belief:
 
     `dismissed`: hypotheses that are too small, refuted, or no better than a smaller one. `rivals`:
     others, with as many effects, that predict left-out data as well. `remarks`: what was left out.
+    `idle`: all of it was, since left-out data gain nothing by it.
     """
 
     best: Hypothesis = NULL
@@ -36,6 +37,7 @@ class Belief:
     dismissed: frozenset[Hypothesis] = frozenset()
     rivals: tuple[Hypothesis, ...] = ()
     remarks: tuple[str, ...] = ()
+    idle: bool = False
 
     def without(self, hypothesis: Hypothesis, best: Hypothesis) -> Belief:
         """The same with `hypothesis` dismissed for `best`."""
@@ -151,7 +153,7 @@ def none_of(belief: Belief) -> Belief:
         "predicted as well without: it may be chance"
     )
     none = belief.without(belief.best, NULL)
-    return replace(none, remarks=(*belief.remarks, remark))
+    return replace(none, remarks=(*belief.remarks, remark), idle=True)
 
 
 def as_good(search: Search, hypothesis: Hypothesis, best: Hypothesis) -> bool:
