@@ -151,8 +151,9 @@ class Search(Refits):
             self.visit(hypothesis, number, len(order))
 
     def _try_stand_ins(self) -> None:
-        """Refit the effects that may stand behind nominal figures which the null moves too far."""
-        for hypothesis, start in stand_ins(self.points[NULL], self.problem).items():
+        """Refit the effects that may stand behind nominal figures which the best model so far moves
+        too far."""
+        for hypothesis, start in stand_ins(self.points[self.best()], self.problem).items():
             if self.ended:
                 break
             if hypothesis not in self.points:

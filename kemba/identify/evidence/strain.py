@@ -1,4 +1,4 @@
-"""Nominal figures that the model as it is moves too far, and effects that may stand behind them.
+"""Nominal figures that a model moves too far, and effects that may stand behind them.
 
 An effect that is like some nominal figures (slow valves and small orifices) hides in them: the
 model without it fits almost as well, with figures that nobody would believe. Slopes there say
@@ -28,17 +28,17 @@ class StrainSettings(Settings):
     tried: int = setting(3, "1", "effects that are tried in place of such figures", BY_HAND)
 
 
-def strained(null: LinearisationPoint, problem: Problem) -> Flags:
-    """Which of the null's parameters (k,) are nominal figures that are not believed."""
-    linear, far = null.linear, StrainSettings.current().far
+def strained(point: LinearisationPoint, problem: Problem) -> Flags:
+    """Which of a point's parameters (k,) are nominal figures that are not believed."""
+    linear, far = point.linear, StrainSettings.current().far
     figure = np.array([name in problem.nuisance for name in linear.names])
     return np.asarray(figure & (np.abs(linear.at - linear.mean) > far * linear.width))
 
 
-def stand_ins(null: LinearisationPoint, problem: Problem) -> dict[Hypothesis, dict[str, float]]:
+def stand_ins(point: LinearisationPoint, problem: Problem) -> dict[Hypothesis, dict[str, float]]:
     """Single effects that change predictions most as these figures do, and where their refits
     begin: the figures back at their usual values, the effect in their place."""
-    linear, moved = null.linear, strained(null, problem)
+    linear, moved = point.linear, strained(point, problem)
     if not moved.any():
         return {}
     gram, _, _ = linear.total
