@@ -20,7 +20,7 @@ def test_parts_that_gain_alike_have_the_usual_standard_error() -> None:
     gain = gained(gains, np.ones(4))
     assert gain.nats == 8.0
     assert gain.error == pytest.approx(2.0 * gains.std(ddof=1))
-    assert gained(gains, np.zeros(4)) == gain  # nothing is shown anywhere
+    assert gained(gains, np.zeros(4)) == gain  # both predict the same
 
 
 def test_parts_that_gain_what_they_can_show_do_not_scatter() -> None:

@@ -6,7 +6,6 @@ say nothing of it.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -73,21 +72,23 @@ class Gain:
         return self.nats > self.error
 
 
-def one_part_shows(search: Search, effects: Iterable[str]) -> bool:
-    """Whether one of the effects shows in one part of the logs alone, so that what remains without
-    that part says nothing of it."""
-    alone = CrossValidationSettings.current().alone
-    shown = (_shown(search, [effect]) for effect in effects)
-    return any(each.max() > alone * each.sum() for each in shown)
+def one_part_shows(search: Search, hypothesis: Hypothesis, against: Hypothesis = NULL) -> bool:
+    """Whether one part of the logs alone can tell two hypotheses apart, so that what remains
+    without that part says nothing of it."""
+    apart = _apart(search, hypothesis, against)
+    return bool(apart.max() > CrossValidationSettings.current().alone * apart.sum())
 
 
-def _shown(search: Search, effects: Iterable[str], fine: bool = False) -> Array:
-    """How much each part of the logs (p,) tells of effects of their usual size."""
-    linear, parts = search.points[NULL].linear, folds(search, fine)
-    leads = [search.problem.candidates[effect] for effect in effects]
-    at = [linear.index(c.key) for c in leads]
-    power = linear.gram[:, at, at] @ np.array([c.lead.size**2 for c in leads])
-    return np.asarray(np.bincount(parts, power), dtype=float)
+def _apart(
+    search: Search, hypothesis: Hypothesis, against: Hypothesis, fine: bool = False
+) -> Array:
+    """How far apart the predictions of two hypotheses are in each part of the logs (p,): sum of
+    squares in noise units, twice what the right one of them is expected to gain there."""
+    ours, theirs = (search.points[h].linear for h in (hypothesis, against))
+    other = dict(zip(theirs.names, theirs.at.tolist(), strict=True))
+    step = np.array([other.get(n, z) - z for n, z in zip(ours.names, ours.at, strict=True)])
+    squares = np.einsum("i,bij,j->b", step, ours.gram, step)
+    return np.asarray(np.bincount(folds(search, fine), squares), dtype=float)
 
 
 def folds(search: Search, fine: bool) -> Labels:
@@ -98,35 +99,28 @@ def folds(search: Search, fine: bool) -> Labels:
 
 def left_out(search: Search, hypothesis: Hypothesis, against: Hypothesis = NULL) -> Gain:
     """Gain of one hypothesis over another, row by row, each part predicted from all others."""
-    effects = set(hypothesis) ^ set(against)
-    fine = one_part_shows(search, effects)
+    fine = one_part_shows(search, hypothesis, against)
     points = (search.points[h] for h in (hypothesis, against))
     ours, theirs = (_powers(search, point, point.linear, fine) for point in points)
-    return _gained(search, theirs - ours, effects, fine)
+    return gained(0.5 * (theirs - ours), _apart(search, hypothesis, against, fine))
 
 
 def window_gain(search: Search, hypothesis: Hypothesis, against: Hypothesis) -> Gain:
     """The same of the rows summed over aggregation windows."""
-    effects = set(hypothesis) ^ set(against)
-    fine = one_part_shows(search, effects)
+    fine = one_part_shows(search, hypothesis, against)
     ours, theirs = (window_powers(search, h, fine) for h in (hypothesis, against))
-    return _gained(search, theirs - ours, effects, fine)
+    return gained(0.5 * (theirs - ours), _apart(search, hypothesis, against, fine))
 
 
-def _gained(search: Search, powers: Array, effects: Collection[str], fine: bool) -> Gain:
-    """The gain by which sums of squares (p,) of parts fall."""
-    return gained(0.5 * powers, _shown(search, effects, fine))
-
-
-def gained(gains: Array, shown: Array) -> Gain:
+def gained(gains: Array, apart: Array) -> Gain:
     """Sum of gains (p,) [nats] of parts, and its standard error.
 
-    That of a ratio estimator (Cochran 1977, 6.4): a part is expected to gain as much as it has
-    `shown` (p,) of what is judged. Where all gain alike, it is the usual standard error; a swing
-    that alone shows a motor's torque is no scatter beside jumps that cannot.
+    That of a ratio estimator (Cochran 1977, 6.4): parts are expected to gain as predictions are
+    `apart` (p,) in them. Where all gain alike, it is the usual standard error; a swing that alone
+    shows a motor's torque is no scatter beside jumps that cannot.
     """
     total, count = float(gains.sum()), len(gains)
-    share = shown / shown.sum() if shown.sum() > 0 else np.full(count, 1.0 / count)
+    share = apart / apart.sum() if apart.sum() > 0 else np.full(count, 1.0 / count)
     scatter = float(np.sum((gains - share * total) ** 2))
     return Gain(total, float(np.sqrt(count / (count - 1) * scatter)) if count > 1 else 0.0)
 
