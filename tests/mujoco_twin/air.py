@@ -113,9 +113,11 @@ class Chambers:
         return demand
 
     def _flowing(self, dt: float, x: float, v: float, level: float) -> float:
-        """Eq. 1 (compression counted with its true sign) to 3, by the midpoint rule."""
-        f, flaws = self.figures, self.flaws
-        source = ATM + level * flaws.supply * f.gauge
+        """Eq. 1 (compression counted with its true sign) to 3, by the midpoint rule. The demand is
+        that of first-order chambers, with the time to 63 % of the choked flow into an empty one."""
+        f, flaws, demand = self.figures, self.flaws, 0.0
+        full = flaws.supply * f.gauge
+        source, most = ATM + level * full, f.fill / flaws.rise * flow(ATM + full, 0.0)
 
         def rate(p: float, i: int) -> float:
             u, way, speed = self.valve[i], (x, STROKE - x)[i], (v, -v)[i]
@@ -127,8 +129,12 @@ class Chambers:
             return f.n * (R_GAS * TEMP * (inward - outward) - work) / volume + leak
 
         new = [p + dt * rate(p + 0.5 * dt * rate(p, i), i) for i, p in enumerate(self.state)]
+        for i, (u, p, way) in enumerate(zip(self.valve, self.state, (x, STROKE - x), strict=True)):
+            volume = f.dead[i] + AREA[i] * way
+            tau = (1.0 - math.exp(-1.0)) * volume * full / (f.n * R_GAS * TEMP * most)
+            demand += u * max(0.0, level - (p - ATM) / full) / tau
         self.state = new
-        return 0.0
+        return demand
 
     def force(self, x: float, v: float) -> float:
         """Force on the rod [N], pushing positive; dry friction is MuJoCo's."""
