@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from kemba.errors import enumerated
 from kemba.identify.answer import ENDED, Ranked, Verdict, excess
 from kemba.identify.doubt.parsimony import Belief
@@ -62,10 +64,24 @@ def doubts_about(
         others = ", ".join(" + ".join(h) for h in belief.rivals)
         reasons.append(f"{others} would predict left-out data as well as {' + '.join(best)}")
     part = bool(best) and excess(after) <= (1.0 - least) * excess(before)
+    part = part or (bool(best and reasons) and fits_where_it_acts(search, best))
     unsure = unasked(search, best) if ended else ()
     if unsure and not reasons:
         return Doubts((ENDED,), part=True, unsure=unsure)
     return Doubts(tuple(reasons), part, unsure)
+
+
+def fits_where_it_acts(search: Search, best: Hypothesis) -> bool:
+    """Whether hardly any error is left where the answer acts: windows count by the square of what
+    it changes in them."""
+    problem, theta = search.problem, search.points[best].fit.theta
+    figures = {name: value for name, value in theta.items() if name in problem.nuisance}
+    thetas = (search.points[NULL].fit.theta, theta, figures)
+    columns = np.stack([problem.residual(each) for each in thetas], axis=1)
+    before, after, without = search.base.division.windows.sums(columns).T
+    weight = (without - after) ** 2
+    excess_of = [float(weight @ (r**2 - 1.0)) for r in (before, after)]
+    return excess_of[1] <= VerdictSettings.current().where_it_acts * excess_of[0]
 
 
 def unasked(search: Search, best: Hypothesis) -> Hypothesis:
