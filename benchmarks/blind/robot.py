@@ -49,7 +49,7 @@ PAIRS = [
     ["sensor_delay:body/z", "seal_friction"],
 ]
 REPEATS = ((EFFECTS, 4), (SENSORS, 1), (UNKNOWN, 2), (PAIRS, 2), ([None], 60))
-SEED = 11000  # cases of other seeds were looked at while the method was built
+SEED = 17000  # cases of other seeds were looked at while the method was built
 SIZES, NOISES = (1.0, 0.7, 1.5), (1.0, 2.0, 0.5)
 NULLS = 40  # further machines in which nothing is missing, at the end: a hundred in all
 
