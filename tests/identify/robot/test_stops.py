@@ -33,6 +33,18 @@ def test_a_resting_piston_stays_at_its_stop(sigma: float, drift: float) -> None:
     assert not schedule.low[away].any()
 
 
+def test_a_piston_that_overshoots_its_stop_still_rests_there() -> None:
+    """As one does whose late reading was shifted: the extreme readings are no stop."""
+    time = DT * np.arange(1200)
+    x = np.clip(0.9 * (time - 0.2), 0.0, STROKE)
+    hit = np.argmax(x == STROKE)
+    x[hit : hit + 8] += 2e-3 * np.sin(np.pi * np.arange(8) / 8.0)
+    read = (x + 2e-5 * wobble(0.0, 4, 1200))[:, None]
+    feet = np.full((1200, 1, 2), 0.5)
+    schedule = read_schedule(time, feet, read, STROKE, np.zeros((1200, 3)), np.array([2e-5]))
+    assert schedule.high[hit + 30 :].all() and schedule.low[:190].all()
+
+
 @pytest.mark.parametrize("rises", [0.0, 0.012])  # m
 def test_a_foot_whose_reading_drifts_may_still_touch(rises: float) -> None:
     time = DT * np.arange(2000)

@@ -129,12 +129,11 @@ def read_schedule(
         on_ground = _erode(z < ground + limits.stands, settle) & slow & ~struck
         slips = on_ground & (np.abs(vx) > limits.sliding)
         slides = np.where(slips, np.sign(vx), 0.0)
-        bottom, top = stop_levels(pistons[:, i], stroke)
+        slow_piston = np.abs(piston_rate[:, i]) < limits.slow_piston
+        bottom, top = stop_levels(pistons[slow_piston, i], stroke)
         at_low = _closed(pistons[:, i] < bottom + near_stop[i], settle)
         at_high = _closed(pistons[:, i] > top - near_stop[i], settle)
-        rests = _erode(at_low | at_high, 3 * blur) & (
-            np.abs(piston_rate[:, i]) < limits.slow_piston
-        )
+        rests = _erode(at_low | at_high, 3 * blur) & slow_piston
         legs.append(
             (
                 may,
@@ -226,10 +225,13 @@ def wandering_level(z: Array, level: float, dt: float) -> Array:
 
 
 def stop_levels(x: Array, stroke: float) -> tuple[float, float]:
-    """Readings [m] at the two stops: the extreme ones of x (n,) [m], if they are near the ends of
-    the stroke."""
+    """Readings [m] at the two stops: the extreme ones of x (n,) [m] of a slow piston, if they are
+    near the ends of the stroke. What is read of a fast one may lie behind its stop: smoothed, or
+    late and shifted, it overshoots."""
     search, ordered = ContactSettings.current().stop_search, np.sort(x)
     few = min(ContactSettings.current().stop_rows, len(x) - 1)
+    if few < 0:
+        return 0.0, stroke
     low, high = float(ordered[few]), float(ordered[-1 - few])
     low = low if abs(low) < search else 0.0
     return low, high if abs(high - stroke) < search else stroke
