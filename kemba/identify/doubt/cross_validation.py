@@ -41,7 +41,7 @@ class CrossValidationSettings(Settings):
     alone: float = setting(
         0.9,
         "1",
-        "share of what the logs tell of an effect, in one run, from which quarters of runs are "
+        "share, in one run, of what tells two hypotheses apart, from which quarters of runs are "
         "left out instead of runs",
         BY_HAND,
         decides=True,

@@ -1,6 +1,6 @@
 """Nominal figures that a model moves too far, and effects that may stand behind them.
 
-An effect that is like some nominal figures (slow valves and small orifices) hides in them: the
+An effect that is like some nominal figures (fast valves and wide orifices) hides in them: the
 model without it fits almost as well, with figures that nobody would believe. Slopes there say
 nothing of the effect with the figures where they belong, since predictions bend with both.
 """
