@@ -23,7 +23,7 @@ Setting = dict[str, Any]
 Prepared = tuple[list[dict[str, Any]], Callable[[], Problem]]  # what is hidden, and the problem
 Prepare = Callable[[Setting], Prepared]
 TIME_LIMIT = 300.0  # s, that of the command
-DOCS = Path(__file__).resolve().parents[2] / "docs" / "discovery.md"
+DOCS = Path(__file__).resolve().parents[2] / "docs" / "blind-tests.md"
 
 
 # noise of the sensors: white, or AR(1) with so much left after 1 ms, with wider steps, or drifting
