@@ -1,6 +1,6 @@
 """Tasks of one's own: other poses, bounds and models, from shipped plans and from a guess.
 
-    python benchmarks/own_tasks.py --write    # the table of docs/solving.md
+    python benchmarks/own_tasks.py --write    # the table of docs/continuing.md
 
 Each task is planned as `solve` plans it, then as by `--cold`, side by side in one process: CPU
 seconds of plan, table and executions, and whether the plan is good.
@@ -48,7 +48,7 @@ TASKS = (
     ("jump_forward.yaml", (), "{kind: boom_force, F: 10 N}"),
     ("jump_forward.yaml", (), "{kind: seal_friction, F_c: 11.5 N}"),
 )
-PAGE = Path(__file__).resolve().parents[1] / "docs" / "solving.md"
+PAGE = Path(__file__).resolve().parents[1] / "docs" / "continuing.md"
 BEGIN, END = "<!-- own tasks: written by benchmarks/own_tasks.py -->", "<!-- end of own tasks -->"
 HEAD = (
     "| changed | good | torque² [N².m².s] | CPU s | from a guess: good | torque² | CPU s |",
@@ -84,7 +84,7 @@ def rows(count: int | None) -> Iterator[str]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--tasks", type=int, default=None, help="so many of the list")
-    parser.add_argument("--write", action="store_true", help="into docs/solving.md")
+    parser.add_argument("--write", action="store_true", help="into docs/continuing.md")
     asked = parser.parse_args()
     table = [*HEAD, *printed(rows(asked.tasks)), "", f"On {machine()}."]
     if asked.write:

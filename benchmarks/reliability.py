@@ -26,7 +26,7 @@ TIMES = {
 WORDS = """\
 *Refined and replaying*: refined, and both the plan's inputs and its `controller.csv` come out as
 planned on the plan's own model; *with fitted air*: that model's air is
-[fitted to the plant](solving.md#air-that-fits-the-plant). *Good*: also the simulated robot (the
+[fitted to the plant](continuing.md#air-that-fits-the-plant). *Good*: also the simulated robot (the
 plant) keeps to the tolerances of the task, which is what `kemba-opt solve` needs for exit code 0.
 """.splitlines()
 

@@ -39,7 +39,7 @@ HEAD = """\
 
 `kemba-opt solve` begins from these plans where its task differs from one of them only by the
 figures of this table, and only a little (`kemba/ocp/shipped/shelf.py` says how much). See
-[solving](solving.md#from-a-shipped-plan). They were continued from plans that were found from a
+[solving](continuing.md#from-a-shipped-plan). They were continued from plans that were found from a
 guess, each with its solved program. Of {tried} plans those count whose executions keep to the
 task's tolerances, also on the full plant, and whose table gives the planned apex within 1 mm (where
 that was noted). Of the same figures the one was kept with the smallest cost per landing, in 60
@@ -48,8 +48,8 @@ scenarios at twice the usual uncertainty (the last column), or a cheaper one tha
 of 60 more at least and it costs at most {dear:g} times as much: from that `--robust` begins. `of`:
 among how many. Errors are those on the plant. `air`: the [`landing.air`](tasks.md) with which a
 plan was made, a pulse on stretched legs. `fitted`: made with
-[air that fits the plant](solving.md#air-that-fits-the-plant); a task that begins from it has the
-same air. [Height by height](solving.md#height-by-height) says what `solve` finds.
+[air that fits the plant](continuing.md#air-that-fits-the-plant); a task that begins from it has the
+same air. [Height by height](plan-quality.md#height-by-height) says what `solve` finds.
 Facts of earlier plans were read again from their files when the page was written anew, so that `of`
 is too low there; their programs were solved again on their own nodes, from the nodes.
 Written by `benchmarks/shipped_plans.py` on {machine}.
