@@ -23,6 +23,7 @@ class Series:
     value: Array
     rates: tuple[Array, ...] = ()
     path: Array | None = None
+    read: Array | None = None
 
     def late(self, dt: float) -> Series:
         """The series as it was `dt` [s] earlier (dt < 0: as it will be later).
@@ -32,8 +33,9 @@ class Series:
         if not dt:
             return self
         if self.path is not None:
-            moved = _at(self.time, self.path, self.time - dt) - self.path
-            return replace(self, value=self.value + moved)
+            read = self.time if self.read is None else self.read
+            before, now = (_at(self.time, self.path, at) for at in (read - dt, read))
+            return replace(self, value=self.value + before - now)
         orders = (self.value, *self.rates)
         slopes = (*self.rates, np.zeros_like(self.value))
         value, *rates = (

@@ -10,6 +10,7 @@ import numpy as np
 
 from kemba.identify.answer import ENDED, Answer, Ranked, phrase
 from kemba.identify.doubt.cross_validation import left_out, one_part_shows
+from kemba.identify.doubt.held_out import HeldOut, error
 from kemba.identify.doubt.parsimony import Belief, is_idle, likeliest_part, none_of, simplest
 from kemba.identify.doubt.run_consistency import drifting
 from kemba.identify.doubt.unexplained import Formula, look
@@ -24,7 +25,7 @@ from kemba.identify.evidence.spike_slab import NULL, Hypothesis
 from kemba.identify.evidence.strain import strained
 from kemba.identify.evidence.windows import error_ratio
 from kemba.identify.problem.problem import Problem
-from kemba.identify.ranking import error, fitted_errors, ladder, ranked, strength
+from kemba.identify.ranking import fitted_errors, ladder, ranked, strength
 from kemba.identify.rest import rest_of
 from kemba.identify.settings import DiscoverSettings, VerdictSettings
 from kemba.identify.stages import is_mixture, joined, structure_row, unbuilt
@@ -43,7 +44,7 @@ class Discovery:
     answer: Answer
     search: Search
     best: Hypothesis
-    holdout: Problem | None = None
+    kept: HeldOut | None = None
     fitted: tuple[float, ...] = ()
 
 
@@ -93,7 +94,7 @@ def _discovered(search: Search, guess: Hypothesis, holdout: Problem | None) -> D
     if mixed and anew.answer.verdict == "missing":
         return anew
     # one noise for both, or the model that takes more of its error for noise would look better
-    judge = (holdout or search.problem).heard_as(anew.search.problem)
+    judge = (first.kept.found if first.kept else search.problem).heard_as(anew.search.problem)
     left = error_ratio(judge, search.points[first.best].fit.theta)
     return anew if anew.answer.error_after < left else first
 
@@ -104,19 +105,19 @@ def _built_anew(search: Search, other: Rebuilt, holdout: Problem | None) -> Disc
     search.say(f"building the model anew with {structure}")
     search.visit((structure,))
     second = Search(other.problem, search.deadline, search.say, begin=other.figures, due=search.due)
-    kept = holdout.rebuilt({}).relinearise(other.figures) if holdout else None
-    found = judged(second, second.run(), kept)
+    built = holdout.rebuilt({}).relinearise(other.figures) if holdout else None
+    found = judged(second, second.run(), built)
     # one noise for all rungs: that of the model that explains more of the data
     judge = (holdout or search.problem).heard_as(second.problem)
     before = error_ratio(judge, search.points[NULL].fit.theta)
-    alone = error(second, NULL, found.holdout)
+    alone = error(second, NULL, found.kept)
     row = structure_row(search, structure, (before, alone), second, found.best, other.nats)
     gain = max(_best_gain(search), other.nats)
     answer = joined(row, null_test(search).p_value(gain), found.answer, second, found.best)
     first_error = search.points[NULL].fitted_error
     search.say(f"built anew, the error is {answer.error_after:.2f} times the noise")
     fitted = (first_error, *found.fitted)
-    return Discovery(answer, second, found.best, found.holdout, fitted)
+    return Discovery(answer, second, found.best, found.kept, fitted)
 
 
 def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> Discovery:
@@ -127,9 +128,9 @@ def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> 
     belief = _believed(search, likeliest, test)
     best, p_value, ended = belief.best, belief.p_value, ended or search.late
     search.say("testing whether more is missing")
-    holdout = holdout.heard_as(search.problem) if holdout else None
+    kept = HeldOut.beside(holdout, search.problem) if holdout else None
     if test.too_short:
-        return _undecided(search, test, holdout)
+        return _undecided(search, test, kept)
     # what is too small to be reported still explains: a formula must do better than with it
     slight = best and material(search, likeliest) == best
     formula = look(search, likeliest if slight else best)
@@ -138,33 +139,33 @@ def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> 
         formula = None
     doubts = Doubts((ENDED,) if ended else ())
     if formula is None:
-        doubts = doubts_about(search, belief, drift, holdout, ended)
+        doubts = doubts_about(search, belief, drift, kept, ended)
     search.say("ranking the effects")
-    ranking = ranked(search, belief, holdout)
-    answer = _answer(search, best, p_value, test, ranking, formula, holdout, doubts)
+    ranking = ranked(search, belief, kept)
+    answer = _answer(search, best, p_value, test, ranking, formula, kept, doubts)
     answer.remarks = [*answer.remarks, *belief.remarks]
     if belief.idle and answer.verdict == "nothing":
         answer.sentence = phrase(answer, idle=True)
     if ended and ENDED not in answer.remarks:
         answer.remarks = [*answer.remarks, ENDED]
-    return Discovery(answer, search, best, holdout, fitted_errors(search, best))
+    return Discovery(answer, search, best, kept, fitted_errors(search, best))
 
 
-def _undecided(search: Search, test: NullTest, holdout: Problem | None) -> Discovery:
+def _undecided(search: Search, test: NullTest, kept: HeldOut | None) -> Discovery:
     """What logs allow to say that are too short for anything to be significant: whether something
     differs, but not what."""
     gain, doubts = _best_gain(search), Doubts()
     differs = test.share(gain) <= DiscoverSettings.current().significant
-    if differs or error(search, NULL, holdout) > VerdictSettings.current().whole:
+    if differs or error(search, NULL, kept) > VerdictSettings.current().whole:
         piece = DiscoverSettings.current().fine
         doubts = Doubts((f"they hold {test.blocks} pieces of {piece:g} s, and chance alone needs "
                          f"{test.needed} to be ruled out",))  # fmt: skip
-    ranking = ranked(search, Belief(), holdout)
-    answer = _answer(search, NULL, test.p_value(gain), test, ranking, None, holdout, doubts)
+    ranking = ranked(search, Belief(), kept)
+    answer = _answer(search, NULL, test.p_value(gain), test, ranking, None, kept, doubts)
     if doubts.reasons:
         answer.next = f"record at least {(test.needed + 1) * DiscoverSettings.current().fine:.1f} s"
         answer.sentence = phrase(answer)
-    return Discovery(answer, search, NULL, holdout, fitted_errors(search, NULL))
+    return Discovery(answer, search, NULL, kept, fitted_errors(search, NULL))
 
 
 def _best_gain(search: Search) -> float:
@@ -250,13 +251,13 @@ def _answer(
     test: NullTest,
     ranking: Sequence[Ranked],
     formula: Formula | None,
-    holdout: Problem | None,
+    kept: HeldOut | None,
     doubts: Doubts,
 ) -> Answer:
     problem = search.problem
     whole = len(problem.runs) > 3 and not search.in_pieces
-    before = error(search, NULL, holdout)
-    after = error(search, best, holdout) if best else before
+    before = error(search, NULL, kept)
+    after = error(search, best, kept) if best else before
     verdict = verdict_on(best, formula, doubts)
     rows = {r.effect: r for r in ranking}
     named = tuple(effect for effect in rows if effect in best)
@@ -276,8 +277,8 @@ def _answer(
             effect: {problem.candidates[effect].lead.name: size} for effect, size in sizes.items()
         },
         formula=str(formula) if formula else None,
-        split_by="held-out logs" if holdout else "runs" if whole else "time blocks",
-        ladder=ladder(search, best, holdout),
+        split_by="held-out logs" if kept else "runs" if whole else "time blocks",
+        ladder=ladder(search, best, kept),
     )
     answer.remarks = list(doubts.reasons)
     if verdict == "partly":

@@ -8,7 +8,8 @@ from itertools import pairwise
 import numpy as np
 
 from kemba.identify.answer import Ranked, Value
-from kemba.identify.doubt.cross_validation import left_out, left_out_error
+from kemba.identify.doubt.cross_validation import left_out
+from kemba.identify.doubt.held_out import HeldOut, error, error_as_it_is
 from kemba.identify.doubt.parsimony import Belief
 from kemba.identify.evidence.linear import is_shape
 from kemba.identify.evidence.modes.bounded import within_bounds
@@ -21,21 +22,11 @@ from kemba.identify.evidence.spike_slab import (
     SpikeSlabSettings,
     share_of,
 )
-from kemba.identify.evidence.windows import error_ratio
-from kemba.identify.problem.problem import Array, Candidate, Parameter, Problem
+from kemba.identify.problem.problem import Array, Candidate, Parameter
 from kemba.identify.settings import RankingSettings
 
 
-def error(search: Search, hypothesis: Hypothesis, holdout: Problem | None) -> float:
-    """Error in units of the noise on data that the fit has not seen: the one number that sentence,
-    ranking, ladder and figures show. Of the held-out logs; without any, of left-out blocks."""
-    if holdout is None:
-        return left_out_error(search, hypothesis)
-    unknown = set(holdout.nuisance) - set(search.problem.nuisance)  # of sensors not seen before
-    return error_ratio(holdout, search.points[hypothesis].fit.theta, unknown)
-
-
-def ranked(search: Search, belief: Belief, holdout: Problem | None) -> list[Ranked]:
+def ranked(search: Search, belief: Belief, kept: HeldOut | None) -> list[Ranked]:
     """The effects in order of probability; those of the answer that is believed first."""
     problem, best = search.problem, belief.best
     probability = (
@@ -45,7 +36,7 @@ def ranked(search: Search, belief: Belief, holdout: Problem | None) -> list[Rank
     order = sorted(shares, key=lambda e: (e not in best, -strength(search, e, best), -shares[e]))
     reached = settled(search.base, search.points[best]) if best else None
     found = []
-    before = error(search, NULL, holdout)
+    before = error(search, NULL, kept)
     for effect in order[: RankingSettings.current().shown]:
         hypothesis = best if effect in best else _likeliest_with(search, effect)
         if not hypothesis:
@@ -57,7 +48,7 @@ def ranked(search: Search, belief: Belief, holdout: Problem | None) -> list[Rank
                 values(search, hypothesis, effect, reached if effect in best else None),
                 equivalents(search, belief, effect) if effect in best else (),
                 before,
-                error(search, hypothesis, holdout),
+                error(search, hypothesis, kept),
                 left_out(search, hypothesis).nats,
             )
         )
@@ -157,14 +148,15 @@ def rungs(search: Search, best: Hypothesis) -> list[Hypothesis]:
     return [NULL, *(part for part in parts if part in search.points)]
 
 
-def ladder(search: Search, best: Hypothesis, holdout: Problem | None) -> list[tuple[str, float]]:
+def ladder(search: Search, best: Hypothesis, kept: HeldOut | None) -> list[tuple[str, float]]:
     """Error on unseen data at every rung, by what joins there."""
     steps, names = rungs(search, best), ["model as it is"]
     for before, after in pairwise(steps):
         names.append(" + ".join(e for e in after if e not in before))
-    return [(n, error(search, step, holdout)) for n, step in zip(names, steps, strict=True)]
+    return [(n, error(search, step, kept)) for n, step in zip(names, steps, strict=True)]
 
 
 def fitted_errors(search: Search, best: Hypothesis) -> tuple[float, ...]:
     """Error on the fitted logs at every rung of the ladder."""
-    return tuple(search.points[step].fitted_error for step in rungs(search, best))
+    first, *others = (search.points[step].fitted_error for step in rungs(search, best))
+    return (error_as_it_is(search) if search.own else first, *others)

@@ -8,14 +8,13 @@ import numpy as np
 
 from kemba.errors import enumerated
 from kemba.identify.answer import ENDED, Ranked, Verdict, excess
+from kemba.identify.doubt.held_out import HeldOut, error
 from kemba.identify.doubt.parsimony import Belief
 from kemba.identify.doubt.run_consistency import Drift
 from kemba.identify.doubt.unexplained import Formula, unfinished
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
-from kemba.identify.problem.problem import Problem
 from kemba.identify.problem.sensor_faults import is_fault
-from kemba.identify.ranking import error
 from kemba.identify.rest import pattern_left
 from kemba.identify.settings import VerdictSettings
 
@@ -34,7 +33,7 @@ def doubts_about(
     search: Search,
     belief: Belief,
     drift: Drift | None,
-    holdout: Problem | None,
+    kept: HeldOut | None,
     ended: bool = False,
 ) -> Doubts:
     """Why the best answer cannot be complete, and whether it is a part of one; `ended`: the time
@@ -46,7 +45,7 @@ def doubts_about(
         reasons.append("the error that is left repeats itself with motion and valves")
     elif pattern := pattern_left(search, best):
         reasons.append(f"the error that is left has a pattern: {pattern}")
-    before, after = (error(search, h, holdout) for h in (NULL, best))
+    before, after = (error(search, h, kept) for h in (NULL, best))
     least = settings.part_of_structure if reasons else settings.part
     if ended and after > settings.whole:
         reasons.append(ENDED)

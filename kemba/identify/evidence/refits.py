@@ -16,7 +16,7 @@ from kemba.identify.evidence.point import LinearisationPoint
 from kemba.identify.evidence.refit import Fit, refit
 from kemba.identify.evidence.search_settings import SearchSettings
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis, log_prior, probabilities
-from kemba.identify.problem.problem import Problem
+from kemba.identify.problem.problem import Problem, Theta
 from kemba.stopwatch import Stage
 
 
@@ -29,6 +29,8 @@ class Refits:
     `time.monotonic` [s]. `say`: told of progress. `points`: every hypothesis that was refitted.
     `begin`: figures of the model as it is, where a fit found them already. `base`: the null model.
     `in_pieces`: the error that is told is of quarters of runs left out, and not of whole runs.
+    `own`: the problem and theta of the model as it is, along the motion that it makes of the data
+    itself, where late sensors have led to a motion along which it cannot be judged.
     """
 
     problem: Problem
@@ -38,6 +40,7 @@ class Refits:
     begin: Mapping[str, float] = field(default_factory=dict)
     due: float = np.inf
     in_pieces: bool = False
+    own: tuple[Problem, Theta] | None = None
     base: Baseline = field(init=False)
     _thetas: dict[Hypothesis, dict[str, float]] = field(default_factory=dict)
     _beginnings: dict[Hypothesis, dict[str, float]] = field(default_factory=dict)

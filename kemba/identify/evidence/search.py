@@ -9,6 +9,7 @@ import numpy as np
 
 from kemba.identify.evidence.noise.colour import with_learnt_colour
 from kemba.identify.evidence.null_model import Baseline
+from kemba.identify.evidence.refit import Frozen, refit
 from kemba.identify.evidence.refits import Refits
 from kemba.identify.evidence.search_settings import SearchSettings
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis, log_prior
@@ -59,11 +60,9 @@ class Search(Refits):
             guess = best or self._first_of_table()
             if guess == NULL or self.ended:
                 return best
-            point = self.points[guess]
             self.say(f"searching again with {' + '.join(guess)} in the model")
             among = self._contenders()
-            self.problem = self.problem.relinearise(point.fit.theta)
-            self.start(among, point.fit.theta)
+            self.start(among, self._settle(guess))
             self.visit(guess)
             best = self._round(NULL, settings.leaders)
             if best in (guess, NULL):
@@ -78,15 +77,34 @@ class Search(Refits):
         for _ in range(SearchSettings.current().regrown):
             if len(best) < 2 or self.ended:
                 break
-            theta, before = self.points[best].fit.theta, best
+            before = best
             self.say(f"searching again with {' + '.join(best)} in the model")
-            self.problem = self.problem.relinearise(theta)
-            self.start(frozenset(), theta)
+            self.start(frozenset(), self._settle(best))
             self.visit(best)
             best = self._grow(best)
             if best == before:
                 break
         return best
+
+    def _settle(self, hypothesis: Hypothesis) -> Mapping[str, float]:
+        """Find the motion that a hypothesis makes of the data, until late sensors stay as late; the
+        best theta there."""
+        settings, theta = SearchSettings.current(), self.points[hypothesis].fit.theta
+        asked = self.problem
+        for _ in range(settings.settled):
+            self.problem = self.problem.relinearise(theta)
+            late = self.problem.held_back(theta)
+            if not late or self.ended:
+                break
+            self.own = self.own or (asked, self.points[NULL].fit.theta)
+            figures, before = tuple(self.problem.nuisance), theta
+            slopes = Frozen(figures, self.problem.jacobian(theta, figures))
+            theta = refit(self.problem, hypothesis, theta, slopes).theta
+            self._thetas[hypothesis] = dict(theta)
+            moved = max(abs(theta[name] - before[name]) for name in late)
+            if moved < settings.still * self.problem.interval:
+                break
+        return theta
 
     def _contenders(self) -> frozenset[Hypothesis]:
         """Single effects that were refitted, or whose linear evidence gains a good share of the

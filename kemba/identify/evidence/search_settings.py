@@ -42,6 +42,16 @@ class SearchSettings(Settings):
     followed: int = setting(
         2, "1", "times that the motion is found again with the best guess", BY_HAND, decides=True
     )
+    settled: int = setting(
+        4,
+        "1",
+        "times that the motion is found before a search along it, until late sensors stay as late",
+        "tuned: a piston 5.2 ms late is found 3.2 ms late along the motion as it is read, 5.2 ms "
+        "along the second one after it",
+    )
+    still: float = setting(
+        0.1, "1", "change of such a delay, in rows, at which it stays", "derived: below its 1 sigma"
+    )
     largest: int = setting(
         10, "1", "effects in one answer", "convention: more than any machine is expected to lack"
     )

@@ -10,6 +10,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from functools import cached_property
+from types import MappingProxyType
 
 import numpy as np
 from typing_extensions import Self
@@ -199,10 +200,18 @@ class Problem(ABC):
 
     moves: bool = False  # whether residuals are linearised along a motion that depends on the model
 
+    base: Theta = MappingProxyType({})  # the model with which this motion was found
+
     def relinearise(self, base: Theta) -> Self:
         """This problem, linearised along the motion that the model at `base` makes of the data.
         Its rows may differ from those of the old one."""
         return self
+
+    def held_back(self, theta: Theta) -> tuple[str, ...]:
+        """Parameters that the motion keeps near the values with which it was found: how late the
+        sensors are from which it was read."""
+        late = (c.key for c in self.candidates.values() if c.sensor and c.lead.unit == "s")
+        return tuple(key for key in late if key in theta) if self.moves else ()
 
     bends: bool = False  # whether slopes differ so much from point to point that each needs its own
 

@@ -131,10 +131,9 @@ class RobotProblem(Problem):
         """The same problem, smoothed and linearised anew with the model at `base`."""
         found, old = copy(self), self.state
         own = any(is_fault(name) or name.startswith(GEOMETRY) for name in base)
-        base = base if own else {**self.lengths, **base}
-        found.state = linearise_at(
-            old.physics, old.batch, old.sensors, base, old.ground, self.unknown, old.noise
-        )
+        found.base = base = base if own else {**self.lengths, **base}
+        given = old.physics, old.batch, old.sensors, base, old.ground, self.unknown, old.noise
+        found.state = linearise_at(*given)
         return found
 
     @property

@@ -32,7 +32,7 @@ from kemba.identify.robot.motion.batch import Batch
 from kemba.identify.robot.motion.colour import Noise
 from kemba.identify.robot.motion.contact import ContactSchedule, loaded
 from kemba.identify.robot.motion.filter import FilterGains, gains, innovations
-from kemba.identify.robot.motion.sensing import ahead, sensed
+from kemba.identify.robot.motion.sensing import ahead, sensed, whole_rows
 from kemba.settings import BY_HAND, Settings, setting
 
 
@@ -174,10 +174,14 @@ def linearise_at(
     motion smoothed without the model's forces, where it is known.
     """
     p = values_at(physics, base)[0]
-    first = first or first_reference(physics, batch, p)
-    reference = _without_delays(physics, batch, sensors, base, first)
-    schedules = read_schedules(physics, batch, reference, p)
     dt = float(np.median(batch.h[batch.valid]))
+    late = np.array([sensors.lateness(base, channel) for channel in physics.channels])
+    rows = whole_rows(late, dt)
+    batch = batch.moved(rows)
+    if first is None or rows.any():
+        first = first_reference(physics, batch, p)
+    reference = _without_delays(batch, late - rows * dt, first)
+    schedules = read_schedules(physics, batch, reference, p)
     for _ in range(StateSettings.current().rounds):
         loose = LooseForceDensity.current()
         state = _along(physics, batch, sensors, base, ground, schedules, reference, loose, noise)
@@ -193,11 +197,8 @@ def linearise_at(
     return replace(state, linear={**linear, GRIP: (state.motion.less_grip, 1.0)})
 
 
-def _without_delays(
-    physics: Physics, batch: Batch, sensors: SensorFaults, base: Theta, ref: Reference
-) -> Reference:
-    """The reference as sensors that are not late would have seen it."""
-    late = np.array([sensors.lateness(base, c) for c in physics.channels])
+def _without_delays(batch: Batch, late: Array, ref: Reference) -> Reference:
+    """The reference as sensors that are not `late` (k,) [s] would have seen it."""
     rates = ((ref.q, ref.v), (ref.v, ref.a), (ref.a, np.zeros_like(ref.a)))
     return Reference(*(ahead(a, rate, batch.resampled, late) for a, rate in rates))
 

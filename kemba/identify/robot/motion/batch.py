@@ -17,9 +17,20 @@ Flags = np.ndarray[Any, np.dtype[np.bool_]]
 
 @dataclass(frozen=True)
 class Batch:
-    """`resampled` as arrays whose second axis is the run; steps past a run's end stand still."""
+    """`resampled` as arrays whose second axis is the run; steps past a run's end stand still.
+
+    `source`: the runs as they were recorded, where late readings stand at earlier nodes here.
+    """
 
     resampled: tuple[ResampledLog, ...]
+    source: Batch | None = None
+
+    def moved(self, rows: Array) -> Batch:
+        """The recorded runs with the readings of each channel so many `rows` (m,) earlier."""
+        recorded = self.source or self
+        if not rows.any():
+            return recorded
+        return Batch(tuple(log.moved(rows) for log in recorded.resampled), recorded)
 
     @cached_property
     def n(self) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -35,7 +35,8 @@ class ResampledLog:
     """One run: `time` (n,) of the nodes, `y` (n, m) with NaN where nothing was measured,
     `torque` (n, legs) held from each node, the pulses `sent` to each valve, `sigma` (m,) of one
     value of `y`. `memory` (m,): correlation time [s] of the noise as the sidecar states it, NaN
-    where it does not; `stated` (m,): whether the sidecar states its sigma."""
+    where it does not; `stated` (m,): whether the sidecar states its sigma. `read` (n, m): when each
+    value of `y` was read [s], where that is not at its node."""
 
     name: str
     time: Array
@@ -45,6 +46,16 @@ class ResampledLog:
     sigma: Array
     memory: Array
     stated: np.ndarray[Any, np.dtype[np.bool_]]
+    read: Array | None = None
+
+    def moved(self, rows: Array) -> ResampledLog:
+        """The same run with the readings of each channel so many `rows` (m,) earlier, where their
+        sensor saw them; noise stays as white as it was."""
+        n = len(self.time)
+        places = np.arange(n)[:, None] + rows.astype(int)
+        within, at = (places >= 0) & (places < n), np.clip(places, 0, n - 1)
+        y = np.where(within, np.take_along_axis(self.y, at, axis=0), np.nan)
+        return replace(self, y=y, read=self.time[at])
 
 
 def resample(
