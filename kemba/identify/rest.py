@@ -35,16 +35,24 @@ class Remainder:
 
 def pattern_left(search: Search, best: Hypothesis) -> str:
     """A force that the best hypothesis leaves and that goes with speed, place, load or a command,
-    in words; empty where none explains a fair share of what the hypothesis itself explains."""
+    in words; empty where none explains a fair share of what the hypothesis itself explains.
+
+    A force is no pattern where it is negligible. What it explains is held against the scatter that
+    is left, and not against the noise alone: noise of another colour than was learnt goes with many
+    things a little.
+    """
     point = search.points[best]
     if not best or point.fitted_error < BinSettings.current().tolerated:
         return ""
-    problem = search.problem
-    profiles = force_profiles(problem, problem.residual(point.fit.theta))
-    first = max(profiles, key=lambda profile: profile.gain, default=None)
+    settings, problem = ForceProfileSettings.current(), search.problem
+    found = force_profiles(problem, problem.residual(point.fit.theta))
+    plain = [force for force in found if force.largest > settings.negligible * force.usual]
+    first = max(plain, key=lambda force: force.gain, default=None)
     gained = point.log_evidence - search.points[NULL].log_evidence
-    least = max(ForceProfileSettings.current().plain, UnexplainedSettings.current().left * gained)
-    return str(first) if first is not None and first.gain > least else ""
+    least = max(settings.plain, UnexplainedSettings.current().left * gained)
+    if first is None or first.gain < least * point.fitted_error**2:
+        return ""
+    return str(first)
 
 
 def rest_of(search: Search, best: Hypothesis, unsure: Collection[str]) -> Remainder:
