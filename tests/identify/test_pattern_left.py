@@ -37,5 +37,5 @@ def test_a_negligible_force_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_gains_count_by_the_scatter_that_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert left(monkeypatch, 80.0, 4.0, error=1.12)
-    assert not left(monkeypatch, 80.0, 4.0, error=1.2)
+    assert left(monkeypatch, 90.0, 4.0, error=1.2)
+    assert not left(monkeypatch, 90.0, 4.0, error=1.3)
