@@ -12,9 +12,14 @@ EFFECTS = ("bend", "drag", "hum", "kick", "ramp", "twin", "wave")
 
 
 class Toy(Problem):
-    """y(t) = gain * u(t) + effects; `twin` is nearly `drag`, so the two cannot be told apart."""
+    """y(t) = gain * u(t) + effects; `twin` is nearly `drag`, so the two cannot be told apart.
 
-    def __init__(self, truth: Mapping[str, float], seed: int = 0, runs: int = 3) -> None:
+    `more`: so many further effects, each a wave of its own: the more, the less likely is each.
+    """
+
+    def __init__(
+        self, truth: Mapping[str, float], seed: int = 0, runs: int = 3, more: int = 0
+    ) -> None:
         rng = np.random.default_rng(seed)
         self.runs = tuple(f"run {i}" for i in range(runs))
         self.nuisance = {"gain": (1.0, 0.02), "slope": (0.0, 0.5)}
@@ -22,7 +27,7 @@ class Toy(Problem):
             name: Candidate(
                 name, Parameter("a", "N", 0.0, 10.0, 0.0 if name == "drag" else -np.inf)
             )
-            for name in EFFECTS
+            for name in (*EFFECTS, *(f"wave{i}" for i in range(more)))
         }
         t = np.arange(800) / 1e3
         self._time = np.tile(t, runs)
@@ -32,6 +37,7 @@ class Toy(Problem):
             "bend": v**3, "drag": np.tanh(5 * v), "twin": np.tanh(5.0001 * v),
             "kick": u * v, "wave": np.sin(50 * self._time), "hum": np.cos(90 * self._time),
             "ramp": self._time * v,
+            **{f"wave{i}": np.sin((100 + 10 * i) * self._time) for i in range(more)},
         }  # fmt: skip
         self._u = 100.0 * u
         self.measured = np.zeros(len(v))
