@@ -11,7 +11,14 @@ import numpy as np
 from kemba.identify.answer import ENDED, Answer, Ranked, phrase
 from kemba.identify.doubt.cross_validation import left_out, one_part_shows
 from kemba.identify.doubt.held_out import HeldOut, error
-from kemba.identify.doubt.parsimony import Belief, is_idle, likeliest_part, none_of, simplest
+from kemba.identify.doubt.parsimony import (
+    Belief,
+    is_idle,
+    likeliest_part,
+    needed_instead,
+    none_of,
+    simplest,
+)
 from kemba.identify.doubt.run_consistency import drifting
 from kemba.identify.doubt.unexplained import Formula, look
 from kemba.identify.doubt.wanting import fuller, wanted
@@ -219,9 +226,14 @@ def _believed(search: Search, best: Hypothesis, test: NullTest) -> Belief:
             belief = belief.without(best, against)
             continue
         simpler = simplest(search, belief)
-        if simpler.best == best:
-            return none_of(simpler) if is_idle(search, best) else simpler
-        belief = simpler
+        if simpler.best != best:
+            belief = simpler
+        elif not is_idle(search, best):
+            return simpler
+        elif other := needed_instead(search, best):
+            belief = simpler.without(best, other)
+        else:
+            return none_of(simpler)
     return belief
 
 

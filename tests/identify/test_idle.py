@@ -4,6 +4,7 @@ limit kept from being asked."""
 from __future__ import annotations
 
 from collections.abc import Callable
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +14,8 @@ from kemba.effects import BY_KIND
 from kemba.identify.answer import ENDED
 from kemba.identify.bench.problem import bench_problem
 from kemba.identify.discover import discover
+from kemba.identify.doubt import parsimony
+from kemba.identify.doubt.cross_validation import Gain
 from kemba.identify.doubt.parsimony import Belief, is_idle
 from kemba.identify.evidence.search import Search
 from kemba.identify.verdict import doubts_about, verdict_on
@@ -71,3 +74,26 @@ def test_what_left_out_data_do_not_need_is_not_named() -> None:
     assert (answer.verdict, answer.added) == ("nothing", ())
     assert answer.sentence.startswith("What differs may be chance (p = 0.00")
     assert any("wave would fit these readings better" in remark for remark in answer.remarks)
+
+
+@pytest.mark.parametrize(
+    ("gains", "evidence", "chosen"),
+    [
+        ((0.4, 273.0, 50.0), (0.0, -1.6, 0.2), ("rear",)),  # front and rear fit as well
+        ((0.4, 273.0, 50.0), (0.0, -3.6, 0.2), ()),  # rear fits worse
+        ((0.4, 19.0, 50.0), (0.0, -1.6, 0.2), ()),  # two standard errors are 20 nats
+    ],
+)
+def test_left_out_data_choose_among_effects_that_fit_as_well(
+    monkeypatch: pytest.MonkeyPatch,
+    gains: tuple[float, ...],
+    evidence: tuple[float, ...],
+    chosen: tuple[str, ...],
+) -> None:
+    """Where the likeliest one is idle; of pairs, which fit more, none is taken for a single one."""
+    names = (("front",), ("rear",), ("front", "payload"))
+    points = {h: SimpleNamespace(log_evidence=e) for h, e in zip(names, evidence, strict=True)}
+    known = dict(zip(names, gains, strict=True))
+    monkeypatch.setattr(parsimony, "window_gain", lambda search, h, against: Gain(known[h], 10.0))
+    search = SimpleNamespace(points=points)
+    assert parsimony.needed_instead(search, ("front",)) == chosen  # type: ignore[arg-type]

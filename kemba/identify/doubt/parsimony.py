@@ -21,6 +21,20 @@ from kemba.identify.doubt.cross_validation import left_out, window_gain, window_
 from kemba.identify.evidence.bootstrap import BootstrapSettings
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis, log_prior
+from kemba.identify.settings import RankingSettings
+from kemba.settings import Settings, setting
+
+
+class ParsimonySettings(Settings):
+    """When left-out data choose among hypotheses that explain the data as well."""
+
+    plain: float = setting(
+        2.0,
+        "1",
+        "standard errors by which left-out data must gain by the one that they choose",
+        "convention: two, since several are asked",
+        decides=True,
+    )
 
 
 @dataclass(frozen=True)
@@ -146,6 +160,21 @@ def is_idle(search: Search, best: Hypothesis) -> bool:
     return as_good(search, NULL, best)
 
 
+def needed_instead(search: Search, idle: Hypothesis) -> Hypothesis:
+    """Of the hypotheses that explain the data as well as an idle one, by as many effects, the one
+    that left-out data need most; NULL where they need none.
+
+    A bias of one leg's piston may fit as well as the opposite one of the other leg, and only one of
+    them predicts.
+    """
+    own, same = search.points[idle].log_evidence, RankingSettings.current().same
+    near = [h for h, p in search.points.items() if own - p.log_evidence < same]
+    gains = {h: window_gain(search, h, NULL) for h in near if len(h) == len(idle)}
+    plain = ParsimonySettings.current().plain
+    needed = {h: g.nats for h, g in gains.items() if g.nats > max(plain * g.error, _least())}
+    return max(needed, key=needed.__getitem__, default=NULL)
+
+
 def none_of(belief: Belief) -> Belief:
     """The belief in nothing, where the best hypothesis is idle."""
     remark = (
@@ -160,7 +189,12 @@ def as_good(search: Search, hypothesis: Hypothesis, best: Hypothesis) -> bool:
     """Whether a hypothesis predicts left-out data as well as the `best`: within one standard error
     of it, or with less than any evidence between them."""
     gain = window_gain(search, best, hypothesis)
-    return not gain.pays or gain.nats < BootstrapSettings.current().least
+    return not gain.pays or gain.nats < _least()
+
+
+def _least() -> float:
+    """Nats that are any evidence at all."""
+    return BootstrapSettings.current().least
 
 
 def _remark(search: Search, best: Hypothesis, chosen: Hypothesis) -> str:
