@@ -1,4 +1,4 @@
-"""Load a program that `kemba-opt export --nlp` wrote; needs CasADi only. docs/plan-quality.md shows it.
+"""Load a program that `kemba-opt export --nlp` wrote; needs CasADi only (docs/plan-quality.md).
 
 Usage: python benchmarks/load_program.py nlp/refined.casadi
 """
