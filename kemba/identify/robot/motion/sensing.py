@@ -29,8 +29,8 @@ class SensingSettings(Settings):
         1.5,
         "1",
         "rows from which a late sensor's readings are moved to the rows to which they belong",
-        "tuned: calm rates tell 1 ms well and not 5 ms; of 618 blind cases one ranked a longer delay "
-        "where none was, 1.53 ms",
+        "tuned: calm rates tell 1 ms well and not 5 ms; of 618 blind cases one ranked a longer "
+        "delay where none was, 1.53 ms",
     )
 
 
