@@ -85,7 +85,7 @@ def detectable(record: Record, effect: Record) -> bool:
     """Whether a hidden effect is larger than the size of it that the answer says it sees."""
     lead, true = next(iter(effect["parameters"].items()))
     least = record["answer"]["smallest_detectable"].get(effect["kind"], {}).get(lead, 0.0)
-    return bool(abs(true - _off(lead, true)) > least)
+    return least is not None and bool(abs(true - _off(lead, true)) > least)
 
 
 def _off(name: str, true: float) -> float:

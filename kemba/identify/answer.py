@@ -73,7 +73,7 @@ class Answer:
     error_before: float = float("nan")
     error_after: float = float("nan")
     noise_floor: float = 1.0
-    smallest_detectable: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    smallest_detectable: Mapping[str, Mapping[str, float | None]] = field(default_factory=dict)
     formula: str | None = None
     split_by: str = ""
     model: str | None = None

@@ -71,7 +71,15 @@ def test_nothing_is_found_when_nothing_is_missing() -> None:
     answers = [discover(Toy({}, seed)).answer for seed in range(12)]
     assert sum(a.verdict != "nothing" for a in answers) == 0
     assert all(a.p_value_nothing > 0.02 for a in answers)
-    assert 0.5 < answers[0].smallest_detectable["kick"]["a"] < 6.0
+    seen = answers[0].smallest_detectable["kick"]["a"]
+    assert seen is not None and 0.5 < seen < 6.0
+
+
+def test_an_effect_that_the_logs_cannot_show_has_no_detectable_size() -> None:
+    problem = Toy({})
+    problem._shapes["kick"] = 0.0 * problem._time
+    sizes = discover(problem).answer.smallest_detectable
+    assert sizes["kick"]["a"] is None and sizes["wave"]["a"] is not None
 
 
 def test_a_small_imperfection_is_nothing() -> None:

@@ -14,6 +14,8 @@ from kemba.identify.problem.problem import Array
 from kemba.identify.settings import DiscoverSettings
 from kemba.settings import Settings, setting
 
+ROUNDING = 1e-6  # of what the prior tells: a difference of two figures of doubles, inverted twice
+
 
 class BootstrapSettings(Settings):
     """The test whether anything is missing."""
@@ -142,15 +144,20 @@ def _sign_terms(
     return total
 
 
-def smallest_detectable(ranker: Ranker, threshold: float) -> dict[str, float]:
+def smallest_detectable(ranker: Ranker, threshold: float) -> dict[str, float | None]:
     """Effect -> size [its switch's unit] that these data would show above the threshold [nats] nine
-    times in ten."""
-    found, prior = {}, SpikeSlabSettings.current()
+    times in ten; None where they show it at no size, as a place along level ground."""
+    found: dict[str, float | None] = {}
+    prior = SpikeSlabSettings.current()
     for effect, i in ranker.lead.items():
         size = ranker.candidates[effect].lead.size
         wide = prior.slab * size
         covariance = ranker.score((effect,)).covariance
-        variance = 1.0 / max(1.0 / covariance[i, i] - 1.0 / wide**2, 1e-12 / wide**2)
+        told = 1.0 / covariance[i, i] - 1.0 / wide**2
+        if told * wide**2 < ROUNDING:
+            found[effect] = None
+            continue
+        variance = 1.0 / told
         narrow = variance + (prior.spike * size) ** 2
         gain = 0.5 * (1.0 / narrow - 1.0 / (variance + wide**2))
         occam = 0.5 * np.log((variance + wide**2) / narrow)
