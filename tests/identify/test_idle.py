@@ -79,9 +79,10 @@ def test_what_left_out_data_do_not_need_is_not_named() -> None:
 @pytest.mark.parametrize(
     ("gains", "evidence", "chosen"),
     [
-        ((0.4, 273.0, 50.0), (0.0, -1.6, 0.2), ("rear",)),  # front and rear fit as well
-        ((0.4, 273.0, 50.0), (0.0, -3.6, 0.2), ()),  # rear fits worse
-        ((0.4, 19.0, 50.0), (0.0, -1.6, 0.2), ()),  # two standard errors are 20 nats
+        ((0.4, 273.0, 50.0), (30.0, 28.4, 30.2), ("rear",)),  # front and rear fit as well
+        ((0.4, 273.0, 50.0), (30.0, 26.4, 30.2), ()),  # rear fits worse
+        ((0.4, 19.0, 50.0), (30.0, 28.4, 30.2), ()),  # two standard errors are 20 nats
+        ((0.4, 273.0, 50.0), (1.2, 0.1, 1.2), ()),  # nothing is likelier than rear
     ],
 )
 def test_left_out_data_choose_among_effects_that_fit_as_well(
@@ -93,7 +94,9 @@ def test_left_out_data_choose_among_effects_that_fit_as_well(
     """Where the likeliest one is idle; of pairs, which fit more, none is taken for a single one."""
     names = (("front",), ("rear",), ("front", "payload"))
     points = {h: SimpleNamespace(log_evidence=e) for h, e in zip(names, evidence, strict=True)}
+    points[()] = SimpleNamespace(log_evidence=0.0)
     known = dict(zip(names, gains, strict=True))
     monkeypatch.setattr(parsimony, "window_gain", lambda search, h, against: Gain(known[h], 10.0))
-    search = SimpleNamespace(points=points)
+    problem = SimpleNamespace(candidates=("front", "payload", "rear"))
+    search = SimpleNamespace(points=points, problem=problem)
     assert parsimony.needed_instead(search, ("front",)) == chosen  # type: ignore[arg-type]

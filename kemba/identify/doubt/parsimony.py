@@ -161,14 +161,15 @@ def is_idle(search: Search, best: Hypothesis) -> bool:
 
 
 def needed_instead(search: Search, idle: Hypothesis) -> Hypothesis:
-    """Of the hypotheses that explain the data as well as an idle one, by as many effects, the one
-    that left-out data need most; NULL where they need none.
+    """Of the hypotheses that explain the data as well as an idle one, by as many effects, and are
+    likelier than nothing, the one that left-out data need most; NULL where they need none.
 
     A bias of one leg's piston may fit as well as the opposite one of the other leg, and only one of
     them predicts.
     """
-    own, same = search.points[idle].log_evidence, RankingSettings.current().same
-    near = [h for h, p in search.points.items() if own - p.log_evidence < same]
+    count, same = len(search.problem.candidates), RankingSettings.current().same
+    likely = {h: p.log_evidence + log_prior(h, count) for h, p in search.points.items()}
+    near = [h for h, p in likely.items() if p > max(likely[idle] - same, likely[NULL])]
     gains = {h: window_gain(search, h, NULL) for h in near if len(h) == len(idle)}
     plain = ParsimonySettings.current().plain
     needed = {h: g.nats for h, g in gains.items() if g.nats > max(plain * g.error, _least())}
