@@ -77,11 +77,11 @@ def joined(row: Ranked, p_value: float, answer: Answer, second: Search, best: Hy
         error_before=before,
         ladder=list(zip(steps, [before, *rungs], strict=True)),
     )
-    found.remarks = [f"built anew with {row.effect}; its figures were left free", *answer.remarks]
     if verdict == "partly" and not answer.rest:
         left = rest_of(second, best, [])
         found.rest, found.next = left.where, left.next
     found.sentence = phrase(found)
+    found.remarks = [*answer.remarks, f"built anew with {row.effect}; its figures were left free"]
     return found
 
 
@@ -112,9 +112,9 @@ def _verdict(second: Verdict, before: float, after: float) -> Verdict:
     """What the verdict on the second model says of the first, from the errors before and after."""
     settings = VerdictSettings.current()
     share = excess(after) / max(excess(before), 1e-9)
-    whole = after <= settings.whole or share <= settings.whole_share
-    if second in ("missing", "nothing"):
-        return "missing" if whole else "partly"
-    if second == "unknown" and share <= 1.0 - settings.part_of_structure:
-        return "partly"
-    return second
+    if second in ("missing", "nothing") and (
+        after <= settings.whole or share <= settings.whole_share
+    ):
+        return "missing"
+    least = settings.part_of_structure if second == "unknown" else settings.part
+    return "partly" if share <= 1.0 - least else "unknown"
