@@ -10,6 +10,8 @@ from kemba.effects.sensors import SensorEffect, as_measured, as_true
 from kemba.effects.series import Series
 from kemba.identify.problem.problem import Theta
 
+GEOMETRY = "geometry:"  # names of the lengths begin so
+
 
 def fault_kinds() -> dict[str, type[SensorEffect]]:
     """Every kind of sensor fault in the catalogue."""
@@ -103,6 +105,12 @@ def is_fault(name: str) -> bool:
     """Whether a name in theta is a figure that changes what some sensor shows."""
     kind = name.partition(":")[0]
     return kind in fault_kinds() or kind.partition(".")[0] in carriers()
+
+
+def moves_readings(name: str) -> bool:
+    """Whether a name in theta is a figure that a drift of sensors may imitate: what they show, or a
+    length between them."""
+    return is_fault(name) or name.startswith(GEOMETRY)
 
 
 def is_straight(name: str) -> bool:

@@ -17,6 +17,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from kemba.errors import KembaError
+from kemba.identify.problem.sensor_faults import GEOMETRY
 from kemba.identify.problem.types import Array, Candidate, Flags
 from kemba.identify.robot.dynamics.physics import Physics
 from kemba.identify.robot.dynamics.reference import Reference
@@ -26,7 +27,6 @@ from kemba.mechanism.knee import flexion_of
 from kemba.mechanism.links import altered
 from kemba.settings import BY_HAND, Settings, setting
 
-GEOMETRY = "geometry:"  # names of the lengths begin so
 LEVER = "boom_lever"
 
 

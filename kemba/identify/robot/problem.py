@@ -11,7 +11,7 @@ from typing_extensions import Self
 from kemba.identify.logs.gate import BadData
 from kemba.identify.problem.candidates import sensor_candidates
 from kemba.identify.problem.problem import Problem
-from kemba.identify.problem.sensor_faults import SensorFaults, is_fault, is_straight
+from kemba.identify.problem.sensor_faults import SensorFaults, is_straight, moves_readings
 from kemba.identify.problem.slopes import mean_slope
 from kemba.identify.problem.structure import (
     FIGURES,
@@ -36,7 +36,7 @@ from kemba.identify.robot.dynamics.reference import first_reference
 from kemba.identify.robot.dynamics.settings import ForceDensity
 from kemba.identify.robot.force_channels import robot_force_channels
 from kemba.identify.robot.formulas import formula_columns
-from kemba.identify.robot.geometry import GEOMETRY, mistakes, remarks, standing_lengths
+from kemba.identify.robot.geometry import mistakes, remarks, standing_lengths
 from kemba.identify.robot.labels import describe
 from kemba.identify.robot.missing import robot_missing
 from kemba.identify.robot.motion.batch import Batch
@@ -130,7 +130,7 @@ class RobotProblem(Problem):
     def relinearise(self, base: Theta) -> Self:
         """The same problem, smoothed and linearised anew with the model at `base`."""
         found, old = copy(self), self.state
-        own = any(is_fault(name) or name.startswith(GEOMETRY) for name in base)
+        own = any(map(moves_readings, base))
         found.base = base = base if own else {**self.lengths, **base}
         given = old.physics, old.batch, old.sensors, base, old.ground, self.unknown, old.noise
         found.state = linearise_at(*given)
@@ -213,8 +213,7 @@ class RobotProblem(Problem):
         """Whether the force is linear in it, and nothing else depends on it: shapes, states,
         delays, lengths and what sensors show are not so."""
         physics = self.physics
-        elsewhere = is_fault(name) or name.startswith(GEOMETRY)
-        if elsewhere or name in physics.moving or name in physics.base.delays:
+        if moves_readings(name) or name in physics.moving or name in physics.base.delays:
             return False
         lead = any(name == c.key for c in self.candidates.values())
         return name in self.state.linear or (
@@ -281,7 +280,7 @@ class RobotProblem(Problem):
 
     def _sensor_columns(self) -> Array:
         """Columns (n, k) of every sensor fault and every length, per size."""
-        faults = [c for c in self.candidates.values() if c.sensor or c.effect.startswith(GEOMETRY)]
+        faults = [c for c in self.candidates.values() if moves_readings(c.key)]
         return self.jacobian(self.lengths, [c.key for c in faults]) * [c.lead.size for c in faults]
 
     def formulas(self, theta: Theta) -> Mapping[str, Array]:

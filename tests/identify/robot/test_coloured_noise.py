@@ -95,6 +95,21 @@ def test_logs_tell_whether_their_sensors_drift(drift: float) -> None:
     assert (gain > DriftSettings.current().strong) == (drift > 0.0)
 
 
+@pytest.mark.parametrize(
+    ("name", "asked"),
+    [
+        ("sensor_bias:body/z.b", True),
+        ("geometry:tibia/length.d", True),
+        ("boom_lever.k", True),
+        ("seal_friction.F_c", False),
+    ],
+)
+def test_drifts_are_looked_for_where_they_imitate_the_answer(name: str, asked: bool) -> None:
+    logs = noisy(sensors=measure.Sensors(keep=0.7, drift=2.0))
+    found = with_learnt_colour(robot_problem(logs, load_model()), {name: 1e-3}, careful=True)
+    assert (found.drifting() is None) == asked
+
+
 def test_white_noise_stays_as_it_is_stated() -> None:
     logs = noisy(sensors=measure.Sensors())
     found = with_learnt_colour(robot_problem(logs, load_model("planning")), {})

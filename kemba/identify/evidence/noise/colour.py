@@ -7,7 +7,7 @@ import numpy as np
 from kemba.identify.evidence.linear import Linear, is_on, linearise, time_blocks
 from kemba.identify.evidence.modes.small_effects import mode_of
 from kemba.identify.problem.problem import Array, Labels, Problem, Theta
-from kemba.identify.problem.sensor_faults import is_fault
+from kemba.identify.problem.sensor_faults import moves_readings
 from kemba.settings import Settings, setting
 
 
@@ -34,14 +34,15 @@ def with_learnt_colour(
     if not problem.learns_colour:
         return problem
     found = learnt_colour(problem, theta, blocks, careful)[0]
-    return _with_drift(found, theta) if careful and any(is_fault(name) for name in theta) else found
+    asked = careful and any(map(moves_readings, theta))
+    return _with_drift(found, theta) if asked else found
 
 
 def _with_drift(problem: Problem, theta: Theta) -> Problem:
     """The problem with drifting sensors, where the logs are clearly likelier so.
 
-    A wrong sensor explains some of a drift. The drift itself explains more of it, and it is asked
-    for only where a sensor at theta is wrong: the question takes seconds.
+    A wrong sensor or length explains some of a drift. The drift itself explains more of it, and it
+    is asked for only where one is wrong at theta: the question takes seconds.
     """
     drifting = problem.drifting()
     if drifting is None:
