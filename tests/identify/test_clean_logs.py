@@ -11,6 +11,7 @@ from twin.cases import bench_case
 from twin.measure import Sensors
 
 from kemba.effects import BY_KIND
+from kemba.errors import KembaError
 from kemba.identify.bench.bench_log import prepare
 from kemba.identify.bench.clocks import ClockSettings, looked_at
 from kemba.identify.bench.problem import BenchProblem, bench_problem
@@ -228,6 +229,19 @@ def test_a_short_log_is_undecided_and_says_what_to_record(
     assert answer.verdict == "unknown" and not answer.added and answer.p_value_nothing >= 0.125
     assert "too short to tell what" in answer.sentence
     assert "record at least 0.8 s" in answer.sentence
+
+
+def test_a_mix_up_in_which_the_model_cannot_be_is_none(bench_log: BenchLog) -> None:
+    """A position from the other end leads to negative volumes, in which nothing comes to rest."""
+    run = prepare("run", bench_log(duration=0.6))
+    force = run.measured["piston/F"]
+
+    def predict(trial: object) -> np.ndarray:
+        if trial is not run:
+            raise KembaError("model", "its states do not come to rest")
+        return force + 20.0
+
+    assert contradictions(run, 0.07, predict) == []
 
 
 def test_no_lag_is_read_at_the_end_of_the_search(bench_log: BenchLog) -> None:

@@ -79,7 +79,7 @@ def contradictions(run: BenchLog, stroke: float, predict: Predict) -> list[Kemba
     error, scale = _misfit(run, predict)
     if error < limits.small * run.sigma["piston/F"]:
         return []
-    trials = [(text, _misfit(trial, predict)) for text, trial in mix_ups(run, stroke)]
+    trials = [(text, _misfit_mixed_up(trial, predict)) for text, trial in mix_ups(run, stroke)]
     text, (best, spread) = min(trials, key=lambda t: t[1][0] / t[1][1])
     if best / spread < limits.close and best / spread * limits.better < error / scale:
         return [KembaError(path, text, "the force answers the valves so much better then")]
@@ -106,6 +106,15 @@ def _misfit(run: BenchLog, predict: Predict) -> tuple[float, float]:
         error = float(np.sqrt(np.mean((predict(run)[keep] - force) ** 2)))
     error = error if np.isfinite(error) else np.inf
     return error, max(float(np.std(force)), float(np.sqrt(np.mean(force**2))), 1.0)
+
+
+def _misfit_mixed_up(trial: BenchLog, predict: Predict) -> tuple[float, float]:
+    """The same for a mix-up; infinite where it leads the model to no prediction, as to a negative
+    volume."""
+    try:
+        return _misfit(trial, predict)
+    except KembaError:
+        return np.inf, 1.0
 
 
 def _clock(run: BenchLog, predict: Predict) -> list[KembaError]:
