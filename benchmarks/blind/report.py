@@ -189,7 +189,8 @@ def _shapes(records: Sequence[Record]) -> list[str]:
     return [
         _row("geometry and assembly: named as such", records, as_shape),
         _row("geometry and assembly: exactly the right one", records, right),
-        _row("the same without the mount, which hardly shows", shown, right),
+        _row("geometry and assembly: in the named class", records, in_class),
+        _row("the same without the mount, which hardly shows", shown, in_class),
         _row("of the lengths named: within 1 mm", lengths, lambda r: _length_error(r) < 1e-3),
     ]
 
