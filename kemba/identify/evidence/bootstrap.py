@@ -14,8 +14,6 @@ from kemba.identify.problem.problem import Array
 from kemba.identify.settings import DiscoverSettings
 from kemba.settings import Settings, setting
 
-ROUNDING = 1e-6  # of what the prior tells: a difference of two figures of doubles, inverted twice
-
 
 class BootstrapSettings(Settings):
     """The test whether anything is missing."""
@@ -28,6 +26,12 @@ class BootstrapSettings(Settings):
     )
     least: float = setting(
         1.0, "nats", "smallest threshold of the log evidence", "convention: evidence of one nat"
+    )
+    silent: float = setting(
+        1e-6,
+        "1",
+        "share of what the prior tells of an effect, below which data tell nothing of it",
+        "derived: rounding alone leaves about 1e-10, as of a place along level ground",
     )
 
 
@@ -154,7 +158,7 @@ def smallest_detectable(ranker: Ranker, threshold: float) -> dict[str, float | N
         wide = prior.slab * size
         covariance = ranker.score((effect,)).covariance
         told = 1.0 / covariance[i, i] - 1.0 / wide**2
-        if told * wide**2 < ROUNDING:
+        if told * wide**2 < BootstrapSettings.current().silent:
             found[effect] = None
             continue
         variance = 1.0 / told
