@@ -64,6 +64,7 @@ class Rest:
         self._changes = ca.Function("changes", [x, p], [ca.densify(scaled), slope])
         settings = RestSettings.current()
         options = {"abstol": settings.tolerance, "reltol": settings.tolerance}
+        options["disable_internal_warnings"] = True  # what did not settle is told by KembaError
         equation = {"x": x, "p": p, "ode": scaled}
         self._wait = ca.integrator("wait", "cvodes", equation, 0.0, settings.wait, options)
 

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import casadi as ca
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 from kemba.contract.cases import Placed
 from kemba.effects import BY_KIND, EFFECTS
+from kemba.errors import KembaError
 from kemba.model import Model, load_model
-from kemba.model.rest import at_rest
+from kemba.model.rest import Rest, at_rest
+from kemba.quantity import Quantity
 
 VALVES = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)]
 
@@ -45,3 +48,11 @@ def test_without_commands_every_state_rests_at_its_nominal_value(kind: str) -> N
     found = at_rest(model, q, np.zeros(len(model.inputs)))
     for value, quantity in zip(found, model.states.values(), strict=True):
         assert value == pytest.approx(quantity.value, abs=1e-4 * quantity.scale), quantity.name
+
+
+def test_what_grows_without_bound_is_told_once(capfd: pytest.CaptureFixture[str]) -> None:
+    """The integrator prints nothing of its own beside it."""
+    s = ca.SX.sym("s")
+    with pytest.raises(KembaError, match="does an effect feed itself"):
+        Rest(s, [], 1.0 + s**2, [Quantity("a/s", "N", 1.0)])()
+    assert capfd.readouterr() == ("", "")
