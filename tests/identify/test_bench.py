@@ -14,6 +14,7 @@ from kemba.effects.base import Effect
 from kemba.effects.pneumatics.switching import delayed, is_on, pulses
 from kemba.identify.adopt import adopt_effect
 from kemba.identify.bench.motion import SmoothedMotion
+from kemba.identify.bench.prediction import absolute_pressure
 from kemba.identify.bench.problem import bench_problem
 from kemba.identify.bench.rig_model import RigModel
 from kemba.identify.design.settings import DesignSearchSettings, ExperimentSettings
@@ -137,8 +138,6 @@ def test_pressures_are_read_when_there_are_any(bench_log: BenchLog) -> None:
     model = load_model(rig=True)
     bare = bench_problem([log], model)
     states = bare.predicted.predictor.predict(bare.logs[0], {}).states
-    from kemba.identify.bench.prediction import absolute_pressure
-
     columns = {
         f"{c} [Pa]": absolute_pressure(c, states, model.mechanism.need_cylinder())
         + 500 * np.random.default_rng(0).standard_normal(len(log))
@@ -147,6 +146,13 @@ def test_pressures_are_read_when_there_are_any(bench_log: BenchLog) -> None:
     problem = bench_problem([log.with_columns(columns)], model)
     assert problem.channels == ("piston/F", "chamber/extend/P", "chamber/retract/P")
     assert np.sqrt(np.mean(problem.residual({}) ** 2)) == pytest.approx(1.0, abs=0.15)
+
+
+def test_a_pressure_of_states_that_diverge_is_no_warning() -> None:
+    """A fit may try a model that is far from the data; what it leaves is refused by its size."""
+    states = {"chamber/extend/F": np.array([1.0, 1e307])}
+    found = absolute_pressure("chamber/extend/P", states, load_model(rig=True).mechanism.need_cylinder())
+    assert np.isfinite(found).tolist() == [True, False]
 
 
 def test_from_logs_to_a_model_and_the_next_test(bench_log: BenchLog, tmp_path: Path) -> None:

@@ -124,4 +124,5 @@ def absolute_pressure(channel: str, states: Mapping[str, Array], cylinder: Cylin
     if f"chamber/{chamber}/P" in states:
         return states[f"chamber/{chamber}/P"]
     area = cylinder.area_extend if chamber == "extend" else cylinder.area_retract
-    return ATMOSPHERE + states[f"chamber/{chamber}/F"] / area
+    with np.errstate(over="ignore"):  # the states of a model far from the data may diverge
+        return np.asarray(ATMOSPHERE + states[f"chamber/{chamber}/F"] / area)
