@@ -151,7 +151,9 @@ def test_pressures_are_read_when_there_are_any(bench_log: BenchLog) -> None:
 def test_a_pressure_of_states_that_diverge_is_no_warning() -> None:
     """A fit may try a model that is far from the data; what it leaves is refused by its size."""
     states = {"chamber/extend/F": np.array([1.0, 1e307])}
-    found = absolute_pressure("chamber/extend/P", states, load_model(rig=True).mechanism.need_cylinder())
+    found = absolute_pressure(
+        "chamber/extend/P", states, load_model(rig=True).mechanism.need_cylinder()
+    )
     assert np.isfinite(found).tolist() == [True, False]
 
 
