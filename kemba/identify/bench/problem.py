@@ -26,7 +26,7 @@ from kemba.identify.bench.quiet import position_noise
 from kemba.identify.bench.validate import contradictions
 from kemba.identify.logs.gate import BadData
 from kemba.identify.problem.candidates import effect_candidates, sensor_candidates
-from kemba.identify.problem.noise import Colour, learn, whiten
+from kemba.identify.problem.noise import Colour, colours, whiten, whitened
 from kemba.identify.problem.problem import Problem
 from kemba.identify.problem.types import (
     Array,
@@ -73,8 +73,9 @@ class BenchProblemSettings(Settings):
 class BenchProblem(Problem):
     """Residuals of bench runs; effects join the model's list when theta switches them on.
 
-    `colour`: noise colour by run and channel; without any, residuals are not whitened. `drift`:
-    whose clock gained on the others before the logs were put on one clock, and its rate.
+    `colour`: noise colour by run and channel; without any, residuals are not whitened. `left` (n,):
+    the residual from which it was learnt. `drift`: whose clock gained on the others before the logs
+    were put on one clock, and its rate.
     """
 
     learns_colour = True
@@ -111,6 +112,7 @@ class BenchProblem(Problem):
             self.nuisance[f"sensor_bias:{channel}.b"] = (0.0, known.pressure_zero)
             self.nuisance[f"sensor_scale:{channel}.k"] = (0.0, known.pressure_gain)
         self.colour: Mapping[tuple[int, int], Colour] = {}
+        self.left: Array | None = None
 
     @property
     def logs(self) -> tuple[BenchLog, ...]:
@@ -214,9 +216,21 @@ class BenchProblem(Problem):
     def recolour(self, residual: Array | None, careful: bool = False) -> Self:
         """The same problem with the colour of every run and channel learnt from `residual` (n,), or
         forgotten."""
-        found = copy(self)
-        found.colour = {} if residual is None else self._learnt(residual, careful)
+        found, found.left = copy(self), residual
+        found.colour = {} if residual is None else colours(self.rows(), residual, careful)
         return found
+
+    def drifting(self) -> Self | None:
+        """The same problem with sensors that may also drift, by as much as their stated noise."""
+        if self.left is None or any(c.drift for c in self.colour.values()):
+            return None
+        found = copy(self)
+        found.colour = colours(self.rows(), self.left, careful=True, drifts=True)
+        return found
+
+    def log_density(self) -> float:
+        """That of the colours."""
+        return sum(colour.log_density for colour in self.colour.values())
 
     def in_detail(self) -> Self:
         """The same problem with nothing read off between rows."""
@@ -225,21 +239,9 @@ class BenchProblem(Problem):
         found.predicted = replace(self.predicted, predictor=predictor)
         return found
 
-    def _learnt(self, residual: Array, careful: bool) -> dict[tuple[int, int], Colour]:
-        rows, found = self.rows(), {}
-        for i in range(len(self.logs)):
-            for k in np.unique(rows.channel[rows.run == i]):
-                own = (rows.run == i) & (rows.channel == k)
-                found[i, int(k)] = learn(residual[own], careful=careful)
-        return found
-
     def whiten(self, columns: Array) -> Array:
         """Columns (n, k) that were not whitened, as `jacobian` would return them."""
-        rows, out = self.rows(), columns.copy()
-        for (i, k), colour in self.colour.items():
-            own = (rows.run == i) & (rows.channel == k)
-            out[own] = whiten(columns[own], colour)
-        return np.asarray(out)
+        return whitened(self.rows(), columns, self.colour)
 
     def validate(self) -> list[str]:
         """A remark on clocks that drift apart. Raises BadData where columns must be mixed up."""

@@ -17,7 +17,7 @@ from kemba.identify.evidence.linear import (
     within,
 )
 from kemba.identify.evidence.modes.small_effects import Mode, mode_of
-from kemba.identify.evidence.noise.colour import best_fit, learnt_colour
+from kemba.identify.evidence.noise.colour import best_fit, learnt_colour, with_learnt_colour
 from kemba.identify.evidence.point import Division, LinearisationPoint
 from kemba.identify.evidence.refit import Fit, Frozen, refit
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis, Ranker
@@ -222,5 +222,8 @@ class Baseline:
         if not self.problem.learns_colour or self.problem.moves:
             return None  # where the motion moves, the search learns the colour with it
         blocks = self.division.blocks
-        self.problem, jacobian = learnt_colour(self.problem, theta, blocks, careful=not keep)
-        return self.problem.whiten(jacobian) if keep else None
+        if not keep:
+            self.problem = with_learnt_colour(self.problem, theta, blocks, careful=True)
+            return None
+        self.problem, jacobian = learnt_colour(self.problem, theta, blocks, careful=False)
+        return self.problem.whiten(jacobian)

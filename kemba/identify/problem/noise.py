@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from statistics import NormalDist
 
@@ -9,7 +10,8 @@ import numpy as np
 from scipy.linalg import solve_toeplitz
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
-from kemba.identify.problem.problem import Array
+from kemba.identify.problem.drift import Drift, drift_waves
+from kemba.identify.problem.problem import Array, Rows
 from kemba.identify.problem.quantisation import step_of
 from kemba.settings import BY_HAND, Settings, setting
 
@@ -75,11 +77,21 @@ def _spread_of_smallest(share: float) -> float:
 
 @dataclass(frozen=True)
 class Colour:
-    """AR model r_t = sum phi_k r_{t-k} + sigma e_t of a standardised residual."""
+    """AR model r_t = sum phi_k r_{t-k} + sigma e_t of a standardised residual of so many `rows`."""
 
     phi: Array
     sigma: float
+    rows: int = 0
     weight: Array | None = None  # (n,) below 1 where the residual has a spike
+    drift: Drift | None = None  # that the series has besides
+
+    @property
+    def log_density(self) -> float:
+        """Log density [nats] of rows that are zero, up to a constant."""
+        found = -self.rows * float(np.log(self.sigma))
+        if self.weight is not None:
+            found += float(np.sum(np.log(self.weight)))
+        return found + (self.drift.log_density if self.drift else 0.0)
 
     @property
     def spread(self) -> float:
@@ -92,6 +104,20 @@ class Colour:
         return float(self.sigma * np.sqrt(np.sum(response**2)))
 
 
+def colours(
+    rows: Rows, residual: Array, careful: bool, drifts: bool = False
+) -> dict[tuple[int, int], Colour]:
+    """The colour of a residual (n,) by run and channel; `drifts`: beside a slow drift."""
+    found = {}
+    for i, k in np.unique(np.stack([rows.run, rows.channel]), axis=1).T.tolist():
+        own = (rows.run == i) & (rows.channel == k)
+        if drifts:
+            found[i, k] = _beside_drift(residual[own], rows.time[own], careful)
+        else:
+            found[i, k] = learn(residual[own], careful=careful)
+    return found
+
+
 def learn(residual: Array, order: int | None = None, careful: bool = False) -> Colour:
     """Yule-Walker fit to a residual (n,), its order by BIC up to `order` (None: the setting).
 
@@ -100,7 +126,15 @@ def learn(residual: Array, order: int | None = None, careful: bool = False) -> C
     order = NoiseSettings.current().order if order is None else order
     weight = caution(residual) if careful else None
     found = _yule_walker(residual if weight is None else residual * weight, order)
-    return replace(found, weight=weight)
+    return replace(found, rows=len(residual), weight=weight)
+
+
+def _beside_drift(residual: Array, time: Array, careful: bool) -> Colour:
+    """The same beside a slow drift, as large as the stated noise; rows at `time` (n,) [s]."""
+    waves, sigmas = drift_waves(time)
+    slow = waves @ np.linalg.lstsq(waves, residual, rcond=None)[0]
+    found = learn(residual - slow, careful=careful)
+    return replace(found, drift=Drift.of(whiten(waves * sigmas, found)))
 
 
 def _yule_walker(residual: Array, order: int) -> Colour:
@@ -148,4 +182,13 @@ def whiten(residual: Array, colour: Colour) -> Array:
     p = len(colour.phi)
     if p:
         white[:p] = residual[:p] / max(colour.spread, colour.sigma)
-    return np.asarray(white)
+    return np.asarray(white) if colour.drift is None else colour.drift.out_of(white)
+
+
+def whitened(rows: Rows, columns: Array, by: Mapping[tuple[int, int], Colour]) -> Array:
+    """Columns (n, k) with the colour of every run and channel taken out."""
+    out = columns.copy()
+    for (i, k), colour in by.items():
+        own = (rows.run == i) & (rows.channel == k)
+        out[own] = whiten(columns[own], colour)
+    return np.asarray(out)

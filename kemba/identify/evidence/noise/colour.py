@@ -34,7 +34,7 @@ def with_learnt_colour(
     if not problem.learns_colour:
         return problem
     found = learnt_colour(problem, theta, blocks, careful)[0]
-    asked = careful and any(map(moves_readings, theta))
+    asked = careful and any(moves_readings(n) for n in theta if n not in problem.nuisance)
     return _with_drift(found, theta) if asked else found
 
 
