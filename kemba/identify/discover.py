@@ -9,19 +9,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kemba.identify.answer import ENDED, Answer, Ranked, phrase
-from kemba.identify.doubt.cross_validation import left_out, one_part_shows
+from kemba.identify.doubt.belief import believed, material
+from kemba.identify.doubt.cross_validation import one_part_shows
 from kemba.identify.doubt.held_out import HeldOut, error
-from kemba.identify.doubt.parsimony import (
-    Belief,
-    is_idle,
-    likeliest_part,
-    needed_instead,
-    none_of,
-    simplest,
-)
+from kemba.identify.doubt.parsimony import Belief
 from kemba.identify.doubt.run_consistency import drifting
 from kemba.identify.doubt.unexplained import Formula, look
-from kemba.identify.doubt.wanting import fuller, wanted
 from kemba.identify.evidence.bootstrap import NullTest, bootstrap, smallest_detectable
 from kemba.identify.evidence.figures import Rebuilt, ahead, settled
 from kemba.identify.evidence.linear import time_blocks
@@ -32,7 +25,7 @@ from kemba.identify.evidence.spike_slab import NULL, Hypothesis
 from kemba.identify.evidence.strain import strained
 from kemba.identify.evidence.windows import error_ratio
 from kemba.identify.problem.problem import Problem
-from kemba.identify.ranking import fitted_errors, ladder, ranked, strength
+from kemba.identify.ranking import fitted_errors, ladder, ranked
 from kemba.identify.rest import rest_of
 from kemba.identify.settings import DiscoverSettings, VerdictSettings
 from kemba.identify.stages import is_mixture, joined, structure_row, unbuilt
@@ -132,7 +125,7 @@ def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> 
     ended, search.in_pieces = search.ended, one_part_shows(search, best)
     search.say("simulating logs in which nothing is missing")
     test, likeliest = null_test(search), best
-    belief = _believed(search, likeliest, test)
+    belief = believed(search, likeliest, test.p_value(_best_gain(search)))
     best, p_value, ended = belief.best, belief.p_value, ended or search.late
     search.say("testing whether more is missing")
     kept = HeldOut.beside(holdout, search.problem) if holdout else None
@@ -203,57 +196,6 @@ def null_test(search: Search) -> NullTest:
     noise = left_out_noise(base.jacobian, left, linear.width, blocks, power)
     singles = [(name,) for name in search.problem.candidates]
     return bootstrap(base.ranker(linear), noise, singles)
-
-
-def _believed(search: Search, best: Hypothesis, test: NullTest) -> Belief:
-    """The best hypothesis with what left-out data ask for besides; without what is not significant,
-    too small, refuted by left-out data or of no use there."""
-    p_value = test.p_value(_best_gain(search))
-    if not best or p_value > DiscoverSettings.current().significant:
-        return Belief(NULL, p_value)
-    belief = Belief(fuller(search, best), p_value)
-    while belief.best:
-        best = belief.best
-        grave = material(search, best)
-        if grave != best:
-            belief = belief.without(best, grave)
-            if grave:
-                search.visit(grave)
-            continue
-        against = likeliest_part(search, best)
-        gain = left_out(search, best, against)
-        if gain.refuted or (len(best) > 1 and not gain.pays):
-            belief = belief.without(best, against)
-            continue
-        simpler = simplest(search, belief)
-        if simpler.best != best:
-            belief = simpler
-        elif not is_idle(search, best):
-            return simpler
-        elif other := needed_instead(search, best):
-            belief = simpler.without(best, other)
-        else:
-            return none_of(simpler)
-    return belief
-
-
-def material(search: Search, hypothesis: Hypothesis) -> Hypothesis:
-    """Those effects of a hypothesis that are larger than a model's usual imperfection, or smaller
-    and asked for by left-out data, and whose intervals exclude that they are absent."""
-    score, linear = search.points[hypothesis].score, search.points[hypothesis].linear
-    settings = DiscoverSettings.current()
-    least = settings.matters if len(hypothesis) == 1 else settings.matters_too
-
-    def share(effect: str) -> float:
-        c = search.problem.candidates[effect]
-        i = linear.index(c.key)
-        step, sd = abs(score.z[i] - c.lead.off), np.sqrt(score.covariance[i, i])
-        return float(step / c.lead.size) if step > settings.apart * sd else 0.0
-
-    strongest = max(hypothesis, key=lambda e: strength(search, e, hypothesis))
-    shares = {e: share(e) for e in hypothesis}
-    large = {e for e in shares if shares[e] >= (settings.matters if e == strongest else least)}
-    return tuple(e for e in shares if e in large or wanted(search, hypothesis, e, shares[e]))
 
 
 def _answer(

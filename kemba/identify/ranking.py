@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from kemba.identify.answer import Ranked, Value
+from kemba.identify.doubt.belief import strength
 from kemba.identify.doubt.cross_validation import left_out
 from kemba.identify.doubt.held_out import HeldOut, error, error_as_it_is
 from kemba.identify.doubt.parsimony import Belief
@@ -69,15 +70,6 @@ def _doubted(probability: Mapping[Hypothesis, float]) -> dict[Hypothesis, float]
     rest = sum(p for h, p in probability.items() if h)
     scale = min(1.0, most / rest) if rest > 0 else 1.0
     return {h: p * scale if h else 1.0 - rest * scale for h, p in probability.items()}
-
-
-def strength(search: Search, effect: str, best: Hypothesis) -> float:
-    """How much evidence goes when this effect is taken out of the answer."""
-    if effect not in best:
-        return 0.0
-    rest = tuple(h for h in best if h != effect)
-    points = search.points
-    return points[best].log_evidence - points[rest].log_evidence if rest in points else 0.0
 
 
 def equivalents(search: Search, belief: Belief, effect: str) -> tuple[str, ...]:

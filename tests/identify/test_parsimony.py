@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from toy_problem import Toy
 
-from kemba.identify.discover import _believed, discover, null_test
+from kemba.identify.discover import discover
+from kemba.identify.doubt.belief import believed
 from kemba.identify.doubt.cross_validation import Gain, left_out, left_out_error
 from kemba.identify.doubt.parsimony import Belief, likeliest_part, overclaimed, simplest
 from kemba.identify.evidence.search import Search
@@ -94,8 +95,8 @@ def test_effects_that_do_not_pay_leave_an_answer_one_by_one(
     search = Search(windowed({"kick.a": 9.0, "hum.a": 3.0, "wave.a": 3.0}))
     search.start()
     search.visit(many)
-    monkeypatch.setattr("kemba.identify.discover.left_out", alone_pays)
-    assert _believed(search, many, null_test(search)).best == ("kick",)
+    monkeypatch.setattr("kemba.identify.doubt.belief.left_out", alone_pays)
+    assert believed(search, many, p_value=0.0).best == ("kick",)
 
 
 def test_rivals_that_left_out_data_cannot_tell_are_named() -> None:

@@ -9,7 +9,8 @@ import pytest
 from toy_problem import Toy
 
 from kemba.identify.answer import ENDED, Answer, Ranked, Value, phrase
-from kemba.identify.discover import discover, material
+from kemba.identify.discover import discover
+from kemba.identify.doubt.belief import material
 from kemba.identify.doubt.cross_validation import Gain, left_out, left_out_error
 from kemba.identify.doubt.parsimony import Belief
 from kemba.identify.evidence.search import Search

@@ -1,0 +1,78 @@
+"""Which of the effects that evidence proposes are believed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kemba.identify.doubt.cross_validation import left_out
+from kemba.identify.doubt.parsimony import (
+    Belief,
+    is_idle,
+    likeliest_part,
+    needed_instead,
+    none_of,
+    simplest,
+)
+from kemba.identify.doubt.wanting import fuller, wanted
+from kemba.identify.evidence.search import Search
+from kemba.identify.evidence.spike_slab import NULL, Hypothesis
+from kemba.identify.settings import DiscoverSettings
+
+
+def believed(search: Search, best: Hypothesis, p_value: float) -> Belief:
+    """The best hypothesis with what left-out data ask for besides; without what is not significant,
+    too small, refuted by left-out data or of no use there."""
+    if not best or p_value > DiscoverSettings.current().significant:
+        return Belief(NULL, p_value)
+    belief = Belief(fuller(search, best), p_value)
+    while belief.best:
+        best = belief.best
+        grave = material(search, best)
+        if grave != best:
+            belief = belief.without(best, grave)
+            if grave:
+                search.visit(grave)
+            continue
+        against = likeliest_part(search, best)
+        gain = left_out(search, best, against)
+        if gain.refuted or (len(best) > 1 and not gain.pays):
+            belief = belief.without(best, against)
+            continue
+        simpler = simplest(search, belief)
+        if simpler.best != best:
+            belief = simpler
+        elif not is_idle(search, best):
+            return simpler
+        elif other := needed_instead(search, best):
+            belief = simpler.without(best, other)
+        else:
+            return none_of(simpler)
+    return belief
+
+
+def material(search: Search, hypothesis: Hypothesis) -> Hypothesis:
+    """Those effects of a hypothesis that are larger than a model's usual imperfection, or smaller
+    and asked for by left-out data, and whose intervals exclude that they are absent."""
+    score, linear = search.points[hypothesis].score, search.points[hypothesis].linear
+    settings = DiscoverSettings.current()
+    least = settings.matters if len(hypothesis) == 1 else settings.matters_too
+
+    def share(effect: str) -> float:
+        c = search.problem.candidates[effect]
+        i = linear.index(c.key)
+        step, sd = abs(score.z[i] - c.lead.off), np.sqrt(score.covariance[i, i])
+        return float(step / c.lead.size) if step > settings.apart * sd else 0.0
+
+    strongest = max(hypothesis, key=lambda e: strength(search, e, hypothesis))
+    shares = {e: share(e) for e in hypothesis}
+    large = {e for e in shares if shares[e] >= (settings.matters if e == strongest else least)}
+    return tuple(e for e in shares if e in large or wanted(search, hypothesis, e, shares[e]))
+
+
+def strength(search: Search, effect: str, best: Hypothesis) -> float:
+    """How much evidence goes when this effect is taken out of the answer."""
+    if effect not in best:
+        return 0.0
+    rest = tuple(h for h in best if h != effect)
+    points = search.points
+    return points[best].log_evidence - points[rest].log_evidence if rest in points else 0.0
