@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from kemba.identify.problem.drift import Drift, drift_waves
+from kemba.identify.problem.drift import DriftNoise, drift_waves
 from kemba.identify.problem.noise import colours, whitened
 from kemba.identify.problem.types import Rows
 
@@ -32,7 +32,7 @@ def drifting_noise(seed: int, slow: float) -> np.ndarray:
 
 def test_out_of_a_drift_rows_are_white_with_the_density_of_their_covariance() -> None:
     columns = np.random.default_rng(0).standard_normal((6, 2))
-    drift, row = Drift.of(columns), np.arange(6.0)
+    drift, row = DriftNoise.of(columns), np.arange(6.0)
     white = drift.out_of(row)
     root = drift.out_of(np.eye(6))
     covariance = np.eye(6) + columns @ columns.T

@@ -48,7 +48,7 @@ def _sigmas(order: Array, length: float) -> Array:
 
 
 @dataclass(frozen=True)
-class Drift:
+class DriftNoise:
     """A drift whose size is not known, in white rows: they have the covariance I + UU'.
 
     `shape` (n, d): orthonormal; `variance` (d,): of the drift along it.
@@ -58,7 +58,7 @@ class Drift:
     variance: Array
 
     @classmethod
-    def of(cls, columns: Array) -> Drift:
+    def of(cls, columns: Array) -> DriftNoise:
         """Of columns U (n, d), one per cosine of unit sigma, whitened."""
         shape, size, _ = np.linalg.svd(columns, full_matrices=False)
         return cls(shape, size**2)

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.linalg import solve_toeplitz
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
-from kemba.identify.problem.drift import Drift, drift_waves
+from kemba.identify.problem.drift import DriftNoise, drift_waves
 from kemba.identify.problem.problem import Array, Rows
 from kemba.identify.problem.quantisation import step_of
 from kemba.settings import BY_HAND, Settings, setting
@@ -83,7 +83,7 @@ class Colour:
     sigma: float
     rows: int = 0
     weight: Array | None = None  # (n,) below 1 where the residual has a spike
-    drift: Drift | None = None  # that the series has besides
+    drift: DriftNoise | None = None  # that the series has besides
 
     @property
     def log_density(self) -> float:
@@ -134,7 +134,7 @@ def _beside_drift(residual: Array, time: Array, careful: bool) -> Colour:
     waves, sigmas = drift_waves(time)
     slow = waves @ np.linalg.lstsq(waves, residual, rcond=None)[0]
     found = learn(residual - slow, careful=careful)
-    return replace(found, drift=Drift.of(whiten(waves * sigmas, found)))
+    return replace(found, drift=DriftNoise.of(whiten(waves * sigmas, found)))
 
 
 def _yule_walker(residual: Array, order: int) -> Colour:
