@@ -34,15 +34,16 @@ def with_learnt_colour(
     if not problem.learns_colour:
         return problem
     found = learnt_colour(problem, theta, blocks, careful)[0]
-    asked = careful and any(moves_readings(n) for n in theta if n not in problem.nuisance)
-    return _with_drift(found, theta) if asked else found
+    blamed = any(moves_readings(n) for n in theta if n not in problem.nuisance)
+    return _with_drift(found, theta) if careful and (blamed or not problem.moves) else found
 
 
 def _with_drift(problem: Problem, theta: Theta) -> Problem:
     """The problem with drifting sensors, where the logs are clearly likelier so.
 
-    A wrong sensor or length explains some of a drift. The drift itself explains more of it, and it
-    is asked for only where one is wrong at theta: the question takes seconds.
+    A wrong sensor or length explains some of a drift, and so does friction. The drift itself
+    explains more of it. Where the motion moves it is asked for only where a sensor or a length is
+    wrong at theta: there the question takes seconds.
     """
     drifting = problem.drifting()
     if drifting is None:
