@@ -14,7 +14,8 @@ import pytest
 from scipy.stats import kstest
 from toy_problem import EFFECTS, Toy
 
-from kemba.identify.discover import _believed, _best_gain, discover
+from kemba.identify.discover import _best_gain, discover
+from kemba.identify.doubt.belief import believed
 from kemba.identify.doubt.parsimony import Belief
 from kemba.identify.evidence.bootstrap import NullTest
 from kemba.identify.evidence.spike_slab import SpikeSlabSettings
@@ -87,5 +88,6 @@ def test_the_best_of_the_pairs_does_not_count_as_one_effect() -> None:
 
 def test_what_chance_does_as_often_is_not_believed() -> None:
     """The search names an effect; every simulated log looks better."""
-    test = NullTest(np.full(99, 50.0), (), 40)
-    assert _believed(search(a=3.0), ("a",), test) == Belief()
+    found = search(a=3.0)
+    p_value = NullTest(np.full(99, 50.0), (), 40).p_value(_best_gain(found))
+    assert believed(found, ("a",), p_value) == Belief()

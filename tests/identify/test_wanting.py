@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from toy_problem import Toy
 
-from kemba.identify.discover import discover, material
+from kemba.identify.discover import discover
+from kemba.identify.doubt.belief import material
 from kemba.identify.doubt.cross_validation import left_out, left_out_error
 from kemba.identify.doubt.wanting import fuller, is_asked, wanted
 from kemba.identify.evidence.search import Search
