@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from kemba.identify.problem.drift import DriftNoise, drift_waves
+from kemba.identify.problem.drift import DriftNoise
 from kemba.identify.problem.noise import colours, whitened
 from kemba.identify.problem.types import Rows
 
@@ -68,4 +68,3 @@ def test_the_likelier_noise_is_the_one_that_is_there(slow: float) -> None:
             white = whitened(rows(n), noise[:, None], colour)
             nats.append(colour[0, 0].log_density - 0.5 * float(np.sum(white**2)))
         assert (nats[1] - nats[0] > 3.0) == (slow > 0.0)
-    assert drift_waves(TIME)[0].shape == (n, 8)

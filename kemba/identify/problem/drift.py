@@ -24,7 +24,7 @@ class DriftColumnSettings(Settings):
         8,
         "1",
         "cosines of a run",
-        "derived: 94 to 99 % of the variance of a lag of 1 s in 0.5 to 3 s",
+        "derived: 92 to 99 % of the variance of a lag of 1 s in 0.5 to 4 s",
     )
     size: float = setting(
         1.0, "1", "sigma of a drift, in stated sigmas", "convention: as the noise"
