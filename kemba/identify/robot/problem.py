@@ -244,8 +244,7 @@ class RobotProblem(Problem):
         row = float(np.median(batch.h[batch.valid]))
         steps = max(2, round(RobotProblemSettings.current().predicted / row))
         y = np.nan_to_num(state.measurement(theta))
-        g = state.motion.extend(state.acceleration(theta)[..., None])[..., 0]
-        errors = predicted_error(state.motion.system, y, g, steps)
+        errors = predicted_error(state.motion.system, y, state.acceleration(theta), steps)
         return {
             channel: errors[..., i][state.mask[..., i]]
             for i, channel in enumerate(self.physics.channels)

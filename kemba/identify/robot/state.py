@@ -125,8 +125,7 @@ class LinearisedState:
     def whitened(self, y: Array | None, g: Array) -> Array:
         """Predicted minus measured (n, L, m, c), whitened, of columns y (n, L, m, c), None for
         zero, and accelerations g (n, L, k, c)."""
-        _, errors = innovations(self.motion.system, self.gain, y, self.motion.extend(g))
-        return -(self.gain.whitener @ errors)
+        return -innovations(self.motion.system, self.gain, y, g)
 
     def residuals(self, thetas: Sequence[Theta]) -> Array:
         """Whitened residuals (n, L, m, c) at each theta, rows that are no data included."""

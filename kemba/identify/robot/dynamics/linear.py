@@ -62,12 +62,6 @@ class LinearisedMotion:
         W[..., :k, :k] = scatter(self.inverse @ self.channels, density, h)
         return replace(self.system, W=W)
 
-    def extend(self, g: Array) -> Array:
-        """Accelerations `g` (n, L, k, c) with zeros for the places of feet and stops and for the
-        noise of sensors, on which no force acts."""
-        more = self.system.G.shape[-1] - g.shape[2]
-        return np.concatenate([g, np.zeros((*g.shape[:2], more, g.shape[3]))], 2)
-
     def with_noise(self, noise: Noise, batch: Batch) -> LinearisedMotion:
         """The same motion, read by sensors with this noise."""
         return replace(self, system=coloured(self.plain, noise, batch.sigma, batch.h))
@@ -236,8 +230,7 @@ def smoothed(motion: LinearisedMotion, gain: FilterGains, y: Array, g: Array) ->
     """A better reference: the smoothed deviations added. `y` (n, L, m) measured beyond the
     reference, `g` (n, L, k) acceleration of the model beyond the reference's."""
     k = motion.ref.q.shape[2]
-    g_all = motion.extend(g[..., None])[..., 0]
-    x, w = smooth(motion.system, gain, y, g_all)
+    x, w = smooth(motion.system, gain, y, g)
     A_q, A_v = motion.A
     dq, dv = x[..., :k], x[..., k : 2 * k]
     turn = (A_q @ dq[..., None] + A_v @ dv[..., None])[..., 0]

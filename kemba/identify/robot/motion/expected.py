@@ -30,9 +30,7 @@ def expected_power(system: System, gain: FilterGains, seed: int = 0) -> Array:
     settings = ExpectedSettings.current()
     rng = np.random.default_rng(seed)
     y = simulated(system, settings.draws, rng)
-    g = np.zeros((*y.shape[:2], system.G.shape[-1], settings.draws))
-    _, errors = innovations(system, gain, y, g)
-    power = np.mean((gain.whitener @ errors) ** 2, axis=-1)
+    power = np.mean(innovations(system, gain, y, None) ** 2, axis=-1)
     width = settings.width
     padded = np.pad(power, ((width // 2, width // 2), (0, 0), (0, 0)), mode="edge")
     total = np.cumsum(padded, axis=0)
@@ -43,10 +41,11 @@ def expected_power(system: System, gain: FilterGains, seed: int = 0) -> Array:
 def predicted_error(system: System, y: Array, g: Array, steps: int) -> Array:
     """y (n, L, m) minus its prediction, begun anew on the reference every so many steps.
 
-    In the channels' units: how far the model's motion leaves the measured one in a window.
+    In the channels' units: how far the model's motion leaves the measured one in a window; `g`
+    (n, L, j): accelerations of the first j channels of G.
     """
     n, runs, m, d = system.H.shape
-    push = (system.G @ g[..., None])[..., 0]
+    push = (system.G[..., : g.shape[2]] @ g[..., None])[..., 0]
     errors = np.empty((n, runs, m))
     x = np.zeros((runs, d))
     for k in range(n):

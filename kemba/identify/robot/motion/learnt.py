@@ -52,16 +52,15 @@ def learnt_noise(
     kinds: list[Kind] = []
     columns: list[Array] = []
     memories = (0.0, *settings.memories, *(settings.drifts if drifts else ()))
-    j, m = system.G.shape[-1], system.H.shape[2]
+    m = system.H.shape[2]
     for channel in range(channels):
         y = np.concatenate([_channel_noise(t, channel, sigma, h, m) for t in memories], axis=-1)
-        seen = _through(system, gain, y, None)
+        seen = innovations(system, gain, y, None)
         parts = np.split(seen, len(memories), axis=-1)
         columns += [covariances(part, errors, counts) for part in parts]
         kinds += [Kind(channel, memory) for memory in memories]
     for i, push in enumerate(pushes):
-        g = _force_noise(settings.force, push, h, j)
-        seen = _through(system, gain, None, g)
+        seen = innovations(system, gain, None, _force_noise(settings.force, push, h))
         columns.append(covariances(seen, errors, counts))
         kinds.append(Kind(channels + i, settings.force))
     return chosen_noise(*weighted(columns, measured, counts), kinds, most, known)
@@ -76,17 +75,8 @@ def _channel_noise(memory: float, channel: int, sigma: Array, h: Array, m: int) 
     return y
 
 
-def _force_noise(memory: float, push: Array, h: Array, j: int) -> Array:
-    """Accelerations (n, L, j, draws) of one force of unit sigma."""
+def _force_noise(memory: float, push: Array, h: Array) -> Array:
+    """Accelerations (n, L, k, draws) of one force of unit sigma."""
     draws = ColourSettings.current().draws
     force = lag_noise(memory, h, draws, np.random.default_rng(5))
-    g = np.zeros((*h.shape, j, draws))
-    g[:, :, : push.shape[2]] = push[..., None] * force[:, :, None]
-    return g
-
-
-def _through(system: System, gain: FilterGains, y: Array | None, g: Array | None) -> Array:
-    """Whitened errors (n, L, m, c) that noise of the sensors `y` (n, L, m, c) and accelerations `g`
-    (n, L, j, c) make; None is zero."""
-    _, found = innovations(system, gain, y, g)
-    return np.asarray(gain.whitener @ found)
+    return np.asarray(push[..., None] * force[:, :, None])
