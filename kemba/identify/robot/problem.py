@@ -192,22 +192,19 @@ class RobotProblem(Problem):
         names = list(names)
         if not names:
             return np.empty((len(self.residual(theta, runs)), 0))
+        # the shapes of absent effects have their typical value
+        typical = {k: v.typical for k, v in self.parameters().items() if np.isfinite(v.typical)}
         direct = [n for n in names if self._is_direct(n)]
-        columns = self._direct(theta, direct) if direct else {}
+        found = self.state.slopes({**typical, **theta}, direct, runs)
+        columns = dict(zip(direct, found, strict=True))
         steps = {n: list(self.steps(theta, n)) for n in names if n not in columns}
-        moved = [{**theta, **step} for group in steps.values() for step, _ in group]
-        if moved:
-            shifted = np.where(self.state.mask[..., None], self.state.residuals([theta, *moved]), 0)
-            base, there = shifted[..., 0], iter(np.moveaxis(shifted[..., 1:], -1, 0))
+        if steps:
+            moved = [{**theta, **step} for group in steps.values() for step, _ in group]
+            there = self.state.each_residual([theta, *moved], runs)
+            base = next(there)
         for name, group in steps.items():
             columns[name] = mean_slope(base, [next(there) for _ in group], [h for _, h in group])
-        return self.state.pick(np.stack([columns[n] for n in names], axis=-1), runs)
-
-    def _direct(self, theta: Theta, names: Sequence[str]) -> dict[str, Array]:
-        """Columns (n, L, m) of parameters in which the force is linear; shapes of absent effects
-        have their typical value."""
-        typical = {k: v.typical for k, v in self.parameters().items() if np.isfinite(v.typical)}
-        return self.state.slopes({**typical, **theta}, names)
+        return np.stack([columns[n] for n in names], axis=-1)
 
     def _is_direct(self, name: str) -> bool:
         """Whether the force is linear in it, and nothing else depends on it: shapes, states,

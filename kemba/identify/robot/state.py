@@ -8,7 +8,7 @@ states are free; contact and stop forces are unknown where the data show contact
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -31,7 +31,7 @@ from kemba.identify.robot.dynamics.settings import ForceDensity, LooseForceDensi
 from kemba.identify.robot.motion.batch import Batch
 from kemba.identify.robot.motion.colour import Noise
 from kemba.identify.robot.motion.contact import ContactSchedule, loaded
-from kemba.identify.robot.motion.filter import FilterGains, gains, innovations
+from kemba.identify.robot.motion.filter import FilterGains, at_once, gains, innovations
 from kemba.identify.robot.motion.sensing import ahead, sensed, whole_rows
 from kemba.settings import BY_HAND, Settings, setting
 
@@ -107,16 +107,19 @@ class LinearisedState:
                 force = force + (theta[name] - nominal) * column
         return self.motion.defect(force)
 
-    def slopes(self, theta: Theta, names: Sequence[str]) -> dict[str, Array]:
-        """Whitened columns (n, L, m) of parameters in which the force is linear."""
-        slopes = self.forces.slopes(*values_at(self.physics, theta))
+    def slopes(
+        self, theta: Theta, names: Sequence[str], runs: Collection[int] | None = None
+    ) -> Iterator[Array]:
+        """Whitened column (rows,) of each parameter in turn, in which the force is linear."""
+        slopes = self.forces.slopes(*values_at(self.physics, theta)) if names else np.empty(0)
         place = {n: i for i, n in enumerate(self.physics.names)}
-        forces = [
-            self.linear[n][0] if n in self.linear else self.batch.deep(slopes[:, :, place[n]])
-            for n in names
-        ]
-        g = np.stack([self.motion.response(f) for f in forces], axis=-1)
-        return dict(zip(names, np.moveaxis(self.pushed(g), -1, 0), strict=True))
+        for part in at_once(len(names)):
+            forces = (
+                self.linear[n][0] if n in self.linear else self.batch.deep(slopes[:, :, place[n]])
+                for n in names[part]
+            )
+            g = np.stack([self.motion.response(f) for f in forces], axis=-1)
+            yield from self.pick(self.pushed(g), runs).T
 
     def pushed(self, g: Array) -> Array:
         """Whitened residuals (n, L, m, c) that accelerations g (n, L, k, c) make."""
@@ -132,6 +135,13 @@ class LinearisedState:
         y = np.stack([self.measurement(t) for t in thetas], axis=-1)
         g = np.stack([self.acceleration(t) for t in thetas], axis=-1)
         return self.whitened(y, g)
+
+    def each_residual(
+        self, thetas: Sequence[Theta], runs: Collection[int] | None = None
+    ) -> Iterator[Array]:
+        """Whitened residuals (rows,) at each theta in turn."""
+        for part in at_once(len(thetas)):
+            yield from self.pick(self.residuals(thetas[part]), runs).T
 
     def with_noise(self, noise: Noise) -> LinearisedState:
         """The same logs and motion, filtered with this noise of the sensors."""
@@ -190,6 +200,7 @@ def linearise_at(
             schedules = read_schedules(physics, batch, reference, p)
         normal = [state.motion.normal[: len(s.phase), i] for i, s in enumerate(schedules)]
         schedules = tuple(loaded(s, f, dt) for s, f in zip(schedules, normal, strict=True))
+        del state  # its arrays make room for the next one's
     state = _along(physics, batch, sensors, base, ground, schedules, reference, unknown, noise)
     links = zip(physics.links, np.moveaxis(state.motion.links, -1, 0), strict=True)
     linear = {name: (column, 0.0) for name, column in links}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -49,10 +50,9 @@ class System:
 
 @dataclass(frozen=True)
 class FilterGains:
-    """What the filter makes of a System: gains, whiteners of the innovations, predicted P, and
-    what becomes of a predicted state and of a measurement in a step that corrects the state."""
+    """What the filter makes of a System: whiteners of the innovations, predicted P, and what
+    becomes of a predicted state and of a measurement in a step that corrects the state."""
 
-    K: Array
     whitener: Array
     P: Array
     turn: Array
@@ -67,25 +67,22 @@ def gains(system: System) -> FilterGains:
     R = np.where(
         known, s.R, FilterSettings.current().missing * np.nanmax(np.where(known, s.R, 0.0))
     )
-    noise = s.G @ s.W @ s.G.swapaxes(-1, -2)
-    Ht, diagonal = s.H.swapaxes(-1, -2), np.arange(m)
-    spread = np.zeros((n, runs, m, m))
-    spread[..., diagonal, diagonal] = R
-    K, carry = np.empty((n, runs, d, m)), np.empty((n, runs, d, m))
-    turn, P_all, S_all = np.empty_like(s.F), np.empty_like(s.F), np.empty_like(spread)
-    P = s.P0.copy()
+    turn, P_all = np.empty_like(s.F), np.empty_like(s.F)
+    carry, whitener = np.empty((n, runs, d, m)), np.empty((n, runs, m, m))
+    P, diagonal = s.P0.copy(), np.arange(m)
     for k in range(n):
         P_all[k] = P
-        PHt = P @ Ht[k]
-        S = S_all[k] = s.H[k] @ PHt + spread[k]
-        K[k] = np.linalg.solve(S, PHt.swapaxes(-1, -2)).swapaxes(-1, -2)
-        c = carry[k] = s.F[k] @ K[k]
+        PHt = P @ s.H[k].swapaxes(-1, -2)
+        S = s.H[k] @ PHt
+        S[:, diagonal, diagonal] += R[k]
+        white = whitener[k] = np.linalg.inv(np.linalg.cholesky(S))
+        c = carry[k] = s.F[k] @ (PHt @ white.swapaxes(-1, -2) @ white)
         t = turn[k] = s.F[k] - c @ s.H[k]
         # Joseph's form keeps P positive where a row is a thousand times sharper than the state
-        P = t @ P @ t.swapaxes(-1, -2) + (c * R[k][:, None, :]) @ c.swapaxes(-1, -2) + noise[k]
+        P = t @ P @ t.swapaxes(-1, -2) + (c * R[k][:, None, :]) @ c.swapaxes(-1, -2)
+        P += s.G[k] @ s.W[k] @ s.G[k].swapaxes(-1, -2)
         P = 0.5 * (P + P.swapaxes(-1, -2))
-    whitener = np.asarray(np.linalg.inv(np.linalg.cholesky(S_all)), dtype=float)
-    return FilterGains(K, whitener, P_all, turn, carry)
+    return FilterGains(whitener, P_all, turn, carry)
 
 
 def innovations(system: System, gain: FilterGains, y: Array | None, g: Array | None) -> Array:
@@ -93,11 +90,16 @@ def innovations(system: System, gain: FilterGains, y: Array | None, g: Array | N
     (n, L, j, c) of the first j channels of G; None is zero."""
     count = max(a.shape[-1] for a in (y, g) if a is not None)
     whole = np.empty((*system.H.shape[:3], count))
-    for begin in range(0, count, FilterSettings.current().columns):
-        part = slice(begin, begin + FilterSettings.current().columns)
+    for part in at_once(count):
         own = (None if a is None else a[..., part] for a in (y, g))
         whole[..., part] = gain.whitener @ predicted(system, gain, *own)[1]
     return whole
+
+
+def at_once(count: int) -> Iterator[slice]:
+    """The parts of so many columns that pass the filter at once."""
+    size = FilterSettings.current().columns
+    return (slice(i, i + size) for i in range(0, count, size))
 
 
 def predicted(
@@ -129,14 +131,12 @@ def smooth(system: System, gain: FilterGains, y: Array, g: Array) -> tuple[Array
     states, errors = predicted(s, gain, y[..., None], g[..., None])
     n, runs, _, d = s.H.shape
     solved = gain.whitener.swapaxes(-1, -2) @ (gain.whitener @ errors)
-    Ft, Ht = s.F.swapaxes(-1, -2), s.H.swapaxes(-1, -2)
-    WGt = s.W @ s.G.swapaxes(-1, -2)
+    pushed = s.H.swapaxes(-1, -2) @ solved
     x, w = np.empty((n, runs, d)), np.empty((n, runs, s.G.shape[-1]))
     pull = np.zeros((runs, d, 1))
     for k in reversed(range(n)):
-        w[k] = (WGt[k] @ pull)[..., 0]
-        carried = Ft[k] @ pull
-        pull = Ht[k] @ (solved[k] - gain.K[k].swapaxes(-1, -2) @ carried) + carried
+        w[k] = (s.W[k] @ (s.G[k].swapaxes(-1, -2) @ pull))[..., 0]
+        pull = pushed[k] + gain.turn[k].swapaxes(-1, -2) @ pull
         x[k] = (states[k] + gain.P[k] @ pull)[..., 0]
     return x, w
 
@@ -147,21 +147,15 @@ def smooth_with_band(system: System, gain: FilterGains, y: Array, g: Array) -> t
     s = system
     n, runs, _, d = s.H.shape
     states, errors = predicted(s, gain, y[..., None], g[..., None])
-    solved = gain.whitener.swapaxes(-1, -2) @ (gain.whitener @ errors)
-    known = np.isfinite(s.R)[..., None]
-    whitened = gain.whitener @ np.where(known, s.H, 0.0)
-    Ft, Ht = s.F.swapaxes(-1, -2), np.where(known, s.H, 0.0).swapaxes(-1, -2)
+    errors = gain.whitener @ errors
+    seen = np.where(np.isfinite(s.R)[..., None], s.H, 0.0)
+    whitened = (gain.whitener @ seen).swapaxes(-1, -2)
     x, variance = np.empty((n, runs, d)), np.empty((n, runs, d))
     pull, certainty = np.zeros((runs, d, 1)), np.zeros((runs, d, d))
-    eye = np.eye(d)
     for k in reversed(range(n)):
-        keep = eye - gain.K[k] @ s.H[k]
-        carried = Ft[k] @ pull
-        pull = Ht[k] @ solved[k] + keep.swapaxes(-1, -2) @ carried
-        certainty = keep.swapaxes(-1, -2) @ (Ft[k] @ certainty @ s.F[k]) @ keep
-        certainty += whitened[k].swapaxes(-1, -2) @ whitened[k]
-        P = gain.P[k]
+        back, P = gain.turn[k].swapaxes(-1, -2), gain.P[k]
+        pull = whitened[k] @ errors[k] + back @ pull
+        certainty = whitened[k] @ whitened[k].swapaxes(-1, -2) + back @ certainty @ gain.turn[k]
         x[k] = (states[k] + P @ pull)[..., 0]
-        spread = np.diagonal(P - P @ certainty @ P, axis1=1, axis2=2)
-        variance[k] = np.maximum(spread, 0.0)
-    return x, variance
+        variance[k] = np.diagonal(P, axis1=1, axis2=2) - ((P @ certainty) * P).sum(axis=2)
+    return x, np.maximum(variance, 0.0)
