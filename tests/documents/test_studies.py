@@ -19,7 +19,7 @@ SMALL = {
     "benchmarks/plant_tables.py": ["plant", "--figures", "figures"],
     "benchmarks/scaling.py": ["--nodes", "20", "40", "--repeats", "1"],
     "benchmarks/sensitivity.py": ["--report"],
-    "benchmarks/waiting.py": ["--cases", "1"],
+    "benchmarks/waiting.py": ["--cases", "1", "--times", "1"],
 }
 
 
