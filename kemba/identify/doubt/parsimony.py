@@ -11,6 +11,8 @@ answer, and the windowed error of blocks that the fit has not seen may call for 
 - evidence claims too much: the rows of left-out blocks gain nothing by the larger answer, or more
   nats than their windows do, by more than one standard error. The first rule alone took true
   damping out of an answer on logs of the full plant: a few logs cannot tell a small gain from none.
+
+An effect that gains little beside what the answer leaves beyond the noise is left out as well.
 """
 
 from __future__ import annotations
@@ -33,6 +35,13 @@ class ParsimonySettings(Settings):
         "1",
         "standard errors by which left-out data must gain by the one that they choose",
         "convention: two, since several are asked",
+        decides=True,
+    )
+    share: float = setting(
+        0.05,
+        "1",
+        "of what the larger answer leaves beyond the noise, what it must explain more",
+        "convention: a twentieth; 0.03 to 0.15 give the same answer on a real drive",
         decides=True,
     )
 
@@ -69,7 +78,8 @@ def simplest(search: Search, belief: Belief) -> Belief:
     known = _known_parts(search, best)
     least = min(known, key=lambda h: window_powers(search, h).sum())
     equal = [h for h in known if as_good(search, h, least)]
-    fine = [h for h in equal if overclaimed(search, h, best)] or [best]
+    plain = [h for h in equal if overclaimed(search, h, best) or is_little(search, h, best)]
+    fine = plain or [best]
     few = [h for h in fine if len(h) == min(map(len, fine))]
     chosen = max(few, key=lambda h: search.points[h].log_evidence)
     if chosen == best:
@@ -188,9 +198,22 @@ def none_of(belief: Belief) -> Belief:
 
 def as_good(search: Search, hypothesis: Hypothesis, best: Hypothesis) -> bool:
     """Whether a hypothesis predicts left-out data as well as the `best`: within one standard error
-    of it, or with less than any evidence between them."""
+    of it, with less than any evidence between them, or with little beside what the best leaves."""
     gain = window_gain(search, best, hypothesis)
-    return not gain.pays or gain.nats < _least()
+    return not gain.pays or gain.nats < _least() or is_little(search, hypothesis, best)
+
+
+def is_little(search: Search, smaller: Hypothesis, larger: Hypothesis) -> bool:
+    """Whether the larger hypothesis gains little beside what it leaves of left-out data beyond
+    their noise.
+
+    Where a motion repeats, so does what the model lacks: effects that imitate some of it predict
+    left-out data as well.
+    """
+    rows = search.points[larger].windowed.count.sum()
+    left = 0.5 * max(0.0, float(window_powers(search, larger).sum() - rows))
+    share = ParsimonySettings.current().share
+    return window_gain(search, larger, smaller).nats < share * left
 
 
 def _least() -> float:
