@@ -57,6 +57,10 @@ RULES = (
         *("that of other rigs", "2 % of the log's length", "vessel"),
     ),
     (
+        "an effect that explains little beside what the answer leaves",
+        *("named", "left out, below a tenth", "drive"),
+    ),
+    (
         "blocks from which the intervals of `characterise` come",
         *("12 of time", "12, 24 and 48, of time and of the way", "drive (M)"),
     ),

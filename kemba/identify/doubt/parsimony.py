@@ -38,10 +38,10 @@ class ParsimonySettings(Settings):
         decides=True,
     )
     share: float = setting(
-        0.05,
+        0.1,
         "1",
-        "of what the larger answer leaves beyond the noise, what it must explain more",
-        "convention: a twentieth; 0.03 to 0.15 give the same answer on a real drive",
+        "of what a larger answer leaves beyond the noise, what it must explain more",
+        "convention: a tenth; 0.04 to 0.18 give the same answer on a real drive",
         decides=True,
     )
 
@@ -145,14 +145,15 @@ def _instead(search: Search, belief: Belief, chosen: Hypothesis) -> Belief:
     """The belief in a smaller hypothesis. Others with as many effects that predict as well, within
     one standard error, are its rivals, whatever their evidence is, which was not believed of the
     larger one either; those that predict worse are dismissed, and so are larger ones that predict
-    no better."""
+    no better, or that add an effect which was left out."""
     rivals, dismissed = [], {belief.best, *belief.dismissed}
+    dropped = set(belief.best) - set(chosen)
     for other in search.points:
         if len(other) < len(chosen) or other == chosen:
             continue
         if len(other) == len(chosen) and as_good(search, other, chosen):
             rivals.append(other)
-        elif as_good(search, chosen, other):
+        elif as_good(search, chosen, other) or (set(chosen) < set(other) and dropped & set(other)):
             dismissed.add(other)
     remark = _remark(search, belief.best, chosen)
     return replace(
@@ -225,6 +226,6 @@ def _remark(search: Search, best: Hypothesis, chosen: Hypothesis) -> str:
     dropped = [e for e in best if e not in chosen]
     nats = search.points[best].log_evidence - search.points[chosen].log_evidence
     return (
-        f"{' and '.join(dropped)} would fit these readings better (by {nats:.0f} nats), but do not "
-        "predict left-out data any better, and are left out; logs of other motions would tell"
+        f"{' and '.join(dropped)} would fit these readings better (by {nats:.0f} nats), but predict "
+        "left-out data little or no better, and are left out; logs of other motions would tell"
     )
