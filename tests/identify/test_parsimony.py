@@ -64,6 +64,14 @@ def test_an_effect_is_small_beside_what_the_answer_leaves(beside: float, named: 
     assert simplest(search, Belief(("hum", "kick"), 0.01)).best == named
 
 
+def test_a_larger_answer_with_an_effect_that_was_left_out_is_no_rival() -> None:
+    problem = Toy({"kick.a": 9.0, "hum.a": 0.5, "wave.a": 3.0})
+    problem.measured = problem.measured + 4.0 * np.sin(200 * problem._time)
+    search = searched(problem, "kick", "hum", "wave")
+    found = simplest(search, Belief(("hum", "kick"), 0.01))
+    assert found.best == ("kick",) and ("hum", "kick", "wave") in found.dismissed
+
+
 @pytest.mark.parametrize(("rows", "too_much"), [(-1.0, True), (1.0, False), (5.0, True)])
 def test_a_larger_answer_must_gain_in_left_out_rows_but_not_only_there(
     rows: float, too_much: bool, monkeypatch: pytest.MonkeyPatch

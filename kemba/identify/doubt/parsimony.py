@@ -226,6 +226,7 @@ def _remark(search: Search, best: Hypothesis, chosen: Hypothesis) -> str:
     dropped = [e for e in best if e not in chosen]
     nats = search.points[best].log_evidence - search.points[chosen].log_evidence
     return (
-        f"{' and '.join(dropped)} would fit these readings better (by {nats:.0f} nats), but predict "
-        "left-out data little or no better, and are left out; logs of other motions would tell"
+        f"{' and '.join(dropped)} would fit these readings better (by {nats:.0f} nats), but "
+        "predict left-out data little or no better, and are left out; logs of other motions would "
+        "tell"
     )
