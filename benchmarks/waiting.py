@@ -109,7 +109,8 @@ def main() -> None:
     options = parser.parse_args()
     lines = printed(table(options.cases, options.times))
     if options.write:
-        put_block(PAGE, BEGIN, END, [*lines, "", f"On {machine()}."])
+        how = f"Asked {options.times} times each, least to greatest, on {machine()}."
+        put_block(PAGE, BEGIN, END, [*lines, "", how])
 
 
 if __name__ == "__main__":

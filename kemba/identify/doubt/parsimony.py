@@ -167,7 +167,8 @@ def _instead(search: Search, belief: Belief, chosen: Hypothesis) -> Belief:
 
 def is_idle(search: Search, best: Hypothesis) -> bool:
     """Whether left-out data, summed over aggregation windows, gain no more by an answer than their
-    scatter. Its p-value counts rows, whose noise may be slower than it is taken to be."""
+    scatter, or little beside what it leaves. Its p-value counts rows, whose noise may be slower
+    than it is taken to be."""
     return as_good(search, NULL, best)
 
 
@@ -191,7 +192,7 @@ def none_of(belief: Belief) -> Belief:
     """The belief in nothing, where the best hypothesis is idle."""
     remark = (
         f"{' and '.join(belief.best)} would fit these readings better, but left-out data are "
-        "predicted as well without: it may be chance"
+        "predicted as well without, or nearly so: it may be chance"
     )
     none = belief.without(belief.best, NULL)
     return replace(none, remarks=(*belief.remarks, remark), idle=True)

@@ -202,8 +202,9 @@ class RobotProblem(Problem):
             moved = [{**theta, **step} for group in steps.values() for step, _ in group]
             there = self.state.each_residual([theta, *moved], runs)
             base = next(there)
-        for name, group in steps.items():
-            columns[name] = mean_slope(base, [next(there) for _ in group], [h for _, h in group])
+            for name, group in steps.items():
+                ends = [next(there) for _ in group]
+                columns[name] = mean_slope(base, ends, [h for _, h in group])
         return np.stack([columns[n] for n in names], axis=-1)
 
     def _is_direct(self, name: str) -> bool:
