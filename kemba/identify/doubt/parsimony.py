@@ -77,7 +77,7 @@ def simplest(search: Search, belief: Belief) -> Belief:
     _thin(search, best)
     known = _known_parts(search, best)
     least = min(known, key=lambda h: window_powers(search, h).sum())
-    equal = [h for h in known if as_good(search, h, least)]
+    equal = [h for h in known if is_enough(search, h, least)]
     plain = [h for h in equal if overclaimed(search, h, best) or is_little(search, h, best)]
     fine = plain or [best]
     few = [h for h in fine if len(h) == min(map(len, fine))]
@@ -100,7 +100,7 @@ def _thin(search: Search, best: Hypothesis) -> None:
         _visit(search, smaller)
         rest = min(smaller, key=lambda h: window_powers(search, h).sum())
         least = min(least, rest, key=lambda h: window_powers(search, h).sum())
-        if not as_good(search, rest, least):
+        if not is_enough(search, rest, least):
             break
 
 
@@ -153,7 +153,9 @@ def _instead(search: Search, belief: Belief, chosen: Hypothesis) -> Belief:
             continue
         if len(other) == len(chosen) and as_good(search, other, chosen):
             rivals.append(other)
-        elif as_good(search, chosen, other) or (set(chosen) < set(other) and dropped & set(other)):
+        elif is_enough(search, chosen, other) or (
+            set(chosen) < set(other) and dropped & set(other)
+        ):
             dismissed.add(other)
     remark = _remark(search, belief.best, chosen)
     return replace(
@@ -167,8 +169,7 @@ def _instead(search: Search, belief: Belief, chosen: Hypothesis) -> Belief:
 
 def is_idle(search: Search, best: Hypothesis) -> bool:
     """Whether left-out data, summed over aggregation windows, gain no more by an answer than their
-    scatter, or little beside what it leaves. Its p-value counts rows, whose noise may be slower
-    than it is taken to be."""
+    scatter. Its p-value counts rows, whose noise may be slower than it is taken to be."""
     return as_good(search, NULL, best)
 
 
@@ -192,7 +193,7 @@ def none_of(belief: Belief) -> Belief:
     """The belief in nothing, where the best hypothesis is idle."""
     remark = (
         f"{' and '.join(belief.best)} would fit these readings better, but left-out data are "
-        "predicted as well without, or nearly so: it may be chance"
+        "predicted as well without: it may be chance"
     )
     none = belief.without(belief.best, NULL)
     return replace(none, remarks=(*belief.remarks, remark), idle=True)
@@ -200,9 +201,14 @@ def none_of(belief: Belief) -> Belief:
 
 def as_good(search: Search, hypothesis: Hypothesis, best: Hypothesis) -> bool:
     """Whether a hypothesis predicts left-out data as well as the `best`: within one standard error
-    of it, with less than any evidence between them, or with little beside what the best leaves."""
+    of it, or with less than any evidence between them."""
     gain = window_gain(search, best, hypothesis)
-    return not gain.pays or gain.nats < _least() or is_little(search, hypothesis, best)
+    return not gain.pays or gain.nats < _least()
+
+
+def is_enough(search: Search, smaller: Hypothesis, larger: Hypothesis) -> bool:
+    """Whether the larger hypothesis is not needed beside the smaller one."""
+    return as_good(search, smaller, larger) or is_little(search, smaller, larger)
 
 
 def is_little(search: Search, smaller: Hypothesis, larger: Hypothesis) -> bool:
