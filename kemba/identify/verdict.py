@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from kemba.errors import enumerated
 from kemba.identify.answer import ENDED, Ranked, Verdict, excess
+from kemba.identify.doubt.acting import excess_where_acting
 from kemba.identify.doubt.held_out import HeldOut, error
 from kemba.identify.doubt.parsimony import Belief
 from kemba.identify.doubt.run_consistency import Drift
@@ -71,16 +70,9 @@ def doubts_about(
 
 
 def fits_where_it_acts(search: Search, best: Hypothesis) -> bool:
-    """Whether hardly any error is left where the answer acts: windows count by the square of what
-    it changes in them."""
-    problem, theta = search.problem, search.points[best].fit.theta
-    figures = {name: value for name, value in theta.items() if name in problem.nuisance}
-    thetas = (search.points[NULL].fit.theta, theta, figures)
-    columns = np.stack([problem.residual(each) for each in thetas], axis=1)
-    before, after, without = search.base.division.windows.sums(columns).T
-    weight = (without - after) ** 2
-    excess_of = [float(weight @ (r**2 - 1.0)) for r in (before, after)]
-    return excess_of[1] <= VerdictSettings.current().where_it_acts * excess_of[0]
+    """Whether hardly any error is left where the answer acts."""
+    before, after = excess_where_acting(search, best)
+    return after <= VerdictSettings.current().where_it_acts * before
 
 
 def unasked(search: Search, best: Hypothesis) -> Hypothesis:
