@@ -70,6 +70,9 @@ def test_a_larger_answer_with_an_effect_that_was_left_out_is_no_rival() -> None:
     search = searched(problem, "kick", "hum", "wave")
     found = simplest(search, Belief(("hum", "kick"), 0.01))
     assert found.best == ("kick",) and ("hum", "kick", "wave") in found.dismissed
+    search.visit(("kick", "wave"))
+    earlier = Belief(("hum", "kick"), 0.01, frozenset({("hum", "kick", "wave")}))
+    assert ("kick", "wave") in simplest(search, earlier).dismissed
 
 
 @pytest.mark.parametrize(("rows", "too_much"), [(-1.0, True), (1.0, False), (5.0, True)])

@@ -148,7 +148,7 @@ def _instead(search: Search, belief: Belief, chosen: Hypothesis) -> Belief:
     larger one either; those that predict worse are dismissed, and so are larger ones that predict
     no better, or that add an effect which was left out."""
     rivals, dismissed = [], {belief.best, *belief.dismissed}
-    dropped = set(belief.best) - set(chosen)
+    dropped = set(belief.best).union(*belief.dismissed) - set(chosen)
     for other in search.points:
         if len(other) < len(chosen) or other == chosen:
             continue
