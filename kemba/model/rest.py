@@ -73,10 +73,7 @@ class Rest:
         values. Raises KembaError where they grow without bound."""
         if not len(self._start):
             return np.empty(0)
-        x, p = self._start / self._scale, ca.vertcat(*(ca.DM(h) for h in held))
-        moving = np.asarray(self._changes(x, p)[0])
-        if np.all(np.abs(moving) <= RestSettings.current().still):
-            return np.array(self._start)
+        x, p = self._start / self._scale, np.hstack([[], *map(np.ravel, held)])
         settled = self._settled(x, p)
         if settled is not None:
             return np.asarray(settled * self._scale)
@@ -87,15 +84,18 @@ class Rest:
             raise KembaError("model", what, hint="does an effect feed itself?") from None
         return np.asarray(np.asarray(found).ravel() * self._scale)
 
-    def _settled(self, x: Array, p: ca.DM) -> Array | None:
+    def _settled(self, x: Array, p: Array) -> Array | None:
         """Where scaled states (ns,) do not change any more, by Newton's method from x; None where
         it finds no such place, or a state would get there after the wait only."""
         settings = RestSettings.current()
-        for _ in range(settings.steps):
-            moving, slope = (np.asarray(a) for a in self._changes(x, p))
+        for step in range(settings.steps):
+            moving, slope = (a.full() for a in self._changes(x, p))
+            still = bool(np.all(np.abs(moving) <= settings.still))
+            if still and not step:
+                return x  # nothing moves
             if not (np.isfinite(moving).all() and np.isfinite(slope).all()):
                 return None
-            if np.abs(moving).max() <= settings.still:
+            if still:
                 slowest = float(np.linalg.eigvals(slope).real.max())
                 return x if slowest * settings.wait < np.log(settings.left) else None
             try:

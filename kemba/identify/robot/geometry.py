@@ -21,6 +21,7 @@ from kemba.identify.problem.sensor_faults import GEOMETRY
 from kemba.identify.problem.types import Array, Candidate, Flags
 from kemba.identify.robot.dynamics.physics import Physics
 from kemba.identify.robot.dynamics.reference import Reference
+from kemba.identify.robot.dynamics.samples import SampleMap
 from kemba.identify.robot.motion.batch import Batch
 from kemba.identify.robot.motion.contact import steady
 from kemba.mechanism.knee import flexion_of
@@ -112,15 +113,13 @@ class Standing:
         y = physics.call("seen", q, 0 * q, p=physics.nominal)[0]
         lift = steady(reference.a[..., 1:2], dt) / physics.mechanism.need_robot().gravity
         load = np.maximum(1.0 + batch.flat(lift)[::step, 0], 0.0)
-        self.samples = [
-            ca.DM(a.T) for a in (q[:, : 3 + self.legs], y[:, -self.legs :], load[:, None])
-        ]
-        self._map = self._function(physics).map(len(q))
+        self.samples = [q[:, : 3 + self.legs], y[:, -self.legs :], load[:, None]]
+        self._map = SampleMap(self._function(physics))
 
     def turned(self) -> Standing:
         """The same with the other sign of the body's pitch."""
-        found, q = copy(self), ca.DM(self.samples[0])
-        q[2, :] *= -1
+        found, q = copy(self), self.samples[0].copy()
+        q[:, 2] *= -1
         found.samples = [q, *self.samples[1:]]
         return found
 
@@ -150,10 +149,8 @@ class Standing:
 
     def heights(self, x: Array) -> tuple[Array, Array]:
         """Heights (n, legs) [m] of the feet, and their slopes (n, legs, k)."""
-        count = self.samples[0].shape[1]
-        z, slopes = self._map(*self.samples, ca.repmat(ca.DM(x), 1, count))
-        deep = slopes.full().reshape(self.legs, count, len(x)).transpose(1, 0, 2)
-        return z.full().T, deep
+        z, slopes = self._map(self.samples, x)
+        return z, slopes
 
 
 def standing_lengths(

@@ -103,7 +103,7 @@ class LinearisedState:
         """Acceleration (n, L, k) that the model at theta adds to the reference's."""
         force = self.forces.at(*values_at(self.physics, theta))
         for name, (column, nominal) in self.linear.items():
-            if name in theta:
+            if theta.get(name, nominal) != nominal:
                 force = force + (theta[name] - nominal) * column
         return self.motion.defect(force)
 
