@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy import sparse
 
 from kemba.identify.problem.problem import (
     Array,
@@ -139,10 +140,9 @@ def condense(
 
 def moved(linear: Linear, at: Array, jacobian: Array, r: Array, blocks: Labels) -> Linear:
     """The same slopes about another point, where the residual is r (n,)."""
-    labels = np.unique(blocks)
-    slope = np.array([jacobian[blocks == b].T @ r[blocks == b] for b in labels])
-    power = np.array([float(r[blocks == b] @ r[blocks == b]) for b in labels])
-    return replace(linear, at=at, slope=slope, power=power)
+    places = np.searchsorted(np.unique(blocks), blocks), np.arange(len(r))
+    by_block = sparse.csr_array((r, places))  # quicker than parts of J, which would be copied
+    return replace(linear, at=at, slope=by_block @ jacobian, power=by_block @ r)
 
 
 def within(candidates: Mapping[str, Candidate], theta: Theta) -> dict[str, float]:

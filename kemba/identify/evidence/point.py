@@ -65,6 +65,6 @@ class Division:
         fine = condense(names, *at, jacobian, r, self.blocks)
         if len(self.windows.first) == len(r):
             return fine, fine
-        sums = self.windows.sums(np.column_stack([jacobian, r]))
-        windowed = condense(names, *at, sums[:, :-1], sums[:, -1], self.blocks[self.windows.first])
+        sums = self.windows.sums(jacobian), self.windows.sums(r)
+        windowed = condense(names, *at, *sums, self.blocks[self.windows.first])
         return fine, windowed

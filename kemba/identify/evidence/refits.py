@@ -103,12 +103,14 @@ class Refits:
         """The problem about a refitted point: slopes of its own parameters are those of the fit,
         all others are the null's."""
         names, base = names_of(self.problem, fit.theta), self.base
-        known = base.point.linear
-        columns = [
-            fit.columns[n] if n in fit.columns else base.jacobian[:, known.index(n)] for n in names
-        ]
+        known = {n: i for i, n in enumerate(base.point.linear.names)}
+        own = {i: fit.columns[n] for i, n in enumerate(names) if n in fit.columns}
+        at = [0 if i in own else known[n] for i, n in enumerate(names)]
+        slopes = np.take(base.jacobian, at, axis=1)
+        for i, column in own.items():
+            slopes[:, i] = column
         also = self._beginnings.get(hypothesis)
-        return base.judged(hypothesis, fit, names, np.stack(columns, axis=1), also=also)
+        return base.judged(hypothesis, fit, names, slopes, also=also)
 
     def _guess(self, hypothesis: Hypothesis) -> dict[str, float]:
         """Where a refit starts: at its last result, or at the linear estimate from the largest part

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy import sparse
 
 from kemba.identify.problem.problem import Array, Labels, Problem, Rows, Texts, Theta
 
@@ -28,9 +29,11 @@ class Windows:
     noise: Array
 
     def sums(self, columns: Array) -> Array:
-        """Columns (n, ...) summed over every window, (k, ...), in units of noise."""
-        scale = self.noise.reshape(-1, *[1] * (columns.ndim - 1))
-        return np.asarray(np.add.reduceat(columns, self.first, axis=0) / scale)
+        """Columns (n,) or (n, c) summed over every window, (k,) or (k, c), in units of noise."""
+        count = len(columns)
+        weights = 1.0 / np.repeat(self.noise, np.diff(self.first, append=count))
+        sums = sparse.csr_array((weights, np.arange(count), np.append(self.first, count)))
+        return np.asarray(sums @ columns)
 
 
 def aggregation_windows(problem: Problem, rows: Rows, region: Texts) -> Windows:

@@ -104,7 +104,7 @@ class LinearisedState:
         force = self.forces.at(*values_at(self.physics, theta))
         for name, (column, nominal) in self.linear.items():
             if theta.get(name, nominal) != nominal:
-                force = force + (theta[name] - nominal) * column
+                force += (theta[name] - nominal) * column
         return self.motion.defect(force)
 
     def slopes(
