@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -114,9 +114,9 @@ class Baseline:
         self.rescore(theta, names)
         ranker = self.ranker(self.point.mode.linear)
         self.table = ranker.table((0, 1, 2) if self.among is None else (0, 1))
-        for hypothesis in [h for h in self.table if len(h) == 1]:
-            if self.among is None or hypothesis in self.among:
-                self.table[hypothesis] = self._improved(hypothesis)
+        singles = [h for h in self.table if len(h) == 1]
+        chosen = singles if self.among is None else [h for h in singles if h in self.among]
+        self.table |= self._improved([h for h in chosen if not self._is_straight(h)])
 
     def rescore(self, theta: Mapping[str, float] | None = None, names: Names = ()) -> None:
         """Score the null with the slopes as they are now, at theta or where it was."""
@@ -175,42 +175,59 @@ class Baseline:
         """The mode of a hypothesis from the best of these starts."""
         return mode_of(self.problem, hypothesis, starts, linear, slopes, self.division.blocks)
 
-    def _improved(self, hypothesis: Hypothesis) -> float:
-        """Log evidence of a single effect with the true residual at its linear estimate.
+    def _improved(self, hypotheses: Sequence[Hypothesis]) -> dict[Hypothesis, float]:
+        """The best log evidence of single effects within a few Newton steps, with the true residual
+        there and the slopes of the null."""
+        found = dict.fromkeys(hypotheses, -np.inf)
+        tried = [(h, theta) for h in hypotheses for theta in self._starts(h)]
+        for _ in range(NullModelSettings.current().glances + 1):
+            seen = list(zip(tried, self._about([theta for _, theta in tried]), strict=True))
+            tried = []
+            for (hypothesis, _), linear in seen:
+                if linear is None:
+                    continue
+                score = self.ranker(linear).score(hypothesis)
+                found[hypothesis] = max(found[hypothesis], score.log_evidence)
+                tried.append((hypothesis, self._estimate(hypothesis, linear, score.z)))
+        return found
 
-        Residuals are far from linear in delays and time constants: these start from their size, on
-        both sides, as well.
-        """
-        (effect,) = hypothesis
-        candidate, theta = self.problem.candidates[effect], self.point.fit.theta
-        if self.problem.is_straight(candidate.key):
-            return self.table[hypothesis]
-        starts: list[dict[str, float]] = [dict(theta)]
+    def _is_straight(self, hypothesis: Hypothesis) -> bool:
+        """Whether residuals are linear in a single effect."""
+        return self.problem.is_straight(self.problem.candidates[hypothesis[0]].key)
+
+    def _starts(self, hypothesis: Hypothesis) -> Iterator[dict[str, float]]:
+        """The null; times also begin at their size, on both sides, as residuals are far from linear
+        in them."""
+        yield dict(self.point.fit.theta)
+        candidate = self.problem.candidates[hypothesis[0]]
         if candidate.lead.unit == "s":
-            signs = (1.0, -1.0) if candidate.lead.signed else (1.0,)
-            sizes = [within(self.problem.candidates, candidate.typical(sign)) for sign in signs]
-            starts += [{**theta, **size} for size in sizes]
-        return max(self._descend(hypothesis, start) for start in starts)
+            for sign in (1.0, -1.0) if candidate.lead.signed else (1.0,):
+                size = within(self.problem.candidates, candidate.typical(sign))
+                yield {**self.point.fit.theta, **size}
 
-    def _descend(self, hypothesis: Hypothesis, theta: dict[str, float]) -> float:
-        """The best log evidence within a few Newton steps from theta, with the slopes of the
-        null."""
-        settings = NullModelSettings.current()
-        free = {*self.problem.nuisance, *(self.problem.candidates[e].key for e in hypothesis)}
-        linear, best = self.point.mode.linear, -np.inf
-        own = np.array([name in free for name in linear.names])
-        for step in range(settings.glances + 1):
-            if step or theta != self.point.fit.theta:
-                r = self.problem.residual(theta)
-                if not np.all(np.abs(r) < settings.absurd):
-                    break  # a linear estimate may point to where nothing can be predicted
-                at, _, _ = priors(self.problem, theta, linear.names)
-                linear = moved(linear, at, self.jacobian, r, self.division.blocks)
-            score = self.ranker(linear).score(hypothesis)
-            best = max(best, score.log_evidence)
-            at = np.where(own, score.z, linear.at)
-            theta = within(self.problem.candidates, estimate(self.problem, linear, at))
-        return best
+    def _about(self, thetas: Sequence[Mapping[str, float]]) -> Iterator[Linear | None]:
+        """The slopes of the null about each theta; None where nothing can be predicted: a linear
+        estimate may point there."""
+        null, blocks = self.point, self.division.blocks
+        apart = [theta for theta in thetas if theta != null.fit.theta]
+        residuals = iter(self.problem.residuals(apart).T if apart else ())
+        for theta in thetas:
+            if theta == null.fit.theta:
+                yield null.mode.linear
+                continue
+            r = next(residuals)
+            if np.all(np.abs(r) < NullModelSettings.current().absurd):
+                at, _, _ = priors(self.problem, theta, null.mode.linear.names)
+                yield moved(null.mode.linear, at, self.jacobian, r, blocks)
+            else:
+                yield None
+
+    def _estimate(self, hypothesis: Hypothesis, linear: Linear, z: Array) -> dict[str, float]:
+        """Theta at the z (k,) of a hypothesis's score; absent effects stay as they are."""
+        problem = self.problem
+        free = {*problem.nuisance, *(problem.candidates[e].key for e in hypothesis)}
+        at = np.where([name in free for name in linear.names], z, linear.at)
+        return within(problem.candidates, estimate(problem, linear, at))
 
     def _learn_noise(self, theta: Mapping[str, float], keep: bool) -> Array | None:
         """Learn the noise colour from the residual that is left when every effect may help to
