@@ -183,7 +183,7 @@ class RobotProblem(Problem):
 
     def residuals(self, thetas: Sequence[Theta]) -> Array:
         """The same (n, c) at each theta; the filter takes them side by side."""
-        return self.state.pick(self.state.residuals(thetas))
+        return np.stack(list(self.state.each_residual(thetas)), axis=1)
 
     def jacobian(
         self, theta: Theta, names: Iterable[str], runs: Collection[int] | None = None
