@@ -118,9 +118,9 @@ def predicted(
     if g is not None:
         states[1:] += s.G[:-1, ..., : g.shape[2]] @ np.ascontiguousarray(g[:-1])
     turned = np.empty(states.shape[1:])
-    for k in range(n - 1):
-        np.matmul(gain.turn[k], states[k], out=turned)
-        states[k + 1] += turned
+    for turn, now, following in zip(gain.turn[:-1], states[:-1], states[1:], strict=True):
+        np.matmul(turn, now, out=turned)
+        following += turned
     seen = s.H @ states
     return states, (-seen if y is None else y - seen)
 
