@@ -122,11 +122,15 @@ def table(records: Sequence[Record]) -> str:
     }
     known = [*groups["single"], *groups["sensor"]]
     seen = [r for r in known if detectable(r, r["truth"][0])]
+    white = [r for r in known if not r["case"]["colour"]]
+    coloured = [r for r in known if r["case"]["colour"]]
     errors, covered = parameters([*known, *groups["shape"], *groups["pair"], *groups["many"]])
     rows = [
         _row("right effect first", known, lambda r: among_first(r, 1)),
         _row("right effect first, physics", groups["single"], lambda r: among_first(r, 1)),
         _row("right effect first, sensors", groups["sensor"], lambda r: among_first(r, 1)),
+        _row("right effect first, white noise", white, lambda r: among_first(r, 1)),
+        _row("right effect first, other noise", coloured, lambda r: among_first(r, 1)),
         _row(
             "right effect first, where larger than the smallest size that the answer says it sees",
             seen,
