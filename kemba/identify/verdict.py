@@ -42,10 +42,11 @@ def doubts_about(
         reasons.append(str(drift))
     elif unfinished(search, best):
         reasons.append("the error that is left repeats itself with motion and valves")
-    elif pattern := pattern_left(search, best):
+    least = settings.part_of_structure if reasons else settings.part
+    # a pattern may be left of an answer that explains most of what repeats itself
+    if not reasons and (pattern := pattern_left(search, best)):
         reasons.append(f"the error that is left has a pattern: {pattern}")
     before, after = (error(search, h, kept) for h in (NULL, best))
-    least = settings.part_of_structure if reasons else settings.part
     if ended and after > settings.whole:
         reasons.append(ENDED)
         least = 0.0  # however little it explains, nothing else could be asked

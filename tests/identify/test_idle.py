@@ -96,7 +96,7 @@ def test_left_out_data_choose_among_effects_that_fit_as_well(
     points = {h: SimpleNamespace(log_evidence=e) for h, e in zip(names, evidence, strict=True)}
     points[()] = SimpleNamespace(log_evidence=0.0)
     known = dict(zip(names, gains, strict=True))
-    monkeypatch.setattr(parsimony, "window_gain", lambda search, h, against: Gain(known[h], 10.0))
+    monkeypatch.setattr(parsimony, "gain_over_nothing", lambda search, h: Gain(known[h], 10.0))
     problem = SimpleNamespace(candidates=("front", "payload", "rear"))
     search = SimpleNamespace(points=points, problem=problem)
     assert parsimony.needed_instead(search, ("front",)) == chosen  # type: ignore[arg-type]

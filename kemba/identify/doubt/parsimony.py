@@ -20,7 +20,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from kemba.identify.doubt.acting import excess_where_acting
-from kemba.identify.doubt.cross_validation import left_out, window_gain, window_powers
+from kemba.identify.doubt.cross_validation import (
+    gain_over_nothing,
+    left_out,
+    window_gain,
+    window_powers,
+)
 from kemba.identify.evidence.bootstrap import BootstrapSettings
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis, log_prior
@@ -169,9 +174,11 @@ def _instead(search: Search, belief: Belief, chosen: Hypothesis) -> Belief:
 
 
 def is_idle(search: Search, best: Hypothesis) -> bool:
-    """Whether left-out data, summed over aggregation windows, gain no more by an answer than their
-    scatter. Its p-value counts rows, whose noise may be slower than it is taken to be."""
-    return as_good(search, NULL, best)
+    """Whether left-out data, summed over aggregation windows, and nominal figures gain no more by
+    an answer than their scatter. Its p-value counts rows, whose noise may be slower than it is
+    taken to be."""
+    gain = gain_over_nothing(search, best)
+    return not gain.pays or gain.nats < _least()
 
 
 def needed_instead(search: Search, idle: Hypothesis) -> Hypothesis:
@@ -184,7 +191,7 @@ def needed_instead(search: Search, idle: Hypothesis) -> Hypothesis:
     count, same = len(search.problem.candidates), RankingSettings.current().same
     likely = {h: p.log_evidence + log_prior(h, count) for h, p in search.points.items()}
     near = [h for h, p in likely.items() if p > max(likely[idle] - same, likely[NULL])]
-    gains = {h: window_gain(search, h, NULL) for h in near if len(h) == len(idle)}
+    gains = {h: gain_over_nothing(search, h) for h in near if len(h) == len(idle)}
     plain = ParsimonySettings.current().plain
     needed = {h: g.nats for h, g in gains.items() if g.nats > max(plain * g.error, _least())}
     return max(needed, key=needed.__getitem__, default=NULL)
