@@ -110,6 +110,8 @@ MACHINES = {
     "late old slopes": "the same since then; before intervals were taken from slopes that hold",
     "late": "the same since hypotheses are scored at their mode, and intervals are taken from "
     "slopes that hold, machines of other seeds",
+    "late figures": "the same since nominal figures count where left-out data are asked, machines "
+    "of other seeds",
 }
 
 

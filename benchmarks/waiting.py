@@ -5,7 +5,7 @@
 
 Logs of the second twin (tests/mujoco_twin), cut after 1 s: one hidden effect each, then five at
 once. Every command is a process of its own, figures included; on a machine with nothing else to do.
-Each case is asked three times: the least and the greatest time are told.
+Each case is asked three times: the median is told, in brackets the least and the greatest time.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -95,9 +96,8 @@ def table(cases: int | None, times: int) -> Iterator[str]:
 
 
 def spread(seconds: Sequence[float]) -> str:
-    """The least, and the greatest where it differs."""
-    least, most = f"{min(seconds):.1f}", f"{max(seconds):.1f}"
-    return least if least == most else f"{least} to {most}"
+    """The median, and in brackets the least and the greatest."""
+    return f"{median(seconds):.1f} ({min(seconds):.1f} to {max(seconds):.1f})"
 
 
 def main() -> None:
@@ -109,7 +109,7 @@ def main() -> None:
     options = parser.parse_args()
     lines = printed(table(options.cases, options.times))
     if options.write:
-        how = f"Asked {options.times} times each, least to greatest, on {machine()}."
+        how = f"Asked {options.times} times each: median, in brackets the range, on {machine()}."
         put_block(PAGE, BEGIN, END, [*lines, "", how])
 
 

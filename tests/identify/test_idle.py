@@ -15,9 +15,10 @@ from kemba.identify.answer import ENDED
 from kemba.identify.bench.problem import bench_problem
 from kemba.identify.discover import discover
 from kemba.identify.doubt import parsimony
-from kemba.identify.doubt.cross_validation import Gain
+from kemba.identify.doubt.cross_validation import Gain, figures_off, window_gain
 from kemba.identify.doubt.parsimony import Belief, is_idle
 from kemba.identify.evidence.search import Search
+from kemba.identify.evidence.spike_slab import NULL
 from kemba.identify.verdict import doubts_about, verdict_on
 from kemba.model.spec import load_model
 from kemba.trajectory import Trajectory
@@ -74,6 +75,21 @@ def test_what_left_out_data_do_not_need_is_not_named() -> None:
     assert (answer.verdict, answer.added) == ("nothing", ())
     assert answer.sentence.startswith("What differs may be chance (p = 0.00")
     assert any("wave would fit these readings better" in remark for remark in answer.remarks)
+
+
+@pytest.mark.parametrize(("force", "sigmas"), [(5.0, 3.0), (0.5, 0.75)])
+def test_a_nominal_figure_far_off_speaks_for_an_effect(force: float, sigmas: float) -> None:
+    """A force that the nominal gain may imitate, so that left-out data need no effect."""
+    problem = Toy({})
+    problem.window = 20
+    problem._shapes["kick"] = problem._u / 100.0
+    problem.measured = problem.measured + force * problem._shapes["kick"]
+    search = Search(problem)
+    search.start()
+    search.visit(("kick",))
+    assert abs(window_gain(search, ("kick",), NULL).nats) < 1.0
+    assert figures_off(search, NULL) == pytest.approx(0.5 * sigmas**2, rel=0.1)
+    assert is_idle(search, ("kick",)) == (sigmas < 1.0)
 
 
 @pytest.mark.parametrize(
