@@ -14,15 +14,13 @@ from kemba.identify.doubt.cross_validation import one_part_shows
 from kemba.identify.doubt.held_out import HeldOut, error
 from kemba.identify.doubt.parsimony import Belief
 from kemba.identify.doubt.run_consistency import drifting
+from kemba.identify.doubt.significance import best_gain, null_test
 from kemba.identify.doubt.unexplained import Formula, look
-from kemba.identify.evidence.bootstrap import NullTest, bootstrap, smallest_detectable
+from kemba.identify.evidence.bootstrap import NullTest, smallest_detectable
 from kemba.identify.evidence.figures import Rebuilt, ahead, settled
-from kemba.identify.evidence.linear import time_blocks
-from kemba.identify.evidence.noise.left_out_noise import LeftOutNoiseSettings, left_out_noise
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.search_settings import SearchSettings
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
-from kemba.identify.evidence.strain import strained
 from kemba.identify.evidence.windows import error_ratio
 from kemba.identify.problem.problem import Problem
 from kemba.identify.ranking import fitted_errors, ladder, ranked
@@ -112,7 +110,7 @@ def _built_anew(search: Search, other: Rebuilt, holdout: Problem | None) -> Disc
     before = error_ratio(judge, search.points[NULL].fit.theta)
     alone = error(second, NULL, found.kept)
     row = structure_row(search, structure, (before, alone), second, found.best, other.nats)
-    gain = max(_best_gain(search), other.nats)
+    gain = max(best_gain(search), other.nats)
     answer = joined(row, null_test(search).p_value(gain), found.answer, second, found.best)
     first_error = search.points[NULL].fitted_error
     search.say(f"built anew, the error is {answer.error_after:.2f} times the noise")
@@ -125,7 +123,7 @@ def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> 
     ended, search.in_pieces = search.ended, one_part_shows(search, best)
     search.say("simulating logs in which nothing is missing")
     test, likeliest = null_test(search), best
-    belief = believed(search, likeliest, test.p_value(_best_gain(search)))
+    belief = believed(search, likeliest, test.p_value(best_gain(search)))
     best, p_value, ended = belief.best, belief.p_value, ended or search.late
     search.say("testing whether more is missing")
     kept = HeldOut.beside(holdout, search.problem) if holdout else None
@@ -154,7 +152,7 @@ def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> 
 def _undecided(search: Search, test: NullTest, kept: HeldOut | None) -> Discovery:
     """What logs allow to say that are too short for anything to be significant: whether something
     differs, but not what."""
-    gain, doubts = _best_gain(search), Doubts()
+    gain, doubts = best_gain(search), Doubts()
     differs = test.share(gain) <= DiscoverSettings.current().significant
     if differs or error(search, NULL, kept) > VerdictSettings.current().whole:
         piece = DiscoverSettings.current().fine
@@ -166,36 +164,6 @@ def _undecided(search: Search, test: NullTest, kept: HeldOut | None) -> Discover
         answer.next = f"record at least {(test.needed + 1) * DiscoverSettings.current().fine:.1f} s"
         answer.sentence = phrase(answer)
     return Discovery(answer, search, NULL, kept, fitted_errors(search, NULL))
-
-
-def _best_gain(search: Search) -> float:
-    """Evidence [nats] of the best single effect over nothing, as in the simulated logs: by the
-    slopes about the null's mode. A refit, with shapes of its own, finds more than any of theirs.
-
-    Where the motion depends on the model, or the null's figures are not believed, slopes there tell
-    too little: of the refitted single effects; of the smallest sets that were refitted, where no
-    single effect was. A larger set is one of many more than the simulated logs are searched for,
-    and would look rarer than it is.
-    """
-    if not search.problem.moves and not strained(search.points[NULL], search.problem).any():
-        return search.base.best_gain()
-    sizes = [len(h) for h in search.points if h]
-    null = search.points[NULL].log_evidence
-    gains = (p.log_evidence - null for h, p in search.points.items() if len(h) == min(sizes))
-    return max(gains) if sizes else 0.0
-
-
-def null_test(search: Search) -> NullTest:
-    """The bootstrap of the search, with the noise these data have."""
-    base, mode = search.base, search.base.point.mode
-    linear = mode.linear
-    blocks = time_blocks(search.problem, shortest=DiscoverSettings.current().fine)
-    left = mode.residual + base.jacobian @ (base.flexible_fit() - linear.at)
-    settings = LeftOutNoiseSettings.current()
-    power = settings.power_in_motion if search.problem.moves else settings.power
-    noise = left_out_noise(base.jacobian, left, linear.width, blocks, power)
-    singles = [(name,) for name in search.problem.candidates]
-    return bootstrap(base.ranker(linear), noise, singles)
 
 
 def _answer(

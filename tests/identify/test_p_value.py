@@ -14,9 +14,10 @@ import pytest
 from scipy.stats import kstest
 from toy_problem import EFFECTS, Toy
 
-from kemba.identify.discover import _best_gain, discover
+from kemba.identify.discover import discover
 from kemba.identify.doubt.belief import believed
 from kemba.identify.doubt.parsimony import Belief
+from kemba.identify.doubt.significance import best_gain
 from kemba.identify.evidence.bootstrap import NullTest
 from kemba.identify.evidence.spike_slab import SpikeSlabSettings
 
@@ -81,13 +82,13 @@ def search(**gains: float) -> Any:
 
 def test_the_best_of_the_pairs_does_not_count_as_one_effect() -> None:
     """The simulated logs are searched for single effects only."""
-    assert _best_gain(search(a=2.0, b=3.0, a_b=30.0)) == 3.0
-    assert _best_gain(search(a_b=30.0)) == 30.0  # nothing else was refitted
-    assert _best_gain(search()) == 0.0
+    assert best_gain(search(a=2.0, b=3.0, a_b=30.0)) == 3.0
+    assert best_gain(search(a_b=30.0)) == 30.0  # nothing else was refitted
+    assert best_gain(search()) == 0.0
 
 
 def test_what_chance_does_as_often_is_not_believed() -> None:
     """The search names an effect; every simulated log looks better."""
     found = search(a=3.0)
-    p_value = NullTest(np.full(99, 50.0), (), 40).p_value(_best_gain(found))
+    p_value = NullTest(np.full(99, 50.0), (), 40).p_value(best_gain(found))
     assert believed(found, ("a",), p_value) == Belief()

@@ -181,6 +181,13 @@ def is_idle(search: Search, best: Hypothesis) -> bool:
     return not gain.pays or gain.nats < _least()
 
 
+def is_plain(search: Search, hypothesis: Hypothesis) -> bool:
+    """Whether left-out data and nominal figures gain by a hypothesis, plainly more than their
+    scatter."""
+    gain = gain_over_nothing(search, hypothesis)
+    return gain.nats > max(ParsimonySettings.current().plain * gain.error, _least())
+
+
 def needed_instead(search: Search, idle: Hypothesis) -> Hypothesis:
     """Of the hypotheses that explain the data as well as an idle one, by as many effects, and are
     likelier than nothing, the one that left-out data need most; NULL where they need none.
@@ -191,10 +198,8 @@ def needed_instead(search: Search, idle: Hypothesis) -> Hypothesis:
     count, same = len(search.problem.candidates), RankingSettings.current().same
     likely = {h: p.log_evidence + log_prior(h, count) for h, p in search.points.items()}
     near = [h for h, p in likely.items() if p > max(likely[idle] - same, likely[NULL])]
-    gains = {h: gain_over_nothing(search, h) for h in near if len(h) == len(idle)}
-    plain = ParsimonySettings.current().plain
-    needed = {h: g.nats for h, g in gains.items() if g.nats > max(plain * g.error, _least())}
-    return max(needed, key=needed.__getitem__, default=NULL)
+    needed = [h for h in near if len(h) == len(idle) and is_plain(search, h)]
+    return max(needed, key=lambda h: gain_over_nothing(search, h).nats, default=NULL)
 
 
 def none_of(belief: Belief) -> Belief:
