@@ -192,6 +192,11 @@ def _shapes(records: Sequence[Record]) -> list[str]:
     shown = [r for r in records if hidden(r) != ["geometry:piston/mount"]]
     return [
         _row("geometry and assembly: named as such", records, as_shape),
+        _row(
+            "the same where larger than the smallest size that the answer says it sees",
+            [r for r in records if detectable(r, r["truth"][0])],
+            as_shape,
+        ),
         _row("geometry and assembly: exactly the right one", records, right),
         _row("geometry and assembly: in the named class", records, in_class),
         _row("the same without the mount, which hardly shows", shown, in_class),
