@@ -7,8 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from kemba.identify import rest
+from kemba.identify import rest, verdict
 from kemba.identify.compare.force_profiles import ForceProfile
+from kemba.identify.doubt.parsimony import Belief
 
 
 def left(monkeypatch: pytest.MonkeyPatch, gain: float, force: float, error: float = 1.2) -> str:
@@ -39,3 +40,17 @@ def test_a_negligible_force_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_gains_count_by_the_scatter_that_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
     assert left(monkeypatch, 90.0, 4.0, error=1.2)
     assert not left(monkeypatch, 90.0, 4.0, error=1.3)
+
+
+@pytest.mark.parametrize(("repeats", "said"), [(False, "partly"), (True, "unknown")])
+def test_a_loss_found_is_a_part_where_no_more_than_a_pattern_is_left(
+    monkeypatch: pytest.MonkeyPatch, repeats: bool, said: str
+) -> None:
+    """It explains 40 % of the excess; half is asked where most of the rest repeats itself."""
+    best, errors = ("both_mode_loss",), {(): 2.42, ("both_mode_loss",): 1.66}
+    monkeypatch.setattr(verdict, "unfinished", lambda search, best: repeats)
+    monkeypatch.setattr(verdict, "pattern_left", lambda search, best: "a force after extend")
+    monkeypatch.setattr(verdict, "error", lambda search, hypothesis, kept: errors[hypothesis])
+    monkeypatch.setattr(verdict, "fits_where_it_acts", lambda search, best: False)
+    doubts = verdict.doubts_about(SimpleNamespace(), Belief(best), None, None)  # type: ignore[arg-type]
+    assert verdict.verdict_on(best, None, doubts) == said
