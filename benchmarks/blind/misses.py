@@ -7,8 +7,8 @@ At the end of the search, each of them is fitted to its logs, and so is what was
 nominal figures within their tolerances, and small shares of all other effects, as every machine
 has them. The gain is how much better the hidden effect explains these and the readings: half the
 fall of the sum of squares [nats]. Where nothing is hidden, the best of so many effects gains more
-than the last column in 3 % of all logs (chi-squared, Bonferroni): who names effects that gain less
-blames more machines.
+than the last column in about 3 % of all logs (chi-squared, Bonferroni; in fewer, as effects act
+alike).
 """
 
 from __future__ import annotations
