@@ -10,7 +10,7 @@ from kemba.identify.doubt.acting import excess_where_acting
 from kemba.identify.doubt.held_out import HeldOut, error
 from kemba.identify.doubt.parsimony import Belief
 from kemba.identify.doubt.run_consistency import Drift
-from kemba.identify.doubt.unexplained import Formula, unfinished
+from kemba.identify.doubt.unexplained import Formula, explains_structure, unfinished
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
 from kemba.identify.problem.sensor_faults import is_fault
@@ -43,9 +43,10 @@ def doubts_about(
     elif unfinished(search, best):
         reasons.append("the error that is left repeats itself with motion and valves")
     least = settings.part_of_structure if reasons else settings.part
-    # a pattern may be left of an answer that explains most of what repeats itself
     if not reasons and (pattern := pattern_left(search, best)):
         reasons.append(f"the error that is left has a pattern: {pattern}")
+        if not explains_structure(search, best):
+            least = settings.part_of_structure
     before, after = (error(search, h, kept) for h in (NULL, best))
     if ended and after > settings.whole:
         reasons.append(ENDED)

@@ -9,6 +9,7 @@ import pytest
 
 from kemba.identify import rest, verdict
 from kemba.identify.compare.force_profiles import ForceProfile
+from kemba.identify.doubt import unexplained
 from kemba.identify.doubt.parsimony import Belief
 
 
@@ -42,13 +43,15 @@ def test_gains_count_by_the_scatter_that_is_left(monkeypatch: pytest.MonkeyPatch
     assert not left(monkeypatch, 90.0, 4.0, error=1.3)
 
 
-@pytest.mark.parametrize(("repeats", "said"), [(False, "partly"), (True, "unknown")])
-def test_a_loss_found_is_a_part_where_no_more_than_a_pattern_is_left(
-    monkeypatch: pytest.MonkeyPatch, repeats: bool, said: str
+@pytest.mark.parametrize(("left", "said"), [(0.02, "partly"), (3.0, "unknown")])
+def test_a_loss_found_is_a_part_where_hardly_anything_else_repeats_itself(
+    monkeypatch: pytest.MonkeyPatch, left: float, said: str
 ) -> None:
-    """It explains 40 % of the excess; half is asked where most of the rest repeats itself."""
+    """It explains 40 % of the excess; half is asked where more of what repeats itself is left."""
+    repeats = {(): (7.0, 5.9), ("both_mode_loss",): (1.0, left)}
     best, errors = ("both_mode_loss",), {(): 2.42, ("both_mode_loss",): 1.66}
-    monkeypatch.setattr(verdict, "unfinished", lambda search, best: repeats)
+    monkeypatch.setattr(verdict, "unfinished", lambda search, best: False)
+    monkeypatch.setattr(unexplained, "structured", lambda search, hypothesis: repeats[hypothesis])
     monkeypatch.setattr(verdict, "pattern_left", lambda search, best: "a force after extend")
     monkeypatch.setattr(verdict, "error", lambda search, hypothesis, kept: errors[hypothesis])
     monkeypatch.setattr(verdict, "fits_where_it_acts", lambda search, best: False)
