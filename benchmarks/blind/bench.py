@@ -63,12 +63,12 @@ MODELS = {"first_order": "planning", "orifice": str(Path(__file__).parent / "ori
 NULLS = 70  # further machines in which nothing is missing, at the end: a hundred in all
 
 
-def cases() -> list[dict[str, Any]]:
+def cases(seed: int = SEED) -> list[dict[str, Any]]:
     """Settings of all cases; each kind is spread evenly over the order, before further nulls."""
-    rng = np.random.default_rng(SEED)
+    rng = np.random.default_rng(seed)
     turns = study.spread(REPEATS, rng)
     turns += [(None, turn) for turn in range(NULLS)]
-    found = [_setting(effect, turn, SEED + i, rng) for i, (effect, turn) in enumerate(turns)]
+    found = [_setting(effect, turn, seed + i, rng) for i, (effect, turn) in enumerate(turns)]
     return [{**setting, "colour": study.colour(i)} for i, setting in enumerate(found)]
 
 
@@ -115,4 +115,4 @@ def prepared(setting: dict[str, Any]) -> study.Prepared:
 
 
 if __name__ == "__main__":
-    study.main("bench", __doc__, cases(), prepared)
+    study.main("bench", __doc__, cases, prepared)

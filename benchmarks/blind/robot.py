@@ -54,12 +54,12 @@ SIZES, NOISES = (1.0, 0.7, 1.5), (1.0, 2.0, 0.5)
 NULLS = 40  # further machines in which nothing is missing, at the end: a hundred in all
 
 
-def cases() -> list[dict[str, Any]]:
+def cases(seed: int = SEED) -> list[dict[str, Any]]:
     """Settings of all cases; each kind is spread evenly over the order, before further nulls."""
-    rng = np.random.default_rng(SEED)
+    rng = np.random.default_rng(seed)
     turns = study.spread(REPEATS, rng)
     turns += [(None, turn) for turn in range(NULLS)]
-    found = [_setting(effect, turn, SEED + i, rng) for i, (effect, turn) in enumerate(turns)]
+    found = [_setting(effect, turn, seed + i, rng) for i, (effect, turn) in enumerate(turns)]
     return [{**setting, "colour": study.colour(i)} for i, setting in enumerate(found)]
 
 
@@ -108,4 +108,4 @@ def _standing(folder: Path, effect: Any, size: float, **options: Any) -> tuple[l
 
 
 if __name__ == "__main__":
-    study.main("robot", __doc__, cases(), prepared)
+    study.main("robot", __doc__, cases, prepared)

@@ -57,15 +57,15 @@ AIR = ("first_order", "first_order", "orifice", "first_order")
 MODELS = {"first_order": "planning", "orifice": str(Path(__file__).parent / "orifice_robot.yaml")}
 
 
-def cases() -> list[dict[str, Any]]:
+def cases(seed: int = SEED) -> list[dict[str, Any]]:
     """Settings of all cases; each kind is spread evenly over the whole order."""
-    rng = np.random.default_rng(SEED)
+    rng = np.random.default_rng(seed)
     turns = study.spread(REPEATS, rng)
     turns += [(effect, turn) for turn in range(MORE) for effect in MANY]
     return [
         {
             "effect": effect,
-            "seed": SEED + i,
+            "seed": seed + i,
             "size": SIZES[turn % 3],
             "noise": NOISES[(turn + turn // 3) % 3],
             "figures_off": float(rng.choice([0.01, 0.02])),
@@ -113,4 +113,4 @@ def prepared(setting: dict[str, Any]) -> study.Prepared:
 
 
 if __name__ == "__main__":
-    study.main("second", __doc__, cases(), prepared)
+    study.main("second", __doc__, cases, prepared)

@@ -22,6 +22,7 @@ from kemba.identify.problem.problem import Problem
 Setting = dict[str, Any]
 Prepared = tuple[list[dict[str, Any]], Callable[[], Problem]]  # what is hidden, and the problem
 Prepare = Callable[[Setting], Prepared]
+Draw = Callable[..., Sequence[Setting]]  # all cases, of the usual seed or of another
 TIME_LIMIT = 300.0  # s, that of the command
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "blind-tests.md"
 
@@ -94,10 +95,11 @@ def compared(records: list[report.Record], prepare: Prepare, out: Path) -> None:
         print(f"{record['case']['effect']}: {record['others']}", flush=True)
 
 
-def main(name: str, text: str | None, cases: Sequence[Setting], prepare: Prepare) -> None:
+def main(name: str, text: str | None, draw: Draw, prepare: Prepare) -> None:
     """The command line of a study: run what is not yet in the file, then print the report."""
     parser = argparse.ArgumentParser(description=text)
     parser.add_argument("--cases", type=int, default=None, help="so many of the beginning only")
+    parser.add_argument("--seed", type=int, help="other cases, in a file and a table of their own")
     parser.add_argument("--only", default="", help="of these kinds only, as in the report")
     parser.add_argument("--out", type=Path, default=Path(f"{name}.jsonl"))
     parser.add_argument("--part", default="1/1", help="i/n: every n-th case, from the i-th on")
@@ -107,6 +109,7 @@ def main(name: str, text: str | None, cases: Sequence[Setting], prepare: Prepare
         "--others", action="store_true", help="ask only other methods, about what is in the file"
     )
     options = parser.parse_args()
+    cases = draw() if options.seed is None else draw(options.seed)
     if options.others:
         compared(report.read(options.out), prepare, options.out)
     for setting in () if options.report or options.others else _pending(cases, options):
@@ -124,7 +127,7 @@ def main(name: str, text: str | None, cases: Sequence[Setting], prepare: Prepare
     found += f"the twin cannot do them.\n\n{report.table(done)}"
     print(found)
     if options.write:
-        report.write(DOCS, name, found)
+        report.write(DOCS, name if options.seed is None else f"{name} {options.seed}", found)
 
 
 def _pending(cases: Sequence[Setting], options: argparse.Namespace) -> Iterator[Setting]:
