@@ -19,13 +19,13 @@ import os
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "benchmarks")]
 
 import numpy as np
+from block import printed
 from scipy.stats import chi2
 
 from blind import report, study
@@ -65,31 +65,25 @@ def misfit(search: Search, hypothesis: Hypothesis) -> float:
     return 0.5 * float(power + weight @ off**2 - pull @ step)
 
 
-def told(name: str, record: report.Record) -> dict[str, Any]:
+def told(name: str, record: report.Record) -> str:
     """One line of the table."""
     _, make = importlib.import_module(f"blind.{name}").prepared(record["case"])
     search = discover(make(), time_limit=study.TIME_LIMIT).search
     effect, answered = hidden(record)[0], tuple(sorted(named(record)))
-    return {
-        "hidden": effect,
-        "size": next(iter(record["truth"][0]["parameters"].values())),
-        "answered": " + ".join(answered) or record["answer"]["verdict"],
-        "gain": gain(search, effect, answered),
-        "needed": 0.5 * float(chi2.isf(FALSE / len(search.problem.candidates), 1)),
-    }
+    size = next(iter(record["truth"][0]["parameters"].values()))
+    says = " + ".join(answered) or record["answer"]["verdict"]
+    chance = 0.5 * float(chi2.isf(FALSE / len(search.problem.candidates), 1))
+    gained = gain(search, effect, answered)
+    return f"| {name} | {effect} | {size:.3g} | {says} | {gained:.1f} | {chance:.1f} |"
 
 
-def lines(cases: int | None) -> Iterator[str]:
+def table(cases: int | None) -> Iterator[str]:
     """Lines of the table, of so many misses of each study (None: all)."""
     yield "| logs of | hidden | size [SI] | answered | gain of it [nats] | 3 % by chance [nats] |"
     yield "|---|---|---:|---|---:|---:|"
     for name in STUDIES:
         for record in list(missed(name))[:cases]:
-            row = told(name, record)
-            yield (
-                f"| {name} | {row['hidden']} | {row['size']:.3g} | {row['answered']} "
-                f"| {row['gain']:.1f} | {row['needed']:.1f} |"
-            )
+            yield told(name, record)
 
 
 def main() -> None:
@@ -98,12 +92,9 @@ def main() -> None:
     parser.add_argument("--cases", type=int, help="so many misses of each study only")
     parser.add_argument("--write", action="store_true", help="put the table into the docs")
     asked = parser.parse_args()
-    found = []
-    for line in lines(asked.cases):
-        print(line, flush=True)
-        found.append(line)
+    lines = printed(table(asked.cases))
     if asked.write:
-        report.write(study.DOCS, "misses", "\n".join(found))
+        report.write(study.DOCS, "misses", "\n".join(lines))
 
 
 if __name__ == "__main__":

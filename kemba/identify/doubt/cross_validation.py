@@ -113,7 +113,7 @@ def window_gain(search: Search, hypothesis: Hypothesis, against: Hypothesis) -> 
 
 
 def gain_over_nothing(search: Search, hypothesis: Hypothesis) -> Gain:
-    """The same over nothing, and how much less likely nothing makes the nominal figures.
+    """Gain over nothing of the rows summed over aggregation windows, and of the nominal figures.
 
     Without its effects, nominal figures may move until left-out data are predicted as well: a body
     that is 2.3 prior sigmas too heavy for a payload. Their prior is knowledge as data are.
