@@ -29,6 +29,7 @@ from twin.figures import Robot
 from twin.measure import Sensors
 
 from kemba.identify.evidence.linear import time_blocks
+from kemba.identify.evidence.noise.colour import best_fit
 from kemba.identify.evidence.noise.left_out_noise import left_out_noise
 from kemba.identify.evidence.search import Search
 from kemba.identify.logs.reading import read_logs
@@ -51,7 +52,7 @@ def powers(seed: int, folder: Path) -> tuple[float, float, float]:
     base, problem = search.base, search.problem
     mode, jacobian = base.point.mode, base.jacobian
     linear = mode.linear
-    left = mode.residual + jacobian @ (base.flexible_fit() - linear.at)
+    left = mode.residual + jacobian @ (best_fit(linear) - linear.at)
     blocks = time_blocks(problem, shortest=DiscoverSettings.current().fine)
     along = directions(jacobian, base.ranker(linear).nuisance)
     plain = np.stack([jacobian[blocks == b].T @ left[blocks == b] for b in np.unique(blocks)])

@@ -11,11 +11,11 @@ import numpy as np
 from kemba.identify.answer import ENDED, Answer, Ranked, phrase
 from kemba.identify.doubt.belief import believed, material
 from kemba.identify.doubt.cross_validation import one_part_shows
+from kemba.identify.doubt.formula import Formula, look
 from kemba.identify.doubt.held_out import HeldOut, error
 from kemba.identify.doubt.parsimony import Belief
 from kemba.identify.doubt.run_consistency import drifting
 from kemba.identify.doubt.significance import best_gain, null_test
-from kemba.identify.doubt.unexplained import Formula, look
 from kemba.identify.evidence.bootstrap import NullTest, smallest_detectable
 from kemba.identify.evidence.figures import Rebuilt, ahead, settled
 from kemba.identify.evidence.search import Search
@@ -189,7 +189,7 @@ def _answer(
     sizes = smallest_detectable(ranker, test.threshold)
     answer = Answer(
         verdict=verdict,
-        p_value_nothing=p_value if not formula else min(p_value, float(np.exp(-formula.gain))),
+        p_value_nothing=min(p_value, formula.p_value) if formula else p_value,
         ranking=ranking,
         added=added,
         found=named if verdict in ("missing", "partly") else (),

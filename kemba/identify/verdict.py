@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from kemba.errors import enumerated
 from kemba.identify.answer import ENDED, Ranked, Verdict, excess
 from kemba.identify.doubt.acting import excess_where_acting
+from kemba.identify.doubt.formula import Formula
 from kemba.identify.doubt.held_out import HeldOut, error
 from kemba.identify.doubt.parsimony import Belief
 from kemba.identify.doubt.run_consistency import Drift
-from kemba.identify.doubt.unexplained import Formula, explains_structure, unfinished
+from kemba.identify.doubt.unexplained import explains_structure, unfinished
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
 from kemba.identify.problem.sensor_faults import is_fault

@@ -12,7 +12,7 @@ from twin.measure import Sensors
 
 from kemba.identify.bench.problem import bench_problem
 from kemba.identify.doubt.drifts import drift_columns
-from kemba.identify.doubt.unexplained import Formula, look
+from kemba.identify.doubt.formula import Formula, look
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL
 from kemba.identify.logs.reading import read_logs

@@ -4,8 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
+from toy_problem import Toy
 
-from kemba.identify.doubt.unexplained import by_chance
+from kemba.identify.doubt import formula
+from kemba.identify.doubt.formula import by_chance, look
+from kemba.identify.evidence.bootstrap import NullTest
+from kemba.identify.evidence.search import Search
+from kemba.identify.evidence.spike_slab import NULL
 from kemba.identify.settings import DiscoverSettings
 from kemba.settings import changed
 
@@ -25,3 +31,23 @@ def test_a_stricter_p_value_asks_for_more() -> None:
     with changed(DiscoverSettings, significant=0.01):
         assert by_chance(36) == pytest.approx(usual + np.log(2.0))
     assert by_chance(72) == pytest.approx(usual + np.log(2.0))
+
+
+def test_slow_noise_is_taken_for_a_formula_less_often(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Noise that lasts for 10 ms: terms gain more by it than the best of as many may by chance."""
+    searches = [searched(seed) for seed in range(40)]
+    found = sum(look(search, NULL) is not None for search in searches)
+    careless = NullTest(np.zeros(10), (), 200)
+    monkeypatch.setattr(formula, "bootstrap", lambda *arguments: careless)
+    alarms = sum(look(search, NULL) is not None for search in searches)
+    assert alarms >= 6 and found <= alarms // 2
+
+
+def searched(seed: int) -> Search:
+    """The search on logs of the toy in which nothing is missing."""
+    toy, rng, keep = Toy({}, seed), np.random.default_rng(seed), 0.9
+    white = np.sqrt(1.0 - keep**2) * rng.standard_normal(len(toy.measured))
+    toy.measured += lfilter([1.0], [1.0, -keep], white)
+    search = Search(toy)
+    search.start()
+    return search

@@ -6,11 +6,13 @@ import numpy as np
 
 from kemba.identify.doubt.parsimony import is_plain
 from kemba.identify.evidence.bootstrap import NullTest, bootstrap
-from kemba.identify.evidence.linear import time_blocks
+from kemba.identify.evidence.linear import Linear, time_blocks
+from kemba.identify.evidence.noise.colour import best_fit
 from kemba.identify.evidence.noise.left_out_noise import LeftOutNoiseSettings, left_out_noise
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL
 from kemba.identify.evidence.strain import strained
+from kemba.identify.problem.problem import Array
 from kemba.identify.settings import DiscoverSettings
 
 
@@ -48,12 +50,18 @@ def _plain_gain(search: Search) -> float:
 
 def null_test(search: Search) -> NullTest:
     """The bootstrap of the search, with the noise these data have."""
-    base, mode = search.base, search.base.point.mode
-    linear = mode.linear
-    blocks = time_blocks(search.problem, shortest=DiscoverSettings.current().fine)
-    left = mode.residual + base.jacobian @ (base.flexible_fit() - linear.at)
-    settings = LeftOutNoiseSettings.current()
-    power = settings.power_in_motion if search.problem.moves else settings.power
-    noise = left_out_noise(base.jacobian, left, linear.width, blocks, power)
+    base = search.base
+    linear = base.point.mode.linear
+    noise = redrawn_noise(search, linear, base.jacobian)
     singles = [(name,) for name in search.problem.candidates]
     return bootstrap(base.ranker(linear), noise, singles)
+
+
+def redrawn_noise(search: Search, linear: Linear, jacobian: Array) -> Array:
+    """J'e (b, k) of short blocks of what a fit of everything in `linear`, with slopes (n, k),
+    leaves of the null's residual: noise for the bootstrap."""
+    problem, settings = search.problem, LeftOutNoiseSettings.current()
+    left = search.base.point.mode.residual + jacobian @ (best_fit(linear) - linear.at)
+    blocks = time_blocks(problem, shortest=DiscoverSettings.current().fine)
+    power = settings.power_in_motion if problem.moves else settings.power
+    return left_out_noise(jacobian, left, linear.width, blocks, power)

@@ -105,18 +105,15 @@ def bootstrap(
 
 def _slopes(ranker: Ranker, noise: Array, rng: np.random.Generator, draws: int) -> Array:
     """J'r (k, draws) of logs in which nothing is missing, at the prior mean."""
-    linear, prior = ranker.linear, SpikeSlabSettings.current()
-    gram = linear.gram.sum(axis=0)
+    linear = ranker.linear
     signs = rng.choice([-1.0, 1.0], size=(draws, len(noise)))
-    width = linear.width.copy()
-    tolerance = rng.choice(prior.tolerances, size=draws)
-    truth = rng.standard_normal((draws, len(width))) * width
-    truth[:, ranker.nuisance] *= tolerance[:, None]
+    tolerance = rng.choice(SpikeSlabSettings.current().tolerances, size=draws)
+    truth = rng.standard_normal((draws, len(linear.width))) * ranker.widths((), 1.0)
+    truth[:, ranker.figures] *= tolerance[:, None]
     for effect, i in ranker.lead.items():
-        truth[:, i] *= prior.spike
         if not ranker.candidates[effect].lead.signed:
             truth[:, i] = np.abs(truth[:, i])
-    return np.asarray((-(truth @ gram) + signs @ noise).T)
+    return np.asarray((-(truth @ linear.gram.sum(axis=0)) + signs @ noise).T)
 
 
 def _evidence(ranker: Ranker, hypothesis: Hypothesis, slopes: Array) -> Array:

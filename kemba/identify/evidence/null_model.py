@@ -78,10 +78,6 @@ class Baseline:
         singles = self.ranker(self.point.mode.linear).table((1,))
         return max(singles.values()) - self.point.log_evidence
 
-    def flexible_fit(self) -> Array:
-        """z (k,) of the best fit about the null's mode, every effect free within its full size."""
-        return best_fit(self.point.mode.linear)
-
     def seen_from(self, theta: Mapping[str, float]) -> None:
         """Learn the noise colour from the residual at theta, and rank all hypotheses again."""
         self._learn_noise(theta, keep=False)

@@ -13,6 +13,7 @@ from scipy.special import log_ndtr, logsumexp
 
 from kemba.identify.evidence.linear import Linear
 from kemba.identify.evidence.neighbours import Neighbours
+from kemba.identify.evidence.windows import START
 from kemba.identify.problem.problem import Array, Candidate
 from kemba.settings import BY_HAND, Settings, setting
 
@@ -99,6 +100,8 @@ class Ranker:
         self.silent = frozenset(silent)
         free = set(nuisance)
         self.nuisance = np.array([name in free for name in linear.names])
+        # how a log begins says nothing of how well figures are known
+        self.figures = self.nuisance & [not name.startswith(START) for name in linear.names]
         self.lead = {c.effect: linear.index(c.key) for c in candidates.values()}
         self._gram, self._slope, self._power = linear.total
 
@@ -130,7 +133,7 @@ class Ranker:
         """Prior widths (k,) under a hypothesis; nominal figures are off by `tolerance` prior
         sigmas."""
         width = self.linear.width.copy()
-        width[self.nuisance] *= tolerance
+        width[self.figures] *= tolerance
         for effect, i in self.lead.items():
             spike = self._prior.silent if effect in self.silent else self.spike
             share = np.hypot(self._prior.slab, spike) if effect in hypothesis else spike
