@@ -61,7 +61,7 @@ def redrawn_noise(search: Search, linear: Linear, jacobian: Array) -> Array:
     """J'e (b, k) of short blocks of what a fit of everything in `linear`, with slopes (n, k),
     leaves of the null's residual: noise for the bootstrap."""
     problem, settings = search.problem, LeftOutNoiseSettings.current()
-    left = search.base.point.mode.residual + jacobian @ (best_fit(linear) - linear.at)
+    left = search.points[NULL].mode.residual + jacobian @ (best_fit(linear) - linear.at)
     blocks = time_blocks(problem, shortest=DiscoverSettings.current().fine)
     power = settings.power_in_motion if problem.moves else settings.power
     return left_out_noise(jacobian, left, linear.width, blocks, power)
