@@ -9,13 +9,36 @@ import numpy as np
 
 from kemba.identify.doubt.drifts import drift_columns
 from kemba.identify.doubt.significance import redrawn_noise
-from kemba.identify.doubt.unexplained import UnexplainedSettings
 from kemba.identify.evidence.bootstrap import bootstrap
 from kemba.identify.evidence.linear import condense
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis, Ranker
 from kemba.identify.problem.problem import Array, Candidate, Parameter
 from kemba.identify.settings import DiscoverSettings
+from kemba.settings import BY_HAND, Settings, setting
+
+
+class TermSettings(Settings):
+    """Which terms make a formula."""
+
+    width: float = setting(
+        10.0,
+        "1",
+        "prior of a term's force, in sigmas of the noise where it acts most",
+        BY_HAND,
+        decides=True,
+    )
+    terms: int = setting(2, "1", "most terms of a formula", "convention: a formula can be read")
+    matters: float = setting(
+        0.2,
+        "1",
+        "smallest force of a formula, as a share of what matters in practice",
+        BY_HAND,
+        decides=True,
+    )
+    no_force: float = setting(
+        1e-9, "1", "force, in sigmas, of a term that acts nowhere", "convention: zero"
+    )
 
 
 @dataclass(frozen=True)
@@ -46,7 +69,7 @@ def extended(search: Search, formulas: Mapping[str, Array]) -> tuple[Ranker, Arr
 
     Beside them every sensor may drift: a formula is what no drift explains.
     """
-    mode, settings = search.points[NULL].mode, UnexplainedSettings.current()
+    mode, settings = search.points[NULL].mode, TermSettings.current()
     names = {f"term{i}": formula for i, formula in enumerate(formulas)}
     columns = np.stack([formulas[f] for f in names.values()], axis=1)
     reach = np.percentile(np.abs(columns), 99, axis=0)
@@ -114,13 +137,13 @@ def _matters(search: Search, formula: Formula) -> Hypothesis:
     one beside a large one would let the formula look better than the effect that is there."""
     problem, theta = search.problem, search.points[NULL].fit.theta
     parts = zip(formula.candidates, formula.terms, formula.coefficients, strict=True)
-    least = UnexplainedSettings.current().matters
+    least = TermSettings.current().matters
     return tuple(n for n, term, (c, _) in parts if problem.weight(theta, term, c) > least)
 
 
 def _grow(ranker: Ranker, names: Mapping[str, str]) -> Hypothesis:
     """Terms chosen one after the other; each must add enough evidence."""
-    least, most = by_chance(len(names)), UnexplainedSettings.current().terms
+    least, most = by_chance(len(names)), TermSettings.current().terms
     chosen: Hypothesis = ()
     reached = ranker.score(chosen).log_evidence
     for _ in range(most):

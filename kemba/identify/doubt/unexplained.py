@@ -11,16 +11,8 @@ from kemba.settings import BY_HAND, Settings, setting
 
 
 class UnexplainedSettings(Settings):
-    """When something is missing that the catalogue does not have."""
+    """When error that repeats itself tells that something is missing."""
 
-    width: float = setting(
-        10.0,
-        "1",
-        "prior of a term's force, in sigmas of the noise where it acts most",
-        BY_HAND,
-        decides=True,
-    )
-    terms: int = setting(2, "1", "most terms of a formula", "convention: a formula can be read")
     structure: float = setting(
         1.0,
         "1",
@@ -31,21 +23,11 @@ class UnexplainedSettings(Settings):
     left: float = setting(
         0.1, "1", "the same as a share of what the answer explains", BY_HAND, decides=True
     )
-    matters: float = setting(
-        0.2,
-        "1",
-        "smallest force of a formula, as a share of what matters in practice",
-        BY_HAND,
-        decides=True,
-    )
     clip: float = setting(30.0, "1", "residuals are clipped at so many sigmas", BY_HAND)
     ridges: tuple[float, ...] = setting(
         (1e-4, 1e-2, 1.0), "1", "penalties of the regression that are tried", BY_HAND
     )
     folds: int = setting(5, "1", "blocks of time that are left out in turn", "convention: five")
-    no_force: float = setting(
-        1e-9, "1", "force, in sigmas, of a term that acts nowhere", "convention: zero"
-    )
 
 
 def structured(search: Search, hypothesis: Hypothesis) -> tuple[float, float]:
