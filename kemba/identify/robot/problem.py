@@ -270,15 +270,15 @@ class RobotProblem(Problem):
         """Which lengths make the feet stand, where they are not the model's. Raises BadData where
         a log contradicts itself or any model."""
         r = self.residual(self.lengths)
-        found = contradictions(self.state, self.rows(), r, self._columns)
+        found = contradictions(self.state, self.rows(), r, self._sensor_columns)
         if faults := list(mistakes(self.standing, self.runs)) or list(found):
             raise BadData(faults)
         return remarks(self.standing)
 
-    def _columns(self) -> Array:
-        """Columns (n, k) of everything that may be found in the logs, per size."""
-        found = [c for name, c in self.candidates.items() if name not in self.structures]
-        return self.jacobian(self.lengths, [c.key for c in found]) * [c.lead.size for c in found]
+    def _sensor_columns(self) -> Array:
+        """Columns (n, k) of every sensor fault and every length, per size."""
+        faults = [c for c in self.candidates.values() if moves_readings(c.key)]
+        return self.jacobian(self.lengths, [c.key for c in faults]) * [c.lead.size for c in faults]
 
     def formulas(self, theta: Theta) -> Mapping[str, Array]:
         """Simple terms on rods, hips and body: formula -> column (n,), the same at every theta."""

@@ -30,22 +30,20 @@ class RobotValidateSettings(Settings):
     absurd: float = setting(
         15.0,
         "1",
-        "rms one-step error, in sigmas, that nothing in the catalogue explains",
+        "rms one-step error, in sigmas, that no missing effect makes",
         BY_HAND,
         decides=True,
     )
-    faulty: float = setting(
-        4.0, "1", "largest effect or fault of a sensor, in sizes", BY_HAND, decides=True
-    )
+    faulty: float = setting(4.0, "1", "largest fault of a sensor, in sizes", BY_HAND, decides=True)
 
 
 def contradictions(
-    state: LinearisedState, rows: Rows, r: Array, columns: Callable[[], Array]
+    state: LinearisedState, rows: Rows, r: Array, sensor_columns: Callable[[], Array]
 ) -> Iterator[KembaError]:
     """What cannot be, run by run.
 
-    `rows` and `r` (n,): the residual of the model as it is. `columns`: gives those (n, k) of all
-    effects and sensor faults per size; it is called only where a residual is too large.
+    `rows` and `r` (n,): the residual of the model as it is. `sensor_columns`: gives the columns
+    (n, k) of all sensor faults per size; it is called only where a residual is too large.
     """
     absurd = RobotValidateSettings.current().absurd
     forgiven: Array | None = None
@@ -56,7 +54,7 @@ def contradictions(
         own = rows.run == i
         power = _power(state.physics.channels, r, rows, own)
         if max(power.values(), default=0.0) > absurd:
-            forgiven = _forgiven(r, columns()) if forgiven is None else forgiven
+            forgiven = _forgiven(r, sensor_columns()) if forgiven is None else forgiven
             power = _power(state.physics.channels, forgiven, rows, own)
         worst = max(power, key=power.__getitem__, default="")
         if worst and power[worst] > absurd and not sunk:
@@ -97,11 +95,11 @@ def _power(channels: Sequence[str], r: Array, rows: Rows, own: Flags) -> dict[st
 
 
 def _forgiven(r: Array, columns: Array) -> Array:
-    """The residual (n,) less what effects and faults of sensors can explain: these are to be found,
-    not refused. `columns` (n, k) per size of each."""
+    """The residual (n,) less what faults of sensors can explain: these are to be found, not
+    refused. `columns` (n, k) per size of each fault."""
     gram = columns.T @ columns + 1e-9 * np.eye(columns.shape[1])
-    most = RobotValidateSettings.current().faulty
+    faulty = RobotValidateSettings.current().faulty
     lower = np.linalg.cholesky(gram)
     wanted = np.linalg.solve(lower, -columns.T @ r)
-    found = lsq_linear(lower.T, wanted, bounds=(-most, most))
+    found = lsq_linear(lower.T, wanted, bounds=(-faulty, faulty))
     return np.asarray(r + columns @ found.x)
