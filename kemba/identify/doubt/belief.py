@@ -8,6 +8,7 @@ from kemba.identify.doubt.cross_validation import left_out
 from kemba.identify.doubt.parsimony import (
     Belief,
     is_idle,
+    is_plain,
     likeliest_part,
     needed_instead,
     none_of,
@@ -45,8 +46,8 @@ def believed(search: Search, best: Hypothesis, p_value: float) -> Belief:
             return simpler
         elif other := needed_instead(search, best):
             belief = simpler.without(best, other)
-        else:
-            return none_of(simpler)
+        else:  # three to five runs tell little of their scatter, and quarters of them more
+            return simpler if is_plain(search, best, quarters=True) else none_of(simpler)
     return belief
 
 

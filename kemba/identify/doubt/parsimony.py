@@ -181,10 +181,10 @@ def is_idle(search: Search, best: Hypothesis) -> bool:
     return not gain.pays or gain.nats < _least()
 
 
-def is_plain(search: Search, hypothesis: Hypothesis) -> bool:
+def is_plain(search: Search, hypothesis: Hypothesis, quarters: bool = False) -> bool:
     """Whether left-out data and nominal figures gain by a hypothesis, plainly more than their
-    scatter."""
-    gain = gain_over_nothing(search, hypothesis)
+    scatter; `quarters`: where quarters of runs are left out."""
+    gain = gain_over_nothing(search, hypothesis, quarters)
     return gain.nats > max(ParsimonySettings.current().plain * gain.error, _least())
 
 
