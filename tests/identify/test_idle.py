@@ -15,6 +15,7 @@ from kemba.identify.answer import ENDED
 from kemba.identify.bench.problem import bench_problem
 from kemba.identify.discover import discover
 from kemba.identify.doubt import parsimony
+from kemba.identify.doubt.belief import believed
 from kemba.identify.doubt.cross_validation import Gain, figures_off, window_gain
 from kemba.identify.doubt.parsimony import Belief, is_idle
 from kemba.identify.evidence.search import Search
@@ -77,6 +78,21 @@ def test_what_left_out_data_do_not_need_is_not_named() -> None:
     assert any("wave would fit these readings better" in remark for remark in answer.remarks)
 
 
+@pytest.mark.parametrize(("last", "named"), [(0.0, True), (-0.7, False)])
+def test_few_runs_tell_little_of_their_scatter(last: float, named: bool) -> None:
+    """A force in three of four runs, in the last one so many times as large: quarters of runs may
+    need it plainly where runs scatter more than they gain."""
+    problem = Toy({}, runs=4)
+    problem.window = 20
+    force = np.where(problem.rows().run == 3, last, 1.0)  # N
+    problem.measured = problem.measured + 3.0 * force * problem._shapes["wave"]
+    search = Search(problem)
+    search.start()
+    search.visit(("wave",))
+    assert is_idle(search, ("wave",))
+    assert believed(search, ("wave",), 0.0025).best == (("wave",) if named else ())
+
+
 @pytest.mark.parametrize(("force", "sigmas"), [(5.0, 3.0), (0.5, 0.75)])
 def test_a_nominal_figure_far_off_speaks_for_an_effect(force: float, sigmas: float) -> None:
     """A force that the nominal gain may imitate, so that left-out data need no effect."""
@@ -112,7 +128,11 @@ def test_left_out_data_choose_among_effects_that_fit_as_well(
     points = {h: SimpleNamespace(log_evidence=e) for h, e in zip(names, evidence, strict=True)}
     points[()] = SimpleNamespace(log_evidence=0.0)
     known = dict(zip(names, gains, strict=True))
-    monkeypatch.setattr(parsimony, "gain_over_nothing", lambda search, h: Gain(known[h], 10.0))
+
+    def gained(search: Search, h: tuple[str, ...], quarters: bool = False) -> Gain:
+        return Gain(known[h], 10.0)
+
+    monkeypatch.setattr(parsimony, "gain_over_nothing", gained)
     problem = SimpleNamespace(candidates=("front", "payload", "rear"))
     search = SimpleNamespace(points=points, problem=problem)
     assert parsimony.needed_instead(search, ("front",)) == chosen  # type: ignore[arg-type]
