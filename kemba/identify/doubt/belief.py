@@ -46,9 +46,15 @@ def believed(search: Search, best: Hypothesis, p_value: float) -> Belief:
             return simpler
         elif other := needed_instead(search, best):
             belief = simpler.without(best, other)
-        else:  # three to five runs tell little of their scatter, and quarters of them more
-            return simpler if is_plain(search, best, quarters=True) else none_of(simpler)
+        else:
+            return simpler if _quarters_need(search, best) else none_of(simpler)
     return belief
+
+
+def _quarters_need(search: Search, best: Hypothesis) -> bool:
+    """Whether quarters of runs that are left out plainly need one effect: three to five runs tell
+    little of how much they scatter. Several together may imitate what differs between runs."""
+    return len(best) == 1 and is_plain(search, best, quarters=True)
 
 
 def material(search: Search, hypothesis: Hypothesis) -> Hypothesis:
