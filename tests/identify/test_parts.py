@@ -12,7 +12,9 @@ from kemba.identify.doubt.cross_validation import (
     gained,
     window_powers,
 )
+from kemba.identify.doubt.parsimony import is_idle
 from kemba.identify.evidence.search import Search
+from kemba.settings import changed
 
 
 def test_parts_that_gain_alike_have_the_usual_standard_error() -> None:
@@ -54,10 +56,13 @@ def test_what_one_run_alone_shows_is_found() -> None:
     assert answer.split_by == "time blocks"
 
 
-def test_left_out_whole_that_run_could_not_confirm_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    whole = CrossValidationSettings(alone=1.0)
-    monkeypatch.setattr(CrossValidationSettings, "current", classmethod(lambda cls: whole))
-    assert discover(one_run_hums(8.0)).answer.added == ()
+@pytest.mark.parametrize(("alone", "idle"), [(1.0, True), (0.9, False)])
+def test_left_out_whole_that_run_could_not_confirm_it(alone: float, idle: bool) -> None:
+    search = Search(one_run_hums(8.0))
+    search.start()
+    search.visit(("hum",))
+    with changed(CrossValidationSettings, alone=alone):
+        assert is_idle(search, ("hum",)) == idle
 
 
 def test_what_one_run_alone_shows_is_not_found_where_it_is_not() -> None:
