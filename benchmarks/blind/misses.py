@@ -12,7 +12,7 @@ alike).
 
 Along a robot's motion residuals are linear, and fits are those of the search. On the bench edges of
 valves move past readings: there every fit is sought anew, with slopes of each of its steps, also
-from the machine as it is, of which `discover` knows nothing. Logs that were refused are left out.
+from the hidden effect as it is, which `discover` cannot know. Logs that were refused are left out.
 """
 
 from __future__ import annotations
@@ -46,14 +46,10 @@ FALSE = 0.03  # share of machines without any effect that may be blamed
 def missed(name: str) -> Iterator[Record]:
     """Records of one hidden effect that is not the first of an answer that names any."""
     for record in report.read(Path(__file__).with_name(f"{name}.jsonl")):
-        asked = kind(record) in ("single", "sensor", "shape")
-        if asked and not right_first(record) and record["answer"]["verdict"] != "bad-data":
+        refused = record["answer"]["verdict"] == "bad-data"
+        one = kind(record) in ("single", "sensor", "shape")
+        if one and not refused and not report.among_first(record, 1):
             yield record
-
-
-def right_first(record: Record) -> bool:
-    """Whether the hidden effect is the first of those named."""
-    return report.among_first(record, 1)
 
 
 def gain(search: Search, record: Record) -> float:

@@ -57,7 +57,7 @@ def test_what_one_run_alone_shows_is_found() -> None:
 
 
 @pytest.mark.parametrize(("alone", "idle"), [(1.0, True), (0.9, False)])
-def test_left_out_whole_that_run_could_not_confirm_it(alone: float, idle: bool) -> None:
+def test_whole_runs_cannot_confirm_what_one_alone_shows(alone: float, idle: bool) -> None:
     search = Search(one_run_hums(8.0))
     search.start()
     search.visit(("hum",))
