@@ -39,7 +39,10 @@ from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
 from kemba.identify.problem.problem import Theta
 
-STUDIES = ("bench", "robot", "second", "bench_16000", "robot_19000", "second_21000")
+STUDIES = (
+    *("bench", "robot", "second"),
+    *("bench_16000", "robot_19000", "robot_24000", "second_21000"),
+)
 FALSE = 0.03  # share of machines without any effect that may be blamed
 
 
