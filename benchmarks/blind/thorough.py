@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from kemba.errors import KembaError
-from kemba.identify.evidence.linear import Linear, estimate, priors, within
+from kemba.identify.evidence.linear import Linear, estimate, priors
 from kemba.identify.evidence.modes.bounded import effect_bounds
 from kemba.identify.evidence.spike_slab import Hypothesis, Ranker
 from kemba.identify.problem.problem import Array, Problem, Theta
@@ -78,7 +78,15 @@ class _Fit:
             if not candidate.lead.signed and u[i] <= candidate.lead.off / self.width[i] + OFF:
                 absent.add(candidate.key)
         theta = estimate(self.problem, self.linear, u * self.width)
-        return within(candidates, {**shapes, **{k: v for k, v in theta.items() if k not in absent}})
+        found = {k: v for k, v in theta.items() if k not in absent}
+        usual = {
+            key: p.typical
+            for c in candidates.values()
+            if c.key in found
+            for key, p in c.keys().items()
+            if key != c.key
+        }
+        return {**usual, **shapes, **found}
 
     def _residual(self, theta: Theta) -> Array:
         try:

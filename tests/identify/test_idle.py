@@ -93,6 +93,29 @@ def test_few_runs_tell_little_of_their_scatter(last: float, named: bool) -> None
     assert believed(search, ("wave",), 0.0025).best == (("wave",) if named else ())
 
 
+@pytest.mark.parametrize(
+    ("evidence", "nats", "error", "enough"),
+    [
+        (6.2, 10.2, 6.9, True),  # 1.5 standard errors: a true effect seldom gains two
+        (6.2, 5.9, 6.9, False),
+        (6.2, 0.9, 0.3, False),  # less than a nat
+        (30.8, 27.8, 18.7, False),  # a true effect would have gained two
+        (30.8, 37.8, 18.7, True),
+    ],
+)
+def test_quarters_are_asked_for_what_evidence_lets_expect(
+    monkeypatch: pytest.MonkeyPatch, evidence: float, nats: float, error: float, enough: bool
+) -> None:
+    """Gain of left-out quarters, its standard error, and the gain of evidence."""
+    points = {
+        ("bias",): SimpleNamespace(log_evidence=evidence),
+        NULL: SimpleNamespace(log_evidence=0.0),
+    }
+    monkeypatch.setattr(parsimony, "gain_over_nothing", lambda *_, quarters: Gain(nats, error))
+    search = SimpleNamespace(points=points)
+    assert parsimony.is_plain_enough(search, ("bias",)) == enough  # type: ignore[arg-type]
+
+
 @pytest.mark.parametrize(("force", "sigmas"), [(5.0, 3.0), (0.5, 0.75)])
 def test_a_nominal_figure_far_off_speaks_for_an_effect(force: float, sigmas: float) -> None:
     """A force that the nominal gain may imitate, so that left-out data need no effect."""
@@ -129,7 +152,7 @@ def test_left_out_data_choose_among_effects_that_fit_as_well(
     points[()] = SimpleNamespace(log_evidence=0.0)
     known = dict(zip(names, gains, strict=True))
 
-    def gained(search: Search, h: tuple[str, ...], quarters: bool = False) -> Gain:
+    def gained(search: Search, h: tuple[str, ...]) -> Gain:
         return Gain(known[h], 10.0)
 
     monkeypatch.setattr(parsimony, "gain_over_nothing", gained)

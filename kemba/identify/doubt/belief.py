@@ -8,7 +8,7 @@ from kemba.identify.doubt.cross_validation import left_out
 from kemba.identify.doubt.parsimony import (
     Belief,
     is_idle,
-    is_plain,
+    is_plain_enough,
     likeliest_part,
     needed_instead,
     none_of,
@@ -52,9 +52,9 @@ def believed(search: Search, best: Hypothesis, p_value: float) -> Belief:
 
 
 def _quarters_need(search: Search, best: Hypothesis) -> bool:
-    """Whether quarters of runs that are left out plainly need one effect: three to five runs tell
-    little of how much they scatter. Several together may imitate what differs between runs."""
-    return len(best) == 1 and is_plain(search, best, quarters=True)
+    """Whether quarters of runs that are left out need one effect: three to five runs tell little of
+    how much they scatter. Several together may imitate what differs between runs."""
+    return len(best) == 1 and is_plain_enough(search, best)
 
 
 def material(search: Search, hypothesis: Hypothesis) -> Hypothesis:
