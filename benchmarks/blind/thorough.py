@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from kemba.errors import KembaError
-from kemba.identify.evidence.linear import Linear, estimate, priors
+from kemba.identify.evidence.linear import Linear, estimate, priors, usual_shapes
 from kemba.identify.evidence.modes.bounded import effect_bounds
 from kemba.identify.evidence.spike_slab import Hypothesis, Ranker
 from kemba.identify.problem.problem import Array, Problem, Theta
@@ -79,14 +79,7 @@ class _Fit:
                 absent.add(candidate.key)
         theta = estimate(self.problem, self.linear, u * self.width)
         found = {k: v for k, v in theta.items() if k not in absent}
-        usual = {
-            key: p.typical
-            for c in candidates.values()
-            if c.key in found
-            for key, p in c.keys().items()
-            if key != c.key
-        }
-        return {**usual, **shapes, **found}
+        return usual_shapes(candidates, found) | shapes | found
 
     def _residual(self, theta: Theta) -> Array:
         try:

@@ -193,9 +193,9 @@ def is_plain(search: Search, hypothesis: Hypothesis) -> bool:
 def is_plain_enough(search: Search, hypothesis: Hypothesis) -> bool:
     """The same where quarters of runs are left out, as plainly as its evidence lets expect.
 
-    A true effect that gains g nats gains about sqrt(g/2) standard errors of left-out quarters, and
-    19 in 20 of them gain no more than one less. Below 18 nats, to ask for two is to refuse true
-    effects, and as many as by chance: left-out data cannot tell them apart
+    Where a true effect gains g nats, left-out quarters gain about sqrt(g/2) standard errors, and in
+    19 of 20 cases at most one less than that. Below 18 nats, to ask for two is to refuse true
+    effects as often as what chance makes: left-out data cannot tell the two apart
     (`benchmarks/left_out_power.py`).
     """
     gain = gain_over_nothing(search, hypothesis, quarters=True)

@@ -149,14 +149,18 @@ def within(candidates: Mapping[str, Candidate], theta: Theta) -> dict[str, float
     """Theta with every effect's parameters inside their bounds."""
     bounds = {k: p for c in candidates.values() for k, p in c.keys().items()}
     clipped = {k: _sane(v, bounds[k]) if k in bounds else v for k, v in theta.items()}
-    typical = {
+    return usual_shapes(candidates, clipped) | clipped
+
+
+def usual_shapes(candidates: Mapping[str, Candidate], theta: Theta) -> dict[str, float]:
+    """The usual shapes of the effects that theta switches on."""
+    return {
         key: p.typical
         for c in candidates.values()
-        if is_on(clipped, c.key, c.lead)
+        if is_on(theta, c.key, c.lead)
         for key, p in c.keys().items()
-        if key not in clipped
+        if key != c.key
     }
-    return {**clipped, **typical}
 
 
 def _sane(value: float, parameter: Parameter) -> float:

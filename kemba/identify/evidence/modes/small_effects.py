@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kemba.errors import KembaError
-from kemba.identify.evidence.linear import Linear, estimate, moved, priors
+from kemba.identify.evidence.linear import Linear, estimate, moved, priors, usual_shapes
 from kemba.identify.evidence.spike_slab import Hypothesis, Ranker
 from kemba.identify.problem.problem import Array, Candidate, Labels, Problem, Theta
 from kemba.settings import BY_HAND, Settings, setting
@@ -120,14 +120,7 @@ def _possible(problem: Problem, hypothesis: Hypothesis, linear: Linear) -> dict[
             break
         absent |= wrong
     found = {k: v for k, v in theta.items() if k not in {free[n].key for n in absent}}
-    usual = {
-        key: p.typical
-        for c in free.values()
-        if c.key in found
-        for key, p in c.keys().items()
-        if key != c.key
-    }
-    return usual | found
+    return usual_shapes(free, found) | found
 
 
 def _impossible(candidate: Candidate, theta: Theta) -> bool:
