@@ -25,7 +25,8 @@ def best_gain(search: Search) -> float:
     single effect was. A larger set is one of many more than the simulated logs are searched for,
     and would look rarer than it is.
     """
-    if not search.problem.moves and not strained(search.points[NULL], search.problem).any():
+    slopes_tell = not search.problem.moves and not search.thorough
+    if slopes_tell and not strained(search.points[NULL], search.problem).any():
         return max(search.base.best_gain(), _plain_gain(search))
     sizes = [len(h) for h in search.points if h]
     null = search.points[NULL].log_evidence
@@ -62,6 +63,8 @@ def redrawn_noise(search: Search, linear: Linear, jacobian: Array) -> Array:
     leaves of the null's residual: noise for the bootstrap."""
     problem, settings = search.problem, LeftOutNoiseSettings.current()
     left = search.points[NULL].mode.residual + jacobian @ (best_fit(linear) - linear.at)
+    if search.thorough:
+        left = min(search.points.values(), key=lambda p: p.mode.cost).mode.residual
     blocks = time_blocks(problem, shortest=DiscoverSettings.current().fine)
     power = settings.power_in_motion if problem.moves else settings.power
     return left_out_noise(jacobian, left, linear.width, blocks, power)

@@ -14,6 +14,7 @@ from kemba.identify.evidence.linear import (
     moved,
     names_of,
     priors,
+    slopes_at,
     within,
 )
 from kemba.identify.evidence.modes.small_effects import Mode, mode_of
@@ -152,6 +153,15 @@ class Baseline:
         on = {key.rsplit(".", 1)[0] for key in theta}
         found = self.point.mode.theta.items()
         return {k: v for k, v in found if k.rsplit(".", 1)[0] not in on} | dict(theta)
+
+    def about(self, theta: Mapping[str, float], fit: Fit) -> None:
+        """Judge the null with slopes at theta, its mode, and all hypotheses beside it; `fit`: of
+        the nominal figures alone."""
+        names = self.point.linear.names
+        self.jacobian = slopes_at(self.problem, theta, names)
+        self.residual = self.problem.residual(fit.theta)
+        self.point = self.judged(NULL, fit, names, self.jacobian, theta)
+        self.table = self.ranker(self.point.mode.linear).table((0, 1, 2))
 
     def begin_at(self, theta: Mapping[str, float]) -> None:
         """Judge the null from theta on, and every single effect of the table beside it."""

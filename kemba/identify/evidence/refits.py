@@ -29,6 +29,7 @@ class Refits:
     `time.monotonic` [s]. `say`: told of progress. `points`: every hypothesis that was refitted.
     `begin`: figures of the model as it is, where a fit found them already. `base`: the null model.
     `in_pieces`: the error that is told is of quarters of runs left out, and not of whole runs.
+    `thorough`: nothing and its rivals were fitted anew, by slopes of their own.
     `own`: the problem and theta of the model as it is, along the motion that it makes of the data
     itself, where late sensors have led to a motion along which it cannot be judged.
     """
@@ -40,6 +41,7 @@ class Refits:
     begin: Mapping[str, float] = field(default_factory=dict)
     due: float = np.inf
     in_pieces: bool = False
+    thorough: bool = False
     own: tuple[Problem, Theta] | None = None
     base: Baseline = field(init=False)
     _thetas: dict[Hypothesis, dict[str, float]] = field(default_factory=dict)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kemba.identify.evidence.modes.rivals import fitted_anew, judged_anew, promised
 from kemba.identify.evidence.noise.colour import with_learnt_colour
 from kemba.identify.evidence.null_model import Baseline
 from kemba.identify.evidence.refit import Frozen, refit
@@ -45,8 +46,34 @@ class Search(Refits):
             for number, hypothesis in enumerate(promising, start=1):
                 self.visit(hypothesis, number, len(promising))
             best = self._round(NULL, leaders)
-            best = self._swap(self._grow(best))
-        return best
+        if len(best) < 2 and not self.ended:
+            best = self._look_closer(best)
+        return self._swap(self._grow(best)) if best else best
+
+    def _look_closer(self, best: Hypothesis) -> Hypothesis:
+        """Nothing and the likeliest single effects fitted anew, where slopes at the fit of nothing
+        are no fair judge: its figures are not believed, or slopes promise what modes do not show,
+        or little is between them."""
+        settings, null = SearchSettings.current(), self.points[NULL]
+        begun = stand_ins(null, self.problem)
+        evidence = {h: p.log_evidence for h, p in self.points.items() if len(h) == 1}
+        order = sorted(evidence, key=lambda h: -evidence[h])
+        gain = evidence[order[0]] - null.log_evidence if order else 0.0
+        promise = max(promised(self.base, self.points[h]) for h in (NULL, best))
+        close = settings.little < gain < settings.plenty
+        self.say(f"closer: {len(begun)} {promise:.1f} {gain:.1f}")
+        if not (begun or promise > settings.promise or close):
+            return best
+        among = list(dict.fromkeys([*order[: settings.closer], *begun]))
+        for number, hypothesis in enumerate(among, start=1):
+            self._thetas.setdefault(hypothesis, begun.get(hypothesis, {}))
+            self.visit(hypothesis, number, len(among))
+        self.refresh()
+        self.say("fitting nothing and its rivals once more")
+        points = {h: self.points[h] for h in (NULL, *among)}
+        self.points = dict(judged_anew(self.base, points, fitted_anew(self.base, points, begun)))
+        self.thorough = True
+        return self.best()
 
     def _follow(self, best: Hypothesis) -> Hypothesis:
         """Repeat the search along the motion that the best hypothesis makes of the data, until the

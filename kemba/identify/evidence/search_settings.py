@@ -81,3 +81,11 @@ class SearchSettings(Settings):
         BY_HAND,
         decides=True,
     )
+    little: float = setting(
+        1.5, "nats", "gain of an effect from which fits of it and of nothing are taken anew", BY_HAND
+    )
+    plenty: float = setting(30.0, "nats", "gain up to which they are taken anew", BY_HAND)
+    promise: float = setting(
+        10.0, "nats", "that slopes promise beyond a mode, from which they are taken anew", BY_HAND
+    )
+    closer: int = setting(3, "1", "effects that are fitted anew", BY_HAND)

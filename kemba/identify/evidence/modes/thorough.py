@@ -1,0 +1,148 @@
+"""The best fit of a hypothesis, by slopes of its own at every step.
+
+A search takes most of its slopes at the fit of nothing, as a user waits. Where edges of valves move
+past readings, or nominal figures are far off, these hold nearby only: hypotheses then end tens or
+hundreds of nats above what they can reach, and slopes promise what is not there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from kemba.errors import KembaError
+from kemba.identify.evidence.linear import Linear, estimate, priors
+from kemba.identify.evidence.modes.bounded import effect_bounds
+from kemba.identify.evidence.spike_slab import Hypothesis, Ranker
+from kemba.identify.evidence.windows import START
+from kemba.identify.problem.problem import Array, Problem, Theta
+from kemba.settings import BY_HAND, Settings, setting
+
+
+class ThoroughSettings(Settings):
+    """Least squares with slopes of every step."""
+
+    step: float = setting(
+        0.1,
+        "1",
+        "of a secant, in prior widths: wider than the steps of the cost where edges cross readings",
+        BY_HAND,
+    )
+    evaluations: int = setting(10, "1", "of residuals with their slopes, from a start", BY_HAND)
+    change: float = setting(
+        0.1, "nats", "change of the cost at which a fit ends", "convention: far below any evidence"
+    )
+    off: float = setting(
+        1e-4, "1", "prior widths, below which an effect that cannot be negative is absent", BY_HAND
+    )
+    worst: float = setting(
+        1e4, "1", "sigmas, where nothing can be simulated", "convention: beyond all data"
+    )
+
+
+@dataclass(frozen=True)
+class Best:
+    """The best fit found: half the sum of squares [nats] of readings, nominal figures and small
+    effects, in sigmas of their noise and of their priors; and where that is."""
+
+    cost: float
+    theta: dict[str, float]
+
+
+class ThoroughFit:
+    """Fits of one hypothesis, in prior widths; `linear`: its parameters and their priors."""
+
+    def __init__(self, problem: Problem, hypothesis: Hypothesis, linear: Linear) -> None:
+        self.problem, self.linear = problem, linear
+        self.settings = ThoroughSettings.current()
+        self.width = Ranker(linear, problem.candidates, problem.nuisance).widths(hypothesis, 1.0)
+        lower, upper = effect_bounds(problem, linear.names, hypothesis)
+        for name, candidate in problem.candidates.items():
+            if name not in hypothesis and not candidate.lead.signed:
+                lower[linear.index(candidate.key)] = candidate.lead.off
+        for name in problem.nuisance:
+            i = linear.index(name)
+            lower[i], upper[i] = problem.limits(name)
+        self.lower, self.upper = lower / self.width, upper / self.width
+
+    def best(self, starts: Iterable[Theta]) -> Best:
+        """The best fit from the cheapest of `starts`."""
+        return self.found(min(starts, key=self.cost))
+
+    def found(self, start: Theta) -> Best:
+        """The best fit from one start."""
+        shapes = self._shapes(start)
+        begin = self._inside(start)
+        errors = self._errors(begin, shapes)
+        end = least_squares(
+            lambda u: self._errors(u, shapes),
+            begin,
+            lambda u: self._slopes(u, shapes),
+            (self.lower, self.upper),
+            max_nfev=self.settings.evaluations,
+            ftol=self.settings.change / max(0.5 * float(errors @ errors), 1.0),
+        )
+        return Best(float(end.cost), self._theta(end.x, shapes))
+
+    def cost(self, theta: Theta) -> float:
+        """Cost of theta, moved within bounds."""
+        errors = self._errors(self._inside(theta), self._shapes(theta))
+        return 0.5 * float(errors @ errors)
+
+    def _shapes(self, theta: Theta) -> dict[str, float]:
+        return {k: v for k, v in theta.items() if k not in self.linear.names}
+
+    def _inside(self, theta: Theta) -> Array:
+        begin = priors(self.problem, theta, self.linear.names)[0] / self.width
+        return np.clip(begin, self.lower + 1e-9, self.upper - 1e-9)
+
+    def _errors(self, u: Array, shapes: Theta) -> Array:
+        """Residuals (n,), then distances (k,) from the prior means."""
+        pull = u - self.linear.mean / self.width
+        return np.append(self._residual(self._theta(u, shapes)), pull)
+
+    def _slopes(self, u: Array, shapes: Theta) -> Array:
+        """Secants (n + k, k) of the errors at u."""
+        step, at, names = self.settings.step, self._errors(u, shapes), self.linear.names
+        begun = [name for name in names if name.startswith(START)]  # each moves its own log only
+        rows = len(at) - len(u)
+        found = np.vstack([np.empty((rows, len(u))), np.eye(len(u))])
+        columns = self.problem.jacobian(self._theta(u, shapes), begun) if begun else found
+        for i, name in enumerate(names):
+            if name in begun:
+                found[:rows, i] = columns[:, begun.index(name)] * self.width[i]
+            else:
+                moved = u + step * (np.arange(len(u)) == i)
+                found[:rows, i] = (self._errors(moved, shapes) - at)[:rows] / step
+        return found
+
+    def _theta(self, u: Array, shapes: Theta) -> dict[str, float]:
+        """Theta at `u` (k,); `shapes`: of effects whose own are not fitted."""
+        candidates = self.problem.candidates
+        absent = {candidates[name].key for name in self.problem.structures}
+        for candidate in candidates.values():
+            i = self.linear.index(candidate.key)
+            least = candidate.lead.off / self.width[i] + self.settings.off
+            if not candidate.lead.signed and u[i] <= least:
+                absent.add(candidate.key)
+        found = estimate(self.problem, self.linear, u * self.width)
+        found = {k: v for k, v in found.items() if k not in absent}
+        usual = {
+            key: p.typical
+            for c in candidates.values()
+            if c.key in found
+            for key, p in c.keys().items()
+            if key != c.key
+        }
+        return {**usual, **{k: v for k, v in shapes.items() if k in usual}, **found}
+
+    def _residual(self, theta: Theta) -> Array:
+        worst = self.settings.worst
+        try:
+            r = self.problem.residual(theta)
+        except KembaError:
+            return np.full(len(self.problem.rows()), worst)
+        return np.nan_to_num(np.clip(r, -worst, worst), nan=worst)
