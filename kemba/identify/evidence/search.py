@@ -64,7 +64,8 @@ class Search(Refits):
         self.say(f"closer: {len(begun)} {promise:.1f} {gain:.1f}")
         if not (begun or promise > settings.promise or close):
             return best
-        among = list(dict.fromkeys([*order[: settings.closer], *begun]))
+        likely = [h for h in order if evidence[h] > null.log_evidence + settings.little]
+        among = list(dict.fromkeys([*(likely or order[:1])[: settings.closer], *begun]))
         for number, hypothesis in enumerate(among, start=1):
             self._thetas.setdefault(hypothesis, begun.get(hypothesis, {}))
             self.visit(hypothesis, number, len(among))

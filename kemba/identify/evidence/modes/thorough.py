@@ -7,7 +7,7 @@ hundreds of nats above what they can reach, and slopes promise what is not there
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,7 +31,10 @@ class ThoroughSettings(Settings):
         "of a secant, in prior widths: wider than the steps of the cost where edges cross readings",
         BY_HAND,
     )
-    evaluations: int = setting(10, "1", "of residuals with their slopes, from a start", BY_HAND)
+    evaluations: int = setting(12, "1", "of residuals with their slopes, from a start", BY_HAND)
+    updates: int = setting(
+        2, "1", "steps that slopes are corrected by (Broyden 1965) before they are taken anew", BY_HAND
+    )
     change: float = setting(
         0.1, "nats", "change of the cost at which a fit ends", "convention: far below any evidence"
     )
@@ -50,6 +53,39 @@ class Best:
 
     cost: float
     theta: dict[str, float]
+
+
+class _Slopes:
+    """Slopes (n, k) along a least-squares run, corrected by what each step changes."""
+
+    def __init__(
+        self,
+        errors: Callable[[Array], Array],
+        slopes: Callable[[Array], Array],
+        updates: int,
+    ) -> None:
+        self._errors, self._slopes, self._updates = errors, slopes, updates
+        self._known: list[tuple[Array, Array]] = []
+        self._jacobian = np.empty((0, 0))
+        self._count, self._here = updates, (np.empty(0), np.empty(0))
+
+    def errors(self, u: Array) -> Array:
+        """The errors (n,) at u, which are kept."""
+        self._known.append((u.copy(), self._errors(u)))
+        return self._known[-1][1]
+
+    def at(self, u: Array) -> Array:
+        """Slopes at u, where the errors are known."""
+        errors = next(r for x, r in reversed(self._known) if np.array_equal(x, u))
+        if self._count >= self._updates:
+            self._jacobian, self._count = self._slopes(u), 0
+        else:
+            step = u - self._here[0]
+            missed = errors - self._here[1] - self._jacobian @ step
+            self._jacobian = self._jacobian + np.outer(missed, step) / max(step @ step, 1e-30)
+            self._count += 1
+        self._here, self._known = (u.copy(), errors), []
+        return self._jacobian
 
 
 class ThoroughFit:
@@ -77,10 +113,15 @@ class ThoroughFit:
         shapes = self._shapes(start)
         begin = self._inside(start)
         errors = self._errors(begin, shapes)
-        end = least_squares(
+        slopes = _Slopes(
             lambda u: self._errors(u, shapes),
-            begin,
             lambda u: self._slopes(u, shapes),
+            self.settings.updates,
+        )
+        end = least_squares(
+            slopes.errors,
+            begin,
+            slopes.at,
             (self.lower, self.upper),
             max_nfev=self.settings.evaluations,
             ftol=self.settings.change / max(0.5 * float(errors @ errors), 1.0),
