@@ -62,7 +62,8 @@ class Search(Refits):
         promise = max(promised(self.base, self.points[h]) for h in (NULL, best))
         close = settings.little < gain < settings.plenty
         self.say(f"closer: {len(begun)} {promise:.1f} {gain:.1f}")
-        if not (begun or promise > settings.promise or close):
+        far = bool(begun) or promise > settings.promise
+        if not (far or close):
             return best
         likely = [h for h in order if evidence[h] > null.log_evidence + settings.little]
         among = list(dict.fromkeys([*(likely or order[:1])[: settings.closer], *begun]))
@@ -72,7 +73,7 @@ class Search(Refits):
         self.refresh()
         self.say("fitting nothing and its rivals once more")
         points = {h: self.points[h] for h in (NULL, *among)}
-        self.points = dict(judged_anew(self.base, points, fitted_anew(self.base, points, begun)))
+        self.points = dict(judged_anew(self.base, points, fitted_anew(self.base, points, far)))
         self.thorough = True
         return self.best()
 

@@ -82,10 +82,13 @@ class SearchSettings(Settings):
         decides=True,
     )
     little: float = setting(
-        1.5, "nats", "gain of an effect from which fits of it and of nothing are taken anew", BY_HAND
+        1.5,
+        "nats",
+        "gain from which an effect and nothing are fitted anew",
+        BY_HAND,
     )
-    plenty: float = setting(30.0, "nats", "gain up to which they are taken anew", BY_HAND)
+    plenty: float = setting(30.0, "nats", "gain up to which they are", BY_HAND)
     promise: float = setting(
-        10.0, "nats", "that slopes promise beyond a mode, from which they are taken anew", BY_HAND
+        10.0, "nats", "what slopes promise beyond a mode, from which they are", BY_HAND
     )
     closer: int = setting(3, "1", "effects that are fitted anew", BY_HAND)

@@ -7,21 +7,33 @@ its own mode and from the best fit of the others.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from kemba.identify.evidence.linear import names_of, slopes_at
+from kemba.identify.evidence.linear import names_of, slopes_at, within
 from kemba.identify.evidence.modes.shared import SharedSettings
 from kemba.identify.evidence.modes.thorough import Best, ThoroughFit
 from kemba.identify.evidence.null_model import Baseline
 from kemba.identify.evidence.point import LinearisationPoint
-from kemba.identify.evidence.refit import Frozen, refit
+from kemba.identify.evidence.refit import Fit, Frozen, refit
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
 from kemba.identify.problem.problem import Problem, Theta
+from kemba.settings import Settings, setting
+
+
+class RivalsSettings(Settings):
+    """Where fits of effects begin."""
+
+    shares: tuple[float, ...] = setting(
+        (0.3, 0.6, 1.2, 2.4),
+        "1",
+        "sizes, in those of the catalogue, with the model as its file says",
+        "convention: each twice the one before",
+    )
+
 
 Points = Mapping[Hypothesis, LinearisationPoint]
-Starts = Mapping[Hypothesis, Theta]
 
 
 def promised(base: Baseline, point: LinearisationPoint) -> float:
@@ -35,16 +47,19 @@ def promised(base: Baseline, point: LinearisationPoint) -> float:
     return point.mode.cost - 0.5 * float(power + weight @ off**2 - pull @ step)
 
 
-def fitted_anew(base: Baseline, points: Points, also: Starts) -> dict[Hypothesis, Best]:
-    """The best fits of these points' hypotheses; `also`: where those of effects may begin."""
+def fitted_anew(base: Baseline, points: Points, far: bool) -> dict[Hypothesis, Best]:
+    """The best fits of these points' hypotheses; those of effects also begin at the usual nominal
+    figures where the fits so far are `far` from them."""
     problem = base.problem
     fits = {h: ThoroughFit(problem, h, point.linear) for h, point in points.items()}
     found = {NULL: fits[NULL].found(points[NULL].mode.theta)}
     for hypothesis in filter(None, fits):
         own = points[hypothesis].mode.theta
         starts = [own, _beside(problem, found[NULL].theta, hypothesis, own)]
-        starts += [also[hypothesis]] if hypothesis in also else []
         found[hypothesis] = fits[hypothesis].best(starts)
+        if far:
+            usual = fits[hypothesis].best(_usual(problem, hypothesis))
+            found[hypothesis] = min(found[hypothesis], usual, key=lambda best: best.cost)
     top = min(found, key=lambda h: found[h].cost)
     for hypothesis, fit in fits.items():
         if hypothesis == top:
@@ -72,10 +87,19 @@ def judged_anew(base: Baseline, points: Points, found: Mapping[Hypothesis, Best]
     return new
 
 
-def _silent(problem: Problem, hypothesis: Hypothesis, theta: Theta):  # type: ignore[no-untyped-def]
+def _silent(problem: Problem, hypothesis: Hypothesis, theta: Theta) -> Fit:
     """The fit of a hypothesis alone, begun at its best fit with a little of all other effects."""
     figures = tuple(problem.nuisance)
     return refit(problem, hypothesis, theta, Frozen(figures, problem.jacobian(theta, figures)))
+
+
+def _usual(problem: Problem, hypothesis: Hypothesis) -> Iterator[dict[str, float]]:
+    """The model as its file says, with one effect of many sizes."""
+    (effect,) = hypothesis
+    candidate = problem.candidates[effect]
+    for share in RivalsSettings.current().shares:
+        for sign in (1.0, -1.0) if candidate.lead.signed else (1.0,):
+            yield within(problem.candidates, candidate.typical(sign * share))
 
 
 def _beside(problem: Problem, theta: Theta, hypothesis: Hypothesis, own: Theta) -> dict[str, float]:

@@ -33,7 +33,10 @@ class ThoroughSettings(Settings):
     )
     evaluations: int = setting(12, "1", "of residuals with their slopes, from a start", BY_HAND)
     updates: int = setting(
-        2, "1", "steps that slopes are corrected by (Broyden 1965) before they are taken anew", BY_HAND
+        2,
+        "1",
+        "steps by which slopes are corrected (Broyden 1965) until they are taken anew",
+        BY_HAND,
     )
     change: float = setting(
         0.1, "nats", "change of the cost at which a fit ends", "convention: far below any evidence"
