@@ -51,31 +51,33 @@ class Search(Refits):
         return self._swap(self._grow(best)) if best else best
 
     def _look_closer(self, best: Hypothesis) -> Hypothesis:
-        """Nothing and the likeliest single effects fitted anew, where slopes at the fit of nothing
-        are no fair judge: its figures are not believed, or slopes promise what modes do not show,
-        or little is between them."""
+        """Nothing and the likeliest single effects fitted anew, where the best of them leaves most
+        of an error that is no noise, and slopes at the fit of nothing are no fair judge: its
+        figures are not believed, or slopes promise what modes do not show."""
         settings, null = SearchSettings.current(), self.points[NULL]
         begun = stand_ins(null, self.problem)
-        evidence = {h: p.log_evidence for h, p in self.points.items() if len(h) == 1}
-        order = sorted(evidence, key=lambda h: -evidence[h])
-        gain = evidence[order[0]] - null.log_evidence if order else 0.0
         promise = max(promised(self.base, self.points[h]) for h in (NULL, best))
-        close = settings.little < gain < settings.plenty
-        self.say(f"closer: {len(begun)} {promise:.1f} {gain:.1f}")
-        far = bool(begun) or promise > settings.promise
-        if not (far or close):
+        doubtful = bool(begun) or promise > settings.promise
+        if not (doubtful and self._unexplained(best) and null.fitted_error > settings.structural):
             return best
-        likely = [h for h in order if evidence[h] > null.log_evidence + settings.little]
-        among = list(dict.fromkeys([*(likely or order[:1])[: settings.closer], *begun]))
+        evidence = {h: p.log_evidence for h, p in self.points.items() if len(h) == 1}
+        order = sorted(evidence, key=lambda h: -evidence[h])[: settings.closer]
+        among = list(dict.fromkeys([*order, *begun]))
         for number, hypothesis in enumerate(among, start=1):
             self._thetas.setdefault(hypothesis, begun.get(hypothesis, {}))
             self.visit(hypothesis, number, len(among))
         self.refresh()
         self.say("fitting nothing and its rivals once more")
         points = {h: self.points[h] for h in (NULL, *among)}
-        self.points = dict(judged_anew(self.base, points, fitted_anew(self.base, points, far)))
+        self.points = dict(judged_anew(self.base, points, fitted_anew(self.base, points)))
         self.thorough = True
         return self.best()
+
+    def _unexplained(self, best: Hypothesis) -> bool:
+        """Whether the best hypothesis leaves more than half of the excess error."""
+        errors = (self.points[h].fitted_error for h in (NULL, best))
+        before, after = (np.sqrt(max(error**2 - 1.0, 0.0)) for error in errors)
+        return bool(after > 0.5 * before)
 
     def _follow(self, best: Hypothesis) -> Hypothesis:
         """Repeat the search along the motion that the best hypothesis makes of the data, until the

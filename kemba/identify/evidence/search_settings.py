@@ -81,13 +81,6 @@ class SearchSettings(Settings):
         BY_HAND,
         decides=True,
     )
-    little: float = setting(
-        1.5,
-        "nats",
-        "gain from which an effect and nothing are fitted anew",
-        BY_HAND,
-    )
-    plenty: float = setting(30.0, "nats", "gain up to which they are", BY_HAND)
     promise: float = setting(
         10.0, "nats", "what slopes promise beyond a mode, from which they are", BY_HAND
     )

@@ -47,9 +47,9 @@ def promised(base: Baseline, point: LinearisationPoint) -> float:
     return point.mode.cost - 0.5 * float(power + weight @ off**2 - pull @ step)
 
 
-def fitted_anew(base: Baseline, points: Points, far: bool) -> dict[Hypothesis, Best]:
+def fitted_anew(base: Baseline, points: Points) -> dict[Hypothesis, Best]:
     """The best fits of these points' hypotheses; those of effects also begin at the usual nominal
-    figures where the fits so far are `far` from them."""
+    figures, from which the fits so far may be far."""
     problem = base.problem
     fits = {h: ThoroughFit(problem, h, point.linear) for h, point in points.items()}
     found = {NULL: fits[NULL].found(points[NULL].mode.theta)}
@@ -57,9 +57,8 @@ def fitted_anew(base: Baseline, points: Points, far: bool) -> dict[Hypothesis, B
         own = points[hypothesis].mode.theta
         starts = [own, _beside(problem, found[NULL].theta, hypothesis, own)]
         found[hypothesis] = fits[hypothesis].best(starts)
-        if far:
-            usual = fits[hypothesis].best(_usual(problem, hypothesis))
-            found[hypothesis] = min(found[hypothesis], usual, key=lambda best: best.cost)
+        usual = fits[hypothesis].best(_usual(problem, hypothesis))
+        found[hypothesis] = min(found[hypothesis], usual, key=lambda best: best.cost)
     top = min(found, key=lambda h: found[h].cost)
     for hypothesis, fit in fits.items():
         if hypothesis == top:

@@ -85,7 +85,9 @@ class _Slopes:
         else:
             step = u - self._here[0]
             missed = errors - self._here[1] - self._jacobian @ step
-            self._jacobian = self._jacobian + np.outer(missed, step) / max(float(step @ step), 1e-30)
+            self._jacobian = self._jacobian + np.outer(missed, step) / max(
+                float(step @ step), 1e-30
+            )
             self._count += 1
         self._here, self._known = (u.copy(), errors), []
         return self._jacobian
