@@ -19,11 +19,14 @@ from kemba.identify.evidence.point import LinearisationPoint
 from kemba.identify.evidence.refit import Fit, Frozen, refit
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
 from kemba.identify.problem.problem import Problem, Theta
-from kemba.settings import Settings, setting
+from kemba.settings import BY_HAND, Settings, setting
 
 
 class RivalsSettings(Settings):
-    """Where fits of effects begin."""
+    """Where fits of effects begin, and which are carried on."""
+
+    first: int = setting(5, "1", "evaluations after which fits are compared", BY_HAND)
+    kept: int = setting(3, "1", "effects whose fits are carried on", BY_HAND)
 
     shares: tuple[float, ...] = setting(
         (0.3, 0.6, 1.2, 2.4),
@@ -48,27 +51,35 @@ def promised(base: Baseline, point: LinearisationPoint) -> float:
 
 
 def fitted_anew(base: Baseline, points: Points) -> dict[Hypothesis, Best]:
-    """The best fits of these points' hypotheses; those of effects also begin at the usual nominal
-    figures, from which the fits so far may be far."""
-    problem = base.problem
+    """The best fits of nothing and of the rivals that fit best after a few steps.
+
+    They begin at their own modes, at that of nothing with their effects beside it, and at the usual
+    nominal figures, from which the fits so far may be far; at last all from the best fit of any.
+    """
+    problem, settings = base.problem, RivalsSettings.current()
     fits = {h: ThoroughFit(problem, h, point.linear) for h, point in points.items()}
     found = {NULL: fits[NULL].found(points[NULL].mode.theta)}
+    begun = {}
     for hypothesis in filter(None, fits):
-        own = points[hypothesis].mode.theta
-        starts = [own, _beside(problem, found[NULL].theta, hypothesis, own)]
-        found[hypothesis] = fits[hypothesis].best(starts)
-        usual = fits[hypothesis].best(_usual(problem, hypothesis))
-        found[hypothesis] = min(found[hypothesis], usual, key=lambda best: best.cost)
+        fit, own = fits[hypothesis], points[hypothesis].mode.theta
+        near = [own, _beside(problem, found[NULL].theta, hypothesis, own)]
+        tried = (near, _usual(problem, hypothesis))
+        begun[hypothesis] = _better(
+            *(fit.found(min(starts, key=fit.cost), settings.first) for starts in tried)
+        )
+    for hypothesis in sorted(begun, key=lambda h: begun[h].cost)[: settings.kept]:
+        found[hypothesis] = fits[hypothesis].found(begun[hypothesis].theta)
     top = min(found, key=lambda h: found[h].cost)
-    for hypothesis, fit in fits.items():
-        if hypothesis == top:
-            continue
-        start = _beside(problem, found[top].theta, hypothesis, found[hypothesis].theta)
-        ahead = found[hypothesis].cost - found[top].cost
-        fair = hypothesis == NULL and ahead > SharedSettings.current().least
-        if fair or fit.cost(start) < found[hypothesis].cost:
-            found[hypothesis] = min(found[hypothesis], fit.found(start), key=lambda b: b.cost)
+    for hypothesis, one in found.items():
+        start = _beside(problem, found[top].theta, hypothesis, one.theta)
+        fair = hypothesis == NULL and one.cost > found[top].cost + SharedSettings.current().least
+        if hypothesis != top and (fair or fits[hypothesis].cost(start) < one.cost):
+            found[hypothesis] = _better(one, fits[hypothesis].found(start))
     return found
+
+
+def _better(one: Best, other: Best) -> Best:
+    return min(one, other, key=lambda best: best.cost)
 
 
 def judged_anew(base: Baseline, points: Points, found: Mapping[Hypothesis, Best]) -> Points:

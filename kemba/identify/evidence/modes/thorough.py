@@ -7,7 +7,7 @@ hundreds of nats above what they can reach, and slopes promise what is not there
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -109,12 +109,8 @@ class ThoroughFit:
             lower[i], upper[i] = problem.limits(name)
         self.lower, self.upper = lower / self.width, upper / self.width
 
-    def best(self, starts: Iterable[Theta]) -> Best:
-        """The best fit from the cheapest of `starts`."""
-        return self.found(min(starts, key=self.cost))
-
-    def found(self, start: Theta) -> Best:
-        """The best fit from one start."""
+    def found(self, start: Theta, evaluations: int | None = None) -> Best:
+        """The best fit from one start, within so many evaluations (None: the setting)."""
         shapes = self._shapes(start)
         begin = self._inside(start)
         errors = self._errors(begin, shapes)
@@ -128,7 +124,7 @@ class ThoroughFit:
             begin,
             slopes.at,
             (self.lower, self.upper),
-            max_nfev=self.settings.evaluations,
+            max_nfev=evaluations or self.settings.evaluations,
             ftol=self.settings.change / max(0.5 * float(errors @ errors), 1.0),
         )
         return Best(float(end.cost), self._theta(end.x, shapes))
