@@ -78,7 +78,7 @@ def search(**gains: float) -> Any:
     """A finished search where the motion moves: evidence by effects, as a_b for two together."""
     points = {tuple(name.split("_")): gain for name, gain in gains.items()} | {(): 0.0}
     found = {h: SimpleNamespace(log_evidence=gain) for h, gain in points.items()}
-    return SimpleNamespace(points=found, problem=SimpleNamespace(moves=True))
+    return SimpleNamespace(points=found, problem=SimpleNamespace(moves=True), thorough=False)
 
 
 def test_the_best_of_the_pairs_does_not_count_as_one_effect() -> None:

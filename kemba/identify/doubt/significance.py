@@ -63,8 +63,9 @@ def redrawn_noise(search: Search, linear: Linear, jacobian: Array) -> Array:
     leaves of the null's residual: noise for the bootstrap."""
     problem, settings = search.problem, LeftOutNoiseSettings.current()
     left = search.points[NULL].mode.residual + jacobian @ (best_fit(linear) - linear.at)
-    if search.thorough:
-        left = min(search.points.values(), key=lambda p: p.mode.cost).mode.residual
+    if search.thorough:  # then slopes there may leave more than the best fit does
+        rest = min(search.points.values(), key=lambda point: point.mode.cost).mode.residual
+        left = min(left, rest, key=lambda errors: float(errors @ errors))
     blocks = time_blocks(problem, shortest=DiscoverSettings.current().fine)
     power = settings.power_in_motion if problem.moves else settings.power
     return left_out_noise(jacobian, left, linear.width, blocks, power)

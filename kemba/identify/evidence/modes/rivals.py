@@ -13,7 +13,7 @@ import numpy as np
 
 from kemba.identify.evidence.linear import names_of, slopes_at, within
 from kemba.identify.evidence.modes.shared import SharedSettings
-from kemba.identify.evidence.modes.thorough import Best, ThoroughFit
+from kemba.identify.evidence.modes.thorough import BestFit, ThoroughFit
 from kemba.identify.evidence.null_model import Baseline
 from kemba.identify.evidence.point import LinearisationPoint
 from kemba.identify.evidence.refit import Fit, Frozen, refit
@@ -50,7 +50,7 @@ def promised(base: Baseline, point: LinearisationPoint) -> float:
     return point.mode.cost - 0.5 * float(power + weight @ off**2 - pull @ step)
 
 
-def fitted_anew(base: Baseline, points: Points) -> dict[Hypothesis, Best]:
+def fitted_anew(base: Baseline, points: Points) -> dict[Hypothesis, BestFit]:
     """The best fits of nothing and of the rivals that fit best after a few steps.
 
     They begin at their own modes, at that of nothing with their effects beside it, and at the usual
@@ -78,11 +78,11 @@ def fitted_anew(base: Baseline, points: Points) -> dict[Hypothesis, Best]:
     return found
 
 
-def _better(one: Best, other: Best) -> Best:
+def _better(one: BestFit, other: BestFit) -> BestFit:
     return min(one, other, key=lambda best: best.cost)
 
 
-def judged_anew(base: Baseline, points: Points, found: Mapping[Hypothesis, Best]) -> Points:
+def judged_anew(base: Baseline, points: Points, found: Mapping[Hypothesis, BestFit]) -> Points:
     """The points at these fits, with slopes of every effect there; `base` is as nothing is now."""
     problem = base.problem
     base.about(found[NULL].theta, _silent(problem, NULL, found[NULL].theta))

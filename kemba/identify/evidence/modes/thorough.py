@@ -50,7 +50,7 @@ class ThoroughSettings(Settings):
 
 
 @dataclass(frozen=True)
-class Best:
+class BestFit:
     """The best fit found: half the sum of squares [nats] of readings, nominal figures and small
     effects, in sigmas of their noise and of their priors; and where that is."""
 
@@ -109,7 +109,7 @@ class ThoroughFit:
             lower[i], upper[i] = problem.limits(name)
         self.lower, self.upper = lower / self.width, upper / self.width
 
-    def found(self, start: Theta, evaluations: int | None = None) -> Best:
+    def found(self, start: Theta, evaluations: int | None = None) -> BestFit:
         """The best fit from one start, within so many evaluations (None: the setting)."""
         shapes = self._shapes(start)
         begin = self._inside(start)
@@ -127,7 +127,7 @@ class ThoroughFit:
             max_nfev=evaluations or self.settings.evaluations,
             ftol=self.settings.change / max(0.5 * float(errors @ errors), 1.0),
         )
-        return Best(float(end.cost), self._theta(end.x, shapes))
+        return BestFit(float(end.cost), self._theta(end.x, shapes))
 
     def cost(self, theta: Theta) -> float:
         """Cost of theta, moved within bounds."""
