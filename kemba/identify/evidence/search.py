@@ -69,7 +69,8 @@ class Search(Refits):
         self.refresh()
         self.say("fitting nothing and its rivals once more")
         points = {h: self.points[h] for h in (NULL, *among)}
-        self.points = dict(judged_anew(self.base, points, fitted_anew(self.base, points)))
+        fits = fitted_anew(self.base, points, lambda: self.ended)
+        self.points = dict(judged_anew(self.base, points, fits))
         self.thorough = True
         return self.best()
 

@@ -7,11 +7,11 @@ its own mode and from the best fit of the others.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from kemba.identify.evidence.linear import names_of, slopes_at, within
+from kemba.identify.evidence.linear import names_of, slopes_at
 from kemba.identify.evidence.modes.shared import SharedSettings
 from kemba.identify.evidence.modes.thorough import BestFit, ThoroughFit
 from kemba.identify.evidence.null_model import Baseline
@@ -23,17 +23,10 @@ from kemba.settings import BY_HAND, Settings, setting
 
 
 class RivalsSettings(Settings):
-    """Where fits of effects begin, and which are carried on."""
+    """Which fits of effects are carried on."""
 
     first: int = setting(5, "1", "evaluations after which fits are compared", BY_HAND)
     kept: int = setting(3, "1", "effects whose fits are carried on", BY_HAND)
-
-    shares: tuple[float, ...] = setting(
-        (0.3, 0.6, 1.2, 2.4),
-        "1",
-        "sizes, in those of the catalogue, with the model as its file says",
-        "convention: each twice the one before",
-    )
 
 
 Points = Mapping[Hypothesis, LinearisationPoint]
@@ -50,11 +43,13 @@ def promised(base: Baseline, point: LinearisationPoint) -> float:
     return point.mode.cost - 0.5 * float(power + weight @ off**2 - pull @ step)
 
 
-def fitted_anew(base: Baseline, points: Points) -> dict[Hypothesis, BestFit]:
+def fitted_anew(
+    base: Baseline, points: Points, ended: Callable[[], bool]
+) -> dict[Hypothesis, BestFit]:
     """The best fits of nothing and of the rivals that fit best after a few steps.
 
-    They begin at their own modes, at that of nothing with their effects beside it, and at the usual
-    nominal figures, from which the fits so far may be far; at last all from the best fit of any.
+    They begin at their own modes, or at that of nothing with their effects beside it; at last from
+    the best fit of any. `ended`: whether the time is over; rivals not begun by then are left out.
     """
     problem, settings = base.problem, RivalsSettings.current()
     fits = {h: ThoroughFit(problem, h, point.linear) for h, point in points.items()}
@@ -63,12 +58,12 @@ def fitted_anew(base: Baseline, points: Points) -> dict[Hypothesis, BestFit]:
     for hypothesis in filter(None, fits):
         fit, own = fits[hypothesis], points[hypothesis].mode.theta
         near = [own, _beside(problem, found[NULL].theta, hypothesis, own)]
-        tried = (near, _usual(problem, hypothesis))
-        begun[hypothesis] = _better(
-            *(fit.found(min(starts, key=fit.cost), settings.first) for starts in tried)
-        )
+        if begun and ended():
+            break
+        begun[hypothesis] = fit.found(min(near, key=fit.cost), settings.first)
     for hypothesis in sorted(begun, key=lambda h: begun[h].cost)[: settings.kept]:
-        found[hypothesis] = fits[hypothesis].found(begun[hypothesis].theta)
+        best = begun[hypothesis]
+        found[hypothesis] = best if ended() else fits[hypothesis].found(best.theta)
     top = min(found, key=lambda h: found[h].cost)
     for hypothesis, one in found.items():
         start = _beside(problem, found[top].theta, hypothesis, one.theta)
@@ -101,15 +96,6 @@ def _silent(problem: Problem, hypothesis: Hypothesis, theta: Theta) -> Fit:
     """The fit of a hypothesis alone, begun at its best fit with a little of all other effects."""
     figures = tuple(problem.nuisance)
     return refit(problem, hypothesis, theta, Frozen(figures, problem.jacobian(theta, figures)))
-
-
-def _usual(problem: Problem, hypothesis: Hypothesis) -> Iterator[dict[str, float]]:
-    """The model as its file says, with one effect of many sizes."""
-    (effect,) = hypothesis
-    candidate = problem.candidates[effect]
-    for share in RivalsSettings.current().shares:
-        for sign in (1.0, -1.0) if candidate.lead.signed else (1.0,):
-            yield within(problem.candidates, candidate.typical(sign * share))
 
 
 def _beside(problem: Problem, theta: Theta, hypothesis: Hypothesis, own: Theta) -> dict[str, float]:

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from kemba.errors import KembaError
-from kemba.identify.evidence.linear import Linear, estimate, priors
+from kemba.identify.evidence.linear import Linear, estimate, priors, usual_shapes
 from kemba.identify.evidence.modes.bounded import effect_bounds
 from kemba.identify.evidence.spike_slab import Hypothesis, Ranker
 from kemba.identify.evidence.windows import START
@@ -172,14 +172,7 @@ class ThoroughFit:
                 absent.add(candidate.key)
         found = estimate(self.problem, self.linear, u * self.width)
         found = {k: v for k, v in found.items() if k not in absent}
-        usual = {
-            key: p.typical
-            for c in candidates.values()
-            if c.key in found
-            for key, p in c.keys().items()
-            if key != c.key
-        }
-        return {**usual, **{k: v for k, v in shapes.items() if k in usual}, **found}
+        return usual_shapes(candidates, found) | shapes | found
 
     def _residual(self, theta: Theta) -> Array:
         worst = self.settings.worst
