@@ -28,20 +28,21 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "benchmarks")]
 
-import numpy as np
 from block import printed
 from scipy.stats import chi2
 
-from blind import report, study, thorough
+from blind import report, study
 from blind.kinds import Record, hidden, kind, named
 from kemba.identify.discover import discover
+from kemba.identify.evidence.modes.rivals import promised
+from kemba.identify.evidence.modes.thorough import BestFit, ThoroughFit
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
 from kemba.identify.problem.problem import Theta
 
 STUDIES = (
     *("bench", "robot", "second"),
-    *("bench_16000", "robot_19000", "robot_24000", "second_21000"),
+    *("bench_16000", "bench_26000", "robot_19000", "robot_24000", "second_21000"),
 )
 FALSE = 0.03  # share of machines without any effect that may be blamed
 
@@ -78,25 +79,21 @@ def true_machine(search: Search, record: Record) -> dict[str, float]:
     return nominal | {f"{effect['kind']}.{k}": v for k, v in effect["parameters"].items()}
 
 
-def searched(search: Search, hypothesis: Hypothesis, starts: Sequence[Theta]) -> thorough.Best:
+def searched(search: Search, hypothesis: Hypothesis, starts: Sequence[Theta]) -> BestFit:
     """The best fit from these starts, without and with what the search found of the effects."""
     point = search.points[hypothesis]
     keys = {key for effect in hypothesis for key in tuple(search.problem.candidates[effect].keys())}
     own = {k: v for k, v in point.mode.theta.items() if k in keys}
     begun = [*starts, *({**start, **own} for start in starts if own)]
-    return thorough.best(search.problem, hypothesis, point.linear, begun)
+    fit = ThoroughFit(search.problem, hypothesis, point.linear)
+    return min((fit.found(start) for start in begun), key=lambda end: end.cost)
 
 
 def misfit(search: Search, hypothesis: Hypothesis) -> float:
     """Half the sum of squares at the best fit: of readings, nominal figures and small effects, in
     sigmas of their noise and of their priors [nats]."""
-    linear = search.points[hypothesis].mode.linear
-    weight = search.base.ranker(linear).widths(hypothesis, 1.0) ** -2.0
-    gram, slope, power = linear.total
-    off = linear.mean - linear.at
-    pull = weight * off - slope
-    step = np.linalg.solve(gram + np.diag(weight), pull)
-    return 0.5 * float(power + weight @ off**2 - pull @ step)
+    point = search.points[hypothesis]
+    return point.mode.cost - promised(search.base, point)
 
 
 def told(name: str, record: report.Record) -> str:

@@ -44,6 +44,12 @@ class ThoroughSettings(Settings):
     off: float = setting(
         1e-4, "1", "prior widths, below which an effect that cannot be negative is absent", BY_HAND
     )
+    inside: float = setting(
+        0.01,
+        "1",
+        "prior widths inside a bound from which fits begin: beside it all steps are short",
+        BY_HAND,
+    )
     worst: float = setting(
         1e4, "1", "sigmas, where nothing can be simulated", "convention: beyond all data"
     )
@@ -68,18 +74,20 @@ class _Slopes:
         updates: int,
     ) -> None:
         self._errors, self._slopes, self._updates = errors, slopes, updates
-        self._known: list[tuple[Array, Array]] = []
+        self._known: dict[bytes, Array] = {}
         self._jacobian = np.empty((0, 0))
         self._count, self._here = updates, (np.empty(0), np.empty(0))
 
     def errors(self, u: Array) -> Array:
-        """The errors (n,) at u, which are kept."""
-        self._known.append((u.copy(), self._errors(u)))
-        return self._known[-1][1]
+        """The errors (n,) at u, which are kept until slopes are asked for elsewhere."""
+        key = u.tobytes()
+        if key not in self._known:
+            self._known[key] = self._errors(u)
+        return self._known[key]
 
     def at(self, u: Array) -> Array:
-        """Slopes at u, where the errors are known."""
-        errors = next(r for x, r in reversed(self._known) if np.array_equal(x, u))
+        """Slopes at u."""
+        errors = self.errors(u)
         if self._count >= self._updates:
             self._jacobian, self._count = self._slopes(u), 0
         else:
@@ -89,7 +97,7 @@ class _Slopes:
                 float(step @ step), 1e-30
             )
             self._count += 1
-        self._here, self._known = (u.copy(), errors), []
+        self._here, self._known = (u.copy(), errors), {u.tobytes(): errors}
         return self._jacobian
 
 
@@ -139,7 +147,8 @@ class ThoroughFit:
 
     def _inside(self, theta: Theta) -> Array:
         begin = priors(self.problem, theta, self.linear.names)[0] / self.width
-        return np.clip(begin, self.lower + 1e-9, self.upper - 1e-9)
+        off = self.settings.inside
+        return np.clip(begin, self.lower + off, self.upper - off)
 
     def _errors(self, u: Array, shapes: Theta) -> Array:
         """Residuals (n,), then distances (k,) from the prior means."""
