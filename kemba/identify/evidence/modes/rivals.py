@@ -54,7 +54,7 @@ def fitted_anew(
     problem, settings = base.problem, RivalsSettings.current()
     fits = {h: ThoroughFit(problem, h, point.linear) for h, point in points.items()}
     found = {NULL: fits[NULL].found(points[NULL].mode.theta)}
-    begun = {}
+    begun: dict[Hypothesis, BestFit] = {}
     for hypothesis in filter(None, fits):
         fit, own = fits[hypothesis], points[hypothesis].mode.theta
         near = [own, _beside(problem, found[NULL].theta, hypothesis, own)]

@@ -181,7 +181,7 @@ class ThoroughFit:
                 absent.add(candidate.key)
         found = estimate(self.problem, self.linear, u * self.width)
         found = {k: v for k, v in found.items() if k not in absent}
-        return usual_shapes(candidates, found) | shapes | found
+        return {**usual_shapes(candidates, found), **shapes, **found}
 
     def _residual(self, theta: Theta) -> Array:
         worst = self.settings.worst
