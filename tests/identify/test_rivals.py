@@ -51,8 +51,10 @@ def test_fits_are_found_again_from_poor_modes(search: Search) -> None:
 
 
 def test_once_the_time_is_over_one_rival_is_fitted(search: Search) -> None:
-    found = fitted_anew(search.base, search.points, lambda: True)
+    told: list[str] = []
+    found = fitted_anew(search.base, search.points, lambda: True, told.append)
     assert set(found) == {NULL, FRICTION}
+    assert told[0] == "fitting seal_friction anew (1 of 2)"
 
 
 def test_what_fits_better_stays_likelier(search: Search) -> None:

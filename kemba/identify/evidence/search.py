@@ -67,9 +67,9 @@ class Search(Refits):
             self._thetas.setdefault(hypothesis, begun.get(hypothesis, {}))
             self.visit(hypothesis, number, len(among))
         self.refresh()
-        self.say("fitting nothing and its rivals once more")
+        self.say("fitting nothing anew")
         points = {h: self.points[h] for h in (NULL, *among)}
-        fits = fitted_anew(self.base, points, lambda: self.ended)
+        fits = fitted_anew(self.base, points, lambda: self.ended, self.say)
         self.points = dict(judged_anew(self.base, points, fits))
         self.thorough = True
         return self.best()

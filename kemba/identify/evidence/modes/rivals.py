@@ -20,6 +20,7 @@ from kemba.identify.evidence.refit import Fit, Frozen, refit
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
 from kemba.identify.problem.problem import Problem, Theta
 from kemba.settings import BY_HAND, Settings, setting
+from kemba.stopwatch import Stage, Tell, silent
 
 
 class RivalsSettings(Settings):
@@ -44,23 +45,27 @@ def promised(base: Baseline, point: LinearisationPoint) -> float:
 
 
 def fitted_anew(
-    base: Baseline, points: Points, ended: Callable[[], bool]
+    base: Baseline, points: Points, ended: Callable[[], bool], say: Tell = silent
 ) -> dict[Hypothesis, BestFit]:
     """The best fits of nothing and of the rivals that fit best after a few steps.
 
     They begin at their own modes, or at that of nothing with their effects beside it; at last from
     the best fit of any. `ended`: whether the time is over; rivals not begun by then are left out.
+    `say`: told of progress.
     """
     problem, settings = base.problem, RivalsSettings.current()
     fits = {h: ThoroughFit(problem, h, point.linear) for h, point in points.items()}
     found = {NULL: fits[NULL].found(points[NULL].mode.theta)}
     begun: dict[Hypothesis, BestFit] = {}
-    for hypothesis in filter(None, fits):
-        fit, own = fits[hypothesis], points[hypothesis].mode.theta
-        near = [own, _beside(problem, found[NULL].theta, hypothesis, own)]
+    rivals = [h for h in fits if h]
+    for number, hypothesis in enumerate(rivals, start=1):
         if begun and ended():
             break
+        say(Stage(f"fitting {' + '.join(hypothesis)} anew", number, len(rivals)))
+        fit, own = fits[hypothesis], points[hypothesis].mode.theta
+        near = [own, _beside(problem, found[NULL].theta, hypothesis, own)]
         begun[hypothesis] = fit.found(min(near, key=fit.cost), settings.first)
+    say("carrying on the best of these fits")
     for hypothesis in sorted(begun, key=lambda h: begun[h].cost)[: settings.kept]:
         best = begun[hypothesis]
         found[hypothesis] = best if ended() else fits[hypothesis].found(best.theta)
