@@ -51,9 +51,9 @@ class Search(Refits):
         return self._swap(self._grow(best)) if best else best
 
     def _look_closer(self, best: Hypothesis) -> Hypothesis:
-        """Nothing and the likeliest single effects fitted anew, where the best of them leaves most
-        of an error that is no noise, and slopes at the fit of nothing are no fair judge: its
-        figures are not believed, or slopes promise what modes do not show."""
+        """Nothing and the likeliest single effects fitted anew, where the best of them explains
+        hardly anything of an error that is no noise, and slopes at the fit of nothing are no fair
+        judge: its figures are not believed, or slopes promise what modes do not show."""
         settings, null = SearchSettings.current(), self.points[NULL]
         begun = stand_ins(null, self.problem)
         promise = max(promised(self.base, self.points[h]) for h in (NULL, best))
@@ -75,10 +75,10 @@ class Search(Refits):
         return self.best()
 
     def _unexplained(self, best: Hypothesis) -> bool:
-        """Whether the best hypothesis leaves more than half of the excess error."""
+        """Whether the best hypothesis explains hardly anything of the excess error."""
         errors = (self.points[h].fitted_error for h in (NULL, best))
         before, after = (np.sqrt(max(error**2 - 1.0, 0.0)) for error in errors)
-        return bool(after > 0.5 * before)
+        return bool(after > SearchSettings.current().unexplained * before)
 
     def _follow(self, best: Hypothesis) -> Hypothesis:
         """Repeat the search along the motion that the best hypothesis makes of the data, until the

@@ -84,4 +84,11 @@ class SearchSettings(Settings):
     promise: float = setting(
         10.0, "nats", "what slopes promise beyond a mode, from which they are", BY_HAND
     )
+    unexplained: float = setting(
+        0.8,
+        "1",
+        "share of the excess error that the best effect leaves, from which they are; others grow "
+        "from an effect that explains more",
+        BY_HAND,
+    )
     closer: int = setting(3, "1", "effects that are fitted anew", BY_HAND)
