@@ -35,7 +35,9 @@ from blind import report, study
 from blind.kinds import Record, hidden, kind, named
 from kemba.identify.discover import discover
 from kemba.identify.evidence.modes.rivals import promised
-from kemba.identify.evidence.modes.thorough import BestFit, ThoroughFit
+from kemba.identify.evidence.modes.shared import with_own
+from kemba.identify.evidence.modes.thorough import ThoroughFit
+from kemba.identify.evidence.refit import Fit
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
 from kemba.identify.problem.problem import Theta
@@ -79,12 +81,11 @@ def true_machine(search: Search, record: Record) -> dict[str, float]:
     return nominal | {f"{effect['kind']}.{k}": v for k, v in effect["parameters"].items()}
 
 
-def searched(search: Search, hypothesis: Hypothesis, starts: Sequence[Theta]) -> BestFit:
+def searched(search: Search, hypothesis: Hypothesis, starts: Sequence[Theta]) -> Fit:
     """The best fit from these starts, without and with what the search found of the effects."""
     point = search.points[hypothesis]
-    keys = {key for effect in hypothesis for key in tuple(search.problem.candidates[effect].keys())}
-    own = {k: v for k, v in point.mode.theta.items() if k in keys}
-    begun = [*starts, *({**start, **own} for start in starts if own)]
+    beside = [with_own(search.problem, s, hypothesis, point.mode.theta) for s in starts]
+    begun = [*starts, *(beside if hypothesis else ())]
     fit = ThoroughFit(search.problem, hypothesis, point.linear)
     return min((fit.found(start) for start in begun), key=lambda end: end.cost)
 

@@ -61,6 +61,10 @@ RULES = (
         *("named", "left out, below a tenth", "drive"),
     ),
     (
+        "error that the best effect leaves, from which nothing and its rivals are fitted anew",
+        *("half", "80 %", "drive"),
+    ),
+    (
         "blocks from which the intervals of `characterise` come",
         *("12 of time", "12, 24 and 48, of time and of the way", "drive (M)"),
     ),

@@ -11,6 +11,7 @@ import numpy as np
 
 from kemba.errors import KembaError, enumerated
 from kemba.files import read_json
+from kemba.identify.evidence.point import excess
 from kemba.identify.settings import DiscoverSettings
 
 Verdict = Literal["missing", "partly", "nothing", "unknown", "bad-data"]
@@ -19,11 +20,6 @@ PROBABILITY = (
     "The probability of an effect is that of its being among the missing ones. Several effects can "
     "be missing at once, so that the probabilities need not add up to 100 %."
 )
-
-
-def excess(error: float) -> float:
-    """The part of an error, in units of the noise, that noise does not make."""
-    return float(np.sqrt(max(error**2 - 1.0, 0.0)))
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,10 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import expit
 
-from kemba.identify.answer import Answer, Ranked, Value, Verdict, excess, phrase
+from kemba.identify.answer import Answer, Ranked, Value, Verdict, phrase
 from kemba.identify.doubt.cross_validation import left_out
 from kemba.identify.evidence.modes.bounded import within_bounds
+from kemba.identify.evidence.point import excess
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import Hypothesis, SpikeSlabSettings, share_of
 from kemba.identify.rest import rest_of

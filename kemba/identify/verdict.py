@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from kemba.errors import enumerated
-from kemba.identify.answer import ENDED, Ranked, Verdict, excess
+from kemba.identify.answer import ENDED, Ranked, Verdict
 from kemba.identify.doubt.acting import excess_where_acting
 from kemba.identify.doubt.formula import Formula
 from kemba.identify.doubt.held_out import HeldOut, error
 from kemba.identify.doubt.parsimony import Belief
 from kemba.identify.doubt.run_consistency import Drift
 from kemba.identify.doubt.unexplained import explains_structure, unfinished
+from kemba.identify.evidence.point import excess
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
 from kemba.identify.problem.sensor_faults import is_fault

@@ -25,7 +25,7 @@ SLOW_FILL = {"seed": 26082, "size": 0.7, "noise": 0.5, "figures_off": 0.02, "run
 WEAK_SUPPLY = {"seed": 26077, "size": 1.5, "noise": 1.0, "figures_off": 0.01, "runs": 3}
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def search(bench_log: BenchLog) -> Search:
     """A search in logs with friction, after its first refits."""
     hidden = (BY_KIND["seal_friction"](F_c=8.0),)
@@ -84,7 +84,7 @@ def test_nothing_is_fitted_anew_where_an_effect_explains_the_error(bench_log: Be
     ],
 )
 def test_an_effect_behind_unbelievable_figures_is_named(effect: str, case: dict) -> None:
-    """Cases of the blind studies, in which slopes promised hundreds of nats that were not there."""
+    """Cases of the blind studies that were `unknown` and `nothing` at 5 and 7 times the noise."""
     usual = {"effect": effect, "pressures": False, "colour": {}, **USUAL}
     _, make = bench.prepared({**usual, **case})
     answer = discover(make()).answer

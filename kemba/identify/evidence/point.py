@@ -15,6 +15,11 @@ from kemba.identify.evidence.windows import Windows, windows_of
 from kemba.identify.problem.problem import Array, Labels, Problem
 
 
+def excess(error: float) -> float:
+    """The part of an error, in units of the noise, that noise does not make."""
+    return float(np.sqrt(max(error**2 - 1.0, 0.0)))
+
+
 @dataclass(frozen=True)
 class LinearisationPoint:
     """A hypothesis refitted, with the problem linearised there.

@@ -13,6 +13,7 @@ from scipy.optimize import least_squares
 from kemba.identify.evidence.linear import is_shape
 from kemba.identify.evidence.spike_slab import Hypothesis, SpikeSlabSettings
 from kemba.identify.problem.problem import Array, Parameter, Problem
+from kemba.identify.problem.slopes import bounded
 from kemba.settings import BY_HAND, Settings, setting
 
 
@@ -219,13 +220,9 @@ class _LeastSquares:
         """Residuals (n,), then the distances (k,) from the prior means in widths."""
         # slopes are asked for where the residual was
         if self._last is None or not np.array_equal(x, self._last[0]):
-            r = self._bounded(self.problem.residual(self._theta(x)))
+            r = bounded(self.problem.residual(self._theta(x)), self.settings.absurd)
             self._last = x.copy(), np.concatenate([r, x])
         return self._last[1]
-
-    def _bounded(self, r: Array) -> Array:
-        absurd = self.settings.absurd
-        return np.nan_to_num(np.clip(r, -absurd, absurd), nan=absurd)
 
     def _jacobian(self, x: Array) -> Array:
         base = self._residual(x)
@@ -245,6 +242,8 @@ class _LeastSquares:
             upper, step = self._bounds()[1][n:], self.settings.step
             steps = np.where(x[n:] + step > upper, -step, step)
             moved = x + np.eye(len(x))[n:] * steps[:, None]
-            there = self._bounded(self.problem.residuals([self._theta(z) for z in moved]))
+            there = bounded(
+                self.problem.residuals([self._theta(z) for z in moved]), self.settings.absurd
+            )
             jacobian[:rows, n:] = (there - base[:rows, None]) / steps
         return jacobian

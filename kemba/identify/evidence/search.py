@@ -10,6 +10,7 @@ import numpy as np
 from kemba.identify.evidence.modes.rivals import fitted_anew, judged_anew, promised
 from kemba.identify.evidence.noise.colour import with_learnt_colour
 from kemba.identify.evidence.null_model import Baseline
+from kemba.identify.evidence.point import excess
 from kemba.identify.evidence.refit import Frozen, refit
 from kemba.identify.evidence.refits import Refits
 from kemba.identify.evidence.search_settings import SearchSettings
@@ -54,31 +55,22 @@ class Search(Refits):
         """Nothing and the likeliest single effects fitted anew, where the best of them explains
         hardly anything of an error that is no noise, and slopes at the fit of nothing are no fair
         judge: its figures are not believed, or slopes promise what modes do not show."""
-        settings, null = SearchSettings.current(), self.points[NULL]
-        begun = stand_ins(null, self.problem)
-        promise = max(promised(self.base, self.points[h]) for h in (NULL, best))
-        doubtful = bool(begun) or promise > settings.promise
-        if not (doubtful and self._unexplained(best) and null.fitted_error > settings.structural):
+        settings = SearchSettings.current()
+        error, left = (self.points[h].fitted_error for h in (NULL, best))
+        if error <= settings.structural or excess(left) <= settings.unexplained * excess(error):
             return best
         evidence = {h: p.log_evidence for h, p in self.points.items() if len(h) == 1}
-        order = sorted(evidence, key=lambda h: -evidence[h])[: settings.closer]
-        among = list(dict.fromkeys([*order, *begun]))
-        for number, hypothesis in enumerate(among, start=1):
-            self._thetas.setdefault(hypothesis, begun.get(hypothesis, {}))
-            self.visit(hypothesis, number, len(among))
-        self.refresh()
+        likely = sorted(evidence, key=lambda h: -evidence[h])[: settings.closer]
+        instead = self._try_stand_ins(NULL)
+        promise = max(promised(self.base, self.points[h]) for h in (NULL, best))
+        if not instead and promise <= settings.promise:
+            return best
         self.say("fitting nothing anew")
-        points = {h: self.points[h] for h in (NULL, *among)}
+        points = {h: self.points[h] for h in (NULL, *likely, *instead)}
         fits = fitted_anew(self.base, points, lambda: self.ended, self.say)
         self.points = dict(judged_anew(self.base, points, fits))
         self.thorough = True
         return self.best()
-
-    def _unexplained(self, best: Hypothesis) -> bool:
-        """Whether the best hypothesis explains hardly anything of the excess error."""
-        errors = (self.points[h].fitted_error for h in (NULL, best))
-        before, after = (np.sqrt(max(error**2 - 1.0, 0.0)) for error in errors)
-        return bool(after > SearchSettings.current().unexplained * before)
 
     def _follow(self, best: Hypothesis) -> Hypothesis:
         """Repeat the search along the motion that the best hypothesis makes of the data, until the
@@ -176,7 +168,7 @@ class Search(Refits):
             self._refit_leaders(given, leaders, least)
             self.share_modes()
         if given == NULL:
-            self._try_stand_ins()
+            self._try_stand_ins(self.best())
         if given == NULL and self.points[NULL].fitted_error > SearchSettings.current().structural:
             for structure in sorted(self.problem.structures):
                 self.visit((structure,))
@@ -200,15 +192,16 @@ class Search(Refits):
                 break
             self.visit(hypothesis, number, len(order))
 
-    def _try_stand_ins(self) -> None:
-        """Refit the effects that may stand behind nominal figures which the best model so far moves
-        too far."""
-        for hypothesis, start in stand_ins(self.points[self.best()], self.problem).items():
+    def _try_stand_ins(self, hypothesis: Hypothesis) -> list[Hypothesis]:
+        """Refit the effects that may stand behind nominal figures which a hypothesis moves too far;
+        those that are refitted."""
+        begun = stand_ins(self.points[hypothesis], self.problem)
+        for effect, start in begun.items():
             if self.ended:
                 break
-            if hypothesis not in self.points:
-                self._thetas.setdefault(hypothesis, start)
-                self.visit(hypothesis)
+            self._thetas.setdefault(effect, start)
+            self.visit(effect)
+        return [effect for effect in begun if effect in self.points]
 
     def _extensions(self, given: Hypothesis) -> dict[Hypothesis, float]:
         """Linear evidence of `given` plus one effect. The members of a pair that is much better

@@ -1,4 +1,4 @@
-"""Finite differences of residuals: how far they go, and their mean slope."""
+"""Residuals where little can be predicted, and their finite differences."""
 
 from __future__ import annotations
 
@@ -26,6 +26,11 @@ class StepSettings(Settings):
     absurd: float = setting(
         1e5, "1", "residual in sigmas at which nothing can be predicted", "convention: beyond data"
     )
+
+
+def bounded(residual: Array, absurd: float) -> Array:
+    """Residuals held within `absurd` sigmas; those that are no numbers are as large as that."""
+    return np.asarray(np.clip(np.nan_to_num(residual, nan=absurd), -absurd, absurd))
 
 
 def mean_slope(base: Array, there: Sequence[Array], steps: Sequence[float]) -> Array:

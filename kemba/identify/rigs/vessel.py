@@ -13,6 +13,7 @@ from kemba.identify.problem.candidates import by_default, sensor_candidates, swi
 from kemba.identify.problem.nominal import nominal_figures
 from kemba.identify.problem.problem import Problem
 from kemba.identify.problem.sensor_faults import SensorFaults
+from kemba.identify.problem.slopes import bounded
 from kemba.identify.problem.types import Array, Rows, Theta
 from kemba.identify.rigs.blow_down import BlowDown
 from kemba.identify.rigs.candidates import standing_candidates
@@ -122,8 +123,7 @@ class VesselProblem(Problem):
             parts += [
                 (expected[name] - y) / log.sigma[name] for name, (_, y) in log.readings.items()
             ]
-        absurd = RefitSettings.current().absurd
-        return np.clip(np.nan_to_num(np.concatenate(parts), nan=absurd), -absurd, absurd)
+        return bounded(np.concatenate(parts), RefitSettings.current().absurd)
 
     def expected(self, theta: Theta, index: int) -> dict[str, Array]:
         """Channel -> what should have been read (k,), in its unit."""

@@ -1,8 +1,8 @@
 """Nothing and its rivals, each at its best fit and by slopes taken there.
 
 Where nothing fits by figures that nobody would believe, or slopes promise more than a mode shows,
-or effects gain little, it is not enough to look from one place: each of them is fitted anew, from
-its own mode and from the best fit of the others.
+slopes at one place are no fair judge: each of them is fitted anew, from its own mode and from the
+best fit of the others.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from kemba.identify.evidence.linear import names_of, slopes_at
-from kemba.identify.evidence.modes.shared import SharedSettings
-from kemba.identify.evidence.modes.thorough import BestFit, ThoroughFit
+from kemba.identify.evidence.modes.shared import SharedSettings, with_own
+from kemba.identify.evidence.modes.thorough import ThoroughFit
 from kemba.identify.evidence.null_model import Baseline
 from kemba.identify.evidence.point import LinearisationPoint
 from kemba.identify.evidence.refit import Fit, Frozen, refit
@@ -46,7 +46,7 @@ def promised(base: Baseline, point: LinearisationPoint) -> float:
 
 def fitted_anew(
     base: Baseline, points: Points, ended: Callable[[], bool], say: Tell = silent
-) -> dict[Hypothesis, BestFit]:
+) -> dict[Hypothesis, Fit]:
     """The best fits of nothing and of the rivals that fit best after a few steps.
 
     They begin at their own modes, or at that of nothing with their effects beside it; at last from
@@ -56,14 +56,14 @@ def fitted_anew(
     problem, settings = base.problem, RivalsSettings.current()
     fits = {h: ThoroughFit(problem, h, point.linear) for h, point in points.items()}
     found = {NULL: fits[NULL].found(points[NULL].mode.theta)}
-    begun: dict[Hypothesis, BestFit] = {}
+    begun: dict[Hypothesis, Fit] = {}
     rivals = [h for h in fits if h]
     for number, hypothesis in enumerate(rivals, start=1):
         if begun and ended():
             break
         say(Stage(f"fitting {' + '.join(hypothesis)} anew", number, len(rivals)))
         fit, own = fits[hypothesis], points[hypothesis].mode.theta
-        near = [own, _beside(problem, found[NULL].theta, hypothesis, own)]
+        near = [own, with_own(problem, found[NULL].theta, hypothesis, own)]
         begun[hypothesis] = fit.found(min(near, key=fit.cost), settings.first)
     say("carrying on the best of these fits")
     for hypothesis in sorted(begun, key=lambda h: begun[h].cost)[: settings.kept]:
@@ -71,18 +71,18 @@ def fitted_anew(
         found[hypothesis] = best if ended() else fits[hypothesis].found(best.theta)
     top = min(found, key=lambda h: found[h].cost)
     for hypothesis, one in found.items():
-        start = _beside(problem, found[top].theta, hypothesis, one.theta)
+        start = with_own(problem, found[top].theta, hypothesis, one.theta)
         fair = hypothesis == NULL and one.cost > found[top].cost + SharedSettings.current().least
         if hypothesis != top and (fair or fits[hypothesis].cost(start) < one.cost):
             found[hypothesis] = _better(one, fits[hypothesis].found(start))
     return found
 
 
-def _better(one: BestFit, other: BestFit) -> BestFit:
+def _better(one: Fit, other: Fit) -> Fit:
     return min(one, other, key=lambda best: best.cost)
 
 
-def judged_anew(base: Baseline, points: Points, found: Mapping[Hypothesis, BestFit]) -> Points:
+def judged_anew(base: Baseline, points: Points, found: Mapping[Hypothesis, Fit]) -> Points:
     """The points at these fits, with slopes of every effect there; `base` is as nothing is now."""
     problem = base.problem
     base.about(found[NULL].theta, _silent(problem, NULL, found[NULL].theta))
@@ -101,10 +101,3 @@ def _silent(problem: Problem, hypothesis: Hypothesis, theta: Theta) -> Fit:
     """The fit of a hypothesis alone, begun at its best fit with a little of all other effects."""
     figures = tuple(problem.nuisance)
     return refit(problem, hypothesis, theta, Frozen(figures, problem.jacobian(theta, figures)))
-
-
-def _beside(problem: Problem, theta: Theta, hypothesis: Hypothesis, own: Theta) -> dict[str, float]:
-    """Theta with the effects of a hypothesis as `own` has them."""
-    keys = {k for effect in hypothesis for k in tuple(problem.candidates[effect].keys())}
-    kept = {k: v for k, v in theta.items() if k not in keys}
-    return kept | {k: v for k, v in own.items() if k in keys}

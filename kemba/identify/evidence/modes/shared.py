@@ -40,26 +40,32 @@ def better_beginnings(
     of `best`, as it is, or with the hypothesis's own effects beside or instead of its effects."""
     found = {}
     for hypothesis, point in points.items():
-        own = [_with_own(problem, point, best, keep) for keep in (True, False)]
-        starts = [best.mode.theta, *own]
+        theta, own = best.mode.theta, point.mode.theta
+        bare = without(problem, theta, best.hypothesis)
+        beside = [with_own(problem, base, hypothesis, own) for base in (theta, bare)]
+        starts = [theta, *beside]
         costs = [_cost(problem, point, start) for start in starts]
         if min(costs) < point.mode.cost - SharedSettings.current().least:
             found[hypothesis] = dict(starts[int(np.argmin(costs))])
     return found
 
 
-def _with_own(
-    problem: Problem, point: LinearisationPoint, other: LinearisationPoint, keep: bool
+def without(problem: Problem, theta: Theta, hypothesis: Hypothesis) -> dict[str, float]:
+    """Theta without the parameters of a hypothesis."""
+    own = _keys(problem, hypothesis)
+    return {k: v for k, v in theta.items() if k not in own}
+
+
+def with_own(
+    problem: Problem, theta: Theta, hypothesis: Hypothesis, own: Theta
 ) -> dict[str, float]:
-    """Theta of the other's mode with the effects of `point`; `keep`: with those of the other."""
-    own = _keys(problem, point.hypothesis)
-    dropped = own if keep else own | _keys(problem, other.hypothesis)
-    theta = {k: v for k, v in other.mode.theta.items() if k not in dropped}
-    return theta | {k: v for k, v in point.mode.theta.items() if k in own}
+    """Theta with the parameters of a hypothesis as `own` has them."""
+    keys = _keys(problem, hypothesis)
+    return without(problem, theta, hypothesis) | {k: v for k, v in own.items() if k in keys}
 
 
 def _keys(problem: Problem, hypothesis: Hypothesis) -> set[str]:
-    return {key for key in problem.parameters() if key.rpartition(".")[0] in hypothesis}
+    return {key for effect in hypothesis for key in tuple(problem.candidates[effect].keys())}
 
 
 def _cost(problem: Problem, point: LinearisationPoint, theta: Theta) -> float:

@@ -8,7 +8,6 @@ hundreds of nats above what they can reach, and slopes promise what is not there
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -16,9 +15,11 @@ from scipy.optimize import least_squares
 from kemba.errors import KembaError
 from kemba.identify.evidence.linear import Linear, estimate, priors, usual_shapes
 from kemba.identify.evidence.modes.bounded import effect_bounds
+from kemba.identify.evidence.refit import Fit
 from kemba.identify.evidence.spike_slab import Hypothesis, Ranker
 from kemba.identify.evidence.windows import START
 from kemba.identify.problem.problem import Array, Problem, Theta
+from kemba.identify.problem.slopes import bounded
 from kemba.settings import BY_HAND, Settings, setting
 
 
@@ -53,15 +54,6 @@ class ThoroughSettings(Settings):
     worst: float = setting(
         1e4, "1", "sigmas, where nothing can be simulated", "convention: beyond all data"
     )
-
-
-@dataclass(frozen=True)
-class BestFit:
-    """The best fit found: half the sum of squares [nats] of readings, nominal figures and small
-    effects, in sigmas of their noise and of their priors; and where that is."""
-
-    cost: float
-    theta: dict[str, float]
 
 
 class _Slopes:
@@ -102,7 +94,11 @@ class _Slopes:
 
 
 class ThoroughFit:
-    """Fits of one hypothesis, in prior widths; `linear`: its parameters and their priors."""
+    """Fits of one hypothesis, in prior widths; `linear`: its parameters and their priors.
+
+    Costs [nats] are half the sum of squares of readings, nominal figures and small effects, in
+    sigmas of their noise and of their priors.
+    """
 
     def __init__(self, problem: Problem, hypothesis: Hypothesis, linear: Linear) -> None:
         self.problem, self.linear = problem, linear
@@ -117,7 +113,7 @@ class ThoroughFit:
             lower[i], upper[i] = problem.limits(name)
         self.lower, self.upper = lower / self.width, upper / self.width
 
-    def found(self, start: Theta, evaluations: int | None = None) -> BestFit:
+    def found(self, start: Theta, evaluations: int | None = None) -> Fit:
         """The best fit from one start, within so many evaluations (None: the setting)."""
         shapes = self._shapes(start)
         begin = self._inside(start)
@@ -135,7 +131,7 @@ class ThoroughFit:
             max_nfev=evaluations or self.settings.evaluations,
             ftol=self.settings.change / max(0.5 * float(errors @ errors), 1.0),
         )
-        return BestFit(float(end.cost), self._theta(end.x, shapes))
+        return Fit(self._theta(end.x, shapes), float(end.cost))
 
     def cost(self, theta: Theta) -> float:
         """Cost of theta, moved within bounds."""
@@ -186,7 +182,6 @@ class ThoroughFit:
     def _residual(self, theta: Theta) -> Array:
         worst = self.settings.worst
         try:
-            r = self.problem.residual(theta)
+            return bounded(self.problem.residual(theta), worst)
         except KembaError:
             return np.full(len(self.problem.rows()), worst)
-        return np.nan_to_num(np.clip(r, -worst, worst), nan=worst)
