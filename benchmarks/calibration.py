@@ -4,6 +4,7 @@
     python benchmarks/calibration.py --cases 200         # the study, about half an hour of CPU
     python benchmarks/calibration.py --cases 10 --from 30 --only clean --length 1
     python benchmarks/calibration.py --machines imperfect
+    python benchmarks/calibration.py --machines late --only clean --level 0.05
 
 Every case is a machine of its own, with its own disturbances and noise, and two bench logs. Where
 nothing is missing, the p-value of that must be uniform (Kolmogorov-Smirnov). Where one effect is
@@ -16,6 +17,9 @@ machines that differ as the discovery believes:
   but no delay and no lag;
 - `late`: with these, too: a machine as the discovery believes in every respect. 5 % of a delay is a
   tenth of a row: an edge then falls before or after a reading.
+
+With another `--level` of the p-value, records are kept apart: they tell of all lower levels, too,
+since an answer beyond a level is `nothing`.
 
 Records are added to benchmarks/program.json; benchmarks/program_page.py writes its page from them.
 """
@@ -38,7 +42,9 @@ from scipy.stats import kstest
 from twin.cases import bench_case, draw
 from twin.measure import Sensors
 
+from kemba.identify.settings import DiscoverSettings
 from kemba.identify.workflow import discover_logs
+from kemba.settings import changed
 
 SEED = 70_000  # no case of it was looked at while the method was built
 HIDDEN = ("seal_friction", "valve_delay", "piston_damping", "supply_scale", "gas_spring")
@@ -88,19 +94,25 @@ def main() -> int:
     parser.add_argument("--only", choices=["clean", "missing"], help="of these cases only")
     parser.add_argument("--machines", choices=MACHINES, default=MACHINES[0])
     parser.add_argument("--length", type=float, default=LENGTH, help="seconds of each log")
+    usual = DiscoverSettings.current().significant
+    parser.add_argument("--level", type=float, default=usual, help="p-value that is significant")
     arguments = parser.parse_args()
+    about = arguments.machines
+    if arguments.level != usual:
+        about = f"{about} level {arguments.level:g}"
     for number in range(arguments.first, arguments.first + arguments.cases):
         for name, run in (("clean", clean), ("missing", missing)):
             if arguments.only not in (None, name):
                 continue
-            with tempfile.TemporaryDirectory() as folder:
+            level = changed(DiscoverSettings, significant=arguments.level)
+            with tempfile.TemporaryDirectory() as folder, level:
                 found = run(number, Path(folder), arguments.machines, arguments.length)
             found["length"] = arguments.length
-            part = f"{name} {arguments.machines}"
+            part = f"{name} {about}"
             kept = load().get("calibration", {}).get(part, {})
             put("calibration", part, {**kept, str(number): found})
             print(number, part, found, flush=True)
-    report(arguments.machines)
+    report(about)
     return 0
 
 

@@ -9,10 +9,11 @@ class DiscoverSettings(Settings):
     """When an effect is called missing, and when its answer is doubted."""
 
     significant: float = setting(
-        0.02,
+        0.03,
         "1",
         "p-value of nothing up to which something is missing",
-        "convention: one false alarm in fifty clean data sets",
+        "convention: three false alarms in a hundred clean data sets (counted by "
+        "benchmarks/calibration.py)",
         decides=True,
     )
     matters: float = setting(

@@ -9,12 +9,11 @@ import numpy as np
 
 from kemba.identify.doubt.drifts import drift_columns
 from kemba.identify.doubt.significance import redrawn_noise
-from kemba.identify.evidence.bootstrap import bootstrap
+from kemba.identify.evidence.bootstrap import BootstrapSettings, bootstrap
 from kemba.identify.evidence.linear import condense
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis, Ranker
 from kemba.identify.problem.problem import Array, Candidate, Parameter
-from kemba.identify.settings import DiscoverSettings
 from kemba.settings import BY_HAND, Settings, setting
 
 
@@ -100,13 +99,12 @@ def extended(search: Search, formulas: Mapping[str, Array]) -> tuple[Ranker, Arr
 
 
 def by_chance(count: int) -> float:
-    """Gain [nats] that the best of `count` terms reaches by chance at most as often as a p-value
-    may be significant.
+    """Gain [nats] that the best of `count` terms rarely reaches by chance.
 
     A Bayes factor exceeds exp(g) with a probability of exp(-g) at most where its term is not there
     (Markov's inequality); `count` of them do so with `count` times that probability at most.
     """
-    return float(np.log(count / DiscoverSettings.current().significant))
+    return float(np.log(count / BootstrapSettings.current().rare))
 
 
 def look(search: Search, best: Hypothesis) -> Formula | None:

@@ -22,7 +22,15 @@ class BootstrapSettings(Settings):
         400,
         "1",
         "number of simulated logs",
-        "derived: eight of them lie beyond the p-value asked for, so that it is known to a third",
+        "derived: twelve of them lie beyond the p-value asked for, so that it is known to a third",
+    )
+    rare: float = setting(
+        0.02,
+        "1",
+        "share of simulated logs that reach a threshold by chance",
+        "convention: one in fifty; stricter than DiscoverSettings.significant, since no left-out "
+        "data are asked about formulas and detectable sizes",
+        decides=True,
     )
     least: float = setting(
         1.0, "nats", "smallest threshold of the log evidence", "convention: evidence of one nat"
@@ -73,10 +81,9 @@ class NullTest:
 
     @property
     def threshold(self) -> float:
-        """Log evidence that only as many of such logs reach as a significant p-value allows."""
-        significant = DiscoverSettings.current().significant
-        least = BootstrapSettings.current().least
-        return float(max(np.quantile(self.scores, 1.0 - significant), least))
+        """Log evidence that such logs reach rarely."""
+        settings = BootstrapSettings.current()
+        return float(max(np.quantile(self.scores, 1.0 - settings.rare), settings.least))
 
 
 def bootstrap(
