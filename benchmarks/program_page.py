@@ -203,10 +203,11 @@ def _clean(title: str, cases: dict[str, dict[str, Any]]) -> list[Any]:
 def _levels(cases: dict[str, dict[str, Any]]) -> str:
     """False alarms on the same machines by the level of the p-value."""
     told = [c for c in cases.values() if c["verdict"] != "nothing"]
-    counts = [(sum(c["p"] <= level for c in told), level) for level in (0.02, 0.03, 0.05)]
-    return f"""Of {len(cases)} further
-machines with delays and lags {enumerated([f"{n} at {level:g}" for n, level in counts])} would be
-false alarms."""
+    levels = (0.02, 0.03, 0.05)
+    counts = [f"{sum(c['p'] <= level for c in told)} at {level:g}" for level in levels]
+    return f"""By this level, so
+many of {len(cases)} further machines with delays and lags are called faulty:
+{enumerated(counts)}."""
 
 
 def _hidden(title: str, cases: dict[str, dict[str, Any]]) -> list[Any]:
