@@ -67,7 +67,11 @@ class VerdictSettings(Settings):
         decides=True,
     )
     part_of_structure: float = setting(
-        0.5, "1", "the same where what is left repeats itself", BY_HAND, decides=True
+        0.5,
+        "1",
+        "the same where more than `whole` is left and repeats itself, or a figure drifts",
+        BY_HAND,
+        decides=True,
     )
     where_it_acts: float = setting(
         0.01,

@@ -40,16 +40,20 @@ def doubts_about(
     """Why the best answer cannot be complete, and whether it is a part of one; `ended`: the time
     was over before the search was."""
     settings, reasons, best = VerdictSettings.current(), [], belief.best
+    before, after = (error(search, h, kept) for h in (NULL, best))
+    least = settings.part
     if drift is not None:
         reasons.append(str(drift))
+        least = settings.part_of_structure
     elif unfinished(search, best):
         reasons.append("the error that is left repeats itself with motion and valves")
-    least = settings.part_of_structure if reasons else settings.part
-    if not reasons and (pattern := pattern_left(search, best)):
+        least = settings.part_of_structure
+    elif pattern := pattern_left(search, best):
         reasons.append(f"the error that is left has a pattern: {pattern}")
         if not explains_structure(search, best):
             least = settings.part_of_structure
-    before, after = (error(search, h, kept) for h in (NULL, best))
+    if drift is None and after <= settings.whole:
+        least = settings.part  # a whole answer may leave as much
     if ended and after > settings.whole:
         reasons.append(ENDED)
         least = 0.0  # however little it explains, nothing else could be asked
