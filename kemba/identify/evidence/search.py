@@ -31,8 +31,24 @@ class Search(Refits):
         self.say("fitting the model as it is, and a slope for every effect")
         self.start()
         best = self._round(NULL, SearchSettings.current().leaders)
+        if instead := self._leaves_far_less(best):
+            best = self._along(instead)
         self.say(f"first guess: {' + '.join(best) or 'nothing'}")
         return best
+
+    def _leaves_far_less(self, best: Hypothesis) -> Hypothesis:
+        """The single effect that leaves far less than the best hypothesis, if there is one.
+
+        Along the motion that data without an effect would have, its evidence counts for less than
+        that of effects which change the motion a little.
+        """
+        settings, singles = SearchSettings.current(), [h for h in self.points if len(h) == 1]
+        if not self.problem.moves or not singles or self.ended:
+            return NULL
+        error = {h: self.points[h].fitted_error for h in (best, *singles)}
+        least = min(singles, key=error.__getitem__)
+        far_less = excess(error[least]) < settings.far_less * excess(error[best])
+        return least if error[best] > settings.structural and far_less else NULL
 
     def further(self, best: Hypothesis) -> Hypothesis:
         """The likeliest hypothesis, searched for from the first guess."""
@@ -84,14 +100,18 @@ class Search(Refits):
             guess = best or self._first_of_table()
             if guess == NULL or self.ended:
                 return best
-            self.say(f"searching again with {' + '.join(guess)} in the model")
-            among = self._contenders()
-            self.start(among, self._settle(guess))
-            self.visit(guess)
-            best = self._round(NULL, settings.leaders)
+            best = self._along(guess)
             if best in (guess, NULL):
                 break
         return self._swap(self._regrow(self._grow(best))) if best else best
+
+    def _along(self, guess: Hypothesis) -> Hypothesis:
+        """The best single effect along the motion that a guess makes of the data."""
+        self.say(f"searching again with {' + '.join(guess)} in the model")
+        among = self._contenders()
+        self.start(among, self._settle(guess))
+        self.visit(guess)
+        return self._round(NULL, SearchSettings.current().leaders)
 
     def _regrow(self, best: Hypothesis) -> Hypothesis:
         """Find the motion again with an answer of several effects, and let it grow from there.

@@ -42,6 +42,14 @@ class SearchSettings(Settings):
     followed: int = setting(
         2, "1", "times that the motion is found again with the best guess", BY_HAND, decides=True
     )
+    far_less: float = setting(
+        0.5,
+        "1",
+        "share of the excess error that the likeliest effect leaves, below which another one that "
+        "leaves less is followed first",
+        "tuned: a quadratic damping of -62 N.s2.m-2 leaves 0.37 of what a mount of the piston "
+        "leaves, which was likelier along the first motion",
+    )
     settled: int = setting(
         4,
         "1",
