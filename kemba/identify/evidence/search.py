@@ -40,9 +40,10 @@ class Search(Refits):
         """The single effect that leaves far less than the best hypothesis, if there is one.
 
         Along the motion that data without an effect would have, its evidence counts for less than
-        that of effects which change the motion a little.
+        that of effects which change the motion a little. Another structure is built in instead.
         """
-        settings, singles = SearchSettings.current(), [h for h in self.points if len(h) == 1]
+        settings, structures = SearchSettings.current(), self.problem.structures
+        singles = [h for h in self.points if len(h) == 1 and not structures & set(h)]
         if not self.problem.moves or not singles or self.ended:
             return NULL
         error = {h: self.points[h].fitted_error for h in (best, *singles)}

@@ -37,7 +37,9 @@ def test_an_effect_that_leaves_far_less_than_the_likeliest_is_followed(
 ) -> None:
     found = dict(zip((LIKELIEST, OTHER), errors, strict=True))
     points = {h: SimpleNamespace(fitted_error=error) for h, error in found.items()}
-    search = SimpleNamespace(problem=SimpleNamespace(moves=moves), points=points, ended=False)
+    points[("chambers:orifice",)] = SimpleNamespace(fitted_error=0.9)  # is built in instead
+    problem = SimpleNamespace(moves=moves, structures={"chambers:orifice"})
+    search = SimpleNamespace(problem=problem, points=points, ended=False)
     assert Search._leaves_far_less(search, LIKELIEST) == followed  # type: ignore[arg-type]
 
 
