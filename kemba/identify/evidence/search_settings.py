@@ -49,6 +49,7 @@ class SearchSettings(Settings):
         "leaves less is followed first",
         "tuned: a quadratic damping of -62 N.s2.m-2 leaves 0.37 of what a mount of the piston "
         "leaves, which was likelier along the first motion",
+        decides=True,
     )
     settled: int = setting(
         4,
