@@ -46,6 +46,6 @@ def test_an_effect_that_leaves_far_less_than_the_likeliest_is_followed(
 @pytest.mark.slow
 def test_pistons_that_are_pushed_into_their_stops_are_no_orifices() -> None:
     """Along the first motion a damping of -62 N.s2.m-2 leaves 3.2 times the noise, the likeliest
-    effect 8.4; orifice chambers leave less than that, too."""
+    effect 8.4, and orifice chambers were built in beside that."""
     _, problem = robot.prepared(PUSH)
     assert discover(problem()).answer.ranking[0].effect == "quadratic_damping"
