@@ -21,7 +21,7 @@ from block import put_block
 from kemba.config import dump_yaml, load_yaml
 from kemba.config.parsing import find_config
 from kemba.ocp import load_task
-from kemba.report.best import Approach, Listener, best_plan
+from kemba.solve import Approach, Listener, best_plan
 from kemba.sweep import machine
 
 BEGIN, END = "<!-- authors: written by benchmarks/authors_plans.py -->", "<!-- end of authors -->"

@@ -42,10 +42,10 @@ from kemba.ocp.certificate.status import Status
 from kemba.plant.execution.certificate import rest_after
 from kemba.plant.execution.controller import execute
 from kemba.plotting.robot.machine import load_machine
-from kemba.report import Listener, solve_into
-from kemba.report.best import Approach
-from kemba.report.earlier import origin_of
+from kemba.report import solve_into
 from kemba.runs import RunFolder, load_run
+from kemba.solve import Approach, Listener
+from kemba.solve.earlier import origin_of
 from kemba.sweep.workers.machine import machine as this_computer
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "learn.md"

@@ -17,8 +17,7 @@ from pathlib import Path
 from block import printed, put_block
 
 from kemba.ocp import load_task
-from kemba.report import Approach, Listener
-from kemba.report.best import best_plan
+from kemba.solve import Approach, Listener, best_plan
 from kemba.sweep import machine
 
 # The task, what is changed in it, and effects that its model is given.

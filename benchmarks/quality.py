@@ -28,7 +28,7 @@ from quality_table import RECORD, REFINED, summary, written
 from kemba.ocp import load_task, plan
 from kemba.ocp.certificate.objective import objective
 from kemba.ocp.certificate.status import Status
-from kemba.report.best import Approach, Listener, best_plan
+from kemba.solve import Approach, Listener, best_plan
 
 NOISE = 0.25  # of the guesses of `--starts`
 HEIGHTS = (0.36, 0.45, 0.55, 0.65, 0.77, 0.9)  # m

@@ -20,11 +20,11 @@ from block import printed, put_block
 
 from kemba.ocp import load_task
 from kemba.ocp.continuation.between import Origin
-from kemba.report import Approach, Listener, solve_into
-from kemba.report.best import best_plan
-from kemba.report.earlier import origin_of
-from kemba.report.judging.executed import Executed
+from kemba.report import solve_into
 from kemba.runs import RunFolder
+from kemba.solve import Approach, Listener, best_plan
+from kemba.solve.earlier import origin_of
+from kemba.solve.trial import Executed
 from kemba.sweep import machine
 
 CHANGES = {

@@ -17,7 +17,7 @@ import numpy as np
 
 from kemba.ocp import controller_table, load_task
 from kemba.plant.execution import retiming
-from kemba.report.best import Approach, Listener, best_plan
+from kemba.solve import Approach, Listener, best_plan
 from kemba.sweep import machine
 
 

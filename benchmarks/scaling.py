@@ -21,7 +21,7 @@ import numpy as np
 
 from kemba.ocp import load_task
 from kemba.plotting import plot_growth, save_figure
-from kemba.report.best import Approach, Listener, best_plan
+from kemba.solve import Approach, Listener, best_plan
 from kemba.sweep import machine
 
 NODES = (50, 100, 200, 400)

@@ -23,7 +23,7 @@ from kemba.ocp import load_task
 from kemba.plant.execution.certificate import rest_after
 from kemba.plant.execution.controller import execute
 from kemba.plant.execution.replay import LandingSettings, Replay, peak, touches
-from kemba.report.best import Approach, Listener, best_plan
+from kemba.solve import Approach, Listener, best_plan
 from kemba.sweep import machine
 from kemba.trajectory import Trajectory
 

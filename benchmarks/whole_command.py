@@ -28,8 +28,8 @@ STAGES = {
     "plan": ("kemba.ocp.planning", "searched"),
     "from a shipped plan": ("kemba.ocp.planning", "continued"),
     "refinement": ("kemba.ocp.refined", "on_phases"),
-    "table": ("kemba.report.judging.executed", "retimed"),
-    "replays": ("kemba.report.judging.executed", "judged"),
+    "table": ("kemba.solve.trial", "retimed"),
+    "replays": ("kemba.solve.trial", "judged"),
     "files": ("kemba.report.solving", "_write"),
     "figure": ("kemba.report.drawing", "draw_plan"),
 }

@@ -33,6 +33,7 @@ LEVELS = [
     {"runs"},
     {"policy", "sensitivity"},
     {"scenarios"},
+    {"solve"},
     {"plotting", "report"},
     {"sweep"},
     {"learn"},

@@ -14,8 +14,9 @@ from kemba.effects import BY_KIND
 from kemba.files import read_json
 from kemba.model.spec import model_files
 from kemba.ocp import Task, load_task
-from kemba.report import Approach, Listener, solve_into
+from kemba.report import solve_into
 from kemba.runs import Run, RunFolder, load_run
+from kemba.solve import Approach, Listener
 from kemba.stopwatch import Tell, silent
 from kemba.trajectory import Trajectory
 

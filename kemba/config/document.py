@@ -43,6 +43,13 @@ class Document:
             return self.error_at(*self.marks[known], what, expected, hint)
         return KembaError(self.source, what, expected, hint)
 
+    def place(self, location: Location) -> str:
+        """Where a part stands, `jump.yaml:31`, or the option that set it; empty where unknown."""
+        known = self.nearest(location)
+        if known in self.overrides:
+            return self.overrides[known]
+        return f"{self.source}:{self.marks[known][0] + 1}" if known in self.marks else ""
+
     def nearest(self, location: Location) -> Location:
         """The innermost part around `location` whose place is known; `()` is the whole."""
         while location and location not in self.overrides and location not in self.marks:

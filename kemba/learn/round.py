@@ -35,10 +35,11 @@ from kemba.plant.execution.certificate import rest_after
 from kemba.plant.execution.controller import execute
 from kemba.plant.execution.replay import ends_standing
 from kemba.plotting.robot.machine import Machine, load_machine
-from kemba.report import Approach, Listener, solve_into
-from kemba.report.earlier import origin_of
-from kemba.report.judging.verdict import verdicts
+from kemba.report import solve_into
 from kemba.runs import Run, RunFolder, write_json
+from kemba.solve import Approach, Listener
+from kemba.solve.earlier import origin_of
+from kemba.solve.verdict import verdicts
 from kemba.trajectory import Trajectory
 
 PLAIN = "controller_uncorrected.csv"
@@ -158,8 +159,7 @@ def learn(asked: Asked, folder: RunFolder, listener: Listener) -> Round:
     old = load_task(run.task)[0]
     found = _learnt(asked, past, run, old, folder, listener.tell)
     task, document = load_task(asked.target, list(asked.overrides))
-    # what the logs teach is the model; fitted to the shipped plant it would be another one
-    update = {"model": found.model, "plant": beside(task.plant, Path()), "fit_air": False}
+    update = {"model": found.model, "plant": beside(task.plant, Path())}
     task = task.model_copy(update=update)
     if asked.correct:
         found = replace(found, correction=correction_from(found.executed, found.simulated))

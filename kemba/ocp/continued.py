@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from kemba.ocp.certificate.objective import costs, objective
-from kemba.ocp.certificate.status import Status, verdict
+from kemba.ocp.certificate.status import Status, missed_of, verdict
 from kemba.ocp.continuation.between import Origin
 from kemba.ocp.continuation.continue_plan import Continuation, Continuing
 from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.planned import Plan
 from kemba.ocp.planner import Planner
-from kemba.ocp.task.requirement import Requirement
 from kemba.stopwatch import Stopwatch
-from kemba.trajectory import Trajectory
 
 TORQUE = "torque_squared_integral"
 
@@ -37,11 +32,10 @@ def continued(planner: Planner, origin: Origin) -> tuple[Plan | None, str]:
     new, certificate = answer.trajectory, answer.certificate
     if answer.ending is Ending.INTERRUPTED or new is None or certificate is None:
         return None, answer.sentence
+    if certificate.missed:
+        return None, f"its result is not what was asked: {missed_of(certificate.missed)}"
     if not certificate.within(task.tolerances):
         return None, "its result misses the task's tolerances"
-    against = valves_against(planner.requirements, new)
-    if against:
-        return None, f"it keeps the order of its valves, which `{against}` rules out"
     status, sentence = verdict(task, certificate, new, answer.ending)
     facts = f"{sentence}, refined on {len(answer.phases)} phases from {origin.name}"
     cost, before = costs(model, new), costs(origin.model, origin.plan)
@@ -70,16 +64,6 @@ def continued(planner: Planner, origin: Origin) -> tuple[Plan | None, str]:
     return found, ""
 
 
-def valves_against(requirements: Sequence[Requirement], plan: Trajectory) -> str:
-    """The first requirement on a valve that a plan does not meet; "" where it meets all. Phases
-    keep the valves as they are, so that no row of their program says so."""
-    for asked in (r for r in requirements if r.quantity.binary and r.quantity.name in plan):
-        opened = plan[asked.quantity.name][asked.nodes(len(plan) - 1, first=1)]
-        if np.any((opened < asked.lower) | (opened > asked.upper)):
-            return asked.text
-    return ""
-
-
 def dear(found: Plan, before: float) -> bool:
     """Whether a plan costs so much more than `before`, by its task's own cost, that one from a
     guess is likely to cost less."""
@@ -94,27 +78,17 @@ def from_scratch(found: Plan, why: str) -> Plan:
     return replace(found, sentence=sentence, continued=False)
 
 
-def with_air_and_grip(planner: Planner, found: Plan) -> Plan:
-    """The plan solved again with the pulse that `landing.air` asks for, and within `grip`.
+def with_grip(planner: Planner, found: Plan) -> Plan:
+    """The plan solved again within `grip`.
 
-    Steps of the relaxed problem are too long for a pulse of some milliseconds, and which way a foot
-    pushes is decided there on all of the ground's friction; so both come last. Where that fails,
-    the plan without them is not what was asked.
+    Which way a foot pushes is decided in the relaxed problem on all of the ground's friction, so
+    this comes last. Where it fails, the plan without it is not what was asked.
     """
-    task = planner.task
-    given = {"landing.air": task.landing.air is not None, "grip": task.grip < 1.0}
-    keys = " and ".join(f"`{key}`" for key, asked in given.items() if asked)
-    origin = Origin(
-        found.trajectory,
-        planner.model,
-        tuple(planner.requirements),
-        f"the plan without {keys}",
-        once=not given["grip"],
-        stages=found.stages,
-    )
+    known = found.trajectory, planner.model, tuple(planner.requirements)
+    origin = Origin(*known, "the plan without `grip`", stages=found.stages)
     near, why = continued(planner, origin)
     if near is None:
-        what = f"{keys} is not kept ({why})"
+        what = f"`grip` is not kept ({why})"
         return replace(found, status=Status.ACCEPTABLE, sentence=f"{what}; {found.sentence}")
     wall, cpu = found.solve_s + near.solve_s, found.solve_cpu_s + near.solve_cpu_s
     return replace(near, continued=None, solve_s=wall, solve_cpu_s=cpu)

@@ -29,8 +29,8 @@ class Sought(Settings):
 
 
 def found_and_refined(planner: Planner, refused: bool) -> Plan:
-    """A plan from the guess, refined where the task asks for it; without air on the legs and grip,
-    which come last."""
+    """A plan from the guess, refined where the task asks for it; without grip, which comes
+    last."""
     if planner.task.refine == "radau" and planner.start is None and not refused:
         found = _from_fewer(planner)
         if found is not None:
@@ -51,8 +51,7 @@ def _from_fewer(planner: Planner) -> Plan | None:
     found = refined(coarse, searched(coarse, False))
     if not found.refined:
         return None if planner.session.control.ended() is None else found
-    # as the coarser plan was made: grip and air on the legs come last
-    plain = {"grip": 1.0, "landing": task.landing.model_copy(update={"air": None})}
+    plain = {"grip": 1.0}  # as the coarser plan was made
     name = f"the plan on {fewer} nodes"
     origin = Origin(
         found.trajectory, found.model, found.requirements, name, once=True, stages=found.stages

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 from kemba.model import Model
 from kemba.ocp.certificate.certify import Certificate, certify
@@ -46,7 +45,6 @@ class Plan:
     continued: bool | None = None  # whether it comes from an earlier plan, where one was given
     start: str = "guess"  # or the shipped plan from which it begins
     stages: Stages | None = field(default=None, repr=False, compare=False)  # of a refined plan
-    fitted_air: Mapping[str, Any] | None = None  # with which its shipped start was made
 
     @property
     def iterations(self) -> int:

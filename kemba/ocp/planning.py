@@ -14,7 +14,7 @@ from kemba.errors import KembaError
 from kemba.model import Model
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.continuation.between import Origin
-from kemba.ocp.continued import continued, from_scratch, with_air_and_grip
+from kemba.ocp.continued import continued, from_scratch, with_grip
 from kemba.ocp.finer import found_and_refined
 from kemba.ocp.infeasibility.checks import check_task
 from kemba.ocp.infeasibility.diagnostic import Diagnostic
@@ -61,8 +61,8 @@ def plan(
         if near is not None:
             return near
     found = found_and_refined(planner, refused is not None)
-    if found.status is Status.SOLVED and (task.landing.air or task.grip < 1.0):
-        found = with_air_and_grip(planner, found)
+    if found.status is Status.SOLVED and task.grip < 1.0:
+        found = with_grip(planner, found)
     if found.status is Status.SOLVED and task.clearance:
         found = clear(found)
     if not found.status.plan and found.status is not Status.INTERRUPTED:
@@ -83,8 +83,8 @@ def plans_nearby(
     """Plans of a task and the near shipped plans from which they begin, the nearest of each way
     (`ways`).
 
-    Only solved ones; none where no shipped plan is near, or the task cannot be met. A plan that was
-    made with fitted air begins one with the same air. Raises ConfigErrors as `plan` does.
+    Only solved ones; none where no shipped plan is near, or the task cannot be met. Raises
+    ConfigErrors as `plan` does.
     """
     control = Control(_deadline(task), log, watch, stop)
     job = _job(task, document, None, control, tell)
@@ -96,17 +96,10 @@ def plans_nearby(
         listed = relatives(task, model)
         if next(job.planner.reductions()).symmetric:
             tried = 1  # a plan of half the robot from a guess takes little longer
-    own = [n for n in listed if task.fit_air or not n.entry.effects]
-    for near in islice(ways(own), tried):
-        kept, fit = near.entry, near.entry.effects
-        if near.task.model != task.model or task.effects.keys() & fit.keys():
-            fit = {}  # this model has air of its own
-        asked = task.model_copy(update={"effects": {**task.effects, **fit}})
-        planner = _job(asked, document, None, control, tell).planner if fit else job.planner
-        found, _ = continued(planner, _origin(near))
+    for near in islice(ways(listed), tried):
+        found, _ = continued(job.planner, _origin(near))
         if found is not None and found.status is Status.SOLVED:
-            found = replace(found, continued=None, start=f"shipped: {kept.name}")
-            yield replace(found, fitted_air=kept.fitted_air if fit else None), kept
+            yield replace(found, continued=None, start=f"shipped: {near.entry.name}"), near.entry
         if control.ended() is not None:
             return
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from kemba.ocp.certificate.objective import costs
-from kemba.ocp.certificate.status import Status, verdict
+from kemba.ocp.certificate.status import Status, missed_of, verdict
 from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.phases.settings import Refining
 from kemba.ocp.planned import Plan
@@ -71,8 +71,12 @@ def on_phases(planner: Planner, found: Plan) -> Plan:
     if answer.ending is Ending.INTERRUPTED:
         kept = "interrupted while refining, the implicit Euler plan is kept"
         return replace(found, status=Status.INTERRUPTED, sentence=f"{found.sentence}; {kept}")
-    if new is None or certificate is None or not certificate.within(task.tolerances):
+    if new is None or certificate is None:
         return _unrefined(found, answer.sentence)
+    if certificate.missed:
+        return _unrefined(found, missed_of(certificate.missed))
+    if not certificate.within(task.tolerances):
+        return _unrefined(found, "its result misses the task's tolerances")
     status, sentence = verdict(task, certificate, new, answer.ending)
     return replace(
         found,

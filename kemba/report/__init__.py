@@ -5,20 +5,17 @@ Imported when first asked for: who only reviews logs needs no optimiser.
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from kemba.report.best import Approach
-    from kemba.report.listener import Listener
     from kemba.report.solving import solve_into
 
-__all__ = ["Approach", "Listener", "solve_into"]
-
-_HOMES = {"Approach": "best", "Listener": "listener", "solve_into": "solving"}
+__all__ = ["solve_into"]
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
+    if name != "solve_into":
         raise AttributeError(f"module 'kemba.report' has no attribute '{name}'")
-    return getattr(import_module(f"kemba.report.{_HOMES[name]}"), name)
+    from kemba.report.solving import solve_into
+
+    return solve_into

@@ -13,11 +13,11 @@ from kemba.config import Document, dump_yaml
 from kemba.files import WriteError
 from kemba.ocp import Plan, Task
 from kemba.ocp.continuation.kept import write_stages
-from kemba.report.best import Approach, best_plan
 from kemba.report.drawing import Drawer, Here, Nowhere
-from kemba.report.judging.executed import Motions
-from kemba.report.listener import Listener
 from kemba.runs import PLANT_RUN, STAGES, RunFolder, write_json
+from kemba.solve import Approach, best_plan
+from kemba.solve.listener import Listener
+from kemba.solve.trial import Motions
 from kemba.trajectory import Trajectory
 
 

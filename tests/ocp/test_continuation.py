@@ -25,8 +25,8 @@ from kemba.ocp.refinement.refine import Refiner, reduction_of, valve_columns
 from kemba.ocp.shipped.shelf import neighbours
 from kemba.ocp.transcription.symmetry import whole
 from kemba.ocp.transcription.unilateral import read_constraints
-from kemba.report.earlier import origin_of
 from kemba.runs import load_run
+from kemba.solve.earlier import origin_of
 from kemba.trajectory import Trajectory
 from kemba_cli.main import app
 

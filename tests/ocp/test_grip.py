@@ -15,7 +15,7 @@ from kemba.ocp.planning import plan, plans_nearby
 from kemba.ocp.reading import asked_of
 from kemba.ocp.shipped.kind import kind_of
 from kemba.plant.execution.controller import execute
-from kemba.report.judging.judged import judged, plant_of, table_of
+from kemba.solve.judged import judged, plant_of, table_of
 
 
 @cache

@@ -23,7 +23,7 @@ from kemba.ocp.shipped.kind import kind_of
 from kemba.ocp.shipped.shelf import Near, Neighbour, neighbours, relatives, shelf, ways
 from kemba.ocp.transcription.symmetry import find_symmetry
 from kemba.ocp.transcription.unilateral import read_constraints
-from kemba.report import Approach, Listener, best
+from kemba.solve import Approach, Listener, loop
 from kemba.trajectory import Trajectory
 from kemba_cli.main import app
 
@@ -140,17 +140,6 @@ def test_a_task_that_asks_something_else_has_relatives_of_the_same_figures() -> 
         assert all(n.asked().start == load_task("jump_forward.yaml")[0].start for n in found)
 
 
-def test_fitted_air_is_not_written_over_that_of_another_model(tmp_path: Path) -> None:
-    learnt = tmp_path / "learnt.yaml"
-    learnt.write_text("base: planning\neffects:\n  - {kind: boom_force, F: 1 N}\n")
-    for option, fitted in (("start.body/x=1 cm", True), (f"model={learnt}", False)):
-        task, document = load_task("jump_forward.yaml", [option])
-        own = kin("jump_forward.yaml", option)[0]
-        assert own.entry.effects and own.entry.effects.items() <= own.asked().effects.items()
-        found, entry = next(plans_nearby(task, document))
-        assert bool(found.fitted_air) == fitted and entry == own.entry
-
-
 def test_what_is_kept_of_a_plan(tmp_path: Path) -> None:
     entry = shelf(SHELF)[0]
     model = task_model(load_task("jump")[0])
@@ -224,11 +213,11 @@ def test_plans_of_a_dearer_minimum_come_after_a_guess(monkeypatch: pytest.Monkey
     """From 0.46 to 0.44 m one was found that costs 40 times as much; from a guess it is half. In
     0.6 s at 0.62 MPa a guess misses 0.65 m, and plans that cost five times as much meet it."""
     asked: list[float] = []
-    monkeypatch.setattr(best, "dear", lambda found, before: asked.append(before) or True)
+    monkeypatch.setattr(loop, "dear", lambda found, before: asked.append(before) or True)
     task, document = load_task("jump.yaml", ["height=0.51 m"])
     guess = next(plans_nearby(task, document))[0]
-    monkeypatch.setattr(best, "plan", lambda *words, **how: replace(guess, start="guess"))
-    found = list(best._candidates(task, document, Approach(), Listener()))
+    monkeypatch.setattr(loop, "plan", lambda *words, **how: replace(guess, start="guess"))
+    found = list(loop._candidates(task, document, Approach(), Listener()))
     assert [one.plan.start == "guess" for one in found] == [True, *[False] * len(asked)]
     own = [n.entry.cost for n in ways(neighbours(task, task_model(task)))]
     assert 1 < len(asked) <= Near.current().tried

@@ -15,8 +15,9 @@ from kemba.ocp import load_task, task_model
 from kemba.plant import execute, replay
 from kemba.plant.execution.counterpart import counterpart
 from kemba.plant.execution.replay import LandingSettings
-from kemba.report import Approach, Listener, solve_into
+from kemba.report import solve_into
 from kemba.runs import RunFolder
+from kemba.solve import Approach, Listener
 from kemba.trajectory import Trajectory
 from kemba_cli.main import app
 

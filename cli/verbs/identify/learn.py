@@ -60,8 +60,8 @@ def learn(
     from kemba.learn.round import Asked
     from kemba.learn.round import learn as learn_once
     from kemba.ocp import load_task
-    from kemba.report import Listener
     from kemba.runs import RunFolder, load_run
+    from kemba.solve import Listener
     from kemba_cli.course import LEARN
     from kemba_cli.next_steps import after_solve, say_next
     from kemba_cli.progress import Progress

@@ -79,9 +79,10 @@ def solve(
     from kemba.ocp.nlp.interrupt import Interrupt
     from kemba.ocp.reading import asked_of
     from kemba.plant.simulation.loading import load_meanwhile
-    from kemba.report import Approach, Listener, solve_into
+    from kemba.report import solve_into
     from kemba.report.drawing import drawer
     from kemba.runs import RunFolder
+    from kemba.solve import Approach, Listener
     from kemba_cli.course import SOLVE
     from kemba_cli.next_steps import after_solve, say_next
     from kemba_cli.progress import Progress
@@ -90,7 +91,7 @@ def solve(
     if resume is not None and earlier is not None:
         raise typer.BadParameter("--resume and --from exclude each other", param_hint="--from")
     if earlier is not None:
-        from kemba.report.earlier import origin_of
+        from kemba.solve.earlier import origin_of
 
         origin = origin_of(earlier)
         task = task or str(earlier / "task.yaml")

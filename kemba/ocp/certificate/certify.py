@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 
 from kemba.model import Model
+from kemba.ocp.certificate.asked import Measured, measured
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task, Tolerances
 from kemba.ocp.transcription.first_node import state_rows
@@ -32,16 +33,28 @@ class Violation:
 
 @dataclass(frozen=True)
 class Certificate:
-    """Residuals of a plan and its worst violations, worst first."""
+    """Residuals of a plan, its worst violations, worst first, and what the task asks, measured."""
 
     complementarity: float
     binary: float
     dynamics: float
     bounds: float
     worst: tuple[Violation, ...]
+    asked: tuple[Measured, ...] = ()
+
+    @property
+    def missed(self) -> tuple[Measured, ...]:
+        """The requirements that are not kept, the largest miss first."""
+        missed = (measured for measured in self.asked if not measured.met)
+        return tuple(sorted(missed, key=lambda m: -m.miss / m.scale))
 
     def within(self, tolerances: Tolerances) -> bool:
-        """Whether every residual is acceptable; valves must be exactly binary."""
+        """Whether every residual is acceptable and every requirement kept; valves must be exactly
+        binary."""
+        return not self.missed and self.sound(tolerances)
+
+    def sound(self, tolerances: Tolerances) -> bool:
+        """Whether the motion obeys its equations and bounds, whatever the task asks of it."""
         return (
             self.complementarity <= tolerances.complementarity
             and self.binary == 0.0
@@ -60,15 +73,24 @@ def certify(
     """Residuals of a trajectory under implicit Euler on its own grid, with the `most` worst.
 
     complementarity: largest force (by body weight) times gap [m] or slip [m.s-1]; binary: largest
-    u(1 - u); dynamics: largest scaled defect; bounds: largest scaled violation of bounds, limits,
-    signs and requirements, the first node included. Raises KembaError for missing columns.
+    u(1 - u); dynamics: largest scaled defect; bounds: largest scaled violation of bounds, limits
+    and signs, the first node included. Raises KembaError for missing columns.
     """
-    measured = Measurement(model, trajectory)
-    bounds = [measured.signs(), measured.first_node(), measured.boxes()]
-    bounds.append(measured.requirements(requirements))
-    defects = max(measured.dynamics(), measured.kinematics(), measured.rates())
-    pairs, binary = measured.products(), measured.binary()
-    return Certificate(pairs, binary, defects, max(bounds), measured.worst(most))
+    of_laws = Measurement(model, trajectory)
+    bounds = [of_laws.signs(), of_laws.first_node(), of_laws.boxes()]
+    defects = max(of_laws.dynamics(), of_laws.kinematics(), of_laws.rates())
+    pairs, binary = of_laws.products(), of_laws.binary()
+    asked = measured(model, task, requirements, trajectory)
+    worst = (*violations(asked), *of_laws.worst(most))
+    return Certificate(pairs, binary, defects, max(bounds), worst[:most], asked)
+
+
+def violations(asked: Iterable[Measured]) -> tuple[Violation, ...]:
+    """The requirements that are not kept, the largest miss first."""
+    missed = sorted((m for m in asked if not m.met), key=lambda m: -m.miss / m.scale)
+    return tuple(
+        Violation(m.text, m.node, m.time_s, m.miss, m.unit, m.miss / m.scale) for m in missed
+    )
 
 
 Label = tuple[str, str, float]  # what a column says, the unit of its violation, one unit's size
@@ -182,23 +204,6 @@ class Measurement:
             over = np.maximum(lower - values, values - upper) / scale
             labels = [(f"bound:{q.name}", q.unit, q.scale) for q in quantities]
             worst = max(worst, self.note(over, labels, first))
-        return worst
-
-    def requirements(self, requirements: Sequence[Requirement]) -> float:
-        """What the task asks; inputs and forces act on the interval before a node."""
-        acting = {q.name for name in ("u", "lam") for q in groups(self.model)[name]}
-        worst, nodes = 0.0, len(self.trajectory) - 1
-        for requirement in requirements:
-            name, unit = requirement.quantity.name, requirement.quantity.unit
-            first = int(name in acting)
-            at = requirement.nodes(nodes, first)
-            if not at:
-                continue
-            first = at[0]
-            values = self.trajectory[name][at, None]
-            over = np.maximum(requirement.lower - values, values - requirement.upper)
-            label = (f"{requirement.text}:{name}", unit, requirement.scale)
-            worst = max(worst, self.note(over / requirement.scale, [label], first))
         return worst
 
     def binary(self) -> float:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import Enum
 
+from kemba.ocp.certificate.asked import Measured
 from kemba.ocp.certificate.certify import Certificate
 from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.task.height import rise_of_feet
@@ -61,9 +63,12 @@ def verdict(
         return Status.SOLVED, f"solved: {facts}"
     factor, names = Judging.current().acceptable, ("complementarity", "dynamics", "bounds")
     loose = {name: factor * getattr(task.tolerances, name) for name in names}
-    worst = _worst(certificate)
-    if certificate.within(task.tolerances.model_copy(update=loose)):
+    worst, missed = _worst(certificate), certificate.missed
+    nearly = all(m.miss <= factor * m.allowed for m in missed)
+    if nearly and certificate.sound(task.tolerances.model_copy(update=loose)):
         return Status.ACCEPTABLE, f"the plan misses its tolerances: {worst}; {facts}"
+    if certificate.sound(task.tolerances) and (ending is None or ending.good):
+        return Status.ACCEPTABLE, f"the plan is not what was asked: {missed_of(missed)}; {facts}"
     if ending is None:
         return Status.STALLED, f"no plan was found: {worst}"
     if ending.limit:
@@ -79,7 +84,16 @@ def _feet(trajectory: Trajectory) -> str:
     return f" (feet {rise} cm up)" if rise else ""
 
 
+def missed_of(missed: Sequence[Measured]) -> str:
+    """The largest miss in words, and how many others there are."""
+    others = len(missed) - 1
+    more = f", and {others} more requirement{'s' * (others > 1)}" if others else ""
+    return f"{missed[0].sentence}{more}"
+
+
 def _worst(certificate: Certificate) -> str:
+    if certificate.missed:
+        return missed_of(certificate.missed)
     if not certificate.worst:
         return "nothing is violated"
     v = certificate.worst[0]

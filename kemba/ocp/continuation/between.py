@@ -26,8 +26,7 @@ class Origin:
     intervals, nothing else is tried. `ticks`: valve edges of the new plan are on the controller's
     ticks; where that fails at once, these ticks do not fit, and nothing else is tried. `stages`:
     the solved program of the plan, where it is at hand. `figures`: those of its task
-    (`kemba.ocp.shipped.kind`), where they are known. `fitted_air`: the fit of its air,
-    where it has one.
+    (`kemba.ocp.shipped.kind`), where they are known.
     """
 
     plan: Trajectory
@@ -39,7 +38,6 @@ class Origin:
     ticks: bool = False
     stages: Stages | None = None
     figures: Mapping[str, float] = field(default_factory=dict)
-    fitted_air: Mapping[str, Any] | None = None
 
 
 def model_between(old: Model, new: Model, share: float) -> Model:

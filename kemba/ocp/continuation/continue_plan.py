@@ -21,20 +21,20 @@ from kemba.ocp.nlp import ipopt
 from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.nlp.ipopt import Control, Iterate
 from kemba.ocp.nlp.stagnation import Stagnation
+from kemba.ocp.phases.independent import ContradictionError
 from kemba.ocp.phases.modes import Phase
 from kemba.ocp.phases.notes import noted_phases
 from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.radau import RADAU5
 from kemba.ocp.phases.settings import Elements, Refining
 from kemba.ocp.phases.stages import Stages
-from kemba.ocp.phases.stretched import extending, stretched
 from kemba.ocp.phases.ticks import on_ticks
 from kemba.ocp.refinement.refine import Refined, Refiner, reduction_of, refine, valve_columns
 from kemba.ocp.refinement.sample import certificate, to_trajectory
 from kemba.ocp.refinement.solve import solve, warm
 from kemba.ocp.refinement.start import on_elements
 from kemba.ocp.relaxation.session import Attempt
-from kemba.ocp.task.requirement import Requirement, apex_node
+from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.symmetry import Reduction
 from kemba.ocp.transcription.unilateral import read_constraints
@@ -132,12 +132,14 @@ class Continuation:
                 found = self._walk(mesh, reduction)
                 if found.done:
                     return found
-            if found is not None and (self.origin.once or self.task.landing.air):
-                return found  # phases read anew would have no pulse of air
+            if found is not None and self.origin.once:
+                return found
             return self._read_anew(start)
         except KembaError as error:
             why = f"the earlier plan does not fit this model: {error}"
             return Refined(None, None, Ending.UNSUITABLE, 0, reason=why)
+        except ContradictionError as error:
+            return Refined(None, None, Ending.UNSUITABLE, 0, reason=str(error))
         except ValueError as error:
             return Refined(None, None, Ending.UNSUITABLE, 0, reason=f"the model {error}")
 
@@ -150,11 +152,6 @@ class Continuation:
         phases = noted_phases(start.meta, constraints, valves, len(start) - 1)
         if phases is None:
             return
-        if self.task.landing.air:
-            apex = apex_node(self.requirements, len(start) - 1)
-            extends = extending(self.model, reduction)
-            air = self.task.landing.air
-            start, phases = stretched(start, phases, constraints, extends, apex, air)
         marks = [r.at for r in self.requirements if r.at is not None]
         stages, nodes = self.origin.stages, self.task.nodes
         if stages is not None and tuple(phases) == stages.phases and stages.nodes <= nodes:

@@ -1,4 +1,4 @@
-"""Equalities at one node: which of them are linearly independent."""
+"""Equalities at one node: which of them are linearly independent, and whether the others agree."""
 
 from __future__ import annotations
 
@@ -8,6 +8,13 @@ import numpy as np
 from kemba.ocp.phases.settings import ModeConstraints
 from kemba.ocp.phases.view import View
 
+AGREES = 1e-4  # of a scaled quantity; a dependent equality with another value contradicts the rest
+STEPS = 10  # of Gauss and Newton to a point on the equalities
+
+
+class ContradictionError(ValueError):
+    """An equality that asks for another value than those from which it follows."""
+
 
 class Independent:
     """Equalities at one node, by their gradients with respect to (q, v, s) at a guess.
@@ -16,26 +23,50 @@ class Independent:
     """
 
     def __init__(self, guess: dict[str, np.ndarray]) -> None:
-        self.guess = guess
+        self.guess = np.concatenate([guess[x] for x in ("q", "v", "s")])
         self.basis: list[np.ndarray] = []
+        self.kept: list[ca.Function] = []
 
-    def adds(self, g: ca.SX, view: View) -> bool:
+    def adds(self, g: ca.SX, view: View, what: str) -> bool:
         """Whether g = 0 (g is a scalar) is independent of the equalities so far; if so it joins
-        them."""
-        row = self.rest(g, view)
-        if row is None:
-            return False
-        self.basis.append(row / np.linalg.norm(row))
-        return True
+        them. Raises ContradictionError, which names `what` is asked, where these exclude it."""
+        equality = _with_slope(g, view)
+        row = self._rest(equality)
+        if row is not None:
+            self.basis.append(row / np.linalg.norm(row))
+            self.kept.append(equality)
+            return True
+        if abs(self._left(equality)) > AGREES:
+            raise ContradictionError(f"the order of contacts and stops excludes {what}")
+        return False
 
-    def rest(self, g: ca.SX, view: View) -> np.ndarray | None:
-        """The part (n,) of the gradient of a scalar g that is orthogonal to all others; None if
-        zero."""
-        z = view.z("q v s")
-        slope = ca.Function("slope", [z], [ca.densify(ca.jacobian(g, z))])
-        row = np.array(slope(np.concatenate([self.guess[x] for x in ("q", "v", "s")]))).ravel()
+    def grants(self, g: ca.SX, view: View) -> bool:
+        """Whether the equalities so far decide a scalar g."""
+        return self._rest(_with_slope(g, view)) is None
+
+    def _rest(self, equality: ca.Function) -> np.ndarray | None:
+        """The part (n,) of the gradient that is orthogonal to all others; None if zero."""
+        row = np.array(equality(self.guess)[1]).ravel()
         size = float(np.linalg.norm(row))
         for b in self.basis:
             row = row - (row @ b) * b
         small = ModeConstraints.current().independent
         return None if np.linalg.norm(row) <= small * max(size, small) else row
+
+    def _left(self, equality: ca.Function) -> float:
+        """The value of an equality at the point near the guess at which all others hold."""
+        x = self.guess
+        for _ in range(STEPS if self.kept else 0):
+            parts = [kept(x) for kept in self.kept]
+            left = np.array([float(value) for value, _ in parts])
+            if np.abs(left).max() < AGREES * AGREES:
+                break
+            slopes = np.vstack([np.array(slope) for _, slope in parts])
+            x = x - np.linalg.lstsq(slopes, left, rcond=None)[0]
+        return float(equality(x)[0])
+
+
+def _with_slope(g: ca.SX, view: View) -> ca.Function:
+    """A scalar g and its gradient (1, n) as a function of (q, v, s)."""
+    z = view.z("q v s")
+    return ca.Function("equality", [z], [ca.densify(g), ca.densify(ca.jacobian(g, z))])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
 
 import casadi as ca
 import numpy as np
@@ -14,7 +13,6 @@ from kemba.ocp.phases.modes import AHEAD, BACK, HELD, OPEN
 from kemba.ocp.phases.program import PhaseProgram, Where
 from kemba.ocp.phases.radau import STATE
 from kemba.ocp.phases.settings import ModeConstraints
-from kemba.ocp.phases.stretched import extending, rising, stretching
 from kemba.ocp.phases.view import View
 from kemba.ocp.task.requirement import SCALES
 from kemba.ocp.transcription.first_node import state_rows
@@ -140,7 +138,7 @@ def _start(
         rows.append(("slip", constraint.friction.slip, SPEED))
     for name, expression, scale in rows:
         g = view.of(expression) / scale
-        if start.adds(g, view):
+        if start.adds(g, view, f"that {constraint.label} is closed at first"):
             program.add(f"{constraint.label} first {name}", view.z("q v"), g, 0.0, 0.0, [at])
 
 
@@ -150,7 +148,7 @@ def _first_state(program: PhaseProgram, view: View, start: Independent) -> None:
     at = np.concatenate([first[g] for g in STATE])
     for row in state_rows(node, reduction.pairs, reduction.limits):
         g = view.of(row.expression) / (LENGTH if row.unit == "m" else row.scale)
-        if start.rest(g, view) is not None:
+        if not start.grants(g, view):
             program.add(f"{row.label} first", view.z("q v s"), g, 0.0, INF, [at])
 
 
@@ -175,21 +173,9 @@ def _durations(program: PhaseProgram) -> None:
     columns = [program.columns.h[:, 0]]
     low, high = 1 - task.step_variation, 1 + task.step_variation
     program.add("duration", h, sum(lasting), low, high, columns)
-    _air(program, h, lasting)
     for valve in range(len(phases[0].valves)):
         places = [phase.valves[valve] for phase in phases]
         switches = [p for p in range(1, len(phases)) if places[p] != places[p - 1]]
         for a, b in itertools.pairwise(switches):
             dwell = sum(lasting[a:b], ca.SX(0))
             program.add("dwell", h, dwell, task.min_dwell / task.duration, INF, columns)
-
-
-def _air(program: PhaseProgram, h: ca.SX, lasting: Sequence[ca.SX]) -> None:
-    """Air is let onto the legs for long enough, in the phases of the rise that do so."""
-    air, extends = program.task.landing.air, extending(program.model, program.reduction)
-    flight = rising(program.phases, program.constraints, program.apex)
-    pulses = [p for p in flight if stretching(program.phases[p], extends)]
-    if air and pulses:
-        total = sum((lasting[p] for p in pulses), ca.SX(0))
-        low = air / program.task.duration
-        program.add("landing.air", h, total, low, INF, [program.columns.h[:, 0]])

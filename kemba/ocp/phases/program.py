@@ -16,6 +16,7 @@ from kemba.ocp.phases.columns import Columns
 from kemba.ocp.phases.modes import OPEN, Phase
 from kemba.ocp.phases.radau import STATE, Scheme, element, impact
 from kemba.ocp.phases.settings import Elements
+from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.layout import Layout
 from kemba.ocp.transcription.symmetry import Reduction
@@ -93,6 +94,7 @@ class PhaseProgram:
         self.element = element(model, self.layout, reduction, task.cost, scheme)
         self.jump = impact(model, self.layout, reduction)
         self.added: list[PhasePart] = []
+        self.requirements: Sequence[Requirement] = ()
         self.apex = 0  # the node after which impacts are those of the landing
 
     def _closes(self, p: int) -> bool:

@@ -22,6 +22,7 @@ def add_requirements(
 ) -> None:
     """Bounds where a requirement is about a variable, else rows; none where modes imply it."""
     view = View(program)
+    program.requirements = requirements
     program.apex = apex_node(requirements, program.nodes)
     _granted_at_end(program, view, end)
     seen: set[tuple[object, ...]] = set()
@@ -36,11 +37,12 @@ def add_requirements(
             at = _columns(program, requirement.node(program.nodes), full=True)
             program.add_cost(z, aim_cost(requirement, g), at)
         last = program.nodes
-        acts = ca.depends_on(g, view.z("u lam"))
-        nodes = requirement.nodes(last, int(acts))
-        if requirement.at is not None and requirement.lower == requirement.upper and not acts:
+        nodes = requirement.nodes(last)
+        fixed = requirement.at is not None and requirement.lower == requirement.upper
+        if fixed and not requirement.acts:
             moment = {0: start, last: end}.get(nodes[0])
-            if moment is not None and not moment.adds(g, view):
+            left = (g - requirement.lower) / requirement.scale
+            if moment is not None and not moment.adds(left, view, f"`{requirement.text}`"):
                 continue
         _put(program, view, requirement, g, nodes)
 
@@ -91,7 +93,8 @@ def _granted_at_end(program: PhaseProgram, view: View, end: Independent) -> None
     for constraint, mode in zip(program.constraints, program.phases[-1].modes, strict=True):
         if mode == 0:
             continue
-        end.adds(view.of(constraint.gap), view)
-        end.adds(view.of(constraint.rate), view)
+        granted = [constraint.gap, constraint.rate]
         if constraint.friction is not None and mode == HELD:
-            end.adds(view.of(constraint.friction.slip), view)
+            granted.append(constraint.friction.slip)
+        for expression in granted:
+            end.adds(view.of(expression), view, f"that {constraint.label} is closed at the end")

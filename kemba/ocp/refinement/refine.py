@@ -13,7 +13,7 @@ from kemba.ocp.certificate.certify import Certificate
 from kemba.ocp.certificate.grazing import LASTS
 from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.nlp.ipopt import Control, Iterate
-from kemba.ocp.phases.independent import Independent
+from kemba.ocp.phases.independent import ContradictionError, Independent
 from kemba.ocp.phases.mode_constraints import add_mode_constraints
 from kemba.ocp.phases.modes import Phase, read_phases
 from kemba.ocp.phases.program import PhaseProgram
@@ -91,6 +91,8 @@ def refine(
     refiner = Refiner(model, task, requirements, plan, reduction, control or Control(), tell)
     try:
         return refiner.run()
+    except ContradictionError as error:
+        return Refined(None, None, Ending.UNSUITABLE, refiner.iterations, reason=str(error))
     except ValueError as error:
         return Refined(None, None, Ending.UNSUITABLE, 0, reason=f"the model {error}")
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
-from kemba.ocp.certificate.certify import Certificate, Violation, first_state
+from kemba.ocp.certificate.asked import measured
+from kemba.ocp.certificate.certify import Certificate, Violation, first_state, violations
 from kemba.ocp.phases.notes import phase_notes
 from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.radau import STATE
@@ -117,12 +118,14 @@ def certificate(program: PhaseProgram, x: np.ndarray, trajectory: Trajectory) ->
     boxes = np.maximum(program.lower - x, x - program.upper)
     start = arrays(program.model, trajectory)
     first = first_state(program.model, *(start[name][0] for name in STATE))
+    asked = measured(program.model, program.task, program.requirements, trajectory)
     return Certificate(
         complementarity=_complementarity(program, trajectory),
         binary=0.0,  # valves are rounded constants of their phase
         dynamics=float(np.max(over[physics], initial=0.0)),
         bounds=max(float(np.max(part, initial=0.0)) for part in (boxes, over[~physics], -first)),
-        worst=tuple(found),
+        worst=(*violations(asked), *found)[:WORST],
+        asked=asked,
     )
 
 

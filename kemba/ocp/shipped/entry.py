@@ -48,32 +48,20 @@ class Entry:
 
     @property
     def effects(self) -> dict[str, dict[str, Any]]:
-        """The figures of fitted air with which it was made, as a task's `effects`; empty without
-        a fit."""
-        return dict(self.plan.meta["effects"]) if self.fitted_air else {}
-
-    @property
-    def fitted_air(self) -> dict[str, Any] | None:
-        """The fit itself, as certificates have it; None also where it changes nothing."""
-        return kept_fit(self.plan)
+        """The parameters of effects with which it was made, where they are not the model's, as a
+        task's `effects`."""
+        return dict(self.plan.meta.get("effects", {}))
 
     @property
     def way(self) -> str:
-        """The order of its valves and contacts and its fitted air: what a plan has in common with
-        one that begins from it."""
-        modes = [str(phase).partition(" ")[2] for phase in self.plan.meta["phases"]]
-        return json.dumps([modes, self.effects], sort_keys=True)
+        """The order of its valves and contacts: what a plan has in common with one that begins
+        from it."""
+        return json.dumps([str(phase).partition(" ")[2] for phase in self.plan.meta["phases"]])
 
     @property
     def name(self) -> str:
         """The name of its file, without the ending."""
         return self.file.stem
-
-
-def kept_fit(plan: Trajectory) -> dict[str, Any] | None:
-    """The fit of a kept plan's air; None where there is none, or no factor differs from 1."""
-    fit: dict[str, Any] | None = plan.meta.get("fitted_air")
-    return fit if fit and any(factor != 1.0 for factor in fit["factors"].values()) else None
 
 
 def write_plan(

@@ -15,7 +15,7 @@ FIGURES = ("height", "distance", "supply", "payload", "duration")
 # What says how a plan is made, named or judged, but not what is asked of it.
 APART = (
     *("name", "notes", "model", "plant", "effects", "nodes", "hold", "robust", "uncertainties"),
-    *("grip", "feet", "guess", "guess_noise", "seed", "fit_air", "solver", "tolerances"),
+    *("grip", "feet", "guess", "guess_noise", "seed", "solver", "tolerances"),
 )
 LETTERS = 12  # of a fingerprint
 
@@ -24,10 +24,10 @@ def kind_of(task: Task, model: Model) -> str:
     """A fingerprint of everything but the figures: what is asked, of which robot and effects.
 
     Payload and supply pressure are figures; any other parameter of an effect is part of the kind.
-    `landing.air` is none: a plan with it meets a task that does not ask for it, and one without
-    gets its pulse when it is continued. Nor is `grip`, for the same reason.
+    `grip` is none: a plan with it meets a task that does not ask for it, and one without gets it
+    when it is continued.
     """
-    apart = dict.fromkeys((*FIGURES, *APART), True) | {"landing": {"air"}}
+    apart = dict.fromkeys((*FIGURES, *APART), True)
     asked = task.model_dump(mode="json", exclude=apart, exclude_none=True)
     robot = model.mechanism.robot
     physics = {

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from math import ceil, floor
 
@@ -35,6 +35,8 @@ class Requirement:
     `during` (fractions of the nodes; the whole motion by default).
 
     `aim`: 1 where the quantity is to be as large as possible, -1 as small as possible, else 0.
+    `acts`: whether it is an input or a force, which act on the interval before a node, or depends
+    on one. `line`: the place in the task's file, `jump.yaml:31`.
     """
 
     location: Location
@@ -44,6 +46,8 @@ class Requirement:
     upper: float
     during: tuple[float, float] = (0.0, 1.0)
     aim: int = 0
+    acts: bool = False
+    line: str = field(default="", compare=False)
 
     @property
     def scale(self) -> float:
@@ -57,15 +61,16 @@ class Requirement:
         return written(self.location)
 
     def node(self, nodes: int) -> int:
-        """The node at which it holds."""
-        return round((self.at or 0.0) * nodes)
+        """The node at which it holds; what acts has none before the first interval's end."""
+        return max(int(self.acts), round((self.at or 0.0) * nodes))
 
-    def nodes(self, count: int, first: int = 0) -> list[int]:
-        """The nodes at which it holds on a grid of `count`, from `first` on."""
+    def nodes(self, count: int) -> list[int]:
+        """The nodes at which it holds on a grid of `count`: at least the nearest one."""
         if self.at is not None:
             return [self.node(count)]
         begin, end = (share * count for share in self.during)
-        return list(range(max(first, ceil(begin - ROUND)), floor(end + ROUND) + 1))
+        inside = range(max(int(self.acts), ceil(begin - ROUND)), floor(end + ROUND) + 1)
+        return list(inside) or [max(int(self.acts), round((begin + end) / 2))]
 
     @property
     def always(self) -> bool:
@@ -136,15 +141,23 @@ def resolve(
         except ValueError as error:
             if read:
                 errors.append(document.error((key,), f"{key}: {error}"))
-    if task.landing.air and read and (what := air_fault(task, apex)):
-        errors.append(document.error(("landing", "air"), f"landing.air: {what}"))
     if task.grip < 1.0 and task.refine == "none":
         errors.append(document.error(("grip",), f"grip: {UNREFINED}"))
     errors += cost_errors(task.cost, document)
     errors += option_errors(task.solver.options, document)
     if errors:
         raise ConfigErrors(errors)
-    return requirements
+    acting = _acting(model, {r.quantity.name for r in requirements})
+    return [
+        replace(r, acts=r.quantity.name in acting, line=document.place(r.location))
+        for r in requirements
+    ]
+
+
+def _acting(model: Model, names: Iterable[str]) -> set[str]:
+    """The quantities that inputs or forces decide."""
+    causes = ca.vertcat(model.node.u, model.node.lam)
+    return {n for n in names if ca.depends_on(ca.SX(quantity_expression(model, n)), causes)}
 
 
 Asked = tuple[Location, str, float | None, Bound | Goal]
@@ -256,13 +269,6 @@ def feet_at_apex(task: Task, model: Model, apex: Requirement | None) -> list[Req
         Requirement(("feet",), known[f"{leg}/foot/z"], apex.at, task.feet, math.inf)
         for leg in model.mechanism.legs
     ]
-
-
-def air_fault(task: Task, apex: Requirement | None) -> str | None:
-    """Why a task cannot have air on its legs in the rise of its flight, or None."""
-    if task.refine == "none":
-        return UNREFINED
-    return None if apex else "needs a goal for body/z at the top of the flight"
 
 
 def _number(task: Task, value: float | str, quantity: Quantity) -> float:

@@ -6,9 +6,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, PrivateAttr, model_validator
 
 from kemba.config import Document, FileName, Section, beside, parse
+from kemba.config.document import written
 from kemba.model.spec import Supply
 from kemba.quantity import Param
 
@@ -66,7 +67,7 @@ class Goal(Section):
 
 
 class Landing(Section):
-    """How the motion lands: how softly, and on legs that air has stretched."""
+    """How softly the motion lands."""
 
     impact_speed: (
         Annotated[
@@ -74,13 +75,6 @@ class Landing(Section):
             Param(
                 "m.s-1", lower=0.15, doc="at most, of feet on the ground and of legs at their stops"
             ),
-        ]
-        | None
-    ) = None
-    air: (
-        Annotated[
-            float,
-            Param("s", lower=0.0, upper=1.0, doc="extending valves open in the flight's rise"),
         ]
         | None
     ) = None
@@ -103,7 +97,9 @@ class Tolerances(Section):
 
     `apex`, `touchdown` and `final` hold for the replay on the same model, `table_...` for the
     controller's table on that model, `plant_...` for the table on the plant; a plan that ends
-    standing must land upright on all three.
+    standing must land upright on all three. A plant whose apex is off by what is allowed touches
+    down earlier or later by that length over the speed of the landing: so much is allowed unless
+    `plant_touchdown` says otherwise, 25 ms at most.
     """
 
     complementarity: Annotated[float, Param("1", lower=0.0)] = 1e-6
@@ -116,7 +112,9 @@ class Tolerances(Section):
     table_touchdown: Annotated[float, Param("s", lower=0.0, doc="touchdown of the table")] = 0.003
     table_final: Annotated[float, Param("m", lower=0.0, doc="where the table ends")] = 0.03
     plant_apex: Annotated[float, Param("m", lower=0.0, doc="apex on the plant")] = 0.05
-    plant_touchdown: Annotated[float, Param("s", lower=0.0, doc="touchdown on the plant")] = 0.015
+    plant_touchdown: (
+        Annotated[float, Param("s", lower=0.0, doc="touchdown on the plant; see above")] | None
+    ) = None
     plant_final: Annotated[float, Param("m", lower=0.0, doc="where the plant ends")] = 0.05
 
 
@@ -135,8 +133,6 @@ class Task(Section):
     how high the feet are at the top, and `height` is that and a stretched leg.
     `effects` changes parameters of the model's effects, by name or by place in its list:
     `{contact: {mu: 0.6}}`.
-    `fit_air`: where the plant does not move as planned, the air of the model is fitted to its
-    motion and the plan made again.
     `robust`: by how many scenarios, drawn from the file `uncertainties`, plans are chosen.
     """
 
@@ -171,8 +167,8 @@ class Task(Section):
     min_dwell: Annotated[float, Param("s", lower=0.0, doc="of a valve between switches")] = 0.01
     method: Literal["relaxation", "penalty", "penalty_ramped"] = "relaxation"
     refine: Literal["none", "radau"] = "radau"
-    fit_air: bool = True
     solver: Solver = Field(default_factory=Solver)
+    _retired: tuple[str, ...] = PrivateAttr(default=())
     tolerances: Tolerances = Field(default_factory=Tolerances)
 
     @model_validator(mode="after")
@@ -195,7 +191,8 @@ class Task(Section):
         named = {value for b in bounds for value in (b.equals, b.at_least, b.at_most)}
         given = (n for n in ("height", "distance") if getattr(self, n) is not None)
         hint = "changes nothing: no goal, bound, start or end refers to it"
-        return [f"`{name}` {hint}, as in `equals: {name}`" for name in given if name not in named]
+        idle = [f"`{name}` {hint}, as in `equals: {name}`" for name in given if name not in named]
+        return [*self._retired, *idle]
 
 
 def _last_height(document: Document) -> Document:
@@ -207,9 +204,37 @@ def _last_height(document: Document) -> Document:
     return document
 
 
+# keys of earlier versions: what an old file is told
+RETIRED = {
+    ("fit_air",): "plans are no longer bent to the simulated robot; learn from logs instead, or "
+    "plan with `model: fitted`, the air of the paper's tables fitted to its rigs",
+    ("landing", "air"): "it served plans that were bent to the simulated robot",
+}
+
+
+def _without_retired(document: Document) -> tuple[Document, tuple[str, ...]]:
+    """The document without keys of earlier versions, and a remark for each."""
+    remarks = []
+    for location, why in RETIRED.items():
+        *parents, key = location
+        holder = document.data
+        for parent in parents:
+            holder = holder.get(parent) if isinstance(holder, dict) else None
+        if not isinstance(holder, dict) or key not in holder:
+            continue
+        place = document.place(location)
+        remarks.append(f"{place + ': ' if place else ''}`{written(location)}` is ignored: {why}")
+        kept = {k: v for k, v in holder.items() if k != key}
+        data = {**document.data, parents[0]: kept} if parents else kept
+        document = replace(document, data=data)
+    return document, tuple(remarks)
+
+
 def parse_task(document: Document) -> Task:
     """The task of a document; its own models are looked for beside it first. Raises KembaError."""
-    task = parse(_last_height(document), Task)
+    document, retired = _without_retired(_last_height(document))
+    task = parse(document, Task)
+    task._retired = retired
     if not document.source:
         return task
     folder = Path(document.source).parent

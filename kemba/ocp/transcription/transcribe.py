@@ -193,14 +193,11 @@ class Transcription:
     def requirement_expressions(self) -> Iterator[tuple[Requirement, ca.SX, list[int]]]:
         """Every requirement with its expression in the stage's y and the nodes where it holds.
 
-        Those that the symmetry grants or repeats are left out, and those that hold at no node: a
-        short time on a coarse grid.
+        Those that the symmetry grants or repeats are left out.
         """
-        node = self.model.node
         seen: set[tuple[object, ...]] = set()
         for requirement in self.requirements:
-            expression = quantity_expression(self.model, requirement.quantity.name)
-            g = self.of_state(expression)
+            g = self.of_state(quantity_expression(self.model, requirement.quantity.name))
             key = (
                 requirement.location,
                 requirement.at,
@@ -212,11 +209,7 @@ class Transcription:
             if ca.jacobian(g, self.stage.y).nnz() == 0 or key in seen:
                 continue
             seen.add(key)
-            # inputs and forces act on the interval before a node, so the first node has none
-            acts = ca.depends_on(expression, ca.vertcat(node.u, node.lam))
-            where = requirement.nodes(self.nodes, int(acts))
-            if where:
-                yield requirement, g, where
+            yield requirement, g, requirement.nodes(self.nodes)
 
     def _tighten(
         self, where: list[int], variable: tuple[int, float, float], requirement: Requirement

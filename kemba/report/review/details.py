@@ -6,9 +6,9 @@ from collections.abc import Iterable, Mapping
 from html import escape
 from typing import Any
 
-from kemba.report.judging.verdict import EXECUTIONS
 from kemba.report.review.html import Rows, folded, pairs
 from kemba.runs import Run
+from kemba.solve.verdict import EXECUTIONS
 
 Facts = Mapping[str, Any]
 

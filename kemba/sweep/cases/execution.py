@@ -95,8 +95,7 @@ def _run_folder(expansion: Expansion, run: str) -> Path:
 def _plan_folder(expansion: Expansion, name: str, block: ExecuteBlock, folder: Path) -> Path:
     """The folder of the plan to execute. Raises KembaError when there is no good plan."""
     from kemba.ocp.task.task import parse_task
-    from kemba.report import Approach, Listener
-    from kemba.report.best import best_plan
+    from kemba.solve import Approach, Listener, best_plan
 
     if block.run is not None:
         run = load_run(_run_folder(expansion, block.run))

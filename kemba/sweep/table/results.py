@@ -30,7 +30,7 @@ FORMULA = (
 FIGURES = (
     "status", "good", "sentence", "apex_m", "apex_error_m", "touchdown_error_s", "final_error_m",
     "fault", "pitch_rad", "duration_s", "solve_s", "solve_cpu_s", "build_s", "wall_s", "cpu_s",
-    "iterations", "variables", "start", "refined", "replays", "fitted",
+    "iterations", "variables", "start", "refined", "replays",
 )  # fmt: skip
 
 

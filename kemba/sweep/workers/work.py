@@ -8,13 +8,11 @@ from kemba.sweep.cases.case import Record, Work
 def solve_case(work: Work) -> Record:
     """Plan a task as `kemba-opt solve` does, and execute it; the figures of its certificate.
 
-    `replays`: the plan's inputs and its table come out as planned on the plan's own model;
-    `fitted`: the air of that model is fitted to the plant.
+    `replays`: the plan's inputs and its table come out as planned on the plan's own model.
     """
     from kemba.config import Document, parse
     from kemba.ocp import Task
-    from kemba.report import Approach, Listener
-    from kemba.report.best import best_plan
+    from kemba.solve import Approach, Listener, best_plan
 
     approach = Approach(cold=work["cold"], replay=work["replay"])
     task, document = parse(work["task"], Task), Document(work["task"])
@@ -29,7 +27,6 @@ def solve_case(work: Work) -> Record:
         **{key: best.result[key] for key in kept},
         "refined": best.plan.refined,
         "replays": done is not None and done.replays,
-        "fitted": "fitted_air" in best.result,
     }
 
 

@@ -1,4 +1,4 @@
-"""A plan with its controller table, executed on its own model and on the plant, and judged."""
+"""A trial: a plan with its controller table, executed and judged, and its score."""
 
 from __future__ import annotations
 
@@ -12,26 +12,27 @@ from kemba.ocp.certificate.objective import objective
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.report import answer, sentence_of
 from kemba.plant.execution.counterpart import another_robot
-from kemba.plant.execution.fitted_air import FittedAir
 from kemba.plant.execution.retiming import retimed
-from kemba.report.judging.judged import Judged, judged
-from kemba.settings import Settings, setting
-from kemba.stopwatch import Tell
+from kemba.solve.judged import Judged, judged
+from kemba.stopwatch import Tell, silent
 from kemba.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from kemba.scenarios.share import Share
 
 Begun = Callable[[Trajectory], None]
+WELL = 0.5  # of what is allowed: a table that misses by more is worth edges on ticks
 
 
-class TableSettings(Settings):
-    """When the table of a good plan is worth another plan with valve edges on its ticks."""
+@dataclass(frozen=True)
+class Execution:
+    """How plans are executed: whether they are at all, who is told, who gets each plan before
+    (`begun`), and the run folder in the answer."""
 
-    well: float = setting(
-        0.5, "1", "of what is allowed: 1 mm of apex, 1.5 ms of touchdown by default",
-        "derived: apex within 1 mm is asked of tables from 0.36 to 0.9 m",
-    )  # fmt: skip
+    replay: bool = True
+    tell: Tell = silent
+    begun: Begun = lambda plan: None
+    place: str = ""
 
 
 @dataclass(frozen=True)
@@ -43,19 +44,39 @@ class Motions:
 
 
 @dataclass(frozen=True)
-class Executed:
+class Trial:
     """A plan, its entries in the JSON with those of its executions, what is written, and how the
-    executions were judged where there were any."""
+    executions were judged where there were any. `repair`: by what it comes of the trial before."""
 
     plan: Plan
     result: dict[str, Any]
     motions: Motions
     judged: Judged | None = None
+    repair: str = ""
+
+    def __str__(self) -> str:
+        """One line: where it began, what was repaired, how good it is."""
+        cost = objective(
+            self.plan.model, self.plan.task, self.plan.requirements, self.plan.trajectory
+        )
+        parts = [self.plan.start, self.repair, str(self.result["status"]), f"cost {cost:.4g}"]
+        if self.misses:
+            parts.append(f"misses {self.misses:.2g} of what is allowed")
+        return ", ".join(part for part in parts if part)
 
     @property
     def good(self) -> bool:
         """Whether it is solved and its executions confirm it."""
         return bool(self.result["good"])
+
+    @property
+    def table_misses(self) -> bool:
+        """Whether of its own model's executions only that of the table misses."""
+        return (
+            self.judged is not None
+            and self.judged.verdicts["replay"].good
+            and not self.judged.replays
+        )
 
     @property
     def misses(self) -> float:
@@ -66,7 +87,7 @@ class Executed:
         if not self.good:
             return self.judged.share
         table = self.judged.verdicts["table_replay"].share
-        return table if table > TableSettings.current().well else 0.0
+        return table if table > WELL else 0.0
 
     @property
     def fine(self) -> bool:
@@ -74,7 +95,7 @@ class Executed:
         return self.good and self.misses == 0.0
 
     @property
-    def rank(self) -> tuple[bool, bool, bool, float, float]:
+    def score(self) -> tuple[bool, bool, bool, float, float]:
         """Better ones are greater: good, a plan at all, true on its own model; by what executions
         miss; by cost."""
         found = self.plan
@@ -85,42 +106,35 @@ class Executed:
 
 def executed(
     found: Plan,
-    table: Trajectory | None,
-    share: Share | None,
-    replay: bool,
-    tell: Tell,
-    begun: Begun,
-    place: str = "",
-) -> Executed:
-    """A plan with its table and, if `replay`, its executions; `begun` gets it before these.
-
-    `place`: the run folder in the answer.
-    """
-    result = answer(found, place)
+    execution: Execution,
+    table: Trajectory | None = None,
+    share: Share | None = None,
+    repair: str = "",
+) -> Trial:
+    """A plan with its table and, if asked for, its executions."""
+    result = answer(found, execution.place)
     if table is None and found.attempts:
         table = controller_table(found.model, found.trajectory, found.task.hold)
     if table is not None:
-        begun(found.trajectory)
-    if table is None or not replay or not found.status.plan:
-        return Executed(found, result, Motions(table))
-    tell("replay: the times of controller.csv")
+        execution.begun(found.trajectory)
+    if table is None or not execution.replay or not found.status.plan:
+        return Trial(found, result, Motions(table), repair=repair)
+    execution.tell("replay: the times of controller.csv")
     known = None
     if share is None:
         near = retimed(found.model, found.trajectory, table)
         table, known = near.table, near.replay
     done: Judged | None = None
     try:
-        done = judged(found, table, tell=tell, known=known)
+        done = judged(found, table, tell=execution.tell, known=known)
         result |= {**done.facts, **_confirmed(found, done)}
     except KembaError as error:  # a model that the simulator cannot execute still has its plan
         result |= _unconfirmed(found, f"it cannot be simulated: {error}")
-    if found.fitted_air:
-        fit = FittedAir(**found.fitted_air)
-        result |= {"fitted_air": fit.summary(), "sentence": f"{result['sentence']}; {fit.sentence}"}
     if share is not None:
         result |= {"robust": share.summary()}
         result["sentence"] += f"; {share.sentence}"
-    return Executed(found, result, Motions(table, done.motion if done else None), done)
+    motions = Motions(table, done.motion if done else None)
+    return Trial(found, result, motions, done, repair)
 
 
 def _confirmed(found: Plan, done: Judged) -> dict[str, Any]:

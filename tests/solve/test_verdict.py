@@ -12,9 +12,9 @@ from typer.testing import CliRunner
 
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.task.task import Tolerances
-from kemba.report.judging.executed import Executed, Motions
-from kemba.report.judging.judged import Judged
-from kemba.report.judging.verdict import Verdict, verdicts
+from kemba.solve.judged import Judged
+from kemba.solve.trial import Executed, Motions
+from kemba.solve.verdict import Verdict, verdicts
 from kemba_cli.main import app
 
 LANDED = {
@@ -96,7 +96,7 @@ def run(plant: float, table: float, good: bool) -> Executed:
 
 
 def test_of_plans_that_fail_the_nearest_is_best(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("kemba.report.judging.executed.objective", lambda *parts: 1.0)
+    monkeypatch.setattr("kemba.solve.trial.objective", lambda *parts: 1.0)
     far, near = run(7.6, 0.1, False), run(1.7, 0.1, False)
     assert near.rank > far.rank
     good, exact = run(0.9, 0.8, True), run(0.9, 0.1, True)

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from kemba.model import Model
 from kemba.ocp import Plan, Task, controller_table
+from kemba.ocp.certificate.asked import Measured, on_execution
 from kemba.plant.execution.certificate import executions, plant_run, summaries
 from kemba.plant.execution.counterpart import counterpart
 from kemba.plant.execution.replay import Replay, ends_standing
 from kemba.plant.execution.retiming import ExecutedTable, retimed
-from kemba.report.judging.verdict import Verdict, verdicts
+from kemba.solve.verdict import EXECUTIONS, Allowed, Verdict, allowances, judge
 from kemba.stopwatch import Tell, silent
 from kemba.trajectory import Trajectory
+
+OWN = ("replay", "table_replay")  # the executions on the plan's own model
 
 
 @dataclass(frozen=True)
@@ -40,7 +45,7 @@ class Judged:
     @property
     def replays(self) -> bool:
         """Whether the executions on the plan's own model do."""
-        return all(self.verdicts[name].good for name in ("replay", "table_replay"))
+        return all(self.verdicts[name].good for name in OWN)
 
 
 def plant_of(task: Task) -> Model:
@@ -69,7 +74,25 @@ def judged(
     model, plan, task = found.model, found.trajectory, found.task
     done = executions(model, plan, table, plant or plant_of(task), tell, known)
     facts = summaries(model, done)
+    limits = allowances(task.tolerances, bool(ends_standing(model, plan)), landing_speed(plan))
+    verdicts = {
+        key: judge(
+            EXECUTIONS[key], facts[key], limits[key], asked_of(found, done[key], limits[key])
+        )
+        for key in EXECUTIONS
+    }
     there = done["plant_replay"]
-    lands = bool(ends_standing(model, plan))
-    judgements = verdicts(facts, task.tolerances, lands)
-    return Judged(facts, judgements, plant_run(there) if there else None)
+    return Judged(facts, verdicts, plant_run(there) if there else None)
+
+
+def asked_of(found: Plan, done: Replay | None, allowed: Allowed) -> Sequence[Measured]:
+    """What the task asks of lengths and angles, measured on an execution."""
+    if done is None:
+        return ()
+    may = allowed.apex, allowed.final, allowed.touchdown
+    return on_execution(found.requirements, found.trajectory, done.trajectory, *may)
+
+
+def landing_speed(plan: Trajectory) -> float:
+    """How fast [m/s] the body of a plan falls at most after its apex."""
+    return max(0.0, -float(plan["body/vz"][int(np.argmax(plan["body/z"])) :].min()))

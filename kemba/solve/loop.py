@@ -1,4 +1,12 @@
-"""The plan that `solve` gives: from shipped plans or a guess, executed, the best of several."""
+"""The plan that `solve` gives: starts, each planned, executed and repaired, until one is good.
+
+for each start:                     an earlier plan, shipped plans nearby, a guess
+    plan from it                    kemba.ocp
+    for each repair:                nothing, edges on ticks, another guess
+        execute and judge           kemba.solve.trial
+    stop if the best trial is good
+give the trial of the best score
+"""
 
 from __future__ import annotations
 
@@ -19,10 +27,9 @@ from kemba.ocp.reading import task_model
 from kemba.ocp.shipped.kind import figures_of
 from kemba.ocp.shipped.shelf import Near, neighbours
 from kemba.ocp.starts import plan_best
-from kemba.report.earlier import fit_of, without_fit
-from kemba.report.judging.executed import Begun, Executed, executed
-from kemba.report.judging.matched import matched, summed
-from kemba.report.listener import Listener
+from kemba.solve.listener import Listener
+from kemba.solve.repairs import repaired, summed
+from kemba.solve.trial import Begun, Execution, Trial, executed
 from kemba.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -72,34 +79,37 @@ def best_plan(
     listener: Listener,
     begun: Begun | None = None,
     place: str = "",
-) -> Executed:
+) -> Trial:
     """The plan of a task, executed and judged: the first good one, or the best of all tried.
 
     `begun` gets each plan before it is executed, at last the one that is returned. `place`: the
     run folder in the answer. Raises KembaError where the task or a file is wrong.
     """
     begun = begun or (lambda plan: None)
-    best: Executed | None = None
-    bare = without_fit(task, fit_of(task, approach.origin))
+    execution = Execution(approach.replay, listener.tell, begun, place)
+    best = last = None
     for one in _candidates(task, document, approach, listener):
-        how = approach.replay, listener.tell, begun, place
-        made = last = executed(one.plan, one.table, one.share, *how)
-        if approach.replay and not (made.fine or (made.good and one.share)):
-            # without fitted air, which remedies add themselves
-            asked = one.plan.task.model_copy(update={"effects": bare.effects})
-            words = asked, document, listener, begun, approach.log, place
-            made, last = improved(made, *words, guess=one.last)
+        first = executed(one.plan, execution, one.table, one.share)
+        if not approach.replay or (first.good and one.share):
+            trials = iter((first,))
+        else:
+            how = {**_how(listener), "log": approach.log}
+            trials = repaired(first, one.plan.task, document, how, execution, one.last)
+        made: Trial | None = None
+        for last in trials:
+            made = last if made is None or last.score[:4] > made.score[:4] else made
+        assert made is not None
         if one.share is not None and made.plan is not one.plan:
-            from kemba.report.robust import with_share
+            from kemba.solve.robust import with_share
 
             made = with_share(made)
-        best = made if best is None else max(best, made, key=lambda made: made.rank)
+        best = made if best is None else max(best, made, key=lambda trial: trial.score)
         if best.good and approach.starts == 1:
             break
     assert best is not None
     if best is not last and best.motions.table is not None:
         begun(best.plan.trajectory)
-    known, remark = compared(best.plan, bare)
+    known, remark = compared(best.plan, task)
     if best.plan.continued is False and best.plan.start.startswith("shipped"):
         remark += (
             "; it begins from a shipped plan: the earlier one is further, or does not come true"
@@ -108,28 +118,8 @@ def best_plan(
     return best
 
 
-def improved(
-    first: Executed,
-    task: Task,
-    document: Document,
-    listener: Listener,
-    begun: Begun = lambda plan: None,
-    log: Path | None = None,
-    place: str = "",
-    guess: bool = True,
-) -> tuple[Executed, Executed]:
-    """The plan that comes true best of a first one and those made after it (`matched`), whatever
-    they cost; and the last one that was executed."""
-    best = last = first
-    for last in matched(first, task, document, listener, begun, log, place, guess):
-        best = max(best, last, key=lambda one: one.rank[:4])
-    return best, last
-
-
-def _tried_first(origin: Origin, task: Task) -> bool:
-    """Whether an earlier plan is tried in one step, before shipped plans that are near the task:
-    where none of them is nearer."""
-    return bool(neighbours(task, task_model(task))) and not shelf_is_nearer(origin.figures, task)
+def _how(listener: Listener) -> dict[str, Any]:
+    return {"watch": listener.watch, "stop": listener.stop, "tell": listener.tell}
 
 
 def shelf_is_nearer(figures: Mapping[str, float], task: Task) -> bool:
@@ -139,26 +129,31 @@ def shelf_is_nearer(figures: Mapping[str, float], task: Task) -> bool:
     return any(n.apart < own for n in neighbours(task, model))
 
 
+def _tried_first(origin: Origin, task: Task) -> bool:
+    """Whether an earlier plan is tried in one step, before shipped plans that are near the task:
+    where none of them is nearer."""
+    return bool(neighbours(task, task_model(task))) and not shelf_is_nearer(origin.figures, task)
+
+
 def _candidates(
     task: Task, document: Document, approach: Approach, listener: Listener
 ) -> Iterator[PlanCandidate]:
     """Plans of a task, made when asked for: from the earlier plan, from shipped plans, from
     a guess or from the earlier plan in many steps; last are those that cost so much more than the
     shipped plans they begin from that a guess is likely to cost less."""
-    how: dict[str, Any] = {"watch": listener.watch, "stop": listener.stop, "tell": listener.tell}
-    fit = fit_of(task, approach.origin)
+    how = _how(listener)
 
     def plans(task: Task) -> Iterator[PlanCandidate]:
-        origin, bare = approach.origin, without_fit(task, fit)
+        origin = approach.origin
         shelved = approach.start is None and not approach.cold
-        if origin is not None and shelved and _tried_first(origin, bare):
+        if origin is not None and shelved and _tried_first(origin, task):
             once = replace(origin, once=True)
             near, _ = plan_from(once, task, document, approach.log, **how)
             if near is not None:
-                yield PlanCandidate(replace(near, fitted_air=fit))
+                yield PlanCandidate(near)
                 origin = None
         late = []
-        for one, entry in plans_nearby(bare, document, approach.log, **how) if shelved else ():
+        for one, entry in plans_nearby(task, document, approach.log, **how) if shelved else ():
             candidate = PlanCandidate(one if approach.free else replace(one, continued=False))
             if dear(one, entry.cost):
                 late.append(candidate)
@@ -172,23 +167,21 @@ def _candidates(
         if a.starts > 1 and a.free:
             return plan_best(task, document, a.starts, a.jobs, a.log, listener.tell)
         found = plan(task, document, log=a.log, start=a.start, origin=origin, **how)
-        found = replace(found, fitted_air=fit)
         left = a.origin is not None and origin is None
         return from_scratch(found, "the simulated robot does not follow it") if left else found
 
     if approach.replay and task.robust > 0:
-        from kemba.report.robust import most_robust  # loads SciPy, which most plans do not need
+        from kemba.solve.robust import most_robust  # loads SciPy, which most plans do not need
 
         def changed(found: Plan, task: Task) -> Plan | None:
-            bare = without_fit(task, found.fitted_air)
-            if shelf_is_nearer(figures_of(found.task, found.model), bare):
-                for one, _ in plans_nearby(bare, document, approach.log, **how):
+            if shelf_is_nearer(figures_of(found.task, found.model), task):
+                for one, _ in plans_nearby(task, document, approach.log, **how):
                     return replace(summed(found, one), start=one.start)
             names = "the plan as asked", "other starts (--starts 4) may take less"
             known = found.trajectory, found.model, found.requirements
             origin = Origin(*known, *names, once=True, stages=found.stages)
             new, _ = plan_from(origin, task, document, approach.log, **how)
-            return new and replace(summed(found, new), fitted_air=found.fitted_air)
+            return new and summed(found, new)
 
         found = most_robust(task, lambda task: next(plans(task)).plan, changed, listener.tell)
         yield PlanCandidate(found.plan, found.table, found.share, last=True)

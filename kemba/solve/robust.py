@@ -9,11 +9,11 @@ from kemba.model import Model
 from kemba.ocp import Plan, Task
 from kemba.ocp.certificate.status import Status
 from kemba.plant.stepping.family import share_equations
-from kemba.report.judging.executed import Executed
-from kemba.report.judging.judged import judged, plant_of, table_of
-from kemba.report.robust_ways import WAYS, Changed, RobustSettings, variants
 from kemba.scenarios.draw import Scenario, scenarios
 from kemba.scenarios.share import ScenarioOutcome, Share, outcomes, share, share_of
+from kemba.solve.judged import judged, plant_of, table_of
+from kemba.solve.robust_ways import WAYS, Changed, RobustSettings, variants
+from kemba.solve.trial import Trial
 from kemba.trajectory import Trajectory
 
 Solve = Callable[[Task], Plan]
@@ -143,7 +143,7 @@ class _Search:
         return replace(one, done=done)
 
 
-def with_share(found: Executed) -> Executed:
+def with_share(found: Trial) -> Trial:
     """A plan that was made again after its share was taken, with its own; the same where it has no
     table. Raises KembaError where the plant or the uncertainties are wrong."""
     plan, table = found.plan, found.motions.table

@@ -13,12 +13,12 @@ from kemba.ocp import Plan, Task, load_task
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.planning import plans_nearby
 from kemba.ocp.shipped.kind import figures_of
-from kemba.report.best import shelf_is_nearer
-from kemba.report.judging.judged import plant_of
-from kemba.report.robust import most_robust
-from kemba.report.robust_ways import gripping, least_grip, lifted, longer
 from kemba.scenarios.draw import Scenario, scenarios
 from kemba.scenarios.share import ScenarioOutcome, outcomes
+from kemba.solve.judged import plant_of
+from kemba.solve.loop import shelf_is_nearer
+from kemba.solve.robust import most_robust
+from kemba.solve.robust_ways import gripping, least_grip, lifted, longer
 
 
 @cache
@@ -113,7 +113,7 @@ def test_a_plan_that_fails_is_executed_in_all_scenarios_only_where_none_is_bette
         counts.append(len(given[3]))
         return outcomes(*given)
 
-    monkeypatch.setattr("kemba.report.robust.outcomes", noted)
+    monkeypatch.setattr("kemba.solve.robust.outcomes", noted)
     _, _, solve, _ = solving(0.84)
     task = asked(0.84, 20, tmp_path / "slippery.yaml")
     found = most_robust(task, solve, lambda *given: counts.append("changed"), lambda text: None)

@@ -1,0 +1,291 @@
+"""What a task asks, measured on a written motion: every requirement, by an evaluation of its own.
+
+The programs lower a requirement to bounds and rows, and leave out what follows from others. Nothing
+of that is used here: values come from the columns of the motion, and between nodes from its joints.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from kemba.model import Model
+from kemba.model.impact import felt
+from kemba.ocp.certificate.grip import grip_of
+from kemba.ocp.task.requirement import SCALES, Requirement, apex_node, quantity_expression
+from kemba.ocp.task.task import Task
+from kemba.ocp.transcription.solution import arrays, groups
+from kemba.ocp.transcription.symmetry import whole
+from kemba.ocp.transcription.unilateral import rigid_constraints
+from kemba.trajectory import Array, Trajectory
+
+BETWEEN = 4  # places in every interval at which bounds are looked at
+CLOSED = 1e-6  # m; a smaller gap touches
+
+
+@dataclass(frozen=True)
+class Measured:
+    """One requirement on a motion: the value furthest beyond its limits, or nearest to them.
+
+    `line`: where the task asks for it (`jump.yaml:31`); `text`: what it asks, `end.*/foot/z:
+    front/foot/z`; `value`, `lower`, `upper`, `allowed` in `unit`; `node`, `time_s`: where it is.
+    `allowed`: how far beyond its limits the value may be.
+    """
+
+    line: str
+    text: str
+    value: float
+    lower: float
+    upper: float
+    unit: str
+    allowed: float
+    scale: float
+    node: int
+    time_s: float
+
+    @property
+    def miss(self) -> float:
+        """How far the value is beyond its limits; infinite where there is none."""
+        over = max(self.lower - self.value, self.value - self.upper, 0.0)
+        return float(over) if np.isfinite(self.value) else np.inf
+
+    @property
+    def met(self) -> bool:
+        """Whether the requirement is kept."""
+        return self.miss <= self.allowed
+
+    @property
+    def sentence(self) -> str:
+        """What is asked and what is there: `end.body/z: body/z` (jump.yaml:31) is
+        0.441 m at 0.700 s, 0.5 m asked: 0.059 m off."""
+        asked, at = _range(self.lower, self.upper, self.unit), f"at {self.time_s:.3f} s"
+        line = f" ({self.line})" if self.line else ""
+        there, off = _with_unit(self.value, self.unit), _with_unit(self.miss, self.unit)
+        return f"`{self.text}`{line} is {there} {at}, {asked} asked: {off} off"
+
+    def json(self) -> dict[str, Any]:
+        """The entry of the certificate."""
+        return {
+            "line": self.line,
+            "text": self.text,
+            "value": self.value if np.isfinite(self.value) else None,
+            "lower": self.lower if np.isfinite(self.lower) else None,
+            "upper": self.upper if np.isfinite(self.upper) else None,
+            "unit": self.unit,
+            "met": self.met,
+        }
+
+
+def measured(
+    model: Model, task: Task, requirements: Sequence[Requirement], plan: Trajectory
+) -> tuple[Measured, ...]:
+    """Every requirement of a task on a plan, in the order of the task.
+
+    Nodes may miss by the task's tolerance of bounds; between them, where no program asks for
+    anything, lengths and angles of a bound by what the re-simulation may.
+    """
+    course = _Course.of(model, requirements, plan)
+    found = [_on_plan(requirement, task, plan, course) for requirement in requirements]
+    return (*found, *_of_the_task(model, task, requirements, plan))
+
+
+def on_execution(
+    asked: Sequence[Requirement],
+    plan: Trajectory,
+    real: Trajectory,
+    way: float,
+    end: float,
+    late: float,
+) -> tuple[Measured, ...]:
+    """The requirements on lengths and angles on an execution of a plan, by the plan's clock.
+
+    `way`, `end`: how far [m] the execution may be from the plan up to its landing, and from there
+    on; angles at an arm of `SCALES`. `late`: how much earlier or later [s] it may be, where a bound
+    begins or ends under way. Rates, forces and valves at one instant are not compared: an execution
+    that touches down a millisecond later has others.
+    """
+    clock, found = plan.time - plan.time[0], []
+    landed = min(_landing(plan, clock), clock[-1])
+    for requirement in asked:
+        quantity = requirement.quantity
+        if quantity.unit not in ("m", "rad") or quantity.name not in real:
+            continue
+        if requirement.lower == -np.inf and requirement.upper == np.inf:
+            continue
+        if requirement.at is not None:
+            time = np.array([clock[requirement.node(len(plan) - 1)]])
+            values = np.interp(time, real.time, real[quantity.name])
+        else:
+            at = requirement.nodes(len(plan) - 1)
+            begin, until = clock[at[0]] + late * (at[0] > 0), clock[at[-1]]
+            until -= late * (at[-1] < len(plan) - 1)
+            rows = (real.time >= begin) & (real.time <= until)
+            time, values = real.time[rows], real[quantity.name][rows]
+        parts = [(time < landed, way), (time >= landed, end)]
+        each = [
+            _worst(requirement, values[part], time[part], most / SCALES["m"] * requirement.scale)
+            for part, most in parts
+            if part.any()
+        ]
+        found += [m for m in each if not m.met][:1] or each[:1]
+    return tuple(found)
+
+
+def _landing(plan: Trajectory, clock: Array) -> float:
+    """When [s] the first foot of a plan comes down after its apex; infinite where none does."""
+    names = [name for name in plan.names if name.endswith("/foot/z")]
+    if not names:
+        return np.inf
+    lowest, apex = np.min([plan[name] for name in names], axis=0), int(np.argmax(plan["body/z"]))
+    down = apex + np.flatnonzero((lowest[apex:-1] > CLOSED) & (lowest[apex + 1 :] <= CLOSED)) + 1
+    return float(clock[down[0]]) if len(down) else np.inf
+
+
+def _on_plan(requirement: Requirement, task: Task, plan: Trajectory, course: _Course) -> Measured:
+    name, last = requirement.quantity.name, len(plan) - 1
+    exact = task.tolerances.bounds * requirement.scale
+    if name not in plan:
+        blank = np.array([np.nan])
+        return _worst(requirement, blank, plan.time[[-1]], exact)
+    at = np.array(requirement.nodes(last))
+    nodes = _worst(requirement, plan[name][at], plan.time[at], exact, at)
+    if requirement.at is not None or name not in course.values or not nodes.met:
+        return nodes
+    inside = (course.time >= plan.time[at[0]]) & (course.time <= plan.time[at[-1]])
+    if not inside.any():
+        return nodes
+    between = task.tolerances.apex / SCALES["m"] * requirement.scale
+    way = _worst(requirement, course.values[name][inside], course.time[inside], between)
+    return way if not way.met or way.miss > nodes.miss else nodes
+
+
+def _worst(
+    requirement: Requirement,
+    values: Array,
+    time: Array,
+    allowed: float,
+    nodes: Array | None = None,
+) -> Measured:
+    """The value furthest beyond the limits of a requirement, or nearest to them."""
+    beyond = np.maximum(requirement.lower - values, values - requirement.upper)
+    i = int(np.argmax(np.where(np.isfinite(values), beyond, np.inf)))
+    quantity = requirement.quantity
+    return Measured(
+        line=requirement.line,
+        text=f"{requirement.text}: {quantity.name}",
+        value=float(values[i]),
+        lower=requirement.lower,
+        upper=requirement.upper,
+        unit=quantity.unit,
+        allowed=allowed,
+        scale=requirement.scale,
+        node=int(nodes[i]) if nodes is not None else 0,
+        time_s=float(time[i]),
+    )
+
+
+@dataclass(frozen=True)
+class _Course:
+    """Lengths and angles between the nodes of a plan: times (n,) [s] and values (n,) by name."""
+
+    time: Array
+    values: dict[str, Array]
+
+    @classmethod
+    def of(cls, model: Model, requirements: Iterable[Requirement], plan: Trajectory) -> _Course:
+        """The requirements' lengths and angles on every interval, whose coordinates lie on the
+        parabola through both ends with the rate at its end. That is the line of implicit Euler,
+        and it knows of no impact at the beginning."""
+        node = model.node
+        wanted = {
+            r.quantity.name: quantity_expression(model, r.quantity.name)
+            for r in requirements
+            if r.at is None and r.quantity.unit in ("m", "rad")
+        }
+        others = ca.vertcat(node.v, node.s, node.lam, node.u)
+        kept = {n: g for n, g in wanted.items() if not ca.depends_on(ca.SX(g), others)}
+        if not kept:
+            return cls(np.zeros(0), {})
+        x, h = arrays(model, plan), np.diff(plan.time)[:, None]
+        share = np.arange(1, BETWEEN) / BETWEEN
+        q0, q1, w1 = x["q"][:-1], x["q"][1:], x["v"][1:]
+        bend = q0 - q1 + h * w1
+        q = [q1 - h * w1 * (1 - s) + bend * (1 - s) ** 2 for s in share]
+        time = [plan.time[:-1] + s * h[:, 0] for s in share]
+        f = ca.Function("course", [node.q], [ca.densify(ca.vertcat(*kept.values()))])
+        rows = np.concatenate(q)
+        values = np.array(f.map(len(rows))(rows.T))
+        return cls(np.concatenate(time), dict(zip(kept, values, strict=True)))
+
+
+def _of_the_task(
+    model: Model, task: Task, requirements: Sequence[Requirement], plan: Trajectory
+) -> Iterator[Measured]:
+    """What keys of their own ask: the duration, how long valves stay, soft landings, grip."""
+    exact, last = task.tolerances.bounds, len(plan) - 1
+    blank = Measured("", "", 0.0, -np.inf, np.inf, "s", exact, 1.0, last, float(plan.time[-1]))
+    lasts = float(plan.time[-1] - plan.time[0])
+    spread = task.step_variation * task.duration
+    ends = task.duration - spread, task.duration + spread
+    yield replace(
+        blank, text="duration", value=lasts, lower=ends[0], upper=ends[1],
+        allowed=exact * task.duration,
+    )  # fmt: skip
+    dwell = _shortest_dwell(model, plan)
+    if dwell is not None and task.min_dwell:
+        # an implicit Euler plan switches at nodes, whose steps vary
+        slack = 0.0 if "phases" in plan.meta else task.step
+        shortest = max(task.min_dwell - slack, 0.0)
+        yield replace(
+            blank, text="min_dwell", value=dwell, lower=shortest, allowed=exact * task.duration
+        )
+    if task.landing.impact_speed is not None:
+        speed, node = _fastest_impact(model, plan, apex_node(requirements, last))
+        yield replace(
+            blank, text="landing.impact_speed", value=speed, upper=task.landing.impact_speed,
+            unit="m.s-1", node=node, time_s=float(plan.time[node]),
+        )  # fmt: skip
+    if task.grip < 1.0 and (grip := grip_of(model, plan)) is not None:
+        yield replace(blank, text="grip", value=grip, upper=task.grip, unit="1")
+
+
+def _shortest_dwell(model: Model, plan: Trajectory) -> float | None:
+    """The shortest time [s] between two switches of one valve; None where none switches twice."""
+    found = []
+    for name in (q.name for q in groups(model)["u"] if q.binary):
+        edges = plan.time[:-1][np.flatnonzero(np.diff(plan[name][1:])) + 1]
+        found += [b - a for a, b in itertools.pairwise(edges)]
+    return float(min(found)) if found else None
+
+
+def _fastest_impact(model: Model, plan: Trajectory, apex: int) -> tuple[float, int]:
+    """The largest speed [m/s] of feet and stops that close after the node `apex`, and its node."""
+    node, x = model.node, arrays(model, plan)
+    speed, at = 0.0, len(plan) - 1
+    for constraint in rigid_constraints(model, whole(node)):
+        f = ca.Function("gap", [node.q, node.v], [constraint.gap, constraint.rate])
+        gap, rate = (np.array(part).ravel() for part in f.map(len(plan))(x["q"].T, x["v"].T))
+        closes = np.flatnonzero((gap[:-1] > CLOSED) & (gap[1:] <= CLOSED)) + 1
+        for k in closes[closes > apex]:
+            if "phases" not in plan.meta:  # implicit Euler: the rate that the step stopped
+                rate[k] = rate[k - 1]
+            own = -felt(model.mechanism, constraint.label) * float(rate[k])
+            speed, at = max((speed, at), (own, int(k)))
+    return speed, at
+
+
+def _range(lower: float, upper: float, unit: str) -> str:
+    if lower == upper:
+        return _with_unit(lower, unit)
+    least = [f"at least {_with_unit(lower, unit)}"] * bool(lower > -np.inf)
+    most = [f"at most {_with_unit(upper, unit)}"] * bool(upper < np.inf)
+    return " and ".join(least + most)
+
+
+def _with_unit(value: float, unit: str) -> str:
+    return f"{value:.4g} {unit}".removesuffix(" 1")

@@ -1,0 +1,30 @@
+"""The plan of an earlier run as the origin of another one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from kemba.ocp import load_task, task_model
+from kemba.ocp.continuation.between import Origin
+from kemba.ocp.continuation.kept import read_stages
+from kemba.ocp.shipped.kind import figures_of
+from kemba.ocp.task.requirement import resolve
+from kemba.runs import STAGES, load_run
+
+
+def origin_of(run: str | Path) -> Origin:
+    """Plan, model and requirements of a run folder.
+
+    Raises KembaError where the folder is no run, has no plan, or its model is gone.
+    """
+    found = load_run(run)
+    plan = found.trajectory
+    task, document = load_task(found.task)
+    model = task_model(task)
+    return Origin(
+        plan,
+        model,
+        tuple(resolve(task, model, document)),
+        stages=read_stages(found.path / STAGES),
+        figures=figures_of(task, model),
+    )
