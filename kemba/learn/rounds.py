@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from kemba.errors import KembaError
+from kemba.files import sha256
 from kemba.plant.execution.controller import read_controller
-from kemba.runs import Run, load_run, sha256
+from kemba.runs import Run, load_run
 from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Array, Trajectory
 
