@@ -1,0 +1,230 @@
+"""The model that is written: every effect of an answer at its joint estimate, with its covariance.
+
+One least-squares fit of the whitened residuals over the parameters of all these effects and over
+the figures of the model's own that its file can say; what a file cannot say stays as it is, so that
+what is said of the fit is true of the file. Of rigs whose motion is measured, rows count by the
+noise as stated: noise that was learnt under this model would forget what changes slowly.
+
+Intervals come from the slopes at the fit, all nominal figures free within their tolerances. They
+are widened by as much as blocks of time scatter more than rows do ("sandwich"), and span what the
+runs say one by one where these disagree.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from copy import copy
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.special import stdtrit
+
+from kemba.errors import enumerated
+from kemba.identify.answer import Covariance, Value
+from kemba.identify.evidence.linear import is_shape, time_blocks
+from kemba.identify.evidence.refit import Frozen, refit
+from kemba.identify.evidence.spike_slab import Hypothesis, SpikeSlabSettings
+from kemba.identify.problem.problem import Array, Candidate, Labels, Problem, Theta
+from kemba.identify.problem.sensor_faults import is_fault
+from kemba.identify.tails import chi2_above
+
+LOOSE = 10.0  # prior sigma of a figure of a rig that is fitted: as good as none
+ROUNDS = 2  # times that the fit begins again with slopes along the figures taken anew
+BLOCKS = (12, 24, 48)  # of time, at least, whose scatter is asked for: the widest interval counts
+DISAGREE = 0.01  # p-value from which runs disagree
+GAUGE = "orifice_chamber.gauge"  # a factor of a table, which is no parameter by itself
+TELLS = 0.1  # share of the best run's information from which a run is asked
+
+
+@dataclass(frozen=True)
+class Joint:
+    """Effects at their joint estimate.
+
+    `theta`: of the fit. `names` (k,) of all written parameters (`effect.parameter`), with `value`
+    (k,), 95 % interval `low`, `high` (k,) and `covariance` (k, k), SI units; `figures`: those that
+    the model had already, by name. `remarks`: parameters in which runs disagree.
+    """
+
+    theta: Mapping[str, float]
+    names: tuple[str, ...]
+    value: Array
+    low: Array
+    high: Array
+    covariance: Array
+    figures: Mapping[str, float] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def matrix(self) -> Covariance:
+        """The covariance of all scalar parameters of effects."""
+        keep = [i for i, name in enumerate(self.names) if name != GAUGE]
+        rows = self.covariance[np.ix_(keep, keep)].tolist()
+        return Covariance(tuple(self.names[i] for i in keep), tuple(map(tuple, rows)))
+
+    def values(self, candidate: Candidate) -> dict[str, Value]:
+        """The parameters of one effect, as the catalogue has them."""
+        found = {}
+        for parameter in candidate.parameters:
+            name, unit = candidate.reciprocal.get(parameter.name, (parameter.name, parameter.unit))
+            i = self.names.index(f"{candidate.effect}.{name}")
+            value, low, high = (float(x[i]) for x in (self.value, self.low, self.high))
+            found[name] = Value(value, low, high, unit)
+        return found
+
+
+def joint_fit(problem: Problem, hypothesis: Hypothesis, start: Theta) -> Joint:
+    """The effects of a hypothesis and the figures of the model, fitted together from `start`."""
+    problem, own = _prepared(problem)
+    keys = {k: p for e in hypothesis for k, p in problem.candidates[e].keys().items()}
+    theta = {k: v for k, v in start.items() if k in keys or k in own or k.startswith("start:")}
+    free = (*own, *(n for n in problem.nuisance if n.startswith("start:")))
+    for _ in range(ROUNDS if free else 1):
+        theta = refit(problem, hypothesis, theta, Frozen(free, problem.jacobian(theta, free))).theta
+    return _judged(problem, tuple(keys), own, theta)
+
+
+def _prepared(problem: Problem) -> tuple[Problem, tuple[str, ...]]:
+    """The problem of the fit, and the nominal figures that are free in it: those of the model's
+    effects which its file can say, of every leg alike."""
+    model = getattr(problem, "model", None)
+    if model is None:
+        return problem, tuple(problem.nuisance)
+    scalars = {f"{e.name}.{p}" for e in model.effects for p in type(e).model_fields}
+    own = tuple(n for n in problem.nuisance if n in scalars or n in problem.own_figures)
+    if problem.moves:
+        return problem, own
+    found = copy(problem.recolour(None))
+    loose = {n: (v, max(LOOSE * abs(v), sigma)) for n, (v, sigma) in found.nuisance.items()
+             if n in own}  # fmt: skip
+    found.nuisance = found.nuisance | loose
+    return found, own
+
+
+def _judged(problem: Problem, keys: tuple[str, ...], own: tuple[str, ...], theta: Theta) -> Joint:
+    """The fit at theta with its covariance and intervals."""
+    others = tuple(n for n in problem.nuisance if n not in own)
+    names = (*keys, *own, *others)
+    jacobian, r = problem.jacobian(theta, names), problem.residual(theta)
+    parameters = problem.parameters()
+    slab = SpikeSlabSettings.current().slab
+    width = [
+        slab * parameters[k].size * (theta[k] if is_shape(problem, k) else 1.0) for k in keys
+    ] + [problem.nuisance[n][1] for n in (*own, *others)]
+    scale = np.array(width)
+    j = jacobian * scale
+    h = np.linalg.inv(j.T @ j + np.eye(len(names)))
+    count = len(keys) + len(own)
+    spread = np.max([_spread(labels, j, r, h)[:count] for labels in _divisions(problem)], axis=0)
+    inflated = np.maximum(spread / np.sqrt(np.diag(h)[:count]) / 1.96, 1.0)
+    unit = scale[:count] * inflated
+    value = np.array([theta[n] if n in theta else problem.nuisance[n][0] for n in names[:count]])
+    size = np.array([abs(theta[k] - parameters[k].off) if np.isfinite(parameters[k].off) and
+                     not is_shape(problem, k) else abs(theta[k]) for k in keys])  # fmt: skip
+    imperfect = SpikeSlabSettings.current().spike * np.append(size, np.zeros(len(own)))
+    reach = 1.96 * np.hypot(unit * np.sqrt(np.diag(h)[:count]), imperfect * problem.moves)
+    low, high = value - reach, value + reach
+    remarks = []
+    for i, ends in _by_run(problem, j, r, h, count):
+        apart = value[i] + scale[i] * np.array(ends)
+        if apart.min() < low[i] or apart.max() > high[i]:
+            low[i], high[i] = min(low[i], apart.min()), max(high[i], apart.max())
+            told = " to ".join(f"{x:.3g}" for x in sorted(apart))
+            remarks.append(f"{names[i]} differs between runs ({told}); its interval spans them")
+    covariance = np.outer(unit, unit) * h[:count, :count]
+    return _as_written(problem, names[:count], theta, (value, low, high), covariance, remarks)
+
+
+def _divisions(problem: Problem) -> list[Labels]:
+    """Labels (n,) of the rows in blocks of time, and in stretches of a way that is gone to and fro,
+    each with two directions: what a model lacks at one place it lacks in every repeat."""
+    found = [time_blocks(problem, wanted=count) for count in BLOCKS]
+    if (way := problem.way()) is not None:
+        place, forward = way
+        for count in BLOCKS:
+            edges = np.linspace(place.min(), place.max(), count + 1)[1:-1]
+            found.append(2 * np.searchsorted(edges, place) + forward)
+    return found
+
+
+def _spread(labels: Labels, j: Array, r: Array, h: Array) -> Array:
+    """Half the 95 % interval (k,) of each parameter, from the scatter of blocks of rows.
+
+    `labels` (n,) of the blocks; `j` (n, k) and `r` (n,): slopes and residual of the fit; `h`
+    (k, k): inverse of j'j with the priors.
+    """
+    order = np.unique(labels)
+    pieces = np.stack([j[labels == b].T @ r[labels == b] for b in order])
+    freedom = max(len(order) - 1, 1)
+    covariance = h @ (pieces.T @ pieces) @ h * len(order) / freedom
+    return np.asarray(np.sqrt(np.diag(covariance)) * stdtrit(freedom, 0.975))
+
+
+def _by_run(
+    problem: Problem, j: Array, r: Array, h: Array, count: int
+) -> Iterable[tuple[int, tuple[float, float]]]:
+    """Parameters on which runs disagree, and the ends of what they say, from the fit: each run's
+    own value, all others as they are fitted, its error from the scatter of its blocks."""
+    run = problem.rows().run
+    blocks = time_blocks(problem, wanted=max(BLOCKS[1], 6 * len(problem.runs)))
+    if len(problem.runs) < 2:
+        return
+    for i in range(count):
+        told, steps, errors = [], [], []
+        for k in range(len(problem.runs)):
+            own = run == k
+            power = float(j[own, i] @ j[own, i])
+            pieces = np.bincount(blocks[own], j[own, i] * r[own])
+            pieces = pieces[np.unique(blocks[own])]
+            scatter = len(pieces) * float(np.var(pieces, ddof=1)) if len(pieces) > 1 else power
+            told.append(power)
+            steps.append(-float(pieces.sum()) / max(power, 1e-30))
+            errors.append(np.sqrt(max(scatter, power)) / max(power, 1e-30))
+        keep = np.array(told) > TELLS * max(told)
+        if keep.sum() < 2:
+            continue
+        step, error = np.array(steps)[keep], np.array(errors)[keep]
+        weight = 1.0 / error**2
+        mean = float(weight @ step / weight.sum())
+        if chi2_above(float(weight @ (step - mean) ** 2), int(keep.sum()) - 1) < DISAGREE:
+            yield i, (float(step.min()), float(step.max()))
+
+
+def _as_written(
+    problem: Problem,
+    names: tuple[str, ...],
+    theta: Theta,
+    triple: tuple[Array, Array, Array],
+    covariance: Array,
+    remarks: list[str],
+) -> Joint:
+    """The estimate in the catalogue's names and units: a figure that is scaled by its value, a
+    reciprocal as what it is the reciprocal of, all within their bounds."""
+    value, low, high = (x.copy() for x in triple)
+    told, slope, figures = [], np.ones(len(names)), {}
+    for i, name in enumerate(names):
+        effect, parameter = name.rsplit(".", 1) if "." in name else (name, "")
+        candidate = problem.candidates.get(effect)
+        if candidate is None or name not in theta or name in problem.nuisance:
+            told.append(name)
+            if hasattr(problem, "model") and _is_factor(problem, name):
+                slope[i] = float(problem.model.effect(effect).value(parameter))
+                ends = sorted(slope[i] * np.array([low[i], high[i]]))
+                value[i], low[i], high[i] = slope[i] * value[i], *ends
+            figures[name] = float(value[i])
+            continue
+        bounds = candidate.keys()[name]
+        value[i], low[i], high[i] = np.clip([value[i], low[i], high[i]], bounds.lower, bounds.upper)
+        if parameter in candidate.reciprocal:
+            parameter = candidate.reciprocal[parameter][0]
+            slope[i] = -1.0 / max(value[i], 1e-12) ** 2
+            value[i], low[i], high[i] = 1.0 / np.maximum([value[i], high[i], low[i]], 1e-12)
+        told.append(f"{effect}.{parameter}")
+    return Joint(
+        dict(theta), tuple(told), value, low, high, covariance * np.outer(slope, slope), figures,
+        (enumerated(remarks),) if remarks else (),
+    )  # fmt: skip
+
+
+def _is_factor(problem: Problem, name: str) -> bool:
+    """Whether a nuisance parameter is the factor of a figure, and not its value."""
+    return name not in problem.own_figures and not is_fault(name)
