@@ -10,7 +10,7 @@ import numpy as np
 
 from kemba.config import dump_yaml, parse
 from kemba.effects import BY_KIND
-from kemba.errors import KembaError, suggest
+from kemba.errors import KembaError, enumerated, suggest
 from kemba.identify.answer import read_answer
 from kemba.identify.problem.candidates import where_field
 from kemba.identify.problem.structure import ORIFICE, orifice_item
@@ -37,7 +37,7 @@ def write_model(
     support = {e: {"support": "sure" if e in sure else "likely"} for e in wanted if answer}
     listed = [item(name, rows[name]["parameters"]) | support.get(name, {}) for name in wanted]
     data = {
-        "name": f"{Path(base).stem}_{'_'.join(w.split(':')[0] for w in wanted)}"[:60],
+        "name": "_".join([Path(base).stem, *(w.split(":")[0] for w in wanted)])[:60],
         "base": reference(base),
         **({"chambers": "orifice"} if ORIFICE in wanted else {}),
         "effects": [*_refitted(base, answer.get("figures") or {}), *listed],
@@ -101,19 +101,27 @@ def reference(base: str) -> str:
     return str(Path(base).resolve())
 
 
+def adopted(folder: str | Path, only_sure: bool) -> str:
+    """Why an answer gives no model, in words; empty where it gives one. Raises KembaError where
+    there is no answer."""
+    answer = read_answer(folder)
+    if not answer.get("added"):
+        return f"{folder} found no effect that a model could be written with"
+    if only_sure and not answer.get("sure"):
+        likely = enumerated(answer["added"])
+        return f"{folder} is sure of no effect; likely are {likely}: adopt without --only-sure"
+    return ""
+
+
 def adopt_answer(folder: str | Path, out: Path, only_sure: bool = False) -> tuple[str, ...]:
     """Write the model of all that an answer found at its joint estimate; `only_sure`: without what
     is only likely. The effects that it has. Raises KembaError where there are none."""
-    file, answer = Path(folder) / "answer.json", read_answer(folder)
-    added = tuple(answer.get("added") or ())
-    if not added:
-        raise KembaError(str(file), "found no effect that a model could be written with")
+    if nothing := adopted(folder, only_sure):
+        raise KembaError(str(folder), nothing)
+    answer = read_answer(folder)
     if only_sure:
-        answer = _without(answer, [name for name in added if name not in answer.get("sure", ())])
-        added = tuple(answer["added"])
-        if not added:
-            hint = "adopt takes what is likely as well without --only-sure"
-            raise KembaError(str(file), "is sure of none of the effects that it found", hint=hint)
+        answer = _without(answer, [e for e in answer["added"] if e not in answer["sure"]])
+    added = tuple(answer["added"])
     write_model(out, str(answer.get("base") or "planning"), answer["ranking"], added, answer)
     return added
 

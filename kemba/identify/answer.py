@@ -103,6 +103,11 @@ class Answer:
         """Error beyond the noise that the best answer leaves."""
         return excess(self.error_after)
 
+    @property
+    def writes(self) -> bool:
+        """Whether a model is written: something was found, or figures were fitted anew."""
+        return bool(self.added) or self.covariance is not None
+
     def told_in(self, before: tuple[float, float]) -> None:
         """Tell the errors of steps and ranking by the scale of `error_before` and `error_after`,
         which were `before` so far, and the sentence anew."""

@@ -153,6 +153,8 @@ def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> 
     joint = None
     if whole and verdict_on(best, formula, doubts) in WRITTEN:
         joint = joint_fit(search.problem, whole, search.points[whole].fit.theta)
+    elif not best and formula is None and _was_learnt(search.problem):
+        joint = joint_fit(search.problem, NULL, search.points[NULL].fit.theta)
     whole = whole if joint else best
     search.say("ranking the effects")
     ranking = ranked(search, belief, kept, whole, joint)
@@ -167,6 +169,12 @@ def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> 
     if ended and ENDED not in answer.remarks:
         answer.remarks = [*answer.remarks, ENDED]
     return Discovery(answer, search, whole, kept, fitted_errors(search, whole), joint)
+
+
+def _was_learnt(problem: Problem) -> bool:
+    """Whether the model has effects of an earlier answer: more logs know their figures better."""
+    model = getattr(problem, "model", None)
+    return model is not None and any(effect.support for effect in model.effects)
 
 
 def _undecided(search: Search, test: NullTest, kept: HeldOut | None) -> Discovery:

@@ -12,28 +12,25 @@ runs say one by one where these disagree.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from copy import copy
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.special import stdtrit
 
 from kemba.errors import enumerated
 from kemba.identify.answer import Covariance, Value
-from kemba.identify.evidence.linear import is_shape, time_blocks
+from kemba.identify.evidence.linear import is_shape
 from kemba.identify.evidence.refit import Frozen, refit
+from kemba.identify.evidence.scatter import apart_between_runs, divisions, half_widths
 from kemba.identify.evidence.spike_slab import Hypothesis, SpikeSlabSettings
-from kemba.identify.problem.problem import Array, Candidate, Labels, Problem, Theta
+from kemba.identify.evidence.windows import START
+from kemba.identify.problem.problem import Array, Candidate, Problem, Theta
 from kemba.identify.problem.sensor_faults import is_fault
-from kemba.identify.tails import chi2_above
 
 LOOSE = 10.0  # prior sigma of a figure of a rig that is fitted: as good as none
 ROUNDS = 2  # times that the fit begins again with slopes along the figures taken anew
-BLOCKS = (12, 24, 48)  # of time, at least, whose scatter is asked for: the widest interval counts
-DISAGREE = 0.01  # p-value from which runs disagree
 GAUGE = "orifice_chamber.gauge"  # a factor of a table, which is no parameter by itself
-TELLS = 0.1  # share of the best run's information from which a run is asked
 
 
 @dataclass(frozen=True)
@@ -75,12 +72,26 @@ class Joint:
 def joint_fit(problem: Problem, hypothesis: Hypothesis, start: Theta) -> Joint:
     """The effects of a hypothesis and the figures of the model, fitted together from `start`."""
     problem, own = _prepared(problem)
-    keys = {k: p for e in hypothesis for k, p in problem.candidates[e].keys().items()}
-    theta = {k: v for k, v in start.items() if k in keys or k in own or k.startswith("start:")}
-    free = (*own, *(n for n in problem.nuisance if n.startswith("start:")))
+    theta = _fitted(problem, own, hypothesis, start)
+    keys = tuple(k for e in hypothesis for k in tuple(problem.candidates[e].keys()))
+    return _judged(problem, keys, own, theta)
+
+
+def joint_estimate(problem: Problem, hypothesis: Hypothesis, start: Theta) -> dict[str, float]:
+    """Theta of the same fit."""
+    problem, own = _prepared(problem)
+    return _fitted(problem, own, hypothesis, start)
+
+
+def _fitted(
+    problem: Problem, own: tuple[str, ...], hypothesis: Hypothesis, start: Theta
+) -> dict[str, float]:
+    keys = {k for e in hypothesis for k in tuple(problem.candidates[e].keys())}
+    theta = {k: v for k, v in start.items() if k in keys or k in own or k.startswith(START)}
+    free = (*own, *(n for n in problem.nuisance if n.startswith(START)))
     for _ in range(ROUNDS if free else 1):
         theta = refit(problem, hypothesis, theta, Frozen(free, problem.jacobian(theta, free))).theta
-    return _judged(problem, tuple(keys), own, theta)
+    return theta
 
 
 def _prepared(problem: Problem) -> tuple[Problem, tuple[str, ...]]:
@@ -114,7 +125,7 @@ def _judged(problem: Problem, keys: tuple[str, ...], own: tuple[str, ...], theta
     j = jacobian * scale
     h = np.linalg.inv(j.T @ j + np.eye(len(names)))
     count = len(keys) + len(own)
-    spread = np.max([_spread(labels, j, r, h)[:count] for labels in _divisions(problem)], axis=0)
+    spread = np.max([half_widths(labels, j, r, h)[:count] for labels in divisions(problem)], axis=0)
     inflated = np.maximum(spread / np.sqrt(np.diag(h)[:count]) / 1.96, 1.0)
     unit = scale[:count] * inflated
     value = np.array([theta[n] if n in theta else problem.nuisance[n][0] for n in names[:count]])
@@ -124,7 +135,7 @@ def _judged(problem: Problem, keys: tuple[str, ...], own: tuple[str, ...], theta
     reach = 1.96 * np.hypot(unit * np.sqrt(np.diag(h)[:count]), imperfect * problem.moves)
     low, high = value - reach, value + reach
     remarks = []
-    for i, ends in _by_run(problem, j, r, h, count):
+    for i, ends in apart_between_runs(problem, j[:, :count], r):
         apart = value[i] + scale[i] * np.array(ends)
         if apart.min() < low[i] or apart.max() > high[i]:
             low[i], high[i] = min(low[i], apart.min()), max(high[i], apart.max())
@@ -132,61 +143,6 @@ def _judged(problem: Problem, keys: tuple[str, ...], own: tuple[str, ...], theta
             remarks.append(f"{names[i]} differs between runs ({told}); its interval spans them")
     covariance = np.outer(unit, unit) * h[:count, :count]
     return _as_written(problem, names[:count], theta, (value, low, high), covariance, remarks)
-
-
-def _divisions(problem: Problem) -> list[Labels]:
-    """Labels (n,) of the rows in blocks of time, and in stretches of a way that is gone to and fro,
-    each with two directions: what a model lacks at one place it lacks in every repeat."""
-    found = [time_blocks(problem, wanted=count) for count in BLOCKS]
-    if (way := problem.way()) is not None:
-        place, forward = way
-        for count in BLOCKS:
-            edges = np.linspace(place.min(), place.max(), count + 1)[1:-1]
-            found.append(2 * np.searchsorted(edges, place) + forward)
-    return found
-
-
-def _spread(labels: Labels, j: Array, r: Array, h: Array) -> Array:
-    """Half the 95 % interval (k,) of each parameter, from the scatter of blocks of rows.
-
-    `labels` (n,) of the blocks; `j` (n, k) and `r` (n,): slopes and residual of the fit; `h`
-    (k, k): inverse of j'j with the priors.
-    """
-    order = np.unique(labels)
-    pieces = np.stack([j[labels == b].T @ r[labels == b] for b in order])
-    freedom = max(len(order) - 1, 1)
-    covariance = h @ (pieces.T @ pieces) @ h * len(order) / freedom
-    return np.asarray(np.sqrt(np.diag(covariance)) * stdtrit(freedom, 0.975))
-
-
-def _by_run(
-    problem: Problem, j: Array, r: Array, h: Array, count: int
-) -> Iterable[tuple[int, tuple[float, float]]]:
-    """Parameters on which runs disagree, and the ends of what they say, from the fit: each run's
-    own value, all others as they are fitted, its error from the scatter of its blocks."""
-    run = problem.rows().run
-    blocks = time_blocks(problem, wanted=max(BLOCKS[1], 6 * len(problem.runs)))
-    if len(problem.runs) < 2:
-        return
-    for i in range(count):
-        told, steps, errors = [], [], []
-        for k in range(len(problem.runs)):
-            own = run == k
-            power = float(j[own, i] @ j[own, i])
-            pieces = np.bincount(blocks[own], j[own, i] * r[own])
-            pieces = pieces[np.unique(blocks[own])]
-            scatter = len(pieces) * float(np.var(pieces, ddof=1)) if len(pieces) > 1 else power
-            told.append(power)
-            steps.append(-float(pieces.sum()) / max(power, 1e-30))
-            errors.append(np.sqrt(max(scatter, power)) / max(power, 1e-30))
-        keep = np.array(told) > TELLS * max(told)
-        if keep.sum() < 2:
-            continue
-        step, error = np.array(steps)[keep], np.array(errors)[keep]
-        weight = 1.0 / error**2
-        mean = float(weight @ step / weight.sum())
-        if chi2_above(float(weight @ (step - mean) ** 2), int(keep.sum()) - 1) < DISAGREE:
-            yield i, (float(step.min()), float(step.max()))
 
 
 def _as_written(

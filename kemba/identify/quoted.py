@@ -44,8 +44,8 @@ def measured_in(logs: Sequence[Trajectory], model: str | Path) -> Measured:
     supply = (spec.supply, spec.supply) if spec.supply else None
     modes = tuple(sorted({mode for log in logs for mode in _modes(log)}))
     robot = sha256(robot_files(spec.robot)[0]) if spec.robot else None
-    spans = ((min(x), max(x)) if x else None for x in (apex, speed))
-    return Measured(*spans, supply=supply, modes=modes, robot=robot)
+    spans = [(min(x), max(x)) if x else None for x in (apex, speed)]
+    return Measured(apex=spans[0], speed=spans[1], supply=supply, modes=modes, robot=robot)
 
 
 def _speed(log: Trajectory) -> Array:

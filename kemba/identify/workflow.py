@@ -90,10 +90,11 @@ def _quote(answer: Answer, judge: Problem, logs: Sequence[Trajectory], model: st
     the one that is written; what does not predict better there is not written."""
     before = answer.error_before, answer.error_after
     answer.error_before = answer.error_after = noise_ratio(judge)
-    if answer.added:
+    if answer.writes:
         with tempfile.TemporaryDirectory() as folder:
             data = answer.json()
-            file = write_model(Path(folder) / "model.yaml", model, data["ranking"], answer.added)
+            file = Path(folder) / "model.yaml"
+            write_model(file, model, data["ranking"], answer.added, data)
             written = make_problem(excerpts(logs)[0], model_of(logs, str(file)))
         answer.error_after = noise_ratio(written)
     answer.told_in(before)
@@ -103,7 +104,7 @@ def _evidence(
     answer: Answer, fitted: Sequence[Trajectory], kept: Sequence[Trajectory], model: str
 ) -> dict[str, Any] | None:
     """What the model that is written rests on, as its YAML says it; None where none is written."""
-    if not answer.added:
+    if not answer.writes:
         return None
     used = [*((log, "learnt") for log in fitted), *((log, "quoted") for log in kept)]
     paths = [(Path(log.meta["path"]).resolve(), use) for log, use in used]
@@ -182,7 +183,7 @@ def write_answer(answer: Answer, out: Path, model: str) -> None:
     data: dict[str, Any] = answer.json()
     for stale in ("model.yaml", COVARIANCE, "answer.json"):
         (out / stale).unlink(missing_ok=True)
-    if answer.added:
+    if answer.writes:
         path = write_model(out / "model.yaml", model, data["ranking"], answer.added, data)
         answer.model = data["model"] = str(path)
     write_json(out / "answer.json", data | {"base": reference(model)})
