@@ -27,10 +27,14 @@ from kemba.identify.evidence.spike_slab import Hypothesis, SpikeSlabSettings
 from kemba.identify.evidence.windows import START
 from kemba.identify.problem.problem import Array, Candidate, Problem, Theta
 from kemba.identify.problem.sensor_faults import is_fault
+from kemba.identify.problem.structure import ORIFICE
 
-LOOSE = 10.0  # prior sigma of a figure of a rig that is fitted: as good as none
+# of what a rig brings along: the figure that its logs tell better than any drawing
+TOLD = ("measured_chambers.gain", "drive_axis.J", "vessel_chamber.a")
+LOOSE = 0.5  # prior sigma of its factor: as good as none
 ROUNDS = 2  # times that the fit begins again with slopes along the figures taken anew
-GAUGE = "orifice_chamber.gauge"  # a factor of a table, which is no parameter by itself
+# a share of another structure, and factors of a table, which are no parameters by themselves
+UNTOLD = tuple(f"orifice_chamber.{name}" for name in ("a", "level", "gauge"))
 
 
 @dataclass(frozen=True)
@@ -53,10 +57,13 @@ class Joint:
 
     @property
     def matrix(self) -> Covariance:
-        """The covariance of all scalar parameters of effects."""
-        keep = [i for i, name in enumerate(self.names) if name != GAUGE]
+        """The covariance of all scalar parameters of effects, as a model names them."""
+        told = {
+            i: name.replace(f"{ORIFICE}.", "orifice_chamber.") for i, name in enumerate(self.names)
+        }
+        keep = [i for i, name in told.items() if name not in UNTOLD]
         rows = self.covariance[np.ix_(keep, keep)].tolist()
-        return Covariance(tuple(self.names[i] for i in keep), tuple(map(tuple, rows)))
+        return Covariance(tuple(told[i] for i in keep), tuple(map(tuple, rows)))
 
     def values(self, candidate: Candidate) -> dict[str, Value]:
         """The parameters of one effect, as the catalogue has them."""
@@ -100,13 +107,13 @@ def _prepared(problem: Problem) -> tuple[Problem, tuple[str, ...]]:
     model = getattr(problem, "model", None)
     if model is None:
         return problem, tuple(problem.nuisance)
-    scalars = {f"{e.name}.{p}" for e in model.effects for p in type(e).model_fields}
-    own = tuple(n for n in problem.nuisance if n in scalars or n in problem.own_figures)
+    scalars = {f"{e.name}.{p}" for e in model.effects for p in (*e.tolerances(), *e.off)}
+    written = {name for name in scalars if "[" not in name} | set(problem.own_figures)
+    own = tuple(n for n in problem.nuisance if n in written)
     if problem.moves:
         return problem, own
     found = copy(problem.recolour(None))
-    loose = {n: (v, max(LOOSE * abs(v), sigma)) for n, (v, sigma) in found.nuisance.items()
-             if n in own}  # fmt: skip
+    loose = {n: (found.nuisance[n][0], LOOSE) for n in own if n in TOLD}
     found.nuisance = found.nuisance | loose
     return found, own
 

@@ -19,15 +19,13 @@ from kemba.effects.base import Effect
 from kemba.errors import KembaError
 from kemba.identify.evidence.scatter import apart_between_runs, divisions, half_widths
 from kemba.identify.evidence.windows import rms
+from kemba.identify.joint import TOLD
 from kemba.identify.problem.problem import Array, Problem
 from kemba.identify.rigs.problem import rig_problem
 from kemba.identify.rigs.vessel import vessel_problem
 from kemba.model.model import Model
 from kemba.settings import BY_HAND, Settings, setting
 from kemba.trajectory import Trajectory
-
-# of what a rig brings along: which figures its logs can tell
-TOLD = ("measured_chambers.gain", "drive_axis.J", "vessel_chamber.a")
 
 
 class RigFitSettings(Settings):
