@@ -29,7 +29,7 @@ from robustness_page import PICTURE, page
 
 from kemba.config import shipped_folder
 from kemba.errors import KembaError
-from kemba.files import atomic_text
+from kemba.files import atomic_text, sha256
 from kemba.model import Model
 from kemba.ocp import load_task, task_model
 from kemba.plant.execution.certificate import rest_after
@@ -39,7 +39,7 @@ from kemba.plant.execution.replay import ends_standing
 from kemba.policy.execute import execute_policy
 from kemba.policy.player import Policy
 from kemba.policy.write import FILE
-from kemba.runs import Run, load_run, sha256
+from kemba.runs import Run, load_run
 from kemba.scenarios.conditions import standing
 from kemba.scenarios.draw import Scenario, scenarios
 from kemba.scenarios.feedback import policy_of

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import hashlib
 import json
 import math
 import os
@@ -21,6 +22,11 @@ class WriteError(KembaError):
 
 class DiskFull(WriteError):  # noqa: N818
     """There is no space left: the command was right and can be repeated later."""
+
+
+def sha256(path: str | Path) -> str:
+    """The hash of a file's content."""
+    return hashlib.sha256(Path(path).read_bytes()).hexdigest()
 
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)

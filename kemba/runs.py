@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import platform
 import sys
 from collections.abc import Iterable, Sequence
@@ -15,7 +14,7 @@ from typing import Any
 
 import kemba
 from kemba.errors import KembaError
-from kemba.files import read_json, write_error, write_json
+from kemba.files import read_json, sha256, write_error, write_json
 from kemba.folders import LOCK, lock_folder, try_writing, unlock
 from kemba.trajectory import Trajectory
 
@@ -188,11 +187,6 @@ def versions() -> dict[str, str]:
     """The versions that decide about a result."""
     found = {"kemba": kemba.__version__, "python": platform.python_version()}
     return found | {name: metadata.version(name) for name in LIBRARIES}
-
-
-def sha256(path: str | Path) -> str:
-    """The hash of a file's content."""
-    return hashlib.sha256(Path(path).read_bytes()).hexdigest()
 
 
 def _now() -> str:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol
 
 import casadi as ca
-from pydantic import BaseModel, ConfigDict, field_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator
 from typing_extensions import Self
 
 from kemba.quantity import Param, Quantity, Tolerance
@@ -126,6 +126,8 @@ class Effect(BaseModel):
 
     kind: str
     on: str | None = None
+    # how an effect that was found is known; it is no physics, so dumps and hashes leave it out
+    support: Literal["sure", "likely"] | None = Field(default=None, exclude=True)
 
     place: ClassVar[Literal["leg", "body"]] = "leg"
     family: ClassVar[str] = ""
@@ -258,4 +260,5 @@ class Effect(BaseModel):
     def listed(self) -> dict[str, Any]:
         """The effect as an item of a model's YAML list."""
         values = self.model_dump(mode="json", by_alias=True, exclude_defaults=True)
-        return {"kind": self.kind, **values}
+        support = {"support": self.support} if self.support else {}
+        return {"kind": self.kind, **values, **support}

@@ -1,4 +1,4 @@
-"""From an answer to a model: the base, and the effects that were found."""
+"""From an answer to a model: the base, what was found at its joint estimate, and its evidence."""
 
 from __future__ import annotations
 
@@ -6,33 +6,77 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from kemba.config import dump_yaml, parse
 from kemba.effects import BY_KIND
-from kemba.errors import KembaError, suggest
+from kemba.errors import KembaError, enumerated, suggest
 from kemba.identify.answer import read_answer
 from kemba.identify.problem.candidates import where_field
 from kemba.identify.problem.structure import ORIFICE, orifice_item
-from kemba.model.spec import ModelSpec, load_spec
+from kemba.model.evidence import EvidenceLog, write_covariance
+from kemba.model.spec import ModelSpec, build_model, load_spec
+
+COVARIANCE = "covariance.csv"
 
 
 def write_model(
-    path: Path, base: str, ranking: Iterable[Mapping[str, Any]], effects: Iterable[str]
+    path: Path,
+    base: str,
+    ranking: Iterable[Mapping[str, Any]],
+    effects: Iterable[str],
+    answer: Mapping[str, Any] | None = None,
 ) -> Path:
-    """A model YAML at `path`: `base` with these effects of the ranking. Checked by loading it."""
-    wanted = list(effects)
-    rows = {row["effect"]: row for row in ranking}
-    listed = [item(name, rows[name]["parameters"]) for name in wanted]
+    """A model YAML at `path`: `base` with these effects of the ranking. Checked by loading it.
+
+    `answer`: the answer.json whose joint estimate these effects are; its figures, covariance and
+    evidence are written as well.
+    """
+    wanted, answer = list(effects), answer or {}
+    rows, sure = {row["effect"]: row for row in ranking}, answer.get("sure", ())
+    support = {e: {"support": "sure" if e in sure else "likely"} for e in wanted if answer}
+    listed = [item(name, rows[name]["parameters"]) | support.get(name, {}) for name in wanted]
     data = {
-        "name": f"{Path(base).stem}_{'_'.join(w.split(':')[0] for w in wanted)}"[:60],
+        "name": "_".join([Path(base).stem, *(w.split(":")[0] for w in wanted)])[:60],
         "base": reference(base),
         **({"chambers": "orifice"} if ORIFICE in wanted else {}),
-        "effects": listed,
+        "effects": [*_refitted(base, answer.get("figures") or {}), *listed],
+        **_evidence(path, answer),
         "notes": "found by kemba-opt discover",
     }
     parse(data, ModelSpec)
     dump_yaml(data, path)
     load_spec(path)
     return path
+
+
+def _refitted(base: str, figures: Mapping[str, float]) -> list[dict[str, Any]]:
+    """The effects of the base whose figures were fitted as well, as items of a model's list."""
+    found = []
+    for effect in build_model(load_spec(base)).effects if figures else ():
+        own = {name.rsplit(".", 1)[1]: float(f"{value:.6g}") for name, value in figures.items()
+               if name.rsplit(".", 1)[0] == effect.name}  # fmt: skip
+        if own:
+            found.append(effect.bind(own).listed())
+    return found
+
+
+def _evidence(path: Path, answer: Mapping[str, Any]) -> dict[str, Any]:
+    """The key `evidence` of a model at `path`, its covariance written beside it."""
+    evidence, covariance = answer.get("evidence"), answer.get("covariance")
+    if not evidence:
+        return {}
+    found = {k: v for k, v in evidence.items() if k != "logs" and v is not None}
+    found["logs"] = [
+        EvidenceLog.of(log["file"], path.parent, log["use"]).model_dump()
+        | {"sha256": log["sha256"]}
+        for log in evidence["logs"]
+    ]
+    if covariance:
+        name = COVARIANCE if path.stem == "model" else f"{path.stem}_{COVARIANCE}"
+        write_covariance(path.parent / name, covariance["names"], np.array(covariance["matrix"]))
+        found["covariance"] = name
+    return {"evidence": found}
 
 
 def item(name: str, parameters: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
@@ -55,6 +99,73 @@ def reference(base: str) -> str:
     if not Path(base).is_file():
         return base
     return str(Path(base).resolve())
+
+
+def adopted(folder: str | Path, only_sure: bool) -> str:
+    """Why an answer gives no model, in words; empty where it gives one. Raises KembaError where
+    there is no answer."""
+    answer = read_answer(folder)
+    if not answer.get("added"):
+        return f"{folder} found no effect that a model could be written with"
+    if only_sure and not answer.get("sure"):
+        likely = enumerated(answer["added"])
+        return f"{folder} is sure of no effect; likely are {likely}: adopt without --only-sure"
+    return ""
+
+
+def adopt_answer(folder: str | Path, out: Path, only_sure: bool = False) -> tuple[str, ...]:
+    """Write the model of all that an answer found at its joint estimate; `only_sure`: without what
+    is only likely. The effects that it has. Raises KembaError where there are none."""
+    if nothing := adopted(folder, only_sure):
+        raise KembaError(str(folder), nothing)
+    answer = read_answer(folder)
+    if only_sure:
+        answer = _without(answer, [e for e in answer["added"] if e not in answer["sure"]])
+    added = tuple(answer["added"])
+    write_model(out, str(answer.get("base") or "planning"), answer["ranking"], added, answer)
+    return added
+
+
+def _without(answer: Mapping[str, Any], dropped: list[str]) -> dict[str, Any]:
+    """An answer without some of its effects: what the others are, these being absent, as its joint
+    covariance tells."""
+    found = {**answer, "added": [e for e in answer["added"] if e not in dropped]}
+    joint = answer.get("covariance")
+    if not dropped or not joint:
+        return found
+    names, c = list(joint["names"]), np.array(joint["matrix"])
+    rows = {row["effect"]: row for row in answer["ranking"]}
+    off = {f"{e}.{p}": value for e in dropped for p, value in BY_KIND[e.split(":")[0]].off.items()}
+    gone = [i for i, name in enumerate(names) if name in off]
+    kept = [i for i, name in enumerate(names) if name.rsplit(".", 1)[0] not in dropped]
+    step = [off[names[i]] - rows[_of(names[i])[0]]["parameters"][_of(names[i])[1]]["value"]
+            for i in gone]  # fmt: skip
+    gain = c[np.ix_(kept, gone)] @ np.linalg.pinv(c[np.ix_(gone, gone)])
+    moved = dict(zip([names[i] for i in kept], gain @ np.array(step), strict=True))
+    left = c[np.ix_(kept, kept)] - gain @ c[np.ix_(gone, kept)]
+    found["ranking"] = [_moved(row, moved) for row in answer["ranking"]]
+    found["figures"] = {
+        n: v + float(moved.get(n, 0.0)) for n, v in (answer.get("figures") or {}).items()
+    }
+    matrix = (0.5 * (left + left.T)).tolist()
+    found["covariance"] = {"names": [names[i] for i in kept], "matrix": matrix}
+    evidence = answer.get("evidence") or {}
+    found["evidence"] = {k: v for k, v in evidence.items() if k != "error_held_out"}
+    return found
+
+
+def _of(name: str) -> tuple[str, str]:
+    effect, _, parameter = name.rpartition(".")
+    return effect, parameter
+
+
+def _moved(row: Mapping[str, Any], moved: Mapping[str, float]) -> dict[str, Any]:
+    """A row of the ranking with its parameters where the others' absence moves them."""
+    values = {
+        p: {**v, "value": v["value"] + float(moved.get(f"{row['effect']}.{p}", 0.0))}
+        for p, v in row["parameters"].items()
+    }
+    return {**row, "parameters": values}
 
 
 def adopt_effect(folder: str | Path, effect: str, out: Path) -> Path:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -52,13 +52,22 @@ class Ranked:
     holdout_gain_nats: float = float("nan")
 
 
+@dataclass(frozen=True)
+class Covariance:
+    """Joint covariance of parameters (`effect.parameter`), in SI units, row by row."""
+
+    names: tuple[str, ...]
+    matrix: tuple[tuple[float, ...], ...]
+
+
 @dataclass
 class Answer:
     """What `discover` answers; `json()` is its machine-readable form.
 
     Errors are of data that the fit has not seen, in units of the noise; `ranking`, `ladder` and
-    sentence show the same number. `added`: what `model` has; with the verdict `partly` only what is
-    sure. `rest`: where the error sits that is left; `next`: what to measure to learn more of it.
+    sentence show the same number. `added`: what `model` has; `sure`: what of it is sure. `figures`
+    of the model's own that were fitted as well; `covariance` of all that is written, and its
+    `evidence`. `rest`: where the error sits that is left; `next`: what to measure to learn more.
     """
 
     verdict: Verdict
@@ -78,7 +87,11 @@ class Answer:
     ladder: Sequence[tuple[str, float]] = ()  # step, held-out error
     rest: str = ""
     next: str = ""
-    found: tuple[str, ...] = ()  # effects of the best answer, sure or not
+    sure: tuple[str, ...] = ()
+    figures: Mapping[str, float] = field(default_factory=dict)
+    covariance: Covariance | None = None
+    evidence: Mapping[str, Any] | None = None
+    idle: bool = False  # left-out data gained nothing by what would fit
 
     @property
     def excess_before(self) -> float:
@@ -90,6 +103,26 @@ class Answer:
         """Error beyond the noise that the best answer leaves."""
         return excess(self.error_after)
 
+    @property
+    def writes(self) -> bool:
+        """Whether a model is written: something was found, or figures were fitted anew."""
+        return bool(self.added) or self.covariance is not None
+
+    def told_in(self, before: tuple[float, float]) -> None:
+        """Tell the errors of steps and ranking by the scale of `error_before` and `error_after`,
+        which were `before` so far, and the sentence anew."""
+        old, new = before, (self.error_before, self.error_after)
+        scale = (new[0] - new[1]) / (old[0] - old[1]) if abs(old[0] - old[1]) > 1e-9 else 1.0
+
+        def there(error: float) -> float:
+            return max(new[1] + scale * (error - old[1]), 0.0)
+
+        self.ladder = [(step, there(error)) for step, error in self.ladder]
+        self.ranking = [
+            replace(r, error_before=new[0], error_after=there(r.error_after)) for r in self.ranking
+        ]
+        self.sentence = phrase(self)
+
     def json(self) -> dict[str, Any]:
         """The object that `--json` prints."""
         more = {"excess_before": self.excess_before, "excess_after": self.excess_after}
@@ -100,12 +133,12 @@ FEW = 2  # parameters of an effect that a sentence has room for
 ENDED = "the time limit ended the search; with a larger --time-limit it goes on"
 
 
-def phrase(answer: Answer, idle: bool = False) -> str:
-    """The verdict in one plain sentence; `idle`: left-out data gained nothing by what would fit."""
+def phrase(answer: Answer) -> str:
+    """The verdict in one plain sentence."""
     if answer.verdict == "nothing":
         what = "Nothing is missing as far as these data can tell"
         if answer.p_value_nothing <= DiscoverSettings.current().significant:
-            what = f"What differs {'may be chance' if idle else 'is too small to matter'}"
+            what = f"What differs {'may be chance' if answer.idle else 'is too small to matter'}"
         return (
             f"{what} (p = {answer.p_value_nothing:.2g}); "
             f"the error is {answer.error_after:.2f} times the noise."
@@ -121,21 +154,26 @@ def phrase(answer: Answer, idle: bool = False) -> str:
         return f"Something is missing that no {tried} explains{why}.{more}"
     if answer.verdict == "partly":
         return _partly(answer)
-    parts = [r for r in answer.ranking if r.effect in answer.added]
+    parts, likely = _told(answer)
     named = enumerated([_named(r) for r in parts])
     before, after = f"{answer.error_before:.2f}", f"{answer.error_after:.2f}"
     falls = f"falls from {before} to {after}"
     if float(after) >= float(before):
         falls = f"was {before} and is {after}"
-    return f"Missing: {named}; the held-out error {falls} times the noise.{_doubt(parts)}"
+    also = f" Likely as well: {enumerated([_named(r) for r in likely])}." if likely else ""
+    text = f"Missing: {named}; the held-out error {falls} times the noise."
+    return f"{text}{_doubt(parts)}{also}"
+
+
+def _told(answer: Answer) -> tuple[list[Ranked], list[Ranked]]:
+    """Rows of the ranking that are sure, and those that are likely."""
+    sure = [r for r in answer.ranking if r.effect in answer.sure]
+    return sure, [r for r in answer.ranking if r.effect in set(answer.added) - set(answer.sure)]
 
 
 def _partly(answer: Answer) -> str:
     """What is sure, what is likely, how much of the error it explains, and where the rest sits."""
-    sure = [r for r in answer.ranking if r.effect in answer.added]
-    unsure = set(answer.found) - set(answer.added)
-    likely = [r for r in answer.ranking if r.effect in unsure]
-    parts = []
+    (sure, likely), parts = _told(answer), []
     if sure:
         parts.append(f"Missing, among others: {enumerated([_named(r) for r in sure])}.")
     if likely:
@@ -143,7 +181,7 @@ def _partly(answer: Answer) -> str:
         parts.append(f"Likely, but not sure: {names}.{_doubt(likely)}")
     goes = f"held-out error goes from {answer.error_before:.2f} to {answer.error_after:.2f}"
     share = 1.0 - answer.excess_after / max(answer.excess_before, 1e-9)
-    together = "Together they explain" if len(answer.found) > 1 else "It explains"
+    together = "Together they explain" if len(answer.added) > 1 else "It explains"
     explained = f"{100 * max(share, 0.0):.0f} % of the error beyond the noise"
     parts.append(f"{together} {explained} (the {goes} times the noise).")
     parts += [f"Still unexplained: {answer.rest}." if answer.rest else ""]

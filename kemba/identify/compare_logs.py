@@ -9,10 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from kemba.identify.compare.compare import Comparison, compare
-from kemba.identify.evidence.noise.colour import with_learnt_colour
-from kemba.identify.evidence.windows import free_starts
 from kemba.identify.logs.reading import read_logs
 from kemba.identify.problem.problem import Problem
+from kemba.identify.quoted import heard
 from kemba.identify.workflow import admitted, check_all, model_of
 from kemba.logs import load_map
 from kemba.stopwatch import Tell, silent
@@ -50,7 +49,7 @@ def compare_read(
     tell("finding the motion in the logs")
     problem, _ = admitted(read, built)
     tell("learning the noise of the sensors")
-    problem = with_learnt_colour(problem, free_starts(problem))
+    problem = heard(problem)
     tell("comparing with the model")
     return compare(problem, model, [str(log.meta["path"]) for log in read]), problem
 

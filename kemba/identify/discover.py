@@ -14,6 +14,7 @@ from kemba.identify.doubt.cross_validation import one_part_shows
 from kemba.identify.doubt.formula import Formula, look
 from kemba.identify.doubt.held_out import HeldOut, error
 from kemba.identify.doubt.parsimony import Belief
+from kemba.identify.doubt.predictive import predictive, quoted
 from kemba.identify.doubt.run_consistency import drifting
 from kemba.identify.doubt.significance import best_gain, null_test
 from kemba.identify.evidence.bootstrap import NullTest, smallest_detectable
@@ -22,12 +23,15 @@ from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.search_settings import SearchSettings
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
 from kemba.identify.evidence.windows import error_ratio
+from kemba.identify.joint import Joint, joint_fit
 from kemba.identify.problem.problem import Problem
 from kemba.identify.ranking import fitted_errors, ladder, ranked
 from kemba.identify.rest import rest_of
 from kemba.identify.settings import DiscoverSettings, VerdictSettings
 from kemba.identify.stages import is_mixture, joined, structure_row, unbuilt
 from kemba.identify.verdict import Doubts, doubts_about, is_sure, verdict_on
+
+WRITTEN = ("missing", "partly")  # verdicts that give a model
 
 Talk = Callable[[str], None]
 
@@ -36,7 +40,8 @@ Talk = Callable[[str], None]
 class Discovery:
     """A finished search and what was made of it.
 
-    `fitted`: errors on the fitted logs at every step of the answer's `ladder`.
+    `best`: the effects of the model that is written, at their `joint` estimate. `fitted`: errors on
+    the fitted logs at every step of the answer's `ladder`.
     """
 
     answer: Answer
@@ -44,6 +49,7 @@ class Discovery:
     best: Hypothesis
     kept: HeldOut | None = None
     fitted: tuple[float, ...] = ()
+    joint: Joint | None = None
 
 
 def discover(
@@ -109,13 +115,16 @@ def _built_anew(search: Search, other: Rebuilt, holdout: Problem | None) -> Disc
     judge = (holdout or search.problem).heard_as(second.problem)
     before = error_ratio(judge, search.points[NULL].fit.theta)
     alone = error(second, NULL, found.kept)
-    row = structure_row(search, structure, (before, alone), second, found.best, other.nats)
+    fit = second.points[found.best].fit.theta
+    joint = found.joint or joint_fit(second.problem, found.best, fit)
+    row = structure_row(search, structure, (before, alone), second, joint, other.nats)
     gain = max(best_gain(search), other.nats)
     answer = joined(row, null_test(search).p_value(gain), found.answer, second, found.best)
     first_error = search.points[NULL].fitted_error
     search.say(f"built anew, the error is {answer.error_after:.2f} times the noise")
     fitted = (first_error, *found.fitted)
-    return Discovery(answer, second, found.best, found.kept, fitted)
+    answer.figures, answer.covariance = joint.figures, joint.matrix
+    return replace(found, answer=answer, fitted=fitted, joint=joint)
 
 
 def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> Discovery:
@@ -124,9 +133,11 @@ def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> 
     search.say("simulating logs in which nothing is missing")
     test, likeliest = null_test(search), best
     belief = believed(search, likeliest, test.p_value(best_gain(search)))
-    best, p_value, ended = belief.best, belief.p_value, ended or search.late
     search.say("testing whether more is missing")
     kept = HeldOut.beside(holdout, search.problem) if holdout else None
+    whole = predictive(search, belief.best, likeliest) if belief.best else NULL
+    belief, whole = quoted(search, belief, whole, kept)
+    best, p_value, ended = belief.best, belief.p_value, ended or search.late
     if test.too_short:
         return _undecided(search, test, kept)
     # what is too small to be reported still explains: a formula must do better than with it
@@ -138,15 +149,32 @@ def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> 
     doubts = Doubts((ENDED,) if ended else ())
     if formula is None:
         doubts = doubts_about(search, belief, drift, kept, ended)
+    search.say("fitting all that was found together")
+    joint = None
+    if whole and verdict_on(best, formula, doubts) in WRITTEN:
+        joint = joint_fit(search.problem, whole, search.points[whole].fit.theta)
+    elif not best and formula is None and _was_learnt(search.problem):
+        joint = joint_fit(search.problem, NULL, search.points[NULL].fit.theta)
+    whole = whole if joint else best
     search.say("ranking the effects")
-    ranking = ranked(search, belief, kept)
-    answer = _answer(search, best, p_value, test, ranking, formula, kept, doubts)
+    ranking = ranked(search, belief, kept, whole, joint)
+    answer = _answer(search, best, p_value, test, ranking, formula, kept, doubts, whole)
     answer.remarks = [*answer.remarks, *belief.remarks]
+    if joint is not None:
+        answer.figures, answer.covariance = joint.figures, joint.matrix
+        answer.remarks += joint.remarks
     if belief.idle and answer.verdict == "nothing":
-        answer.sentence = phrase(answer, idle=True)
+        answer.idle = True
+        answer.sentence = phrase(answer)
     if ended and ENDED not in answer.remarks:
         answer.remarks = [*answer.remarks, ENDED]
-    return Discovery(answer, search, best, kept, fitted_errors(search, best))
+    return Discovery(answer, search, whole, kept, fitted_errors(search, whole), joint)
+
+
+def _was_learnt(problem: Problem) -> bool:
+    """Whether the model has effects of an earlier answer: more logs know their figures better."""
+    model = getattr(problem, "model", None)
+    return model is not None and any(effect.support for effect in model.effects)
 
 
 def _undecided(search: Search, test: NullTest, kept: HeldOut | None) -> Discovery:
@@ -175,16 +203,17 @@ def _answer(
     formula: Formula | None,
     kept: HeldOut | None,
     doubts: Doubts,
+    whole: Hypothesis = NULL,
 ) -> Answer:
     problem = search.problem
-    whole = len(problem.runs) > 3 and not search.in_pieces
+    by_run = len(problem.runs) > 3 and not search.in_pieces
     before = error(search, NULL, kept)
-    after = error(search, best, kept) if best else before
+    after = error(search, whole, kept) if whole else before
     verdict = verdict_on(best, formula, doubts)
     rows = {r.effect: r for r in ranking}
     named = tuple(effect for effect in rows if effect in best)
     sure = tuple(r for r in named if r not in doubts.unsure and is_sure(rows[r]))
-    added = {"missing": named, "partly": sure}.get(verdict, ())
+    added = tuple(effect for effect in rows if effect in whole) if verdict in WRITTEN else ()
     ranker = search.base.ranker(search.points[NULL].linear)
     sizes = smallest_detectable(ranker, test.threshold)
     answer = Answer(
@@ -192,15 +221,15 @@ def _answer(
         p_value_nothing=min(p_value, formula.p_value) if formula else p_value,
         ranking=ranking,
         added=added,
-        found=named if verdict in ("missing", "partly") else (),
+        sure={"missing": named, "partly": sure}.get(verdict, ()),
         error_before=before,
         error_after=after,
         smallest_detectable={
             effect: {problem.candidates[effect].lead.name: size} for effect, size in sizes.items()
         },
         formula=str(formula) if formula else None,
-        split_by="held-out logs" if kept else "runs" if whole else "time blocks",
-        ladder=ladder(search, best, kept),
+        split_by="held-out logs" if kept else "runs" if by_run else "time blocks",
+        ladder=ladder(search, whole, kept),
     )
     answer.remarks = list(doubts.reasons)
     if verdict == "partly":

@@ -14,8 +14,6 @@ from kemba.identify.doubt.held_out import HeldOut, error, error_as_it_is
 from kemba.identify.doubt.parsimony import Belief
 from kemba.identify.evidence.linear import is_shape
 from kemba.identify.evidence.modes.bounded import within_bounds
-from kemba.identify.evidence.modes.settled import settled
-from kemba.identify.evidence.point import LinearisationPoint
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import (
     NULL,
@@ -23,30 +21,44 @@ from kemba.identify.evidence.spike_slab import (
     SpikeSlabSettings,
     share_of,
 )
+from kemba.identify.joint import Joint
 from kemba.identify.problem.problem import Array, Candidate, Parameter
 from kemba.identify.settings import RankingSettings
 
 
-def ranked(search: Search, belief: Belief, kept: HeldOut | None) -> list[Ranked]:
-    """The effects in order of probability; those of the answer that is believed first."""
+def ranked(
+    search: Search,
+    belief: Belief,
+    kept: HeldOut | None,
+    whole: Hypothesis = NULL,
+    joint: Joint | None = None,
+) -> list[Ranked]:
+    """The effects in order of probability; those of the answer that is believed first, then the
+    others of the `whole` that is written, with what the `joint` fit says of them."""
     problem, best = search.problem, belief.best
     probability = (
         search.probabilities(belief.dismissed) if best else _doubted(search.probabilities())
     )
     shares = share_of(probability, problem.candidates)
-    order = sorted(shares, key=lambda e: (e not in best, -strength(search, e, best), -shares[e]))
-    reached = settled(search.base, search.points[best]) if best else None
+    order = sorted(
+        shares,
+        key=lambda e: (e not in best, e not in whole, -strength(search, e, best), -shares[e]),
+    )
     found = []
     before = error(search, NULL, kept)
-    for effect in order[: RankingSettings.current().shown]:
-        hypothesis = best if effect in best else _likeliest_with(search, effect)
+    for effect in order[: max(RankingSettings.current().shown, len(whole))]:
+        written = joint is not None and effect in whole
+        hypothesis = (whole if written else best) if effect in {*whole, *best} else NULL
+        hypothesis = hypothesis or _likeliest_with(search, effect)
         if not hypothesis:
             continue
         found.append(
             Ranked(
                 effect,
                 shares[effect],
-                values(search, hypothesis, effect, reached if effect in best else None),
+                joint.values(problem.candidates[effect])
+                if joint is not None and written
+                else values(search, hypothesis, effect),
                 equivalents(search, belief, effect) if effect in best else (),
                 before,
                 error(search, hypothesis, kept),
@@ -87,25 +99,19 @@ def equivalents(search: Search, belief: Belief, effect: str) -> tuple[str, ...]:
     return tuple(sorted(found))
 
 
-def values(
-    search: Search, hypothesis: Hypothesis, effect: str, reached: LinearisationPoint | None = None
-) -> dict[str, Value]:
+def values(search: Search, hypothesis: Hypothesis, effect: str) -> dict[str, Value]:
     """Parameters of one effect with 95 % intervals.
 
     The model's own imperfection may add to an effect or hide some of it: as much, in one sigma, as
-    the spike of the prior allows. `reached`: the same hypothesis with slopes that hold at its best
-    fit (`settled`); the interval is the one there, and reaches to the value.
+    the spike of the prior allows.
     """
     problem, candidate = search.problem, search.problem.candidates[effect]
     point, found = search.points[hypothesis], {}
-    z, there = within_bounds(problem, point), within_bounds(problem, reached or point)
-    covariance = (reached or point).score.covariance
+    z, covariance = within_bounds(problem, point), point.score.covariance
     for key, parameter in candidate.keys().items():
         i = point.linear.index(key)
-        low, high = _interval(
-            there[i], covariance[i, i], None if is_shape(problem, key) else parameter
-        )
-        triple = np.array([z[i], min(low, z[i]), max(high, z[i])])
+        ends = _interval(z[i], covariance[i, i], None if is_shape(problem, key) else parameter)
+        triple = np.array([z[i], *ends])
         if is_shape(problem, key):
             triple = np.exp(np.clip(triple, -50, 50))
         triple = np.clip(triple, parameter.lower, parameter.upper)

@@ -13,10 +13,10 @@ from scipy.special import expit
 
 from kemba.identify.answer import Answer, Ranked, Value, Verdict, phrase
 from kemba.identify.doubt.cross_validation import left_out
-from kemba.identify.evidence.modes.bounded import within_bounds
 from kemba.identify.evidence.point import excess
 from kemba.identify.evidence.search import Search
-from kemba.identify.evidence.spike_slab import Hypothesis, SpikeSlabSettings, share_of
+from kemba.identify.evidence.spike_slab import Hypothesis, share_of
+from kemba.identify.joint import Joint
 from kemba.identify.rest import rest_of
 from kemba.identify.settings import VerdictSettings
 
@@ -26,7 +26,7 @@ def structure_row(
     structure: str,
     errors: tuple[float, float],
     second: Search,
-    best: Hypothesis,
+    joint: Joint,
     nats: float,
 ) -> Ranked:
     """The structure in the ranking, with its figures as the second search found them.
@@ -35,16 +35,11 @@ def structure_row(
     ahead with every effect free; from this its probability is told where the first search, whose
     noise may have the colour of the wrong structure's error, saw less in it.
     """
-    candidate = first.problem.candidates[structure]
-    units = {p.name: p for p in candidate.shapes}
-    point, imperfection = second.points[best], SpikeSlabSettings.current().spike
-    values, z = {}, within_bounds(second.problem, point)
+    units, values = {p.name: p for p in first.problem.candidates[structure].shapes}, {}
     for key, name in second.problem.own_figures.items():
-        i, p = point.linear.index(key), units[name]
-        centre = float(z[i])
-        sd = float(np.hypot(np.sqrt(point.score.covariance[i, i]), imperfection * abs(centre)))
-        ends = (centre, centre - 1.96 * sd, centre + 1.96 * sd)
-        value, low, high = np.clip(ends, p.lower, p.upper).tolist()
+        i, p = joint.names.index(key), units[name]
+        triple = np.clip((joint.value[i], joint.low[i], joint.high[i]), p.lower, p.upper)
+        value, low, high = triple.tolist()
         values[name] = Value(value, low, high, p.unit)
     share = share_of(first.probabilities(), [structure])[structure]
     share = max(share, float(expit(nats)) if nats > 0.0 else 0.0)
@@ -73,8 +68,8 @@ def joined(row: Ranked, p_value: float, answer: Answer, second: Search, best: Hy
         verdict=verdict,
         p_value_nothing=p_value,
         ranking=[row, *answer.ranking],
-        added=(row.effect, *answer.added) if named else (),
-        found=(row.effect, *(answer.found or best)) if named else (),
+        added=(row.effect, *(answer.added or best)) if named else (),
+        sure=(row.effect, *answer.sure) if named else (),
         error_before=before,
         ladder=list(zip(steps, [before, *rungs], strict=True)),
     )
@@ -102,10 +97,16 @@ def unbuilt(answer: Answer, structure: str) -> Answer:
         return answer
     remark = f"{structure} explains only a part, beside the chambers of the model"
     left = answer.rest or f"a model with {structure} instead was not built, or explains less"
+    likely = tuple(dict.fromkeys((structure, *answer.added)))
     found = replace(
-        answer, verdict="partly", added=(), rest=left, remarks=[remark, *answer.remarks]
+        answer,
+        verdict="partly",
+        added=likely,
+        sure=(),
+        rest=left,
+        remarks=[remark, *answer.remarks],
     )
-    found.sentence = phrase(found)
+    found.sentence, found.added = phrase(found), ()
     return found
 
 

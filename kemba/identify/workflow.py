@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import tempfile
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from kemba.errors import KembaError
-from kemba.files import write_json
-from kemba.identify.adopt import reference, write_model
+from kemba.errors import KembaError, enumerated
+from kemba.files import sha256, write_json
+from kemba.identify.adopt import COVARIANCE, reference, write_model
 from kemba.identify.answer import Answer
 from kemba.identify.discover import Discovery, discover
 from kemba.identify.logs.excerpt import excerpts
@@ -17,11 +18,13 @@ from kemba.identify.logs.gate import BadData, check_logs, sentence
 from kemba.identify.logs.limits import limits_of
 from kemba.identify.logs.reading import read_logs, taken_on
 from kemba.identify.problem.problem import Problem
+from kemba.identify.quoted import measured_in, noise_ratio, plant_of
 from kemba.logs import load_map
 from kemba.model import Model, load_model
 from kemba.trajectory import Trajectory
 
 Paths = Sequence[str | Path]
+QUOTED = 3  # of so many logs one is kept aside for the error that is quoted, where none are given
 
 
 def discover_logs(
@@ -35,8 +38,9 @@ def discover_logs(
 ) -> tuple[Answer, Discovery | None]:
     """Answer which effect `model` lacks; written to the folder `out` when one is given.
 
-    Data that cannot be right give the verdict `bad-data`, and nothing is fitted. Raises
-    KembaError for files that cannot be read.
+    The errors that it tells are those of `compare` with the model that is written, on the logs of
+    `holdout`; where there are none, on logs that are kept aside. Data that cannot be right give the
+    verdict `bad-data`, and nothing is fitted. Raises KembaError for files that cannot be read.
     """
     started = time.monotonic()
     columns = load_map(column_map) if column_map else None
@@ -45,16 +49,20 @@ def discover_logs(
     found: Discovery | None = None
     try:
         _apart(fitted, kept)
+        fitted, kept, said = _kept_aside(fitted, kept)
         built = model_of(fitted, model)
         checked = [*check_all([*fitted, *kept], built), *limits_of(fitted)]
         say("finding the motion in the logs")
         problem, remarks = admitted(fitted, built)
-        remarks = [*built.remarks, *checked, *remarks]
+        remarks = [*said, *built.remarks, *checked, *remarks]
         judge = make_problem(excerpts(kept)[0], built) if kept else None
         left = time_limit - (time.monotonic() - started)
         found = discover(problem, judge, left, say)
         answer = found.answer
+        say("comparing what is written with the quoted logs")
+        _quote(answer, judge or problem, kept or fitted, model)
         answer.remarks = [*answer.remarks, *remarks]
+        answer.evidence = _evidence(answer, fitted, kept, model)
     except BadData as error:
         answer = Answer("bad-data", sentence=sentence(error.errors))
         answer.remarks = [str(e) for e in error.errors]
@@ -62,6 +70,54 @@ def discover_logs(
     if out is not None:
         write_answer(answer, Path(out), model)
     return answer, found
+
+
+def _kept_aside(
+    fitted: Sequence[Trajectory], kept: Sequence[Trajectory]
+) -> tuple[list[Trajectory], list[Trajectory], list[str]]:
+    """Logs to learn from, logs to quote, and a remark where none were given for that."""
+    count = 0 if kept else len(fitted) // QUOTED
+    if count:
+        learnt, quoted = list(fitted[:-count]), list(fitted[-count:])
+        names = enumerated([str(log.meta["name"]) for log in quoted])
+        return learnt, quoted, [f"kept aside for the quoted error: {names}"]
+    few = "of data that the fit has seen: with three logs or more, one is kept aside"
+    return list(fitted), list(kept), [] if kept else [f"the quoted error is {few}"]
+
+
+def _quote(answer: Answer, judge: Problem, logs: Sequence[Trajectory], model: str) -> None:
+    """Tell the errors on quoted logs as `compare` does, of the model as it is (`judge`), and of
+    the one that is written; what does not predict better there is not written."""
+    before = answer.error_before, answer.error_after
+    answer.error_before = answer.error_after = noise_ratio(judge)
+    if answer.writes:
+        with tempfile.TemporaryDirectory() as folder:
+            data = answer.json()
+            file = Path(folder) / "model.yaml"
+            write_model(file, model, data["ranking"], answer.added, data)
+            written = make_problem(excerpts(logs)[0], model_of(logs, str(file)))
+        answer.error_after = noise_ratio(written)
+    answer.told_in(before)
+
+
+def _evidence(
+    answer: Answer, fitted: Sequence[Trajectory], kept: Sequence[Trajectory], model: str
+) -> dict[str, Any] | None:
+    """What the model that is written rests on, as its YAML says it; None where none is written."""
+    if not answer.writes:
+        return None
+    used = [*((log, "learnt") for log in fitted), *((log, "quoted") for log in kept)]
+    paths = [(Path(log.meta["path"]).resolve(), use) for log, use in used]
+    quoted, plant = kept or fitted, None
+    if quoted[0].meta["kind"] == "robot":
+        plant = noise_ratio(make_problem(excerpts(quoted)[0], plant_of(model)))
+    return {
+        "logs": [{"file": str(p), "sha256": sha256(p), "use": use} for p, use in paths],
+        "error_before": answer.error_before,
+        "error_held_out": answer.error_after,
+        "error_plant": plant,
+        "measured": measured_in([*fitted, *kept], model).model_dump(exclude_none=True),
+    }
 
 
 def model_of(logs: Sequence[Trajectory], name: str) -> Model:
@@ -125,10 +181,10 @@ def write_answer(answer: Answer, out: Path, model: str) -> None:
     """answer.json, and the model with what was found."""
     out.mkdir(parents=True, exist_ok=True)
     data: dict[str, Any] = answer.json()
-    for stale in ("model.yaml", "answer.json"):
+    for stale in ("model.yaml", COVARIANCE, "answer.json"):
         (out / stale).unlink(missing_ok=True)
-    if answer.added:
-        path = write_model(out / "model.yaml", model, data["ranking"], answer.added)
+    if answer.writes:
+        path = write_model(out / "model.yaml", model, data["ranking"], answer.added, data)
         answer.model = data["model"] = str(path)
     write_json(out / "answer.json", data | {"base": reference(model)})
 

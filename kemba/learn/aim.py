@@ -25,7 +25,9 @@ class AimSettings(Settings):
 
     apex: float = setting(1e-3, "m", "apex error that needs no search", CHOSEN)
     touchdown: float = setting(3e-3, "s", "touchdown error that needs no search", CHOSEN)
-    pitch: float = setting(0.02, "rad", "pitch error at touchdown that needs no search", CHOSEN)
+    pitch: float = setting(
+        0.009, "rad", "pitch at touchdown, beyond the plan's, that a moved edge may make", CHOSEN
+    )
     moved: int = setting(8, "ms", "by which an edge moves at most", CHOSEN, decides=True)
     executions: int = setting(150, "1", "simulations at most", CHOSEN)
 
@@ -61,7 +63,7 @@ class Aim:
             seen.apex + add.apex,
             seen.apex_time,
             seen.touchdown + add.touchdown,
-            seen.pitch + add.pitch,
+            seen.pitch,
             seen.upright,
         )
         return flight, lands
@@ -73,7 +75,8 @@ class Aim:
         table = read_controller(table)
         rest, first = rest_after(self.model, self.plan, table), table
         wanted = flight_of(self.plan, self.machine)
-        best, must_land = self._miss(table, rest, wanted)
+        turn = self._turn(table, rest, wanted)
+        best, must_land = self._miss(table, rest, wanted, turn)
         left = settings.executions
         while best > 1.0 and left > 0:
             nearest, choice = best, None
@@ -81,7 +84,7 @@ class Aim:
                 if left <= 0 or not _within(first, trial, settings.moved):
                     continue
                 left -= 1
-                miss, lands = self._miss(trial, rest, wanted)
+                miss, lands = self._miss(trial, rest, wanted, turn)
                 if miss < nearest and (lands or not must_land):
                     nearest, choice = miss, trial
                     if miss < 0.7 * best:
@@ -91,9 +94,22 @@ class Aim:
             best, table = nearest, choice
         return Aimed(table, self.expected(table, rest)[0], _moved(first, table))
 
-    def _miss(self, table: Trajectory, rest: float, wanted: FlownJump) -> tuple[float, bool]:
-        """The root of squared errors in units of what needs no search, and whether it lands."""
-        settings = AimSettings.current()
+    def _turn(self, table: Trajectory, rest: float, wanted: FlownJump) -> float:
+        """The largest pitch [rad] beyond the plan's that a corrected table may touch down with:
+        that of the table as it is, at least."""
+        most = AimSettings.current().pitch
+        try:
+            turned = abs(self.expected(table, rest)[0].pitch - wanted.pitch)
+        except KembaError:
+            return most
+        return max(turned, most) if isfinite(turned) else most
+
+    def _miss(
+        self, table: Trajectory, rest: float, wanted: FlownJump, turn: float
+    ) -> tuple[float, bool]:
+        """The root of squared errors in units of what needs no search, and whether it lands; a
+        table that turns the body by more than `turn` [rad] counts as fallen."""
+        settings, fallen = AimSettings.current(), RetimingSettings.current().fallen
         try:
             flight, lands = self.expected(table, rest)
         except KembaError:
@@ -101,9 +117,10 @@ class Aim:
         errors = [(flight.apex - wanted.apex) / settings.apex]
         if isfinite(wanted.touchdown):
             errors.append((flight.touchdown - wanted.touchdown) / settings.touchdown)
-            errors.append((flight.pitch - wanted.pitch) / settings.pitch)
+            if abs(flight.pitch - wanted.pitch) > turn + 1e-9:
+                return fallen, False
         miss = float(np.linalg.norm(errors))
-        return (miss if isfinite(miss) else RetimingSettings.current().fallen), lands
+        return (miss if isfinite(miss) else fallen), lands
 
 
 def _moved(first: Trajectory, table: Trajectory) -> dict[str, list[int]]:

@@ -13,12 +13,7 @@ from kemba.config import dump_yaml
 from kemba.learn.flight import FlownJump
 from kemba.settings import CHOSEN, Settings, setting
 
-QUANTITIES = ("apex", "touchdown", "pitch")
-SAID = {
-    "apex": ("rises to", "rise to", "m"),
-    "touchdown": ("lands at", "land at", "s"),
-    "pitch": ("touches down with a pitch of", "have", "rad"),
-}
+QUANTITIES = ("apex", "touchdown")
 NOTE = "what executions did beyond the learnt model; it moves valve edges and is no physics"
 
 
@@ -27,25 +22,23 @@ class CorrectionSettings(Settings):
 
     apex: float = setting(0.05, "m", "largest apex error that is corrected", CHOSEN)
     touchdown: float = setting(0.02, "s", "largest error of touchdown that is corrected", CHOSEN)
-    pitch: float = setting(0.1, "rad", "largest error of pitch that is corrected", CHOSEN)
     apex_scatter: float = setting(
         3e-3, "m", "1 sigma of the apex between executions, where fewer than three are known",
         "derived: valves that scatter by 0.1 ms, on the shipped plant",
     )  # fmt: skip
     touchdown_scatter: float = setting(2e-3, "s", "the same for touchdown", CHOSEN)
-    pitch_scatter: float = setting(0.01, "rad", "the same for the pitch there", CHOSEN)
 
 
 @dataclass(frozen=True)
 class Correction:
-    """Executed minus simulated on the learnt model: apex [m], touchdown [s], pitch there [rad].
+    """Executed minus simulated on the learnt model: apex [m], touchdown [s]. The body's pitch is
+    left alone.
 
     `logs`: from how many executions; `limited`: what was larger than its bound.
     """
 
     apex: float = 0.0
     touchdown: float = 0.0
-    pitch: float = 0.0
     logs: int = 0
     limited: tuple[str, ...] = ()
 
@@ -73,21 +66,13 @@ def correction_from(executed: Sequence[FlownJump], simulated: FlownJump) -> Corr
     return Correction(**found, logs=len(executed), limited=tuple(limited))
 
 
-def contradictions(executed: Sequence[FlownJump], simulated: FlownJump) -> tuple[str, ...]:
-    """What a simulation does otherwise than its executions, by more than is corrected, in words."""
-    settings, found = CorrectionSettings.current(), []
-    for name, (does, do, unit) in SAID.items():
-        values = np.array([getattr(f, name) for f in executed])
-        values = values[np.isfinite(values)]
-        ours, bound = float(getattr(simulated, name)), float(getattr(settings, name))
-        if not len(values) or (name == "pitch" and not np.isfinite(ours)):
-            continue  # no touchdown is said once
-        logs = f"where the logs {do} {values.mean():.3f} {unit}"
-        if not np.isfinite(ours):
-            found.append(f"does not land {logs}")
-        elif abs(ours - values.mean()) > bound:
-            found.append(f"{does} {ours:.3f} {unit} {logs}")
-    return tuple(found)
+def scatter_of(executed: Sequence[FlownJump]) -> float:
+    """1 sigma [m] of the apex between executions: what is usual, counted as one of them, and what
+    they show."""
+    usual = CorrectionSettings.current().apex_scatter
+    apex = np.array([f.apex for f in executed])
+    squares = float(np.sum((apex - apex.mean()) ** 2)) if len(apex) > 1 else 0.0
+    return float(np.sqrt((usual**2 + squares) / max(len(apex), 1)))
 
 
 def write_correction(
@@ -95,7 +80,7 @@ def write_correction(
 ) -> None:
     """The correction's own file; `moved`: ticks [ms] by which valve edges moved, by column."""
     values = {k: list(v) if isinstance(v, tuple) else v for k, v in asdict(correction).items()}
-    units = {"apex": "m", "touchdown": "s", "pitch": "rad"}
+    units = {"apex": "m", "touchdown": "s"}
     dump_yaml(
         {"note": NOTE, "unexplained": values, "units": units, "edges_moved_ms": moved, **reached},
         path,

@@ -8,13 +8,15 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+from kemba.learn.expected import ExpectedApex
 from kemba.learn.round import Round
+from kemba.learn.words import effects
 from kemba.ocp import load_task, task_model
 from kemba.plant.execution.certificate import rest_after
 from kemba.plant.execution.controller import execute
 from kemba.plotting.study.learning import plot_executions, plot_rounds
 from kemba.plotting.style import svg_text
-from kemba.report.review.html import pairs
+from kemba.report.review.html import pairs, table
 from kemba.report.review.verdict import ReviewVerdict
 from kemba.report.stage import write_page
 
@@ -22,7 +24,7 @@ Rows = Iterable[tuple[str, Any]]
 
 
 def write_learning(found: Round, folder: Path) -> Path:
-    """Write learning.html to the folder of the new run; it needs no other file."""
+    """Write learn.html to the folder of the new run; it needs no other file."""
     parts = [
         verdict_of(found, folder).html(),
         f'<div class="facts">{"".join(_tables(found))}</div>',
@@ -32,10 +34,11 @@ def write_learning(found: Round, folder: Path) -> Path:
         f"<figure>{svg_text(_executions(found))}</figure>",
         "<h2>Rounds</h2>",
         f"<figure>{svg_text(_rounds(found))}</figure>",
+        _growth(found),
         f"<p>{escape(_correction(found))}</p>",
     ]
     title = f"Round {found.past.round} of learning: {folder.resolve().name}"
-    return write_page(folder / "learning.html", title, "\n".join(parts))
+    return write_page(folder / "learn.html", title, "\n".join(parts))
 
 
 def verdict_of(found: Round, folder: Path) -> ReviewVerdict:
@@ -44,7 +47,7 @@ def verdict_of(found: Round, folder: Path) -> ReviewVerdict:
     if not found.good:
         aim = "do not send it to the robot; see why:"
         return ReviewVerdict("bad", found.sentence, aim, f"kemba-opt report {run}")
-    sure = found.answer.verdict in ("missing", "nothing") and not found.refused
+    sure = found.answer.verdict in ("missing", "nothing")
     aim = "send controller.csv to the robot, or execute it on the simulated one:"
     command = f"kemba-opt simulate {run} --repeat 3 --noise"
     return ReviewVerdict("good" if sure else "fair", found.sentence, aim, command)
@@ -78,8 +81,42 @@ def _tables(found: Round) -> Iterable[str]:
         yield pairs("the next run", [
             ("planned apex", f"{found.target.apex:.4f} m"),
             ("expected apex", f"{found.aimed.expected.apex:.4f} m"),
+            ("its 95 % band", _band(found.next_expected)),
             ("expected touchdown", f"{landing:+.1f} ms from the plan's"),
         ])  # fmt: skip
+
+
+def _band(band: ExpectedApex | None) -> str:
+    return f"{band.low:.4f} to {band.high:.4f} m" if band is not None else "not known"
+
+
+def _growth(found: Round) -> str:
+    """The model of every round: what was added, its error before and after, and where the run that
+    was learnt from came down beside what was expected of it."""
+    now = {
+        "round": found.past.round,
+        "effects": effects(found.answer),
+        "compare_before": found.compare_before,
+        "compare_after": found.compare_after,
+        "executed_apex_m": found.executed_apex,
+        "was_expected": found.was_expected and found.was_expected.json(),
+    }
+    rows = []
+    for told in (*found.past.history, now):
+        band = ExpectedApex.of(told.get("was_expected"))
+        apex = told.get("executed_apex_m")
+        inside = "" if band is None or apex is None else "yes" if band.holds(apex) else "no"
+        added = [f"<b>{escape(n)}</b> {escape(v)}" for n, v in (told.get("effects") or {}).items()]
+        rows.append((
+            str(told["round"]),
+            "<br>".join(added) or "nothing",
+            f"{told['compare_before']:.2f} to {told['compare_after']:.2f}",
+            "" if apex is None else f"{apex:.4f} m",
+            "" if band is None else _band(band),
+            inside,
+        ))  # fmt: skip
+    heads = ("round", "added to the model", "error / noise", "executed apex", "expected", "inside")
+    return table("The model, round by round", heads, rows)
 
 
 def _seconds(value: float) -> str:

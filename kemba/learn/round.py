@@ -1,4 +1,4 @@
-"""One round: compare, discover, adopt, plan anew, correct."""
+"""One round: discover, adopt what predicts better, plan anew, correct what is left."""
 
 from __future__ import annotations
 
@@ -12,20 +12,16 @@ import numpy as np
 
 from kemba.config import Document, beside, dump_yaml
 from kemba.errors import KembaError
+from kemba.files import read_json
 from kemba.identify.adopt import reference, write_model
 from kemba.identify.answer import Answer
-from kemba.identify.compare_logs import compare_logs
 from kemba.identify.discover import Discovery
 from kemba.identify.logs.reading import read_logs
 from kemba.identify.workflow import discover_logs
 from kemba.learn import words
 from kemba.learn.aim import Aim, Aimed
-from kemba.learn.correction import (
-    Correction,
-    contradictions,
-    correction_from,
-    write_correction,
-)
+from kemba.learn.correction import Correction, correction_from, scatter_of, write_correction
+from kemba.learn.expected import ExpectedApex, band_about
 from kemba.learn.flight import FlownJump, flight_of
 from kemba.learn.rounds import Past, entry, past_of
 from kemba.logs import load_map
@@ -44,7 +40,6 @@ from kemba.trajectory import Trajectory
 
 PLAIN = "controller_uncorrected.csv"
 SUPPLY = 0.7e6  # Pa, of a model that names none
-LEARNT = ("missing", "partly")  # verdicts that give a model
 
 
 @dataclass(frozen=True)
@@ -79,12 +74,19 @@ class Round:
     result: dict[str, Any] = field(default_factory=dict)
     aimed: Aimed | None = None
     target: FlownJump | None = None
-    refused: tuple[str, ...] = ()  # why the learnt model is not `model`, which it else is
+    was_expected: ExpectedApex | None = None  # of the run that was executed, by the round before
+    next_expected: ExpectedApex | None = None
+    remarks: tuple[str, ...] = ()
 
     @property
-    def contradicted(self) -> tuple[str, ...]:
-        """What `model` does otherwise than the executions, by more than is corrected, in words."""
-        return contradictions(self.executed, self.simulated)
+    def learnt(self) -> bool:
+        """Whether `model` is a new one: it predicts better on quoted logs, whatever the verdict."""
+        return bool(self.answer.model) and self.compare_after < self.compare_before
+
+    @property
+    def executed_apex(self) -> float:
+        """Mean executed apex [m]."""
+        return float(np.mean([f.apex for f in self.executed]))
 
     @property
     def expected_apex_error(self) -> float | None:
@@ -96,12 +98,12 @@ class Round:
     @property
     def executed_apex_error(self) -> float:
         """Mean executed minus planned apex [m] of the run that was learnt from."""
-        return float(np.mean([f.apex for f in self.executed])) - self.planned.apex
+        return self.executed_apex - self.planned.apex
 
     @property
     def good(self) -> bool:
-        """Whether there is a new plan that its model's executions confirm, and logs that model."""
-        return bool(self.result.get("confirmed")) and not self.contradicted
+        """Whether there is a new plan that its model's executions confirm."""
+        return bool(self.result.get("confirmed"))
 
     def json(self) -> dict[str, Any]:
         """The object that `--json` prints."""
@@ -115,11 +117,14 @@ class Round:
             "run": self.result.get("run"),
             "expected_apex_error_m": self.expected_apex_error,
             "executed_apex_error_m": self.executed_apex_error,
+            "executed_apex_m": self.executed_apex,
+            "was_expected": _told(self.was_expected),
+            "inside": self.was_expected and self.was_expected.holds(self.executed_apex),
+            "next_expected": _told(self.next_expected),
             "unexplained_apex_m": self.correction.apex,
             "simulated_touchdown_s": finite(self.simulated.touchdown),
             "executed_touchdown_s": finite(float(np.mean([f.touchdown for f in self.executed]))),
-            "contradicted": list(self.contradicted),
-            "refused": list(self.refused),
+            "remarks": list(self.remarks),
             "good": self.good,
             "sentence": self.sentence,
         }
@@ -127,24 +132,25 @@ class Round:
     @property
     def sentence(self) -> str:
         """The round in words."""
-        failed = "" if self.good else f"FAILED: the next plan is not confirmed: {self._why}"
+        why = str(self.result.get("sentence") or "there is none").removeprefix("FAILED: ")
+        failed = "" if self.good else f"FAILED: the next plan is not confirmed: {why}"
+        told = words.jumped(self.executed_apex_error)
+        inside = words.against(self.was_expected, self.executed_apex)
         return words.sentences(
             [
                 failed,
-                f"round {self.past.round}: {words.jumped(self.executed_apex_error)}",
+                f"round {self.past.round}: {told}{inside}",
                 words.learnt(
                     self.answer.verdict, self.answer.added, self.compare_before, self.compare_after
                 ),
-                words.refused(self.refused, self.answer.added),
-                words.expected(self.expected_apex_error),
+                words.expected(self.next_expected, self.target.apex if self.target else None),
+                *self.remarks,
             ]
         )
 
-    @property
-    def _why(self) -> str:
-        if self.contradicted and self.result.get("confirmed"):
-            return f"the executed plan's table, on its model, {' and '.join(self.contradicted)}"
-        return str(self.result.get("sentence") or "there is none").removeprefix("FAILED: ")
+
+def _told(band: ExpectedApex | None) -> dict[str, float] | None:
+    return band.json() if band is not None else None
 
 
 def learn(asked: Asked, folder: RunFolder, listener: Listener) -> Round:
@@ -162,58 +168,75 @@ def learn(asked: Asked, folder: RunFolder, listener: Listener) -> Round:
     update = {"model": found.model, "plant": beside(task.plant, Path())}
     task = task.model_copy(update=update)
     if asked.correct:
-        found = replace(found, correction=correction_from(found.executed, found.simulated))
+        found = _with_correction(found, old, run)
     return _planned(found, task, document, folder, listener)
 
 
 def _learnt(
     asked: Asked, past: Past, run: Run, old: Task, folder: RunFolder, tell: Callable[[str], None]
 ) -> Round:
-    """Compare with the run's model, discover, compare with the model found."""
-    kept, out = [*asked.holdout] or [*past.logs], folder / "answer"
+    """Discover what the run's model lacks; the model is the one found, where it predicts better."""
+    out = folder / "answer"
     shutil.rmtree(out, ignore_errors=True)  # of a round that was killed
     out.mkdir()
     here = as_executed(old.model, old, out / "model_of_the_run.yaml")
-    before, _ = compare_logs(kept, here, asked.column_map, tell=tell)
     answer, discovery = discover_logs(
         past.logs, asked.holdout, here, asked.column_map, asked.time_limit, tell, out
     )
     if answer.verdict == "bad-data":
         raise KembaError("--logs", answer.sentence, hint="see kemba-opt check LOG")
-    model, after = old.model, before.noise_ratio
-    if answer.verdict in LEARNT and answer.added:
-        tell("comparing with what was learnt")
-        file = write_model(out / "model.yaml", old.model, answer.json()["ranking"], answer.added)
+    model = old.model
+    if answer.model and answer.error_after < answer.error_before:
+        data = answer.json()
+        file = write_model(out / "model.yaml", old.model, data["ranking"], answer.added, data)
         model = str(file.resolve())
-        here = as_executed(model, old, out / "model_learnt_of_the_run.yaml")
-        after = compare_logs(kept, here, asked.column_map)[0].noise_ratio
     machine = load_machine(old.model)
     table, plan = run.controller, run.trajectory
-    found = Round(
+    before = simulated = _simulated(task_model(old), plan, table, machine)
+    if model != old.model:
+        learnt = task_model(old.model_copy(update={"model": model}))
+        simulated = _simulated(learnt, plan, table, machine)
+    return Round(
         past=past,
-        model=old.model,
+        model=model,
         answer=answer,
         discovery=discovery,
-        compare_before=before.noise_ratio,
-        compare_after=after,
+        compare_before=answer.error_before,
+        compare_after=answer.error_after,
         planned=flight_of(plan, machine),
         executed=[flight_of(log, machine) for log in past.executed[past.last]],
-        simulated=(unlearnt := _simulated(task_model(old), plan, table, machine)),
-        before=unlearnt,
+        simulated=simulated,
+        before=before,
+        was_expected=_expected_before(run),
+        remarks=(*past.remarks, *words.few(past.logs)),
     )
-    if model == old.model:
-        return found
-    learnt = task_model(old.model_copy(update={"model": model}))
-    return with_model(found, model, _simulated(learnt, plan, table, machine))
 
 
-def with_model(found: Round, model: str, simulated: FlownJump) -> Round:
-    """The round with the learnt `model`, unless executions contradict more of what that does in
-    simulation than of what the run's own model does."""
-    told = contradictions(found.executed, simulated)
-    if len(told) > len(found.contradicted):
-        return replace(found, refused=told)
-    return replace(found, model=model, simulated=simulated)
+def _expected_before(run: Run) -> ExpectedApex | None:
+    """What the round that made a run expected of it; None of a run that `learn` did not make."""
+    file = run.path / "learning.json"
+    told = read_json(file) if file.is_file() else None
+    return ExpectedApex.of(told.get("next_expected")) if isinstance(told, dict) else None
+
+
+def _with_correction(found: Round, old: Task, run: Run) -> Round:
+    """The round with what executions do beyond the model; without it where the table that was
+    executed had a correction, and the model says that the plain one would have come as near."""
+    correction = correction_from(found.executed, found.simulated)
+    plain = run.path / PLAIN
+    if not plain.is_file():
+        return replace(found, correction=correction)
+    model = task_model(old.model_copy(update={"model": found.model}))
+    there = _simulated(model, run.trajectory, Trajectory.read(plain), load_machine(old.model))
+    without = abs(there.apex - found.planned.apex)
+    if without > abs(found.executed_apex_error):
+        return replace(found, correction=correction)
+    said = (
+        "the correction of the executed table is undone: by the learnt model the plain table "
+        f"would have missed the apex by {1e3 * without:.1f} mm, and the corrected one missed it by "
+        f"{1e3 * abs(found.executed_apex_error):.1f} mm"
+    )
+    return replace(found, remarks=(*found.remarks, said))
 
 
 def as_executed(model: str, task: Task, path: Path) -> str:
@@ -247,6 +270,9 @@ def _planned(
         "added": list(found.answer.added),
         "model": found.model,
         "executed_apex_error_m": found.executed_apex_error,
+        "executed_apex_m": found.executed_apex,
+        "was_expected": _told(found.was_expected),
+        "effects": words.effects(found.answer),
         "compare_before": found.compare_before,
         "compare_after": found.compare_after,
     }
@@ -279,7 +305,10 @@ def _corrected(found: Round, task: Task, folder: RunFolder) -> Round:
         "expected_touchdown_s": aimed.expected.touchdown,
     }
     write_correction(folder / "correction.yaml", found.correction, aimed.moved, reached)
-    return replace(found, aimed=aimed, target=target)
+    rest = rest_after(model, plan, aimed.table)
+    middle, scatter = aimed.expected.apex, scatter_of(found.executed)
+    band = band_about(middle, aimed.table, model, task.model, machine, rest, scatter)
+    return replace(found, aimed=aimed, target=target, next_expected=band)
 
 
 def _confirmed(result: dict[str, Any], task: Task, plan: Path) -> bool:

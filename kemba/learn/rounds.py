@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from kemba.errors import KembaError
+from kemba.errors import KembaError, enumerated
+from kemba.files import sha256
 from kemba.plant.execution.controller import read_controller
-from kemba.runs import Run, load_run, sha256
+from kemba.runs import Run, load_run
 from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Array, Trajectory
 
@@ -31,8 +32,7 @@ class Past:
     """What a new round knows: its number, the runs, the logs of each, and all logs to fit.
 
     `executed` maps the places of `runs` to the new logs of that run, by the clock of its plan;
-    `history` holds the entries
-    of earlier rounds.
+    `history` holds the entries of earlier rounds, `remarks` what became of their logs.
     """
 
     round: int
@@ -40,6 +40,7 @@ class Past:
     executed: dict[int, list[Trajectory]]
     logs: tuple[Path, ...]
     history: list[dict[str, Any]] = field(default_factory=list)
+    remarks: tuple[str, ...] = ()
 
     @property
     def last(self) -> int:
@@ -61,7 +62,8 @@ def past_of(
         executed.setdefault(place, []).append(timed)
     entries = {e["round"]: e for run in found for e in _entries(run)}
     history = [entries[number] for number in sorted(entries)]
-    earlier = [Path(path) for entry in history for path in entry["logs"]]
+    told = {path: digest for entry in history for path, digest in entry["logs"].items()}
+    earlier, remarks = _still_there(told)
     new = [Path(log.meta["path"]) for log in logs]
     listed = {path.resolve(): path for path in [*earlier, *new] if path.is_file()}
     used = {digest for entry in history for digest in entry["logs"].values()}
@@ -70,7 +72,24 @@ def past_of(
             what = "was already learnt from, so it cannot judge what was learnt"
             raise KembaError(str(path), what, hint="keep another log with --holdout")
     number = 1 + max(map(_round, found))
-    return Past(number, tuple(found), executed, tuple(listed.values()), history)
+    logs_of_all = tuple(listed.values())
+    return Past(number, tuple(found), executed, logs_of_all, history, remarks)
+
+
+def _still_there(told: Mapping[str, str]) -> tuple[list[Path], tuple[str, ...]]:
+    """Logs of earlier rounds, by path and SHA-256, that are as they were, and a remark on those
+    that are not: they are not fitted again."""
+    kept, gone, changed = [], [], []
+    for path, digest in told.items():
+        if not Path(path).is_file():
+            gone.append(path)
+        elif sha256(path) != digest:
+            changed.append(path)
+        else:
+            kept.append(Path(path))
+    what = {"of an earlier round is gone": gone, "has changed since an earlier round": changed}
+    remarks = [f"{enumerated(n)} {text}: not fitted again" for text, n in what.items() if n]
+    return kept, tuple(remarks)
 
 
 def entry(past: Past, facts: dict[str, Any]) -> dict[str, Any]:

@@ -1,11 +1,13 @@
 """Mechanism and effects become one residual with complementarity pairs."""
 
+from kemba.model.evidence import Evidence
 from kemba.model.model import SUPPLY, Model
 from kemba.model.node import Node, Row
-from kemba.model.spec import ModelSpec, build_model, load_model, load_spec
+from kemba.model.spec import ModelSpec, build_model, load_model, load_spec, read_covariance
 
 __all__ = [
     "SUPPLY",
+    "Evidence",
     "Model",
     "ModelSpec",
     "Node",
@@ -13,4 +15,5 @@ __all__ = [
     "build_model",
     "load_model",
     "load_spec",
+    "read_covariance",
 ]

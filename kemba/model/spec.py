@@ -15,6 +15,7 @@ from kemba.effects.pneumatics.constants import ATMOSPHERE
 from kemba.errors import KembaError
 from kemba.mechanism import OwnRig, load_robot, rig_mechanism, robot_mechanism
 from kemba.mechanism.robot_file import find_file, robot_files
+from kemba.model.evidence import Array, Evidence, located, matrix_in
 from kemba.model.model import Model
 from kemba.model.own_rig import own_model
 from kemba.quantity import Param
@@ -39,12 +40,20 @@ class ModelSpec(Section):
     supply: Supply | None = None
     chambers: Literal["first_order", "orifice"] | None = None
     effects: tuple[AnyEffect, ...] = Field(default=())
+    evidence: Evidence | None = None
     notes: str = ""
+
+    @property
+    def adds(self) -> bool:
+        """Whether it is another model than its base."""
+        return bool(self.robot or self.rig or self.supply or self.chambers or self.effects)
 
 
 def load_spec(name: str | Path = "planning") -> ModelSpec:
     """The model YAML `name` (a path or a shipped model) with its bases merged in."""
-    (_, spec), *bases = model_chain(name)
+    chain = model_chain(name)
+    (_, spec), *bases = chain
+    _, evidence = _with_evidence(chain)
     for _, base in bases:
         merged = {e.name: e for e in (*base.effects, *spec.effects)}
         update: dict[str, Any] = {
@@ -52,7 +61,38 @@ def load_spec(name: str | Path = "planning") -> ModelSpec:
             for key in ("robot", "rig", "supply", "chambers")
         }
         spec = spec.model_copy(update={**update, "effects": tuple(merged.values())})
-    return spec.model_copy(update={"base": None})
+    return spec.model_copy(update={"base": None, "evidence": evidence})
+
+
+def _with_evidence(chain: list[tuple[Path, ModelSpec]]) -> tuple[Path, Evidence | None]:
+    """The file of a chain whose evidence counts, and that: the first one that adds something."""
+    path, spec = next(((p, s) for p, s in chain if s.evidence or s.adds), chain[-1])
+    return path, spec.evidence
+
+
+def read_covariance(name: str | Path) -> tuple[tuple[str, ...], Array]:
+    """Names (`effect.parameter`) and joint covariance (k, k), in SI units, of what the model YAML
+    `name` was found to have.
+
+    Raises KembaError where the model has no evidence or covariance, and at the line that names the
+    file where that is missing, malformed, of other parameters or no covariance.
+    """
+    path, evidence = _with_evidence(model_chain(name))
+    if evidence is None or evidence.covariance is None:
+        what = "has no covariance of what was found" if evidence else "has no evidence"
+        hint = "find it anew with: kemba-opt discover LOG..."
+        raise KembaError(str(path), what, "evidence.covariance was expected", hint)
+    spec = load_spec(name)
+    try:
+        known = [f"{e.name}.{p}" for e in spec.effects for p in e.parameters()]
+        return matrix_in(path.parent / evidence.covariance, known)
+    except KembaError as error:
+        raise located(error, load_yaml(path)) from None
+
+
+def evidence_folder(name: str | Path) -> Path:
+    """The folder from which the evidence of the model YAML `name` names its logs."""
+    return _with_evidence(model_chain(name))[0].parent
 
 
 def model_chain(name: str | Path) -> list[tuple[Path, ModelSpec]]:

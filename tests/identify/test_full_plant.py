@@ -48,7 +48,7 @@ def test_discover_names_the_full_plant(tmp_path: Path) -> None:
     """All candidates, from the planning model on; the model written is as good on other logs."""
     fitted, kept = written(tmp_path, 0)
     answer = answered(fitted, kept, None, lambda text: None, tmp_path / "answer")
-    assert {ORIFICE, LINE} <= set(answer.found), answer.sentence
+    assert {ORIFICE, LINE} <= set(answer.added), answer.sentence
     assert answer.error_after < 1.5 < answer.error_before
     assert answer.verdict in ("missing", "partly") and answer.model
     before, after = (compare_logs(kept, name)[0] for name in ("planning", answer.model))

@@ -98,10 +98,10 @@ def test_what_the_catalogue_lacks_is_unknown() -> None:
 def test_what_is_sure_is_told_where_the_time_ends_the_search() -> None:
     truth = {"kick.a": 9.0, "wave.a": -6.0, "hum.a": 6.0}
     answer = discover(Toy(truth, seed=2), time_limit=0.0).answer
-    assert answer.found == ("hum",) and answer.added == ()  # none was tried beside the first
+    assert answer.added == ("hum",) and answer.sure == ()  # none was tried beside the first
     assert answer.verdict == "partly" and ENDED in answer.remarks
     whole = discover(Toy(truth, seed=2)).answer
-    assert set(whole.found) == {"kick", "wave", "hum"} and ENDED not in whole.remarks
+    assert set(whole.added) == {"kick", "wave", "hum"} and ENDED not in whole.remarks
     single = discover(Toy({"kick.a": 9.0}, seed=2), time_limit=0.0).answer
     assert single.verdict == "missing" and ENDED in single.remarks
 
@@ -156,6 +156,7 @@ def test_the_sentence_says_falls_only_where_the_error_falls(after: float, said: 
         "missing",
         ranking=[Ranked("payload", 1.0, {})],
         added=("payload",),
+        sure=("payload",),
         error_before=0.96,
         error_after=after,
     )
@@ -167,7 +168,7 @@ def test_a_part_of_an_answer_says_what_it_explains_and_what_is_left() -> None:
     rng = np.random.default_rng(5)
     problem.measured += 4.0 * rng.standard_normal(len(problem.measured))
     answer = discover(problem).answer
-    assert answer.verdict == "partly" and answer.added == ("kick",) == answer.found
+    assert answer.verdict == "partly" and answer.added == ("kick",) == answer.sure
     assert answer.excess_before == pytest.approx(np.sqrt(answer.error_before**2 - 1.0))
     share = 1.0 - answer.excess_after / answer.excess_before
     assert f"explains {100 * share:.0f} % of the error beyond the noise" in answer.sentence
@@ -181,7 +182,7 @@ def test_an_effect_that_has_a_rival_is_likely_and_not_sure() -> None:
     rng = np.random.default_rng(5)
     problem.measured += 4.0 * rng.standard_normal(len(problem.measured))
     answer = discover(problem).answer
-    assert answer.verdict == "partly" and not answer.added
+    assert answer.verdict == "partly" and answer.added and not answer.sure
     assert "Likely, but not sure: " in answer.sentence and "kemba-opt experiment" in answer.sentence
 
 

@@ -95,7 +95,7 @@ def second(verdict: str, after: float) -> Answer:
     ladder = [("model as it is", 2.0), ("seal_friction", after)]
     named = () if verdict == "unknown" else ("seal_friction",)
     return Answer(
-        verdict, 0.1, "", [friction], named, 2.0, after, found=named, ladder=ladder, rest="rods"
+        verdict, 0.1, "", [friction], named, 2.0, after, sure=named, ladder=ladder, rest="rods"
     )
 
 
@@ -117,9 +117,9 @@ def test_two_stages_are_one_answer(verdict: str, after: float, said: str) -> Non
     assert [error for _, error in whole.ladder] == [5.0, 2.0, after]
     assert whole.error_before == 5.0 and whole.p_value_nothing == 0.002
     if said == "unknown":
-        assert whole.added == () == whole.found and "built anew" not in whole.sentence
+        assert whole.added == () == whole.sure and "built anew" not in whole.sentence
     else:
-        assert whole.found == (ORIFICE, "seal_friction")
+        assert whole.added == (ORIFICE, "seal_friction")
         assert ORIFICE in whole.sentence
 
 
@@ -145,9 +145,9 @@ def test_a_share_of_another_structure_is_no_whole_answer(
 ) -> None:
     """The model that is written has the structure whole: 0.78 of it land elsewhere."""
     row = Ranked(ORIFICE, 1.0, {"a": Value((low + high) / 2, low, high, "1")}, (), 2.5, 0.9)
-    answer = Answer("missing", 0.002, "", [row], (ORIFICE,), 2.5, 0.9, found=(ORIFICE,))
+    answer = Answer("missing", 0.002, "", [row], (ORIFICE,), 2.5, 0.9, sure=(ORIFICE,))
     assert is_mixture(answer, ORIFICE) == mixed
     if mixed:
         part = unbuilt(answer, ORIFICE)
-        assert (part.verdict, part.added, part.found) == ("partly", (), (ORIFICE,))
+        assert (part.verdict, part.added, part.sure) == ("partly", (), ())
         assert "Likely, but not sure: chambers:orifice" in part.sentence

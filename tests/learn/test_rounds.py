@@ -58,7 +58,7 @@ def test_one_round(planned: Path, tmp_path: Path) -> None:
     new = load_run(tmp_path / "run-1")
     assert new.manifest["learn"]["round"] == 1 and len(new.manifest["learn"]["logs"]) == 1
     assert new.certificate["continued"] is True
-    page = (tmp_path / "run-1" / "learning.html").read_text("utf-8")
+    page = (tmp_path / "run-1" / "learn.html").read_text("utf-8")
     assert (
         "supply_scale" in page and page.count("<svg") == 2 and "http" not in page.split("<svg")[0]
     )

@@ -27,8 +27,10 @@ def drive_log(
     unit: str = "m",
     seed: int = 0,
     seconds: float = 8.0,
+    scale: float = 1.0,
 ) -> Path:
-    """An axis that follows sines under a PD controller; `weight` hangs: torque -weight sin q."""
+    """An axis that follows sines under a PD controller; `weight` hangs: torque -weight sin q. The
+    motor does `scale` times what the log says."""
     rng = np.random.default_rng(seed)
     rates, sizes = 2 * np.pi * np.array([0.4, 0.9, 1.7]), np.array([0.10, 0.05, 0.02])
     phases = rng.uniform(0, 2 * np.pi, 3)
@@ -51,7 +53,8 @@ def drive_log(
     force = np.array([motor(*at) for at in zip(time, q, v, strict=True)])
     columns = {
         f"axis/q [{unit}]": q + 1e-7 * rng.standard_normal(len(q)),
-        f"axis/tau [{'N' if unit == 'm' else 'N.m'}]": force + 0.1 * rng.standard_normal(len(q)),
+        f"axis/tau [{'N' if unit == 'm' else 'N.m'}]": force / scale
+        + 0.1 * rng.standard_normal(len(q)),
     }
     Trajectory(time, columns, {"kind": "drive"}).write(path)
     return path

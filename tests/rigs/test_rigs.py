@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -36,6 +37,20 @@ def test_friction_of_a_drive_is_found(tmp_path: Path) -> None:
     law = next(name for name in COULOMB if name in found)
     assert found[law][COULOMB[law]].value == pytest.approx(3.0, rel=0.1)
     assert found["axis_damping"]["F_v"].value == pytest.approx(8.0, rel=0.1)
+
+
+@pytest.mark.parametrize("scale", [1.0, 0.8])
+def test_the_true_model_of_a_drive_explains_its_log_whatever_its_motor_does(
+    tmp_path: Path, scale: float
+) -> None:
+    """A scale of the motor is part of the prediction, also beside figures within tolerance."""
+    listed = [{"kind": "axis_friction", "F_c": 3.0}, {"kind": "axis_damping", "F_v": 8.0}]
+    listed += [{"kind": "axis_scale", "k": scale}] if scale != 1.0 else []
+    log = drive_log(tmp_path / "a.csv", scale=scale)
+    found, problem = compare_logs([log], model_file(tmp_path, DRIVE, *listed))
+    assert found.noise_ratio == pytest.approx(1.0, abs=0.3)
+    nominal = {name: value for name, (value, _) in problem.nuisance.items()}
+    assert np.allclose(problem.residual(nominal), problem.residual({}))
 
 
 @pytest.mark.nightly

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from kemba_cli.common import Force, Json, OwnEffects, Quiet, print_json, results, say
+from kemba_cli.common import Force, Foreign, Json, OwnEffects, Quiet, print_json, results, say
 
 if TYPE_CHECKING:
     from kemba.plant.rig.characterise import Characteristics
@@ -34,6 +34,7 @@ def characterise(
     model: Annotated[
         str, typer.Option(help="Model YAML whose robot has the cylinder that was tested.")
     ] = "planning",
+    column_map: Foreign = None,
     paper: Annotated[
         bool, typer.Option("--paper", help="Use the paper's own tables instead of logs.")
     ] = False,
@@ -60,18 +61,18 @@ def characterise(
         if figure or figures:
             what = "figures are drawn of the paper's rigs only"
             raise typer.BadParameter(what, param_hint="--figure")
-        _own_rig(logs, model, out, force, json, quiet)
+        _own_rig(logs, model, out, force, json, quiet, column_map)
         return
-    from kemba.logs import log_files
+    from kemba.logs import load_map, log_files, open_log
     from kemba.plant.rig.characterise import characterise as fit
     from kemba.plant.rig.tables import as_json
-    from kemba.trajectory import Trajectory
     from kemba_cli.next_steps import after_model, say_next
 
     if out:
         fresh(out, force)
     folder = _folder(figure, figures, out)
-    read = {str(file): Trajectory.read(file) for file in log_files(logs)}
+    columns = load_map(column_map) if column_map else None
+    read = {str(file): open_log(file, columns) for file in log_files(logs)}
     found = fit(read, load_model(model, rig=True).mechanism.need_cylinder())
     if out:
         found.write_model(out, out.stem)
@@ -100,7 +101,13 @@ def _folder(figure: bool | None, figures: Path | None, model: Path | None) -> Pa
 
 
 def _own_rig(
-    logs: list[Path], model: str, out: Path | None, force: bool, json: bool, quiet: bool
+    logs: list[Path],
+    model: str,
+    out: Path | None,
+    force: bool,
+    json: bool,
+    quiet: bool,
+    column_map: Path | None,
 ) -> None:
     """The figures of a rig of the user's own, and of the effects that its model lists."""
     from rich.table import Table
@@ -112,7 +119,7 @@ def _own_rig(
 
     if out:
         fresh(out, force)
-    found = characterise_logs(logs, model)
+    found = characterise_logs(logs, model, column_map)
     if out:
         found.write_model(out, reference(model))
     if json:
@@ -125,6 +132,8 @@ def _own_rig(
     results().print(table)
     error = f"{found.error_before:.3g} to {found.error_after:.3g} times the noise of the sensors"
     typer.echo(f"The error falls from {error}. Intervals are those of one mounting.")
+    for name in found.apart:
+        say(f"{name} differs between runs; its interval spans them", quiet)
     say(f"wrote {out}" if out else "write a model with --out MODEL.yaml", quiet)
     say_next(after_model(out, True, logs) if out else "", quiet)
 

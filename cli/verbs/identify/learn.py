@@ -49,7 +49,7 @@ def learn(
     """Learn from executed runs and plan the next one: compare, discover, adopt, plan, correct.
 
     The new run folder holds the model (answer/), the plan, a controller table with the correction
-    (correction.yaml), and the page learning.html. Exit code 1 when the new plan is not confirmed.
+    (correction.yaml), and the page learn.html. Exit code 1 when the new plan is not confirmed.
 
     With nothing given it takes the newest run and its newest logs.
 

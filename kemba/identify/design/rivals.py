@@ -43,7 +43,7 @@ def contenders(answer: Mapping[str, Any]) -> Rivals:
         raise KembaError("answer.json", "has no ranking", "nothing is left to be separated")
     doubtful = [name for name, row in rows.items() if row["equivalent_to"]]
     first = [*doubtful, *rows][0]
-    beside = {*answer.get("added", ()), *answer.get("found", ())} - {first}
+    beside = set(answer.get("added", ())) - {first}
     likely = [name for name in rows if name not in beside]
     order = dict.fromkeys([first, *rows[first]["equivalent_to"], *likely])
     chosen = [name for name in order if name in rows][: ExperimentSettings.current().rivals]

@@ -31,6 +31,7 @@ from kemba.identify.problem.types import (
     Texts,
     Theta,
 )
+from kemba.model.model import Model
 
 __all__ = [
     "Array",
@@ -75,6 +76,7 @@ class Problem(ABC):
     candidates: dict[str, Candidate]
     nuisance: dict[str, tuple[float, float]]
     window: int = 1
+    model: Model  # whose file can say figures of its own; a problem without one has no file
 
     @abstractmethod
     def residual(self, theta: Theta, runs: Collection[int] | None = None) -> Array:

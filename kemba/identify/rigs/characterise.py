@@ -1,8 +1,7 @@
 """The figures of a rig and of its effects, fitted to logs, with honest intervals.
 
-Least squares on the residuals. What a model lacks is no white noise: it lasts. So the intervals
-come from blocks of time ("sandwich"), of several lengths, as long as the motion or shorter; the
-widest interval counts. They are those of one mounting of one machine.
+Least squares on the residuals within what a model can have; intervals from blocks of rows, spanning
+what runs say that disagree (`evidence.scatter`). They are those of one mounting of one machine.
 """
 
 from __future__ import annotations
@@ -14,34 +13,24 @@ from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.special import stdtrit
 
 from kemba.config import dump_yaml
 from kemba.effects.base import Effect
 from kemba.errors import KembaError
-from kemba.identify.evidence.linear import time_blocks
+from kemba.identify.evidence.scatter import apart_between_runs, divisions, half_widths
 from kemba.identify.evidence.windows import rms
-from kemba.identify.problem.problem import Array, Labels, Problem
+from kemba.identify.joint import TOLD
+from kemba.identify.problem.problem import Array, Problem
 from kemba.identify.rigs.problem import rig_problem
 from kemba.identify.rigs.vessel import vessel_problem
 from kemba.model.model import Model
 from kemba.settings import BY_HAND, Settings, setting
 from kemba.trajectory import Trajectory
 
-# of what a rig brings along: which figures its logs can tell
-TOLD = ("measured_chambers.gain", "drive_axis.J", "vessel_chamber.a")
-
 
 class RigFitSettings(Settings):
     """How the figures of a rig are fitted."""
 
-    blocks: tuple[int, ...] = setting(
-        (12, 24, 48),
-        "1",
-        "numbers of blocks of time, at least, from which intervals come: the widest counts",
-        "derived: errors that a repeated motion repeats cancel within a block as long as a repeat, "
-        "so one length can be blind; with fewer than 12 blocks the spread itself is not known",
-    )
     loose: float = setting(
         10.0, "1", "prior sigma of a factor that is fitted", "convention: as good as none"
     )
@@ -72,6 +61,7 @@ class RigFit:
     error_before: float
     error_after: float
     rows: int
+    apart: tuple[str, ...] = ()  # figures on which runs disagree: their intervals span them
 
     def json(self) -> dict[str, Any]:
         """The figures as plain data."""
@@ -80,7 +70,7 @@ class RigFit:
             for f in self.figures
         }
         errors = {"error_before": self.error_before, "error_after": self.error_after}
-        return {"figures": listed, **errors, "rows": self.rows}
+        return {"figures": listed, **errors, "rows": self.rows, "apart": list(self.apart)}
 
     def effects(self) -> list[Effect]:
         """The model's effects with the fitted values."""
@@ -140,8 +130,14 @@ def _fit(
         theta = dict(zip(free, centre + width * x, strict=True))
         return np.concatenate([problem.residual(theta), known * x])
 
+    lower, upper = _bounds(model, names, values, len(starts))
     found = least_squares(
-        residual, np.zeros(len(free)), x_scale="jac", diff_step=settings.step, method="trf"
+        residual,
+        np.zeros(len(free)),
+        bounds=(lower, upper),
+        x_scale="jac",
+        diff_step=settings.step,
+        method="trf",
     )
     rows = len(problem.rows())
     j, r = found.jac[:rows], found.fun[:rows]
@@ -152,40 +148,34 @@ def _fit(
         hint = "fix one of them: leave it out of the model, or log another motion"
         raise KembaError(worst, "cannot be told from the other figures by these logs", hint=hint)
     h = np.linalg.inv(j.T @ j + np.diag(known))
-    divisions = [d for n in settings.blocks for d in _divisions(problem, n)]
-    half_widths = np.max([_half_widths(d, j, r, h) for d in divisions], axis=0)
+    widths = np.max([half_widths(d, j, r, h) for d in divisions(problem)], axis=0)
+    runs = dict(apart_between_runs(problem, j[:, : len(names)], r))
     figures = []
     for i, name in enumerate(names):
-        factor, spread = 1.0 + found.x[i], half_widths[i]
-        value, half = factor * values[name], abs(spread * values[name])
+        ends = [-widths[i], widths[i], *runs.get(i, ())]
+        value = (1.0 + found.x[i]) * values[name]
+        low, high = (value + abs(values[name]) * end for end in (min(ends), max(ends)))
         effect, field = name.rsplit(".", 1)
         given = float(model.effect(effect).value(field))
         unit = _unit(model, name)
-        figures.append(FittedFigure(name, unit, value, value - half, value + half, given))
-    return RigFit(model, tuple(figures), before, rms(r), rows)
+        figures.append(FittedFigure(name, unit, value, low, high, given))
+    apart = tuple(names[i] for i in runs)
+    return RigFit(model, tuple(figures), before, rms(r), rows, apart)
 
 
-def _divisions(problem: Problem, wanted: int) -> list[Labels]:
-    """Labels (n,) of the rows in so many blocks of time, and in so many stretches of the way, each
-    with two directions: what a model lacks at one place it lacks in every repeat."""
-    found = [time_blocks(problem, wanted=wanted)]
-    if (way := problem.way()) is not None:
-        place, forward = way
-        edges = np.linspace(place.min(), place.max(), wanted + 1)[1:-1]
-        found.append(2 * np.searchsorted(edges, place) + forward)
-    return found
-
-
-def _half_widths(labels: Labels, j: Array, r: Array, h: Array) -> Array:
-    """Half the 95 % interval (k,) of each parameter, from the scatter of blocks of rows.
-
-    `labels` (n,) of the blocks; `j` (n, k) and `r` (n,): slopes and residual of the fit; `h`
-    (k, k): inverse of j'j.
-    """
-    pieces = np.stack([j[labels == b].T @ r[labels == b] for b in np.unique(labels)])
-    freedom = max(len(pieces) - 1, 1)
-    covariance = h @ (pieces.T @ pieces) @ h * len(pieces) / freedom
-    return np.asarray(np.sqrt(np.diag(covariance)) * stdtrit(freedom, 0.975))
+def _bounds(
+    model: Model, names: list[str], values: Mapping[str, float], starts: int
+) -> tuple[Array, Array]:
+    """Smallest and largest change (k,) of the factors of figures such that a model can have them;
+    of what follows, how logs start, there is none."""
+    ends = []
+    for name in names:
+        declared = model.parameters[name][0] if name in model.parameters else None
+        span = (declared.lower, declared.upper) if declared else (-np.inf, np.inf)
+        ends.append(sorted(end / values[name] - 1.0 for end in span))
+    ends += [[-np.inf, np.inf]] * starts
+    lower, upper = np.array(ends).T
+    return lower, upper
 
 
 def _unit(model: Model, name: str) -> str:

@@ -73,9 +73,9 @@ class Predictor:
 
     def _gain(self, theta: Theta) -> float:
         """Force of the motor over the force that the log says."""
-        listed = self.model.parameters.get("axis_scale.k")
-        least = GainSettings.current().least
-        return max(theta.get("axis_scale.k", listed[1] if listed else 1.0), least)
+        listed = self.model.parameters.get("axis_scale.k")  # which theta scales, if there is one
+        gain = theta.get("axis_scale.k", 1.0) * (listed[1] if listed else 1.0)
+        return max(gain, GainSettings.current().least)
 
     def variance(self, log: RigLog, usual: float) -> Array:
         """Variance (k,) of `gap` under the model as it is; friction of the size `usual` is in doubt
@@ -87,8 +87,9 @@ class Predictor:
         total = noise.sum(axis=1) + (usual * log.doubt) ** 2
         if self.answer not in self.balance({}).inputs:
             total = total + channels.sigma[self.answer] ** 2
-        else:  # the motor's force enters once: as what was measured
-            total = total - noise[:, -1] + channels.sigma[self.answer] ** 2
+        else:  # the motor's force enters once: as what was measured, in whose unit all else counts
+            others = (total - noise[:, -1]) / self._gain({}) ** 2
+            total = others + channels.sigma[self.answer] ** 2
         return np.asarray(total)
 
     def true(self, log: Filtered, theta: Theta) -> Filtered:

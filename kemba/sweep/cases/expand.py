@@ -20,8 +20,8 @@ from kemba.config import (
 from kemba.config.document import Location
 from kemba.effects import BY_KIND
 from kemba.errors import KembaError
+from kemba.files import sha256
 from kemba.model.spec import load_spec, model_files
-from kemba.runs import sha256
 from kemba.sweep.cases.case import content_hash
 from kemba.sweep.cases.schema import Sweep
 

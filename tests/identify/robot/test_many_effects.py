@@ -26,7 +26,7 @@ def test_four_effects_are_named_together(keep: float) -> None:
         log.meta["noise"] = {name: sensors.spread(name) for name in known}
     answer = discover(robot_problem(logs, load_model("planning"))).answer
     assert answer.verdict in ("missing", "partly")
-    named = set(answer.found)
+    named = set(answer.added)
     assert len(named & set(HIDDEN)) >= 3, answer.sentence
     assert len(named - set(HIDDEN)) <= 1, answer.sentence
     assert answer.excess_after < 0.4 * answer.excess_before

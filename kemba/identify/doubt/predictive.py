@@ -1,0 +1,69 @@
+"""The effects of the model that is written: all that help to predict data that were not fitted.
+
+What is sure enough to be said, and what predicts best, are two questions. A model for planning has
+every effect that evidence proposes and by which left-out data are predicted better, by rows and
+summed over windows; likely ones, too, and those that are too small to be reported.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from kemba.identify.doubt.cross_validation import left_out, window_gain
+from kemba.identify.doubt.held_out import HeldOut
+from kemba.identify.doubt.parsimony import Belief, none_of
+from kemba.identify.evidence.search import Search
+from kemba.identify.evidence.spike_slab import Hypothesis
+from kemba.identify.evidence.windows import error_ratio
+from kemba.identify.joint import joint_estimate
+
+ANY = 1.0  # nats that are any evidence at all
+SAME = 2e-3  # share of an error by which it must change to have changed: rounding of the fit
+
+
+def predictive(search: Search, best: Hypothesis, likeliest: Hypothesis) -> Hypothesis:
+    """The believed effects, and those of the likeliest hypothesis that help to predict folds of the
+    fitted logs."""
+    whole = tuple(sorted({*best, *likeliest}))
+    while len(whole) > len(best) and not search.late:
+        search.visit(whole)
+        parts = {e: tuple(x for x in whole if x != e) for e in whole if e not in best}
+        for part in parts.values():
+            search.visit(part)
+        search.refresh()
+        gain = {e: window_gain(search, whole, part).nats for e, part in parts.items()}
+        least = min(gain, key=gain.__getitem__)
+        if gain[least] > ANY and left_out(search, whole, parts[least]).nats > 0.0:
+            break
+        whole = parts[least]
+    return whole
+
+
+def quoted(
+    search: Search, belief: Belief, whole: Hypothesis, kept: HeldOut | None
+) -> tuple[Belief, Hypothesis]:
+    """Belief and written effects without those that raise the error on logs `kept` for quoting;
+    one that leaves it as it was is written, but not believed. All at their joint estimates."""
+    if kept is None or len(whole) < 2:
+        return belief, whole
+    best, there = belief.best, _quoted_error(search, whole, kept)
+    for effect in reversed(whole):
+        part = tuple(e for e in whole if e != effect)
+        if search.late or not part:
+            break
+        without = _quoted_error(search, part, kept)
+        if without < there * (1.0 + SAME):
+            best = tuple(e for e in best if e != effect)
+        if without < there * (1.0 - SAME):
+            whole, there = part, without
+    if best == belief.best:
+        return belief, whole
+    return (replace(belief, best=best) if best else none_of(belief)), whole if best else ()
+
+
+def _quoted_error(search: Search, hypothesis: Hypothesis, kept: HeldOut) -> float:
+    """Error of the joint estimate of a hypothesis on the kept logs."""
+    search.visit(hypothesis)
+    search.refresh()
+    theta = joint_estimate(search.problem, hypothesis, search.points[hypothesis].fit.theta)
+    return error_ratio(kept.found, theta)

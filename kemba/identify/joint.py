@@ -1,0 +1,193 @@
+"""The model that is written: every effect of an answer at its joint estimate, with its covariance.
+
+One least-squares fit of the whitened residuals over the parameters of all these effects and over
+the figures of the model's own that its file can say; what a file cannot say stays as it is, so that
+what is said of the fit is true of the file. Of rigs whose motion is measured, rows count by the
+noise as stated: noise that was learnt under this model would forget what changes slowly.
+
+Intervals come from the slopes at the fit, all nominal figures free within their tolerances. They
+are widened by as much as blocks of time scatter more than rows do ("sandwich"), and span what the
+runs say one by one where these disagree.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from copy import copy
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from kemba.errors import enumerated
+from kemba.identify.answer import Covariance, Value
+from kemba.identify.evidence.linear import is_shape
+from kemba.identify.evidence.refit import Frozen, refit
+from kemba.identify.evidence.scatter import apart_between_runs, divisions, half_widths
+from kemba.identify.evidence.spike_slab import Hypothesis, SpikeSlabSettings
+from kemba.identify.evidence.windows import START
+from kemba.identify.problem.problem import Array, Candidate, Problem, Theta
+from kemba.identify.problem.sensor_faults import is_fault
+from kemba.identify.problem.structure import ORIFICE
+
+# of what a rig brings along: the figure that its logs tell better than any drawing
+TOLD = ("measured_chambers.gain", "drive_axis.J", "vessel_chamber.a")
+LOOSE = 0.5  # prior sigma of its factor: as good as none
+ROUNDS = 2  # times that the fit begins again with slopes along the figures taken anew
+# a share of another structure, and factors of a table, which are no parameters by themselves
+UNTOLD = tuple(f"orifice_chamber.{name}" for name in ("a", "level", "gauge"))
+
+
+@dataclass(frozen=True)
+class Joint:
+    """Effects at their joint estimate.
+
+    `theta`: of the fit. `names` (k,) of all written parameters (`effect.parameter`), with `value`
+    (k,), 95 % interval `low`, `high` (k,) and `covariance` (k, k), SI units; `figures`: those that
+    the model had already, by name. `remarks`: parameters in which runs disagree.
+    """
+
+    theta: Mapping[str, float]
+    names: tuple[str, ...]
+    value: Array
+    low: Array
+    high: Array
+    covariance: Array
+    figures: Mapping[str, float] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def matrix(self) -> Covariance:
+        """The covariance of all scalar parameters of effects, as a model names them."""
+        told = {
+            i: name.replace(f"{ORIFICE}.", "orifice_chamber.") for i, name in enumerate(self.names)
+        }
+        keep = [i for i, name in told.items() if name not in UNTOLD]
+        rows = self.covariance[np.ix_(keep, keep)].tolist()
+        return Covariance(tuple(told[i] for i in keep), tuple(map(tuple, rows)))
+
+    def values(self, candidate: Candidate) -> dict[str, Value]:
+        """The parameters of one effect, as the catalogue has them."""
+        found = {}
+        for parameter in candidate.parameters:
+            name, unit = candidate.reciprocal.get(parameter.name, (parameter.name, parameter.unit))
+            i = self.names.index(f"{candidate.effect}.{name}")
+            value, low, high = (float(x[i]) for x in (self.value, self.low, self.high))
+            found[name] = Value(value, low, high, unit)
+        return found
+
+
+def joint_fit(problem: Problem, hypothesis: Hypothesis, start: Theta) -> Joint:
+    """The effects of a hypothesis and the figures of the model, fitted together from `start`."""
+    problem, own = _prepared(problem)
+    theta = _fitted(problem, own, hypothesis, start)
+    keys = tuple(k for e in hypothesis for k in tuple(problem.candidates[e].keys()))
+    return _judged(problem, keys, own, theta)
+
+
+def joint_estimate(problem: Problem, hypothesis: Hypothesis, start: Theta) -> dict[str, float]:
+    """Theta of the same fit."""
+    problem, own = _prepared(problem)
+    return _fitted(problem, own, hypothesis, start)
+
+
+def _fitted(
+    problem: Problem, own: tuple[str, ...], hypothesis: Hypothesis, start: Theta
+) -> dict[str, float]:
+    keys = {k for e in hypothesis for k in tuple(problem.candidates[e].keys())}
+    theta = {k: v for k, v in start.items() if k in keys or k in own or k.startswith(START)}
+    free = (*own, *(n for n in problem.nuisance if n.startswith(START)))
+    for _ in range(ROUNDS if free else 1):
+        theta = refit(problem, hypothesis, theta, Frozen(free, problem.jacobian(theta, free))).theta
+    return theta
+
+
+def _prepared(problem: Problem) -> tuple[Problem, tuple[str, ...]]:
+    """The problem of the fit, and the nominal figures that are free in it: those of the model's
+    effects which its file can say, of every leg alike."""
+    model = getattr(problem, "model", None)
+    if model is None:
+        return problem, tuple(problem.nuisance)
+    scalars = {f"{e.name}.{p}" for e in model.effects for p in (*e.tolerances(), *e.off)}
+    written = {name for name in scalars if "[" not in name} | set(problem.own_figures)
+    own = tuple(n for n in problem.nuisance if n in written)
+    if problem.moves:
+        return problem, own
+    found = copy(problem.recolour(None))
+    loose = {n: (found.nuisance[n][0], LOOSE) for n in own if n in TOLD}
+    found.nuisance = found.nuisance | loose
+    return found, own
+
+
+def _judged(problem: Problem, keys: tuple[str, ...], own: tuple[str, ...], theta: Theta) -> Joint:
+    """The fit at theta with its covariance and intervals."""
+    others = tuple(n for n in problem.nuisance if n not in own)
+    names = (*keys, *own, *others)
+    jacobian, r = problem.jacobian(theta, names), problem.residual(theta)
+    parameters = problem.parameters()
+    slab = SpikeSlabSettings.current().slab
+    width = [
+        slab * parameters[k].size * (theta[k] if is_shape(problem, k) else 1.0) for k in keys
+    ] + [problem.nuisance[n][1] for n in (*own, *others)]
+    scale = np.array(width)
+    j = jacobian * scale
+    h = np.linalg.inv(j.T @ j + np.eye(len(names)))
+    count = len(keys) + len(own)
+    spread = np.max([half_widths(labels, j, r, h)[:count] for labels in divisions(problem)], axis=0)
+    inflated = np.maximum(spread / np.sqrt(np.diag(h)[:count]) / 1.96, 1.0)
+    unit = scale[:count] * inflated
+    value = np.array([theta[n] if n in theta else problem.nuisance[n][0] for n in names[:count]])
+    size = np.array([abs(theta[k] - parameters[k].off) if np.isfinite(parameters[k].off) and
+                     not is_shape(problem, k) else abs(theta[k]) for k in keys])  # fmt: skip
+    imperfect = SpikeSlabSettings.current().spike * np.append(size, np.zeros(len(own)))
+    reach = 1.96 * np.hypot(unit * np.sqrt(np.diag(h)[:count]), imperfect * problem.moves)
+    low, high = value - reach, value + reach
+    remarks = []
+    for i, ends in apart_between_runs(problem, j[:, :count], r):
+        apart = value[i] + scale[i] * np.array(ends)
+        if apart.min() < low[i] or apart.max() > high[i]:
+            low[i], high[i] = min(low[i], apart.min()), max(high[i], apart.max())
+            told = " to ".join(f"{x:.3g}" for x in sorted(apart))
+            remarks.append(f"{names[i]} differs between runs ({told}); its interval spans them")
+    covariance = np.outer(unit, unit) * h[:count, :count]
+    return _as_written(problem, names[:count], theta, (value, low, high), covariance, remarks)
+
+
+def _as_written(
+    problem: Problem,
+    names: tuple[str, ...],
+    theta: Theta,
+    triple: tuple[Array, Array, Array],
+    covariance: Array,
+    remarks: list[str],
+) -> Joint:
+    """The estimate in the catalogue's names and units: a figure that is scaled by its value, a
+    reciprocal as what it is the reciprocal of, all within their bounds."""
+    value, low, high = (x.copy() for x in triple)
+    told, slope, figures = [], np.ones(len(names)), {}
+    for i, name in enumerate(names):
+        effect, parameter = name.rsplit(".", 1) if "." in name else (name, "")
+        candidate = problem.candidates.get(effect)
+        if candidate is None or name not in theta or name in problem.nuisance:
+            told.append(name)
+            if hasattr(problem, "model") and _is_factor(problem, name):
+                slope[i] = float(problem.model.effect(effect).value(parameter))
+                ends = sorted(slope[i] * np.array([low[i], high[i]]))
+                value[i], low[i], high[i] = slope[i] * value[i], *ends
+            figures[name] = float(value[i])
+            continue
+        bounds = candidate.keys()[name]
+        value[i], low[i], high[i] = np.clip([value[i], low[i], high[i]], bounds.lower, bounds.upper)
+        if parameter in candidate.reciprocal:
+            parameter = candidate.reciprocal[parameter][0]
+            slope[i] = -1.0 / max(value[i], 1e-12) ** 2
+            value[i], low[i], high[i] = 1.0 / np.maximum([value[i], high[i], low[i]], 1e-12)
+        told.append(f"{effect}.{parameter}")
+    return Joint(
+        dict(theta), tuple(told), value, low, high, covariance * np.outer(slope, slope), figures,
+        (enumerated(remarks),) if remarks else (),
+    )  # fmt: skip
+
+
+def _is_factor(problem: Problem, name: str) -> bool:
+    """Whether a nuisance parameter is the factor of a figure, and not its value."""
+    return name not in problem.own_figures and not is_fault(name)

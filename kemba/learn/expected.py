@@ -1,0 +1,103 @@
+"""The apex to expect of a table: its middle and its 95 % band.
+
+The table is simulated on the learnt model and on models that are drawn from its covariance; what
+executions do beyond the model is added, and their scatter widens the band.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from kemba.effects import Effect
+from kemba.errors import KembaError
+from kemba.learn.flight import flight_of
+from kemba.model import Model, load_spec, read_covariance
+from kemba.plant.execution.controller import execute_many
+from kemba.plotting.robot.machine import Machine
+from kemba.trajectory import Trajectory
+
+DRAWN = 40  # models: the spread is then known to a tenth
+FEWEST = 10  # of them that must be simulated for a spread
+
+
+@dataclass(frozen=True)
+class ExpectedApex:
+    """Apex [m] to expect of one execution, and the ends of its 95 % band."""
+
+    apex: float
+    low: float
+    high: float
+
+    def holds(self, apex: float) -> bool:
+        """Whether an executed apex lies inside."""
+        return self.low <= apex <= self.high
+
+    def json(self) -> dict[str, float]:
+        """As plain data."""
+        return {"apex_m": self.apex, "low_m": self.low, "high_m": self.high}
+
+    @classmethod
+    def of(cls, told: Any) -> ExpectedApex | None:
+        """From plain data; None where it is none."""
+        try:
+            return cls(float(told["apex_m"]), float(told["low_m"]), float(told["high_m"]))
+        except (KeyError, TypeError, ValueError):
+            return None
+
+
+def band_about(
+    apex: float, table: Trajectory, model: Model, name: str, machine: Machine, rest: float,
+    scatter: float,
+) -> ExpectedApex:  # fmt: skip
+    """The band about an expected `apex` [m] of a table on `model`, built of the model YAML `name`;
+    `rest` [s] is simulated after the table, `scatter` [m] is 1 sigma between executions."""
+    reach = 1.96 * float(np.hypot(_spread(table, model, name, machine, rest), scatter))
+    return ExpectedApex(apex, apex - reach, apex + reach)
+
+
+def _spread(table: Trajectory, model: Model, name: str, machine: Machine, rest: float) -> float:
+    """1 sigma [m] of the apex of models drawn from the covariance of `name`; 0 without one."""
+    evidence = load_spec(name).evidence
+    if evidence is None or evidence.covariance is None:
+        return 0.0
+    cases = [{"model": drawn, "extra": rest} for drawn in drawn_models(model, name)]
+    done = [d for d in execute_many(table, cases) if not isinstance(d, KembaError)]
+    apex = np.array([flight_of(d.trajectory, machine).apex for d in done])
+    apex = apex[np.isfinite(apex)]
+    return float(apex.std(ddof=1)) if len(apex) >= FEWEST else 0.0
+
+
+def drawn_models(model: Model, name: str, count: int = DRAWN, seed: int = 0) -> list[Model]:
+    """So many models drawn from the covariance of the model YAML `name` about `model`."""
+    names, covariance = read_covariance(name)
+    known = {e.name: e for e in model.effects}
+    middle = np.array([_value(known, n) for n in names])
+    size, axes = np.linalg.eigh(covariance)
+    root = axes * np.sqrt(np.maximum(size, 0.0))
+    steps = np.random.default_rng(seed).standard_normal((count, len(names))) @ root.T
+    return [_with(model, dict(zip(names, middle + step, strict=True))) for step in steps]
+
+
+def _value(known: Mapping[str, Effect], name: str) -> float:
+    effect, _, parameter = name.rpartition(".")
+    return float(known[effect].value(parameter)) if effect in known else 0.0
+
+
+def _with(model: Model, values: Mapping[str, float]) -> Model:
+    """The model with parameters changed, each within its bounds."""
+    effects = []
+    for effect in model.effects:
+        declared = effect.parameters()
+        own = {}
+        for name, value in values.items():
+            owner, _, parameter = name.rpartition(".")
+            if owner == effect.name:
+                bounds = declared.get(parameter)
+                value = float(np.clip(value, bounds.lower, bounds.upper)) if bounds else value
+                own[parameter] = value
+        effects.append(effect.bind(own) if own else effect)
+    return Model(model.mechanism, effects, model.supply, model.name)
