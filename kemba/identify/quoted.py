@@ -45,7 +45,9 @@ def measured_in(logs: Sequence[Trajectory], model: str | Path) -> Measured:
     modes = tuple(sorted({mode for log in logs for mode in _modes(log)}))
     robot = sha256(robot_files(spec.robot)[0]) if spec.robot else None
     spans = [(min(x), max(x)) if x else None for x in (apex, speed)]
-    return Measured(apex=spans[0], speed=spans[1], supply=supply, modes=modes, robot=robot)
+    load = sum(e.value("m") for e in spec.effects if e.kind == "payload")
+    known: dict[str, Any] = {"modes": modes, "robot": robot, "payload": load}
+    return Measured(apex=spans[0], speed=spans[1], supply=supply, **known)
 
 
 def _speed(log: Trajectory) -> Array:

@@ -6,21 +6,19 @@ executions do beyond the model is added, and their scatter widens the band.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from kemba.effects import Effect
 from kemba.errors import KembaError
 from kemba.learn.flight import flight_of
-from kemba.model import Model, load_spec, read_covariance
+from kemba.model import Model, load_spec
+from kemba.model.drawn import drawn_models
 from kemba.plant.execution.controller import execute_many
 from kemba.plotting.robot.machine import Machine
 from kemba.trajectory import Trajectory
 
-DRAWN = 40  # models: the spread is then known to a tenth
 FEWEST = 10  # of them that must be simulated for a spread
 
 
@@ -69,35 +67,3 @@ def _spread(table: Trajectory, model: Model, name: str, machine: Machine, rest: 
     apex = np.array([flight_of(d.trajectory, machine).apex for d in done])
     apex = apex[np.isfinite(apex)]
     return float(apex.std(ddof=1)) if len(apex) >= FEWEST else 0.0
-
-
-def drawn_models(model: Model, name: str, count: int = DRAWN, seed: int = 0) -> list[Model]:
-    """So many models drawn from the covariance of the model YAML `name` about `model`."""
-    names, covariance = read_covariance(name)
-    known = {e.name: e for e in model.effects}
-    middle = np.array([_value(known, n) for n in names])
-    size, axes = np.linalg.eigh(covariance)
-    root = axes * np.sqrt(np.maximum(size, 0.0))
-    steps = np.random.default_rng(seed).standard_normal((count, len(names))) @ root.T
-    return [_with(model, dict(zip(names, middle + step, strict=True))) for step in steps]
-
-
-def _value(known: Mapping[str, Effect], name: str) -> float:
-    effect, _, parameter = name.rpartition(".")
-    return float(known[effect].value(parameter)) if effect in known else 0.0
-
-
-def _with(model: Model, values: Mapping[str, float]) -> Model:
-    """The model with parameters changed, each within its bounds."""
-    effects = []
-    for effect in model.effects:
-        declared = effect.parameters()
-        own = {}
-        for name, value in values.items():
-            owner, _, parameter = name.rpartition(".")
-            if owner == effect.name:
-                bounds = declared.get(parameter)
-                value = float(np.clip(value, bounds.lower, bounds.upper)) if bounds else value
-                own[parameter] = value
-        effects.append(effect.bind(own) if own else effect)
-    return Model(model.mechanism, effects, model.supply, model.name)

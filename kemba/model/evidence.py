@@ -53,13 +53,14 @@ class EvidenceLog(Section):
 
 class Measured(Section):
     """What the logs span: `apex` of the body's centre [m], `speed` [m/s], the largest of the body
-    in each log, `supply` [Pa]; valve `modes` that occur; the `robot`'s file."""
+    in each log, `supply` [Pa]; valve `modes` that occur; the `robot`'s file; `payload` [kg]."""
 
     apex: tuple[Annotated[float, Param("m")], Annotated[float, Param("m")]] | None = None
     speed: tuple[Annotated[float, Param("m.s-1")], Annotated[float, Param("m.s-1")]] | None = None
     supply: tuple[Annotated[float, Param("Pa")], Annotated[float, Param("Pa")]] | None = None
     modes: tuple[str, ...] = ()
     robot: str | None = None
+    payload: Annotated[float, Param("kg", lower=0.0)] | None = None
 
 
 class Evidence(Section):

@@ -9,11 +9,23 @@ from kemba.ocp.certificate.status import Status
 from kemba.ocp.planned import Plan
 from kemba.ocp.task.height import rise_of_feet
 
+GROUND = 1e-3  # m; lower feet stand
+
 
 def sentence_of(plan: Plan) -> str:
     """The plan's sentence for the user; that of a plan which is not what was asked says so."""
     asked = plan.status in (Status.SOLVED, Status.INTERRUPTED)
     return plan.sentence if asked else f"FAILED: {plan.sentence}"
+
+
+def warnings(plan: Plan) -> list[str]:
+    """What a task that was met may not have meant."""
+    rests = any(r.location == ("end", "rest") for r in plan.requirements)
+    feet = [name for name in plan.trajectory.names if name.endswith("/foot/z")]
+    if not rests or not feet or min(plan.trajectory[name][-1] for name in feet) <= GROUND:
+        return []
+    hint = 'a robot in the air falls; ask for `"*/foot/z": 0 m` at the end'
+    return [f"the motion ends at rest with no foot on the ground: {hint}"]
 
 
 def answer(plan: Plan, run: str) -> dict[str, Any]:
@@ -46,13 +58,21 @@ def answer(plan: Plan, run: str) -> dict[str, Any]:
         "table_replay": None,
         "plant_replay": None,
         "impacts": None,
+        "requirements": [measured.json() for measured in certificate.asked],
+        "reached": {
+            measured.text.removeprefix("goals.").partition(":")[0]: measured.value
+            for measured in certificate.asked
+            if measured.text.startswith("goals.")
+        },
+        "verdict_on": None,
+        "band": None,
         "robust": None,
         "good": plan.status is Status.SOLVED,
         "continued": plan.continued,
         "start": plan.start,
         "best_known": None,
         "ignored": plan.model.ignored,
-        "remarks": plan.model.remarks,
+        "remarks": [*plan.model.remarks, *warnings(plan)],
         "relax": [
             {
                 name: getattr(r, name)

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from kemba.model import Model
 from kemba.ocp import Plan, Task, controller_table
-from kemba.ocp.certificate.asked import Measured, on_execution
+from kemba.ocp.certificate.asked import MeasuredRequirement, on_execution
 from kemba.plant.execution.certificate import executions, plant_run, summaries
 from kemba.plant.execution.counterpart import counterpart
 from kemba.plant.execution.replay import Replay, ends_standing
 from kemba.plant.execution.retiming import ExecutedTable, retimed
+from kemba.solve.truth import PLANT, Band, Truth, band_of, beyond, truth_of
 from kemba.solve.verdict import EXECUTIONS, Allowed, Verdict, allowances, judge
 from kemba.stopwatch import Tell, silent
 from kemba.trajectory import Trajectory
@@ -25,22 +26,53 @@ OWN = ("replay", "table_replay")  # the executions on the plan's own model
 @dataclass(frozen=True)
 class Judged:
     """The entries of a plan's executions in the certificate, the verdict on each, and the motion of
-    the plant if it could be started."""
+    the plant if it could be started. `truth`: whose verdict counts; `band`: of the apex on models
+    within the uncertainty of a learnt one."""
 
     facts: Mapping[str, Any]
     verdicts: Mapping[str, Verdict]
     motion: Trajectory | None
+    truth: Truth = field(default_factory=lambda: Truth(PLANT))
+    band: Band | None = None
+
+    @property
+    def deciding(self) -> Mapping[str, Verdict]:
+        """The verdicts that decide: a model that was learnt from logs outranks the plant."""
+        return {k: v for k, v in self.verdicts.items() if k in OWN or not self.truth.learnt}
+
+    @property
+    def causes(self) -> list[str]:
+        """Why the plan is not confirmed; empty where it is."""
+        found = [verdict.sentence for verdict in self.deciding.values() if not verdict.good]
+        unsure = self.band is not None and not self.band.good
+        return [*found, *([self.band.sentence] if self.band and unsure else [])]
 
     @property
     def good(self) -> bool:
-        """Whether every execution keeps to the tolerances."""
-        return all(verdict.good for verdict in self.verdicts.values())
+        """Whether every execution that decides keeps to the tolerances."""
+        return not self.causes
+
+    @property
+    def remarks(self) -> list[str]:
+        """What else is to be said of the executions and of what they rest on."""
+        found = [v.sentence for v in self.deciding.values() if v.good]
+        if self.truth.learnt:
+            found.append(f"on the simulated robot with physical chambers: {self._plant}")
+        if self.band is not None and self.band.good:
+            found.append(self.band.sentence)
+        return [*found, *self.truth.remarks]
+
+    @property
+    def _plant(self) -> str:
+        there = self.verdicts["plant_replay"]
+        said = there.sentence.removeprefix("the ").removeprefix("simulated robot ")
+        return said if there.good else f"it {said}, which is information only"
 
     @property
     def share(self) -> float:
-        """The largest error of all executions in units of what is allowed; infinite after a
-        fall."""
-        return max(verdict.share for verdict in self.verdicts.values())
+        """The largest error of the executions that decide, in units of what is allowed; infinite
+        after a fall."""
+        return max(verdict.share for verdict in self.deciding.values())
 
     @property
     def replays(self) -> bool:
@@ -81,11 +113,16 @@ def judged(
         )
         for key in EXECUTIONS
     }
-    there = done["plant_replay"]
-    return Judged(facts, verdicts, plant_run(there) if there else None)
+    there, truth = done["plant_replay"], truth_of(task)
+    band: Band | None = None
+    if truth.learnt and truth.evidence is not None:
+        band, why = band_of(found, table)
+        said = [*truth.remarks, *beyond(found, truth.evidence), why]
+        truth = replace(truth, remarks=tuple(text for text in said if text))
+    return Judged(facts, verdicts, plant_run(there) if there else None, truth, band)
 
 
-def asked_of(found: Plan, done: Replay | None, allowed: Allowed) -> Sequence[Measured]:
+def asked_of(found: Plan, done: Replay | None, allowed: Allowed) -> Sequence[MeasuredRequirement]:
     """What the task asks of lengths and angles, measured on an execution."""
     if done is None:
         return ()

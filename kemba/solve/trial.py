@@ -6,12 +6,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from kemba.errors import KembaError
+from kemba.errors import KembaError, enumerated
 from kemba.ocp import Plan, controller_table
 from kemba.ocp.certificate.objective import objective
 from kemba.ocp.certificate.status import Status
-from kemba.ocp.report import answer, sentence_of
-from kemba.plant.execution.counterpart import another_robot
+from kemba.ocp.report import answer, sentence_of, warnings
+from kemba.plant.execution.counterpart import another_robot, lacking
 from kemba.plant.execution.retiming import retimed
 from kemba.solve.judged import Judged, judged
 from kemba.stopwatch import Tell, silent
@@ -130,6 +130,7 @@ def executed(
         result |= {**done.facts, **_confirmed(found, done)}
     except KembaError as error:  # a model that the simulator cannot execute still has its plan
         result |= _unconfirmed(found, f"it cannot be simulated: {error}")
+    result["sentence"] = "; ".join([result["sentence"], *warnings(found)])
     if share is not None:
         result |= {"robust": share.summary()}
         result["sentence"] += f"; {share.sentence}"
@@ -140,14 +141,15 @@ def executed(
 def _confirmed(found: Plan, done: Judged) -> dict[str, Any]:
     """What the executions of a plan change in the answer: it stays solved only if all of them come
     near enough."""
-    task, judgements = found.task, done.verdicts.values()
-    other = another_robot(task.model, task.plant)
+    task = found.task
+    other, without = another_robot(task.model, task.plant), lacking(task.model, task.plant)
     names = [f"the plant is another robot, {other}, which {task.plant} names"] if other else []
-    matches = [verdict.sentence for verdict in judgements if verdict.good]
+    if without:
+        names.append(f"the plant is without {enumerated(without)}, as the plan's model")
+    facts = {"verdict_on": done.truth.on, "band": done.band.json() if done.band else None}
     if done.good:
-        return {"sentence": "; ".join([sentence_of(found), *names, *matches])}
-    causes = [verdict.sentence for verdict in judgements if not verdict.good]
-    return _unconfirmed(found, " and ".join(causes), [*names, *matches])
+        return {**facts, "sentence": "; ".join([sentence_of(found), *names, *done.remarks])}
+    return facts | _unconfirmed(found, " and ".join(done.causes), [*names, *done.remarks])
 
 
 def _unconfirmed(found: Plan, cause: str, remarks: Sequence[str] = ()) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from kemba.errors import enumerated
-from kemba.ocp.certificate.asked import Measured
+from kemba.ocp.certificate.asked import MeasuredRequirement
 from kemba.ocp.task.task import Tolerances
 
 Facts = Mapping[str, Any]
@@ -65,7 +65,7 @@ def allowances(tolerances: Tolerances, lands: bool, landing_speed: float) -> dic
 
 
 def judge(
-    who: str, facts: Facts | None, allowed: Allowed, asked: Sequence[Measured] = ()
+    who: str, facts: Facts | None, allowed: Allowed, asked: Sequence[MeasuredRequirement] = ()
 ) -> Verdict:
     """An execution against what is allowed, and the requirements as measured on it.
 

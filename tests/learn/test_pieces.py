@@ -20,12 +20,13 @@ from kemba.learn.correction import (
     scatter_of,
     write_correction,
 )
-from kemba.learn.expected import ExpectedApex, drawn_models
+from kemba.learn.expected import ExpectedApex
 from kemba.learn.flight import FlownJump, flight_of
 from kemba.learn.page import verdict_of
 from kemba.learn.round import Round, as_executed
 from kemba.learn.rounds import entry, past_of, sent
 from kemba.model import load_model
+from kemba.model.drawn import drawn_models
 from kemba.model.evidence import write_covariance
 from kemba.ocp import load_task
 from kemba.plotting.robot.machine import load_machine

@@ -29,7 +29,7 @@ CLOSED = 1e-6  # m; a smaller gap touches
 
 
 @dataclass(frozen=True)
-class Measured:
+class MeasuredRequirement:
     """One requirement on a motion: the value furthest beyond its limits, or nearest to them.
 
     `line`: where the task asks for it (`jump.yaml:31`); `text`: what it asks, `end.*/foot/z:
@@ -83,7 +83,7 @@ class Measured:
 
 def measured(
     model: Model, task: Task, requirements: Sequence[Requirement], plan: Trajectory
-) -> tuple[Measured, ...]:
+) -> tuple[MeasuredRequirement, ...]:
     """Every requirement of a task on a plan, in the order of the task.
 
     Nodes may miss by the task's tolerance of bounds; between them, where no program asks for
@@ -101,7 +101,7 @@ def on_execution(
     way: float,
     end: float,
     late: float,
-) -> tuple[Measured, ...]:
+) -> tuple[MeasuredRequirement, ...]:
     """The requirements on lengths and angles on an execution of a plan, by the plan's clock.
 
     `way`, `end`: how far [m] the execution may be from the plan up to its landing, and from there
@@ -146,7 +146,9 @@ def _landing(plan: Trajectory, clock: Array) -> float:
     return float(clock[down[0]]) if len(down) else np.inf
 
 
-def _on_plan(requirement: Requirement, task: Task, plan: Trajectory, course: _Course) -> Measured:
+def _on_plan(
+    requirement: Requirement, task: Task, plan: Trajectory, course: _Course
+) -> MeasuredRequirement:
     name, last = requirement.quantity.name, len(plan) - 1
     exact = task.tolerances.bounds * requirement.scale
     if name not in plan:
@@ -170,12 +172,12 @@ def _worst(
     time: Array,
     allowed: float,
     nodes: Array | None = None,
-) -> Measured:
+) -> MeasuredRequirement:
     """The value furthest beyond the limits of a requirement, or nearest to them."""
     beyond = np.maximum(requirement.lower - values, values - requirement.upper)
     i = int(np.argmax(np.where(np.isfinite(values), beyond, np.inf)))
     quantity = requirement.quantity
-    return Measured(
+    return MeasuredRequirement(
         line=requirement.line,
         text=f"{requirement.text}: {quantity.name}",
         value=float(values[i]),
@@ -225,10 +227,12 @@ class _Course:
 
 def _of_the_task(
     model: Model, task: Task, requirements: Sequence[Requirement], plan: Trajectory
-) -> Iterator[Measured]:
+) -> Iterator[MeasuredRequirement]:
     """What keys of their own ask: the duration, how long valves stay, soft landings, grip."""
     exact, last = task.tolerances.bounds, len(plan) - 1
-    blank = Measured("", "", 0.0, -np.inf, np.inf, "s", exact, 1.0, last, float(plan.time[-1]))
+    blank = MeasuredRequirement(
+        "", "", 0.0, -np.inf, np.inf, "s", exact, 1.0, last, float(plan.time[-1])
+    )
     lasts = float(plan.time[-1] - plan.time[0])
     spread = task.step_variation * task.duration
     ends = task.duration - spread, task.duration + spread

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 
 from kemba.model import Model
-from kemba.ocp.certificate.asked import Measured, measured
+from kemba.ocp.certificate.asked import MeasuredRequirement, measured
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task, Tolerances
 from kemba.ocp.transcription.first_node import state_rows
@@ -40,10 +40,10 @@ class Certificate:
     dynamics: float
     bounds: float
     worst: tuple[Violation, ...]
-    asked: tuple[Measured, ...] = ()
+    asked: tuple[MeasuredRequirement, ...] = ()
 
     @property
-    def missed(self) -> tuple[Measured, ...]:
+    def missed(self) -> tuple[MeasuredRequirement, ...]:
         """The requirements that are not kept, the largest miss first."""
         missed = (measured for measured in self.asked if not measured.met)
         return tuple(sorted(missed, key=lambda m: -m.miss / m.scale))
@@ -85,7 +85,7 @@ def certify(
     return Certificate(pairs, binary, defects, max(bounds), worst[:most], asked)
 
 
-def violations(asked: Iterable[Measured]) -> tuple[Violation, ...]:
+def violations(asked: Iterable[MeasuredRequirement]) -> tuple[Violation, ...]:
     """The requirements that are not kept, the largest miss first."""
     missed = sorted((m for m in asked if not m.met), key=lambda m: -m.miss / m.scale)
     return tuple(

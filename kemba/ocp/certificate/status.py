@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from enum import Enum
 
-from kemba.ocp.certificate.asked import Measured
+from kemba.ocp.certificate.asked import MeasuredRequirement
 from kemba.ocp.certificate.certify import Certificate
 from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.task.height import rise_of_feet
@@ -84,7 +84,7 @@ def _feet(trajectory: Trajectory) -> str:
     return f" (feet {rise} cm up)" if rise else ""
 
 
-def missed_of(missed: Sequence[Measured]) -> str:
+def missed_of(missed: Sequence[MeasuredRequirement]) -> str:
     """The largest miss in words, and how many others there are."""
     others = len(missed) - 1
     more = f", and {others} more requirement{'s' * (others > 1)}" if others else ""
