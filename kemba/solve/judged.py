@@ -15,7 +15,7 @@ from kemba.plant.execution.certificate import executions, plant_run, summaries
 from kemba.plant.execution.counterpart import counterpart
 from kemba.plant.execution.replay import Replay, ends_standing
 from kemba.plant.execution.retiming import ExecutedTable, retimed
-from kemba.solve.truth import PLANT, Band, Truth, band_of, beyond, truth_of
+from kemba.solve.truth import PLANT, ApexBand, Truth, band_of, beyond, truth_of
 from kemba.solve.verdict import EXECUTIONS, Allowed, Verdict, allowances, judge
 from kemba.stopwatch import Tell, silent
 from kemba.trajectory import Trajectory
@@ -33,7 +33,7 @@ class Judged:
     verdicts: Mapping[str, Verdict]
     motion: Trajectory | None
     truth: Truth = field(default_factory=lambda: Truth(PLANT))
-    band: Band | None = None
+    band: ApexBand | None = None
 
     @property
     def deciding(self) -> Mapping[str, Verdict]:
@@ -114,7 +114,7 @@ def judged(
         for key in EXECUTIONS
     }
     there, truth = done["plant_replay"], truth_of(task)
-    band: Band | None = None
+    band: ApexBand | None = None
     if truth.learnt and truth.evidence is not None:
         band, why = band_of(found, table)
         said = [*truth.remarks, *beyond(found, truth.evidence), why]

@@ -29,7 +29,7 @@ from kemba.ocp.shipped.shelf import Near, neighbours
 from kemba.ocp.starts import plan_best
 from kemba.solve.listener import Listener
 from kemba.solve.repairs import repaired, summed
-from kemba.solve.trial import Begun, Execution, Trial, executed
+from kemba.solve.trial import Begun, Trial, TrialOrder, executed
 from kemba.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ def best_plan(
     run folder in the answer. Raises KembaError where the task or a file is wrong.
     """
     begun = begun or (lambda plan: None)
-    execution = Execution(approach.replay, listener.tell, begun, place)
+    execution = TrialOrder(approach.replay, listener.tell, begun, place)
     best = last = None
     for one in _candidates(task, document, approach, listener):
         first = executed(one.plan, execution, one.table, one.share)

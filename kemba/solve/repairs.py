@@ -19,7 +19,7 @@ from kemba.ocp.continuation.between import Origin
 from kemba.ocp.continued import dear
 from kemba.ocp.phases.settings import Refining
 from kemba.ocp.planning import plan, plan_from
-from kemba.solve.trial import Execution, Trial, executed
+from kemba.solve.trial import Trial, TrialOrder, executed
 
 GUESSES = 2  # other guesses at most; each costs as much as the first plan
 TICKS, ANOTHER = "valve edges on the ticks of the controller", "another plan, from a guess"
@@ -30,7 +30,7 @@ def repaired(
     task: Task,
     document: Document,
     how: Mapping[str, Any],
-    execution: Execution,
+    execution: TrialOrder,
     guess: bool,
 ) -> Iterator[Trial]:
     """The trial and those that come of repairing it, until one is `fine` or nothing is left to try.

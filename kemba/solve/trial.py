@@ -25,7 +25,7 @@ WELL = 0.5  # of what is allowed: a table that misses by more is worth edges on 
 
 
 @dataclass(frozen=True)
-class Execution:
+class TrialOrder:
     """How plans are executed: whether they are at all, who is told, who gets each plan before
     (`begun`), and the run folder in the answer."""
 
@@ -106,7 +106,7 @@ class Trial:
 
 def executed(
     found: Plan,
-    execution: Execution,
+    execution: TrialOrder,
     table: Trajectory | None = None,
     share: Share | None = None,
     repair: str = "",

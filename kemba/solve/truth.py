@@ -24,7 +24,7 @@ LANDS = 0.95  # share of the drawn models on which a landing must be kept
 
 
 @dataclass(frozen=True)
-class Band:
+class ApexBand:
     """What a controller's table does on models drawn from the covariance of what was learnt: how
     many were executed, on how many the motion is kept, and the 95 % band of the apex [m]."""
 
@@ -113,7 +113,7 @@ def beyond(found: Plan, evidence: Evidence) -> list[str]:
     return sentences
 
 
-def band_of(found: Plan, table: Trajectory) -> tuple[Band | None, str]:
+def band_of(found: Plan, table: Trajectory) -> tuple[ApexBand | None, str]:
     """The band of a plan's table on models drawn from the covariance of its own; None and why where
     there is no covariance."""
     model, plan = found.model, found.trajectory
@@ -134,4 +134,4 @@ def band_of(found: Plan, table: Trajectory) -> tuple[Band | None, str]:
         return None, "how sure the plan is cannot be said: no drawn model can be simulated"
     middle = peak(plan.time, plan["body/z"])[1]
     reach = 1.96 * float(np.std(apex, ddof=1))
-    return Band(len(drawn), kept, middle - reach, middle + reach), ""
+    return ApexBand(len(drawn), kept, middle - reach, middle + reach), ""

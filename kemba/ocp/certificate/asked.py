@@ -32,9 +32,9 @@ CLOSED = 1e-6  # m; a smaller gap touches
 class MeasuredRequirement:
     """One requirement on a motion: the value furthest beyond its limits, or nearest to them.
 
-    `line`: where the task asks for it (`jump.yaml:31`); `text`: what it asks, `end.*/foot/z:
-    front/foot/z`; `value`, `lower`, `upper`, `allowed` in `unit`; `node`, `time_s`: where it is.
-    `allowed`: how far beyond its limits the value may be.
+    `line`: where the task asks for it (`jump.yaml:31`); `text`: what it asks, with the quantity
+    (`end.*/foot/z:front/foot/z`); `value`, `lower`, `upper` and `allowed`, by which the value may
+    be beyond its limits, in `unit`; `node`, `time_s`: where it is.
     """
 
     line: str
@@ -61,7 +61,7 @@ class MeasuredRequirement:
 
     @property
     def sentence(self) -> str:
-        """What is asked and what is there: `end.body/z: body/z` (jump.yaml:31) is
+        """What is asked and what is there: `end.body/z:body/z` (jump.yaml:31) is
         0.441 m at 0.700 s, 0.5 m asked: 0.059 m off."""
         asked, at = _range(self.lower, self.upper, self.unit), f"at {self.time_s:.3f} s"
         line = f" ({self.line})" if self.line else ""
@@ -179,7 +179,7 @@ def _worst(
     quantity = requirement.quantity
     return MeasuredRequirement(
         line=requirement.line,
-        text=f"{requirement.text}: {quantity.name}",
+        text=f"{requirement.text}:{quantity.name}",
         value=float(values[i]),
         lower=requirement.lower,
         upper=requirement.upper,

@@ -81,8 +81,8 @@ def certify(
     defects = max(of_laws.dynamics(), of_laws.kinematics(), of_laws.rates())
     pairs, binary = of_laws.products(), of_laws.binary()
     asked = measured(model, task, requirements, trajectory)
-    worst = (*violations(asked), *of_laws.worst(most))
-    return Certificate(pairs, binary, defects, max(bounds), worst[:most], asked)
+    worst = sorted((*violations(asked), *of_laws.worst(most)), key=lambda v: -v.size)
+    return Certificate(pairs, binary, defects, max(bounds), tuple(worst[:most]), asked)
 
 
 def violations(asked: Iterable[MeasuredRequirement]) -> tuple[Violation, ...]:

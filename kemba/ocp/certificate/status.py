@@ -92,8 +92,6 @@ def missed_of(missed: Sequence[MeasuredRequirement]) -> str:
 
 
 def _worst(certificate: Certificate) -> str:
-    if certificate.missed:
-        return missed_of(certificate.missed)
     if not certificate.worst:
         return "nothing is violated"
     v = certificate.worst[0]

@@ -124,7 +124,7 @@ def certificate(program: PhaseProgram, x: np.ndarray, trajectory: Trajectory) ->
         binary=0.0,  # valves are rounded constants of their phase
         dynamics=float(np.max(over[physics], initial=0.0)),
         bounds=max(float(np.max(part, initial=0.0)) for part in (boxes, over[~physics], -first)),
-        worst=(*violations(asked), *found)[:WORST],
+        worst=tuple(sorted((*violations(asked), *found), key=lambda v: -v.size)[:WORST]),
         asked=asked,
     )
 
