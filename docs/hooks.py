@@ -20,7 +20,6 @@ NEXT = {
     "reliability-of-the-program.md": "[what is trusted](security.md), or [install](start.md)",
     "robustness.md": "[feedback around a plan](policy.md), or [sweeps](sweeps.md) of your own",
     "security.md": "[how files are written](files.md), or [sweeps on a cluster](sweeps.md)",
-    "shipped-plans.md": "[plan a jump](plan.md), or [every key of a task](tasks.md)",
     "sensitivity.md": "[how discovery works](discovery.md), or [how plans are found](solving.md)",
 }
 

@@ -28,7 +28,7 @@ from kemba.trajectory import Trajectory
 from kemba_cli.main import app
 
 SHELF = shipped_folder("plans")
-STALE = "made for another robot or task: python benchmarks/shipped_plans.py"
+STALE = "made for another robot or task"
 
 
 def near(name: str, *options: str) -> list[Neighbour]:

@@ -18,7 +18,7 @@ from kemba.ocp.shipped.kind import FIGURES, as_asked_by, figures_of, kind_of
 from kemba.ocp.task.task import Task, parse_task
 from kemba.settings import Settings, setting
 
-TRIED = "tuned: continuation of jump and jump_forward (docs/shipped-plans.md)"
+TRIED = "tuned: continuation of jump and jump_forward (docs/continuing.md)"
 INDEX = "plans.csv"
 MODEL = {"model", "effects"}  # what names the model of a task
 
