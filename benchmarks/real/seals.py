@@ -4,8 +4,9 @@ KEMBA_DATA=folder python -m benchmarks.real.seals [SET...]
 
 Source as that of the two seals in `cylinder.py`; the files are looked for in `seals/` of the data
 folder by their own names, those of `repeatability` with the folder's name before (`rerun1_...`).
-Of every set one pressure is kept: RMS of the rod's force there, on the rows that a rig's problem
-judges, of the model as it is, of `answer/model.yaml`, of `characterise` and of plain least squares.
+Of every set one pressure is kept: RMS of the rod's force there, on the rows of a rig's problem in
+which it slides for sure, of the model as it is, of `answer/model.yaml`, of `characterise` and of
+plain least squares on such rows.
 """
 
 from __future__ import annotations
@@ -32,6 +33,7 @@ from kemba.model import load_model, load_spec
 from kemba.trajectory import Trajectory
 
 BARS = (1, 3, 5, 7)
+SURE = 0.1  # doubt about the direction of the friction, below which a rod slides
 LISTED = ("seal_friction", "pressure_friction")
 
 
@@ -86,7 +88,7 @@ def logs_of(one: SealSet, scratch: Path) -> tuple[list[Path], list[Path]]:
 
 def rms(problem: RigProblem) -> float:
     """RMS [N] of predicted less measured force on the judged rows."""
-    gaps = [problem.predictor.gap(log, {}) for log in problem.logs]
+    gaps = [problem.predictor.gap(log, {})[log.doubt < SURE] for log in problem.logs]
     return float(np.sqrt(np.mean(np.concatenate(gaps) ** 2)))
 
 
@@ -103,8 +105,9 @@ def least_squares(learnt: Sequence[Path], kept: Sequence[Path]) -> float:
         rows, forces = [], []
         problem = rig_problem(read_logs(paths), model)
         for log in problem.logs:
-            c, at = log.channels, log.channels.rows
-            push = problem.predictor.gap(log, {}) + c.others["piston/F"][at]
+            c, sure = log.channels, log.doubt < SURE
+            at = c.rows[sure]
+            push = problem.predictor.gap(log, {})[sure] + c.others["piston/F"][at]
             z = np.tanh(c.v[at] / model.mechanism.sign_speed)
             rows.append(np.stack([push, -z, -np.abs(push) * z], axis=1))
             forces.append(c.others["piston/F"][at])

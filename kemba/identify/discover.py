@@ -23,7 +23,7 @@ from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.search_settings import SearchSettings
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
 from kemba.identify.evidence.windows import error_ratio
-from kemba.identify.joint import Joint, joint_fit
+from kemba.identify.joint import Joint, joint_fit, told_by_figures
 from kemba.identify.problem.problem import Problem
 from kemba.identify.ranking import fitted_errors, ladder, ranked
 from kemba.identify.rest import rest_of
@@ -136,6 +136,7 @@ def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> 
     search.say("testing whether more is missing")
     kept = HeldOut.beside(holdout, search.problem) if holdout else None
     whole = predictive(search, belief.best, likeliest) if belief.best else NULL
+    whole = told_by_figures(search.problem, whole, search.points[whole].fit.theta)
     belief, whole = quoted(search, belief, whole, kept)
     best, p_value, ended = belief.best, belief.p_value, ended or search.late
     if test.too_short:

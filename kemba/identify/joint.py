@@ -32,6 +32,8 @@ from kemba.identify.problem.structure import ORIFICE
 # of what a rig brings along: the figure that its logs tell better than any drawing
 TOLD = ("measured_chambers.gain", "drive_axis.J", "vessel_chamber.a")
 LOOSE = 0.5  # prior sigma of its factor: as good as none
+ALIKE = 0.998  # cosine of slopes from which two figures are one
+FAR = 3.0  # tolerances by which a figure is off that is told
 ROUNDS = 2  # times that the fit begins again with slopes along the figures taken anew
 # a share of another structure, and factors of a table, which are no parameters by themselves
 UNTOLD = tuple(f"orifice_chamber.{name}" for name in ("a", "level", "gauge"))
@@ -78,44 +80,55 @@ class Joint:
 
 def joint_fit(problem: Problem, hypothesis: Hypothesis, start: Theta) -> Joint:
     """The effects of a hypothesis and the figures of the model, fitted together from `start`."""
-    problem, own = _prepared(problem)
-    theta = _fitted(problem, own, hypothesis, start)
+    problem, own, theta = _fitted(problem, hypothesis, start)
     keys = tuple(k for e in hypothesis for k in tuple(problem.candidates[e].keys()))
     return _judged(problem, keys, own, theta)
 
 
 def joint_estimate(problem: Problem, hypothesis: Hypothesis, start: Theta) -> dict[str, float]:
     """Theta of the same fit."""
-    problem, own = _prepared(problem)
-    return _fitted(problem, own, hypothesis, start)
+    return _fitted(problem, hypothesis, start)[2]
+
+
+def own_figures(problem: Problem) -> tuple[str, ...]:
+    """The nominal figures that are free in the fit: those of the model's effects which its file can
+    say, of every leg alike."""
+    model = getattr(problem, "model", None)
+    if model is None:
+        return tuple(problem.nuisance)
+    scalars = {f"{e.name}.{p}" for e in model.effects for p in (*e.tolerances(), *e.off)}
+    written = {name for name in scalars if "[" not in name} | set(problem.own_figures)
+    return tuple(n for n in problem.nuisance if n in written)
+
+
+def told_by_figures(problem: Problem, hypothesis: Hypothesis, start: Theta) -> Hypothesis:
+    """The hypothesis without faults of sensors that look like a figure which the fit leaves free: a
+    force sensor's scale and the bore's gain are one in logs of a cylinder."""
+    figures = [n for n in own_figures(problem) if n in TOLD]
+    faults = [e for e in hypothesis if problem.candidates[e].sensor]
+    if not figures or not faults or len(hypothesis) < 2:
+        return hypothesis
+    keys = [problem.candidates[e].key for e in faults]
+    slopes = problem.coarser(start).jacobian(start, [*figures, *keys])
+    unit = slopes / np.maximum(np.linalg.norm(slopes, axis=0), 1e-300)
+    alike = np.abs(unit[:, : len(figures)].T @ unit[:, len(figures) :]).max(axis=0) > ALIKE
+    return tuple(e for e in hypothesis if e not in np.array(faults)[alike])
 
 
 def _fitted(
-    problem: Problem, own: tuple[str, ...], hypothesis: Hypothesis, start: Theta
-) -> dict[str, float]:
+    problem: Problem, hypothesis: Hypothesis, start: Theta
+) -> tuple[Problem, tuple[str, ...], dict[str, float]]:
+    """The problem of the fit, the figures that are free in it, and the best theta."""
+    own = own_figures(problem)
     keys = {k for e in hypothesis for k in tuple(problem.candidates[e].keys())}
     theta = {k: v for k, v in start.items() if k in keys or k in own or k.startswith(START)}
     free = (*own, *(n for n in problem.nuisance if n.startswith(START)))
+    loose = {n: (problem.nuisance[n][0], LOOSE) for n in own if n in TOLD}
     for _ in range(ROUNDS if free else 1):
+        problem = copy(problem.coarser(theta))
+        problem.nuisance = problem.nuisance | loose
         theta = refit(problem, hypothesis, theta, Frozen(free, problem.jacobian(theta, free))).theta
-    return theta
-
-
-def _prepared(problem: Problem) -> tuple[Problem, tuple[str, ...]]:
-    """The problem of the fit, and the nominal figures that are free in it: those of the model's
-    effects which its file can say, of every leg alike."""
-    model = getattr(problem, "model", None)
-    if model is None:
-        return problem, tuple(problem.nuisance)
-    scalars = {f"{e.name}.{p}" for e in model.effects for p in (*e.tolerances(), *e.off)}
-    written = {name for name in scalars if "[" not in name} | set(problem.own_figures)
-    own = tuple(n for n in problem.nuisance if n in written)
-    if problem.moves:
-        return problem, own
-    found = copy(problem.recolour(None))
-    loose = {n: (found.nuisance[n][0], LOOSE) for n in own if n in TOLD}
-    found.nuisance = found.nuisance | loose
-    return found, own
+    return problem, own, theta
 
 
 def _judged(problem: Problem, keys: tuple[str, ...], own: tuple[str, ...], theta: Theta) -> Joint:
@@ -141,7 +154,8 @@ def _judged(problem: Problem, keys: tuple[str, ...], own: tuple[str, ...], theta
     imperfect = SpikeSlabSettings.current().spike * np.append(size, np.zeros(len(own)))
     reach = 1.96 * np.hypot(unit * np.sqrt(np.diag(h)[:count]), imperfect * problem.moves)
     low, high = value - reach, value + reach
-    remarks = []
+    remarks = [_far(problem, names[i], value[i], low[i], high[i]) for i in range(len(keys), count)]
+    remarks = [text for text in remarks if text]
     for i, ends in apart_between_runs(problem, j[:, :count], r):
         apart = value[i] + scale[i] * np.array(ends)
         if apart.min() < low[i] or apart.max() > high[i]:
@@ -186,6 +200,18 @@ def _as_written(
         dict(theta), tuple(told), value, low, high, covariance * np.outer(slope, slope), figures,
         (enumerated(remarks),) if remarks else (),
     )  # fmt: skip
+
+
+def _far(problem: Problem, name: str, value: float, low: float, high: float) -> str:
+    """That a figure of a rig differs from the one given by more than it may; empty where not."""
+    model = getattr(problem, "model", None)
+    if name not in TOLD or model is None:
+        return ""
+    effect, figure = name.rsplit(".", 1)
+    if abs(value - 1.0) < FAR * model.effect(effect).tolerances().get(figure, 0.0):
+        return ""
+    off = f"{value:.4g} ({low:.4g} to {high:.4g}) times the one given"
+    return f"{name} is {off}: more than it may differ by itself, as an area or a sensor's scale may"
 
 
 def _is_factor(problem: Problem, name: str) -> bool:

@@ -44,13 +44,13 @@ def quoted(
 ) -> tuple[Belief, Hypothesis]:
     """Belief and written effects without those that raise the error on logs `kept` for quoting;
     one that leaves it as it was is written, but not believed. All at their joint estimates."""
-    if kept is None or len(whole) < 2:
-        return belief, whole
-    best, there = belief.best, _quoted_error(search, whole, kept)
-    for effect in reversed(whole):
+    best = tuple(e for e in belief.best if e in whole)
+    there = _quoted_error(search, whole, kept) if kept is not None and whole else 0.0
+    for effect in reversed(whole) if kept is not None else ():
         part = tuple(e for e in whole if e != effect)
         if search.late or not part:
             break
+        assert kept is not None
         without = _quoted_error(search, part, kept)
         if without < there * (1.0 + SAME):
             best = tuple(e for e in best if e != effect)

@@ -165,6 +165,11 @@ class Problem(ABC):
         short time from the measured motion. Channels that are missing here have none."""
         return {}
 
+    def coarser(self, theta: Theta) -> Self:
+        """This problem as a joint fit takes it: what the model at theta lacks beyond the stated
+        noise counts as noise that all rows have alike. Default: this one."""
+        return self
+
     # Noise colour
 
     learns_colour: bool = False  # whether the colour of the noise is learnt from residuals

@@ -119,6 +119,21 @@ class RigProblem(Problem):
             }
         return found
 
+    def coarser(self, theta: Theta) -> Self:
+        """The same problem without colour, which forgets what changes slowly, and with what the
+        model at theta lacks as noise of all rows alike [N or N.m], beside that of the sensors."""
+        found = self.recolour(None)
+        gap, plain = (
+            np.concatenate([self.predictor.gap(log, at) for log in self.logs]) for at in (theta, {})
+        )
+        # where a direction is in doubt, all that the effects at theta do is
+        usual = max(self.usual, float(np.sqrt(np.mean((gap - plain) ** 2))))
+        power = [self.predictor.variance(log, usual) for log in self.logs]
+        known = np.concatenate(power)
+        lacks = max(float(np.average(gap**2 - known, weights=1.0 / known)), 0.0)
+        found._sigma = [np.sqrt(one + lacks) for one in power]
+        return found
+
     def whiten(self, columns: Array) -> Array:
         """Columns (n, k) that were not whitened, as `jacobian` would return them."""
         run, out = self.rows().run, columns.copy()
