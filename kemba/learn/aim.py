@@ -29,7 +29,7 @@ class AimSettings(Settings):
         0.009, "rad", "pitch at touchdown, beyond the plan's, that a moved edge may make", CHOSEN
     )
     moved: int = setting(8, "ms", "by which an edge moves at most", CHOSEN, decides=True)
-    executions: int = setting(150, "1", "simulations at most", CHOSEN)
+    executions: int = setting(60, "1", "simulations at most", CHOSEN)
 
 
 @dataclass(frozen=True)

@@ -9,13 +9,18 @@ from typing import Any
 
 import numpy as np
 
+from kemba.config import dump_yaml
 from kemba.errors import KembaError, enumerated
 from kemba.files import sha256
+from kemba.identify.written.adopt import reference
+from kemba.model import load_spec
+from kemba.ocp import Task
 from kemba.plant.execution.controller import read_controller
 from kemba.runs import Run, load_run
 from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Array, Trajectory
 
+SUPPLY = 0.7e6  # Pa, of a model that names none
 ENTRY = "learn"  # of the manifest of a run that `learn` made
 
 
@@ -140,3 +145,14 @@ def _differs(table: Trajectory, log: Trajectory, time: Array) -> float:
     if any(name not in log for name in names):
         return 1.0
     return max(float(np.mean(sent(table, time, n) != np.round(log[n]))) for n in names)
+
+
+def as_executed(model: str, task: Task, path: Path) -> str:
+    """A model with the supply and payload of a task, written to `path` where it needs them."""
+    spec = load_spec(model)
+    if not task.payload and task.supply in (None, spec.supply or SUPPLY):
+        return model
+    extra = [{"kind": "payload", "m": task.payload}] if task.payload else []
+    data = {"name": f"{spec.name}_of_the_run", "base": reference(model), "effects": extra}
+    dump_yaml(data | ({"supply": task.supply} if task.supply else {}), path)
+    return str(path)

@@ -23,8 +23,8 @@ from kemba.learn.correction import (
 from kemba.learn.expected import ExpectedApex, drawn_models
 from kemba.learn.flight import FlownJump, flight_of
 from kemba.learn.page import verdict_of
-from kemba.learn.round import Round, as_executed
-from kemba.learn.rounds import entry, past_of, sent
+from kemba.learn.round import Round
+from kemba.learn.rounds import as_executed, entry, past_of, sent
 from kemba.model import load_model
 from kemba.model.evidence import write_covariance
 from kemba.ocp import load_task

@@ -15,7 +15,7 @@ from kemba.identify.doubt.parsimony import Belief, none_of
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import Hypothesis
 from kemba.identify.evidence.windows import error_ratio
-from kemba.identify.joint import joint_estimate
+from kemba.identify.written.joint import joint_estimate
 
 ANY = 1.0  # nats that are any evidence at all
 SAME = 2e-3  # share of an error by which it must change to have changed: rounding of the fit

@@ -76,7 +76,7 @@ class Problem(ABC):
     candidates: dict[str, Candidate]
     nuisance: dict[str, tuple[float, float]]
     window: int = 1
-    model: Model  # whose file can say figures of its own; a problem without one has no file
+    model: Model  # of the logs; what has none has no file either
 
     @abstractmethod
     def residual(self, theta: Theta, runs: Collection[int] | None = None) -> Array:
@@ -166,13 +166,10 @@ class Problem(ABC):
         return {}
 
     def coarser(self, theta: Theta) -> Self:
-        """This problem as a joint fit takes it: what the model at theta lacks beyond the stated
-        noise counts as noise that all rows have alike. Default: this one."""
+        """This problem with what the model at theta lacks as noise of all rows. Default: this."""
         return self
 
-    # Noise colour
-
-    learns_colour: bool = False  # whether the colour of the noise is learnt from residuals
+    learns_colour: bool = False  # noise: whether its colour of the noise is learnt from residuals
 
     def in_detail(self) -> Self:
         """This problem as intervals need it: what no log can tell apart must look the same to the

@@ -1,7 +1,7 @@
 """The figures of a rig and of its effects, fitted to logs, with honest intervals.
 
 Least squares on the residuals within what a model can have; intervals from blocks of rows, spanning
-what runs say that disagree (`evidence.scatter`). They are those of one mounting of one machine.
+what runs say that disagree (`written.scatter`). They are those of one mounting of one machine.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from scipy.optimize import least_squares
 from kemba.config import dump_yaml
 from kemba.effects.base import Effect
 from kemba.errors import KembaError
-from kemba.identify.evidence.scatter import apart_between_runs, divisions, half_widths
 from kemba.identify.evidence.windows import rms
-from kemba.identify.joint import TOLD
 from kemba.identify.problem.problem import Array, Problem
 from kemba.identify.rigs.problem import rig_problem
 from kemba.identify.rigs.vessel import vessel_problem
+from kemba.identify.written.joint import TOLD
+from kemba.identify.written.scatter import apart_between_runs, divisions, half_widths
 from kemba.model.model import Model
 from kemba.settings import BY_HAND, Settings, setting
 from kemba.trajectory import Trajectory

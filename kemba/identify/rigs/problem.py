@@ -83,7 +83,8 @@ class RigProblem(Problem):
     def residual(self, theta: Theta, runs: Collection[int] | None = None) -> Array:
         parts = []
         for i in self._all(runs):
-            r = self.predictor.gap(self.logs[i], theta) / self._sigma[i]
+            with np.errstate(over="ignore"):  # a fit may try what nothing is predicted at
+                r = self.predictor.gap(self.logs[i], theta) / self._sigma[i]
             parts.append(whiten(r, self.colour[i]) if i in self.colour else r)
         return np.concatenate(parts)
 

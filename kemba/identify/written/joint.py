@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from copy import copy
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -22,12 +22,12 @@ from kemba.errors import enumerated
 from kemba.identify.answer import Covariance, Value
 from kemba.identify.evidence.linear import is_shape
 from kemba.identify.evidence.refit import Frozen, refit
-from kemba.identify.evidence.scatter import apart_between_runs, divisions, half_widths
 from kemba.identify.evidence.spike_slab import Hypothesis, SpikeSlabSettings
 from kemba.identify.evidence.windows import START
 from kemba.identify.problem.problem import Array, Candidate, Problem, Theta
 from kemba.identify.problem.sensor_faults import is_fault
 from kemba.identify.problem.structure import ORIFICE
+from kemba.identify.written.scatter import apart_between_runs, divisions, half_widths
 
 # of what a rig brings along: the figure that its logs tell better than any drawing
 TOLD = ("measured_chambers.gain", "drive_axis.J", "vessel_chamber.a")
@@ -40,7 +40,7 @@ UNTOLD = tuple(f"orifice_chamber.{name}" for name in ("a", "level", "gauge"))
 
 
 @dataclass(frozen=True)
-class Joint:
+class JointFit:
     """Effects at their joint estimate.
 
     `theta`: of the fit. `names` (k,) of all written parameters (`effect.parameter`), with `value`
@@ -78,7 +78,7 @@ class Joint:
         return found
 
 
-def joint_fit(problem: Problem, hypothesis: Hypothesis, start: Theta) -> Joint:
+def joint_fit(problem: Problem, hypothesis: Hypothesis, start: Theta) -> JointFit:
     """The effects of a hypothesis and the figures of the model, fitted together from `start`."""
     problem, own, theta = _fitted(problem, hypothesis, start)
     keys = tuple(k for e in hypothesis for k in tuple(problem.candidates[e].keys()))
@@ -124,15 +124,26 @@ def _fitted(
     theta = {k: v for k, v in start.items() if k in keys or k in own or k.startswith(START)}
     free = (*own, *(n for n in problem.nuisance if n.startswith(START)))
     loose = {n: (problem.nuisance[n][0], LOOSE) for n in own if n in TOLD}
-    for _ in range(ROUNDS if free else 1):
+    candidates = problem.candidates | {
+        name: _whole(problem.candidates[name]) for name in problem.structures & set(hypothesis)
+    }
+    for _ in range(ROUNDS):
         problem = copy(problem.coarser(theta))
-        problem.nuisance = problem.nuisance | loose
+        problem.nuisance, problem.candidates = problem.nuisance | loose, candidates
         theta = refit(problem, hypothesis, theta, Frozen(free, problem.jacobian(theta, free))).theta
     return problem, own, theta
 
 
-def _judged(problem: Problem, keys: tuple[str, ...], own: tuple[str, ...], theta: Theta) -> Joint:
+def _whole(structure: Candidate) -> Candidate:
+    """Another structure as the model that is written has it: whole, not as a share."""
+    return replace(structure, lead=replace(structure.lead, lower=1.0, upper=1.0))
+
+
+def _judged(
+    problem: Problem, keys: tuple[str, ...], own: tuple[str, ...], theta: Theta
+) -> JointFit:
     """The fit at theta with its covariance and intervals."""
+    problem = problem.in_detail()
     others = tuple(n for n in problem.nuisance if n not in own)
     names = (*keys, *own, *others)
     jacobian, r = problem.jacobian(theta, names), problem.residual(theta)
@@ -173,7 +184,7 @@ def _as_written(
     triple: tuple[Array, Array, Array],
     covariance: Array,
     remarks: list[str],
-) -> Joint:
+) -> JointFit:
     """The estimate in the catalogue's names and units: a figure that is scaled by its value, a
     reciprocal as what it is the reciprocal of, all within their bounds."""
     value, low, high = (x.copy() for x in triple)
@@ -196,7 +207,7 @@ def _as_written(
             slope[i] = -1.0 / max(value[i], 1e-12) ** 2
             value[i], low[i], high[i] = 1.0 / np.maximum([value[i], high[i], low[i]], 1e-12)
         told.append(f"{effect}.{parameter}")
-    return Joint(
+    return JointFit(
         dict(theta), tuple(told), value, low, high, covariance * np.outer(slope, slope), figures,
         (enumerated(remarks),) if remarks else (),
     )  # fmt: skip
