@@ -17,19 +17,16 @@ from kemba.model import load_spec
 from kemba.ocp import Task
 from kemba.plant.execution.controller import read_controller
 from kemba.runs import Run, load_run
-from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Array, Trajectory
 
 SUPPLY = 0.7e6  # Pa, of a model that names none
 ENTRY = "learn"  # of the manifest of a run that `learn` made
 
 
-class MatchSettings(Settings):
+class MatchSettings:
     """When a log is an execution of a run."""
 
-    valves: float = setting(
-        0.02, "1", "share of rows in which a valve command differs from the table", CHOSEN
-    )
+    valves = 0.02  # share of rows in which a valve command differs from the table
 
 
 @dataclass(frozen=True)
@@ -131,7 +128,7 @@ def _placed(log: Trajectory, runs: Sequence[Run]) -> tuple[int, Trajectory]:
             time = log.time - log.time[0] + begin
             tried.append((_differs(table, log, time), place, time))
     miss, place, time = min(tried, key=lambda trial: trial[0])
-    if miss > MatchSettings.current().valves:
+    if miss > MatchSettings.valves:
         what = f"its valve commands differ from the run's in {miss:.0%} of the rows"
         hint = "give the run that was executed, or logs that begin where its controller.csv begins"
         raise KembaError(str(log.meta["path"]), what, f"an execution of {runs[place].path}", hint)

@@ -242,7 +242,7 @@ def test_models_are_drawn_from_the_covariance_within_their_bounds(tmp_path: Path
 
 
 def test_scatter_counts_what_is_usual_once() -> None:
-    usual = CorrectionSettings.current().apex_scatter
+    usual = CorrectionSettings.apex_scatter
     assert scatter_of(flights([0.0])) == pytest.approx(usual)
     assert scatter_of(flights([0.001, -0.001, 0.0])) < usual
     assert scatter_of(flights([0.02, -0.02, 0.0])) > 2.0 * usual

@@ -26,19 +26,15 @@ from kemba.identify.rigs.predictor import Predictor
 from kemba.identify.rigs.rig_log import RigLog, prepare
 from kemba.identify.rigs.sizes import sized, usual_force
 from kemba.model.model import Model
-from kemba.settings import Settings, setting
 from kemba.trajectory import Trajectory
 
 
-class RigProblemSettings(Settings):
+class RigProblemSettings:
     """How well the sensors of a rig are known."""
 
-    weather: float = setting(
-        1e3,
-        "Pa",
-        "prior sigma of the zero of a pressure sensor",
-        "derived: the pressure of the air changes by 1 kPa (1 sigma) with the weather",
-    )
+    # prior sigma of the zero of a pressure sensor [Pa]: the pressure of the air changes by 1 kPa (1
+    # sigma) with the weather
+    weather = 1e3
 
 
 class RigProblem(Problem):
@@ -61,7 +57,7 @@ class RigProblem(Problem):
         self.predictor = predictor
         predictor.candidates = self.candidates
         self.nuisance = predictor.figures | predictor.sensors.nuisance
-        zero = RigProblemSettings.current().weather
+        zero = RigProblemSettings.weather
         for name in model.mechanism.logged:
             key = f"sensor_bias:{name}"
             if name.endswith("/P") and key not in predictor.sensors.listed:
