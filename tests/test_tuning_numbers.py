@@ -91,7 +91,7 @@ CONSTANTS = {  # file -> names, why
     ),
     "identify/written/quoted.py": ("AROUND", "over which a speed is told"),
     "identify/workflow.py": ("QUOTED", "logs of which one is kept aside"),
-    "identify/doubt/predictive.py": ("ANY SAME", "any evidence at all; rounding of a fit"),
+    "identify/doubt/predictive.py": ("ANY STRONG SAME", "evidence; rounding of a fit"),
     "identify/written/scatter.py": ("BLOCKS DISAGREE TELLS OF_A_RUN", "counts and a p-value"),
     "learn/expected.py": ("DRAWN FEWEST", "models that are drawn"),
     "model/evidence.py": ("ROUNDING WIDER", "rounding; noise of a span's ends"),

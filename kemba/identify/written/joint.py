@@ -163,7 +163,7 @@ def _judged(
     size = np.array([abs(theta[k] - parameters[k].off) if np.isfinite(parameters[k].off) and
                      not is_shape(problem, k) else abs(theta[k]) for k in keys])  # fmt: skip
     imperfect = SpikeSlabSettings.current().spike * np.append(size, np.zeros(len(own)))
-    reach = 1.96 * np.hypot(unit * np.sqrt(np.diag(h)[:count]), imperfect * problem.moves)
+    reach = 1.96 * np.hypot(unit * np.sqrt(np.diag(h)[:count]), imperfect)
     low, high = value - reach, value + reach
     remarks = [_far(problem, names[i], value[i], low[i], high[i]) for i in range(len(keys), count)]
     remarks = [text for text in remarks if text]
