@@ -88,7 +88,7 @@ class Answer:
     rest: str = ""
     next: str = ""
     sure: tuple[str, ...] = ()
-    figures: Mapping[str, float] = field(default_factory=dict)
+    figures: Mapping[str, Any] = field(default_factory=dict)
     covariance: Covariance | None = None
     evidence: Mapping[str, Any] | None = None
     idle: bool = False  # left-out data gained nothing by what would fit

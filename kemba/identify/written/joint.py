@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from copy import copy
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -28,6 +29,7 @@ from kemba.identify.problem.problem import Array, Candidate, Problem, Theta
 from kemba.identify.problem.sensor_faults import is_fault
 from kemba.identify.problem.structure import ORIFICE
 from kemba.identify.written.scatter import apart_between_runs, divisions, half_widths
+from kemba.model.model import Model
 
 # of what a rig brings along: the figure that its logs tell better than any drawing
 TOLD = ("measured_chambers.gain", "drive_axis.J", "vessel_chamber.a")
@@ -45,7 +47,8 @@ class JointFit:
 
     `theta`: of the fit. `names` (k,) of all written parameters (`effect.parameter`), with `value`
     (k,), 95 % interval `low`, `high` (k,) and `covariance` (k, k), SI units; `figures`: those that
-    the model had already, by name. `remarks`: parameters in which runs disagree.
+    the model had already, by name, of a table all its values. `remarks`: parameters in which runs
+    disagree.
     """
 
     theta: Mapping[str, float]
@@ -54,16 +57,15 @@ class JointFit:
     low: Array
     high: Array
     covariance: Array
-    figures: Mapping[str, float] = field(default_factory=dict)
+    figures: Mapping[str, Any] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
 
     @property
     def matrix(self) -> Covariance:
         """The covariance of all scalar parameters of effects, as a model names them."""
-        told = {
-            i: name.replace(f"{ORIFICE}.", "orifice_chamber.") for i, name in enumerate(self.names)
-        }
-        keep = [i for i, name in told.items() if name not in UNTOLD]
+        tables = {n for n, value in self.figures.items() if "[" in n or isinstance(value, tuple)}
+        told = [name.replace(f"{ORIFICE}.", "orifice_chamber.") for name in self.names]
+        keep = [i for i, name in enumerate(told) if name not in {*UNTOLD, *tables}]
         rows = self.covariance[np.ix_(keep, keep)].tolist()
         return Covariance(tuple(told[i] for i in keep), tuple(map(tuple, rows)))
 
@@ -97,7 +99,7 @@ def own_figures(problem: Problem) -> tuple[str, ...]:
     if model is None:
         return tuple(problem.nuisance)
     scalars = {f"{e.name}.{p}" for e in model.effects for p in (*e.tolerances(), *e.off)}
-    written = {name for name in scalars if "[" not in name} | set(problem.own_figures)
+    written = scalars | set(problem.own_figures)
     return tuple(n for n in problem.nuisance if n in written)
 
 
@@ -188,16 +190,21 @@ def _as_written(
     """The estimate in the catalogue's names and units: a figure that is scaled by its value, a
     reciprocal as what it is the reciprocal of, all within their bounds."""
     value, low, high = (x.copy() for x in triple)
-    told, slope, figures = [], np.ones(len(names)), {}
+    told, slope, figures = [], np.ones(len(names)), dict[str, Any]()
+    ends = np.stack([low, high], axis=1)
     for i, name in enumerate(names):
         effect, parameter = name.rsplit(".", 1) if "." in name else (name, "")
         candidate = problem.candidates.get(effect)
         if candidate is None or name not in theta or name in problem.nuisance:
             told.append(name)
+            nominal: Any = 1.0
             if hasattr(problem, "model") and _is_factor(problem, name):
-                slope[i] = float(problem.model.effect(effect).value(parameter))
-                ends = sorted(slope[i] * np.array([low[i], high[i]]))
-                value[i], low[i], high[i] = slope[i] * value[i], *ends
+                nominal = _nominal(problem.model, effect, parameter)
+            if isinstance(nominal, tuple):
+                figures[name] = tuple(float(value[i]) * x for x in nominal)
+                continue
+            slope[i] = nominal
+            value[i], (low[i], high[i]) = nominal * value[i], sorted(nominal * ends[i])
             figures[name] = float(value[i])
             continue
         bounds = candidate.keys()[name]
@@ -223,6 +230,13 @@ def _far(problem: Problem, name: str, value: float, low: float, high: float) -> 
         return ""
     off = f"{value:.4g} ({low:.4g} to {high:.4g}) times the one given"
     return f"{name} is {off}: more than it may differ by itself, as an area or a sensor's scale may"
+
+
+def _nominal(model: Model, effect: str, figure: str) -> Any:
+    """The value of a figure of a model's effect: a number, a table, or (`fill[0]`) an entry."""
+    name, _, entry = figure.partition("[")
+    value = model.effect(effect).value(name)
+    return float(value[int(entry[:-1])]) if entry else value
 
 
 def _is_factor(problem: Problem, name: str) -> bool:
