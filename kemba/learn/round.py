@@ -76,11 +76,6 @@ class Round:
     remarks: tuple[str, ...] = ()
 
     @property
-    def learnt(self) -> bool:
-        """Whether `model` is a new one: it predicts better on quoted logs, whatever the verdict."""
-        return bool(self.answer.model) and self.compare_after < self.compare_before
-
-    @property
     def executed_apex(self) -> float:
         """Mean executed apex [m]."""
         return float(np.mean([f.apex for f in self.executed]))
