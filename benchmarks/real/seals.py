@@ -41,7 +41,7 @@ HEAD = (
     "",
     "The same cylinder with seals that no rule was made with. Of each set one pressure is kept (in",
     "brackets): RMS [N] of the rod's force there, on rows in which it slides for sure, of pressure",
-    "times area, of `answer/model.yaml` of `discover`, of `characterise` with both laws of friction",
+    "times area, of `answer/model.yaml`, of `characterise` with both laws of friction",
     "listed, and of plain least squares for gain, F_c and mu on such rows.",
     "",
     "| set (kept) | nominal | discover | characterise | least squares | written | CPU s |",
