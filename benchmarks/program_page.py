@@ -149,7 +149,7 @@ Before the last row, intervals were those of slopes that hold for the model as i
 of delays did not hold the truth: beside a small lag of the hose, which acts 2 ms later where valves
 open 2 ms later, and beside sensors that are late by parts of a row. Intervals are now taken from
 slopes at the best fit, with nothing read off between rows
-(`kemba/identify/evidence/modes/settled.py`).
+(`kemba/identify/written/joint.py`).
 
 Something is missing up to a p-value of {DiscoverSettings.current().significant:g}. {levels}
 

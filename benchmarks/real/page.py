@@ -1,6 +1,6 @@
 """Write docs/real-data.md: what the tool says of data that nobody here made.
 
-KEMBA_DATA=folder python -m benchmarks.real.page            four minutes of CPU time
+KEMBA_DATA=folder python -m benchmarks.real.page            ten minutes of CPU time
 python -m benchmarks.real.page --download                   into the cache of the user
 """
 
@@ -13,7 +13,7 @@ from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from benchmarks.real import cylinder, emps, vessel
+from benchmarks.real import cylinder, emps, seals, vessel
 from benchmarks.real.data import Absent
 
 PAGE = Path(__file__).parents[2] / "docs" / "real-data.md"
@@ -84,7 +84,7 @@ def main() -> None:
     parser.add_argument("--download", action="store_true", help="fetch what has an address")
     download = parser.parse_args().download
     lines = [HEAD]
-    for part in (cylinder, emps, vessel):
+    for part in (cylinder, seals, emps, vessel):
         with tempfile.TemporaryDirectory() as folder:
             try:
                 lines += part.section(Path(folder), download)

@@ -88,7 +88,7 @@ class Answer:
     rest: str = ""
     next: str = ""
     sure: tuple[str, ...] = ()
-    figures: Mapping[str, float] = field(default_factory=dict)
+    figures: Mapping[str, Any] = field(default_factory=dict)
     covariance: Covariance | None = None
     evidence: Mapping[str, Any] | None = None
     idle: bool = False  # left-out data gained nothing by what would fit
@@ -107,6 +107,17 @@ class Answer:
     def writes(self) -> bool:
         """Whether a model is written: something was found, or figures were fitted anew."""
         return bool(self.added) or self.covariance is not None
+
+    def drop_model(self) -> None:
+        """Take back what was found: with it quoted logs are predicted worse than without."""
+        named = f"{enumerated(self.added)} would" if self.added else "figures fitted anew would"
+        raised = (
+            f"{named} raise the quoted error from {self.error_before:.2f} to {self.error_after:.2f}"
+        )
+        self.remarks = [f"{raised}: no model is written", *self.remarks]
+        self.verdict = "unknown" if self.added else self.verdict
+        self.added, self.sure, self.figures, self.covariance = (), (), {}, None
+        self.error_after = self.error_before
 
     def told_in(self, before: tuple[float, float]) -> None:
         """Tell the errors of steps and ranking by the scale of `error_before` and `error_after`,

@@ -11,8 +11,8 @@ import numpy as np
 from kemba.identify.compare.compare import Comparison, compare
 from kemba.identify.logs.reading import read_logs
 from kemba.identify.problem.problem import Problem
-from kemba.identify.quoted import heard
 from kemba.identify.workflow import admitted, check_all, model_of
+from kemba.identify.written.quoted import heard
 from kemba.logs import load_map
 from kemba.stopwatch import Tell, silent
 from kemba.trajectory import Trajectory

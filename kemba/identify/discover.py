@@ -23,13 +23,13 @@ from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.search_settings import SearchSettings
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
 from kemba.identify.evidence.windows import error_ratio
-from kemba.identify.joint import Joint, joint_fit
 from kemba.identify.problem.problem import Problem
-from kemba.identify.ranking import fitted_errors, ladder, ranked
+from kemba.identify.ranking import fitted_errors, ladder, ranked, values
 from kemba.identify.rest import rest_of
 from kemba.identify.settings import DiscoverSettings, VerdictSettings
-from kemba.identify.stages import is_mixture, joined, structure_row, unbuilt
+from kemba.identify.stages import is_mixture, joined, structure_row
 from kemba.identify.verdict import Doubts, doubts_about, is_sure, verdict_on
+from kemba.identify.written.joint import JointFit, joint_fit, told_by_figures
 
 WRITTEN = ("missing", "partly")  # verdicts that give a model
 
@@ -49,7 +49,7 @@ class Discovery:
     best: Hypothesis
     kept: HeldOut | None = None
     fitted: tuple[float, ...] = ()
-    joint: Joint | None = None
+    joint: JointFit | None = None
 
 
 def discover(
@@ -87,11 +87,10 @@ def _discovered(search: Search, guess: Hypothesis, holdout: Problem | None) -> D
         return anew
     first = judged(search, search.further(guess), holdout)
     named = search.problem.structures & set(first.best)
-    mixed = any(is_mixture(first.answer, structure) for structure in named)
-    if mixed:
-        first = replace(first, answer=unbuilt(first.answer, *named))
+    mixed = any(is_mixture(values(search, first.best, s)["a"]) for s in named)
     if anew is None:
-        if first.answer.verdict == "missing" or not named or search.ended:
+        whole = first.answer.verdict == "missing" and not mixed
+        if whole or not named or search.ended:
             return first
         built = settled(search.problem.recolour(None).rebuilt({}))
         anew = _built_anew(search, Rebuilt(*built), holdout)
@@ -136,6 +135,7 @@ def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> 
     search.say("testing whether more is missing")
     kept = HeldOut.beside(holdout, search.problem) if holdout else None
     whole = predictive(search, belief.best, likeliest) if belief.best else NULL
+    whole = told_by_figures(search.problem, whole, search.points[whole].fit.theta)
     belief, whole = quoted(search, belief, whole, kept)
     best, p_value, ended = belief.best, belief.p_value, ended or search.late
     if test.too_short:

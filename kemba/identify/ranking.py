@@ -21,9 +21,9 @@ from kemba.identify.evidence.spike_slab import (
     SpikeSlabSettings,
     share_of,
 )
-from kemba.identify.joint import Joint
 from kemba.identify.problem.problem import Array, Candidate, Parameter
 from kemba.identify.settings import RankingSettings
+from kemba.identify.written.joint import JointFit
 
 
 def ranked(
@@ -31,7 +31,7 @@ def ranked(
     belief: Belief,
     kept: HeldOut | None,
     whole: Hypothesis = NULL,
-    joint: Joint | None = None,
+    joint: JointFit | None = None,
 ) -> list[Ranked]:
     """The effects in order of probability; those of the answer that is believed first, then the
     others of the `whole` that is written, with what the `joint` fit says of them."""

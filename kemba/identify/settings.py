@@ -98,10 +98,7 @@ class RankingSettings(Settings):
         "literature: Kass and Raftery 1995, 'strong' evidence begins at 3 nats",
         decides=True,
     )
-    shown: int = setting(8, "1", "effects in the ranking", "convention: fits a screen")
-    doubted: float = setting(
-        0.5,
-        "1",
-        "largest probability of all effects together where nothing is significant",
-        "convention: nothing is then the likeliest",
-    )
+    shown = 8  # effects in the ranking: fits a screen
+    # largest probability of all effects together where nothing is significant: nothing is then the
+    # likeliest
+    doubted = 0.5

@@ -16,9 +16,9 @@ from kemba.identify.doubt.cross_validation import left_out
 from kemba.identify.evidence.point import excess
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import Hypothesis, share_of
-from kemba.identify.joint import Joint
 from kemba.identify.rest import rest_of
 from kemba.identify.settings import VerdictSettings
+from kemba.identify.written.joint import JointFit
 
 
 def structure_row(
@@ -26,7 +26,7 @@ def structure_row(
     structure: str,
     errors: tuple[float, float],
     second: Search,
-    joint: Joint,
+    joint: JointFit,
     nats: float,
 ) -> Ranked:
     """The structure in the ranking, with its figures as the second search found them.
@@ -81,33 +81,10 @@ def joined(row: Ranked, p_value: float, answer: Answer, second: Search, best: Hy
     return found
 
 
-def is_mixture(answer: Answer, structure: str) -> bool:
-    """Whether an answer has the `structure` as a share of the rods' force only, beside the old one:
-    the model that is written would have it whole, and be another one."""
-    for row in answer.ranking:
-        if row.effect == structure and "a" in row.parameters:
-            share = row.parameters["a"]
-            return not share.low <= 1.0 <= share.high
-    return False
-
-
-def unbuilt(answer: Answer, structure: str) -> Answer:
-    """Such an answer: a part of one, from which no model can be written."""
-    if answer.verdict not in ("missing", "partly"):
-        return answer
-    remark = f"{structure} explains only a part, beside the chambers of the model"
-    left = answer.rest or f"a model with {structure} instead was not built, or explains less"
-    likely = tuple(dict.fromkeys((structure, *answer.added)))
-    found = replace(
-        answer,
-        verdict="partly",
-        added=likely,
-        sure=(),
-        rest=left,
-        remarks=[remark, *answer.remarks],
-    )
-    found.sentence, found.added = phrase(found), ()
-    return found
+def is_mixture(share: Value) -> bool:
+    """Whether a structure is found as a share of the rods' force only, beside the old one: a model
+    has it whole, and is another one."""
+    return not share.low <= 1.0 <= share.high
 
 
 def _verdict(second: Verdict, before: float, after: float) -> Verdict:

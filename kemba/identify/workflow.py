@@ -10,7 +10,6 @@ from typing import Any
 
 from kemba.errors import KembaError, enumerated
 from kemba.files import sha256, write_json
-from kemba.identify.adopt import COVARIANCE, reference, write_model
 from kemba.identify.answer import Answer
 from kemba.identify.discover import Discovery, discover
 from kemba.identify.logs.excerpt import excerpts
@@ -18,7 +17,8 @@ from kemba.identify.logs.gate import BadData, check_logs, sentence
 from kemba.identify.logs.limits import limits_of
 from kemba.identify.logs.reading import read_logs, taken_on
 from kemba.identify.problem.problem import Problem
-from kemba.identify.quoted import measured_in, noise_ratio, plant_of
+from kemba.identify.written.adopt import COVARIANCE, reference, write_model
+from kemba.identify.written.quoted import measured_in, noise_ratio, plant_of
 from kemba.logs import load_map
 from kemba.model import Model, load_model
 from kemba.trajectory import Trajectory
@@ -97,6 +97,8 @@ def _quote(answer: Answer, judge: Problem, logs: Sequence[Trajectory], model: st
             write_model(file, model, data["ranking"], answer.added, data)
             written = make_problem(excerpts(logs)[0], model_of(logs, str(file)))
         answer.error_after = noise_ratio(written)
+        if answer.error_after > answer.error_before:
+            answer.drop_model()
     answer.told_in(before)
 
 

@@ -23,13 +23,11 @@ from kemba.trajectory import Trajectory
 class AimSettings(Settings):
     """How a table is corrected: by moving valve edges, which sets push duration and landing."""
 
-    apex: float = setting(1e-3, "m", "apex error that needs no search", CHOSEN)
-    touchdown: float = setting(3e-3, "s", "touchdown error that needs no search", CHOSEN)
-    pitch: float = setting(
-        0.009, "rad", "pitch at touchdown, beyond the plan's, that a moved edge may make", CHOSEN
-    )
+    apex = 1e-3  # apex error that needs no search [m]
+    touchdown = 3e-3  # touchdown error that needs no search [s]
+    pitch = 0.009  # pitch at touchdown, beyond the plan's, that a moved edge may make [rad]
     moved: int = setting(8, "ms", "by which an edge moves at most", CHOSEN, decides=True)
-    executions: int = setting(150, "1", "simulations at most", CHOSEN)
+    executions = 60  # simulations at most
 
 
 @dataclass(frozen=True)

@@ -11,22 +11,20 @@ import numpy as np
 
 from kemba.config import dump_yaml
 from kemba.learn.flight import FlownJump
-from kemba.settings import CHOSEN, Settings, setting
 
 QUANTITIES = ("apex", "touchdown")
 NOTE = "what executions did beyond the learnt model; it moves valve edges and is no physics"
 
 
-class CorrectionSettings(Settings):
+class CorrectionSettings:
     """Bounds of the correction, and the scatter that is expected of executions."""
 
-    apex: float = setting(0.05, "m", "largest apex error that is corrected", CHOSEN)
-    touchdown: float = setting(0.02, "s", "largest error of touchdown that is corrected", CHOSEN)
-    apex_scatter: float = setting(
-        3e-3, "m", "1 sigma of the apex between executions, where fewer than three are known",
-        "derived: valves that scatter by 0.1 ms, on the shipped plant",
-    )  # fmt: skip
-    touchdown_scatter: float = setting(2e-3, "s", "the same for touchdown", CHOSEN)
+    apex = 0.05  # largest apex error that is corrected [m]
+    touchdown = 0.02  # largest error of touchdown that is corrected [s]
+    # 1 sigma of the apex between executions, where fewer than three are known [m]: valves that
+    # scatter by 0.1 ms, on the shipped plant
+    apex_scatter = 3e-3
+    touchdown_scatter = 2e-3  # the same for touchdown [s]
 
 
 @dataclass(frozen=True)
@@ -48,7 +46,7 @@ def correction_from(executed: Sequence[FlownJump], simulated: FlownJump) -> Corr
 
     An error e with standard error s counts by e^2 / (e^2 + s^2), so that scatter is not chased.
     """
-    settings, found, limited = CorrectionSettings.current(), {}, []
+    settings, found, limited = CorrectionSettings, {}, []
     for name in QUANTITIES:
         errors = np.array([getattr(f, name) - getattr(simulated, name) for f in executed])
         errors = errors[np.isfinite(errors)]
@@ -69,7 +67,7 @@ def correction_from(executed: Sequence[FlownJump], simulated: FlownJump) -> Corr
 def scatter_of(executed: Sequence[FlownJump]) -> float:
     """1 sigma [m] of the apex between executions: what is usual, counted as one of them, and what
     they show."""
-    usual = CorrectionSettings.current().apex_scatter
+    usual = CorrectionSettings.apex_scatter
     apex = np.array([f.apex for f in executed])
     squares = float(np.sum((apex - apex.mean()) ** 2)) if len(apex) > 1 else 0.0
     return float(np.sqrt((usual**2 + squares) / max(len(apex), 1)))

@@ -12,11 +12,13 @@ from typing import Any
 import numpy as np
 
 from kemba.errors import KembaError
+from kemba.files import read_json
 from kemba.learn.flight import flight_of
 from kemba.model import Model, load_spec
 from kemba.model.drawn import drawn_models
 from kemba.plant.execution.controller import execute_many
 from kemba.plotting.robot.machine import Machine
+from kemba.runs import Run
 from kemba.trajectory import Trajectory
 
 FEWEST = 10  # of them that must be simulated for a spread
@@ -45,6 +47,13 @@ class ExpectedApex:
             return cls(float(told["apex_m"]), float(told["low_m"]), float(told["high_m"]))
         except (KeyError, TypeError, ValueError):
             return None
+
+
+def expected_of(run: Run) -> ExpectedApex | None:
+    """What the round that made a run expected of it; None of a run that `learn` did not make."""
+    file = run.path / "learning.json"
+    told = read_json(file) if file.is_file() else None
+    return ExpectedApex.of(told.get("next_expected")) if isinstance(told, dict) else None
 
 
 def band_about(

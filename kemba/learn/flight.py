@@ -8,20 +8,16 @@ import numpy as np
 
 from kemba.plant.execution.replay import LandingSettings
 from kemba.plotting.robot.machine import Machine
-from kemba.settings import Settings, setting
 from kemba.trajectory import Array, Trajectory
 
 
-class FlightSettings(Settings):
+class FlightSettings:
     """How apex and touchdown are read off a motion."""
 
-    around: float = setting(
-        0.02, "s", "a parabola is fitted to the heights this far around the highest reading",
-        "derived: 40 readings average 0.3 mm of noise to 0.05 mm; the body falls 2 mm in 20 ms",
-    )  # fmt: skip
-    down: float = setting(
-        3e-3, "m", "a lower foot stands", "derived: ten times the noise of the body's height"
-    )
+    # a parabola is fitted to the heights this far around the highest reading [s]: 40 readings
+    # average 0.3 mm of noise to 0.05 mm; the body falls 2 mm in 20 ms
+    around = 0.02
+    down = 3e-3  # a lower foot stands [m]: ten times the noise of the body's height
 
 
 @dataclass(frozen=True)
@@ -38,7 +34,7 @@ class FlownJump:
 
 def flight_of(motion: Trajectory, machine: Machine) -> FlownJump:
     """The flight of a motion with body/z, body/pitch and every leg's hip and piston (or knee)."""
-    settings = FlightSettings.current()
+    settings = FlightSettings
     known = np.isfinite(motion["body/z"])
     time, z = motion.time[known], motion["body/z"][known]
     apex_time, apex = _peak(time, z, settings.around)

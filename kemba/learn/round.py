@@ -10,22 +10,21 @@ from typing import Any
 
 import numpy as np
 
-from kemba.config import Document, beside, dump_yaml
+from kemba.config import Document, beside
 from kemba.errors import KembaError
-from kemba.files import read_json
-from kemba.identify.adopt import reference, write_model
 from kemba.identify.answer import Answer
 from kemba.identify.discover import Discovery
 from kemba.identify.logs.reading import read_logs
 from kemba.identify.workflow import discover_logs
+from kemba.identify.written.adopt import write_model
 from kemba.learn import words
 from kemba.learn.aim import Aim, Aimed
 from kemba.learn.correction import Correction, correction_from, scatter_of, write_correction
-from kemba.learn.expected import ExpectedApex, band_about
+from kemba.learn.expected import ExpectedApex, band_about, expected_of
 from kemba.learn.flight import FlownJump, flight_of
-from kemba.learn.rounds import Past, entry, past_of
+from kemba.learn.rounds import Past, as_executed, entry, past_of
 from kemba.logs import load_map
-from kemba.model import Model, load_spec
+from kemba.model import Model
 from kemba.ocp import Task, load_task, task_model
 from kemba.plant.execution.certificate import rest_after
 from kemba.plant.execution.controller import execute
@@ -37,7 +36,6 @@ from kemba.solve.earlier import origin_of
 from kemba.trajectory import Trajectory
 
 PLAIN = "controller_uncorrected.csv"
-SUPPLY = 0.7e6  # Pa, of a model that names none
 
 
 @dataclass(frozen=True)
@@ -77,11 +75,6 @@ class Round:
     remarks: tuple[str, ...] = ()
 
     @property
-    def learnt(self) -> bool:
-        """Whether `model` is a new one: it predicts better on quoted logs, whatever the verdict."""
-        return bool(self.answer.model) and self.compare_after < self.compare_before
-
-    @property
     def executed_apex(self) -> float:
         """Mean executed apex [m]."""
         return float(np.mean([f.apex for f in self.executed]))
@@ -116,9 +109,9 @@ class Round:
             "expected_apex_error_m": self.expected_apex_error,
             "executed_apex_error_m": self.executed_apex_error,
             "executed_apex_m": self.executed_apex,
-            "was_expected": _told(self.was_expected),
+            "was_expected": self.was_expected and self.was_expected.json(),
             "inside": self.was_expected and self.was_expected.holds(self.executed_apex),
-            "next_expected": _told(self.next_expected),
+            "next_expected": self.next_expected and self.next_expected.json(),
             "unexplained_apex_m": self.correction.apex,
             "simulated_touchdown_s": finite(self.simulated.touchdown),
             "executed_touchdown_s": finite(float(np.mean([f.touchdown for f in self.executed]))),
@@ -145,10 +138,6 @@ class Round:
                 *self.remarks,
             ]
         )
-
-
-def _told(band: ExpectedApex | None) -> dict[str, float] | None:
-    return band.json() if band is not None else None
 
 
 def learn(asked: Asked, folder: RunFolder, listener: Listener) -> Round:
@@ -205,16 +194,9 @@ def _learnt(
         executed=[flight_of(log, machine) for log in past.executed[past.last]],
         simulated=simulated,
         before=before,
-        was_expected=_expected_before(run),
+        was_expected=expected_of(run),
         remarks=(*past.remarks, *words.few(past.logs)),
     )
-
-
-def _expected_before(run: Run) -> ExpectedApex | None:
-    """What the round that made a run expected of it; None of a run that `learn` did not make."""
-    file = run.path / "learning.json"
-    told = read_json(file) if file.is_file() else None
-    return ExpectedApex.of(told.get("next_expected")) if isinstance(told, dict) else None
 
 
 def _with_correction(found: Round, old: Task, run: Run) -> Round:
@@ -235,17 +217,6 @@ def _with_correction(found: Round, old: Task, run: Run) -> Round:
         f"{1e3 * abs(found.executed_apex_error):.1f} mm"
     )
     return replace(found, remarks=(*found.remarks, said))
-
-
-def as_executed(model: str, task: Task, path: Path) -> str:
-    """A model with the supply and payload of a task, written to `path` where it needs them."""
-    spec = load_spec(model)
-    if not task.payload and task.supply in (None, spec.supply or SUPPLY):
-        return model
-    extra = [{"kind": "payload", "m": task.payload}] if task.payload else []
-    data = {"name": f"{spec.name}_of_the_run", "base": reference(model), "effects": extra}
-    dump_yaml(data | ({"supply": task.supply} if task.supply else {}), path)
-    return str(path)
 
 
 def finite(value: float) -> float | None:
@@ -269,7 +240,7 @@ def _planned(
         "model": found.model,
         "executed_apex_error_m": found.executed_apex_error,
         "executed_apex_m": found.executed_apex,
-        "was_expected": _told(found.was_expected),
+        "was_expected": found.was_expected and found.was_expected.json(),
         "effects": words.effects(found.answer),
         "compare_before": found.compare_before,
         "compare_after": found.compare_after,

@@ -9,22 +9,24 @@ from typing import Any
 
 import numpy as np
 
+from kemba.config import dump_yaml
 from kemba.errors import KembaError, enumerated
 from kemba.files import sha256
+from kemba.identify.written.adopt import reference
+from kemba.model import load_spec
+from kemba.ocp import Task
 from kemba.plant.execution.controller import read_controller
 from kemba.runs import Run, load_run
-from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Array, Trajectory
 
+SUPPLY = 0.7e6  # Pa, of a model that names none
 ENTRY = "learn"  # of the manifest of a run that `learn` made
 
 
-class MatchSettings(Settings):
+class MatchSettings:
     """When a log is an execution of a run."""
 
-    valves: float = setting(
-        0.02, "1", "share of rows in which a valve command differs from the table", CHOSEN
-    )
+    valves = 0.02  # share of rows in which a valve command differs from the table
 
 
 @dataclass(frozen=True)
@@ -126,7 +128,7 @@ def _placed(log: Trajectory, runs: Sequence[Run]) -> tuple[int, Trajectory]:
             time = log.time - log.time[0] + begin
             tried.append((_differs(table, log, time), place, time))
     miss, place, time = min(tried, key=lambda trial: trial[0])
-    if miss > MatchSettings.current().valves:
+    if miss > MatchSettings.valves:
         what = f"its valve commands differ from the run's in {miss:.0%} of the rows"
         hint = "give the run that was executed, or logs that begin where its controller.csv begins"
         raise KembaError(str(log.meta["path"]), what, f"an execution of {runs[place].path}", hint)
@@ -140,3 +142,14 @@ def _differs(table: Trajectory, log: Trajectory, time: Array) -> float:
     if any(name not in log for name in names):
         return 1.0
     return max(float(np.mean(sent(table, time, n) != np.round(log[n]))) for n in names)
+
+
+def as_executed(model: str, task: Task, path: Path) -> str:
+    """A model with the supply and payload of a task, written to `path` where it needs them."""
+    spec = load_spec(model)
+    if not task.payload and task.supply in (None, spec.supply or SUPPLY):
+        return model
+    extra = [{"kind": "payload", "m": task.payload}] if task.payload else []
+    data = {"name": f"{spec.name}_of_the_run", "base": reference(model), "effects": extra}
+    dump_yaml(data | ({"supply": task.supply} if task.supply else {}), path)
+    return str(path)

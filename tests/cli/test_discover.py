@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
+from kemba.model import load_spec, read_covariance
 from kemba_cli.main import app
 
 FIELDS = {
@@ -75,6 +76,21 @@ def test_json_has_every_field_and_files_are_written(folder: Path, tmp_path: Path
     assert json.loads((out / "answer.json").read_text())["verdict"] == "missing"
     for name in ("model.yaml", "heat_map.png", "residual.png", "ladder.png"):
         assert (out / name).stat().st_size > 50
+
+    compared = run("compare", *folder.glob("*.csv"), "--model", out / "model.yaml", "--json")
+    quoted = json.loads(compared.stdout)["noise_ratio"]
+    assert quoted == pytest.approx(answer["error_after"], rel=0.01), "what is said is written"
+    evidence = load_spec(out / "model.yaml").evidence
+    assert evidence is not None and evidence.error_held_out == answer["error_after"]
+    assert {log.use for log in evidence.logs} == {"learnt"}, "two logs: none is kept aside"
+    assert not evidence.faults(out)
+    assert "sensor_bias:piston/F.b" in read_covariance(out / "model.yaml")[0]
+
+    whole = run("adopt", out, "--out", tmp_path / "whole.yaml")
+    assert whole.exit_code == 0 and load_spec(tmp_path / "whole.yaml").evidence is not None
+    sure = run("adopt", out, "--only-sure", "--out", tmp_path / "sure.yaml")
+    assert sure.exit_code == 0 and "support: sure" in (tmp_path / "sure.yaml").read_text()
+    assert run("adopt", out, "payload", "--only-sure").exit_code == 2
 
     adopted = run("adopt", out, "sensor_bias:piston/F", "--out", tmp_path / "mine.yaml")
     assert adopted.exit_code == 0 and "channel: piston/F" in (tmp_path / "mine.yaml").read_text()

@@ -11,10 +11,10 @@ from toy_problem import Toy
 from kemba.config import load_yaml
 from kemba.errors import KembaError
 from kemba.files import write_json
-from kemba.identify.adopt import adopt_answer, adopted
 from kemba.identify.discover import discover
-from kemba.identify.evidence.scatter import apart_between_runs
-from kemba.identify.joint import joint_fit
+from kemba.identify.written.adopt import adopt_answer, adopted
+from kemba.identify.written.joint import joint_fit
+from kemba.identify.written.scatter import apart_between_runs
 from kemba.model import load_spec, read_covariance
 
 TRUTH = {"kick.a": 8.0, "bend.a": -6.0}

@@ -7,15 +7,12 @@ from collections.abc import Collection
 import numpy as np
 import pytest
 
-from kemba.errors import KembaError
 from kemba.identify.discover import discover
 from kemba.identify.evidence.linear import linearise, time_blocks
-from kemba.identify.evidence.modes.settled import settled
 from kemba.identify.evidence.modes.small_effects import mode_of
-from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Ranker
 from kemba.identify.problem.problem import Array, Candidate, Parameter, Problem, Rows, Theta
-from kemba.identify.ranking import values
+from kemba.identify.written.joint import joint_fit
 
 ROW, RUNS = 1e-3, 3  # s
 EDGES = 0.0505 + 0.04 * np.arange(18)  # s, between two rows; up and down in turn
@@ -111,36 +108,13 @@ def test_a_step_to_where_nothing_can_be_predicted_is_not_taken() -> None:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_an_interval_is_taken_where_the_effects_act_together(seed: int) -> None:
+def test_intervals_are_taken_where_the_effects_act_together(seed: int) -> None:
     """Edges that fall 3.6 ms late: the slope of `falls_late` is that of edges on time, four rows
     earlier, until it is taken anew."""
     truth = {"late.T": 3.1e-3, "falls_late.T": 5e-4}
-    search = Search(Late(truth, seed))
-    search.start()
-    before = search.visit(("late",))
-    point = settled(search.base, before)
-    i, j = (point.linear.index(name) for name in truth)
-    z, sd = point.score.z, np.sqrt(np.diag(point.score.covariance))
-    assert abs(z[i] - truth["late.T"]) < 3.0 * sd[i]
-    assert abs(before.score.z[i] - truth["late.T"]) > 1.5e-4 > abs(z[i] - truth["late.T"])
-    assert abs(z[j] - truth["falls_late.T"]) < 1e-4
-    value = values(search, ("late",), "late", point)["T"]
-    assert value.low <= truth["late.T"] <= value.high
-    assert value.low <= value.value <= value.high
-
-
-def test_slopes_that_lead_nowhere_leave_the_search_s_own() -> None:
-    class Broken(Late):
-        broken = False
-
-        def residual(self, theta: Theta, runs: Collection[int] | None = None) -> Array:
-            if self.broken:
-                raise KembaError("model", "cannot be simulated there")
-            return super().residual(theta, runs)
-
-    problem = Broken({"late.T": 3e-3})
-    search = Search(problem)
-    search.start()
-    found = search.visit(("late",))
-    problem.broken = True
-    assert settled(search.base, found) is found
+    found = joint_fit(Late(truth, seed), ("falls_late", "late"), {"late.T": 3e-3})
+    for name, value, low, high in zip(
+        found.names[:2], found.value, found.low, found.high, strict=False
+    ):
+        assert value == pytest.approx(truth[name], abs=1.5e-4)
+        assert low <= truth[name] <= high

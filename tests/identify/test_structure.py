@@ -13,13 +13,13 @@ from robot_logs import hop, hops
 from twin import figures, measure, run
 
 from kemba.effects.pneumatics.orifice import OrificeChamber
-from kemba.identify.adopt import write_model
 from kemba.identify.answer import Answer, Ranked, Value
 from kemba.identify.discover import discover
 from kemba.identify.problem.candidates import by_default
 from kemba.identify.problem.structure import ORIFICE, structure_candidates
 from kemba.identify.robot.problem import robot_problem
-from kemba.identify.stages import is_mixture, joined, unbuilt
+from kemba.identify.stages import is_mixture, joined
+from kemba.identify.written.adopt import write_model
 from kemba.model import Model, load_model
 from kemba.model.spec import load_spec
 from kemba.trajectory import Trajectory
@@ -144,10 +144,4 @@ def test_a_share_of_another_structure_is_no_whole_answer(
     low: float, high: float, mixed: bool
 ) -> None:
     """The model that is written has the structure whole: 0.78 of it land elsewhere."""
-    row = Ranked(ORIFICE, 1.0, {"a": Value((low + high) / 2, low, high, "1")}, (), 2.5, 0.9)
-    answer = Answer("missing", 0.002, "", [row], (ORIFICE,), 2.5, 0.9, sure=(ORIFICE,))
-    assert is_mixture(answer, ORIFICE) == mixed
-    if mixed:
-        part = unbuilt(answer, ORIFICE)
-        assert (part.verdict, part.added, part.sure) == ("partly", (), ())
-        assert "Likely, but not sure: chambers:orifice" in part.sentence
+    assert is_mixture(Value((low + high) / 2, low, high, "1")) == mixed

@@ -23,8 +23,8 @@ from kemba.learn.correction import (
 from kemba.learn.expected import ExpectedApex
 from kemba.learn.flight import FlownJump, flight_of
 from kemba.learn.page import verdict_of
-from kemba.learn.round import Round, as_executed
-from kemba.learn.rounds import entry, past_of, sent
+from kemba.learn.round import Round
+from kemba.learn.rounds import as_executed, entry, past_of, sent
 from kemba.model import load_model
 from kemba.model.drawn import drawn_models
 from kemba.model.evidence import write_covariance
@@ -243,7 +243,7 @@ def test_models_are_drawn_from_the_covariance_within_their_bounds(tmp_path: Path
 
 
 def test_scatter_counts_what_is_usual_once() -> None:
-    usual = CorrectionSettings.current().apex_scatter
+    usual = CorrectionSettings.apex_scatter
     assert scatter_of(flights([0.0])) == pytest.approx(usual)
     assert scatter_of(flights([0.001, -0.001, 0.0])) < usual
     assert scatter_of(flights([0.02, -0.02, 0.0])) > 2.0 * usual

@@ -12,12 +12,15 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from machines import cogging_log, cylinder_log, drive_log, model_file, vessel_log
 from real_data import reader, real
+from typer.testing import CliRunner
 
+from kemba.config import dump_yaml
 from kemba.errors import KembaError
 from kemba.identify.compare_logs import compare_logs
 from kemba.identify.rigs.files import characterise_logs
 from kemba.identify.workflow import discover_logs
 from kemba.model import load_model
+from kemba_cli.main import app
 
 DRIVE = {"kind": "drive", "motion": "linear", "inertia": "2 kg"}
 CYLINDER = {"kind": "cylinder", "bore": "25 mm", "stroke": "40 mm", "chambers": ["extend"]}
@@ -37,6 +40,27 @@ def test_friction_of_a_drive_is_found(tmp_path: Path) -> None:
     law = next(name for name in COULOMB if name in found)
     assert found[law][COULOMB[law]].value == pytest.approx(3.0, rel=0.1)
     assert found["axis_damping"]["F_v"].value == pytest.approx(8.0, rel=0.1)
+
+
+def test_characterise_reads_foreign_columns_and_stays_where_a_model_can_be(tmp_path: Path) -> None:
+    """A seal without friction: least squares alone would find a negative one."""
+    log, out = cylinder_log(tmp_path / "a.csv", 3e5, coulomb=0.0), tmp_path / "out.yaml"
+    text = log.read_text()
+    log.write_text(text.replace("piston/F [N]", "load").replace("piston/x [m]", "way"))
+    columns = {"time [s]": "time [s]", "piston/x [m]": "way", "piston/F [N]": "load",
+               "chamber/extend/P [Pa]": "chamber/extend/P [Pa]"}  # fmt: skip
+    listed = {name: {"source": source} for name, source in columns.items()}
+    listed["piston/F [N]"] |= {"unit": "N"}
+    listed["piston/x [m]"] |= {"unit": "m"}
+    dump_yaml({"kind": "cylinder", "columns": listed}, tmp_path / "map.yaml")
+    effects = {"kind": "seal_friction"}, {"kind": "pressure_friction"}
+    words = ["characterise", log, "--model", model_file(tmp_path, CYLINDER, *effects)]
+    told = CliRunner().invoke(app, [str(w) for w in (*words, "--map", tmp_path / "map.yaml",
+                                                     "--out", out)])  # fmt: skip
+    assert told.exit_code == 0, told.output
+    found = {e.name: e for e in load_model(out).effects}
+    assert 0.0 <= found["seal_friction"].value("F_c") < 0.5
+    assert 0.0 <= found["pressure_friction"].value("mu") < 0.005
 
 
 @pytest.mark.parametrize("scale", [1.0, 0.8])

@@ -27,29 +27,18 @@ PRESSURES = ("chamber/extend/P", "chamber/retract/P")
 class BenchLogSettings(Settings):
     """How a bench log is prepared."""
 
-    finest_force: float = setting(0.2, "N", "smallest noise of the force sensor", BY_HAND)
-    finest_pressure: float = setting(100.0, "Pa", "smallest noise of a pressure sensor", BY_HAND)
-    finest_share: float = setting(
-        5e-4, "1", "noise that is added, as a share of a channel's range", BY_HAND
-    )
+    finest_force = 0.2  # smallest noise of the force sensor [N]
+    finest_pressure = 100.0  # smallest noise of a pressure sensor [Pa]
+    finest_share = 5e-4  # noise that is added, as a share of a channel's range
     gap: float = setting(
         0.012, "s", "longest gap of the position that is bridged", BY_HAND, decides=True
     )
-    memory: float = setting(
-        0.12,
-        "s",
-        "time after which chambers do not depend on the moment of a switching",
-        "derived: three times the slowest rise time of Table I",
-    )
-    neighbours: int = setting(
-        9, "1", "samples over which the largest error of the velocity counts", BY_HAND
-    )
-    damping: float = setting(
-        60.0,
-        "N.s.m-1",
-        "usual damping, by which an error of the velocity makes one of the force",
-        BY_HAND,
-    )
+    # time after which chambers do not depend on the moment of a switching [s]: three times the
+    # slowest rise time of Table I
+    memory = 0.12
+    neighbours = 9  # samples over which the largest error of the velocity counts
+    # usual damping, by which an error of the velocity makes one of the force [N.s.m-1]
+    damping = 60.0
     friction: float = setting(
         10.0,
         "N",
@@ -57,10 +46,8 @@ class BenchLogSettings(Settings):
         "derived: the tables of the paper imply 6 to 8 N",
         decides=True,
     )
-    creeping: float = setting(
-        200.0, "N.s.m-1", "damping that a slow piston has in addition", BY_HAND
-    )
-    creep: float = setting(0.08, "m.s-1", "speed up to which it has it", BY_HAND)
+    creeping = 200.0  # damping that a slow piston has in addition [N.s.m-1]
+    creep = 0.08  # speed up to which it has it [m.s-1]
 
 
 @dataclass(frozen=True)
@@ -129,7 +116,7 @@ def prepare(
 def _seen_within(time: Array) -> float:
     """Time [s] between rows where it is so long that valve edges are blurred, else 0."""
     step = float(np.median(np.diff(time)))
-    return step if step > LimitSettings.current().row else 0.0
+    return step if step > LimitSettings.row else 0.0
 
 
 def noise_of(channel: str, y: Array) -> float:

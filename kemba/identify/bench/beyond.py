@@ -12,13 +12,12 @@ from kemba.identify.bench.predicted import PredictedLogs
 from kemba.identify.evidence.linear import within
 from kemba.identify.evidence.spike_slab import SpikeSlabSettings
 from kemba.identify.problem.types import Array, Candidate, Leftover, Theta
-from kemba.settings import BY_HAND, Settings, setting
 
 
-class BenchFormulaSettings(Settings):
+class BenchFormulaSettings:
     """What counts as the largest force of a formula."""
 
-    peak: float = setting(99.5, "%", "percentile of the rows that is taken as the largest", BY_HAND)
+    peak = 99.5  # percentile of the rows that is taken as the largest [%]
 
 
 def formula_columns(predicted: PredictedLogs, theta: Theta) -> tuple[tuple[str, ...], Array]:
@@ -37,7 +36,7 @@ def formula_columns(predicted: PredictedLogs, theta: Theta) -> tuple[tuple[str, 
 def weight(predicted: PredictedLogs, theta: Theta, formula: str, coefficient: float) -> float:
     """Largest force of a formula as a share of what matters in practice."""
     forces = (_forces(predicted, theta, i)[formula] for i in range(len(predicted.logs)))
-    percent = BenchFormulaSettings.current().peak
+    percent = BenchFormulaSettings.peak
     peak = max(float(np.percentile(np.abs(force), percent)) for force in forces)
     return abs(coefficient) * peak / BenchLogSettings.current().friction
 

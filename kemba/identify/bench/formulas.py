@@ -10,25 +10,20 @@ from kemba.effects.mechanics.friction import V_COULOMB
 from kemba.identify.bench.motion import SmoothedMotion
 from kemba.identify.doubt.force_terms import dahl, end_terms
 from kemba.identify.problem.problem import Array
-from kemba.settings import BY_HAND, Settings, setting
 
 
-class FormulaSettings(Settings):
+class FormulaSettings:
     """Constants of the simple force terms that are tried."""
 
-    memories: tuple[float, ...] = setting(
-        (0.001, 0.006, 0.02, 0.06, 0.2), "s", "times for which a switching is remembered", BY_HAND
-    )
-    creeps: tuple[float, ...] = setting(
-        (0.002, 0.006, 0.015), "m", "travel over which a hysteresis turns round", BY_HAND
-    )
-    speed: float = setting(0.3, "m.s-1", "speed by which speeds are scaled", BY_HAND)
+    memories = (0.001, 0.006, 0.02, 0.06, 0.2)  # times for which a switching is remembered [s]
+    creeps = (0.002, 0.006, 0.015)  # travel over which a hysteresis turns round [m]
+    speed = 0.3  # speed by which speeds are scaled [m.s-1]
 
 
 def terms(motion: SmoothedMotion, u: Array, stroke: float) -> Iterator[tuple[str, Array]]:
     """(formula, force per unit coefficient (n,)); `u` (n, 2): share of each valve being on;
     `stroke` [m]."""
-    settings = FormulaSettings.current()
+    settings = FormulaSettings
     x, v, (u_e, u_r) = motion.x, motion.v, u.T
     sign = np.tanh(v / V_COULOMB)
     out, back = np.maximum(v, 0.0), np.minimum(v, 0.0)
@@ -61,7 +56,7 @@ def features(motion: SmoothedMotion, u: Array, stroke: float) -> Array:
     times functions of how long ago each valve was on. `u` (n, 2): share of each valve being on."""
     from scipy.signal import lfilter  # it takes half a second
 
-    settings, step = FormulaSettings.current(), float(np.median(np.diff(motion.time)))
+    settings, step = FormulaSettings, float(np.median(np.diff(motion.time)))
     x, v = motion.x / stroke - 0.5, motion.v / settings.speed
     places = [np.ones(len(x)), x, x**2, v, np.abs(v), v * x, np.tanh(motion.v / V_COULOMB)]
     histories = [np.ones(len(x)), u[:, 0] * u[:, 1]]

@@ -11,18 +11,17 @@ from scipy.linalg import cholesky_banded, solveh_banded
 
 from kemba.identify.bench.predicted import PredictedLogs
 from kemba.identify.problem.types import Array, MissingForce, Theta
-from kemba.settings import BY_HAND, Settings, setting
 
 FORCE = "piston/F"
 
 
-class BenchMissingSettings(Settings):
+class BenchMissingSettings:
     """The missing force of a bench log."""
 
-    memory: float = setting(0.025, "s", "correlation time of the missing force", BY_HAND)
-    rounds: int = setting(20, "1", "rounds in which its strength is learnt", BY_HAND)
-    begin: float = setting(5.0, "N", "strength (1 sigma) with which learning begins", BY_HAND)
-    negligible: float = setting(0.05, "N", "strength that is as good as none", BY_HAND)
+    memory = 0.025  # correlation time of the missing force [s]
+    rounds = 20  # rounds in which its strength is learnt
+    begin = 5.0  # strength (1 sigma) with which learning begins [N]
+    negligible = 0.05  # strength that is as good as none [N]
 
 
 def bench_missing(
@@ -50,7 +49,7 @@ def lagged(
     `time` (n,) [s]; `gap` (n,): the lag plus white noise of `variance` (n,). The strength (1 sigma
     of the lag) is learnt unless it is `known`.
     """
-    settings = BenchMissingSettings.current()
+    settings = BenchMissingSettings
     keep = np.exp(-np.diff(time) / settings.memory)
     strength = known or settings.begin
     for _ in range(1 if known else settings.rounds):

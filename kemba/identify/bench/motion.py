@@ -12,27 +12,18 @@ from kemba.identify.logs.local_fit import local_fit, weights
 from kemba.identify.problem.noise import difference_sigma
 from kemba.identify.problem.problem import Array
 from kemba.identify.problem.sensor_noise import ChannelNoise
-from kemba.settings import BY_HAND, Settings, setting
 
 
-class MotionSettings(Settings):
+class MotionSettings:
     """How the velocity of an imposed motion is found."""
 
-    finest: float = setting(2e-6, "m", "smallest noise of the position sensor", BY_HAND)
-    half_widths: tuple[int, ...] = setting(
-        (5, 8, 11, 15, 20, 27, 40, 60, 90, 135),
-        "1",
-        "half widths, in samples, of the windows that are tried",
-        "convention: each about 1.4 times the one before",
-    )
-    measured: float = setting(
-        0.5, "1", "share of valid readings that a measured velocity needs", BY_HAND
-    )
-    width: int = setting(6, "1", "half width, in samples, of its smoothing", BY_HAND)
-    finest_speed: float = setting(1e-6, "m.s-1", "smallest noise of a velocity sensor", BY_HAND)
-    contradicts: float = setting(
-        3.0, "1", "sigmas by which a measured velocity may differ", "convention: three sigmas"
-    )
+    finest = 2e-6  # smallest noise of the position sensor [m]
+    # half widths, in samples, of the windows that are tried: each about 1.4 times the one before
+    half_widths = (5, 8, 11, 15, 20, 27, 40, 60, 90, 135)
+    measured = 0.5  # share of valid readings that a measured velocity needs
+    width = 6  # half width, in samples, of its smoothing
+    finest_speed = 1e-6  # smallest noise of a velocity sensor [m.s-1]
+    contradicts = 3.0  # sigmas by which a measured velocity may differ: three sigmas
 
 
 @dataclass(frozen=True)
@@ -57,7 +48,7 @@ def smooth_motion(
     [m.s-1] is averaged with the derived one, by their errors. `noise` of the position sensor, in
     `difference_sigma` of x; None: white.
     """
-    settings, good = MotionSettings.current(), np.isfinite(x)
+    settings, good = MotionSettings, np.isfinite(x)
     noise = noise or ChannelNoise()
     grid, values, step = even_grid(time, x)
     sigma = max(difference_sigma(x[good]), settings.finest)
@@ -91,7 +82,7 @@ def _adaptive(
     n = len(values)
     best = np.full(n, np.inf)
     position, rate, half = values.copy(), np.zeros(n), np.zeros(n)
-    for width in MotionSettings.current().half_widths:
+    for width in MotionSettings.half_widths:
         if 2 * width + 1 > n:
             break
         x, v = (local_fit(values, width, step, 3, k) for k in (0, 1))
@@ -129,7 +120,7 @@ def _weigh_in(
 
     Where the two contradict each other, the derived one counts alone.
     """
-    settings, good = MotionSettings.current(), np.isfinite(v)
+    settings, good = MotionSettings, np.isfinite(v)
     measured = np.interp(grid, time[good], v[good])
     sigma = max(difference_sigma(v[good]), settings.finest_speed)
     width = settings.width

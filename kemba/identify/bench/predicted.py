@@ -11,18 +11,14 @@ from kemba.identify.bench.bench_log import BenchLog
 from kemba.identify.bench.motion import SmoothedMotion
 from kemba.identify.bench.prediction import BenchPredictor
 from kemba.identify.problem.types import Array, Theta
-from kemba.settings import Settings, setting
 
 
-class StartSettings(Settings):
+class StartSettings:
     """How a log begins."""
 
-    early: float = setting(
-        0.08,
-        "s",
-        "beginning of a log that tells whether a valve had just been switched",
-        "derived: twice the slowest rise time of Table I",
-    )
+    # beginning of a log that tells whether a valve had just been switched [s]: twice the slowest
+    # rise time of Table I
+    early = 0.08
 
 
 @dataclass(frozen=True)
@@ -99,7 +95,7 @@ def _settled(log: BenchLog, predictor: BenchPredictor) -> BenchLog:
     trials = [replace(log, commands=(e, r)) for e in options[0] for r in options[1]]
     if len(trials) == 1:
         return log
-    end = log.motion.time[0] + StartSettings.current().early
+    end = log.motion.time[0] + StartSettings.early
     early = log.motion.time[log.keep["piston/F"]] < end
 
     def cost(trial: BenchLog) -> float:

@@ -47,12 +47,9 @@ from kemba.trajectory import Trajectory
 class BenchProblemSettings(Settings):
     """How well pressure sensors are known, and what counts as a change and as rest."""
 
-    pressure_zero: float = setting(
-        2e5,
-        "Pa",
-        "prior sigma of the bias of a pressure sensor",
-        "convention: two atmospheres; its zero is the atmosphere's or that of a vacuum",
-    )
+    # prior sigma of the bias of a pressure sensor [Pa]: two atmospheres; its zero is the
+    # atmosphere's or that of a vacuum
+    pressure_zero = 2e5
     pressure_gain: float = setting(
         0.02,
         "1",
@@ -67,7 +64,7 @@ class BenchProblemSettings(Settings):
         BY_HAND,
         decides=True,
     )
-    rest: float = setting(2e-3, "m.s-1", "speed below which the piston rests", BY_HAND)
+    rest = 2e-3  # speed below which the piston rests [m.s-1]
 
 
 class BenchProblem(Problem):

@@ -25,20 +25,16 @@ from kemba.identify.problem.sensor_noise import (
     weighted,
 )
 from kemba.identify.problem.types import Array, Flags
-from kemba.settings import BY_HAND, Settings, setting
 
 
-class QuietSettings(Settings):
+class QuietSettings:
     """Where the piston rests, and what is believed of the noise there."""
 
-    width: int = setting(135, "1", "half width, in samples, of the cubic", BY_HAND)
-    rest: float = setting(2e-3, "m.s-1", "speed up to which the piston rests", BY_HAND)
-    most: float = setting(
-        10.0,
-        "1",
-        "largest noise that is believed, in sigmas told from differences of rows",
-        "derived: third differences show a tenth of AR(1) noise of 0.98 per row",
-    )
+    width = 135  # half width, in samples, of the cubic
+    rest = 2e-3  # speed up to which the piston rests [m.s-1]
+    # largest noise that is believed, in sigmas told from differences of rows: third differences
+    # show a tenth of AR(1) noise of 0.98 per row
+    most = 10.0
 
 
 @dataclass(frozen=True)
@@ -67,14 +63,14 @@ def position_noise(logs: Sequence[tuple[Array, Array]]) -> ChannelNoise:
     counts = pairs(errors)
     measured = covariances(np.nan_to_num(errors)[..., None], errors, counts)
     kinds = [Kind(0, memory) for memory in memories]
-    most = np.array([QuietSettings.current().most])
+    most = np.array([QuietSettings.most])
     a, b = weighted(columns, measured, counts)
     return chosen_noise(a, b, kinds, most, np.array([True]))[0]
 
 
 def _quiet(time: Array, x: Array) -> _Quiet | None:
     """A log without its motion; None where it is too short."""
-    settings = QuietSettings.current()
+    settings = QuietSettings
     width = settings.width
     grid, values, step = even_grid(time, x)
     if len(grid) < 2 * width + 1:
@@ -82,14 +78,14 @@ def _quiet(time: Array, x: Array) -> _Quiet | None:
     smooth, v = (local_fit(values, width, step, 3, k) for k in (0, 1))
     rest = maximum_filter1d(np.abs(v), 2 * width + 1) < settings.rest
     rest[:width] = rest[-width:] = False
-    sigma = max(difference_sigma(x[np.isfinite(x)]), MotionSettings.current().finest)
+    sigma = max(difference_sigma(x[np.isfinite(x)]), MotionSettings.finest)
     return _Quiet((values - smooth) / sigma, rest, step)
 
 
 def _expected(memory: float, step: float) -> Array:
     """Autocovariances (1, lags) of what the cubic leaves of noise of unit sigma and this memory
     [s], on an even grid of this `step` [s]."""
-    width, lags = QuietSettings.current().width, np.array(ColourSettings.current().lags)
+    width, lags = QuietSettings.width, np.array(ColourSettings.current().lags)
     left = np.eye(1, 4 * width + 1, 2 * width)[0]
     left = left - local_fit(left, width, 1.0, 3)  # the filter's answer to one reading
     reach = np.convolve(left, left[::-1])

@@ -18,7 +18,7 @@ from kemba.model.exponential import midpoint_step
 from kemba.model.model import Model
 from kemba.model.node import Node
 from kemba.model.rest import Rest, rate_of
-from kemba.settings import BY_HAND, Settings, setting
+from kemba.settings import Settings, setting
 
 # The velocity is known within v_sigma: the force is its mean over three Gauss-Hermite nodes
 V_NODES, V_MIDDLE = ((-np.sqrt(3.0), 1 / 6), (np.sqrt(3.0), 1 / 6)), 2 / 3  # sigma, weight
@@ -29,10 +29,8 @@ Pulses = tuple[list[Pulse], list[Pulse]]  # of the extend and the retract valve
 class RigModelSettings(Settings):
     """Integration of the chambers along an imposed motion."""
 
-    step: float = setting(
-        1.5e-3, "s", "longest step", "derived: a fifth of the fastest rise time of Table I, 8 ms"
-    )
-    chunk: int = setting(512, "1", "steps per call of a compiled function", BY_HAND)
+    step = 1.5e-3  # longest step [s]: a fifth of the fastest rise time of Table I, 8 ms
+    chunk = 512  # steps per call of a compiled function
     blur: float = setting(
         0.75e-3,
         "s",

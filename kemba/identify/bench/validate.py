@@ -34,9 +34,9 @@ class BenchValidateSettings(Settings):
     latest: float = setting(
         0.015, "s", "a longer lag is no sensor's delay but another clock", BY_HAND, decides=True
     )
-    resolution: float = setting(1e-3, "s", "resolution of lags", "convention: a usual row")
-    shortest: int = setting(400, "1", "steps of resolution that a lag can be read from", BY_HAND)
-    farthest: float = setting(0.5, "s", "longest lag", BY_HAND)
+    resolution = 1e-3  # resolution of lags [s]: a usual row
+    shortest = 400  # steps of resolution that a lag can be read from
+    farthest = 0.5  # longest lag [s]
     alike: float = setting(0.3, "1", "correlation that a lag must reach", BY_HAND, decides=True)
     more_alike: float = setting(
         1.5, "1", "factor by which a lag must raise the correlation", BY_HAND, decides=True

@@ -17,14 +17,13 @@ from kemba.identify.compare.tolerance import Tolerant, slopes, within_tolerance
 from kemba.identify.compare.words import place_of
 from kemba.identify.evidence.windows import Windows, aggregation_windows, free_starts, rms
 from kemba.identify.problem.problem import Array, MissingForce, Problem, Rows, Texts, Theta
-from kemba.settings import BY_HAND, Settings, setting
 from kemba.units import short
 
 
-class CompareSettings(Settings):
+class CompareSettings:
     """How an error is spoken of that is too large for a good model."""
 
-    fair: float = setting(1.5, "1", "error ratio below which it nearly explains them", BY_HAND)
+    fair = 1.5  # error ratio below which it nearly explains them
 
 
 @dataclass(frozen=True)
@@ -134,7 +133,7 @@ def _tolerant(rows: Rows, region: Texts, window: Windows, found: Tolerant) -> tu
     if found.q_value < BinSettings.current().false_discoveries:
         return rms(window.sums(found.left)), False
     sums = window.sums(found.left)
-    fair = CompareSettings.current().fair
+    fair = CompareSettings.fair
     bins = condition_bins(rows, region, window.first, sums)
     clean = not any(c.significant and c.ratio > fair for c in bins)
     return rms(sums), clean and rms(sums) <= BinSettings.current().tolerated
@@ -189,11 +188,7 @@ def phrase(found: Comparison) -> str:
             f"The nominal model errs by {ratio}; {worst}; but parameters within their usual "
             f"tolerance would explain the logs ({short(found.tolerant_ratio)} times)."
         )
-    grade = (
-        "nearly explains"
-        if found.noise_ratio < CompareSettings.current().fair
-        else "does not explain"
-    )
+    grade = "nearly explains" if found.noise_ratio < CompareSettings.fair else "does not explain"
     hints = [h for kind in ("law", "command", "conflict") for h in _first(found.hints, kind)]
     parts = [f"The model {grade} the logs: its error is {ratio}", worst, *(h.text for h in hints)]
     return "; ".join(parts) + "."

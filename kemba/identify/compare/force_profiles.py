@@ -18,21 +18,13 @@ from kemba.units import short
 class ForceProfileSettings(Settings):
     """How a missing force is looked for, and when it is said to be there."""
 
-    bins: int = setting(8, "1", "most bins of a quantity", BY_HAND)
-    fewest: int = setting(30, "1", "samples in a bin", BY_HAND)
-    narrow: float = setting(
-        0.02, "1", "smallest width of a bin over the middle 90 % of a quantity", BY_HAND
-    )
-    wide: float = setting(
-        20.0, "1", "prior sigma of a bin's force over a channel's usual force", BY_HAND
-    )
-    first_lag: float = setting(
-        0.0015, "s", "shortest time from a command's change to an error", "derived: over one row"
-    )
-    last_lag: float = setting(
-        0.042, "s", "longest time", "derived: beyond the slowest rise time of Table I, 37 ms"
-    )
-    lag_step: float = setting(0.004, "s", "step of these times", BY_HAND)
+    bins = 8  # most bins of a quantity
+    fewest = 30  # samples in a bin
+    narrow = 0.02  # smallest width of a bin over the middle 90 % of a quantity
+    wide = 20.0  # prior sigma of a bin's force over a channel's usual force
+    first_lag = 0.0015  # shortest time from a command's change to an error [s]: over one row
+    last_lag = 0.042  # longest time [s]: beyond the slowest rise time of Table I, 37 ms
+    lag_step = 0.004  # step of these times [s]
     same: float = setting(
         0.1,
         "1",
@@ -46,9 +38,7 @@ class ForceProfileSettings(Settings):
     negligible: float = setting(
         0.1, "1", "negligible force over a channel's usual force", BY_HAND, decides=True
     )
-    sure: float = setting(
-        3.0, "1", "sigmas beyond which a bin's force is not zero", "convention: three sigmas"
-    )
+    sure = 3.0  # sigmas beyond which a bin's force is not zero: three sigmas
     plain: float = setting(
         60.0,
         "nats",

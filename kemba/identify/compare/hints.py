@@ -34,12 +34,8 @@ class HintSettings(Settings):
         BY_HAND,
         decides=True,
     )
-    dependent: float = setting(
-        1.5, "1", "z scores are divided by this: rows are not quite independent", BY_HAND
-    )
-    information: float = setting(
-        4.0, "1", "information on a parameter, per size squared, that a run must give", BY_HAND
-    )
+    dependent = 1.5  # z scores are divided by this: rows are not quite independent
+    information = 4.0  # information on a parameter, per size squared, that a run must give
 
 
 @dataclass(frozen=True)

@@ -95,8 +95,8 @@ class _Side:
         h = np.eye(len(z)) + self.columns.T @ self.columns
         least = 0.5 * float(gap @ gap)
         figures = np.array([name in self.problem.nuisance for name in self.names])
-        far = np.where(figures, LinearSettings.current().widths, np.inf)
-        for _ in range(SeparationSettings.current().steps):
+        far = np.where(figures, LinearSettings.widths, np.inf)
+        for _ in range(SeparationSettings.steps):
             z = np.clip(z - np.linalg.solve(h, self.columns.T @ gap + z), -far, far)
             try:
                 gap = self.problem.residual(self._moved(z)) - truth

@@ -37,10 +37,10 @@ class ExperimentSettings(Settings):
     rivals: int = setting(4, "1", "effects that are to be told apart", "convention: few")
 
 
-class SeparationSettings(Settings):
+class SeparationSettings:
     """How evidence between rivals is predicted."""
 
-    steps: int = setting(3, "1", "steps of the fit of a rival", BY_HAND)
+    steps = 3  # steps of the fit of a rival
 
 
 class RigCourseSettings(Settings):

@@ -14,18 +14,17 @@ from kemba.identify.doubt.parsimony import (
     none_of,
     simplest,
 )
-from kemba.identify.doubt.wanting import fuller, wanted
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
 from kemba.identify.settings import DiscoverSettings
 
 
 def believed(search: Search, best: Hypothesis, p_value: float) -> Belief:
-    """The best hypothesis with what left-out data ask for besides; without what is not significant,
-    too small, refuted by left-out data or of no use there."""
+    """The best hypothesis without what is not significant, too small, refuted by left-out data or
+    of no use there."""
     if not best or p_value > DiscoverSettings.current().significant:
         return Belief(NULL, p_value)
-    belief = Belief(fuller(search, best), p_value)
+    belief = Belief(best, p_value)
     while belief.best:
         best = belief.best
         grave = material(search, best)
@@ -58,8 +57,8 @@ def _quarters_need(search: Search, best: Hypothesis) -> bool:
 
 
 def material(search: Search, hypothesis: Hypothesis) -> Hypothesis:
-    """Those effects of a hypothesis that are larger than a model's usual imperfection, or smaller
-    and asked for by left-out data, and whose intervals exclude that they are absent."""
+    """Those effects of a hypothesis that are larger than a model's usual imperfection, and whose
+    intervals exclude that they are absent."""
     score, linear = search.points[hypothesis].score, search.points[hypothesis].linear
     settings = DiscoverSettings.current()
     least = settings.matters if len(hypothesis) == 1 else settings.matters_too
@@ -72,8 +71,7 @@ def material(search: Search, hypothesis: Hypothesis) -> Hypothesis:
 
     strongest = max(hypothesis, key=lambda e: strength(search, e, hypothesis))
     shares = {e: share(e) for e in hypothesis}
-    large = {e for e in shares if shares[e] >= (settings.matters if e == strongest else least)}
-    return tuple(e for e in shares if e in large or wanted(search, hypothesis, e, shares[e]))
+    return tuple(e for e in shares if shares[e] >= (settings.matters if e == strongest else least))
 
 
 def strength(search: Search, effect: str, best: Hypothesis) -> float:

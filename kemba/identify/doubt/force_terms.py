@@ -7,15 +7,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from kemba.identify.problem.types import Array
-from kemba.settings import BY_HAND, Settings, setting
 
 
-class ForceTermSettings(Settings):
+class ForceTermSettings:
     """Constants of the force terms that are tried on rods."""
 
-    ranges: tuple[float, ...] = setting(
-        (0.003, 0.005, 0.008, 0.013, 0.02), "m", "reach of a force at an end of the stroke", BY_HAND
-    )
+    ranges = (0.003, 0.005, 0.008, 0.013, 0.02)  # reach of a force at an end of the stroke [m]
 
 
 def end_terms(x: Array, stroke: float) -> Iterator[tuple[str, Array]]:
@@ -23,7 +20,7 @@ def end_terms(x: Array, stroke: float) -> Iterator[tuple[str, Array]]:
 
     `x` (...) [m]: position of the piston; `stroke` [m].
     """
-    for d in ForceTermSettings.current().ranges:
+    for d in ForceTermSettings.ranges:
         yield f"exp(-(x/{d:g})**2)", np.exp(-((x / d) ** 2))
         yield f"exp(-(({stroke:g} - x)/{d:g})**2)", np.exp(-(((stroke - x) / d) ** 2))
 

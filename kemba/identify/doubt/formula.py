@@ -27,7 +27,7 @@ class TermSettings(Settings):
         BY_HAND,
         decides=True,
     )
-    terms: int = setting(2, "1", "most terms of a formula", "convention: a formula can be read")
+    terms = 2  # most terms of a formula: a formula can be read
     matters: float = setting(
         0.2,
         "1",
@@ -35,9 +35,7 @@ class TermSettings(Settings):
         BY_HAND,
         decides=True,
     )
-    no_force: float = setting(
-        1e-9, "1", "force, in sigmas, of a term that acts nowhere", "convention: zero"
-    )
+    no_force = 1e-9  # force, in sigmas, of a term that acts nowhere: zero
 
 
 @dataclass(frozen=True)

@@ -15,16 +15,21 @@ from kemba.identify.doubt.parsimony import Belief, none_of
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import Hypothesis
 from kemba.identify.evidence.windows import error_ratio
-from kemba.identify.joint import joint_estimate
+from kemba.identify.problem.sensor_faults import is_fault
+from kemba.identify.written.joint import joint_estimate
 
 ANY = 1.0  # nats that are any evidence at all
+STRONG = 5.0  # nats of strong evidence, by Kass and Raftery 1995
 SAME = 2e-3  # share of an error by which it must change to have changed: rounding of the fit
 
 
 def predictive(search: Search, best: Hypothesis, likeliest: Hypothesis) -> Hypothesis:
-    """The believed effects, and those of the likeliest hypothesis that help to predict folds of the
-    fitted logs."""
-    whole = tuple(sorted({*best, *likeliest}))
+    """The believed effects, and those that help to predict folds of the fitted logs: of the
+    likeliest hypothesis, and others for which there is strong evidence beside the believed ones."""
+    told = search.points[best].log_evidence + STRONG
+    larger = [h for h in search.points if set(best) < set(h) and len(h) == len(best) + 1]
+    more = [e for h in larger if search.points[h].log_evidence > told for e in h if not is_fault(e)]
+    whole = tuple(sorted({*best, *likeliest, *more}))
     while len(whole) > len(best) and not search.late:
         search.visit(whole)
         parts = {e: tuple(x for x in whole if x != e) for e in whole if e not in best}
@@ -44,13 +49,13 @@ def quoted(
 ) -> tuple[Belief, Hypothesis]:
     """Belief and written effects without those that raise the error on logs `kept` for quoting;
     one that leaves it as it was is written, but not believed. All at their joint estimates."""
-    if kept is None or len(whole) < 2:
-        return belief, whole
-    best, there = belief.best, _quoted_error(search, whole, kept)
-    for effect in reversed(whole):
+    best = tuple(e for e in belief.best if e in whole)
+    there = _quoted_error(search, whole, kept) if kept is not None and whole else 0.0
+    for effect in reversed(whole) if kept is not None else ():
         part = tuple(e for e in whole if e != effect)
         if search.late or not part:
             break
+        assert kept is not None
         without = _quoted_error(search, part, kept)
         if without < there * (1.0 + SAME):
             best = tuple(e for e in best if e != effect)

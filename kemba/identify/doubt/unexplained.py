@@ -23,11 +23,9 @@ class UnexplainedSettings(Settings):
     left: float = setting(
         0.1, "1", "the same as a share of what the answer explains", BY_HAND, decides=True
     )
-    clip: float = setting(30.0, "1", "residuals are clipped at so many sigmas", BY_HAND)
-    ridges: tuple[float, ...] = setting(
-        (1e-4, 1e-2, 1.0), "1", "penalties of the regression that are tried", BY_HAND
-    )
-    folds: int = setting(5, "1", "blocks of time that are left out in turn", "convention: five")
+    clip = 30.0  # residuals are clipped at so many sigmas
+    ridges = (1e-4, 1e-2, 1.0)  # penalties of the regression that are tried
+    folds = 5  # blocks of time that are left out in turn: five
 
 
 def structured(search: Search, hypothesis: Hypothesis) -> tuple[float, float]:

@@ -24,10 +24,8 @@ from kemba.settings import BY_HAND, Settings, setting
 class FigureFitSettings(Settings):
     """How the figures of another structure are found."""
 
-    rounds: int = setting(4, "1", "times that the figures are fitted along a motion", BY_HAND)
-    gain: float = setting(
-        0.02, "1", "share of the error that another round must take away", BY_HAND
-    )
+    rounds = 4  # times that the figures are fitted along a motion
+    gain = 0.02  # share of the error that another round must take away
     ahead: float = setting(
         100.0,
         "nats",

@@ -17,22 +17,15 @@ from kemba.identify.problem.problem import (
     Problem,
     Theta,
 )
-from kemba.settings import BY_HAND, Settings, setting
 
 
-class LinearSettings(Settings):
+class LinearSettings:
     """Where the linearised problem may lead."""
 
-    farthest: float = setting(
-        4.0, "1", "largest distance of a switch from off, in sizes, where it is tried", BY_HAND
-    )
-    widths: float = setting(
-        8.0, "1", "largest distance of a nominal figure from its prior mean, in sigmas", BY_HAND
-    )
-    blocks: int = setting(
-        4, "1", "fewest blocks: fewer runs are cut in time", "convention: for leaving out a quarter"
-    )
-    pieces: int = setting(4, "1", "pieces of a run that are told apart", "convention: quarters")
+    farthest = 4.0  # largest distance of a switch from off, in sizes, where it is tried
+    widths = 8.0  # largest distance of a nominal figure from its prior mean, in sigmas
+    blocks = 4  # fewest blocks: fewer runs are cut in time: for leaving out a quarter
+    pieces = 4  # pieces of a run that are told apart: quarters
 
 
 @dataclass(frozen=True)
@@ -166,7 +159,7 @@ def usual_shapes(candidates: Mapping[str, Candidate], theta: Theta) -> dict[str,
 def _sane(value: float, parameter: Parameter) -> float:
     """Within the bounds, and within a few sizes of off where it is a switch."""
     if np.isnan(parameter.typical):
-        reach = LinearSettings.current().farthest * parameter.size
+        reach = LinearSettings.farthest * parameter.size
         value = float(np.clip(value, parameter.off - reach, parameter.off + reach))
     return float(np.clip(value, parameter.lower, parameter.upper))
 
@@ -199,7 +192,7 @@ def priors(problem: Problem, theta: Theta, names: Iterable[str]) -> tuple[Array,
 def time_blocks(problem: Problem, wanted: int | None = None, shortest: float = 0.0) -> Labels:
     """A label (n,) per row: every run is a block, cut in time where there are fewer runs than
     `wanted` (None: the setting), or cut into pieces of at least `shortest` [s]."""
-    wanted = LinearSettings.current().blocks if wanted is None else wanted
+    wanted = LinearSettings.blocks if wanted is None else wanted
     rows = problem.rows()
     pieces = max(1, int(np.ceil(wanted / max(len(problem.runs), 1))))
     labels = np.zeros(len(rows), dtype=int)
@@ -218,7 +211,7 @@ def estimate(problem: Problem, linear: Linear, z: Array) -> dict[str, float]:
     Nominal figures stay within their reach: a log that is wrong may ask for a negative rise time.
     """
     theta: dict[str, float] = {}
-    widths = LinearSettings.current().widths
+    widths = LinearSettings.widths
     for name, value in zip(linear.names, z, strict=True):
         theta[name] = float(np.exp(value)) if is_shape(problem, name) else float(value)
         if name in problem.nuisance:

@@ -23,19 +23,16 @@ from kemba.identify.evidence.point import Division, LinearisationPoint
 from kemba.identify.evidence.refit import Fit, Frozen, refit
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis, Ranker
 from kemba.identify.problem.problem import Array, Problem
-from kemba.settings import BY_HAND, Settings, setting
 
 Names = tuple[str, ...]
 
 
-class NullModelSettings(Settings):
+class NullModelSettings:
     """How single effects are looked at before the leaders are refitted."""
 
-    glances: int = setting(1, "1", "evaluations of each single effect", BY_HAND)
-    rounds: int = setting(2, "1", "refits of the model as it is", BY_HAND)
-    absurd: float = setting(
-        1e5, "1", "residual in sigmas at which nothing can be predicted", "convention: beyond data"
-    )
+    glances = 1  # evaluations of each single effect
+    rounds = 2  # refits of the model as it is
+    absurd = 1e5  # residual in sigmas at which nothing can be predicted: beyond data
 
 
 class Baseline:
@@ -97,7 +94,7 @@ class Baseline:
         known = problem.jacobian({}, names)
         slopes = known[:, [names.index(n) for n in free]]
         theta: dict[str, float] = {}
-        for _ in range(NullModelSettings.current().rounds):
+        for _ in range(NullModelSettings.rounds):
             r = problem.residual(theta)
             linear = condense(free, *priors(problem, theta, free), slopes, r, blocks)
             theta = estimate(problem, linear, best_fit(linear))
@@ -186,7 +183,7 @@ class Baseline:
         there and the slopes of the null."""
         found = dict.fromkeys(hypotheses, -np.inf)
         tried = [(h, theta) for h in hypotheses for theta in self._starts(h)]
-        for _ in range(NullModelSettings.current().glances + 1):
+        for _ in range(NullModelSettings.glances + 1):
             seen = list(zip(tried, self._about([theta for _, theta in tried]), strict=True))
             tried = []
             for (hypothesis, _), linear in seen:
@@ -222,7 +219,7 @@ class Baseline:
                 yield null.mode.linear
                 continue
             r = next(residuals)
-            if np.all(np.abs(r) < NullModelSettings.current().absurd):
+            if np.all(np.abs(r) < NullModelSettings.absurd):
                 at, _, _ = priors(self.problem, theta, null.mode.linear.names)
                 yield moved(null.mode.linear, at, self.jacobian, r, blocks)
             else:

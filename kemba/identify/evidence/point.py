@@ -56,7 +56,7 @@ class Division:
         self.problem = problem
         self.windows: Windows = windows_of(problem)
         usual = time_blocks(problem)
-        fine = time_blocks(problem, LinearSettings.current().pieces * len(problem.runs))
+        fine = time_blocks(problem, LinearSettings.pieces * len(problem.runs))
         windows = np.unique(fine[self.windows.first])
         short = len(windows) <= fine.max()  # a piece in which no window begins
         self.blocks: Labels = usual if short else fine

@@ -20,24 +20,18 @@ from kemba.settings import BY_HAND, Settings, setting
 class RefitSettings(Settings):
     """The nonlinear refit of one hypothesis."""
 
-    evaluations: int = setting(10, "1", "largest number of evaluations", BY_HAND)
-    cost: float = setting(3e-6, "1", "relative change of the cost at which a fit ends", BY_HAND)
-    change: float = setting(1e-4, "1", "relative change of x at which a fit ends", BY_HAND)
+    evaluations = 10  # largest number of evaluations
+    cost = 3e-6  # relative change of the cost at which a fit ends
+    change = 1e-4  # relative change of x at which a fit ends
     step: float = setting(
         0.03, "1", "step of finite differences, in prior widths", BY_HAND, decides=True
     )
-    bound: float = setting(8.0, "1", "largest distance from the prior mean, in widths", BY_HAND)
-    farthest: float = setting(3.0, "1", "largest start of a switch, in sizes", BY_HAND)
-    nearest: float = setting(0.1, "1", "smallest start of a switch, in sizes", BY_HAND)
-    factor: float = setting(
-        3.0,
-        "1",
-        "a shape also starts at its default times and over this, if within two prior widths",
-        BY_HAND,
-    )
-    absurd: float = setting(
-        1e6, "1", "residuals are clipped at so many sigmas", "convention: finite, beyond all data"
-    )
+    bound = 8.0  # largest distance from the prior mean, in widths
+    farthest = 3.0  # largest start of a switch, in sizes
+    nearest = 0.1  # smallest start of a switch, in sizes
+    # a shape also starts at its default times and over this, if within two prior widths
+    factor = 3.0
+    absurd = 1e6  # residuals are clipped at so many sigmas: finite, beyond all data
 
 
 @dataclass(frozen=True)

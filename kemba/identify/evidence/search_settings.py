@@ -22,13 +22,9 @@ class SearchSettings(Settings):
         BY_HAND,
         decides=True,
     )
-    structural: float = setting(
-        1.3,
-        "1",
-        "error of the model as it is, in noise units, from which another structure is refitted "
-        "whatever its linear evidence is",
-        BY_HAND,
-    )
+    # error of the model as it is, in noise units, from which another structure is refitted whatever
+    # its linear evidence is
+    structural = 1.3
     far_share: float = setting(
         0.7, "1", "or no farther behind than this share of the gain", BY_HAND, decides=True
     )
@@ -51,19 +47,12 @@ class SearchSettings(Settings):
         "leaves, which was likelier along the first motion",
         decides=True,
     )
-    settled: int = setting(
-        4,
-        "1",
-        "times that the motion is found before a search along it, until late sensors stay as late",
-        "tuned: a piston 5.2 ms late is found 3.2 ms late along the motion as it is read, 5.2 ms "
-        "along the second one after it",
-    )
-    still: float = setting(
-        0.1, "1", "change of such a delay, in rows, at which it stays", "derived: below its 1 sigma"
-    )
-    largest: int = setting(
-        10, "1", "effects in one answer", "convention: more than any machine is expected to lack"
-    )
+    # times that the motion is found before a search along it, until late sensors stay as late: a
+    # piston 5.2 ms late is found 3.2 ms late along the motion as it is read, 5.2 ms along the
+    # second one after it
+    settled = 4
+    still = 0.1  # change of such a delay, in rows, at which it stays: below its 1 sigma
+    largest = 10  # effects in one answer: more than any machine is expected to lack
     regrown: int = setting(
         3,
         "1",
@@ -71,9 +60,7 @@ class SearchSettings(Settings):
         BY_HAND,
         decides=True,
     )
-    swapped: int = setting(
-        2, "1", "rounds in which effects of an answer are taken away or swapped", BY_HAND
-    )
+    swapped = 2  # rounds in which effects of an answer are taken away or swapped
     leaders_grown: int = setting(
         3, "1", "effects that are refitted beside the best answer", BY_HAND, decides=True
     )
@@ -90,14 +77,8 @@ class SearchSettings(Settings):
         BY_HAND,
         decides=True,
     )
-    promise: float = setting(
-        10.0, "nats", "what slopes promise beyond a mode, from which they are", BY_HAND
-    )
-    unexplained: float = setting(
-        0.8,
-        "1",
-        "share of the excess error that the best effect leaves, from which they are; others grow "
-        "from an effect that explains more",
-        BY_HAND,
-    )
-    closer: int = setting(3, "1", "effects that are fitted anew", BY_HAND)
+    promise = 10.0  # what slopes promise beyond a mode, from which they are [nats]
+    # share of the excess error that the best effect leaves, from which they are; others grow from
+    # an effect that explains more
+    unexplained = 0.8
+    closer = 3  # effects that are fitted anew

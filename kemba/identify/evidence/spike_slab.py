@@ -32,9 +32,7 @@ class SpikeSlabSettings(Settings):
     slab: float = setting(
         0.7, "1", "width of the slab: of a large effect, in sizes", BY_HAND, decides=True
     )
-    silent: float = setting(
-        1e-6, "1", "width of the spike of a formula", "convention: none, but not singular"
-    )
+    silent = 1e-6  # width of the spike of a formula: none, but not singular
     tolerances: tuple[float, ...] = setting(
         (0.5, 1.0, 1.5),
         "1",

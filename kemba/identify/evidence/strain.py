@@ -13,24 +13,20 @@ from kemba.identify.evidence.linear import estimate
 from kemba.identify.evidence.point import LinearisationPoint
 from kemba.identify.evidence.spike_slab import Hypothesis
 from kemba.identify.problem.problem import Flags, Problem
-from kemba.settings import BY_HAND, Settings, setting
 
 
-class StrainSettings(Settings):
+class StrainSettings:
     """When nominal figures are not believed."""
 
-    far: float = setting(
-        4.0,
-        "1",
-        "prior sigmas from which a nominal figure is not believed",
-        "convention: chance moves one of twenty figures so far in one data set of eight hundred",
-    )
-    tried: int = setting(3, "1", "effects that are tried in place of such figures", BY_HAND)
+    # prior sigmas from which a nominal figure is not believed: chance moves one of twenty figures
+    # so far in one data set of eight hundred
+    far = 4.0
+    tried = 3  # effects that are tried in place of such figures
 
 
 def strained(point: LinearisationPoint, problem: Problem) -> Flags:
     """Which of a point's parameters (k,) are nominal figures that are not believed."""
-    linear, far = point.linear, StrainSettings.current().far
+    linear, far = point.linear, StrainSettings.far
     figure = np.array([name in problem.nuisance for name in linear.names])
     return np.asarray(figure & (np.abs(linear.at - linear.mean) > far * linear.width))
 
@@ -46,7 +42,7 @@ def stand_ins(point: LinearisationPoint, problem: Problem) -> dict[Hypothesis, d
     keys = {name: linear.index(c.key) for name, c in problem.candidates.items()}
     alike = {n: abs(shift[i]) / max(np.sqrt(gram[i, i]), 1e-12) for n, i in keys.items()}
     found: dict[Hypothesis, dict[str, float]] = {}
-    for name in sorted(alike, key=lambda n: -alike[n])[: StrainSettings.current().tried]:
+    for name in sorted(alike, key=lambda n: -alike[n])[: StrainSettings.tried]:
         z, i = np.where(moved, linear.mean, linear.at), keys[name]
         z[i] = linear.mean[i] + shift[i] / gram[i, i]
         found[(name,)] = estimate(problem, linear, z)

@@ -6,34 +6,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from kemba.settings import BY_HAND, Settings, setting
 from kemba.trajectory import Array, Trajectory
 
 
-class ExcerptSettings(Settings):
+class ExcerptSettings:
     """How much of long logs is used."""
 
-    rows: int = setting(
-        60_000,
-        "1",
-        "largest number of rows of all logs together",
-        f"{BY_HAND}; one minute at 1 kHz",
-    )
-    piece: float = setting(
-        2.0,
-        "s",
-        "length of the pieces that are kept of a long log",
-        BY_HAND,
-    )
-    finest: float = setting(
-        7e-4, "s", "rows closer than this are thinned", "derived: below it, two rows fit into 1 ms"
-    )
-    step: float = setting(
-        1e-3,
-        "s",
-        "distance of rows after thinning",
-        "derived: an eighth of the fastest rise time of a chamber (8 ms, Table I)",
-    )
+    rows = 60_000  # largest number of rows of all logs together: one minute at 1 kHz
+    piece = 2.0  # length of the pieces that are kept of a long log [s]
+    finest = 7e-4  # rows closer than this are thinned [s]: below it, two rows fit into 1 ms
+    # distance of rows after thinning [s]: an eighth of the fastest rise time of a chamber (8 ms,
+    # Table I)
+    step = 1e-3
 
 
 def excerpts(
@@ -43,7 +27,7 @@ def excerpts(
 
     `rows`: largest number of rows of all logs together; the setting where it is not given.
     """
-    settings = ExcerptSettings.current()
+    settings = ExcerptSettings
     rows = settings.rows if rows is None else rows
     found, remarks = [], []
     for log in logs:
@@ -65,7 +49,7 @@ def excerpts(
 
 def thinned(log: Trajectory) -> Trajectory:
     """One row per millisecond, and every row in which a valve switches."""
-    settings = ExcerptSettings.current()
+    settings = ExcerptSettings
     step = float(np.median(np.diff(log.time)))
     group = round(settings.step / step) if step < settings.finest else 1
     if group < 2:
@@ -81,7 +65,7 @@ def thinned(log: Trajectory) -> Trajectory:
 def cut(log: Trajectory, share: float) -> list[Trajectory]:
     """Pieces spread evenly over the log that make up `share` of it."""
     span = float(log.time[-1] - log.time[0])
-    piece = ExcerptSettings.current().piece
+    piece = ExcerptSettings.piece
     wanted = max(1, int(span * share / piece))
     if span <= 2 * piece:
         return [log]

@@ -8,24 +8,17 @@ import numpy as np
 
 from kemba.errors import KembaError, suggest
 from kemba.identify.logs.fault import UNMAPPED, log_fault
-from kemba.settings import BY_HAND, Settings, setting
 from kemba.trajectory import TIME, Trajectory
 
 
-class OwnRigGateSettings(Settings):
+class OwnRigGateSettings:
     """When a log of a rig of the user's own is refused."""
 
-    fewest: int = setting(60, "1", "rows that the log of a moving rig needs", BY_HAND)
-    fewest_still: int = setting(8, "1", "readings per channel that a vessel's log needs", BY_HAND)
-    missing: float = setting(
-        0.3, "1", "share of readings of a needed column that may be missing", BY_HAND
-    )
-    vacuum: float = setting(
-        2e4, "Pa", "no rig's pressure is below this", "convention: gauge or bar read so as pascals"
-    )
-    unmoved: float = setting(
-        3.0, "1", "a position with less travel than so many of its steps rests", BY_HAND
-    )
+    fewest = 60  # rows that the log of a moving rig needs
+    fewest_still = 8  # readings per channel that a vessel's log needs
+    missing = 0.3  # share of readings of a needed column that may be missing
+    vacuum = 2e4  # no rig's pressure is below this [Pa]: gauge or bar read so as pascals
+    unmoved = 3.0  # a position with less travel than so many of its steps rests
 
 
 def own_faults(log: Trajectory) -> list[KembaError]:
@@ -55,7 +48,7 @@ def _columns(log: Trajectory) -> Iterator[KembaError]:
 
 
 def _time(log: Trajectory) -> Iterator[KembaError]:
-    limits, t = OwnRigGateSettings.current(), log.time
+    limits, t = OwnRigGateSettings, log.time
     fewest = limits.fewest_still if log.meta["kind"] == "vessel" else limits.fewest
     if len(t) < fewest:
         yield log_fault(log, f"has {len(t)} rows", f"at least {fewest} were expected")
@@ -69,7 +62,7 @@ def _time(log: Trajectory) -> Iterator[KembaError]:
 
 
 def _readings(log: Trajectory) -> Iterator[KembaError]:
-    limits, vessel = OwnRigGateSettings.current(), log.meta["kind"] == "vessel"
+    limits, vessel = OwnRigGateSettings, log.meta["kind"] == "vessel"
     for name in log.meta.get("logged", {}):
         if name not in log:
             continue
@@ -96,7 +89,5 @@ def _excitation(log: Trajectory) -> Iterator[KembaError]:
         if not len(steps):
             hint = "is the sensor dead, or the rig at rest?"
             yield log_fault(log, "never changes", "a log of a rig that works", hint, 0, name)
-        elif name.endswith(("/x", "/q")) and np.ptp(y) < OwnRigGateSettings.current().unmoved * (
-            steps.min()
-        ):
+        elif name.endswith(("/x", "/q")) and np.ptp(y) < OwnRigGateSettings.unmoved * (steps.min()):
             yield log_fault(log, "hardly moves", "a log with motion was expected", column=name)

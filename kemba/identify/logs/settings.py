@@ -19,12 +19,8 @@ class GateSettings(Settings):
         "convention: 50 rows a second; chambers of Table I need 8 to 37 ms to fill",
         decides=True,
     )
-    milliseconds: float = setting(
-        0.5,
-        "s",
-        "median distance of rows that suggests a time in ms",
-        "convention: nobody logs at 2 Hz, 1 kHz is usual",
-    )
+    # median distance of rows that suggests a time in ms [s]: nobody logs at 2 Hz, 1 kHz is usual
+    milliseconds = 0.5
     gaps: float = setting(
         0.5, "s", "mean distance of rows that means long gaps", BY_HAND, decides=True
     )
@@ -41,18 +37,12 @@ class GateSettings(Settings):
     impossible_elsewhere: float = setting(
         0.05, "1", "the same for columns that are not needed", BY_HAND, decides=True
     )
-    valve: float = setting(
-        0.02,
-        "1",
-        "a valve column may be off 0 or 1 by this",
-        "convention: a scaled voltage is off by a few per mille to a few per cent",
-    )
-    absurd: float = setting(
-        1e12,
-        "1",
-        "readings beyond this, in the channel's SI unit, count as missing",
-        "convention: a broken record, not a measured value; its square would overflow",
-    )
+    # a valve column may be off 0 or 1 by this: a scaled voltage is off by a few per mille to a few
+    # per cent
+    valve = 0.02
+    # readings beyond this, in the channel's SI unit, count as missing: a broken record, not a
+    # measured value; its square would overflow
+    absurd = 1e12
     quiet: float = setting(
         1e-4,
         "1",
@@ -63,23 +53,19 @@ class GateSettings(Settings):
     frozen: int = setting(
         40, "1", "equal readings in a row that mean a dead sensor", BY_HAND, decides=True
     )
-    repeats: float = setting(
-        0.2, "1", "share of equal neighbours elsewhere that means a coarse sensor", BY_HAND
-    )
+    repeats = 0.2  # share of equal neighbours elsewhere that means a coarse sensor
     fastest: float = setting(8.0, "m.s-1", "no piston moves faster", BY_HAND, decides=True)
     leap: float = setting(
         0.004, "m", "a position may be off by this between two rows", BY_HAND, decides=True
     )
-    calm: float = setting(
-        0.3, "1", "a leap stands beside steps of less than this share of the largest", BY_HAND
-    )
+    calm = 0.3  # a leap stands beside steps of less than this share of the largest
     moves: float = setting(
         2e-3, "m", "a position with less travel does not move", BY_HAND, decides=True
     )
     beyond: float = setting(
         0.015, "m", "a position may read so far past the stroke", BY_HAND, decides=True
     )
-    dead: int = setting(200, "1", "rows without any change that mean a dead sensor", BY_HAND)
+    dead = 200  # rows without any change that mean a dead sensor
 
 
 # Physical limits by the last part of the name: smallest, largest, and the likely mistake.

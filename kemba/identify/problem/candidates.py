@@ -14,26 +14,18 @@ from kemba.identify.problem.structure import ORIFICE, OrificeShare
 from kemba.model.model import Model
 from kemba.model.scene import port_name
 from kemba.quantity import Param
-from kemba.settings import BY_HAND, Settings, setting
 
 SEARCHED: dict[str, Effect] = {ORIFICE: OrificeShare(), LINE: LineResistance()}
 
 
-class CandidateSettings(Settings):
+class CandidateSettings:
     """Where the parameters of a missing effect are looked for."""
 
-    fastest: float = setting(
-        6e-4,
-        "s",
-        "smallest time constant that is looked for",
-        "derived: about half a sampling interval of 1 ms; a shorter one shows in no log",
-    )
-    reach: float = setting(
-        10.0, "1", "a shape parameter is looked for within this factor of its default", BY_HAND
-    )
-    shape: float = setting(
-        0.7, "1", "prior width of the logarithm of a shape parameter", "convention: a factor of two"
-    )
+    # smallest time constant that is looked for [s]: about half a sampling interval of 1 ms; a
+    # shorter one shows in no log
+    fastest = 6e-4
+    reach = 10.0  # a shape parameter is looked for within this factor of its default
+    shape = 0.7  # prior width of the logarithm of a shape parameter: a factor of two
 
 
 def effect_candidates(model: Model) -> dict[str, Candidate]:
@@ -120,7 +112,7 @@ def sensor_candidates(sigmas: Mapping[str, float], model: Model) -> dict[str, Ca
 def _candidate(
     name: str, effect: type[Effect], declared: Mapping[str, Param], sensor: bool = False
 ) -> Candidate:
-    settings = CandidateSettings.current()
+    settings = CandidateSettings
     (lead, off), *_ = effect.off.items()
     param = declared[lead]
     # a time constant far below the sampling interval is the same as none

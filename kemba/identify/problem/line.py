@@ -13,23 +13,18 @@ from kemba.effects.pneumatics.supply_line import SupplyLine
 from kemba.identify.problem.types import Candidate, Parameter
 from kemba.model.model import Model
 from kemba.quantity import Param, Tolerance
-from kemba.settings import BY_HAND, Settings, setting
 
 LINE = "supply_line"
 
 
-class LineSettings(Settings):
+class LineSettings:
     """Where the supply line's figures are looked for."""
 
-    none: float = setting(
-        1e3, "m-2", "reciprocal of an orifice that is none", "convention: 200 times a valve's area"
-    )
-    size: float = setting(1.5e5, "m-2", "reciprocal that is neither small nor large", BY_HAND)
-    largest: float = setting(1e6, "m-2", "largest reciprocal: an orifice of 1 mm2", BY_HAND)
-    volume: float = setting(
-        0.7, "1", "prior width of the logarithm of the volume", "convention: a factor of two"
-    )
-    reach: float = setting(30.0, "1", "a volume is looked for within this factor", BY_HAND)
+    none = 1e3  # reciprocal of an orifice that is none [m-2]: 200 times a valve's area
+    size = 1.5e5  # reciprocal that is neither small nor large [m-2]
+    largest = 1e6  # largest reciprocal: an orifice of 1 mm2 [m-2]
+    volume = 0.7  # prior width of the logarithm of the volume: a factor of two
+    reach = 30.0  # a volume is looked for within this factor
 
 
 class LineResistance(SupplyLine):
@@ -41,7 +36,7 @@ class LineResistance(SupplyLine):
     nominal: ClassVar[dict[str, Tolerance]] = {}
 
     def evaluate(self, at: At) -> Contribution:
-        area = 1.0 / (self.r + LineSettings.current().none)
+        area = 1.0 / (self.r + LineSettings.none)
         return SupplyLine.evaluate(self.bind({"a": area}), at)  # type: ignore[arg-type]
 
 
@@ -50,7 +45,7 @@ def line_candidates(model: Model) -> dict[str, Candidate]:
     drawing = any("draw_e" in effect.publishes for effect in model.effects)
     if not drawing or any(effect.kind == LINE for effect in model.effects):
         return {}
-    settings, volume = LineSettings.current(), float(SupplyLine().V)
+    settings, volume = LineSettings, float(SupplyLine().V)
     lead = Parameter("r", "m-2", 0.0, settings.size, 0.0, settings.largest)
     ends = (volume / settings.reach, volume * settings.reach)
     hose = Parameter("V", "m3", volume, settings.volume, *ends, volume)

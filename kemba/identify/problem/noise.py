@@ -13,42 +13,30 @@ from scipy.ndimage import maximum_filter1d, uniform_filter1d
 from kemba.identify.problem.drift import DriftNoise, drift_waves
 from kemba.identify.problem.problem import Array, Rows
 from kemba.identify.problem.quantisation import step_of
-from kemba.settings import BY_HAND, Settings, setting
 
 
-class NoiseSettings(Settings):
+class NoiseSettings:
     """How the colour of the noise is learnt."""
 
-    order: int = setting(
-        4, "1", "largest order of the autoregression", "literature: BIC chooses among 0 to this"
-    )
-    fewest: int = setting(50, "1", "rows below which no colour is learnt", BY_HAND)
-    least: float = setting(
-        0.6,
-        "1",
-        "smallest noise that is believed, as a share of the sensor's white noise; a flexible model "
-        "fits some of the noise",
-        BY_HAND,
-    )
-    trim: float = setting(
-        5.0, "1", "residuals beyond so many sigma are clipped: they are switching instants", BY_HAND
-    )
-    softest: float = setting(0.2, "1", "smallest sigma that the clipping assumes", BY_HAND)
-    spike: int = setting(7, "1", "rows that a spike lasts", BY_HAND)
-    around: int = setting(151, "1", "rows around a spike that it is compared with", BY_HAND)
-    spiky: float = setting(5.0, "1", "ratio of mean squares that makes a spike", BY_HAND)
+    order = 4  # largest order of the autoregression: BIC chooses among 0 to this
+    fewest = 50  # rows below which no colour is learnt
+    # smallest noise that is believed, as a share of the sensor's white noise; a flexible model fits
+    # some of the noise
+    least = 0.6
+    trim = 5.0  # residuals beyond so many sigma are clipped: they are switching instants
+    softest = 0.2  # smallest sigma that the clipping assumes
+    spike = 7  # rows that a spike lasts
+    around = 151  # rows around a spike that it is compared with
+    spiky = 5.0  # ratio of mean squares that makes a spike
 
 
-class WhiteNoiseSettings(Settings):
+class WhiteNoiseSettings:
     """How the white noise of a channel is told from its motion."""
 
-    fewest: int = setting(11, "1", "values that are needed to tell noise", BY_HAND)
-    kept: float = setting(
-        0.9,
-        "1",
-        "share of the third differences that count as noise, the smallest ones",
-        "tuned: by hand; impacts and switching valves take less than a tenth of a log",
-    )
+    fewest = 11  # values that are needed to tell noise
+    # share of the third differences that count as noise, the smallest ones: by hand; impacts and
+    # switching valves take less than a tenth of a log
+    kept = 0.9
 
 
 def difference_sigma(values: Array) -> float:
@@ -57,7 +45,7 @@ def difference_sigma(values: Array) -> float:
     From third differences, in which smooth motion cancels. The largest ones are left out: impacts
     and switching valves are no noise. A quantised channel is never better than its own steps.
     """
-    settings = WhiteNoiseSettings.current()
+    settings = WhiteNoiseSettings
     known = values[np.isfinite(values)]
     if len(known) < settings.fewest:
         return 0.0
@@ -123,7 +111,7 @@ def learn(residual: Array, order: int | None = None, careful: bool = False) -> C
 
     `careful`: spikes get less weight from now on.
     """
-    order = NoiseSettings.current().order if order is None else order
+    order = NoiseSettings.order if order is None else order
     weight = caution(residual) if careful else None
     found = _yule_walker(residual if weight is None else residual * weight, order)
     return replace(found, rows=len(residual), weight=weight)
@@ -138,7 +126,7 @@ def _beside_drift(residual: Array, time: Array, careful: bool) -> Colour:
 
 
 def _yule_walker(residual: Array, order: int) -> Colour:
-    settings = NoiseSettings.current()
+    settings = NoiseSettings
     scale = max(1.4826 * float(np.median(np.abs(residual))), settings.softest)
     r = np.clip(residual, -settings.trim * scale, settings.trim * scale)
     n = len(r)
@@ -161,7 +149,7 @@ def caution(residual: Array) -> Array:
     At switching instants and reversals the imposed motion is known worst. An error that lasts is
     left alone: it may be physics.
     """
-    settings, power = NoiseSettings.current(), residual**2
+    settings, power = NoiseSettings, residual**2
     near, around = (uniform_filter1d(power, rows) for rows in (settings.spike, settings.around))
     spike = near > settings.spiky * np.maximum(around, 1.0)
     spike = maximum_filter1d(spike, settings.spike)

@@ -76,7 +76,7 @@ class Problem(ABC):
     candidates: dict[str, Candidate]
     nuisance: dict[str, tuple[float, float]]
     window: int = 1
-    model: Model  # whose file can say figures of its own; a problem without one has no file
+    model: Model  # of the logs; what has none has no file either
 
     @abstractmethod
     def residual(self, theta: Theta, runs: Collection[int] | None = None) -> Array:
@@ -165,9 +165,11 @@ class Problem(ABC):
         short time from the measured motion. Channels that are missing here have none."""
         return {}
 
-    # Noise colour
+    def coarser(self, theta: Theta) -> Self:
+        """This problem with what the model at theta lacks as noise of all rows. Default: this."""
+        return self
 
-    learns_colour: bool = False  # whether the colour of the noise is learnt from residuals
+    learns_colour: bool = False  # noise: whether its colour of the noise is learnt from residuals
 
     def in_detail(self) -> Self:
         """This problem as intervals need it: what no log can tell apart must look the same to the

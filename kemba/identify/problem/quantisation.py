@@ -5,18 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from kemba.identify.problem.types import Array, Flags, Labels
-from kemba.settings import BY_HAND, Settings, setting
+from kemba.settings import Settings, setting
 
 
 class QuantisationSettings(Settings):
     """How the step of a sensor is found."""
 
-    same: float = setting(
-        1e-6,
-        "1",
-        "readings closer than this share of their range are one reading",
-        "convention: conversion of units rounds in the fifteenth digit, files have six or more",
-    )
+    # readings closer than this share of their range are one reading: conversion of units rounds in
+    # the fifteenth digit, files have six or more
+    same = 1e-6
     coarse: float = setting(
         2.0,
         "1",
@@ -24,9 +21,7 @@ class QuantisationSettings(Settings):
         "literature: below it, noise makes rounding errors independent (Widrow and Kollar 2008)",
         decides=True,
     )
-    longest: int = setting(
-        1000, "1", "rows at rest that count as one reading; of a longer rest more count", BY_HAND
-    )
+    longest = 1000  # rows at rest that count as one reading; of a longer rest more count
 
 
 def step_of(values: Array) -> float:

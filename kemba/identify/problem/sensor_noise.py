@@ -44,39 +44,18 @@ class ChannelNoise:
 class ColourSettings(Settings):
     """How the colour of sensors is learnt."""
 
-    memories: tuple[float, ...] = setting(
-        (2e-3, 4e-3, 8e-3, 16e-3, 32e-3, 64e-3),
-        "s",
-        "memories of coloured noise that are tried",
-        "convention: each twice the one before, from two rows to the time of a stride's phase",
-    )
-    drifts: tuple[float, ...] = setting(
-        (0.25, 1.0), "s", "memories of a drift that are tried", "convention: as long as a log"
-    )
-    force: float = setting(0.025, "s", "memory of the forces that may be missing", BY_HAND)
-    lags: tuple[int, ...] = setting(
-        (0, 1, 2, 3, 4, 5, 6, 8, 10, 13, 16, 20, 26, 32, 40, 50, 64, 80, 100),
-        "1",
-        "rows between two errors whose covariance is compared",
-        "convention: denser where colour changes fast",
-    )
-    draws: int = setting(5, "1", "simulated logs of each kind of noise", BY_HAND)
-    fewest: int = setting(200, "1", "rows of a channel below which no colour is learnt", BY_HAND)
-    least: float = setting(
-        0.6,
-        "1",
-        "smallest noise that is believed, in stated sigmas",
-        "convention: as on the bench",
-    )
-    sharpest: float = setting(
-        0.1, "1", "smallest share of the noise's sigma that is white", "convention: a sound filter"
-    )
-    slight: float = setting(
-        0.5,
-        "1",
-        "sigma of a lag below which it is left out, as a share of what is as fast",
-        BY_HAND,
-    )
+    # memories of coloured noise that are tried [s]: each twice the one before, from two rows to the
+    # time of a stride's phase
+    memories = (2e-3, 4e-3, 8e-3, 16e-3, 32e-3, 64e-3)
+    drifts = (0.25, 1.0)  # memories of a drift that are tried [s]: as long as a log
+    force = 0.025  # memory of the forces that may be missing [s]
+    # rows between two errors whose covariance is compared: denser where colour changes fast
+    lags = (0, 1, 2, 3, 4, 5, 6, 8, 10, 13, 16, 20, 26, 32, 40, 50, 64, 80, 100)
+    draws = 5  # simulated logs of each kind of noise
+    fewest = 200  # rows of a channel below which no colour is learnt
+    least = 0.6  # smallest noise that is believed, in stated sigmas: as on the bench
+    sharpest = 0.1  # smallest share of the noise's sigma that is white: a sound filter
+    slight = 0.5  # sigma of a lag below which it is left out, as a share of what is as fast
     plain: float = setting(
         10.0, "1", "gain in chi2 per lag from which a channel is coloured", BY_HAND, decides=True
     )

@@ -23,9 +23,7 @@ class StepSettings(Settings):
         BY_HAND,
         decides=True,
     )
-    absurd: float = setting(
-        1e5, "1", "residual in sigmas at which nothing can be predicted", "convention: beyond data"
-    )
+    absurd = 1e5  # residual in sigmas at which nothing can be predicted: beyond data
 
 
 def bounded(residual: Array, absurd: float) -> Array:

@@ -16,7 +16,6 @@ from kemba.effects.pneumatics.orifice import OrificeChamber
 from kemba.identify.problem.types import Candidate, Parameter
 from kemba.model.model import Model
 from kemba.quantity import Param, Quantity, Tolerance
-from kemba.settings import BY_HAND, Settings, setting
 
 ORIFICE = "chambers:orifice"
 LEVEL = "level"
@@ -29,20 +28,16 @@ FREE_THEN = ("supply_scale", "rise_time_scale")
 OWN = {"P_e": "P_e_orifice", "P_r": "P_r_orifice"}  # states beside those of the model's chambers
 
 
-class StructureSettings(Settings):
+class StructureSettings:
     """How far the figures of orifice chambers may be from the usual ones: 1 sigma of their
     logarithm."""
 
-    area: float = setting(0.2, "1", "of an orifice's area", BY_HAND)
-    volume: float = setting(0.3, "1", "of a dead volume", BY_HAND)
-    level: float = setting(
-        0.1,
-        "1",
-        "of the pressure that reaches the valves",
-        "convention: the size of `supply_scale`, which it stands for",
-    )
-    reach: float = setting(4.0, "1", "largest error of a figure, in these sigmas", BY_HAND)
-    exponent: float = setting(0.08, "1", "of the polytropic exponent", BY_HAND)
+    area = 0.2  # of an orifice's area
+    volume = 0.3  # of a dead volume
+    # of the pressure that reaches the valves: the size of `supply_scale`, which it stands for
+    level = 0.1
+    reach = 4.0  # largest error of a figure, in these sigmas
+    exponent = 0.08  # of the polytropic exponent
 
 
 class OrificeShare(OrificeChamber):
@@ -97,23 +92,22 @@ def structure_candidates(model: Model) -> dict[str, Candidate]:
     if not {"chamber", "mode_damping"} <= kinds:
         return {}
     share = OrificeShare().of_cylinder(model.mechanism.need_cylinder())
-    settings = StructureSettings.current()
     declared = share.declared()
     shapes = []
-    for name, width in _widths(settings).items():
+    for name, width in _widths().items():
         param, usual = declared[name], float(share.value(name))
-        reach = math.exp(settings.reach * width)
+        reach = math.exp(StructureSettings.reach * width)
         low, high = max(param.lower, usual / reach), min(param.upper, usual * reach)
         shapes.append(Parameter(name, param.unit, usual, width, low, high, usual))
     lead = Parameter("a", "1", 0.0, 1.0, 0.0, 1.0)
     return {ORIFICE: Candidate(ORIFICE, lead, tuple(shapes))}
 
 
-def _widths(settings: StructureSettings) -> dict[str, float]:
+def _widths() -> dict[str, float]:
     """1 sigma of each figure's logarithm."""
-    areas = dict.fromkeys(("a_fill", "a_vent"), settings.area)
-    volumes = dict.fromkeys(("V_e", "V_r"), settings.volume)
-    return {**areas, **volumes, "level": settings.level, "n": settings.exponent}
+    areas = dict.fromkeys(("a_fill", "a_vent"), StructureSettings.area)
+    volumes = dict.fromkeys(("V_e", "V_r"), StructureSettings.volume)
+    return {**areas, **volumes, "level": StructureSettings.level, "n": StructureSettings.exponent}
 
 
 def with_orifices(model: Model, values: Mapping[str, float]) -> Model:
@@ -127,7 +121,7 @@ def with_orifices(model: Model, values: Mapping[str, float]) -> Model:
 def free_figures(values: Mapping[str, float]) -> dict[str, tuple[float, float]]:
     """The figures of orifice chambers of all legs as nuisance parameters of a model that has them:
     value and 1 sigma by name; `gauge` is the scale of its table."""
-    widths = _widths(StructureSettings.current())
+    widths = _widths()
     usual = {LEVEL: 1.0, **values}
     return {n: (usual[k], widths[k] * usual[k]) for n, k in FIGURES.items() if k in usual}
 

@@ -9,8 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from kemba.settings import Settings, setting
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Flags = np.ndarray[Any, np.dtype[np.bool_]]
 Labels = np.ndarray[Any, np.dtype[np.int_]]
@@ -24,15 +22,11 @@ Changes = Mapping[str, tuple[Array, Array]]  # command -> times [s] and sizes of
 REGIONS = ("in", "mid", "out")
 
 
-class RegionSettings(Settings):
+class RegionSettings:
     """Regions of a piston's stroke."""
 
-    end: float = setting(
-        0.010,
-        "m",
-        "length of the region at each end of the stroke",
-        "derived: as long as the cushion of the catalogue",
-    )
+    # length of the region at each end of the stroke [m]: as long as the cushion of the catalogue
+    end = 0.010
 
 
 @dataclass(frozen=True)
@@ -128,7 +122,7 @@ class OperatingPoint:
     def regions(self) -> Texts:
         """Label (n,) of each row: `in` near the retracted end of the stroke, `mid`, `out` near the
         extended end; an empty text without a piston."""
-        end = RegionSettings.current().end
+        end = RegionSettings.end
         ends = np.array([end, self.stroke - end])
         index = np.searchsorted(ends, self.x, side="right")
         return np.array([*REGIONS, ""], dtype=object)[np.where(np.isfinite(self.x), index, -1)]

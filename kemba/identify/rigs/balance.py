@@ -12,13 +12,12 @@ from kemba.identify.rigs.filtering import Filtered
 from kemba.model.exponential import midpoint_step
 from kemba.model.model import Model
 from kemba.model.rest import Rest, rate_of
-from kemba.settings import BY_HAND, Settings, setting
 
 
-class BalanceSettings(Settings):
+class BalanceSettings:
     """Integration of the states that effects have, along a log."""
 
-    chunk: int = setting(1000, "1", "steps per call of a compiled function", BY_HAND)
+    chunk = 1000  # steps per call of a compiled function
 
 
 class Balance:
@@ -46,7 +45,7 @@ class Balance:
             at = [given[1], given[2], given[3], given[4:], node.p]
             after, _ = midpoint_step(rate, node.s, symbols[1:], at, given[0])
             step = ca.Function("step", [node.s, given, node.p], [ca.densify(after)])
-            self._chunk = BalanceSettings.current().chunk
+            self._chunk = BalanceSettings.chunk
             self._step = step.mapaccum(self._chunk)
 
     def force(self, log: Filtered, values: Mapping[str, float]) -> Array:

@@ -11,13 +11,12 @@ from kemba.identify.problem.types import Array
 from kemba.model.exponential import midpoint_step
 from kemba.model.model import Model
 from kemba.model.rest import rate_of
-from kemba.settings import BY_HAND, Settings, setting
 
 
-class BlowDownSettings(Settings):
+class BlowDownSettings:
     """Integration of a blow-down."""
 
-    steps: int = setting(2000, "1", "steps over a log", BY_HAND)
+    steps = 2000  # steps over a log
 
 
 class BlowDown:
@@ -32,7 +31,7 @@ class BlowDown:
         h = ca.SX.sym("h")
         after, _ = midpoint_step(rate, node.s, [node.p], [node.p], h)
         step = ca.Function("step", [node.s, h, node.p], [ca.densify(after)])
-        self._count = BlowDownSettings.current().steps
+        self._count = BlowDownSettings.steps
         self._steps = step.mapaccum(self._count)
 
     def run(

@@ -1,7 +1,7 @@
 """The figures of a rig and of its effects, fitted to logs, with honest intervals.
 
 Least squares on the residuals within what a model can have; intervals from blocks of rows, spanning
-what runs say that disagree (`evidence.scatter`). They are those of one mounting of one machine.
+what runs say that disagree (`written.scatter`). They are those of one mounting of one machine.
 """
 
 from __future__ import annotations
@@ -17,27 +17,22 @@ from scipy.optimize import least_squares
 from kemba.config import dump_yaml
 from kemba.effects.base import Effect
 from kemba.errors import KembaError
-from kemba.identify.evidence.scatter import apart_between_runs, divisions, half_widths
 from kemba.identify.evidence.windows import rms
-from kemba.identify.joint import TOLD
 from kemba.identify.problem.problem import Array, Problem
 from kemba.identify.rigs.problem import rig_problem
 from kemba.identify.rigs.vessel import vessel_problem
+from kemba.identify.written.joint import TOLD
+from kemba.identify.written.scatter import apart_between_runs, divisions, half_widths
 from kemba.model.model import Model
-from kemba.settings import BY_HAND, Settings, setting
 from kemba.trajectory import Trajectory
 
 
-class RigFitSettings(Settings):
+class RigFitSettings:
     """How the figures of a rig are fitted."""
 
-    loose: float = setting(
-        10.0, "1", "prior sigma of a factor that is fitted", "convention: as good as none"
-    )
-    step: float = setting(1e-4, "1", "step of finite differences of a factor", BY_HAND)
-    flat: float = setting(
-        1e-5, "1", "smallest pivot of a fit whose figures can be told apart", BY_HAND
-    )
+    loose = 10.0  # prior sigma of a factor that is fitted: as good as none
+    step = 1e-4  # step of finite differences of a factor
+    flat = 1e-5  # smallest pivot of a fit whose figures can be told apart
 
 
 @dataclass(frozen=True)
@@ -92,7 +87,7 @@ def fit_rig(logs: Sequence[Trajectory], model: Model) -> RigFit:
     """Fit every figure that the model lists, and those of the rig itself. Effects that are listed
     without a value start at their usual size. Raises KembaError where logs cannot tell them apart.
     """
-    loose = RigFitSettings.current().loose
+    loose = RigFitSettings.loose
     started = Model(model.mechanism, map(_started, model.effects), model.supply, model.name)
     names = [
         name
@@ -119,7 +114,7 @@ def _started(effect: Effect) -> Effect:
 def _fit(
     problem: Problem, names: list[str], values: Mapping[str, float], model: Model, before: float
 ) -> RigFit:
-    settings = RigFitSettings.current()
+    settings = RigFitSettings
     starts = [n for n in problem.nuisance if n.startswith("start:")]
     free = [*names, *starts]
     centre = np.array([problem.nuisance[n][0] for n in free])

@@ -15,35 +15,23 @@ from scipy.ndimage import gaussian_filter1d
 
 from kemba.identify.problem.noise import difference_sigma
 from kemba.identify.problem.types import Array
-from kemba.settings import BY_HAND, Settings, setting
 
 # noise of value, rate, acceleration behind a Gaussian of s samples: c sigma / (step^k s^(k + 1/2))
 GAIN = (0.5311, 0.3756, 0.4600)
 
 
-class RigFilterSettings(Settings):
+class RigFilterSettings:
     """How the channels of a rig's log are filtered."""
 
-    widths: tuple[int, ...] = setting(
-        (3, 4, 6, 8, 12, 16, 24, 32), "1", "widths (1 sigma) in samples that are tried", BY_HAND
-    )
-    creep: float = setting(
-        0.2,
-        "1",
-        "noise of the rate that is small enough, as a share of `sign_speed`",
-        "derived: the sign of a rate is then certain",
-    )
-    weight: float = setting(
-        0.01,
-        "1",
-        "noise of the inertia's force that is small enough, as a share of the force's spread",
-        BY_HAND,
-    )
-    reach: float = setting(
-        4.0, "1", "widths beyond which the Gaussian is cut off", "convention: 6e-5 of it is lost"
-    )
-    gap: float = setting(5.0, "1", "rows farther apart than so many usual steps are a gap", BY_HAND)
-    finest: float = setting(5e-4, "1", "smallest noise, as a share of a channel's range", BY_HAND)
+    widths = (3, 4, 6, 8, 12, 16, 24, 32)  # widths (1 sigma) in samples that are tried
+    # noise of the rate that is small enough, as a share of `sign_speed`: the sign of a rate is then
+    # certain
+    creep = 0.2
+    # noise of the inertia's force that is small enough, as a share of the force's spread
+    weight = 0.01
+    reach = 4.0  # widths beyond which the Gaussian is cut off: 6e-5 of it is lost
+    gap = 5.0  # rows farther apart than so many usual steps are a gap
+    finest = 5e-4  # smallest noise, as a share of a channel's range
 
 
 @dataclass(frozen=True)
@@ -84,7 +72,7 @@ def filtered(
     the rate] and the force of the inertia `heavy` well against the other channels. `known`: noise
     (1 sigma) by name, "" for the position. Rows with a missing reading are left out.
     """
-    settings, known = RigFilterSettings.current(), known or {}
+    settings, known = RigFilterSettings, known or {}
     good = np.isfinite(position) & np.all([np.isfinite(y) for y in others.values()], axis=0)
     time, position = time[good], position[good]
     others = {name: y[good] for name, y in others.items()}

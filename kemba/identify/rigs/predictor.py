@@ -16,23 +16,20 @@ from kemba.identify.rigs.balance import Balance
 from kemba.identify.rigs.filtering import Filtered
 from kemba.identify.rigs.rig_log import ANSWER, PLACE, RigLog
 from kemba.model.model import Model
-from kemba.settings import BY_HAND, Settings, setting
 
 SEALS = "measured_chambers.travel"
 
 
-class SealSettings(Settings):
+class SealSettings:
     """How well it is known how far seals stretch."""
 
-    travel: float = setting(
-        0.5, "1", "prior sigma of the travel until they slide, as a share of it", BY_HAND
-    )
+    travel = 0.5  # prior sigma of the travel until they slide, as a share of it
 
 
-class GainSettings(Settings):
+class GainSettings:
     """What a motor's scale may be."""
 
-    least: float = setting(0.05, "1", "smallest force of a motor over that of the log", BY_HAND)
+    least = 0.05  # smallest force of a motor over that of the log
 
 
 class Predictor:
@@ -47,7 +44,7 @@ class Predictor:
         self.place, self.answer = PLACE[rig], ANSWER[rig]
         self.figures = nominal_figures(model)
         if rig == "cylinder":
-            self.figures[SEALS] = (1.0, SealSettings.current().travel)
+            self.figures[SEALS] = (1.0, SealSettings.travel)
         self.sensors = SensorFaults(model.effects)
         self._known: dict[tuple[str, ...], Balance] = {}
 
@@ -75,7 +72,7 @@ class Predictor:
         """Force of the motor over the force that the log says."""
         listed = self.model.parameters.get("axis_scale.k")  # which theta scales, if there is one
         gain = theta.get("axis_scale.k", 1.0) * (listed[1] if listed else 1.0)
-        return max(gain, GainSettings.current().least)
+        return max(gain, GainSettings.least)
 
     def variance(self, log: RigLog, usual: float) -> Array:
         """Variance (k,) of `gap` under the model as it is; friction of the size `usual` is in doubt

@@ -26,19 +26,15 @@ from kemba.identify.rigs.predictor import Predictor
 from kemba.identify.rigs.rig_log import RigLog, prepare
 from kemba.identify.rigs.sizes import sized, usual_force
 from kemba.model.model import Model
-from kemba.settings import Settings, setting
 from kemba.trajectory import Trajectory
 
 
-class RigProblemSettings(Settings):
+class RigProblemSettings:
     """How well the sensors of a rig are known."""
 
-    weather: float = setting(
-        1e3,
-        "Pa",
-        "prior sigma of the zero of a pressure sensor",
-        "derived: the pressure of the air changes by 1 kPa (1 sigma) with the weather",
-    )
+    # prior sigma of the zero of a pressure sensor [Pa]: the pressure of the air changes by 1 kPa (1
+    # sigma) with the weather
+    weather = 1e3
 
 
 class RigProblem(Problem):
@@ -61,7 +57,7 @@ class RigProblem(Problem):
         self.predictor = predictor
         predictor.candidates = self.candidates
         self.nuisance = predictor.figures | predictor.sensors.nuisance
-        zero = RigProblemSettings.current().weather
+        zero = RigProblemSettings.weather
         for name in model.mechanism.logged:
             key = f"sensor_bias:{name}"
             if name.endswith("/P") and key not in predictor.sensors.listed:
@@ -83,7 +79,8 @@ class RigProblem(Problem):
     def residual(self, theta: Theta, runs: Collection[int] | None = None) -> Array:
         parts = []
         for i in self._all(runs):
-            r = self.predictor.gap(self.logs[i], theta) / self._sigma[i]
+            with np.errstate(over="ignore"):  # a fit may try what nothing is predicted at
+                r = self.predictor.gap(self.logs[i], theta) / self._sigma[i]
             parts.append(whiten(r, self.colour[i]) if i in self.colour else r)
         return np.concatenate(parts)
 
@@ -117,6 +114,21 @@ class RigProblem(Problem):
             found.colour = {
                 i: learn(residual[run == i], careful=careful) for i in range(len(self.logs))
             }
+        return found
+
+    def coarser(self, theta: Theta) -> Self:
+        """The same problem without colour, which forgets what changes slowly, and with what the
+        model at theta lacks as noise of all rows alike [N or N.m], beside that of the sensors."""
+        found = self.recolour(None)
+        gap, plain = (
+            np.concatenate([self.predictor.gap(log, at) for log in self.logs]) for at in (theta, {})
+        )
+        # where a direction is in doubt, all that the effects at theta do is
+        usual = max(self.usual, float(np.sqrt(np.mean((gap - plain) ** 2))))
+        power = [self.predictor.variance(log, usual) for log in self.logs]
+        known = np.concatenate(power)
+        lacks = max(float(np.average(gap**2 - known, weights=1.0 / known)), 0.0)
+        found._sigma = [np.sqrt(one + lacks) for one in power]
         return found
 
     def whiten(self, columns: Array) -> Array:

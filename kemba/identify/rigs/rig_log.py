@@ -29,12 +29,9 @@ class RigLogSettings(Settings):
         "convention: that travel is taken to be known to a factor of two",
         decides=True,
     )
-    blurred: float = setting(
-        3.0,
-        "1",
-        "time around a turn that the filter mixes into a row, over the filter's width",
-        "convention: three sigmas of the Gaussian",
-    )
+    # time around a turn that the filter mixes into a row, over the filter's width: three sigmas of
+    # the Gaussian
+    blurred = 3.0
 
 
 @dataclass(frozen=True)

@@ -32,15 +32,11 @@ class RigSizeSettings(Settings):
     drive: float = setting(
         0.05, "1", "usual friction of a drive over its largest force", BY_HAND, decides=True
     )
-    large: float = setting(95.0, "%", "percentile of the rows that counts as the largest", BY_HAND)
-    fading: float = setting(
-        0.2, "1", "rate at which a Stribeck friction fades, over the largest rate", BY_HAND
-    )
-    stretch: float = setting(
-        1e-3, "1", "travel until contacts slide, over the whole travel", BY_HAND
-    )
-    cushion: float = setting(0.1, "1", "length of a cushion, over the whole travel", BY_HAND)
-    periods: int = setting(300, "1", "periods that are tried for a cogging force", BY_HAND)
+    large = 95.0  # percentile of the rows that counts as the largest [%]
+    fading = 0.2  # rate at which a Stribeck friction fades, over the largest rate
+    stretch = 1e-3  # travel until contacts slide, over the whole travel
+    cushion = 0.1  # length of a cushion, over the whole travel
+    periods = 300  # periods that are tried for a cogging force
 
 
 def usual_force(predictor: Predictor, logs: Iterable[RigLog]) -> float:
@@ -92,7 +88,7 @@ def _hidden(predictor: Predictor, logs: tuple[RigLog, ...], candidate: Candidate
 
 
 def _shaped(candidate: Candidate, typical: Mapping[str, float]) -> Candidate:
-    reach = CandidateSettings.current().reach
+    reach = CandidateSettings.reach
     shapes = []
     for shape in candidate.shapes:
         name = f"{candidate.effect}.{shape.name}"

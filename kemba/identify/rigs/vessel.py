@@ -30,19 +30,11 @@ class VesselSettings(Settings):
     noise: float = setting(
         0.01, "1", "noise of a reading over the range of its channel", BY_HAND, decides=True
     )
-    warmth: float = setting(
-        0.5, "K", "smallest noise of a temperature", "literature: IEC 60584 class 1 allows 1.5 K"
-    )
-    farthest: float = setting(3.0, "1", "largest factor by which a figure is tried off", BY_HAND)
-    late: float = setting(
-        0.02, "1", "usual delay of a sensor, such as a thermometer's, over a log's length", BY_HAND
-    )
-    start_pressure: float = setting(
-        0.02, "1", "prior sigma of the pressure at the start, as a share", BY_HAND
-    )
-    start_temperature: float = setting(
-        3.0, "K", "prior sigma of the temperature at the start", BY_HAND
-    )
+    warmth = 0.5  # smallest noise of a temperature [K]: IEC 60584 class 1 allows 1.5 K
+    farthest = 3.0  # largest factor by which a figure is tried off
+    late = 0.02  # usual delay of a sensor, such as a thermometer's, over a log's length
+    start_pressure = 0.02  # prior sigma of the pressure at the start, as a share
+    start_temperature = 3.0  # prior sigma of the temperature at the start [K]
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,6 @@ from kemba.identify.problem.line import line_candidates
 from kemba.identify.problem.problem import Candidate, Parameter
 from kemba.identify.problem.structure import structure_candidates
 from kemba.model.model import Model
-from kemba.settings import BY_HAND, Settings, setting
 
 GROUND = ("ground_compliance", "ground_friction", "contact")
 SHARED = ("supply_scale",)  # one supply feeds all legs
@@ -22,12 +21,12 @@ GRIP = "ground_friction.mu"
 LAGS = ("hose_lag.T", "motor_lag.T")
 
 
-class RobotCandidateSettings(Settings):
+class RobotCandidateSettings:
     """Ground and lags, as robot logs can show them."""
 
-    none: float = setting(1e-6, "s", "a lag that is none", "convention: far below a row")
-    softness: float = setting(5e-5, "m.N-1", "size of a ground's softness", BY_HAND)
-    softest: float = setting(1e-3, "m.N-1", "largest softness of a ground", BY_HAND)
+    none = 1e-6  # a lag that is none [s]: far below a row
+    softness = 5e-5  # size of a ground's softness [m.N-1]
+    softest = 1e-3  # largest softness of a ground [m.N-1]
 
 
 def robot_candidates(model: Model) -> dict[str, Candidate]:
@@ -39,7 +38,7 @@ def robot_candidates(model: Model) -> dict[str, Candidate]:
     apart = leg_candidates(model, [n for n in found if n not in (*GROUND, *SHARED)])
     found = {**found, **apart, **geometry_candidates(model), **structure_candidates(model)}
     found |= line_candidates(model)
-    settings = RobotCandidateSettings.current()
+    settings = RobotCandidateSettings
     if "ground_compliance" in found:
         found["ground_compliance"] = Candidate(
             "ground_compliance",
@@ -75,5 +74,5 @@ def ground_of(model: Model) -> tuple[float, dict[str, float]]:
 
 def without_delay(name: str, value: float) -> float:
     """A lag too short to matter as the model should have it: none."""
-    short = name in LAGS and value < CandidateSettings.current().fastest
-    return RobotCandidateSettings.current().none if short else value
+    short = name in LAGS and value < CandidateSettings.fastest
+    return RobotCandidateSettings.none if short else value

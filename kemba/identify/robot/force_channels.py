@@ -10,19 +10,16 @@ from kemba.identify.compare.force_profiles import lags, risen
 from kemba.identify.problem.types import Array, Flags, ForceChannel
 from kemba.identify.robot.operating_point import SIDES, air_forces, changes
 from kemba.identify.robot.state import LinearisedState
-from kemba.settings import BY_HAND, Settings, setting
 
 BODY = {"body z": 1, "body x": 0}  # place among the channels
 
 
-class UsualForceSettings(Settings):
+class UsualForceSettings:
     """A force of each channel that is neither small nor large."""
 
-    body: float = setting(3.0, "N", "on the body", BY_HAND)
-    hip: float = setting(0.5, "N.m", "at a hip", BY_HAND)
-    rod: float = setting(
-        10.0, "N", "on a rod", "derived: friction of 6 to 8 N by the paper's tables"
-    )
+    body = 3.0  # on the body [N]
+    hip = 0.5  # at a hip [N.m]
+    rod = 10.0  # on a rod [N]: friction of 6 to 8 N by the paper's tables
 
 
 def robot_force_channels(state: LinearisedState) -> list[ForceChannel]:
@@ -33,7 +30,7 @@ def robot_force_channels(state: LinearisedState) -> list[ForceChannel]:
     flying = [(s.phase == "flight").astype(float) for s in state.schedules]
     where = state.batch.pad(flying, 0.0)[..., None] > 0.5
     y, rate = state.motion.y, state.motion.rate
-    usual = UsualForceSettings.current()
+    usual = UsualForceSettings
     found = [_rods(state), _hips(state, where)]
     for name, k in BODY.items():
         quantities = {
@@ -56,7 +53,7 @@ def _rods(state: LinearisedState) -> ForceChannel:
     return ForceChannel(
         "rods",
         "N",
-        UsualForceSettings.current().rod,
+        UsualForceSettings.rod,
         {label: np.where(where, values, np.nan) for label, values in quantities.items()},
         force_columns(state, range(3 + legs, 3 + 2 * legs)),
         {side: _after(state, f"valve/{side}") for side in SIDES},
@@ -73,7 +70,7 @@ def _hips(state: LinearisedState, where: Flags) -> ForceChannel:
     return ForceChannel(
         "hips",
         "N.m",
-        UsualForceSettings.current().hip,
+        UsualForceSettings.hip,
         {label: np.where(where, values, np.nan) for label, values in quantities.items()},
         force_columns(state, legs),
         {"hip/tau": _after(state, "hip/tau")},

@@ -11,24 +11,15 @@ from kemba.identify.doubt.force_terms import dahl, end_terms
 from kemba.identify.problem.types import Array
 from kemba.identify.robot.force_channels import force_columns
 from kemba.identify.robot.state import LinearisedState
-from kemba.settings import BY_HAND, Settings, setting
 
 
-class RobotFormulaSettings(Settings):
+class RobotFormulaSettings:
     """Constants of the simple force terms that are tried on robots."""
 
-    speed: float = setting(
-        0.1, "rad.s-1", "speed over which friction at a hip turns round", BY_HAND
-    )
-    creeps: tuple[float, ...] = setting(
-        (0.003, 0.006, 0.012), "m", "travel over which a hysteresis turns round", BY_HAND
-    )
-    ripples: tuple[int, ...] = setting(
-        (6, 8, 10, 12, 14, 16, 18, 20, 24), "1", "ripples of a motor per turn of the hip", BY_HAND
-    )
-    ropes: tuple[float, ...] = setting(
-        (0.26, 0.28, 0.30, 0.32, 0.35), "m", "heights from which a cable pulls", BY_HAND
-    )
+    speed = 0.1  # speed over which friction at a hip turns round [rad.s-1]
+    creeps = (0.003, 0.006, 0.012)  # travel over which a hysteresis turns round [m]
+    ripples = (6, 8, 10, 12, 14, 16, 18, 20, 24)  # ripples of a motor per turn of the hip
+    ropes = (0.26, 0.28, 0.30, 0.32, 0.35)  # heights from which a cable pulls [m]
 
 
 def formula_columns(state: LinearisedState) -> dict[str, Array]:
@@ -61,7 +52,7 @@ def rod_terms(x: Array, v: Array, stroke: float) -> Iterator[tuple[str, Array]]:
     yield "v**3", v**3
     yield f"max(tanh(v/{V_COULOMB:g}), 0)", np.maximum(sign, 0.0)
     yield f"tanh(v/{V_COULOMB:g})*x", sign * x
-    for travel in RobotFormulaSettings.current().creeps:
+    for travel in RobotFormulaSettings.creeps:
         paths = x.reshape(len(x), -1).T
         turned = np.stack([dahl(path, travel) for path in paths], axis=1)
         yield f"dahl(x, {travel:g})", turned.reshape(x.shape)
@@ -69,7 +60,7 @@ def rod_terms(x: Array, v: Array, stroke: float) -> Iterator[tuple[str, Array]]:
 
 def hip_terms(q: Array, w: Array, torque: Array) -> Iterator[tuple[str, Array]]:
     """(formula, torque at the hip (n, L, legs)) of angle, rate and the torque commanded."""
-    settings = RobotFormulaSettings.current()
+    settings = RobotFormulaSettings
     sign = np.tanh(w / settings.speed)
     for n in settings.ripples:
         yield f"sin({n}*q)", np.sin(n * q)
@@ -82,7 +73,7 @@ def hip_terms(q: Array, w: Array, torque: Array) -> Iterator[tuple[str, Array]]:
 def body_terms(name: str, at: Array, v: Array) -> Iterator[tuple[str, Array]]:
     """(formula, force on the body (n, L, 1)) along one axis."""
     yield from drag_terms(name, v)
-    for height in RobotFormulaSettings.current().ropes:
+    for height in RobotFormulaSettings.ropes:
         yield f"max({name} - {height:g}, 0)", np.maximum(at - height, 0.0)
 
 

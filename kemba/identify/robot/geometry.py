@@ -34,55 +34,34 @@ LEVER = "boom_lever"
 class StandingSettings(Settings):
     """How lengths are found from feet that stand."""
 
-    every: float = setting(0.005, "s", "time between the samples that are used", BY_HAND)
-    level: float = setting(
-        0.02,
-        "m",
-        "height at which the ground may seem to be",
-        "convention: as the search for the ground in contact.py",
-    )
-    window: float = setting(5e-3, "m", "height of the band in which standing feet are", BY_HAND)
-    tried: tuple[float, ...] = setting(
-        (-3.5, -2.5, -1.75, -1.25, -0.75, -0.35, 0.35, 0.75, 1.25, 1.75, 2.5, 3.5),
-        "1",
-        "lengths that are tried first, one at a time, in sizes",
-        BY_HAND,
-    )
-    bands: tuple[float, ...] = setting(
-        (0.02, 0.01, 5e-3, 4e-3), "m", "bands about the ground, from round to round", BY_HAND
-    )
-    noise: float = setting(7e-4, "m", "noise of a standing foot's height", BY_HAND)
-    together: float = setting(
-        4.0, "1", "samples that err together, so that they count as one", BY_HAND
-    )
-    prior: float = setting(2.0, "1", "prior width of a length, in sizes", BY_HAND)
-    reach: float = setting(2.5, "1", "largest value of each, in prior widths", BY_HAND)
-    body: float = setting(3e-3, "m", "prior sigma of the zero of the body's height", BY_HAND)
-    angle: float = setting(4e-3, "rad", "prior sigma of the zeros of pitch and hips", BY_HAND)
-    piston: float = setting(6e-4, "m", "prior sigma of the zero of a piston", BY_HAND)
-    sink: float = setting(3e-3, "m", "prior sigma of how deep a foot sinks at rest", BY_HAND)
-    soft: float = setting(
-        5e-4, "m", "the same from which feet have no one height that could tell of lengths", BY_HAND
-    )
-    lever: float = setting(0.04, "1", "prior sigma of the boom's lever", "derived: two sizes")
-    held: float = setting(
-        1e-6, "1", "width of what is not free, as a share", "convention: as good as none"
-    )
-    deep: float = setting(0.02, "m", "depth below the ground at which no foot can be", BY_HAND)
-    often: float = setting(
-        0.01, "1", "share of samples so deep from which lengths are not believed", BY_HAND
-    )
-    gain: float = setting(
-        6.0, "nats", "gain over faults of sensors alone from which lengths are believed", BY_HAND
-    )
+    every = 0.005  # time between the samples that are used [s]
+    # height at which the ground may seem to be [m]: as the search for the ground in contact.py
+    level = 0.02
+    window = 5e-3  # height of the band in which standing feet are [m]
+    # lengths that are tried first, one at a time, in sizes
+    tried = (-3.5, -2.5, -1.75, -1.25, -0.75, -0.35, 0.35, 0.75, 1.25, 1.75, 2.5, 3.5)
+    bands = (0.02, 0.01, 5e-3, 4e-3)  # bands about the ground, from round to round [m]
+    noise = 7e-4  # noise of a standing foot's height [m]
+    together = 4.0  # samples that err together, so that they count as one
+    prior = 2.0  # prior width of a length, in sizes
+    reach = 2.5  # largest value of each, in prior widths
+    body = 3e-3  # prior sigma of the zero of the body's height [m]
+    angle = 4e-3  # prior sigma of the zeros of pitch and hips [rad]
+    piston = 6e-4  # prior sigma of the zero of a piston [m]
+    sink = 3e-3  # prior sigma of how deep a foot sinks at rest [m]
+    soft = 5e-4  # the same from which feet have no one height that could tell of lengths [m]
+    lever = 0.04  # prior sigma of the boom's lever: two sizes
+    held = 1e-6  # width of what is not free, as a share: as good as none
+    deep = 0.02  # depth below the ground at which no foot can be [m]
+    often = 0.01  # share of samples so deep from which lengths are not believed
+    gain = 6.0  # gain over faults of sensors alone from which lengths are believed [nats]
     turned: float = setting(
         12.0, "nats", "gain of the other sign of the pitch over any lengths, from which the sign "
         "is said to be reversed", BY_HAND, decides=True,
     )  # fmt: skip
-    pitch: float = setting(
-        0.05, "rad", "prior sigma of the zero of the pitch where its sign is judged: no zero is "
-        "taken for a sign", BY_HAND,
-    )  # fmt: skip
+    # prior sigma of the zero of the pitch where its sign is judged: no zero is taken for a sign
+    # [rad]
+    pitch = 0.05
 
 
 @dataclass(frozen=True)

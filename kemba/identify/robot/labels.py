@@ -39,7 +39,7 @@ def describe(
         time[: len(log.time)] = log.time
         phase = np.full(batch.n, "", dtype=object)
         phase[: len(log.time)] = schedules[i].phase
-        sigma = np.append(log.sigma, [PlaceSettings.current().ground] * (m - len(log.sigma)))
+        sigma = np.append(log.sigma, [PlaceSettings.ground] * (m - len(log.sigma)))
         whole = {
             "run": np.full(own.shape, i),
             "channel": np.broadcast_to(np.arange(m)[:, None], own.shape),

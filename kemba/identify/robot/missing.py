@@ -15,20 +15,19 @@ from kemba.identify.robot.dynamics.reference import densities
 from kemba.identify.robot.dynamics.settings import QuietForceDensity
 from kemba.identify.robot.motion.filter import System, gains, smooth_with_band
 from kemba.identify.robot.state import LinearisedState
-from kemba.settings import BY_HAND, Settings, setting
 
 
-class RobotMissingSettings(Settings):
+class RobotMissingSettings:
     """The missing force of robot logs. Its strength (1 sigma) is learnt per channel."""
 
-    memory: float = setting(0.025, "s", "correlation time of the missing force", BY_HAND)
-    rounds: int = setting(4, "1", "rounds in which its strength is learnt", BY_HAND)
-    body: float = setting(5.0, "N", "strength with which learning begins", BY_HAND)
-    pitch: float = setting(0.5, "N.m", "the same of the moment on the body", BY_HAND)
-    hip: float = setting(0.5, "N.m", "the same of the torque at a hip", BY_HAND)
-    piston: float = setting(10.0, "N", "the same of the force on a rod", BY_HAND)
-    negligible: float = setting(0.1, "N", "strength of a force that is as good as none", BY_HAND)
-    negligible_moment: float = setting(0.01, "N.m", "the same of a moment", BY_HAND)
+    memory = 0.025  # correlation time of the missing force [s]
+    rounds = 4  # rounds in which its strength is learnt
+    body = 5.0  # strength with which learning begins [N]
+    pitch = 0.5  # the same of the moment on the body [N.m]
+    hip = 0.5  # the same of the torque at a hip [N.m]
+    piston = 10.0  # the same of the force on a rod [N]
+    negligible = 0.1  # strength of a force that is as good as none [N]
+    negligible_moment = 0.01  # the same of a moment [N.m]
 
 
 def robot_missing(
@@ -40,7 +39,7 @@ def robot_missing(
     """
     names = state.physics.channels
     kinds = [_kind(name) for name in names]
-    settings = RobotMissingSettings.current()
+    settings = RobotMissingSettings
     begin = np.array([getattr(settings, kind) for kind in kinds])
     sigma = begin if strength is None else strength
     moment = np.isin(kinds, ("pitch", "hip"))
@@ -83,7 +82,7 @@ def with_forces(state: LinearisedState, density: Array, sigma: Array) -> System:
     F[..., :d, :d] = base.F
     accelerations = base.G[..., : pushes.shape[2]] @ state.motion.inverse @ pushes
     F[..., :d, d:] = accelerations
-    keep = np.exp(-h / RobotMissingSettings.current().memory)
+    keep = np.exp(-h / RobotMissingSettings.memory)
     i = np.arange(k)
     F[..., d + i, d + i] = np.where(state.batch.valid, keep, 1.0)[..., None]
     j = base.G.shape[3]

@@ -27,12 +27,10 @@ MixUp = tuple[str, dict[str, Change]]
 class MixUpSettings(Settings):
     """When the columns of a robot log are said to be mixed up."""
 
-    carried: float = setting(
-        5.0, "m.s-2", "the body falls slower than this: the ground carries it", "convention: g / 2"
-    )
-    window: float = setting(0.05, "s", "time in which a standing foot does not move", BY_HAND)
-    row: float = setting(0.005, "s", "distance of the rows that are looked at", BY_HAND)
-    fewest: int = setting(10, "1", "rows on the ground from which feet can be judged", BY_HAND)
+    carried = 5.0  # the body falls slower than this: the ground carries it [m.s-2]: g / 2
+    window = 0.05  # time in which a standing foot does not move [s]
+    row = 0.005  # distance of the rows that are looked at [s]
+    fewest = 10  # rows on the ground from which feet can be judged
     small: float = setting(
         0.012,
         "m",

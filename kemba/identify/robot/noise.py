@@ -21,12 +21,9 @@ class SensorNoiseSettings(Settings):
     stated: float = setting(
         1.5, "1", "largest learnt noise, in sigmas that a sidecar states", BY_HAND, decides=True
     )
-    guessed: float = setting(
-        10.0,
-        "1",
-        "the same, in sigmas that were told from differences of rows",
-        "derived: third differences show a tenth of AR(1) noise of 0.98 per row",
-    )
+    # the same, in sigmas that were told from differences of rows: third differences show a tenth of
+    # AR(1) noise of 0.98 per row
+    guessed = 10.0
 
 
 def stated_noise(batch: Batch) -> tuple[ChannelNoise, ...]:

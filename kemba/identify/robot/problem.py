@@ -58,9 +58,7 @@ class RobotProblemSettings(Settings):
     window: int = setting(
         20, "1", "rows over which one-step errors are summed", BY_HAND, decides=True
     )
-    predicted: float = setting(
-        0.05, "s", "time of a prediction that tells an error in a channel's unit", BY_HAND
-    )
+    predicted = 0.05  # time of a prediction that tells an error in a channel's unit [s]
 
 
 class RobotProblem(Problem):

@@ -33,14 +33,13 @@ from kemba.identify.robot.motion.colour import Noise
 from kemba.identify.robot.motion.contact import ContactSchedule, loaded
 from kemba.identify.robot.motion.filter import FilterGains, at_once, gains, innovations
 from kemba.identify.robot.motion.sensing import ahead, sensed, whole_rows
-from kemba.settings import BY_HAND, Settings, setting
 
 
-class StateSettings(Settings):
+class StateSettings:
     """How the motion of robot logs is found."""
 
-    rounds: int = setting(2, "1", "times that the motion is smoothed with the model", BY_HAND)
-    lead_in: int = setting(4, "1", "nodes at the start that only tell where a run begins", BY_HAND)
+    rounds = 2  # times that the motion is smoothed with the model
+    lead_in = 4  # nodes at the start that only tell where a run begins
 
 
 @dataclass(frozen=True)
@@ -191,7 +190,7 @@ def linearise_at(
         first = first_reference(physics, batch, p)
     reference = _without_delays(batch, late - rows * dt, first)
     schedules = read_schedules(physics, batch, reference, p)
-    for _ in range(StateSettings.current().rounds):
+    for _ in range(StateSettings.rounds):
         loose = LooseForceDensity.current()
         state = _along(physics, batch, sensors, base, ground, schedules, reference, loose, noise)
         y, g = state.measurement(base), state.acceleration(base)
@@ -230,7 +229,7 @@ def _along(
     density = densities(physics, batch, schedules, unknown)
     motion = linearise_along(physics, batch, schedules, reference, density, states, p, noise)
     mask = np.isfinite(motion.system.R)
-    mask[: StateSettings.current().lead_in] = False
+    mask[: StateSettings.lead_in] = False
     forces = Forces(physics, batch, motion)
     gain = gains(motion.system)
     return LinearisedState(

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from kemba.config import dump_yaml
+from kemba.config import Document, dump_yaml, parse
 from kemba.effects import Effect
 from kemba.effects.pneumatics.chamber import Chamber
 from kemba.effects.pneumatics.damping import ModeDamping
@@ -17,7 +17,7 @@ from kemba.effects.pneumatics.tables import at_supply
 from kemba.effects.pneumatics.valve import Valve
 from kemba.errors import KembaError
 from kemba.mechanism import Cylinder, rig_mechanism
-from kemba.model import Model
+from kemba.model import Model, ModelSpec
 from kemba.plant.rig.estimate import Estimate, mean
 from kemba.plant.rig.imposed import drive, followed
 from kemba.plant.rig.rises import Rise, RiseTable, find_rises, rise_table
@@ -42,10 +42,15 @@ class Characteristics:
         return fitted_effects(self.cylinder, self.rises, self.lines, self.plateaus)
 
     def write_model(self, path: str | Path, name: str = "characterised") -> None:
-        """Write a model YAML: the planning model with the fitted chambers, damping and valves."""
+        """Write a model YAML: the planning model with the fitted chambers, damping and valves.
+
+        Raises KembaError, and writes nothing, where a fitted value is none that a model can have.
+        """
         effects = [_written(effect) for effect in self.effects()]
         notes = "chambers, damping and valves fitted by kemba-opt characterise"
-        dump_yaml({"name": name, "base": "planning", "effects": effects, "notes": notes}, path)
+        data = {"name": name, "base": "planning", "effects": effects, "notes": notes}
+        parse(Document(data, f"the figures that these logs give {path}"), ModelSpec)
+        dump_yaml(data, path)
 
 
 def characterise(logs: dict[str, Trajectory], cylinder: Cylinder) -> Characteristics:

@@ -19,15 +19,14 @@ from kemba.identify.evidence.point import LinearisationPoint
 from kemba.identify.evidence.refit import Fit, Frozen, refit
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
 from kemba.identify.problem.problem import Problem, Theta
-from kemba.settings import BY_HAND, Settings, setting
 from kemba.stopwatch import Stage, Tell, silent
 
 
-class RivalsSettings(Settings):
+class RivalsSettings:
     """Which fits of effects are carried on."""
 
-    first: int = setting(5, "1", "evaluations after which fits are compared", BY_HAND)
-    kept: int = setting(3, "1", "effects whose fits are carried on", BY_HAND)
+    first = 5  # evaluations after which fits are compared
+    kept = 3  # effects whose fits are carried on
 
 
 Points = Mapping[Hypothesis, LinearisationPoint]
@@ -53,7 +52,7 @@ def fitted_anew(
     the best fit of any. `ended`: whether the time is over; rivals not begun by then are left out.
     `say`: told of progress.
     """
-    problem, settings = base.problem, RivalsSettings.current()
+    problem, settings = base.problem, RivalsSettings
     fits = {h: ThoroughFit(problem, h, point.linear) for h, point in points.items()}
     found = {NULL: fits[NULL].found(points[NULL].mode.theta)}
     begun: dict[Hypothesis, Fit] = {}

@@ -17,19 +17,14 @@ from kemba.errors import KembaError
 from kemba.identify.evidence.linear import Linear, estimate, moved, priors, usual_shapes
 from kemba.identify.evidence.spike_slab import Hypothesis, Ranker
 from kemba.identify.problem.problem import Array, Candidate, Labels, Problem, Theta
-from kemba.settings import BY_HAND, Settings, setting
 
 
-class SmallEffectsSettings(Settings):
+class SmallEffectsSettings:
     """How the mode of a hypothesis is found, every other effect being small."""
 
-    rounds: int = setting(5, "1", "linear steps, each with the residual where it led", BY_HAND)
-    change: float = setting(
-        0.1, "nats", "change of the evidence at which the last step is done", BY_HAND
-    )
-    absurd: float = setting(
-        1e5, "1", "residual in sigmas at which nothing can be predicted", "convention: beyond data"
-    )
+    rounds = 5  # linear steps, each with the residual where it led
+    change = 0.1  # change of the evidence at which the last step is done [nats]
+    absurd = 1e5  # residual in sigmas at which nothing can be predicted: beyond data
 
 
 @dataclass(frozen=True)
@@ -56,7 +51,7 @@ def mode_of(
     `linear` and its `jacobian` (n, k): slopes that hold there; `blocks` (n,) label the rows. Where
     the motion depends on the model, the residual is as straight as its slopes: the start is kept.
     """
-    settings = SmallEffectsSettings.current()
+    settings = SmallEffectsSettings
     slopes = linear, jacobian, blocks
     tried = [_at(problem, hypothesis, theta, problem.residual(theta), slopes) for theta in starts]
     best = at = min(tried, key=lambda mode: mode.cost)

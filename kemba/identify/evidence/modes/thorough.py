@@ -20,40 +20,20 @@ from kemba.identify.evidence.spike_slab import Hypothesis, Ranker
 from kemba.identify.evidence.windows import START
 from kemba.identify.problem.problem import Array, Problem, Theta
 from kemba.identify.problem.slopes import bounded
-from kemba.settings import BY_HAND, Settings, setting
 
 
-class ThoroughSettings(Settings):
+class ThoroughSettings:
     """Least squares with slopes of every step."""
 
-    step: float = setting(
-        0.1,
-        "1",
-        "of a secant, in prior widths: wider than the steps of the cost where edges cross readings",
-        BY_HAND,
-    )
-    evaluations: int = setting(12, "1", "of residuals with their slopes, from a start", BY_HAND)
-    updates: int = setting(
-        2,
-        "1",
-        "steps by which slopes are corrected (Broyden 1965) until they are taken anew",
-        BY_HAND,
-    )
-    change: float = setting(
-        0.1, "nats", "change of the cost at which a fit ends", "convention: far below any evidence"
-    )
-    off: float = setting(
-        1e-4, "1", "prior widths, below which an effect that cannot be negative is absent", BY_HAND
-    )
-    inside: float = setting(
-        0.01,
-        "1",
-        "prior widths inside a bound from which fits begin: beside it all steps are short",
-        BY_HAND,
-    )
-    worst: float = setting(
-        1e4, "1", "sigmas, where nothing can be simulated", "convention: beyond all data"
-    )
+    # of a secant, in prior widths: wider than the steps of the cost where edges cross readings
+    step = 0.1
+    evaluations = 12  # of residuals with their slopes, from a start
+    updates = 2  # steps by which slopes are corrected (Broyden 1965) until they are taken anew
+    change = 0.1  # change of the cost at which a fit ends [nats]: far below any evidence
+    off = 1e-4  # prior widths, below which an effect that cannot be negative is absent
+    # prior widths inside a bound from which fits begin: beside it all steps are short
+    inside = 0.01
+    worst = 1e4  # sigmas, where nothing can be simulated: beyond all data
 
 
 class _Slopes:
@@ -102,7 +82,7 @@ class ThoroughFit:
 
     def __init__(self, problem: Problem, hypothesis: Hypothesis, linear: Linear) -> None:
         self.problem, self.linear = problem, linear
-        self.settings = ThoroughSettings.current()
+        self.settings = ThoroughSettings
         self.width = Ranker(linear, problem.candidates, problem.nuisance).widths(hypothesis, 1.0)
         lower, upper = effect_bounds(problem, linear.names, hypothesis)
         for name, candidate in problem.candidates.items():

@@ -12,18 +12,15 @@ from kemba.identify.robot.dynamics.inputs import Inputs, air_states, read_inputs
 from kemba.identify.robot.dynamics.linear import LinearisedMotion
 from kemba.identify.robot.dynamics.physics import Physics
 from kemba.identify.robot.motion.batch import Batch
-from kemba.settings import BY_HAND, CHOSEN, Settings, setting
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
-class ForcesSettings(Settings):
+class ForcesSettings:
     """What is kept of computed forces."""
 
-    kept: int = setting(4, "1", "inputs and states that are kept beside the first ones", BY_HAND)
-    lines: int = setting(
-        50_000_000, "1", "bytes of forces that are kept: the next Jacobian asks for them", CHOSEN
-    )
+    kept = 4  # inputs and states that are kept beside the first ones
+    lines = 50_000_000  # bytes of forces that are kept: the next Jacobian asks for them
 
 
 @dataclass
@@ -59,7 +56,7 @@ class Forces:
         for (None: all)."""
         key = delays.tobytes() + p[self.physics.moves].tobytes() + bytes([among is None])
         if key not in self._states:
-            kept = ForcesSettings.current().kept
+            kept = ForcesSettings.kept
             given = self._inputs.get(delays.tobytes())
             if given is None:
                 given = read_inputs(self.physics, self.batch, self.motion.ref, delays)
@@ -74,7 +71,7 @@ class Forces:
         line = self._lines.get(key)
         if line is None:
             line = ForceLine(p.copy(), self._exact(p, delays))
-            settings = ForcesSettings.current()
+            settings = ForcesSettings
             _keep(self._lines, key, line, max(settings.kept, settings.lines // line.force.nbytes))
         moved = np.flatnonzero(p != line.p)
         if crossed[np.ix_(moved, moved)].any():

@@ -69,7 +69,7 @@ class LinearisedMotion:
     def penetration(self, softness: float, d: float) -> Array:
         """Depth (n, L, 3 legs) [m] of the feet in a ground of stiffness 1/softness [N.m-1] and
         damping `d` [s.m-1]."""
-        growth = np.maximum(1.0 + d * self.sinking, PlaceSettings.current().thinnest)
+        growth = np.maximum(1.0 + d * self.sinking, PlaceSettings.thinnest)
         legs = self.normal.shape[2]
         depth = np.zeros_like(self.places)
         depth[..., 1 : 2 * legs : 2] = softness * np.maximum(self.normal, 0.0) / growth
@@ -100,7 +100,7 @@ def linearise_along(
     y, rate, Jy = (batch.deep(a) for a in physics.call("measured", *at_nodes, p=p))
     feet, feet_rate, Jf = (batch.deep(a) for a in physics.call("feet", *at_nodes, p=p))
     slip = batch.pad([x.slides for x in schedules], 0.0)
-    density, slipping = density.copy(), ContactForceSettings.current().slipping
+    density, slipping = density.copy(), ContactForceSettings.slipping
     for leg in range(legs):  # a sliding foot pushes along the edge of its cone
         pushing = k + 2 * leg
         density[..., pushing] = np.where(slip[..., leg] != 0.0, slipping, density[..., pushing])
@@ -170,7 +170,7 @@ def _filter_system(
     F[..., k : 2 * k, k : 2 * k] += h * A_v
     W = np.zeros((*batch.h.shape, k + places, k + places))
     W[..., :k, :k] = unknown
-    still = PlaceSettings.current()
+    still = PlaceSettings
     held = batch.pad([x.held.astype(float) for x in schedules], 0.0) > 0.5
     wander = np.array([still.ground_wander] * 2 * legs + [still.stop_wander] * legs)
     free = np.array([still.free, still.ground_wander] * legs + [still.free] * legs)
@@ -216,7 +216,7 @@ def rigid_forces(
     (n, L, k, c) with the smallest norm, each channel weighted by the `density` (n, L, c) of its
     unknown force.
     """
-    settings = ContactForceSettings.current()
+    settings = ContactForceSettings
     weighted = channels * density[..., None, :]
     S = weighted @ channels.swapaxes(-1, -2)
     S = S + 1e-9 * np.eye(k)

@@ -15,7 +15,6 @@ from kemba.identify.robot.dynamics.samples import SampleMap
 from kemba.mechanism.robot import link_regressors
 from kemba.model.model import Model
 from kemba.model.rest import rate_of
-from kemba.settings import BY_HAND, Settings, setting
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 FOLDED = 2.9  # rad; a knee folds less far, whatever the lengths of its leg
@@ -23,11 +22,11 @@ FOLDED = 2.9  # rad; a knee folds less far, whatever the lengths of its leg
 Flags = np.ndarray[Any, np.dtype[np.bool_]]
 
 
-class FigureSettings(Settings):
+class FigureSettings:
     """Figures of another structure that are free."""
 
-    reach: float = setting(4.0, "1", "largest error, in sigmas", "convention: beyond chance")
-    least: float = setting(0.2, "1", "smallest value, as a share of the nominal one", BY_HAND)
+    reach = 4.0  # largest error, in sigmas: beyond chance
+    least = 0.2  # smallest value, as a share of the nominal one
 
 
 class Physics:
@@ -78,7 +77,7 @@ class Physics:
     def _bounds(self, figures: Mapping[str, tuple[float, float]]) -> tuple[Array, Array]:
         """Smallest and largest value (k,) of every parameter; of `figures` what a linear estimate
         may not leave: a negative area has no flow."""
-        settings = FigureSettings.current()
+        settings = FigureSettings
         lower, upper = np.full(len(self.names), -np.inf), np.full(len(self.names), np.inf)
         for name, (value, sigma) in figures.items():
             i, reach = self.names.index(name), settings.reach * sigma

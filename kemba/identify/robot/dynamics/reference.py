@@ -61,7 +61,7 @@ def first_reference(physics: Physics, batch: Batch, p: Array) -> Reference:
     slope = np.diagonal(physics.call("measured", known, 0 * known, p=p)[2], axis1=1, axis2=2)
     q, slope = batch.deep(q, np.nan), batch.deep(np.abs(slope), 1.0)
     F, G = integrator(batch.h, k, 0)
-    settings = KinematicSettings.current()
+    settings = KinematicSettings
     names = [c.name for c in physics.mechanism.coordinates]
     density = np.array([settings.density(name) for name in names])
     W = np.eye(k) * density / batch.h[..., None, None]
@@ -106,7 +106,7 @@ def densities(
 
     `least`: density everywhere; contacts, impacts and stops add to it.
     """
-    legs, parts, unknown = len(physics.legs), [], ContactForceSettings.current()
+    legs, parts, unknown = len(physics.legs), [], ContactForceSettings
     for log, schedule in zip(batch.resampled, schedules, strict=True):
         own = [least.body, least.body, least.pitch] + [least.hip] * legs + [least.rod] * legs
         density = np.tile(np.array(own + [0.0] * 2 * legs), (len(log.time), 1))
@@ -126,7 +126,7 @@ def densities(
 
 def _edges(flags: np.ndarray[Any, Any]) -> Array:
     """Density (n, legs) in the nodes after a piston reaches a stop."""
-    unknown = ContactForceSettings.current()
+    unknown = ContactForceSettings
     change = np.zeros(flags.shape, bool)
     change[1:] = flags[1:] & ~flags[:-1]
     wide = change.copy()

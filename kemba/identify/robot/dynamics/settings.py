@@ -37,61 +37,47 @@ class QuietForceDensity(ForceDensity):
     rod: float = setting(1e-5, "N2.s", "force on a rod", "convention: as good as none")
 
 
-class ContactForceSettings(Settings):
+class ContactForceSettings:
     """Density of forces that are unknown in contact."""
 
-    contact: float = setting(300.0, "N2.s", "of a foot on the ground, a piston at a stop", BY_HAND)
-    impact: float = setting(3e4, "N2.s", "of an impact", BY_HAND)
-    slipping: float = setting(1.0, "N2.s", "of a sliding foot, beyond its friction", BY_HAND)
-    stopped: float = setting(50.0, "N2.s", "of a rod, above which its force is a stop's", BY_HAND)
-    edge: int = setting(8, "1", "nodes that an impact at a stop lasts", BY_HAND)
-    air: float = setting(100.0, "N2.s", "of a rod where a log does not begin at rest", BY_HAND)
-    air_fades: float = setting(0.025, "s", "time in which this fades", BY_HAND)
-    rest: int = setting(5, "1", "node of a log that tells whether it begins at rest", BY_HAND)
+    contact = 300.0  # of a foot on the ground, a piston at a stop [N2.s]
+    impact = 3e4  # of an impact [N2.s]
+    slipping = 1.0  # of a sliding foot, beyond its friction [N2.s]
+    stopped = 50.0  # of a rod, above which its force is a stop's [N2.s]
+    edge = 8  # nodes that an impact at a stop lasts
+    air = 100.0  # of a rod where a log does not begin at rest [N2.s]
+    air_fades = 0.025  # time in which this fades [s]
+    rest = 5  # node of a log that tells whether it begins at rest
 
 
-class PlaceSettings(Settings):
+class PlaceSettings:
     """Places that stand still: of feet on the ground, of pistons at their stops."""
 
-    ground: float = setting(1e-4, "m", "noise of a standing foot's place", BY_HAND)
-    ground_level: float = setting(2.5e-4, "m", "prior sigma of the ground's height", BY_HAND)
-    ground_wander: float = setting(
-        6e-5 / math.sqrt(0.02), "m.s-1/2", "wander of a standing foot", f"{BY_HAND}; 60 um in 20 ms"
-    )
-    stop: float = setting(1e-4, "m", "noise of a piston at its stop", BY_HAND)
-    stop_wander: float = setting(
-        1e-4 / math.sqrt(0.02), "m.s-1/2", "wander of a stop", f"{BY_HAND}; 0.1 mm in 20 ms"
-    )
-    unknown: float = setting(3.0, "m", "prior sigma of a place", "convention: no knowledge")
-    free: float = setting(1.0, "m.s-1/2", "wander of a free foot's place", "convention: no hold")
-    position: float = setting(
-        0.03, "m, rad", "prior sigma of a deviation from the reference", "convention: no knowledge"
-    )
-    velocity: float = setting(
-        3.0, "m.s-1, rad.s-1", "prior sigma of its rate", "convention: no knowledge"
-    )
-    thinnest: float = setting(
-        0.5,
-        "1",
-        "smallest factor by which a yielding ground stiffens",
-        "convention: stays positive",
-    )
+    ground = 1e-4  # noise of a standing foot's place [m]
+    ground_level = 2.5e-4  # prior sigma of the ground's height [m]
+    ground_wander = 6e-5 / math.sqrt(0.02)  # wander of a standing foot [m.s-1/2]: 60 um in 20 ms
+    stop = 1e-4  # noise of a piston at its stop [m]
+    stop_wander = 1e-4 / math.sqrt(0.02)  # wander of a stop [m.s-1/2]: 0.1 mm in 20 ms
+    unknown = 3.0  # prior sigma of a place [m]: no knowledge
+    free = 1.0  # wander of a free foot's place [m.s-1/2]: no hold
+    position = 0.03  # prior sigma of a deviation from the reference [m, rad]: no knowledge
+    velocity = 3.0  # prior sigma of its rate [m.s-1, rad.s-1]: no knowledge
+    thinnest = 0.5  # smallest factor by which a yielding ground stiffens: stays positive
 
 
-class KinematicSettings(Settings):
+class KinematicSettings:
     """Smoothing of every coordinate for itself: density of its acceleration."""
 
-    body_x: float = setting(30.0, "m2.s-3", "of the body along the rail", BY_HAND)
-    body_z: float = setting(60.0, "m2.s-3", "of the body's height", BY_HAND)
-    body_pitch: float = setting(300.0, "rad2.s-3", "of the body's pitch", BY_HAND)
-    hip: float = setting(2e3, "rad2.s-3", "of a hip", BY_HAND)
-    knee: float = setting(2e5, "rad2.s-3", "of a knee", BY_HAND)
-    position: float = setting(10.0, "m, rad", "prior sigma of a start", "convention: no knowledge")
-    velocity: float = setting(
-        100.0, "m.s-1, rad.s-1", "prior sigma of its rate", "convention: no knowledge"
-    )
+    body_x = 30.0  # of the body along the rail [m2.s-3]
+    body_z = 60.0  # of the body's height [m2.s-3]
+    body_pitch = 300.0  # of the body's pitch [rad2.s-3]
+    hip = 2e3  # of a hip [rad2.s-3]
+    knee = 2e5  # of a knee [rad2.s-3]
+    position = 10.0  # prior sigma of a start [m, rad]: no knowledge
+    velocity = 100.0  # prior sigma of its rate [m.s-1, rad.s-1]: no knowledge
 
-    def density(self, coordinate: str) -> float:
+    @classmethod
+    def density(cls, coordinate: str) -> float:
         """Of the coordinate of this name."""
-        known = {"body/x": self.body_x, "body/z": self.body_z, "body/pitch": self.body_pitch}
-        return known.get(coordinate) or (self.hip if "hip" in coordinate else self.knee)
+        known = {"body/x": cls.body_x, "body/z": cls.body_z, "body/pitch": cls.body_pitch}
+        return known.get(coordinate) or (cls.hip if "hip" in coordinate else cls.knee)

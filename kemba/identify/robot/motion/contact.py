@@ -17,61 +17,42 @@ from scipy.ndimage import (
 )
 
 from kemba.identify.logs.local_fit import local_fit
-from kemba.settings import BY_HAND, Settings, setting
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Flags = np.ndarray[Any, np.dtype[np.bool_]]
 
 
-class ContactSettings(Settings):
+class ContactSettings:
     """When a foot touches the ground, and when a piston rests at a stop."""
 
-    may_touch: float = setting(
-        9.0e-3,
-        "m",
-        "height below which a foot may touch",
-        "derived: a piston 0.5 mm wrong lifts the foot by 3 mm, a late encoder by 9 mm",
-    )
-    level_search: float = setting(
-        20e-3, "m", "height of a resting foot that may mean the ground", BY_HAND
-    )
-    level_time: float = setting(
-        0.5, "s", "time over which the ground's reading may wander", "convention: half a hop"
-    )
-    level_rate: float = setting(0.03, "m.s-1", "vertical speed of a resting foot", BY_HAND)
-    level_rows: int = setting(20, "1", "rows at rest that give the ground's height", BY_HAND)
-    stands: float = setting(2.5e-3, "m", "height above the ground of a standing foot", BY_HAND)
-    touches: float = setting(1.5e-3, "m", "the same for naming the phase only", BY_HAND)
-    near_stop: float = setting(
-        0.6e-3, "m", "distance from a stop at which a piston may rest on it", BY_HAND
-    )
-    stop_noise: float = setting(
-        5.0,
-        "1",
-        "the same in sigmas of the reading, where that is more; at most half of `stop_search`",
-        "derived: the extreme readings lie 2.5 sigmas before the stop, others 2.5 behind it",
-    )
-    stop_search: float = setting(
-        2.5e-3, "m", "distance from an end of the stroke at which the stop may be", BY_HAND
-    )
-    stop_rows: int = setting(4, "1", "extreme readings that are left out", BY_HAND)
-    blur: float = setting(0.003, "s", "time around a contact in which it may be", BY_HAND)
-    strike: float = setting(0.025, "s", "time in which a foot strikes the ground", BY_HAND)
-    impact: float = setting(0.005, "s", "time that is called an impact", BY_HAND)
-    settled: float = setting(
-        0.010, "s", "time in contact before a foot's height is trusted", BY_HAND
-    )
-    slow_foot: float = setting(0.15, "m.s-1", "vertical speed of a standing foot", BY_HAND)
-    sliding: float = setting(0.1, "m.s-1", "speed of a foot that slides", BY_HAND)
-    sticking: float = setting(0.04, "m.s-1", "speed of a foot that sticks", BY_HAND)
-    slow_body: float = setting(0.05, "m.s-1", "speed of a body at rest", BY_HAND)
-    slow_piston: float = setting(0.02, "m.s-1", "speed of a piston at rest", BY_HAND)
-    firm_load: float = setting(
-        15.0, "N", "load of a foot whose sliding friction is judged", BY_HAND
-    )
-    least_load: float = setting(6.0, "N", "load of a foot that is known to stand", BY_HAND)
-    rate_window: float = setting(0.02, "s", "time over which rates are taken", BY_HAND)
-    steady: float = setting(0.008, "s", "time in which the push of a leg may change", BY_HAND)
+    # height below which a foot may touch [m]: a piston 0.5 mm wrong lifts the foot by 3 mm, a late
+    # encoder by 9 mm
+    may_touch = 9.0e-3
+    level_search = 20e-3  # height of a resting foot that may mean the ground [m]
+    level_time = 0.5  # time over which the ground's reading may wander [s]: half a hop
+    level_rate = 0.03  # vertical speed of a resting foot [m.s-1]
+    level_rows = 20  # rows at rest that give the ground's height
+    stands = 2.5e-3  # height above the ground of a standing foot [m]
+    touches = 1.5e-3  # the same for naming the phase only [m]
+    near_stop = 0.6e-3  # distance from a stop at which a piston may rest on it [m]
+    # the same in sigmas of the reading, where that is more; at most half of `stop_search`: the
+    # extreme readings lie 2.5 sigmas before the stop, others 2.5 behind it
+    stop_noise = 5.0
+    stop_search = 2.5e-3  # distance from an end of the stroke at which the stop may be [m]
+    stop_rows = 4  # extreme readings that are left out
+    blur = 0.003  # time around a contact in which it may be [s]
+    strike = 0.025  # time in which a foot strikes the ground [s]
+    impact = 0.005  # time that is called an impact [s]
+    settled = 0.010  # time in contact before a foot's height is trusted [s]
+    slow_foot = 0.15  # vertical speed of a standing foot [m.s-1]
+    sliding = 0.1  # speed of a foot that slides [m.s-1]
+    sticking = 0.04  # speed of a foot that sticks [m.s-1]
+    slow_body = 0.05  # speed of a body at rest [m.s-1]
+    slow_piston = 0.02  # speed of a piston at rest [m.s-1]
+    firm_load = 15.0  # load of a foot whose sliding friction is judged [N]
+    least_load = 6.0  # load of a foot that is known to stand [N]
+    rate_window = 0.02  # time over which rates are taken [s]
+    steady = 0.008  # time in which the push of a leg may change [s]
 
 
 @dataclass(frozen=True)
@@ -110,7 +91,7 @@ def read_schedule(
     `feet` (n, legs, [x, z]) [m], `pistons` (n, legs) [m], `stroke` [m], `body` (n, 3): x, z [m] and
     pitch [rad]; `noise` (legs,): sigma of the pistons' readings [m].
     """
-    limits, dt = ContactSettings.current(), max(float(np.median(np.diff(time))), 1e-4)
+    limits, dt = ContactSettings, max(float(np.median(np.diff(time))), 1e-4)
     feet_rate, piston_rate = slope(feet, dt), slope(pistons, dt)
     speed = np.abs(slope(body, dt)).max(axis=1)
     blur, settle = max(1, round(limits.blur / dt)), max(1, round(limits.settled / dt))
@@ -168,7 +149,7 @@ def _after(flags: Flags, steps: float) -> Flags:
 
 def loaded(schedule: ContactSchedule, normal: Array, dt: float) -> ContactSchedule:
     """The same with only those feet settled that carry a load: `normal` (n, legs) in N, steady."""
-    settings = ContactSettings.current()
+    settings = ContactSettings
     width = max(3, round(settings.rate_window / dt))
     firm = minimum_filter1d(normal, width, axis=0) > settings.firm_load
     slides = schedule.slides * firm
@@ -181,7 +162,7 @@ def loaded(schedule: ContactSchedule, normal: Array, dt: float) -> ContactSchedu
 
 def steady(values: Array, dt: float) -> Array:
     """Forces or rates (n, ...), smoothed: changes from sample to sample are noise."""
-    return np.asarray(gaussian_filter1d(values, ContactSettings.current().steady / dt, axis=0))
+    return np.asarray(gaussian_filter1d(values, ContactSettings.steady / dt, axis=0))
 
 
 def steady_while(values: Array, acts: Flags, dt: float) -> Array:
@@ -193,7 +174,7 @@ def steady_while(values: Array, acts: Flags, dt: float) -> Array:
 
 def slope(values: Array, dt: float) -> Array:
     """Rate of a noisy signal (n, ...) over a few hundredths of a second."""
-    width = ContactSettings.current().rate_window
+    width = ContactSettings.rate_window
     half = min(max(2, round(width / dt / 2)), (len(values) - 1) // 2)
     return local_fit(values, half, dt, 2, 1)
 
@@ -203,7 +184,7 @@ def ground_level(z: Array, rate: Array) -> float:
 
     It need not be zero: sensors may be off by more than a centimetre.
     """
-    limits = ContactSettings.current()
+    limits = ContactSettings
     resting = z[(np.abs(z) < limits.level_search) & (np.abs(rate) < limits.level_rate)]
     if len(resting) <= limits.level_rows:
         return 0.0
@@ -217,7 +198,7 @@ def wandering_level(z: Array, level: float, dt: float) -> Array:
     Sensors that drift lift a standing foot by a centimetre, and more than that from its usual
     `level` [m].
     """
-    limits = ContactSettings.current()
+    limits = ContactSettings
     width = max(3, round(limits.level_time / dt))
     calm = uniform_filter1d(z, max(3, round(limits.rate_window / dt)), mode="nearest")
     low = maximum_filter1d(minimum_filter1d(calm, width), width)
@@ -228,8 +209,8 @@ def stop_levels(x: Array, stroke: float) -> tuple[float, float]:
     """Readings [m] at the two stops: the extreme ones of x (n,) [m] of a slow piston, if they are
     near the ends of the stroke. What is read of a fast one may lie behind its stop: smoothed, or
     late and shifted, it overshoots."""
-    search, ordered = ContactSettings.current().stop_search, np.sort(x)
-    few = min(ContactSettings.current().stop_rows, len(x) - 1)
+    search, ordered = ContactSettings.stop_search, np.sort(x)
+    few = min(ContactSettings.stop_rows, len(x) - 1)
     if few < 0:
         return 0.0, stroke
     low, high = float(ordered[few]), float(ordered[-1 - few])

@@ -8,17 +8,16 @@ import numpy as np
 
 from kemba.identify.robot.motion.colour import simulated
 from kemba.identify.robot.motion.filter import FilterGains, System, innovations
-from kemba.settings import BY_HAND, Settings, setting
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
-class ExpectedSettings(Settings):
+class ExpectedSettings:
     """Expected power of the residuals, by simulation."""
 
-    draws: int = setting(6, "1", "simulated logs", BY_HAND)
-    width: int = setting(21, "1", "nodes over which the power is averaged; odd", BY_HAND)
-    least: float = setting(0.02, "1", "smallest power", BY_HAND)
+    draws = 6  # simulated logs
+    width = 21  # nodes over which the power is averaged; odd
+    least = 0.02  # smallest power
 
 
 def expected_power(system: System, gain: FilterGains, seed: int = 0) -> Array:
@@ -27,7 +26,7 @@ def expected_power(system: System, gain: FilterGains, seed: int = 0) -> Array:
     It is below 1 where the filter allows for contact forces that a steady stance does not need.
     The draws are few, so that their power is averaged over some nodes.
     """
-    settings = ExpectedSettings.current()
+    settings = ExpectedSettings
     rng = np.random.default_rng(seed)
     y = simulated(system, settings.draws, rng)
     power = np.mean(innovations(system, gain, y, None) ** 2, axis=-1)

@@ -8,26 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from kemba.settings import Settings, setting
-
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
-class FilterSettings(Settings):
+class FilterSettings:
     """Numbers of the filter."""
 
-    missing: float = setting(
-        1e12,
-        "1",
-        "variance of a row that was not measured, over the largest variance",
-        "convention: such a row tells nothing",
-    )
-    columns: int = setting(
-        16,
-        "1",
-        "columns that pass at once: with all, the memory of `compare` is a quarter more",
-        "tuned: time of compare on five logs of 1 s; the same at 32, 7 % longer at 8",
-    )
+    # variance of a row that was not measured, over the largest variance: such a row tells nothing
+    missing = 1e12
+    # columns that pass at once: with all, the memory of `compare` is a quarter more: time of
+    # compare on five logs of 1 s; the same at 32, 7 % longer at 8
+    columns = 16
 
 
 @dataclass(frozen=True)
@@ -64,9 +55,7 @@ def gains(system: System) -> FilterGains:
     s = system
     n, runs, m, d = s.H.shape
     known = np.isfinite(s.R)
-    R = np.where(
-        known, s.R, FilterSettings.current().missing * np.nanmax(np.where(known, s.R, 0.0))
-    )
+    R = np.where(known, s.R, FilterSettings.missing * np.nanmax(np.where(known, s.R, 0.0)))
     turn, P_all = np.empty_like(s.F), np.empty_like(s.F)
     carry, whitener = np.empty((n, runs, d, m)), np.empty((n, runs, m, m))
     P, diagonal = s.P0.copy(), np.arange(m)
@@ -98,7 +87,7 @@ def innovations(system: System, gain: FilterGains, y: Array | None, g: Array | N
 
 def at_once(count: int) -> Iterator[slice]:
     """The parts of so many columns that pass the filter at once."""
-    size = FilterSettings.current().columns
+    size = FilterSettings.columns
     return (slice(i, i + size) for i in range(0, count, size))
 
 

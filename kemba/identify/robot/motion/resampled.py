@@ -11,23 +11,18 @@ import numpy as np
 from kemba.effects.pneumatics.switching import Pulse, pulses
 from kemba.effects.sensors import CHANNELS
 from kemba.identify.problem.noise import WhiteNoiseSettings, difference_sigma
-from kemba.settings import BY_HAND, Settings, setting
 from kemba.trajectory import Trajectory
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
-class ResamplingSettings(Settings):
+class ResamplingSettings:
     """Nodes of robot logs."""
 
-    shortest: float = setting(0.7e-3, "s", "denser rows are averaged", BY_HAND)
-    longest: float = setting(1.6e-3, "s", "nodes farther apart are filled", BY_HAND)
-    finest: float = setting(
-        1e-6,
-        "1",
-        "smallest noise of a channel, in m or rad",
-        "convention: far below what position sensors resolve",
-    )
+    shortest = 0.7e-3  # denser rows are averaged [s]
+    longest = 1.6e-3  # nodes farther apart are filled [s]
+    # smallest noise of a channel, in m or rad: far below what position sensors resolve
+    finest = 1e-6
 
 
 @dataclass(frozen=True)
@@ -89,9 +84,9 @@ def _sigma(log: Trajectory, channel: str, values: Array) -> float:
     stated = _stated(log, channel)
     if stated is not None:
         return stated
-    if np.isfinite(values).sum() < WhiteNoiseSettings.current().fewest:
+    if np.isfinite(values).sum() < WhiteNoiseSettings.fewest:
         return CHANNELS[channel.split("/")[-1]][1]
-    return max(difference_sigma(values), ResamplingSettings.current().finest)
+    return max(difference_sigma(values), ResamplingSettings.finest)
 
 
 def _stated(log: Trajectory, channel: str) -> float | None:
@@ -106,7 +101,7 @@ def _stated(log: Trajectory, channel: str) -> float | None:
 def _thin(time: Array, raw: Array, torque: Array) -> tuple[Array, Array, Array, int]:
     """Averages of so many rows that nodes are at least `shortest` apart."""
     count = max(1, int(np.floor(1e-3 / max(np.median(np.diff(time)), 1e-9) + 0.3)))
-    if np.median(np.diff(time)) >= ResamplingSettings.current().shortest or count == 1:
+    if np.median(np.diff(time)) >= ResamplingSettings.shortest or count == 1:
         return time, raw, torque, 1
     n = len(time) // count * count
     with np.errstate(invalid="ignore"):
@@ -118,9 +113,7 @@ def _thin(time: Array, raw: Array, torque: Array) -> tuple[Array, Array, Array, 
 
 def _fill(time: Array, raw: Array, torque: Array) -> tuple[Array, Array, Array]:
     """Nodes without measurement where rows are far apart."""
-    pieces = np.maximum(1, np.ceil(np.diff(time) / ResamplingSettings.current().longest)).astype(
-        int
-    )
+    pieces = np.maximum(1, np.ceil(np.diff(time) / ResamplingSettings.longest)).astype(int)
     if (pieces == 1).all():
         return time, raw, torque
     start = np.repeat(np.arange(len(pieces)), pieces)

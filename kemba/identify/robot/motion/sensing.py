@@ -11,34 +11,27 @@ from scipy.ndimage import gaussian_filter1d
 from kemba.effects.sensors import SensorEffect, as_measured
 from kemba.effects.series import Series
 from kemba.identify.robot.motion.resampled import ResampledLog
-from kemba.settings import BY_HAND, Settings, setting
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
-class SensingSettings(Settings):
+class SensingSettings:
     """How late sensors read a motion."""
 
-    calm: float = setting(
-        2.0,
-        "1",
-        "nodes over which rates are smoothed before a delay reads them",
-        f"{BY_HAND}; noise in the rate makes delays look shorter, by as much as a half",
-    )
-    caught_up: float = setting(
-        1.5,
-        "1",
-        "rows from which a late sensor's readings are moved to the rows to which they belong",
-        "tuned: calm rates tell 1 ms well and not 5 ms; of 618 blind cases one ranked a longer "
-        "delay where none was, 1.53 ms",
-    )
+    # nodes over which rates are smoothed before a delay reads them: noise in the rate makes delays
+    # look shorter, by as much as a half
+    calm = 2.0
+    # rows from which a late sensor's readings are moved to the rows to which they belong: calm
+    # rates tell 1 ms well and not 5 ms; of 618 blind cases one ranked a longer delay where none
+    # was, 1.53 ms
+    caught_up = 1.5
 
 
 def whole_rows(late: Array, row: float) -> Array:
     """By how many whole rows of `row` [s] the readings of sensors that are `late` (m,) [s] are
     moved; by none where calm rates do."""
     rows = np.rint(late / row)
-    return np.where(np.abs(late) < SensingSettings.current().caught_up * row, 0.0, rows)
+    return np.where(np.abs(late) < SensingSettings.caught_up * row, 0.0, rows)
 
 
 def travelled(rate: Array, h: Array) -> Array:
@@ -47,7 +40,7 @@ def travelled(rate: Array, h: Array) -> Array:
     The rates are smoothed first. A delay multiplies them, and noise in a regressor makes its
     coefficient too small: delays would look shorter than they are, by as much as a half.
     """
-    calm: Array = gaussian_filter1d(rate, SensingSettings.current().calm, axis=0, mode="nearest")
+    calm: Array = gaussian_filter1d(rate, SensingSettings.calm, axis=0, mode="nearest")
     steps = 0.5 * (calm[1:] + calm[:-1]) * h[:-1, :, None]
     return np.concatenate([np.zeros_like(rate[:1]), np.cumsum(steps, axis=0)])
 

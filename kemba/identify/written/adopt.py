@@ -50,15 +50,30 @@ def write_model(
     return path
 
 
-def _refitted(base: str, figures: Mapping[str, float]) -> list[dict[str, Any]]:
+def _refitted(base: str, figures: Mapping[str, Any]) -> list[dict[str, Any]]:
     """The effects of the base whose figures were fitted as well, as items of a model's list."""
     found = []
     for effect in build_model(load_spec(base)).effects if figures else ():
-        own = {name.rsplit(".", 1)[1]: float(f"{value:.6g}") for name, value in figures.items()
-               if name.rsplit(".", 1)[0] == effect.name}  # fmt: skip
+        own: dict[str, Any] = {}
+        for name, value in figures.items():
+            owner, _, figure = name.rpartition(".")
+            if owner == effect.name:
+                figure, _, entry = figure.partition("[")
+                if entry:
+                    table = list(own.get(figure, effect.value(figure)))
+                    table[int(entry[:-1])] = value
+                    value = table
+                own[figure] = _short(value)
         if own:
             found.append(effect.bind(own).listed())
     return found
+
+
+def _short(value: Any) -> Any:
+    """A number, or those of a table, with six digits."""
+    if isinstance(value, list | tuple):
+        return tuple(_short(x) for x in value)
+    return float(f"{value:.6g}")
 
 
 def _evidence(path: Path, answer: Mapping[str, Any]) -> dict[str, Any]:
@@ -145,7 +160,8 @@ def _without(answer: Mapping[str, Any], dropped: list[str]) -> dict[str, Any]:
     left = c[np.ix_(kept, kept)] - gain @ c[np.ix_(gone, kept)]
     found["ranking"] = [_moved(row, moved) for row in answer["ranking"]]
     found["figures"] = {
-        n: v + float(moved.get(n, 0.0)) for n, v in (answer.get("figures") or {}).items()
+        n: v + float(moved[n]) if n in moved else v
+        for n, v in (answer.get("figures") or {}).items()
     }
     matrix = (0.5 * (left + left.T)).tolist()
     found["covariance"] = {"names": [names[i] for i in kept], "matrix": matrix}

@@ -14,7 +14,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from copy import copy
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -22,28 +23,32 @@ from kemba.errors import enumerated
 from kemba.identify.answer import Covariance, Value
 from kemba.identify.evidence.linear import is_shape
 from kemba.identify.evidence.refit import Frozen, refit
-from kemba.identify.evidence.scatter import apart_between_runs, divisions, half_widths
 from kemba.identify.evidence.spike_slab import Hypothesis, SpikeSlabSettings
 from kemba.identify.evidence.windows import START
 from kemba.identify.problem.problem import Array, Candidate, Problem, Theta
 from kemba.identify.problem.sensor_faults import is_fault
 from kemba.identify.problem.structure import ORIFICE
+from kemba.identify.written.scatter import apart_between_runs, divisions, half_widths
+from kemba.model.model import Model
 
 # of what a rig brings along: the figure that its logs tell better than any drawing
 TOLD = ("measured_chambers.gain", "drive_axis.J", "vessel_chamber.a")
 LOOSE = 0.5  # prior sigma of its factor: as good as none
+ALIKE = 0.998  # cosine of slopes from which two figures are one
+FAR = 3.0  # tolerances by which a figure is off that is told
 ROUNDS = 2  # times that the fit begins again with slopes along the figures taken anew
 # a share of another structure, and factors of a table, which are no parameters by themselves
 UNTOLD = tuple(f"orifice_chamber.{name}" for name in ("a", "level", "gauge"))
 
 
 @dataclass(frozen=True)
-class Joint:
+class JointFit:
     """Effects at their joint estimate.
 
     `theta`: of the fit. `names` (k,) of all written parameters (`effect.parameter`), with `value`
     (k,), 95 % interval `low`, `high` (k,) and `covariance` (k, k), SI units; `figures`: those that
-    the model had already, by name. `remarks`: parameters in which runs disagree.
+    the model had already, by name, of a table all its values. `remarks`: parameters in which runs
+    disagree.
     """
 
     theta: Mapping[str, float]
@@ -52,16 +57,15 @@ class Joint:
     low: Array
     high: Array
     covariance: Array
-    figures: Mapping[str, float] = field(default_factory=dict)
+    figures: Mapping[str, Any] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
 
     @property
     def matrix(self) -> Covariance:
         """The covariance of all scalar parameters of effects, as a model names them."""
-        told = {
-            i: name.replace(f"{ORIFICE}.", "orifice_chamber.") for i, name in enumerate(self.names)
-        }
-        keep = [i for i, name in told.items() if name not in UNTOLD]
+        tables = {n for n, value in self.figures.items() if "[" in n or isinstance(value, tuple)}
+        told = [name.replace(f"{ORIFICE}.", "orifice_chamber.") for name in self.names]
+        keep = [i for i, name in enumerate(told) if name not in {*UNTOLD, *tables}]
         rows = self.covariance[np.ix_(keep, keep)].tolist()
         return Covariance(tuple(told[i] for i in keep), tuple(map(tuple, rows)))
 
@@ -76,50 +80,72 @@ class Joint:
         return found
 
 
-def joint_fit(problem: Problem, hypothesis: Hypothesis, start: Theta) -> Joint:
+def joint_fit(problem: Problem, hypothesis: Hypothesis, start: Theta) -> JointFit:
     """The effects of a hypothesis and the figures of the model, fitted together from `start`."""
-    problem, own = _prepared(problem)
-    theta = _fitted(problem, own, hypothesis, start)
+    problem, own, theta = _fitted(problem, hypothesis, start)
     keys = tuple(k for e in hypothesis for k in tuple(problem.candidates[e].keys()))
     return _judged(problem, keys, own, theta)
 
 
 def joint_estimate(problem: Problem, hypothesis: Hypothesis, start: Theta) -> dict[str, float]:
     """Theta of the same fit."""
-    problem, own = _prepared(problem)
-    return _fitted(problem, own, hypothesis, start)
+    return _fitted(problem, hypothesis, start)[2]
+
+
+def own_figures(problem: Problem) -> tuple[str, ...]:
+    """The nominal figures that are free in the fit: those of the model's effects which its file can
+    say, of every leg alike."""
+    model = getattr(problem, "model", None)
+    if model is None:
+        return tuple(problem.nuisance)
+    scalars = {f"{e.name}.{p}" for e in model.effects for p in (*e.tolerances(), *e.off)}
+    written = scalars | set(problem.own_figures)
+    return tuple(n for n in problem.nuisance if n in written)
+
+
+def told_by_figures(problem: Problem, hypothesis: Hypothesis, start: Theta) -> Hypothesis:
+    """The hypothesis without faults of sensors that look like a figure which the fit leaves free: a
+    force sensor's scale and the bore's gain are one in logs of a cylinder."""
+    figures = [n for n in own_figures(problem) if n in TOLD]
+    faults = [e for e in hypothesis if problem.candidates[e].sensor]
+    if not figures or not faults or len(hypothesis) < 2:
+        return hypothesis
+    keys = [problem.candidates[e].key for e in faults]
+    slopes = problem.coarser(start).jacobian(start, [*figures, *keys])
+    unit = slopes / np.maximum(np.linalg.norm(slopes, axis=0), 1e-300)
+    alike = np.abs(unit[:, : len(figures)].T @ unit[:, len(figures) :]).max(axis=0) > ALIKE
+    return tuple(e for e in hypothesis if e not in np.array(faults)[alike])
 
 
 def _fitted(
-    problem: Problem, own: tuple[str, ...], hypothesis: Hypothesis, start: Theta
-) -> dict[str, float]:
+    problem: Problem, hypothesis: Hypothesis, start: Theta
+) -> tuple[Problem, tuple[str, ...], dict[str, float]]:
+    """The problem of the fit, the figures that are free in it, and the best theta."""
+    own = own_figures(problem)
     keys = {k for e in hypothesis for k in tuple(problem.candidates[e].keys())}
     theta = {k: v for k, v in start.items() if k in keys or k in own or k.startswith(START)}
     free = (*own, *(n for n in problem.nuisance if n.startswith(START)))
-    for _ in range(ROUNDS if free else 1):
+    loose = {n: (problem.nuisance[n][0], LOOSE) for n in own if n in TOLD}
+    candidates = problem.candidates | {
+        name: _whole(problem.candidates[name]) for name in problem.structures & set(hypothesis)
+    }
+    for _ in range(ROUNDS):
+        problem = copy(problem.coarser(theta))
+        problem.nuisance, problem.candidates = problem.nuisance | loose, candidates
         theta = refit(problem, hypothesis, theta, Frozen(free, problem.jacobian(theta, free))).theta
-    return theta
+    return problem, own, theta
 
 
-def _prepared(problem: Problem) -> tuple[Problem, tuple[str, ...]]:
-    """The problem of the fit, and the nominal figures that are free in it: those of the model's
-    effects which its file can say, of every leg alike."""
-    model = getattr(problem, "model", None)
-    if model is None:
-        return problem, tuple(problem.nuisance)
-    scalars = {f"{e.name}.{p}" for e in model.effects for p in (*e.tolerances(), *e.off)}
-    written = {name for name in scalars if "[" not in name} | set(problem.own_figures)
-    own = tuple(n for n in problem.nuisance if n in written)
-    if problem.moves:
-        return problem, own
-    found = copy(problem.recolour(None))
-    loose = {n: (found.nuisance[n][0], LOOSE) for n in own if n in TOLD}
-    found.nuisance = found.nuisance | loose
-    return found, own
+def _whole(structure: Candidate) -> Candidate:
+    """Another structure as the model that is written has it: whole, not as a share."""
+    return replace(structure, lead=replace(structure.lead, lower=1.0, upper=1.0))
 
 
-def _judged(problem: Problem, keys: tuple[str, ...], own: tuple[str, ...], theta: Theta) -> Joint:
+def _judged(
+    problem: Problem, keys: tuple[str, ...], own: tuple[str, ...], theta: Theta
+) -> JointFit:
     """The fit at theta with its covariance and intervals."""
+    problem = problem.in_detail()
     others = tuple(n for n in problem.nuisance if n not in own)
     names = (*keys, *own, *others)
     jacobian, r = problem.jacobian(theta, names), problem.residual(theta)
@@ -139,9 +165,10 @@ def _judged(problem: Problem, keys: tuple[str, ...], own: tuple[str, ...], theta
     size = np.array([abs(theta[k] - parameters[k].off) if np.isfinite(parameters[k].off) and
                      not is_shape(problem, k) else abs(theta[k]) for k in keys])  # fmt: skip
     imperfect = SpikeSlabSettings.current().spike * np.append(size, np.zeros(len(own)))
-    reach = 1.96 * np.hypot(unit * np.sqrt(np.diag(h)[:count]), imperfect * problem.moves)
+    reach = 1.96 * np.hypot(unit * np.sqrt(np.diag(h)[:count]), imperfect)
     low, high = value - reach, value + reach
-    remarks = []
+    remarks = [_far(problem, names[i], value[i], low[i], high[i]) for i in range(len(keys), count)]
+    remarks = [text for text in remarks if text]
     for i, ends in apart_between_runs(problem, j[:, :count], r):
         apart = value[i] + scale[i] * np.array(ends)
         if apart.min() < low[i] or apart.max() > high[i]:
@@ -159,20 +186,25 @@ def _as_written(
     triple: tuple[Array, Array, Array],
     covariance: Array,
     remarks: list[str],
-) -> Joint:
+) -> JointFit:
     """The estimate in the catalogue's names and units: a figure that is scaled by its value, a
     reciprocal as what it is the reciprocal of, all within their bounds."""
     value, low, high = (x.copy() for x in triple)
-    told, slope, figures = [], np.ones(len(names)), {}
+    told, slope, figures = [], np.ones(len(names)), dict[str, Any]()
+    ends = np.stack([low, high], axis=1)
     for i, name in enumerate(names):
         effect, parameter = name.rsplit(".", 1) if "." in name else (name, "")
         candidate = problem.candidates.get(effect)
         if candidate is None or name not in theta or name in problem.nuisance:
             told.append(name)
+            nominal: Any = 1.0
             if hasattr(problem, "model") and _is_factor(problem, name):
-                slope[i] = float(problem.model.effect(effect).value(parameter))
-                ends = sorted(slope[i] * np.array([low[i], high[i]]))
-                value[i], low[i], high[i] = slope[i] * value[i], *ends
+                nominal = _nominal(problem.model, effect, parameter)
+            if isinstance(nominal, tuple):
+                figures[name] = tuple(float(value[i]) * x for x in nominal)
+                continue
+            slope[i] = nominal
+            value[i], (low[i], high[i]) = nominal * value[i], sorted(nominal * ends[i])
             figures[name] = float(value[i])
             continue
         bounds = candidate.keys()[name]
@@ -182,10 +214,29 @@ def _as_written(
             slope[i] = -1.0 / max(value[i], 1e-12) ** 2
             value[i], low[i], high[i] = 1.0 / np.maximum([value[i], high[i], low[i]], 1e-12)
         told.append(f"{effect}.{parameter}")
-    return Joint(
+    return JointFit(
         dict(theta), tuple(told), value, low, high, covariance * np.outer(slope, slope), figures,
         (enumerated(remarks),) if remarks else (),
     )  # fmt: skip
+
+
+def _far(problem: Problem, name: str, value: float, low: float, high: float) -> str:
+    """That a figure of a rig differs from the one given by more than it may; empty where not."""
+    model = getattr(problem, "model", None)
+    if name not in TOLD or model is None:
+        return ""
+    effect, figure = name.rsplit(".", 1)
+    if abs(value - 1.0) < FAR * model.effect(effect).tolerances().get(figure, 0.0):
+        return ""
+    off = f"{value:.4g} ({low:.4g} to {high:.4g}) times the one given"
+    return f"{name} is {off}: more than it may differ by itself, as an area or a sensor's scale may"
+
+
+def _nominal(model: Model, effect: str, figure: str) -> Any:
+    """The value of a figure of a model's effect: a number, a table, or (`fill[0]`) an entry."""
+    name, _, entry = figure.partition("[")
+    value = model.effect(effect).value(name)
+    return float(value[int(entry[:-1])]) if entry else value
 
 
 def _is_factor(problem: Problem, name: str) -> bool:
