@@ -13,10 +13,10 @@
 # Why it matters: seals are measured in strokes of about 10 mm/s, there and back; half the difference
 # of force is read as Coulomb friction. On a MuJoCo twin that reading finds viscous damping instead,
 # at any time step, and a tool that is judged by such a twin is marked wrong for the right answer.
-# For dry friction at low speed use noslip_iterations, or solimpfriction close to 1.
+# For dry friction at low speed use noslip_iterations, or a first solimpfriction close to 1.
 #
-# Read: MuJoCo's documentation, "Computation" (friction loss as a soft constraint) and XML reference
-# (joint/frictionloss, solreffriction, solimpfriction; option/noslip_iterations, off by default).
+# Read: MuJoCo's documentation, "Modeling" (solver parameters of friction; slow slippage, told of
+# contacts, without figures), XML reference (joint/frictionloss; noslip_iterations, off by default).
 set -euo pipefail
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
