@@ -1,21 +1,21 @@
 #!/usr/bin/env bash
 # Gradients through CasADi's cvodes: the state is integrated to 1e-10, the gradient to no tolerance.
 #
-# Guess, written before the run: derivatives through integrator("cvodes") are as good as its abstol and
-# reltol; jacobian() of several parameters at once equals the directions one by one; forward and
-# reverse mode agree.
+# Guess, written before the run: the Jacobian of cvodes in one to six parameters at once equals the
+# directions one by one, to tolerance.
 #
 # Seen (casadi 3.8.2): forward mode does. Reverse mode, which gradient() takes, and jacobian() where
-# parameters outnumber outputs, is off at any tolerance. A parameter's gradient is a quadrature along
-# the adjoint, and quad_err_con is off by default: steps are chosen for the adjoint alone. Where that is
-# smooth and the forcing is not, the quadrature steps over it. A mass pushed by four sines of 3 to
-# 12 Hz, tolerances 1e-10: gradients are 1.00, 0.95, 0.74 and 0.58 of the true ones. A damped pendulum
-# pushed at 5 to 30 Hz, default tolerances: thousands of times too large, of either sign.
-# quad_err_con=True mends both.
+# parameters outnumber outputs, is off at any tolerance. A parameter's gradient is a quadrature
+# along the adjoint, and quad_err_con is off by default: steps are chosen for the adjoint alone.
+# Where that is smooth and the forcing is not, the quadrature steps over it. A mass pushed by four
+# sines of 3 to 12 Hz, tolerances 1e-10: gradients are 1.00, 0.95, 0.74 and 0.58 of the true ones. A
+# damped pendulum pushed at 5 to 30 Hz, default tolerances: thousands of times too large, of either
+# sign. quad_err_con=True mends both.
 #
-# Why it matters: valves are pulsed and measured pressures are fast; a fit of many parameters to a rig's
-# run, or shooting over a profile of pressures, asks for just this gradient. Optimisers then stall or
-# wander as with noise. Set quad_err_con, or check one gradient against one forward direction.
+# Why it matters: valves are pulsed and measured pressures are fast; a fit of many parameters to a
+# rig's run, or shooting over a profile of pressures, asks for just this gradient. Optimisers then
+# stall or wander as with noise. Set quad_err_con, or check one gradient against one forward
+# direction.
 #
 # Read: CasADi's reference of integrator (quad_err_con: "Should the quadratures affect the step size
 # control"), its issue 4383 (seen there with three parameters and more), SUNDIALS' CVODES user guide
@@ -37,18 +37,21 @@ x, t = ca.MX.sym("x", 2), ca.MX.sym("t")
 
 
 def gradients(hertz, count, restoring, start, **options):
-    """Slopes of the place after 1 s in the amplitudes of the push: reverse, forward, place itself."""
+    """Slopes of the place after 1 s in the push's amplitudes, reverse and forward; the place."""
     p, wish = ca.MX.sym("p", count), ca.MX.sym("wish", count)
     push = sum(p[k] * ca.sin(2 * np.pi * hertz * (k + 1) * t + 0.3 * k) for k in range(count))
     law = {"x": x, "p": p, "t": t, "ode": ca.vertcat(x[1], push + restoring)}
     run = ca.integrator("run", "cvodes", law, 0, 1.0, options)
     place = run(x0=start, p=wish)["xf"][0]
     reverse = ca.Function("reverse", [wish], [ca.gradient(place, wish)])
-    forward = ca.Function("forward", [wish], [ca.horzcat(*(
-        ca.jtimes(place, wish, ca.DM(np.eye(count)[:, k])) for k in range(count)))])
+    forward = ca.Function(
+        "forward",
+        [wish],
+        [ca.horzcat(*(ca.jtimes(place, wish, ca.DM(np.eye(count)[:, k])) for k in range(count)))],
+    )
     at = np.ones(count)
-    return tuple(np.array(of(at)).ravel() for of in (reverse, forward)) + (
-        lambda amplitudes: float(run(x0=start, p=amplitudes)["xf"][0]),)
+    slopes = [np.array(of(at)).ravel() for of in (reverse, forward)]
+    return *slopes, lambda amplitudes: float(run(x0=start, p=amplitudes)["xf"][0])
 
 
 mass = -0.5 * x[1]

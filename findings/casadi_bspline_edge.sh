@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
 # A map's last row, read by a B-spline, under IPOPT: the worst point is returned as the optimum.
 #
-# Guess, written before the run: outside its grid a cubic `interpolant` goes on with the polynomial
-# of its last piece, as scipy.interpolate.CubicSpline does (`linear` goes on with its last line); a
-# bound that ends where the table ends keeps IPOPT on good ground.
+# Guess, written before the run: outside its grid a B-spline `interpolant` goes on with the
+# polynomial of its last piece, as scipy.interpolate.CubicSpline does; `linear` goes on with its
+# last line.
 #
 # Seen (casadi 3.8.2 with its IPOPT; 3.6.7 alike): outside the grid the B-spline is 0 and so are its
 # slopes. IPOPT widens bounds by bound_relax_factor (1e-8) before it begins, so the table's last row
@@ -14,8 +14,8 @@
 # it finds the full flow.
 #
 # Why it matters: torque-speed maps of motors and flow maps of valves are tables that end at the
-# bound, and full torque and full flow are what the best jumps ask for. Give tables a row beyond
-# the bound; a plan that is feasible, converged and weak may stand on such an edge.
+# bound, and full torque and full flow are what the best jumps ask for. Give tables a row beyond the
+# bound; a plan that is feasible, converged and weak may stand on such an edge.
 #
 # Read: CasADi's reference of `interpolant` (nothing on points outside), IPOPT's options reference
 # (bound_relax_factor, honor_original_bounds).
@@ -52,14 +52,20 @@ def largest(start, grid=opening, rows=flow, scale=1.0, **options):
 
 outside = 1 + 1e-9
 print("flow and slope at 1:        bspline", at("bspline", 1.0), "linear", at("linear", 1.0))
-print("flow and slope at 1 + 1e-9: bspline", at("bspline", outside), "linear", at("linear", outside))
+print(
+    "flow and slope at 1 + 1e-9: bspline", at("bspline", outside), "linear", at("linear", outside)
+)
 print("scipy CubicSpline at 1 + 1e-9:", round(float(CubicSpline(opening, flow)(outside)), 3))
 edge = [largest(start) for start in (0.1, 0.5, 0.9)]
 scaled = largest(0.5, scale=200.0)
 kept = largest(0.5, **{"ipopt.bound_relax_factor": 0.0})
 longer = largest(0.5, [*opening, 1.25], [*flow, 1.1])
-for name, seen in (*(("table ends at the bound", one) for one in edge), ("the same times 200", scaled),
-                   ("bounds not widened", kept), ("one row beyond", longer)):
+for name, seen in (
+    *(("table ends at the bound", one) for one in edge),
+    ("the same times 200", scaled),
+    ("bounds not widened", kept),
+    ("one row beyond", longer),
+):
     print(f"{name:24s} {seen[0]}, opening {seen[1]:.9f}, share of full flow {seen[2]:.6f}")
 
 if at("bspline", outside) != (0.0, 0.0):

@@ -1,9 +1,8 @@
 #!/usr/bin/env bash
 # CasADi's integrators with events: impacts sought in three tries, and slopes that are not slopes.
 #
-# Guess, written before the run: an event is located within event_tol, more finite elements locate
-# it better, and jacobian() through the impact has the jump of slopes (saltation) in it: a bouncing
-# mass is differentiable in its height, its speed and its restitution.
+# Guess, written before the run: events are found within the tolerances, and the Jacobian through an
+# event has the jump of slopes (saltation) in it, so a bouncing mass is differentiable in its start.
 #
 # Seen (casadi 3.8.2; `zero` and `transition` are called experimental by a warning):
 # - An event is sought between two *output times* by at most max_event_iter = 3 tries. If they do
@@ -18,8 +17,8 @@
 # the contacts need, raise max_event_iter, and take derivatives of impacts by time-switching phases
 # (each a smooth integrator, its duration a variable) or by differences.
 #
-# Read: CasADi's reference of `integrator` (options only); its issues 3682 (design of events),
-# 4303 (derivatives with events are open), 4393 (idas passes events without a word).
+# Read: CasADi's reference of `integrator` (options only); its issues 3682 (design of events), 4303
+# (derivatives with events are open), 4393 (idas passes events without a word).
 set -euo pipefail
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
@@ -36,8 +35,11 @@ x, e = ca.MX.sym("x", 2), ca.MX.sym("e")
 ball = {"x": x, "p": e, "ode": ca.vertcat(x[1], -gravity), "zero": x[0]}
 none = [ca.MX.sym(name, size) for name, size in (("index", 1), ("t", 1), ("z", 0), ("u", 0))]
 bounce = ca.Function(
-    "bounce", [none[0], none[1], x, none[2], e, none[3]], [ca.vertcat(0, -e * x[1])],
-    ["index", "t", "x", "z", "p", "u"], ["post_x"],
+    "bounce",
+    [none[0], none[1], x, none[2], e, none[3]],
+    [ca.vertcat(0, -e * x[1])],
+    ["index", "t", "x", "z", "p", "u"],
+    ["post_x"],
 )
 print("casadi", ca.__version__)
 
@@ -56,8 +58,11 @@ def one_second(elements, tries, tolerance):
     return np.array(drop(x0=[height, 0], p=restitution)["xf"]).ravel()
 
 
-coarse = [one_second(elements, None, tolerance)
-          for elements in (20, 200, 2000) for tolerance in (1e-6, 1e-12)]
+coarse = [
+    one_second(elements, None, tolerance)
+    for elements in (20, 200, 2000)
+    for tolerance in (1e-6, 1e-12)
+]
 print("after 1 s, exact:                ", exact(1.0))
 for row in coarse:
     print("rk, one output, default tries:   ", row)
@@ -80,12 +85,16 @@ asked = {
     "reverse, in drop height": ca.gradient(height_after, start)[0],
     "reverse, in restitution": ca.gradient(height_after, ratio),
 }
-slopes = {name: float(ca.Function("slope", [start, ratio], [of])([height, 0], restitution))
-          for name, of in asked.items()}
+slopes = {
+    name: float(ca.Function("slope", [start, ratio], [of])([height, 0], restitution))
+    for name, of in asked.items()
+}
 step = 1e-4
 true = {
-    "drop height": (last(height + step, restitution) - last(height - step, restitution))[0] / (2 * step),
-    "restitution": (last(height, restitution + step) - last(height, restitution - step))[0] / (2 * step),
+    "drop height": (last(height + step, restitution) - last(height - step, restitution))[0]
+    / (2 * step),
+    "restitution": (last(height, restitution + step) - last(height, restitution - step))[0]
+    / (2 * step),
 }
 print("after 0.8 s, exact:", exact(0.8), " cvodes, output every 10 ms:", last(height, restitution))
 for name, of in true.items():

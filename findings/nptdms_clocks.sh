@@ -1,24 +1,24 @@
 #!/usr/bin/env bash
 # TDMS: three ways in which one rig's channels lose their common time in npTDMS' data frames.
 #
-# Guess, written before the run: as_dataframe(time_index=True) puts channels of one rate into common
-# rows, short ones with NaN at their end; different start times are lost, as each channel counts from
-# its own zero (npTDMS' issue 262). time_track(absolute_time=True) of a recording that was stopped
-# and started again shows the pause.
+# Guess, written before the run: as_dataframe(time_index=True) lets channels with other start times
+# each begin at 0 (npTDMS' issue 262), puts channels of one rate into common rows, and fills short
+# ones with NaN at their end.
 #
 # Seen (nptdms 1.13.0, pandas 3.1.1):
-# - The second is so: channels that began 250 ms apart both begin at 0.
-# - The first is wrong. Times come from linspace over each channel's own length, and 3 * 0.1 / 3 and
-#   4 * 0.1 / 4 differ in the last digit. Of two channels at 10 Hz with 5 and 4 values, two rows
+# - The first is so: channels that began 250 ms apart both begin at 0.
+# - Common rows are not. Times come from linspace over each channel's own length, and 3 * 0.1 / 3
+#   and 4 * 0.1 / 4 differ in the last digit. Of two channels at 10 Hz with 5 and 4 values, two rows
 #   coincide and the others do not: seven rows instead of five. At 10 kHz, 12345 and 12340 values
-#   share 1998 rows. It hangs on the lengths: of random pairs at 10 kHz 28 % lose most of their common
-#   rows, at 1 kHz hardly any (300 pairs of 1000 to 100000 values each, by a trial of linspace alone).
+#   share 1998 rows. It hangs on the lengths: of random pairs at 10 kHz 28 % lose most of their
+#   common rows, at 1 kHz hardly any (300 pairs of 1000 to 100000 values each, by a trial of
+#   linspace alone).
 # - The pause is lost: a channel has one wf_start_time, that of its last segment. All rows of the
 #   first recording are dated from the start of the second, without a pause.
 #
 # Why it matters: acquisition that starts module after module, or is stopped between trials, is
-# usual with LabVIEW. dropna() after the first leaves a few accidental rows, interpolation hides them;
-# delays between valve and pressure are fitted to shifts that the reader made. Reckon time as
+# usual with LabVIEW. dropna() after the first leaves a few accidental rows, interpolation hides
+# them; delays between valve and pressure are fitted to shifts that the reader made. Reckon time as
 # wf_start_time + wf_start_offset + n * wf_increment, segment by segment, in integer nanoseconds.
 #
 # Read: npTDMS' documentation (time_track, as_dataframe), its issues 41 and 262.
@@ -40,9 +40,17 @@ print("nptdms", version("nptdms"), "pandas", version("pandas"))
 
 
 def channel(name, size, step=0.1, later_ms=0, first=0.0):
-    return ChannelObject("rig", name, first + np.arange(size, dtype=float), properties={
-        "wf_start_time": begin + np.timedelta64(later_ms, "ms"),
-        "wf_start_offset": 0.0, "wf_increment": step, "wf_samples": size})
+    return ChannelObject(
+        "rig",
+        name,
+        first + np.arange(size, dtype=float),
+        properties={
+            "wf_start_time": begin + np.timedelta64(later_ms, "ms"),
+            "wf_start_offset": 0.0,
+            "wf_increment": step,
+            "wf_samples": size,
+        },
+    )
 
 
 def written(*segments):
@@ -59,8 +67,12 @@ long = written([channel("valve", 12345, 1e-4), channel("pressure", 12340, 1e-4)]
 common = long.as_dataframe(time_index=True).dropna()
 print("two channels at 10 kHz, 12345 and 12340 values:", len(common), "rows with both")
 late = written([channel("valve", 4), channel("pressure", 4, later_ms=250)])
-print("begun 250 ms apart, first times:", [float(late[name].time_track()[0]) for name in ("valve", "pressure")],
-      "rows with both:", len(late.as_dataframe(time_index=True).dropna()))
+print(
+    "begun 250 ms apart, first times:",
+    [float(late[name].time_track()[0]) for name in ("valve", "pressure")],
+    "rows with both:",
+    len(late.as_dataframe(time_index=True).dropna()),
+)
 again = written([channel("valve", 3)], [channel("valve", 3, later_ms=60000, first=100.0)])
 times = again["valve"].time_track(absolute_time=True)
 print("stopped, started again a minute later:", times[0], "to", times[-1])
@@ -71,6 +83,9 @@ if len(common) > 6000:
     sys.exit("changed: at 10 kHz most rows are now shared")
 if len(late.as_dataframe(time_index=True).dropna()) != 4:
     sys.exit("changed: start times are no longer ignored")
-if times[0] != begin + np.timedelta64(60, "s") or (np.diff(times) > np.timedelta64(101, "ms")).any():
+if (
+    times[0] != begin + np.timedelta64(60, "s")
+    or (np.diff(times) > np.timedelta64(101, "ms")).any()
+):
     sys.exit("changed: the pause between two recordings is now in the times")
 EOF

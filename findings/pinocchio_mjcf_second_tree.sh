@@ -1,9 +1,8 @@
 #!/usr/bin/env bash
 # A closed loop in MJCF: Pinocchio reads the first body of the world and drops the others.
 #
-# Guess, written before the run: every body of `worldbody` is read, as a branch at the universe; a
-# cylinder with its rod, a tree of its own that is joined to the leg by `equality/connect`, is
-# there; what a reader cannot represent, it refuses.
+# Guess, written before the run: a world with two bodies is read with both; an `equality/connect`
+# becomes a constraint or is left out.
 #
 # Seen (pin 4.1.0, mujoco 4.0.0): buildModelFromMJCF keeps the first body and what hangs on it. The
 # second tree, its joints and its mass are gone without a word: one joint of three, 3 kg of 3.8 kg.

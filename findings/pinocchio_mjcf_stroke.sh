@@ -1,11 +1,10 @@
 #!/usr/bin/env bash
 # One MJCF file, two strokes: Pinocchio turns the metres of slide joints from degrees into radians.
 #
-# Guess, written before the run: `compiler angle="degree"` (MJCF's default) is about angles; both
-# MuJoCo and Pinocchio read `range` of a slide joint in metres, and `limited="false"` lifts it.
+# Guess, written before the run: of one MJCF file MuJoCo and Pinocchio make the same model.
 #
-# Seen (pin 4.1.0, mujoco 4.0.0): Pinocchio multiplies the range of *every* joint by
-# pi/180. A stroke of 0.1 m becomes 1.7 mm, a base height of 0.2 to 1.2 m becomes 3.5 to 21 mm.
+# Seen (pin 4.1.0, mujoco 4.0.0): Pinocchio multiplies the range of *every* joint by pi/180. A
+# stroke of 0.1 m becomes 1.7 mm, a base height of 0.2 to 1.2 m becomes 3.5 to 21 mm.
 # `limited="false"` is not read: the range stays a limit. MuJoCo reads both as its reference says.
 # Masses, places of bodies, armature and friction loss of the same file agree to rounding. With
 # `angle="radian"` the ranges agree too.

@@ -1,15 +1,15 @@
 #!/usr/bin/env bash
 # A planar loop closed by a point: Pinocchio's constraint dynamics answers nan, and raises nothing.
 #
-# Guess, written before the run: three links that move in a plane, closed by a 3D point constraint:
-# the row across the plane is empty, and constraintDynamics with its default settings either raises
-# or finds the least force, as a proximal solver should; loop accelerations are closed to 1e-8.
+# Guess, written before the run: for three links that move in a plane, closed by a 3D point
+# constraint whose row across the plane is empty, constraintDynamics with its default settings
+# raises or finds the least force; accelerations of the loop are closed to 1e-8.
 #
-# Seen (pin 4.1.0): the default ProximalSettings have mu = 0 and one iteration, so there is no proximal
-# term at all. With the empty row the accelerations are nan, without error or warning; a 6D closure of
-# the same loop likewise. With mu = 1e-6 and ten iterations they are right to 1e-12 of the reference
-# (pseudo-inverse of the same Jacobian); one iteration with mu = 1e-2 is off by 2 %, and says so only
-# in settings.absolute_residual.
+# Seen (pin 4.1.0): the default ProximalSettings have mu = 0 and one iteration, so there is no
+# proximal term at all. With the empty row the accelerations are nan, without error or warning; a 6D
+# closure of the same loop likewise. With mu = 1e-6 and ten iterations they are right to 1e-12 of
+# the reference (pseudo-inverse of the same Jacobian); one iteration with mu = 1e-2 is off by 2 %,
+# and says so only in settings.absolute_residual.
 #
 # Why it matters: hip, knee, cylinder and rod are such a loop, in every leg with a linear actuator,
 # and a sagittal robot on a boom is planar as a whole. Give ProximalSettings with mu > 0 and several
@@ -51,7 +51,8 @@ def accelerations(kind, settings=None):
     pin.computeJointJacobians(model, data, q)
     tip = at(0, -1)
     closure = pin.RigidConstraintModel(
-        kind, model, left, tip, across, data.oMi[across].inverse() * data.oMi[left] * tip, pin.LOCAL)
+        kind, model, left, tip, across, data.oMi[across].inverse() * data.oMi[left] * tip, pin.LOCAL
+    )
     closures, states = pin.StdVec_RigidConstraintModel(), pin.StdVec_RigidConstraintData()
     closures.append(closure)
     states.append(closure.createData())
@@ -70,7 +71,9 @@ def accelerations(kind, settings=None):
 
 kinds = {"point (3D)": pin.ContactType.CONTACT_3D, "frame (6D)": pin.ContactType.CONTACT_6D}
 plain = {name: accelerations(kind) for name, kind in kinds.items()}
-soft = {name: accelerations(kind, pin.ProximalSettings(1e-12, 1e-6, 10)) for name, kind in kinds.items()}
+soft = {
+    name: accelerations(kind, pin.ProximalSettings(1e-12, 1e-6, 10)) for name, kind in kinds.items()
+}
 once = pin.ProximalSettings(1e-12, 1e-2, 1)
 rough = accelerations(kinds["point (3D)"], once)
 for name in kinds:
