@@ -5,12 +5,12 @@
 # right to 1e-6, also with an active bound.
 #
 # Seen (casadi 3.8.2 and 3.6.7): for a quadratic program with finite bounds, none of them active,
-# both end in "Evaluation failed" and no further word. CasADi takes each bound with a multiplier
-# other than 0 as active, up to option min_lam, which is 0; an interior-point method returns 1e-10
-# for all of them, so more rows than variables are active. With min_lam = 1e-8 derivatives are
-# right. At a bound that is active by a hair, multiplier 1e-4, min_lam decides the answer: slope 0
-# below, slope 1 above, nothing between. sqpmethod, whose multipliers are exact zeros, needs no
-# option.
+# Jacobian and slope of the cost end in "Evaluation failed" and no further word. CasADi takes each
+# bound with a multiplier other than 0 as active, up to option min_lam, which is 0; an
+# interior-point method returns 1e-10 for all of them, so more rows than variables are active. With
+# min_lam = 1e-8 derivatives are right. At a bound that is active by a hair, multiplier 1e-4,
+# min_lam decides the answer: slope 0 below, slope 1 above, nothing between. sqpmethod, whose
+# multipliers are exact zeros, needs no option.
 #
 # Why it matters: sensitivities of a plan to mass, pressure or friction are such derivatives. Set
 # min_lam between the barrier's 1e-10 and the multipliers that mean something, and say which bounds
