@@ -10,7 +10,7 @@
 # Where that is smooth and the forcing is not, the quadrature steps over it. A mass pushed by four
 # sines of 3 to 12 Hz, tolerances 1e-10: gradients are 1.00, 0.95, 0.74 and 0.58 of the true ones. A
 # damped pendulum pushed at 5 to 30 Hz, default tolerances: thousands of times too large, of either
-# sign. quad_err_con=True mends both.
+# sign. quad_err_con=True mends both. Gradients through idas are off alike.
 #
 # Why it matters: valves are pulsed and measured pressures are fast; a fit of many parameters to a
 # rig's run, or shooting over a profile of pressures, asks for just this gradient. Optimisers then
