@@ -10,11 +10,10 @@
 # Order 7 keeps levels. ftype="fir" keeps them in the middle and halves them at the ends, as it
 # reckons with zeros beyond the record.
 #
-# Why it matters: rigs record at 10 kHz and fits read at 1 kHz. Pressure, force and position of one
-# log then share a scale of 0.98855 and their *rates* do too (nothing there tells), while stiffness
-# times position no longer matches a weight. A supply at rest reads 1 % low; a fit of chamber area
-# or gain reads 1 % from channels that went through decimate and others that did not. Published
-# slopes of the force of pneumatic cylinders are argued at 1 %.
+# Why it matters: rigs record at 10 kHz and fits read at 1 kHz. A supply at rest reads 1 % low, and
+# a fit of area or gain finds 1 % between channels that went through decimate and others that did
+# not; gains of 1.009 and 1.013 between force and pressure times area (docs/real-data.md) are of
+# this size. Channels that all went through it agree with each other and with no scale.
 #
 # Read: SciPy's reference of decimate (filter named, gain not), of cheby1 (even orders: gain below 1
 # at zero frequency); SciPy's issues 9402 and 17042 (open).
