@@ -14,7 +14,6 @@ sys.path.insert(0, str(ROOT / "benchmarks"))
 
 import full_plant_page
 import learning_page
-import more_plans
 import robustness_page
 
 from kemba.scenarios.draw import load_uncertainties
@@ -98,12 +97,3 @@ def test_figures_of_the_full_plant_stand_beside_the_truth() -> None:
     assert "| `payload` m | not in the plant | not named | 0.1 (0.1 to 0.1) kg |" in text
     assert "| a | missing | 2.40 | 0.90 | - | 0.90 | - | 90 |" in text
     assert text.endswith("0 of 2 intervals contain the plant's figure.")
-
-
-def test_the_page_of_the_shelf_has_the_order_of_its_index() -> None:
-    rows = more_plans.shelf_rows()
-    assert rows == sorted(rows, key=more_plans.sorted_by)
-    for index, line in rows:
-        figures, cells = index[2:7], [cell.strip() for cell in line.strip("|").split("|")]
-        assert [float(f or -1) for f in figures] == [float(c or -1) for c in cells[1:6]]
-        assert float(cells[10]) == pytest.approx(float(index[7]), rel=5e-3)

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import casadi as ca
 import numpy as np
 
-from kemba.ocp.phases.independent import Independent
+from kemba.ocp.phases.independent import ContradictionError, Independent
 from kemba.ocp.phases.modes import HELD
 from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.view import View
 from kemba.ocp.task.requirement import Requirement, apex_node, quantity_expression
-from kemba.ocp.transcription.stage import aim_cost, as_variable
+from kemba.ocp.transcription.stage import aim_cost, as_variable, tighter_bounds
 
 INF = np.inf
 
@@ -66,8 +66,10 @@ def _put(
             ((requirement.lower - offset) / factor, (requirement.upper - offset) / factor)
         )
         at = [z[index] for z in columns]
-        program.lower[at] = np.maximum(program.lower[at], ends[0])
-        program.upper[at] = np.minimum(program.upper[at], ends[1])
+        tighter = tighter_bounds(program.lower[at], program.upper[at], ends)
+        if tighter is None:
+            raise ContradictionError(f"other bounds exclude `{requirement.text}`")
+        program.lower[at], program.upper[at] = tighter
         return
     scale = requirement.scale
     label = f"{requirement.text}:{requirement.quantity.name}"

@@ -17,6 +17,7 @@ from kemba.ocp.transcription.symmetry import Reduction
 
 ANGLE_ARM = 0.2  # m; turns a moment defect into a force defect
 COST_SCALE = 10.0  # N2.m2.s; makes a plan's cost 0.01 to 10 beside penalties near one
+ROUNDED = 1e-9  # of a scaled variable
 AIM = 3.0  # of the scaled cost, for a scale of a quantity that is to be large or small
 
 INF = np.inf
@@ -187,6 +188,19 @@ def as_variable(g: ca.SX, y: ca.SX) -> tuple[int, float, float] | None:
     index = jacobian.sparsity().get_triplet()[1][0]
     offset = float(ca.evalf(ca.substitute(g, y, ca.SX.zeros(y.numel()))))
     return index, factor, offset
+
+
+def tighter_bounds(
+    lower: np.ndarray, upper: np.ndarray, ends: Sequence[float]
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """Bounds (n,) of variables within both ends as well; equal where they cross by rounding only.
+    None where they cross by more: no solver takes such bounds, but a row says what is asked."""
+    low, high = np.maximum(lower, ends[0]), np.minimum(upper, ends[1])
+    if (low - high > ROUNDED).any():
+        return None
+    crossed = low > high
+    low[crossed] = high[crossed] = 0.5 * (low[crossed] + high[crossed])
+    return low, high
 
 
 def bounded_below(g: ca.SX, y: ca.SX, layout: Layout) -> bool:

@@ -40,6 +40,7 @@ from kemba.ocp.transcription.stage import (
     as_variable,
     bounded_below,
     build_stage,
+    tighter_bounds,
 )
 from kemba.ocp.transcription.symmetry import Reduction
 
@@ -133,8 +134,7 @@ class Transcription:
         if 0 in where:
             self.held.append(Held(g, requirement.lower, requirement.upper))
         variable = as_variable(g, self.stage.y)
-        if variable is not None:
-            self._tighten(where, variable, requirement)
+        if variable is not None and self._tighten(where, variable, requirement):
             return None
         rows = _requirement_row(g, requirement)
         at = index[where, : self.layout.size]
@@ -213,13 +213,17 @@ class Transcription:
 
     def _tighten(
         self, where: list[int], variable: tuple[int, float, float], requirement: Requirement
-    ) -> None:
+    ) -> bool:
+        """Whether the bounds of a variable can say a requirement; if so they do."""
         index, factor, offset = variable
         ends = sorted(
             ((requirement.lower - offset) / factor, (requirement.upper - offset) / factor)
         )
-        self.lower[where, index] = np.maximum(self.lower[where, index], ends[0])
-        self.upper[where, index] = np.minimum(self.upper[where, index], ends[1])
+        tighter = tighter_bounds(self.lower[where, index], self.upper[where, index], ends)
+        if tighter is None:
+            return False
+        self.lower[where, index], self.upper[where, index] = tighter
+        return True
 
     @property
     def variables(self) -> int:
