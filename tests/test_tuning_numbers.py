@@ -54,7 +54,6 @@ CONSTANTS = {  # file -> names, why
     "plant/execution/repeat.py": ("VALVE_SCATTER", "scatter of the robot's valves"),
     "plant/execution/controller.py": ("PERIOD", "rate of the robot's controller"),
     "ocp/nlp/stagnation.py": ("USUAL", "iterations of which a median is taken"),
-    "ocp/phases/stretched.py": ("PARTS", "of a phase: before the pulse, the pulse, after it"),
     "ocp/controller.py": ("PERIOD", "rate of the robot's controller"),
     "ocp/shipped/kind.py": ("LETTERS", "length of a fingerprint"),
     "effects/rigs/axis.py": ("PLATE", "tolerance of an effect's figures"),
