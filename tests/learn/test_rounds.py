@@ -53,7 +53,7 @@ def test_one_round(planned: Path, tmp_path: Path) -> None:
     assert found["good"] and found["compare_after"] < 0.8 * found["compare_before"]
     assert found["executed_apex_error_m"] == pytest.approx(before[0], abs=5e-4)
     assert abs(found["expected_apex_error_m"]) < 2e-3
-    assert "there is one log only" in found["sentence"]
+    assert "is one log only" in found["sentence"]
     band = found["next_expected"]
     after = executed(tmp_path / "run-1", machine, tmp_path / "again", repeats=1)
     target = band["apex_m"] - found["expected_apex_error_m"]
