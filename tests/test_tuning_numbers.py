@@ -92,6 +92,7 @@ CONSTANTS = {  # file -> names, why
     "identify/workflow.py": ("QUOTED", "logs of which one is kept aside"),
     "identify/doubt/predictive.py": ("ANY STRONG SAME", "evidence; rounding of a fit"),
     "identify/written/scatter.py": ("BLOCKS DISAGREE TELLS OF_A_RUN", "counts and a p-value"),
+    "learn/aim.py": ("TURNED", "beyond any other error"),
     "learn/expected.py": ("DRAWN FEWEST", "models that are drawn"),
     "model/evidence.py": ("ROUNDING WIDER", "rounding; noise of a span's ends"),
     "identify/logs/settings.py": ("RANGES", "physical limits of channels, by name"),

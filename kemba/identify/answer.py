@@ -54,7 +54,7 @@ class Ranked:
 
 @dataclass(frozen=True)
 class Covariance:
-    """Joint covariance of parameters (`effect.parameter`), in SI units, row by row."""
+    """JointFit covariance of parameters (`effect.parameter`), in SI units, row by row."""
 
     names: tuple[str, ...]
     matrix: tuple[tuple[float, ...], ...]

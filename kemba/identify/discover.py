@@ -138,6 +138,9 @@ def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> 
     whole = told_by_figures(search.problem, whole, search.points[whole].fit.theta)
     belief, whole = quoted(search, belief, whole, kept)
     best, p_value, ended = belief.best, belief.p_value, ended or search.late
+    for hypothesis in filter(None, (best, whole)):
+        search.visit(hypothesis)
+    search.refresh()
     if test.too_short:
         return _undecided(search, test, kept)
     # what is too small to be reported still explains: a formula must do better than with it

@@ -21,6 +21,7 @@ from kemba.identify.written.adopt import COVARIANCE, reference, write_model
 from kemba.identify.written.quoted import measured_in, noise_ratio, plant_of
 from kemba.logs import load_map
 from kemba.model import Model, load_model
+from kemba.model.spec import evidence_faults
 from kemba.trajectory import Trajectory
 
 Paths = Sequence[str | Path]
@@ -54,7 +55,7 @@ def discover_logs(
         checked = [*check_all([*fitted, *kept], built), *limits_of(fitted)]
         say("finding the motion in the logs")
         problem, remarks = admitted(fitted, built)
-        remarks = [*said, *built.remarks, *checked, *remarks]
+        remarks = [*said, *evidence_faults(model), *built.remarks, *checked, *remarks]
         judge = make_problem(excerpts(kept)[0], built) if kept else None
         left = time_limit - (time.monotonic() - started)
         found = discover(problem, judge, left, say)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from math import inf, isfinite
 
 import numpy as np
@@ -13,8 +14,8 @@ from kemba.learn.flight import FlownJump, flight_of
 from kemba.model import Model
 from kemba.plant.execution.certificate import rest_after
 from kemba.plant.execution.controller import execute, read_controller
-from kemba.plant.execution.moved_edges import edges_of, neighbours
-from kemba.plant.execution.retiming import RetimingSettings
+from kemba.plant.execution.moved_edges import Group, edges_of, shared_edges, single_edges
+from kemba.plant.execution.retiming import ExecutedTable, RetimingSettings, Roundings
 from kemba.plotting.robot.machine import Machine
 from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Trajectory
@@ -23,11 +24,14 @@ from kemba.trajectory import Trajectory
 class AimSettings(Settings):
     """How a table is corrected: by moving valve edges, which sets push duration and landing."""
 
-    apex = 1e-3  # apex error that needs no search [m]
+    apex = 0.5e-3  # apex error that needs no search [m]
     touchdown = 3e-3  # touchdown error that needs no search [s]
     pitch = 0.009  # pitch at touchdown, beyond the plan's, that a moved edge may make [rad]
     moved: int = setting(8, "ms", "by which an edge moves at most", CHOSEN, decides=True)
     executions = 60  # simulations at most
+
+
+TURNED = 100.0  # error of a table that turns the body: more than of any other that lands
 
 
 @dataclass(frozen=True)
@@ -67,58 +71,70 @@ class Aim:
         return flight, lands
 
     def corrected(self, table: Trajectory) -> Aimed:
-        """The table with valve edges moved tick by tick as long as it is expected to come nearer
-        to the plan."""
-        settings = AimSettings.current()
-        table = read_controller(table)
-        rest, first = rest_after(self.model, self.plan, table), table
+        """The table with valve edges moved by ticks, as `retiming` chooses them, such that it is
+        expected to come nearest to the plan."""
+        first = read_controller(table)
+        rest = rest_after(self.model, self.plan, first)
         wanted = flight_of(self.plan, self.machine)
-        turn = self._turn(table, rest, wanted)
-        best, must_land = self._miss(table, rest, wanted, turn)
-        left = settings.executions
-        while best > 1.0 and left > 0:
-            nearest, choice = best, None
-            for trial in neighbours(table):
-                if left <= 0 or not _within(first, trial, settings.moved):
-                    continue
-                left -= 1
-                miss, lands = self._miss(trial, rest, wanted, turn)
-                if miss < nearest and (lands or not must_land):
-                    nearest, choice = miss, trial
-                    if miss < 0.7 * best:
-                        break  # good progress: go on from here
-            if choice is None:
-                break
-            best, table = nearest, choice
-        return Aimed(table, self.expected(table, rest)[0], _moved(first, table))
+        turn, must = self._limits(first, rest, wanted)
+        run = partial(self._tried, first=first, rest=rest, wanted=wanted, turn=turn, must=must)
+        search = Roundings(run, AimSettings.executions)
+        best, before = search.tried(first), inf
+        while 1.0 < best.error < before and search.left > 0:
+            before = best.error
+            for edges in (shared_edges(first), single_edges(first)):
+                groups = [group for group in edges if not _begins(first, group) > wanted.touchdown]
+                best = search.around(best, groups) if groups else best
+        return Aimed(best.table, self.expected(best.table, rest)[0], _moved(first, best.table))
 
-    def _turn(self, table: Trajectory, rest: float, wanted: FlownJump) -> float:
-        """The largest pitch [rad] beyond the plan's that a corrected table may touch down with:
-        that of the table as it is, at least."""
-        most = AimSettings.current().pitch
-        try:
-            turned = abs(self.expected(table, rest)[0].pitch - wanted.pitch)
-        except KembaError:
-            return most
-        return max(turned, most) if isfinite(turned) else most
-
-    def _miss(
-        self, table: Trajectory, rest: float, wanted: FlownJump, turn: float
-    ) -> tuple[float, bool]:
-        """The root of squared errors in units of what needs no search, and whether it lands; a
-        table that turns the body by more than `turn` [rad] counts as fallen."""
-        settings, fallen = AimSettings.current(), RetimingSettings.current().fallen
+    def _limits(self, table: Trajectory, rest: float, wanted: FlownJump) -> tuple[float, bool]:
+        """The largest pitch [rad] beyond the plan's that a corrected table may touch down with, at
+        least that of the table as it is; and whether it must land, as that one does."""
+        most = AimSettings.pitch
         try:
             flight, lands = self.expected(table, rest)
         except KembaError:
-            return inf, False
-        errors = [(flight.apex - wanted.apex) / settings.apex]
-        if isfinite(wanted.touchdown):
-            errors.append((flight.touchdown - wanted.touchdown) / settings.touchdown)
-            if abs(flight.pitch - wanted.pitch) > turn + 1e-9:
-                return fallen, False
-        miss = float(np.linalg.norm(errors))
-        return (miss if isfinite(miss) else fallen), lands
+            return most, False
+        turned = abs(flight.pitch - wanted.pitch)
+        return max(turned, most) if isfinite(turned) else most, lands
+
+    def _tried(
+        self,
+        table: Trajectory,
+        first: Trajectory,
+        rest: float,
+        wanted: FlownJump,
+        turn: float,
+        must: bool,
+    ) -> ExecutedTable:
+        """A table with its expected errors of apex, touchdown and pitch there, in units of what
+        needs no search, and of `turn` [rad]: one that turns the body more is never the best.
+
+        One that falls where it `must` land, or has an edge far from where `first` has it, counts as
+        fallen.
+        """
+        fallen = RetimingSettings.current().fallen
+        try:
+            flight, lands = self.expected(table, rest)
+        except KembaError:
+            return ExecutedTable(table, None, np.full(3, inf), inf)
+        late, turned = flight.touchdown - wanted.touchdown, flight.pitch - wanted.pitch
+        signed = np.array([flight.apex - wanted.apex, late, turned])
+        signed /= [AimSettings.apex, AimSettings.touchdown, turn]
+        if not isfinite(wanted.touchdown):
+            signed[1:] = 0.0
+        far = not _within(first, table, AimSettings.current().moved)
+        if far or (must and not lands) or not np.isfinite(signed).all():
+            return ExecutedTable(table, None, signed, fallen)
+        turns = abs(signed[2]) > 1.0 + 1e-9
+        error = float(np.abs(signed[:2]).max())
+        return ExecutedTable(table, None, signed, error + (TURNED if turns else 0.0))
+
+
+def _begins(table: Trajectory, group: Group) -> float:
+    """When [s] the first edge of a group comes."""
+    edges = edges_of(table)
+    return float(min(table.time[edges[name][k]] for name, k in group))
 
 
 def _moved(first: Trajectory, table: Trajectory) -> dict[str, list[int]]:

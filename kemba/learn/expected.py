@@ -59,11 +59,17 @@ def expected_of(run: Run) -> ExpectedApex | None:
 def band_about(
     apex: float, table: Trajectory, model: Model, name: str, machine: Machine, rest: float,
     scatter: float,
-) -> ExpectedApex:  # fmt: skip
-    """The band about an expected `apex` [m] of a table on `model`, built of the model YAML `name`;
-    `rest` [s] is simulated after the table, `scatter` [m] is 1 sigma between executions."""
-    reach = 1.96 * float(np.hypot(_spread(table, model, name, machine, rest), scatter))
-    return ExpectedApex(apex, apex - reach, apex + reach)
+) -> tuple[ExpectedApex, tuple[str, ...]]:  # fmt: skip
+    """The band about an expected `apex` [m] of a table on `model`, built of the model YAML `name`,
+    and a remark where its covariance cannot be had; `rest` [s] is simulated after the table,
+    `scatter` [m] is 1 sigma between executions."""
+    spread, remarks = 0.0, tuple[str, ...]()
+    try:
+        spread = _spread(table, model, name, machine, rest)
+    except KembaError as error:
+        remarks = (f"the expected band has no part of the model's own error: {error.what}",)
+    reach = 1.96 * float(np.hypot(spread, scatter))
+    return ExpectedApex(apex, apex - reach, apex + reach), remarks
 
 
 def _spread(table: Trajectory, model: Model, name: str, machine: Machine, rest: float) -> float:

@@ -276,5 +276,6 @@ def _corrected(found: Round, task: Task, folder: RunFolder) -> Round:
     write_correction(folder / "correction.yaml", found.correction, aimed.moved, reached)
     rest = rest_after(model, plan, aimed.table)
     middle, scatter = aimed.expected.apex, scatter_of(found.executed)
-    band = band_about(middle, aimed.table, model, task.model, machine, rest, scatter)
+    band, said = band_about(middle, aimed.table, model, task.model, machine, rest, scatter)
+    found = replace(found, remarks=(*found.remarks, *said))
     return replace(found, aimed=aimed, target=target, next_expected=band)

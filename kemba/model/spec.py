@@ -90,6 +90,12 @@ def read_covariance(name: str | Path) -> tuple[tuple[str, ...], Array]:
         raise located(error, load_yaml(path)) from None
 
 
+def evidence_faults(name: str | Path) -> list[str]:
+    """Sentences on logs of the evidence of the model YAML `name` that are gone or have changed."""
+    path, evidence = _with_evidence(model_chain(name))
+    return evidence.faults(path.parent) if evidence else []
+
+
 def evidence_folder(name: str | Path) -> Path:
     """The folder from which the evidence of the model YAML `name` names its logs."""
     return _with_evidence(model_chain(name))[0].parent

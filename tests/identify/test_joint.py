@@ -12,11 +12,16 @@ from kemba.config import load_yaml
 from kemba.errors import KembaError
 from kemba.files import write_json
 from kemba.identify.discover import discover
+from kemba.identify.doubt.held_out import HeldOut
+from kemba.identify.doubt.parsimony import Belief
+from kemba.identify.doubt.predictive import quoted
+from kemba.identify.evidence.search import Search
 from kemba.identify.written.adopt import adopt_answer, adopted
 from kemba.identify.written.joint import joint_fit
 from kemba.identify.written.scatter import apart_between_runs
 from kemba.model import load_spec, read_covariance
 
+BOTH = ("kick", "wave")
 TRUTH = {"kick.a": 8.0, "bend.a": -6.0}
 
 
@@ -63,6 +68,20 @@ def test_what_is_said_is_the_joint_estimate() -> None:
     told = found.answer.json()["covariance"]
     assert tuple(told["names"]) == found.joint.names
     assert np.allclose(told["matrix"], found.joint.covariance)
+
+
+def test_an_effect_that_raises_the_quoted_error_does_not_stay() -> None:
+    """A wave that is in the logs that were learnt from only."""
+    problem = Toy({"kick.a": 8.0})
+    problem.measured = problem.measured - 2.0 * problem._shapes["wave"]
+    search = Search(problem)
+    search.start()
+    search.visit(BOTH)
+    kept = HeldOut.beside(Toy({"kick.a": 8.0}, seed=9), search.problem)
+    belief, whole = quoted(search, Belief(BOTH, 0.0), BOTH, kept)
+    assert (belief.best, whole) == (("kick",), ("kick",))
+    same = quoted(search, Belief(BOTH, 0.0), BOTH, None)
+    assert same == (Belief(BOTH, 0.0), BOTH)
 
 
 def answer_in(folder: Path, sure: list[str]) -> Path:

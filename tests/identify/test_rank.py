@@ -284,6 +284,6 @@ def test_a_sentence_names_many_effects_and_leaves_tables_to_the_ranking() -> Non
     mass = Value(3.0, 2.0, 4.0, "kg")
     few, many = {"m": mass}, dict.fromkeys("abc", mass)
     ranking = [Ranked("payload", 1.0, few), Ranked("tubes", 1.0, many), Ranked("rope", 1.0, few)]
-    found = Answer("missing", ranking=ranking, added=("payload", "tubes", "rope"))
+    found = Answer("missing", ranking=ranking, sure=("payload", "tubes", "rope"))
     named = f"payload (m = {mass}), tubes (3 parameters) and rope (m = {mass})"
     assert phrase(found).startswith(f"Missing: {named}; ")

@@ -20,7 +20,7 @@ from kemba.learn.correction import (
     scatter_of,
     write_correction,
 )
-from kemba.learn.expected import ExpectedApex
+from kemba.learn.expected import ExpectedApex, band_about
 from kemba.learn.flight import FlownJump, flight_of
 from kemba.learn.page import verdict_of
 from kemba.learn.round import Round
@@ -240,6 +240,15 @@ def test_models_are_drawn_from_the_covariance_within_their_bounds(tmp_path: Path
     force = np.array([m.effect("boom_force").value("F") for m in drawn])
     assert friction.min() == 0.0 and friction.std() > 0.9
     assert force.mean() == pytest.approx(-6.0, abs=0.3) and force.std() == pytest.approx(1, abs=0.2)
+
+
+def test_a_covariance_that_is_gone_is_said_and_ends_no_round(tmp_path: Path) -> None:
+    path, table = tmp_path / "model.yaml", Trajectory(np.arange(3.0), {})
+    dump_yaml({"base": "planning", "effects": [{"kind": "boom_force", "F": -6.0}],
+               "evidence": {"covariance": "gone.csv"}}, path)  # fmt: skip
+    band, said = band_about(0.5, table, load_model(path), str(path), load_machine(), 0.0, 1e-3)
+    assert "gone.csv: cannot be read" in said[0]
+    assert band.high - band.low == pytest.approx(2 * 1.96e-3)
 
 
 def test_scatter_counts_what_is_usual_once() -> None:

@@ -43,6 +43,7 @@ def compare(
     from kemba.folders import place_for
     from kemba.identify.compare_logs import compare_logs
     from kemba.logs import log_files
+    from kemba.model.spec import evidence_faults
     from kemba_cli.course import COMPARE
     from kemba_cli.next_steps import after_compare, say_next
     from kemba_cli.progress import Progress
@@ -67,6 +68,8 @@ def compare(
         print_json({**found.json(), **({"figure": str(path)} if path else {})})
         return
     typer.echo(found.sentence)
+    for text in evidence_faults(model):
+        say(text, quiet)
     if not quiet:
         _print(found)
     say_next(after_compare(logs, column_map, model, run, found.good or found.tolerable), quiet)

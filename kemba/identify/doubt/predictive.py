@@ -50,13 +50,16 @@ def quoted(
     """Belief and written effects without those that raise the error on logs `kept` for quoting;
     one that leaves it as it was is written, but not believed. All at their joint estimates."""
     best = tuple(e for e in belief.best if e in whole)
-    there = _quoted_error(search, whole, kept) if kept is not None and whole else 0.0
-    for effect in reversed(whole) if kept is not None else ():
+    if kept is None or not whole:
+        return (replace(belief, best=best) if best else belief), whole
+    theta = _joint(search, whole)
+    judge = kept.found.coarser(theta)  # one noise for all, what the whole lacks included
+    there = error_ratio(judge, theta)
+    for effect in reversed(whole):
         part = tuple(e for e in whole if e != effect)
         if search.late or not part:
             break
-        assert kept is not None
-        without = _quoted_error(search, part, kept)
+        without = error_ratio(judge, _joint(search, part))
         if without < there * (1.0 + SAME):
             best = tuple(e for e in best if e != effect)
         if without < there * (1.0 - SAME):
@@ -66,9 +69,8 @@ def quoted(
     return (replace(belief, best=best) if best else none_of(belief)), whole if best else ()
 
 
-def _quoted_error(search: Search, hypothesis: Hypothesis, kept: HeldOut) -> float:
-    """Error of the joint estimate of a hypothesis on the kept logs."""
+def _joint(search: Search, hypothesis: Hypothesis) -> dict[str, float]:
+    """The joint estimate of a hypothesis, which is refitted first."""
     search.visit(hypothesis)
     search.refresh()
-    theta = joint_estimate(search.problem, hypothesis, search.points[hypothesis].fit.theta)
-    return error_ratio(kept.found, theta)
+    return joint_estimate(search.problem, hypothesis, search.points[hypothesis].fit.theta)

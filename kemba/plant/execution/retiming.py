@@ -83,7 +83,7 @@ def retimed(model: Model, plan: Trajectory, table: Trajectory) -> ExecutedTable:
     in units of `RetimingSettings`.
     """
     run = partial(executed_table, model, plan, extra=rest_after(model, plan, table))
-    search = _Roundings(run, RetimingSettings.current().executions)
+    search = Roundings(run, RetimingSettings.current().executions)
     best = search.tried(table)
     last, before = _landing(model, plan), np.inf
     while 1.0 < best.error < before and search.left > 0:
@@ -96,7 +96,7 @@ def retimed(model: Model, plan: Trajectory, table: Trajectory) -> ExecutedTable:
 
 
 @dataclass
-class _Roundings:
+class Roundings:
     """Executes tables as long as executions are left."""
 
     run: Callable[[Trajectory], ExecutedTable]
