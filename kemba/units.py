@@ -213,7 +213,7 @@ def _parsed(text: str) -> tuple[float, pint.Unit]:
         raise ValueError(unreadable)
     try:
         found = ParserHelper.from_string(expression)
-        size = float(found.scale)
+        size = float(found.scale)  # type: ignore[arg-type]
     except Exception:  # pint raises anything on an expression that is none
         raise ValueError(unreadable) from None
     if not 0.0 < size < math.inf:

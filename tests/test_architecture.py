@@ -53,7 +53,9 @@ ONLY_IN = {
     "filelock": {"folders"},
     "pandas": {"logs", "trajectory"},
     "pyarrow": {"logs"},
-    "mcap": {"logs"},
+    **dict.fromkeys(
+        ["mcap", "rosbags", "google", "matio", "asammdf", "nptdms", "pyulog"], {"logs"}
+    ),
 }
 SOURCES = sorted([*ROOT.glob("kemba/**/*.py"), *ROOT.glob("cli/**/*.py")])
 FOLDERS = (".", ".ci", ".github", "cli", "configs", "docs", "kemba", "tests")

@@ -190,7 +190,9 @@ def test_any_unit_means_what_pint_reads_in_it(parts: list[tuple], marked: bool) 
         assert to_si(f"3 {ours}", unit) == pytest.approx(3 * base.magnitude, rel=1e-12)
 
 
-@pytest.mark.parametrize("unit", ["m/0", "m//s", "m..s", "m^999", "(m", "m)", "/", "m/", "2^99.m^-"])
+@pytest.mark.parametrize(
+    "unit", ["m/0", "m//s", "m..s", "m^999", "(m", "m)", "/", "m/", "2^99.m^-"]
+)
 def test_what_is_no_unit_is_refused(unit: str) -> None:
     with pytest.raises(ValueError, match="unreadable unit"):
         convert(1.0, unit, "m")

@@ -48,7 +48,7 @@ def mapped(raw: Recording, layout: ColumnMap, path: Path) -> Trajectory:
 def unwrapped(values: Array) -> Array:
     """An angle (n,) without the leaps by whole turns; missing readings stay missing."""
     good = np.isfinite(values)
-    found = values.copy()
+    found = np.array(values, dtype=float)
     found[good] = np.unwrap(values[good])
     return found
 
@@ -87,11 +87,10 @@ class _Reader:
         if written is not None:
             values = written
         else:
-            parts = [(source, source.names[0])] + ([(source.add, source.add.source)] if source.add else [])
-            values = sum(
-                self._converted(TIME, part, self._counted(self._column(TIME, at), from_first))
-                for part, at in parts
-            )
+            values = np.zeros(len(self.raw.columns[name]))
+            for part, at in zip((source, source.add), source.names, strict=False):
+                counted = self._counted(self._column(TIME, at), from_first)
+                values = values + self._converted(TIME, part or source, counted)
         return np.asarray(source.sign * source.scale * values + source.offset_in("s"))
 
     def values(self, header: str, source: ColumnSource) -> Array:
@@ -146,7 +145,9 @@ class _Reader:
         if source not in names:
             what = f"has no column '{source}', which the map reads as '{header}'"
             raise KembaError(f"{self.path}:1", what, hint=suggest(source, names))
-        if any(name.startswith(f"{source}#") and name[len(source) + 1 :].isdigit() for name in names):
+        if any(
+            name.startswith(f"{source}#") and name[len(source) + 1 :].isdigit() for name in names
+        ):
             what = f"has the column '{source}' more than once"
             raise KembaError(f"{self.path}:1", what, hint="give its number from 1 as `source`")
         return source
@@ -178,7 +179,12 @@ class _Reader:
         if wrong.any():
             row, column = int(np.argmax(wrong)), list(self.raw.columns).index(name) + 1
             hint = "`decimal`, `separator` and `skip_below` of the map" if wrong.all() else ""
-            text = isinstance(cells[row], str) and self.path.suffix.lower() in (".csv", ".txt", ".tsv", ".dat")
+            text = isinstance(cells[row], str) and self.path.suffix.lower() in (
+                ".csv",
+                ".txt",
+                ".tsv",
+                ".dat",
+            )
             line = row + (first_row(self.path, self.layout) if text else 1)
             where = f"{self.path}:{line}:{column}"
             raise KembaError(where, f"{name}: '{cells[row]}' is not a number", hint=hint)

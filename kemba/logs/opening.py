@@ -118,14 +118,15 @@ def _own(raw: Recording, path: Path) -> Trajectory:
         what = f"has no column '{TIME}'; it holds {held(raw.columns)}"
         raise KembaError(str(path), what, hint=map_hint(path))
     numbers = {name: found for name, v in raw.columns.items() if (found := _numbers(v)) is not None}
-    if TIME not in numbers:
+    if TIME not in numbers or raw.units.get(TIME, "s") != "s":
         raise KembaError(str(path), f"'{TIME}' holds no numbers", hint=map_hint(path))
     check_headers([TIME, *(n for n in numbers if n != TIME)], path, lambda _: str(path))
     for name, values in numbers.items():
         if np.isinf(values).any():
             row = int(np.argmax(np.isinf(values))) + 1
             raise KembaError(str(path), f"'{name}' is infinite in row {row}")
-    return Trajectory(numbers.pop(TIME), numbers, raw.meta)
+    said = {"read": list(raw.remarks)} if raw.remarks else {}
+    return Trajectory(numbers.pop(TIME), numbers, {**raw.meta, **said})
 
 
 def held(columns: Raw) -> str:

@@ -11,7 +11,9 @@ import numpy as np
 
 Column = np.ndarray[Any, Any]
 Raw = dict[str, Column]
-TIME_WORD = re.compile(r"(?:^|[^a-z])(?:t|time|timestamp|stamp|zeit|tout)(?:$|[^a-z])", re.IGNORECASE)
+TIME_WORD = re.compile(
+    r"(?:^|[^a-z])(?:t|time|timestamp|stamp|zeit|tout)(?:$|[^a-z])", re.IGNORECASE
+)
 
 CLOCK = "time"  # of the longest group
 OTHER_CLOCK = "log_time"  # of the others, or where a column has that name

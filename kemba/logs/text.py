@@ -50,9 +50,7 @@ def read_text(path: Path, layout: ColumnMap) -> Raw:
     if cells.shape[1] < len(names):
         what = f"rows have {cells.shape[1]} cells below {len(names)} headers"
         raise KembaError(f"{path}:{above + 1}", what, hint="`separator` and `skip_rows` of the map")
-    found = {
-        name: cells[:, column] for column, name in enumerate(numbered(names, cells.shape[1]))
-    }
+    found = {name: cells[:, column] for column, name in enumerate(numbered(names, cells.shape[1]))}
     _check_quotes(found, path, above)
     return found
 

@@ -32,8 +32,9 @@ def draft_map(
 
     out = out or Path(f"{log.stem}_map.yaml")
     fresh(out, force)
-    mechanism = load_model(model).mechanism
-    found = draft(log, mechanism.legs, mechanism)
+    machine = load_model(model).mechanism
+    stroke = None if machine.rig else machine.stroke
+    found = draft(log, machine.legs, stroke, machine.rig, machine.logged)
     with atomic_text(out) as stream:
         stream.write(found.text(log.name))
     answer = {"map": str(out), "kind": found.kind, "columns": found.columns}

@@ -28,11 +28,17 @@ PLOTTER, NAMED, MENTIONED, BY_UNIT, UNNAMED, COUNTER = 100.0, 80.0, 60.0, 50.0, 
 SECONDS = frozenset("sec secs second seconds tv_sec s".split())
 PARTS = {
     "ns": frozenset("nsec nsecs nanosec nanosecs nanosecond nanoseconds ns nano nanos".split()),
-    "us": frozenset("usec usecs microsec microsecs microsecond microseconds us micro micros".split()),
-    "ms": frozenset("msec msecs millisec millisecs millisecond milliseconds ms milli millis".split()),
+    "us": frozenset(
+        "usec usecs microsec microsecs microsecond microseconds us micro micros".split()
+    ),
+    "ms": frozenset(
+        "msec msecs millisec millisecs millisecond milliseconds ms milli millis".split()
+    ),
 }
 LARGEST = {"ns": 1e9, "us": 1e6, "ms": 1e3}
-COUNTERS = frozenset("index idx row rows sample samples frame frames count counter seq number nr id no".split())
+COUNTERS = frozenset(
+    "index idx row rows sample samples frame frames count counter seq number nr id no".split()
+)
 
 
 @dataclass(frozen=True)
@@ -47,7 +53,7 @@ class Stamp:
 
 
 @dataclass(frozen=True)
-class Candidate:
+class Clock:
     """A way to read the time: `seconds` (n,) from its first row."""
 
     score: float
@@ -113,7 +119,7 @@ def joint_state_labels(raw: Raw) -> dict[str, str]:
     }
 
 
-def _candidates(raw: Raw, values: Mapping[str, Array], names: Names) -> list[Candidate]:
+def _candidates(raw: Raw, values: Mapping[str, Array], names: Names) -> list[Clock]:
     found = [c for name in raw if (c := _single(name, raw, values, names)) is not None]
     found += _pairs(values)
     if list(raw)[:2] == ["1", "2"] and _is_split(values):
@@ -121,9 +127,7 @@ def _candidates(raw: Raw, values: Mapping[str, Array], names: Names) -> list[Can
     return found
 
 
-def _single(
-    name: str, raw: Raw, values: Mapping[str, Array], names: Names
-) -> Candidate | None:
+def _single(name: str, raw: Raw, values: Mapping[str, Array], names: Names) -> Clock | None:
     """A column that rises: of numbers, or of texts that are times."""
     stated = names.unit(name)
     if name not in values:
@@ -132,15 +136,14 @@ def _single(
         if read is None or not _rises(read):
             return None
         score = NAMED if says_time(name) else MENTIONED
-        return Candidate(
-            score, {"source": name}, (name,), read, False, f"'{name}' holds clock times"
-        )
+        return Clock(score, {"source": name}, (name,), read, False, f"'{name}' holds clock times")
     rows = values[name]
     if not _rises(rows) or (stated is not None and not _is_time(stated)):
         return None
-    score, reason = _called(name, rows, stated, names)
-    if score is None:
+    called = _called(name, rows, stated, names)
+    if called is None:
         return None
+    score, reason = called
     unit = stated or ranges.time_unit(rows[np.isfinite(rows)])
     exact = raw[name] if raw[name].dtype.kind in "iu" else rows
     seconds = convert(np.asarray(exact - exact[0], dtype=float), unit, "s")
@@ -148,13 +151,11 @@ def _single(
     source = {"source": name, **({} if unit == "s" else {"unit": unit})}
     if stated is None:
         reason += f"; no unit is told: taken as {unit}, by the step between rows"
-    return Candidate(score, source, (name,), seconds, from_first, reason)
+    return Clock(score, source, (name,), seconds, from_first, reason)
 
 
-def _called(
-    name: str, rows: Array, stated: str | None, names: Names
-) -> tuple[float | None, str]:
-    """The score of a rising column by its name, and why; no score where it is something else."""
+def _called(name: str, rows: Array, stated: str | None, names: Names) -> tuple[float, str] | None:
+    """The score of a rising column by its name, and why; None where it is something else."""
     said = words(named_unit(names.labels.get(name, name))[0])
     if name == "__time":
         return PLOTTER, "'__time' is the clock that PlotJuggler puts before all topics"
@@ -169,11 +170,11 @@ def _called(
     if set(said) & COUNTERS or (np.all(steps == 1.0) and not says):
         return COUNTER, f"no column is a time: '{name}' counts rows, so check the rate"
     if says:
-        return None, ""
+        return None
     return UNNAMED, f"no column is called a time: '{name}' is the one that rises"
 
 
-def _pairs(values: Mapping[str, Array]) -> list[Candidate]:
+def _pairs(values: Mapping[str, Array]) -> list[Clock]:
     """Whole seconds and what is below them, in columns of one path."""
     found = []
     for name in values:
@@ -200,13 +201,13 @@ def _split(name: str) -> tuple[str, str]:
     return re.sub(r"[\W_]+$", "", head).lower(), tail.lower()
 
 
-def _pair(values: Mapping[str, Array], whole: str, rest: str, unit: str, score: float) -> Candidate:
+def _pair(values: Mapping[str, Array], whole: str, rest: str, unit: str, score: float) -> Clock:
     source = {"source": whole, "add": {"source": rest, "unit": unit}}
     if named_unit(whole)[1] is None:
         source["unit"] = "s"
     seconds = values[whole] - values[whole][0] + convert(values[rest], unit, "s")
     reason = f"'{whole}' and '{rest}' are the seconds and {unit} of one stamp"
-    return Candidate(score, source, (whole, rest), seconds - seconds[0], True, reason)
+    return Clock(score, source, (whole, rest), seconds - seconds[0], True, reason)
 
 
 def _whole(seconds: Array, rest: Array, unit: str) -> bool:
@@ -224,12 +225,10 @@ def _is_split(values: Mapping[str, Array]) -> bool:
     if "1" not in values or "2" not in values:
         return False
     whole, rest = values["1"], values["2"]
-    return bool(
-        np.all(whole % 1 == 0) and whole[0] > STAMPED and 1e4 < rest.max(initial=0.0) < 1e9
-    )
+    return bool(np.all(whole % 1 == 0) and whole[0] > STAMPED and 1e4 < rest.max(initial=0.0) < 1e9)
 
 
-def _agree(a: Candidate, b: Candidate) -> bool:
+def _agree(a: Clock, b: Clock) -> bool:
     """Whether two clocks run at one rate, where they are as long."""
     if len(a.seconds) != len(b.seconds):
         return True  # of channels of another rate

@@ -14,7 +14,8 @@ import numpy as np
 from kemba.errors import KembaError
 from kemba.logs.columns import ColumnMap
 from kemba.logs.draft import ranges
-from kemba.logs.draft.clock import Stamp, joint_state_labels, numbers, stamp_of, switches
+from kemba.logs.draft.clock import joint_state_labels, numbers, stamp_of, switches
+from kemba.logs.draft.frames import quaternions, upright
 from kemba.logs.draft.layout import Layout, layout_of, units_below
 from kemba.logs.draft.matching import Assigned, assigned
 from kemba.logs.draft.targets import (
@@ -24,16 +25,11 @@ from kemba.logs.draft.targets import (
     rig_targets,
     robot_targets,
 )
-from kemba.logs.draft.words import SPELT, Names, is_unit, named_unit, strange_unit
-from kemba.logs.foreign import pitch, wraps
+from kemba.logs.draft.words import SPELT, Names, is_unit, strange_unit
+from kemba.logs.foreign import wraps
 from kemba.logs.opening import TEXTS, held, raw_columns
 from kemba.logs.recording import Recording
-from kemba.mechanism import Mechanism
 from kemba.trajectory import TIME, Array
-
-QUATERNION = re.compile(r"(?P<stem>.*?)(?P<mark>q(?:uat)?_?)?(?P<axis>[xyzw])")
-NUMBERED = re.compile(r"(?P<stem>.*?q)[\[_/]?(?P<axis>[0-3])\]?")  # of PX4: w first
-UNIT_NORM = 0.02
 
 
 @dataclass(frozen=True)
@@ -67,8 +63,15 @@ class Draft:
         return "\n".join(lines) + "\n"
 
 
-def draft_map(path: Path, legs: Sequence[str], mechanism: Mechanism | None = None) -> Draft:
-    """A map for the log `path` of a machine with these legs, or of the rig or robot `mechanism`.
+def draft_map(
+    path: Path,
+    legs: Sequence[str],
+    stroke: float | None = None,
+    rig: str = "",
+    logged: Mapping[str, str] | None = None,
+) -> Draft:
+    """A map for the log `path` of a robot with these legs and pistons of this `stroke` [m], or of a
+    `rig` of this kind whose logs must have the columns `logged` (units by name).
 
     Raises KembaError where the file is no table or has no time.
     """
@@ -84,11 +87,11 @@ def draft_map(path: Path, legs: Sequence[str], mechanism: Mechanism | None = Non
         what = f"no column rises from row to row like a time; it holds {held(raw.columns)}"
         raise KembaError(str(path), what, "a time was expected")
     rest = {n: v for n, v in values.items() if n not in {*stamp.names, *raw.clocks.values()}}
-    rest, names, turned = _quaternions(rest, names)
-    names, said = _upright(rest, names)
-    kind, targets = _kind(names, rest, mechanism)
+    rest, names, turned = quaternions(rest, names)
+    names, said = upright(rest, names)
+    kind, targets = _kind(names, rest, rig, logged or {})
     found = assigned(names, rest, targets)
-    columns, asked = _sources(found, targets, names, rest, mechanism, turned)
+    columns, asked = _sources(found, targets, names, rest, stroke, turned)
     number = {name: i for i, name in enumerate(raw.columns, start=1)}
     columns = {TIME: _by_number(stamp.source, number), **columns}
     columns = {header: _by_number(source, number) for header, source in columns.items()}
@@ -127,64 +130,13 @@ def _units_below(path: Path, layout: Layout, names: Sequence[str]) -> dict[str, 
     return {name: unit for name, unit in spelt.items() if is_unit(unit)}
 
 
-def _quaternions(
-    values: Mapping[str, Array], names: Names
-) -> tuple[dict[str, Array], Names, dict[str, tuple[str, ...]]]:
-    """The columns without those of quaternions, each with the pitch that it turns by instead, and
-    the four columns x, y, z, w of each pitch."""
-    found: dict[str, dict[str, str]] = {}
-    for name in values:
-        bare = named_unit(name)[0]
-        match = QUATERNION.fullmatch(bare)
-        number = NUMBERED.fullmatch(bare)
-        if match:
-            found.setdefault(f"{match['stem']}{match['mark'] or ''}", {})[match["axis"]] = name
-        elif number:
-            found.setdefault(number["stem"], {})["wxyz"[int(number["axis"])]] = name
-    left, labels, turned = dict(values), dict(names.labels), {}
-    for stem, parts in found.items():
-        if set(parts) != set("xyzw"):
-            continue
-        four = tuple(parts[axis] for axis in "xyzw")
-        norm = np.sqrt(sum(values[name] ** 2 for name in four))
-        if np.nanmean(np.abs(norm - 1.0) < UNIT_NORM) < 0.99:
-            continue
-        for name in four:
-            left.pop(name)
-        label = f"{stem} (pitch of the quaternion)"
-        left[label] = pitch(*(values[name] for name in four))
-        labels[label], turned[label] = f"{stem}_pitch_derived", four
-    below = {**names.below, **dict.fromkeys(turned, "rad")}
-    return left, replace(names, labels=labels, below=below), turned
-
-
-def _upright(values: Mapping[str, Array], names: Names) -> tuple[Names, list[str]]:
-    """Which of y and z is up: z, unless it stays about zero while y does not."""
-    heights = {}
-    for name, y in values.items():
-        says = names.says(name)
-        up = says.get("direction", set()) & {"y", "z"}
-        if len(up) == 1 and says.get("kind", {"position"}) == {"position"} and "leg" not in says:
-            heights.setdefault(up.pop(), []).append(float(np.nanmedian(np.abs(y))))
-    if "y" not in heights or "z" not in heights or max(heights["z"]) > 0.2 * max(heights["y"]):
-        return names, []
-    exchange = str.maketrans("yzYZ", "zyZY")
-    turned = {
-        name: re.sub(r"[YZyz](?![A-Za-z])", lambda m: m[0].translate(exchange), name)
-        for name in values
-        if names.says(name).get("direction", set()) & {"y", "z"}
-    }
-    said = ["Height: z stays about zero, so y is taken as the height"]
-    return replace(names, labels={**turned, **names.labels}), said
-
-
 def _kind(
-    names: Names, values: Mapping[str, Array], mechanism: Mechanism | None
+    names: Names, values: Mapping[str, Array], rig: str, logged: Mapping[str, str]
 ) -> tuple[str, list[Target]]:
     """What machine the columns are of, and the columns that such a log may have: those of the
     model's rig, if it is one."""
-    if mechanism is not None and mechanism.rig:
-        return mechanism.rig, rig_targets(mechanism.logged)
+    if rig:
+        return rig, rig_targets(logged)
 
     def says(group: str, *words: str) -> bool:
         return any(names.says(name).get(group, set()) & set(words) for name in values)
@@ -208,11 +160,10 @@ def _sources(
     targets: Sequence[Target],
     names: Names,
     values: Mapping[str, Array],
-    mechanism: Mechanism | None,
+    stroke: float | None,
     turned: Mapping[str, tuple[str, ...]],
 ) -> tuple[dict[str, dict[str, Any]], list[str]]:
     """The source of each of our columns, and what has to be asked about them."""
-    stroke = mechanism.stroke if mechanism is not None and not mechanism.rig else None
     guessed = _guessed_units(names, found.pairs, values, stroke)
     columns: dict[str, dict[str, Any]] = {}
     asked = []
@@ -270,8 +221,10 @@ def _share_level(
     """A valve that never switches in this log has the threshold of the others."""
     level = next((s["threshold"] for s in columns.values() if "threshold" in s), None)
     for header, name in pairs.items():
-        if "valve/" in header and level is not None and np.nanmax(values[name]) == np.nanmin(
-            values[name]
+        if (
+            "valve/" in header
+            and level is not None
+            and np.nanmax(values[name]) == np.nanmin(values[name])
         ):
             columns[header]["threshold"] = level
 

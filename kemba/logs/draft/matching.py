@@ -51,7 +51,8 @@ def assigned(names: Names, values: Mapping[str, Array], targets: Sequence[Target
                 scores[i, j] = score - STRANGER * strangers if score > NOTHING else NOTHING
     scores[scores < ENOUGH] = NOTHING
     total, best = _best(scores)
-    pairs, ties = {}, {}
+    pairs: dict[str, str] = {}
+    ties: dict[str, tuple[str, ...]] = {}
     for i, j in best.items():
         without = scores.copy()
         without[i, j] = NOTHING

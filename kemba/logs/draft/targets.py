@@ -54,9 +54,7 @@ def robot_targets(legs: Sequence[str]) -> list[Target]:
         own, force = {"leg": leg} if len(legs) > 1 else {}, {"kind": "force"}
         found += [
             Target(f"{leg}/hip/q [rad]", {**own, "part": "hip", "kind": "position"}, needed=True),
-            Target(
-                f"{leg}/hip/tau [N.m]", {**own, "kind": "torque"}, {"part": "hip"}, needed=True
-            ),
+            Target(f"{leg}/hip/tau [N.m]", {**own, "kind": "torque"}, {"part": "hip"}, needed=True),
             *_piston(f"{leg}/", own, {"part": "piston"}),
             Target(f"{leg}/foot/Fx [N]", {**own, "part": "foot", "direction": "x"}, force),
             Target(f"{leg}/foot/Fz [N]", {**own, "part": "foot", "direction": "z"}, force),

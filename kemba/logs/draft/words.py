@@ -52,8 +52,13 @@ WORDS: dict[str, dict[str, str]] = {
         "measured": "meas measured measurement actual act ist fb feedback sensor",
     },
 }
-TIMES = "t time timestamp stamp clock epoch elapsed zeit zeitstempel uhrzeit datum date datetime sec secs tout"
-FILLERS = frozenset("robot header state states joint joints data value values m s log sensors topic".split())
+TIMES = (
+    "t time timestamp stamp clock epoch elapsed zeit zeitstempel uhrzeit datum date datetime sec "
+    "secs tout"
+)
+FILLERS = frozenset(
+    "robot header state states joint joints data value values m s log sensors topic".split()
+)
 LEG_WORDS = {
     "front": "front f fore fr vorn vorne vo",
     "rear": "rear back hind b r h hinten hi",
@@ -66,7 +71,9 @@ SPELT = {
     "dps": "deg/s", "mps": "m/s", "meters": "m", "metres": "m", "seconds": "s", "newton": "N",
     "rad_s": "rad/s", "deg_s": "deg/s", "m_s": "m/s", "mm_s": "mm/s", "m_s2": "m/s2", "Nmm": "N.mm",
 }  # fmt: skip
-UNITS = "ns us µs ms s min mm cm m in deg rad mrad bar mbar kPa MPa Pa psi kN N Nm N.m mN.m mV V".split()
+UNITS = (
+    "ns us µs ms s min mm cm m in deg rad mrad bar mbar kPa MPa Pa psi kN N Nm N.m mN.m mV V"
+).split()
 INSIDE = frozenset("mm cm deg rad mrad bar mbar kPa MPa Pa psi kN Nm".split())
 LEGS_IN_BRACKETS = frozenset("L R F B H A".split())  # `(L)` is the left one, not litres
 BRACKETS = re.compile(r"\s*(?:\[([^\[\]]*)\]|\(([^()]*)\))")
@@ -134,7 +141,7 @@ def named_unit(name: str) -> tuple[str, str | None]:
 
 def is_unit(text: str, indexed: bool = False) -> bool:
     """Whether a text is a unit; `indexed`: a bare number is the place in an array."""
-    if not text or re.fullmatch(r"[\d\W]+", text) and (indexed or text != "1") and text not in "°%":
+    if not text or (re.fullmatch(r"[\d\W]+", text) and (indexed or text != "1") and text not in "°%"):
         return False
     try:
         parse_unit(text)
@@ -183,7 +190,12 @@ def meaning(name: str, legs: Sequence[str]) -> Meaning:
 
 def unknown(name: str, legs: Sequence[str]) -> int:
     """How many words of a name say nothing that is known here."""
-    known = {w for group in _groups(legs).values() for entry, w_ in group.items() for w in (entry, *w_.split())}
+    known = {
+        w
+        for group in _groups(legs).values()
+        for entry, w_ in group.items()
+        for w in (entry, *w_.split())
+    }
     return len([w for w in words(name) if w not in known and w not in FILLERS and not w.isdigit()])
 
 

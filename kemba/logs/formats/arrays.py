@@ -81,7 +81,9 @@ def vectors(content: Mapping[str, Any], path: Path) -> Recording:
     for name, array in arrays.items():
         if array.dtype.names:
             arrays_of = {f"{name}/{key}": array[key] for key in array.dtype.names}
-            found |= {key: a for key, a in arrays_of.items() if a.ndim == 1 and a.dtype.kind in "fiub"}
+            found |= {
+                key: a for key, a in arrays_of.items() if a.ndim == 1 and a.dtype.kind in "fiub"
+            }
         elif array.dtype.kind not in "fiub":
             if array.ndim == 1 and len(array) > 2 and seconds(array) is not None:
                 found[name] = array.astype(object)

@@ -21,12 +21,16 @@ class Topic:
         self.name, self.decode = name, decode
         self.stamps: list[int] = []
         self.columns: dict[str, list[float]] = {}
+        self.texts: set[str] = set()
 
     def add(self, stamp: int, message: Any) -> None:
         """Append a message; fields that come later than others are missing before."""
         row = len(self.stamps)
         self.stamps.append(stamp)
         for name, value in flat(message):
+            if isinstance(value, str):
+                self.texts.add(name)
+                continue
             column = self.columns.get(name)
             if column is None:
                 column = self.columns[name] = [np.nan] * row
@@ -88,14 +92,17 @@ def _protobuf(name: str, data: bytes) -> Decode:
     for file in descriptor_pb2.FileDescriptorSet.FromString(data).file:
         pool.Add(file)
     kind = message_factory.GetMessageClass(pool.FindMessageTypeByName(name))
-    return kind.FromString
+    return lambda data: kind.FromString(data)
 
 
-def flat(value: Any, name: str = "") -> Iterator[tuple[str, float]]:
-    """The numbers of a message by their path: `position/0`, or `position/knee` where the message
+def flat(value: Any, name: str = "") -> Iterator[tuple[str, float | str]]:
+    """The numbers and texts of a message by their path: `position/0`, or `position/knee` where it
     names its entries as a JointState does."""
     if isinstance(value, bool | int | float | np.number):
         yield name, float(value)
+        return
+    if isinstance(value, str):
+        yield name, value
         return
     items = _items(value)
     names = _entries(items)

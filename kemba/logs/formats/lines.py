@@ -19,7 +19,9 @@ def read_lvm(path: Path) -> Recording:
     increment where no X is written."""
     lines = _lines(path)
     if not lines or not lines[0].startswith("LabVIEW Measurement"):
-        raise KembaError(f"{path}:1", "is no LabVIEW measurement", "'LabVIEW Measurement' was expected")
+        raise KembaError(
+            f"{path}:1", "is no LabVIEW measurement", "'LabVIEW Measurement' was expected"
+        )
     ends = [i for i, line in enumerate(lines) if line.startswith(LVM_END)]
     if not ends:
         raise KembaError(str(path), f"has no line '{LVM_END}'")

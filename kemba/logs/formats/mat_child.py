@@ -15,6 +15,8 @@ import sys
 from typing import Any
 
 import numpy as np
+from scipy.io import loadmat
+from scipy.io.matlab import MatlabOpaque
 
 MEMORY = 6_000_000_000  # bytes: an unpacked log of the size that is allowed, three times
 HDF5 = b"\x89HDF\r\n\x1a\n"  # of version 7.3, behind a header or at once
@@ -175,13 +177,10 @@ def uniform(info: dict[str, Any], data: Any) -> np.ndarray | None:
 
 
 def content(path: str) -> dict[str, Any]:
-    """The variables of a file: by SciPy, or by mat-io where it holds objects or is of version 7.3."""
+    """The variables of a file: by SciPy, or by mat-io with objects or in version 7.3."""
     with open(path, "rb") as stream:
         head = stream.read(520)
     if HDF5 not in (head[:8], head[512:]):
-        from scipy.io import loadmat
-        from scipy.io.matlab import MatlabOpaque
-
         found = loadmat(path, appendmat=False, squeeze_me=True)
         if not any(isinstance(value, MatlabOpaque) for value in found.values()):
             return dict(found)
@@ -235,7 +234,8 @@ def main() -> int:
         arrays.append(array)
         index["loose"].append([name, len(arrays) - 1])
     stream = io.BytesIO()
-    np.savez(stream, index=np.array(json.dumps(index)), **{f"a{i}": a for i, a in enumerate(arrays)})
+    numbered: dict[str, Any] = {f"a{i}": array for i, array in enumerate(arrays)}
+    np.savez(stream, index=np.array(json.dumps(index)), **numbered)
     sys.stdout.buffer.write(stream.getvalue())
     return 0
 

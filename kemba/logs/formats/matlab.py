@@ -56,7 +56,9 @@ def read_mat(path: Path) -> Recording:
         except KembaError as error:
             classes = ", ".join(index["classes"])
             what = f"{error.what}; it has objects of {classes}" if classes else error.what
-            raise KembaError(error.where, what, "a timeseries, or a vector a column", WAY_OUT) from None
+            raise KembaError(
+                error.where, what, "a timeseries, or a vector a column", WAY_OUT
+            ) from None
     groups: dict[int, Raw] = {}
     for name, time, values in index["series"]:
         parts = _parts(name, arrays[f"a{values}"], len(arrays[f"a{time}"]))

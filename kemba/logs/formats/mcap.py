@@ -6,6 +6,7 @@ import json
 import math
 from collections import defaultdict
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -76,7 +77,8 @@ def read_mcap(path: Path) -> Recording:
                 if isinstance(record, Metadata):
                     known[record.name] = record.metadata
                 else:
-                    _take(*record, topics, skipped)
+                    schema, channel, message = record
+                    _take(schema, channel, message, topics, skipped)
     except OSError as error:
         raise KembaError(str(path), error.strerror or str(error)) from None
     except ImportError as error:
@@ -88,7 +90,7 @@ def read_mcap(path: Path) -> Recording:
         groups = [topic.group() for topic in topics.values() if topic.columns]
         return recording(groups, said)
     try:
-        return _own(topics, known[META])
+        return replace(_own(topics, known[META]), remarks=tuple(said))
     except (ValueError, TypeError, KeyError, AttributeError):
         what = "its metadata 'kemba' do not fit its messages"
         raise KembaError(str(path), what, "what kemba-opt export writes was expected") from None
@@ -159,5 +161,8 @@ def _own(topics: dict[str, Topic], note: dict[str, str]) -> Recording:
 
 def _field(topics: dict[str, Topic], header: str, rows: int) -> np.ndarray[Any, Any]:
     topic, _, field = ("/" + header.split(" [")[0]).rpartition("/")
-    values = topics[topic or "/"].columns.get(field, [])
+    found = topics[topic or "/"]
+    if field in found.texts:
+        raise ValueError(header)
+    values = found.columns.get(field, [])
     return np.array([*values, *[math.nan] * (rows - len(values))])

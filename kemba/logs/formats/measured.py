@@ -1,4 +1,4 @@
-"""Logs of data loggers: MDF (asammdf), TDMS (nptdms), ULog (pyulog). Each channel keeps its clock."""
+"""Logs of data loggers: MDF (asammdf), TDMS (nptdms), ULog (pyulog); channels keep their clocks."""
 
 from __future__ import annotations
 
@@ -63,7 +63,9 @@ def read_tdms(path: Path) -> Recording:
     with TdmsFile.open(path) as file:
         channels = [c for group in file.groups() for c in group.channels() if len(c)]
         check_size(path, sum(8 * len(channel) for channel in channels))
-        starts = [c.properties["wf_start_time"] for c in channels if "wf_start_time" in c.properties]
+        starts = [
+            c.properties["wf_start_time"] for c in channels if "wf_start_time" in c.properties
+        ]
         several = len({channel.group_name for channel in channels}) > 1
         for group in file.groups():
             groups += _tdms_groups(group, min(starts, default=None), several, said)
@@ -97,7 +99,9 @@ def _tdms_groups(group: Any, start: Any, several: bool, said: list[str]) -> Iter
 def _plain(plain: Raw, units: dict[str, str], name: str, said: list[str]) -> Iterator[Group]:
     """Channels without a waveform: on a channel of times, if the group has one."""
     clocks = [n for n, values in plain.items() if values.dtype.kind == "M"] or [
-        n for n in plain if n.rpartition("/")[2].lower().split(" ")[0].split("[")[0] in ("t", "time")
+        n
+        for n in plain
+        if n.rpartition("/")[2].lower().split(" ")[0].split("[")[0] in ("t", "time")
     ]
     if not clocks:
         said.append(f"left out, since they have no times: the channels of {name}")

@@ -51,7 +51,9 @@ def read_parquet(path: Path) -> Recording:
 
 def _is_time(column: pa.ChunkedArray) -> bool:
     kind = column.type
-    return column.null_count == 0 and (pa.types.is_timestamp(kind) or pa.types.is_duration(kind))
+    return bool(column.null_count == 0) and bool(
+        pa.types.is_timestamp(kind) or pa.types.is_duration(kind)
+    )
 
 
 def _values(column: pa.ChunkedArray) -> np.ndarray[Any, Any]:
