@@ -19,7 +19,7 @@ def is_command(name: str) -> bool:
 
 
 def placed(time: Array, own: Array, values: Array, hold: bool) -> Array:
-    """Readings `values` (m,) at `own` times (m,) on the clock `time` (n,), NaN where there are none.
+    """Readings `values` (m,) at `own` times (m,) on the clock `time` (n,), else NaN.
 
     A reading stands at the nearest row, at the value that the channel has there between its own
     readings; a command is held from the first row after it was sent.

@@ -58,6 +58,9 @@ class StandingSettings(Settings):
     prior: float = setting(2.0, "1", "prior width of a length, in sizes", BY_HAND)
     reach: float = setting(2.5, "1", "largest value of each, in prior widths", BY_HAND)
     body: float = setting(3e-3, "m", "prior sigma of the zero of the body's height", BY_HAND)
+    zero: float = setting(
+        0.02, "m", "prior sigma of the zero of the body's height where it is in doubt", BY_HAND
+    )
     angle: float = setting(4e-3, "rad", "prior sigma of the zeros of pitch and hips", BY_HAND)
     piston: float = setting(6e-4, "m", "prior sigma of the zero of a piston", BY_HAND)
     sink: float = setting(3e-3, "m", "prior sigma of how deep a foot sinks at rest", BY_HAND)
@@ -179,8 +182,7 @@ def standing_lengths(
     x, cost, rows = _refined(standing, start, width)
     if _is_turned(standing, x, width, rows):
         return StandingLengths(turned=True)
-    _, without, _ = _only(standing, (), x, width, rows)
-    if without - cost < settings.gain or x[-2] > settings.soft:
+    if x[-2] > settings.soft or min(_drawn(standing, x, width, rows)) - cost < settings.gain:
         return StandingLengths()
     singles = [_only(standing, (i,), x, width, rows) for i in range(len(sizes))]
     one, alone, _ = min(singles, key=lambda fit: fit[1])
@@ -232,6 +234,20 @@ def _is_turned(standing: Standing, x: Array, width: Array, rows: Flags) -> bool:
     _, best, _ = _refined(standing, x, loose, either)
     _, other, _ = _refined(turned, np.zeros(len(x)), drawn, either)
     return best - other > StandingSettings.current().turned
+
+
+def _drawn(standing: Standing, x: Array, width: Array, rows: Flags) -> Iterator[float]:
+    """Costs of the fits with the lengths of the model: with zeros as exact as they are supposed to
+    be, and with the zero of the height, of the pitch or of the hips in doubt."""
+    settings, first = StandingSettings.current(), len(standing.names)
+    hips = range(first + 2, first + 2 + standing.legs)
+    doubts = ((), [first + 1], [first], list(hips))
+    for places, wide in zip(
+        doubts, (0.0, settings.zero, settings.pitch, settings.pitch), strict=True
+    ):
+        loose = width.copy()
+        loose[list(places)] = wide
+        yield _only(standing, (), np.where(loose == width, x, 0.0), loose, rows)[1]
 
 
 def _only(

@@ -8,6 +8,7 @@ from copy import copy
 import numpy as np
 from typing_extensions import Self
 
+from kemba.errors import KembaError
 from kemba.identify.logs.gate import BadData
 from kemba.identify.problem.candidates import sensor_candidates
 from kemba.identify.problem.problem import Problem
@@ -31,6 +32,12 @@ from kemba.identify.problem.types import (
     Theta,
 )
 from kemba.identify.robot.candidates import extended, ground_of, in_the_air, robot_candidates
+from kemba.identify.robot.commands import (
+    HINT,
+    CommandSettings,
+    turned_torques,
+    valve_mix_ups,
+)
 from kemba.identify.robot.dynamics.physics import Physics
 from kemba.identify.robot.dynamics.reference import first_reference
 from kemba.identify.robot.dynamics.settings import ForceDensity
@@ -39,6 +46,7 @@ from kemba.identify.robot.formulas import formula_columns
 from kemba.identify.robot.geometry import mistakes, remarks, standing_lengths
 from kemba.identify.robot.labels import describe
 from kemba.identify.robot.missing import robot_missing
+from kemba.identify.robot.mix_ups import mixed_up
 from kemba.identify.robot.motion.batch import Batch
 from kemba.identify.robot.motion.colour import Noise
 from kemba.identify.robot.motion.expected import expected_power, predicted_error
@@ -269,11 +277,33 @@ class RobotProblem(Problem):
     def validate(self) -> list[str]:
         """Which lengths make the feet stand, where they are not the model's. Raises BadData where
         a log contradicts itself or any model."""
-        r = self.residual(self.lengths)
-        found = contradictions(self.state, self.rows(), r, self._sensor_columns)
-        if faults := list(mistakes(self.standing, self.runs)) or list(found):
+        logs = self.batch.resampled
+        faults = [fault for log in logs for fault in mixed_up(self.physics, log)]
+        faults = faults or list(mistakes(self.standing, self.runs))
+        if faults:
             raise BadData(faults)
+        r = self.residual(self.lengths)
+        faults = list(turned_torques(self.state, self.rows(), r))
+        faults = faults or list(contradictions(self.state, self.rows(), r, self._sensor_columns))
+        if faults:
+            raise BadData(self._valves_mixed_up(r) or faults)
         return remarks(self.standing)
+
+    def _valves_mixed_up(self, r: Array) -> list[KembaError]:
+        """The mistake about the valves after which the logs contradict the model no more, and
+        whose residual is much smaller than r (n,); the best of them."""
+        found = []
+        for text, logs in valve_mix_ups(self.logs, self.physics.legs):
+            other = type(self)(logs, self.model, self.unknown)
+            left = other.residual(other.lengths)
+            if not list(contradictions(other.state, other.rows(), left, other._sensor_columns)):
+                found.append((float(np.sqrt(np.mean(left**2))), text))
+        before = float(np.sqrt(np.mean(r**2)))
+        left_over, text = min(found, default=(before, ""))
+        if left_over > before / CommandSettings.current().better:
+            return []
+        what = f"the logs err by {before:.1f} times their noise, and by {left_over:.1f} times then"
+        return [KembaError(", ".join(self.runs), text, what, HINT)]
 
     def _sensor_columns(self) -> Array:
         """Columns (n, k) of every sensor fault and every length, per size."""

@@ -9,8 +9,7 @@ from scipy.optimize import lsq_linear
 
 from kemba.errors import KembaError
 from kemba.identify.problem.types import Array, Flags, Rows
-from kemba.identify.robot.mix_ups import mixed_up
-from kemba.identify.robot.state import LinearisedState, values_at
+from kemba.identify.robot.state import LinearisedState
 from kemba.settings import BY_HAND, Settings, setting
 
 
@@ -47,9 +46,8 @@ def contradictions(
     """
     absurd = RobotValidateSettings.current().absurd
     forgiven: Array | None = None
-    lengths, _ = values_at(state.physics, state.base)
     for i, log in enumerate(state.batch.resampled):
-        sunk = list(mixed_up(state.physics, log, lengths)) or list(_sunk(state, i))
+        sunk = list(_sunk(state, i))
         yield from sunk
         own = rows.run == i
         power = _power(state.physics.channels, r, rows, own)

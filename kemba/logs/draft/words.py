@@ -141,7 +141,9 @@ def named_unit(name: str) -> tuple[str, str | None]:
 
 def is_unit(text: str, indexed: bool = False) -> bool:
     """Whether a text is a unit; `indexed`: a bare number is the place in an array."""
-    if not text or (re.fullmatch(r"[\d\W]+", text) and (indexed or text != "1") and text not in "°%"):
+    if not text or (
+        re.fullmatch(r"[\d\W]+", text) and (indexed or text != "1") and text not in "°%"
+    ):
         return False
     try:
         parse_unit(text)
