@@ -53,9 +53,13 @@ ONLY_IN = {
     "filelock": {"folders"},
     "pandas": {"logs", "trajectory"},
     "pyarrow": {"logs"},
-    **dict.fromkeys(
-        ["mcap", "rosbags", "google", "matio", "asammdf", "nptdms", "pyulog"], {"logs"}
-    ),
+    "mcap": {"logs"},
+    "rosbags": {"logs"},
+    "google": {"logs"},
+    "matio": {"logs"},
+    "asammdf": {"logs"},
+    "nptdms": {"logs"},
+    "pyulog": {"logs"},
 }
 SOURCES = sorted([*ROOT.glob("kemba/**/*.py"), *ROOT.glob("cli/**/*.py")])
 FOLDERS = (".", ".ci", ".github", "cli", "configs", "docs", "kemba", "tests")

@@ -16,7 +16,6 @@ import casadi as ca
 import numpy as np
 from scipy.optimize import least_squares
 
-from kemba.errors import KembaError
 from kemba.identify.problem.sensor_faults import GEOMETRY
 from kemba.identify.problem.types import Array, Candidate, Flags
 from kemba.identify.robot.dynamics.physics import Physics
@@ -193,17 +192,6 @@ def standing_lengths(
     boom, by_boom, _ = _only(standing, (), x, free, rows)
     as_good = LEVER in candidates and by_boom - min(alone, cost) < settings.gain
     return StandingLengths(found, float(boom[-1]) if as_good else 0.0)
-
-
-def mistakes(found: StandingLengths, runs: Sequence[str]) -> Iterator[KembaError]:
-    """The sign of the pitch, where feet stand with the other one only."""
-    if found.turned:
-        yield KembaError(
-            ", ".join(runs),
-            "body/pitch has the reversed sign (nose up is positive)",
-            "corrected, feet stand on level ground; else legs of other lengths would be needed",
-            "correct it with `sign` in a column map (--map)",
-        )
 
 
 def remarks(found: StandingLengths) -> list[str]:

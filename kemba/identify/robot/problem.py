@@ -8,7 +8,6 @@ from copy import copy
 import numpy as np
 from typing_extensions import Self
 
-from kemba.errors import KembaError
 from kemba.identify.logs.gate import BadData
 from kemba.identify.problem.candidates import sensor_candidates
 from kemba.identify.problem.problem import Problem
@@ -32,21 +31,14 @@ from kemba.identify.problem.types import (
     Theta,
 )
 from kemba.identify.robot.candidates import extended, ground_of, in_the_air, robot_candidates
-from kemba.identify.robot.commands import (
-    HINT,
-    CommandSettings,
-    turned_torques,
-    valve_mix_ups,
-)
 from kemba.identify.robot.dynamics.physics import Physics
 from kemba.identify.robot.dynamics.reference import first_reference
 from kemba.identify.robot.dynamics.settings import ForceDensity
 from kemba.identify.robot.force_channels import robot_force_channels
 from kemba.identify.robot.formulas import formula_columns
-from kemba.identify.robot.geometry import mistakes, remarks, standing_lengths
+from kemba.identify.robot.geometry import remarks, standing_lengths
 from kemba.identify.robot.labels import describe
 from kemba.identify.robot.missing import robot_missing
-from kemba.identify.robot.mix_ups import mixed_up
 from kemba.identify.robot.motion.batch import Batch
 from kemba.identify.robot.motion.colour import Noise
 from kemba.identify.robot.motion.expected import expected_power, predicted_error
@@ -54,7 +46,7 @@ from kemba.identify.robot.motion.resampled import resample
 from kemba.identify.robot.noise import learnt_from, stated_noise, with_drifts
 from kemba.identify.robot.operating_point import changes, robot_operating_point
 from kemba.identify.robot.state import LinearisedState, linearise_at
-from kemba.identify.robot.validate import contradictions
+from kemba.identify.robot.validate import faults_of
 from kemba.model.model import Model
 from kemba.settings import BY_HAND, Settings, setting
 from kemba.trajectory import Trajectory
@@ -277,35 +269,15 @@ class RobotProblem(Problem):
     def validate(self) -> list[str]:
         """Which lengths make the feet stand, where they are not the model's. Raises BadData where
         a log contradicts itself or any model."""
-        logs = self.batch.resampled
-        faults = [fault for log in logs for fault in mixed_up(self.physics, log)]
-        faults = faults or list(mistakes(self.standing, self.runs))
-        if faults:
+        if faults := faults_of(self):
             raise BadData(faults)
-        r = self.residual(self.lengths)
-        faults = list(turned_torques(self.state, self.rows(), r))
-        faults = faults or list(contradictions(self.state, self.rows(), r, self._sensor_columns))
-        if faults:
-            raise BadData(self._valves_mixed_up(r) or faults)
         return remarks(self.standing)
 
-    def _valves_mixed_up(self, r: Array) -> list[KembaError]:
-        """The mistake about the valves after which the logs contradict the model no more, and
-        whose residual is much smaller than r (n,); the best of them."""
-        found = []
-        for text, logs in valve_mix_ups(self.logs, self.physics.legs):
-            other = type(self)(logs, self.model, self.unknown)
-            left = other.residual(other.lengths)
-            if not list(contradictions(other.state, other.rows(), left, other._sensor_columns)):
-                found.append((float(np.sqrt(np.mean(left**2))), text))
-        before = float(np.sqrt(np.mean(r**2)))
-        left_over, text = min(found, default=(before, ""))
-        if left_over > before / CommandSettings.current().better:
-            return []
-        what = f"the logs err by {before:.1f} times their noise, and by {left_over:.1f} times then"
-        return [KembaError(", ".join(self.runs), text, what, HINT)]
+    def of_logs(self, logs: Sequence[Trajectory]) -> RobotProblem:
+        """The same question of other logs."""
+        return type(self)(logs, self.model, self.unknown)
 
-    def _sensor_columns(self) -> Array:
+    def sensor_columns(self) -> Array:
         """Columns (n, k) of every sensor fault and every length, per size."""
         faults = [c for c in self.candidates.values() if moves_readings(c.key)]
         return self.jacobian(self.lengths, [c.key for c in faults]) * [c.lead.size for c in faults]

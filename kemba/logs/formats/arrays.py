@@ -33,7 +33,7 @@ def write_npz(trajectory: Trajectory, path: Path) -> None:
 
 
 def read_npz(path: Path) -> Recording:
-    """Our own .npz by its units; else every vector of the length that most vectors have."""
+    """Our own .npz by its units; else every vector of numbers. Raises KembaError where it is none."""
     try:
         with zipfile.ZipFile(path) as packed:
             check_size(path, sum(member.file_size for member in packed.infolist()))
@@ -60,7 +60,8 @@ def write_json(trajectory: Trajectory, path: Path) -> None:
 
 
 def read_json(path: Path) -> Recording:
-    """Columns by name, under `columns` or at the top; null is a missing reading."""
+    """Columns by name, under `columns` or at the top; null is a missing reading. Raises KembaError
+    where the file is no such object."""
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
         columns = content.get("columns", content)

@@ -11,7 +11,6 @@ import numpy as np
 from kemba.logs.recording import Group, Raw
 
 Decode = Callable[[bytes], Any]
-NS = 1_000_000_000
 
 
 class Topic:

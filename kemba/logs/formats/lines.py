@@ -16,7 +16,7 @@ TRANSLATION = ("_tx", "_ty", "_tz")  # coordinates of OpenSim that are lengths
 
 def read_lvm(path: Path) -> Recording:
     """LabVIEW measurement: the first segment; X of its first channel is the time, or its start and
-    increment where no X is written."""
+    increment where no X is written. Raises KembaError where the file is of another form."""
     lines = _lines(path)
     if not lines or not lines[0].startswith("LabVIEW Measurement"):
         raise KembaError(
@@ -68,7 +68,7 @@ def _lvm_columns(
 
 def read_sto(path: Path) -> Recording:
     """OpenSim's storage: a header up to `endheader`, then names and numbers; `inDegrees` holds for
-    all coordinates that are angles."""
+    all coordinates that are angles. Raises KembaError where the file is of another form."""
     lines = _lines(path)
     end = next((i for i, line in enumerate(lines) if line.strip().lower() == "endheader"), None)
     if end is None or end + 1 >= len(lines):

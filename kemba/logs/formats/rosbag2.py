@@ -19,7 +19,8 @@ WAY_OUT = "ros2 bag convert writes it without, or as MCAP"
 
 
 def read_db3(path: Path) -> Recording:
-    """Every number of a bag as a column `topic/field`, each topic on its own clock."""
+    """Every number of a bag as a column `topic/field`, each topic on its own clock. Raises
+    KembaError where nothing in it is read."""
     files = [path]
     if path.is_dir():
         files = sorted(p for p in path.iterdir() if p.suffix in (".db3", ".mcap"))
