@@ -108,7 +108,7 @@ class _Reader:
         return np.asarray(source.sign * source.scale * values + source.offset_in(_unit(header)))
 
     def own_time(self, source: ColumnSource, time: Array) -> Array | None:
-        """When the readings of a column were taken [s]; None where it shares the log's clock. Raises
+        """When readings (n,) were taken [s]; None where they share the log's clock. Raises
         KembaError where the two clocks do not run at the same time."""
         clocks = self.raw.clocks
         base = self._name(TIME, self.layout.columns[TIME].names[0])

@@ -41,7 +41,7 @@ class RobotValidateSettings(Settings):
     faulty: float = setting(4.0, "1", "largest fault of a sensor, in sizes", BY_HAND, decides=True)
 
 
-class Judged(Protocol):
+class JudgedLogs(Protocol):
     """What is asked of a problem of robot logs."""
 
     @property
@@ -54,13 +54,17 @@ class Judged(Protocol):
     def standing(self) -> StandingLengths: ...
     @property
     def lengths(self) -> Theta: ...
-    def residual(self, theta: Theta) -> Array: ...
+    def residual(self, theta: Theta) -> Array:
+        """Whitened (n,)."""
+
     def rows(self) -> Rows: ...
-    def sensor_columns(self) -> Array: ...
-    def of_logs(self, logs: Sequence[Trajectory]) -> Judged: ...
+    def sensor_columns(self) -> Array:
+        """Columns (n, k) of every sensor fault, per size."""
+
+    def of_logs(self, logs: Sequence[Trajectory]) -> JudgedLogs: ...
 
 
-def faults_of(problem: Judged) -> list[KembaError]:
+def faults_of(problem: JudgedLogs) -> list[KembaError]:
     """What is wrong with the logs of a problem, the simplest first: columns by the feet alone, the
     sign of torques, then what no model explains, and the valves if they are the reason."""
     logs, physics = problem.state.batch.resampled, problem.state.physics
@@ -85,7 +89,7 @@ def _turned(found: StandingLengths, runs: Sequence[str]) -> Iterator[KembaError]
         )
 
 
-def _valves(problem: Judged, r: Array) -> list[KembaError]:
+def _valves(problem: JudgedLogs, r: Array) -> list[KembaError]:
     """The mistake about the valves after which the logs contradict the model no more, and leave a
     residual much smaller than r (n,); the best of them."""
     found = []

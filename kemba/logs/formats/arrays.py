@@ -33,7 +33,7 @@ def write_npz(trajectory: Trajectory, path: Path) -> None:
 
 
 def read_npz(path: Path) -> Recording:
-    """Our own .npz by its units; else every vector of numbers. Raises KembaError where it is none."""
+    """Our own .npz by its units; else every vector of numbers. Raises KembaError if damaged."""
     try:
         with zipfile.ZipFile(path) as packed:
             check_size(path, sum(member.file_size for member in packed.infolist()))

@@ -96,7 +96,7 @@ class Found:
                     self.walk(f"{path}/{key}".strip("/"), value, depth + 1)
 
     def signals(self, path: str, time: np.ndarray, signals: Any) -> None:
-        """A Simulink structure with time: its signals are labelled."""
+        """A Simulink structure with time (n,): its signals are labelled."""
         items = np.asarray(signals).ravel() if isinstance(signals, np.ndarray) else [signals]
         for i, item in enumerate(items):
             fields = self.fields(item) or {}
@@ -106,7 +106,7 @@ class Found:
                 self.series.append((label, time, values))
 
     def group(self, path: str, time: np.ndarray, fields: dict[str, Any], depth: int) -> None:
-        """A struct of a time and other arrays as long; other fields are walked through."""
+        """A struct of a time (n,) and arrays as long; other fields are walked through."""
         for key, value in fields.items():
             values = numbers(value)
             if key.strip("_").lower() == "time":
@@ -117,7 +117,7 @@ class Found:
                 self.walk(f"{path}/{key}".strip("/"), value, depth + 1)
 
     def cells(self, path: str, value: np.ndarray, depth: int) -> None:
-        """A cell array: of texts, or of anything, each under its name or its number."""
+        """A cell array (n,): of texts, or of anything, each under its name or its number."""
         items = list(value.ravel())
         if items and all(isinstance(i, str) or text(i) for i in items):
             self.loose[path] = np.array([text(i) for i in items])
@@ -145,7 +145,7 @@ LABELS = ("name", "blockpath", "classname", "propagatedname", "porttype", "porti
 
 
 def numbers(value: Any) -> np.ndarray | None:
-    """A value as an array of numbers; None where it is something else."""
+    """A value as numbers (n, ...); None where it is something else."""
     if value is None or isinstance(value, str | dict) or hasattr(value, "classname"):
         return None
     array = np.asarray(value)
@@ -164,7 +164,7 @@ def text(value: Any) -> str:
 
 
 def uniform(info: dict[str, Any], data: Any) -> np.ndarray | None:
-    """Times of a series that states its start and its increment only."""
+    """Times (n,) of a series that states its start and its increment only."""
     plain = {key.strip("_").lower(): np.asarray(value).ravel() for key, value in info.items()}
     values = numbers(data)
     if values is None or "increment" not in plain or not len(plain["increment"]):
