@@ -70,13 +70,14 @@ CONSTANTS = {  # file -> names, why
         "readings by which units are guessed",
     ),
     "logs/draft/clock.py": (
-        "RISING STAMPED ALIKE NEAR PLOTTER NAMED MENTIONED BY_UNIT UNNAMED COUNTER LARGEST",
+        "RISING REPEATED STAMPED ALIKE NEAR PLOTTER NAMED MENTIONED BY_UNIT UNNAMED COUNTER "
+        "LARGEST",
         "how clocks are ranked by their names; units",
     ),
     "logs/draft/frames.py": ("UNIT_NORM", "rounding of a quaternion's norm"),
     "logs/rates.py": ("FULL LONGEST", "what one rate and no gap mean"),
     "logs/times.py": ("DAY HOUR", "seconds of them"),
-    "logs/draft/layout.py": ("LINES", "lines of a table that are looked at"),
+    "logs/draft/layout.py": ("LINES NEARLY", "how a table is looked at"),
     "ocp/transcription/stage.py": ("ANGLE_ARM COST_SCALE AIM", "units of moments and costs"),
     "ocp/task/requirement.py": ("SCALES MOMENTS FLIGHT ROUND", "moments of a task; units"),
     "contract/cases.py": ("OWN_RIGS", "figures of example rigs"),

@@ -46,6 +46,7 @@ def one_clock(log: Trajectory) -> Trajectory:
     """The log on the rows of its fastest channel, of equally fast ones those of the commands, where
     its rows belong to channels of several clocks; others are `placed` there. A log of one rate is
     returned as it is."""
+    log = _joined_rows(log)
     counts = {name: int(np.isfinite(log[name]).sum()) for name in log.names}
     fast = [name for name in counts if counts[name] > FULL * max(counts.values())]
     widest = max(fast, key=lambda name: (is_command(name), counts[name]), default="")
@@ -78,6 +79,23 @@ def _elsewhere(base: Array, other: Array) -> bool:
     """Whether a column is mostly read where the base is not."""
     read = np.isfinite(other)
     return bool(read.any()) and float(np.mean(np.isnan(base[read]))) > 0.5
+
+
+def _joined_rows(log: Trajectory) -> Trajectory:
+    """The log with rows of one stamp as one, where none of its columns is read twice in them."""
+    steps = np.diff(log.time)
+    if not len(steps) or not np.all(steps >= 0) or not np.any(steps == 0):
+        return log
+    first = np.concatenate([[True], steps > 0])
+    row = np.cumsum(first) - 1
+    columns = {}
+    for header, name in zip(log.headers, log.names, strict=True):
+        good = np.isfinite(log[name])
+        if len(np.unique(row[good])) < good.sum():
+            return log
+        columns[header] = np.full(int(first.sum()), np.nan)
+        columns[header][row[good]] = log[name][good]
+    return Trajectory(log.time[first], columns, log.meta)
 
 
 def rate_missing(time: Array, values: Array) -> tuple[float, float]:

@@ -40,7 +40,23 @@ def read_log(path: str | Path, columns: ColumnMap | None = None) -> Trajectory:
     if "noise" in log.meta:
         units = {name: log.unit(name) for name in log.names}
         log.meta["noise"], log.meta["noise_time"] = check_noise(log.meta["noise"], units, beside)
-    return _without_absurd(log)
+    return _without_absurd(_with_torques(log))
+
+
+def _with_torques(log: Trajectory) -> Trajectory:
+    """A robot's log without any torque, as the authors' own is, with torques of zero: the fit then
+    takes them as unknown (`log.meta["torques"]` is False), and says what that costs."""
+    legs = [name.removesuffix("/hip/q") for name in log.names if name.endswith("/hip/q")]
+    if log.meta["kind"] != "robot" or not legs or any(f"{leg}/hip/tau" in log for leg in legs):
+        return log
+    zero = {f"{leg}/hip/tau [N.m]": np.zeros(len(log)) for leg in legs}
+    found = log.with_columns(zero)
+    said = (
+        "no hip torques are logged: they are taken as unknown, so that nothing can be said about "
+        "motors and hips, and less about the body"
+    )
+    found.meta |= {"torques": False, "read": [*log.meta.get("read", []), said]}
+    return found
 
 
 def _turned(log: Trajectory) -> Trajectory:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from copy import copy
+from dataclasses import replace
 
 import numpy as np
 from typing_extensions import Self
@@ -86,6 +87,8 @@ class RobotProblem(Problem):
         self.logs = tuple(logs)
         self.window = RobotProblemSettings.current().window  # innovations are one-step errors
         self.model, self.unknown = model, unknown or ForceDensity.current()
+        if any(log.meta.get("torques") is False for log in logs):
+            self.unknown = replace(self.unknown, hip=10.0)  # N2.m2.s: 10 N.m for 0.1 s
         found = robot_candidates(model)
         effects = in_the_air(found)
         grip, ground = ground_of(model)

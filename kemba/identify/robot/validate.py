@@ -74,8 +74,19 @@ def faults_of(problem: JudgedLogs) -> list[KembaError]:
         return faults
     r, rows = problem.residual(problem.lengths), problem.rows()
     faults = list(turned_torques(problem.state, rows, r))
-    faults = faults or list(contradictions(problem.state, rows, r, problem.sensor_columns))
-    return (_valves(problem, r) or faults) if faults else []
+    return (
+        faults
+        or (_valves(problem, r) if _is_absurd(problem, rows, r) else [])
+        or list(contradictions(problem.state, rows, r, problem.sensor_columns))
+    )
+
+
+def _is_absurd(problem: JudgedLogs, rows: Rows, r: Array) -> bool:
+    """Whether a channel errs by more than any missing effect makes it, sensors right or wrong."""
+    channels = problem.state.physics.channels
+    runs = range(len(problem.logs))
+    power = [max(_power(channels, r, rows, rows.run == i).values(), default=0.0) for i in runs]
+    return max(power) > RobotValidateSettings.current().absurd
 
 
 def _turned(found: StandingLengths, runs: Sequence[str]) -> Iterator[KembaError]:

@@ -18,6 +18,7 @@ from kemba.quantity import convert
 from kemba.trajectory import Array
 
 FIELDS = ("position", "velocity", "effort")
+REPEATED = 0.15  # share of rising steps where up to six topics have rows of one stamp
 RISING = 0.99  # share of steps that must rise: a few repeats are for the gate to tell
 STAMPED = 1e8  # s; larger first stamps count from 1970 (three years) or from the start of a clock
 ALIKE = 0.02  # share by which two clocks of one log may differ
@@ -96,6 +97,8 @@ def stamp_of(raw: Raw, values: Mapping[str, Array], names: Names) -> Stamp | Non
     if alike:
         listed = ", ".join("+".join(c.names) for c in alike[:3])
         reason += f"; as fast as {listed}{' and more' if len(alike) > 3 else ''}"
+    if COUNTER < best.score <= UNNAMED:
+        question = f"no column is called a time; is '{best.names[0]}', which rises, one?"
     if against and best.score > UNNAMED:
         other = against[0]
         question = (
@@ -120,8 +123,10 @@ def joint_state_labels(raw: Raw) -> dict[str, str]:
 
 
 def _candidates(raw: Raw, values: Mapping[str, Array], names: Names) -> list[Clock]:
-    found = [c for name in raw if (c := _single(name, raw, values, names)) is not None]
-    found += _pairs(values)
+    found = _pairs(values)
+    parts = {name for pair in found for name in pair.names}
+    rest = [name for name in raw if name not in parts]
+    found += [c for name in rest if (c := _single(name, raw, values, names)) is not None]
     if list(raw)[:2] == ["1", "2"] and _is_split(values):
         found.append(_pair(values, "1", "2", "ns", NAMED + 1))
     return found
@@ -138,7 +143,9 @@ def _single(name: str, raw: Raw, values: Mapping[str, Array], names: Names) -> C
         score = NAMED if says_time(name) else MENTIONED
         return Clock(score, {"source": name}, (name,), read, False, f"'{name}' holds clock times")
     rows = values[name]
-    if not _rises(rows) or (stated is not None and not _is_time(stated)):
+    if not _rises(rows, says_time(name) or stated is not None) or (
+        stated is not None and not _is_time(stated)
+    ):
         return None
     called = _called(name, rows, stated, names)
     if called is None:
@@ -248,6 +255,13 @@ def _is_text(cell: Any) -> bool:
     return any(letter.isalpha() for letter in str(cell))
 
 
-def _rises(values: Array) -> bool:
+def _rises(values: Array, named: bool = True) -> bool:
+    """Whether a column rises; one that is called a time may repeat, as where each topic has rows of
+    its own."""
     steps = np.diff(values[np.isfinite(values)])
-    return len(steps) > 0 and bool(np.mean(steps > 0) > RISING)
+    if not len(steps):
+        return False
+    rising = np.mean(steps > 0)
+    return bool(
+        rising > RISING or (named and rising > REPEATED and np.mean(steps < 0) < 1 - RISING)
+    )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -164,7 +164,7 @@ def _sources(
     turned: Mapping[str, tuple[str, ...]],
 ) -> tuple[dict[str, dict[str, Any]], list[str]]:
     """The source of each of our columns, and what has to be asked about them."""
-    guessed = _guessed_units(names, found.pairs, values, stroke)
+    guessed = _guessed_units(names, found.pairs, values, stroke, turned)
     columns: dict[str, dict[str, Any]] = {}
     asked = []
     for target in targets:
@@ -197,14 +197,22 @@ def _asked(target: Target, name: str, unit: str | None, names: Names, y: Array) 
 
 
 def _guessed_units(
-    names: Names, pairs: Mapping[str, str], values: Mapping[str, Array], stroke: float | None
+    names: Names,
+    pairs: Mapping[str, str],
+    values: Mapping[str, Array],
+    stroke: float | None,
+    turned: Collection[str],
 ) -> dict[str, str]:
     """The units of columns that are alike, where nothing tells them: those of the others in the
     log, else by the size of all together, since a jump on the spot has small `x` and pitch. Of
     lengths the height tells most: a way forward may be any."""
     found: dict[str, str] = {}
     for group in {ranges.alike(header) for header in pairs}:
-        own = {h: n for h, n in pairs.items() if ranges.alike(h) == group and "valve/" not in h}
+        own = {
+            header: name
+            for header, name in pairs.items()
+            if ranges.alike(header) == group and "valve/" not in header and name not in turned
+        }
         told = {names.unit(name) for name in own.values()} - {None}
         sized = {h: n for h, n in own.items() if h == "body/z [m]"} or own
         size = np.concatenate([values[name] for name in sized.values()] or [np.zeros(0)])

@@ -37,7 +37,7 @@ def quaternions(
             continue
         four = tuple(parts[axis] for axis in "xyzw")
         norm = np.sqrt(sum(values[name] ** 2 for name in four))
-        if np.nanmean(np.abs(norm - 1.0) < UNIT_NORM) < 0.99:
+        if np.mean(np.abs(norm[np.isfinite(norm)] - 1.0) < UNIT_NORM) < 0.99:
             continue
         for name in four:
             left.pop(name)
@@ -45,7 +45,7 @@ def quaternions(
         left[label] = pitch(*(values[name] for name in four))
         labels[label], turned[label] = f"{stem}_pitch_derived", four
     below = {**names.below, **dict.fromkeys(turned, "rad")}
-    return left, replace(names, labels=labels, below=below), turned
+    return left, replace(names, labels=labels, below=below, columns=tuple(left)), turned
 
 
 def upright(values: Mapping[str, Array], names: Names) -> tuple[Names, list[str]]:

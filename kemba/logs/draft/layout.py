@@ -13,6 +13,7 @@ from kemba.errors import KembaError
 from kemba.logs.text import cells_of, encoding, joined
 
 LINES = 300  # as many are looked at; a table that changes later is told when it is read
+NEARLY = 0.8  # share of the most numbers that a way to read a table must give
 SEPARATORS = (";", "tab", ",", "|", "whitespace")
 WAYS = [(mark, sign) for mark in SEPARATORS for sign in (".", ",") if mark != sign]
 NUMBER = {
@@ -25,12 +26,17 @@ Layout = dict[str, Any]
 def layout_of(path: Path) -> Layout:
     """Keys of a column map that say how to read the table; those with their default are left out.
 
-    Of all separators and decimal signs, the one that gives most numbers. Raises KembaError where
-    none gives a table of at least two columns.
+    Of all separators and decimal signs that give about the most numbers, one that gives a name to
+    each column too, and then the one that gives most. Raises KembaError where none gives a table of
+    at least two columns.
     """
     lines = _lines(path)
     found = [(_numbers(lines, *way), way) for way in WAYS]
-    (score, begin, width), (separator, decimal) = max(found, key=lambda pair: pair[0][0])
+    most = max(score for (score, _, _), _ in found)
+    (score, begin, width), (separator, decimal) = max(
+        (way for way in found if way[0][0] >= NEARLY * most),
+        key=lambda way: (_header(lines[: way[0][1]], way[1][0], way[0][2])[1] > 0, way[0][0]),
+    )
     if not score or width < 2:
         expected = "rows of at least two numbers were expected"
         raise KembaError(str(path), "is no table that kemba recognises", expected)

@@ -47,7 +47,8 @@ def alike(header: str) -> str:
 
 def time_unit(values: Array) -> str:
     """The unit of a time column (n,) by the step between its rows."""
-    step = float(np.median(np.diff(values))) if len(values) > 1 else 0.0
+    steps = np.diff(values)
+    step = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
     return next((unit for unit, largest in STEP if step <= largest), "ns")
 
 

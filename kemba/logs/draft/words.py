@@ -153,12 +153,12 @@ def is_unit(text: str, indexed: bool = False) -> bool:
 
 
 def strange_unit(name: str, legs: Sequence[str]) -> str | None:
-    """What stands in square brackets like a unit and is none that is known: `[counts]`."""
+    """What stands in brackets like a unit and is none that is known: `[counts]`."""
     for match in BRACKETS.finditer(name):
-        text = (match[1] or "").strip()
+        text = (match[1] or match[2] or "").strip()
         if not any(letter.isalpha() for letter in text) or named_unit(name)[1] is not None:
             continue
-        if not meaning(text, legs) and not set(words(text)) & {"utc", "gmt", "local"}:
+        if unknown(text, legs):
             return text
     return None
 

@@ -146,21 +146,27 @@ LABELS = ("name", "blockpath", "classname", "propagatedname", "porttype", "porti
 
 def numbers(value: Any) -> np.ndarray | None:
     """A value as numbers (n, ...); None where it is something else."""
-    if value is None or isinstance(value, str | dict) or hasattr(value, "classname"):
-        return None
-    array = np.asarray(value)
-    if array.dtype == object and array.size == 1:
-        return numbers(array.ravel()[0])
+    array = inner(value)
     if array.dtype.kind == "m":
         return np.squeeze(array) / np.timedelta64(1, "s")
     return np.squeeze(array) if array.dtype.kind in "fiub" and array.size > 1 else None
 
 
 def text(value: Any) -> str:
+    """A value as a text; empty where it is something else."""
+    array = inner(value)
+    return str(array.ravel()[0]) if array.dtype.kind == "U" and array.size == 1 else ""
+
+
+def inner(value: Any) -> np.ndarray:
+    """The array (n, ...) in a value that may be wrapped in arrays of one entry."""
     array = np.asarray(value)
     while array.dtype == object and array.size == 1:
-        array = np.asarray(array.ravel()[0])
-    return str(array.ravel()[0]) if array.dtype.kind == "U" and array.size == 1 else ""
+        only = array.ravel()[0]
+        if not isinstance(only, np.ndarray | str):
+            break
+        array = np.asarray(only)
+    return array
 
 
 def uniform(info: dict[str, Any], data: Any) -> np.ndarray | None:
