@@ -134,7 +134,8 @@ def test_lvm(tmp_path: Path) -> None:
     sizes = [{"mm": 1e3, "deg": np.degrees(1)}.get(unit, 1.0) for unit in units]
     head = ["LabVIEW Measurement", "Writer_Version\t2", "Separator\tTab", "Decimal_Separator\t,",
             "***End_of_Header***", "", f"Channels\t{len(columns)}",
-            "\t".join(["Y_Unit_Label", *units]), "***End_of_Header***", "\t".join(["X_Value", *columns, "Comment"])]  # fmt: skip
+            "\t".join(["Y_Unit_Label", *units]), "***End_of_Header***",
+            "\t".join(["X_Value", *columns, "Comment"])]  # fmt: skip
     rows = []
     for i, time in enumerate(log.time):
         cells = [time, *(v[i] * size for v, size in zip(columns.values(), sizes, strict=True))]
