@@ -14,13 +14,14 @@ from kemba.logs.columns import ColumnMap
 from kemba.logs.recording import Column, Raw
 from kemba.trajectory import Array
 
+MISSING = ["", *"nan NaN NAN na NA null NULL none None -".split()]
 COMMENT = ("#", "%", "//")  # before a header, as of numpy.savetxt
 
 
 def read_text(path: Path, layout: ColumnMap) -> Raw:
-    """The columns of a text table as texts (n,), by header or by number from 1.
+    """The columns (n,) of a text table, by header or by number from 1: of numbers where all cells
+    are, else of texts, of which only those of mapped columns are ever converted.
 
-    Cells that are no numbers stay as they are: only those of mapped columns are ever converted.
     Raises KembaError where the file cannot be read or a row has more cells than the header.
     """
     import pandas as pd
@@ -32,8 +33,10 @@ def read_text(path: Path, layout: ColumnMap) -> Raw:
             sep=layout.pattern,
             header=None,
             skiprows=above,
-            dtype=str,
+            decimal=layout.decimal,
             keep_default_na=False,
+            na_values=MISSING,
+            low_memory=False,
             skipinitialspace=True,
             encoding=encoding(path),
         )
@@ -46,11 +49,17 @@ def read_text(path: Path, layout: ColumnMap) -> Raw:
         raise KembaError(str(path), what, hint="`separator` and `skip_rows` of the map") from None
     except OSError as error:
         raise KembaError(str(path), error.strerror or str(error)) from None
-    cells = table.to_numpy(dtype=object)
-    if cells.shape[1] < len(names):
-        what = f"rows have {cells.shape[1]} cells below {len(names)} headers"
+    width = table.shape[1]
+    if width < len(names):
+        what = f"rows have {width} cells below {len(names)} headers"
         raise KembaError(f"{path}:{above + 1}", what, hint="`separator` and `skip_rows` of the map")
-    found = {name: cells[:, column] for column, name in enumerate(numbered(names, cells.shape[1]))}
+    found = {}
+    for name, column in zip(numbered(names, width), table, strict=True):
+        cells = table[column].to_numpy()
+        found[name] = cells if cells.dtype.kind in "fiub" else cells.astype(object)
+        if cells.dtype.kind == "f" and np.isinf(cells).any():
+            row = above + 1 + int(np.argmax(np.isinf(cells)))
+            raise KembaError(f"{path}:{row}", f"{name}: the number is infinite")
     _check_quotes(found, path, above)
     return found
 
@@ -116,7 +125,8 @@ def _lines(path: Path) -> Iterator[tuple[int, str]]:
 def _check_quotes(raw: Raw, path: Path, above: int) -> None:
     """Raise KembaError where a quote was opened that its own line does not close: the rows up to
     the next quote would be lost."""
-    for name, cells in raw.items():
+    texts = {name: cells for name, cells in raw.items() if cells.dtype == object}
+    for name, cells in texts.items():
         for row, cell in enumerate(cells):
             if isinstance(cell, str) and "\n" in cell:
                 what = f"{name}: a quote is opened in row {above + row + 1} that is not closed"

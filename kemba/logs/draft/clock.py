@@ -78,8 +78,11 @@ def numbers(raw: Raw, decimal: str) -> dict[str, Array]:
 def switches(raw: Raw) -> set[str]:
     """The columns that say `on` and `off`, or `true` and `false`."""
     said = {"on", "off", "true", "false"}
+    found = {name for name, cells in raw.items() if cells.dtype == bool}
     texts = {name: cells for name, cells in raw.items() if cells.dtype == object}
-    return {n for n, cells in texts.items() if {str(c).strip().lower() for c in cells} <= said}
+    return found | {
+        n for n, cells in texts.items() if {str(c).strip().lower() for c in cells} <= said
+    }
 
 
 def stamp_of(raw: Raw, values: Mapping[str, Array], names: Names) -> Stamp | None:
@@ -111,7 +114,8 @@ def stamp_of(raw: Raw, values: Mapping[str, Array], names: Names) -> Stamp | Non
 def joint_state_labels(raw: Raw) -> dict[str, str]:
     """Names for the columns of `ros2 topic echo --csv` of a JointState: stamp, frame, the joints'
     names, then their positions, velocities and efforts. Empty where the columns are others."""
-    constant = [n for n, cells in raw.items() if len(set(cells)) == 1 and _is_text(cells[0])]
+    texts = {name: cells for name, cells in raw.items() if cells.dtype == object and len(cells)}
+    constant = [n for n, cells in texts.items() if len(set(cells)) == 1 and _is_text(cells[0])]
     joints = [str(raw[name][0]) for name in constant if name.isdigit() and int(name) > 3]
     after = [name for name in raw if name.isdigit() and int(name) > 3 + len(joints)]
     if not joints or len(after) < len(joints):

@@ -1,7 +1,7 @@
 """A process of its own that reads a MATLAB file; needs NumPy, SciPy, and for objects mat-io.
 
 SciPy's reader is compiled code that trusts the file: damaged bytes may kill the process it runs in.
-Argument: the file. To the standard output as .npz: `index` (JSON: what each array is), then the
+Arguments: the file, and an .npz file to write: `index` (JSON: what each array is), then the
 arrays as `a0`, `a1` and so on. Exit code 1 with the reason where the file cannot be read.
 
 What is found by walking through structs, cells and objects of any class: series, which have data
@@ -9,7 +9,6 @@ and times (timeseries, signals of a Simulink structure with time, timetables), a
 """
 
 import contextlib
-import io
 import json
 import sys
 from typing import Any
@@ -239,10 +238,8 @@ def main() -> int:
     for name, array in found.loose.items():
         arrays.append(array)
         index["loose"].append([name, len(arrays) - 1])
-    stream = io.BytesIO()
     numbered: dict[str, Any] = {f"a{i}": array for i, array in enumerate(arrays)}
-    np.savez(stream, index=np.array(json.dumps(index)), **numbered)
-    sys.stdout.buffer.write(stream.getvalue())
+    np.savez(sys.argv[2], index=np.array(json.dumps(index)), **numbered)
     return 0
 
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import io
 import json
 import re
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -84,7 +84,13 @@ def _content(path: Path) -> tuple[dict[str, Any], dict[str, Column]]:
             pass
     except OSError as error:
         raise KembaError(str(path), error.strerror or str(error)) from None
-    child = [sys.executable, str(Path(__file__).with_name("mat_child.py")), str(path.resolve())]
+    with tempfile.TemporaryDirectory(prefix="kemba-") as folder:
+        return _by_child(path, Path(folder) / "arrays.npz")
+
+
+def _by_child(path: Path, written: Path) -> tuple[dict[str, Any], dict[str, Column]]:
+    script = Path(__file__).with_name("mat_child.py")
+    child = [sys.executable, str(script), str(path.resolve()), str(written)]
     try:
         done = subprocess.run(
             child, stdin=subprocess.DEVNULL, capture_output=True, timeout=LONGEST, check=False
@@ -98,7 +104,7 @@ def _content(path: Path) -> tuple[dict[str, Any], dict[str, Column]]:
             raise missing(path, ImportError(name="mat-io"))
         reason = said if done.returncode > 0 else "it is damaged: its reader crashes"
         raise KembaError(str(path), f"is no MATLAB file that can be read: {reason}", EXPECTED)
-    with np.load(io.BytesIO(done.stdout), allow_pickle=False) as found:
+    with np.load(written, allow_pickle=False) as found:
         arrays = {name: found[name] for name in found.files if name != "index"}
         return json.loads(str(found["index"])), arrays
 
