@@ -54,6 +54,20 @@ NAMES: dict[str, dict[str, str]] = {
     "dotted": {"body/x": "base.pos.x", "body/z": "base.pos.z", "body/pitch": "base.rpy.pitch",
                "hip/q": "{leg}.hip.q", "hip/tau": "{leg}.hip.tau", "piston/x": "{leg}.piston.x",
                "valve/extend": "{leg}.valve.extend", "valve/retract": "{leg}.valve.retract"},
+    "abbrev": {"body/x": "POS_X", "body/z": "POS_Z", "body/pitch": "PITCH",
+               "hip/q": "HIP_ANG_{l}", "hip/tau": "HIP_TRQ_{l}", "piston/x": "CYL_POS_{l}",
+               "valve/extend": "VLV_EXT_{l}", "valve/retract": "VLV_RET_{l}"},
+    "joints": {"body/x": "floating_base/pos_x", "body/z": "floating_base/pos_z",
+               "body/pitch": "floating_base/rot_pitch",
+               "hip/q": "joint_states/{leg}_hip_joint/position",
+               "hip/tau": "joint_states/{leg}_hip_joint/effort",
+               "piston/x": "joint_states/{leg}_knee_rod/position",
+               "valve/extend": "cmd/{leg}_valve/extend",
+               "valve/retract": "cmd/{leg}_valve/retract"},
+    "parts first": {"body/x": "trunk_x", "body/z": "trunk_height", "body/pitch": "trunk_tilt",
+                    "hip/q": "q_hip_{leg}", "hip/tau": "tau_hip_{leg}",
+                    "piston/x": "x_cyl_{leg}", "valve/extend": "valve_{leg}_1",
+                    "valve/retract": "valve_{leg}_2"},
     "planar": {"body/x": "x", "body/z": "y", "body/pitch": "theta", "hip/q": "hip_q_{l}",
                "hip/tau": "hip_tau_{l}", "piston/x": "cyl_x_{l}", "valve/extend": "u_ext_{l}",
                "valve/retract": "u_ret_{l}"},
@@ -189,7 +203,7 @@ CLOCKS: dict[str, Callable[[Trajectory], dict[str, np.ndarray]]] = {
 
 def _desired(log: Trajectory, scheme: str, rng: Rng) -> dict[str, np.ndarray]:
     word = {"snake": "{}_des", "topics": "{}_desired", "words": "{} Setpoint", "camel": "{}Ref",
-            "german": "{}_soll", "dotted": "{}.target", "planar": "{}_cmd"}[scheme]  # fmt: skip
+            "german": "{}_soll", "dotted": "{}.target", "planar": "{}_cmd"}.get(scheme, "{}_ref")  # fmt: skip
     names = ["body/z", "front/hip/q", "rear/piston/x"]
     return {word.format(_name(scheme, n)): log[n] + 0.01 for n in names}
 

@@ -22,7 +22,7 @@ REPEATED = 0.15  # share of rising steps where up to six topics have rows of one
 RISING = 0.99  # share of steps that must rise: a few repeats are for the gate to tell
 STAMPED = 1e8  # s; larger first stamps count from 1970 (three years) or from the start of a clock
 ALIKE = 0.02  # share by which two clocks of one log may differ
-NEAR = 25.0  # scores that differ by less do not decide between clocks that contradict each other
+NEAR = 15.0  # scores that differ by less do not decide between clocks that contradict each other
 
 # Scores: what a column is called decides, how it is written breaks ties.
 PLOTTER, NAMED, MENTIONED, BY_UNIT, UNNAMED, COUNTER = 100.0, 80.0, 60.0, 50.0, 10.0, 5.0

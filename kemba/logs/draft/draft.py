@@ -188,7 +188,7 @@ def _asked(target: Target, name: str, unit: str | None, names: Names, y: Array) 
     strange = strange_unit(written, names.legs)
     if strange and names.unit(name) is None and not target.is_valve:
         found.append(f"{target.header}: '{name}' is in '{strange}', which is no unit that is known")
-    if names.says(name).get("role") == {"desired"} and not target.is_command:
+    if "desired" in names.says(name).get("role", ()) and not target.is_command:
         found.append(f"{target.header}: '{name}' is what was asked for; which column is measured?")
     turns = target.header == "axis/q [rad]" and names.unit(name) is None
     if turns and float(np.nanmax(np.abs(y), initial=0.0)) > dict(ranges.ANGLE)["rad"]:

@@ -129,6 +129,6 @@ def agreement(says: Meaning, target: Target) -> float:
             score += SAID_TOO
         elif group not in target.means:
             score -= UNRELATED * (group in ("kind", "leg", "part"))
-    if says.get("role") == {"desired"} and not target.is_valve:
+    if "desired" in says.get("role", ()) and not target.is_valve:
         score -= ASKED_FOR
     return score

@@ -16,14 +16,14 @@ WORDS: dict[str, dict[str, str]] = {
         "piston": "piston cylinder cyl knee rod actuator kolben zylinder zyl xp fp",
         "body": "body base torso trunk com boom imu pelvis rumpf floating",
         "foot": "foot feet toe grf ground fuss fuß",
-        "valve": "valve valves sol solenoid ventil u ue ur",
+        "valve": "valve valves vlv sol solenoid ventil u ue ur",
         "supply": "supply tank reservoir feed regulator line",
         "axis": "axis drive slide carriage shaft",
     },
     "kind": {
-        "position": "q x pos position angle theta enc encoder stroke travel displacement winkel "
-        "weg laser qm xp height",
-        "torque": "tau torque trq effort moment drehmoment tm",
+        "position": "q x pos position ang angle theta enc encoder stroke travel displacement "
+        "winkel weg laser qm xp height",
+        "torque": "tau torque trq tq effort moment drehmoment tm",
         "force": "f force load loadcell cell kraft transducer grf fp fx fy fz",
         "pressure": "p pressure press druck",
         "speed": "v vel velocity speed rate dx dy dz dq qd dot xdot ydot zdot vx vy vz xd yd zd "
@@ -185,9 +185,24 @@ def meaning(name: str, legs: Sequence[str]) -> Meaning:
             found[group] = set(hits)
     if "other" in found.get("kind", ()):
         found["kind"] = {"other"}
+    if found.get("part", set()) & {"hip", "piston", "foot", "valve"}:
+        _without_leg(found, said, legs)
     if "valve" in found.get("part", ()) and len(found["part"]) > 1 and "u" in said:
         found["part"] -= {"valve"}
     return found
+
+
+def _without_leg(found: Meaning, said: Sequence[str], legs: Sequence[str]) -> None:
+    """Of a part of a leg, take the letter of its leg for nothing else: `CYL_POS_R` is no pitch."""
+    letters = {w for leg in legs for w in LEG_WORDS.get(leg, "").split() if len(w) == 1} & set(said)
+    for group in ("direction", "kind"):
+        by_letter = {e for e in found.get(group, ()) if letters & set(WORDS[group][e].split())}
+        rest = {w for w in said if w not in letters}
+        alone = {e for e in by_letter if not rest & set(WORDS[group][e].split())}
+        if alone:
+            found[group] -= alone
+            if not found[group]:
+                del found[group]
 
 
 def unknown(name: str, legs: Sequence[str]) -> int:
