@@ -203,9 +203,10 @@ CLOCKS: dict[str, Callable[[Trajectory], dict[str, np.ndarray]]] = {
 
 def _desired(log: Trajectory, scheme: str, rng: Rng) -> dict[str, np.ndarray]:
     word = {"snake": "{}_des", "topics": "{}_desired", "words": "{} Setpoint", "camel": "{}Ref",
-            "german": "{}_soll", "dotted": "{}.target", "planar": "{}_cmd"}.get(scheme, "{}_ref")  # fmt: skip
+            "german": "{}_soll", "dotted": "{}.target", "planar": "{}_cmd"}  # fmt: skip
+    form = word.get(scheme, "{}_ref")
     names = ["body/z", "front/hip/q", "rear/piston/x"]
-    return {word.format(_name(scheme, n)): log[n] + 0.01 for n in names}
+    return {form.format(_name(scheme, n)): log[n] + 0.01 for n in names}
 
 
 EXTRAS: dict[str, Callable[[Trajectory, str, Rng], dict[str, np.ndarray]]] = {
