@@ -46,10 +46,8 @@ def export(
         paths = export_nlp(run, out or Path("nlp"), force)
         names = [str(path) for path in paths]
         print_json({"export": names}) if json else typer.echo("\n".join(names))
-        say(
-            f"the functions are of CasADi {casadi.CasadiMeta.version()}; older ones do not read them",
-            quiet,
-        )
+        version = casadi.CasadiMeta.version()
+        say(f"the functions are of CasADi {version}; older ones do not read them", quiet)
         return
     if out is None:
         raise typer.BadParameter("a file was expected, such as jump.mat", param_hint="--out")
