@@ -54,7 +54,14 @@ def _headers(stream: TextIO, path: str | Path) -> list[str]:
             "commas, and decimal points, were expected",
             map_hint(path),
         )
-    return [cell.strip() for cell in next(csv.reader([line]))]
+    return [cell.strip() for cell in _cells(line)]
+
+
+def _cells(line: str) -> list[str]:
+    """The cells of one line, whatever its length."""
+    if len(line) > csv.field_size_limit():
+        return line.rstrip("\n").split(",")
+    return next(csv.reader([line.rstrip("\n")]), [])
 
 
 def check_headers(headers: Iterable[str], path: str | Path, place: Callable[[int], str]) -> None:
@@ -108,7 +115,10 @@ def _culprit(path: str | Path, headers: list[str]) -> KembaError | None:
     """The first faulty cell, found by reading cell by cell."""
     with open(path, encoding="utf-8-sig", newline=None) as stream:
         stream.readline()
-        for number, cells in enumerate(csv.reader(stream), start=2):
+        for number, line in enumerate(stream, start=2):
+            cells = _cells(line)
+            if line.count('"') % 2:
+                return KembaError(f"{path}:{number}", "has a quote that nothing closes")
             if cells and len(cells) != len(headers):
                 what = f"{len(cells)} cells below {len(headers)} headers"
                 return KembaError(f"{path}:{number}", what)

@@ -1,4 +1,4 @@
-"""Numbers with units: the unit grammar `m.s-1`, and conversion by pint.
+"""Numbers with units, read by pint: `m.s-1`, `m/s^2`, `deg/100`, `10 ms`.
 
 pint is imported only for a unit that is not among the `USUAL` ones: it takes a quarter of a second.
 """
@@ -21,10 +21,15 @@ if TYPE_CHECKING:
     Number = TypeVar("Number", float, np.ndarray)
 
 NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
-FACTOR = re.compile(r"([./* ]*)([A-Za-zµμΩ°%]+|1)(?:\^|\*\*)?([+-]?\d+)?")
+TOKEN = re.compile(
+    r"(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?:(?:\^|\*\*)(?P<exponent>[+-]?\d{1,2}(?!\d)))?"
+    r"|(?P<symbol>[A-Za-zµμΩ°%]+)(?:(?:\^|\*\*)?(?P<power>[+-]?\d{1,2}(?!\d)))?"
+    r"|(?P<operator>\s*[*/.·×]\s*|\s+)|(?P<bracket>[()])"
+)
+RAISED = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
 HEADER_UNIT = re.compile(r"1|[A-Za-z%]+(?:-?\d+)?(?:\.[A-Za-z%]+(?:-?\d+)?)*")
 SI_SYMBOLS = frozenset("1 m s kg A K mol cd rad N Pa J W V C F Hz T H".split())
-ALIASES = {"Nm": (("N", 1), ("m", 1)), "°": (("deg", 1),)}  # `Nm` is a textile unit to pint
+TORQUE = re.compile(r"([kMmuµ]?N)([mc]?m)")  # `Nm` is a textile unit to pint
 COMMON = "m mm cm s ms min kg g N kN Pa kPa MPa bar psi rad deg K degC J W Hz rpm L".split()
 
 # SI unit and size of the units that most files have; pint gives the same numbers to the last bit
@@ -107,13 +112,14 @@ def convert(value: Number, source_unit: str, target_unit: str) -> Number:
     si, size = USUAL.get(source_unit, ("", 1.0))
     if si == target_unit:
         return value * size
-    source, target = parse_unit(source_unit), parse_unit(target_unit)
+    (size, source), (divisor, target) = _parsed(source_unit), _parsed(target_unit)
     if source.dimensionality != target.dimensionality:
         raise ValueError(f"is {_dimension(source_unit)}; {expectation(target_unit)}")
     if "rad" in target_unit and re.search(r"Hz\b", source_unit):
         raise ValueError("could mean turns or radians; write rpm or rad.s-1")
-    converted: Number = registry().Quantity(value, source).to(target).magnitude
-    return converted
+    scaled = value if size == 1.0 else value * size
+    converted: Number = registry().Quantity(scaled, source).to(target).magnitude
+    return converted if divisor == 1.0 else converted / divisor
 
 
 def read_si(value: float | int | str) -> tuple[float, str]:
@@ -154,7 +160,7 @@ def is_unit(text: str) -> bool:
 
 def is_si(unit: str) -> bool:
     """Whether every symbol of `unit` is an SI unit without a prefix (kg excepted)."""
-    return all(symbol in SI_SYMBOLS for _, symbol, _ in FACTOR.findall(unit))
+    return all(symbol in SI_SYMBOLS for symbol in re.findall(r"[A-Za-z%]+", unit))
 
 
 def expectation(unit: str) -> str:
@@ -178,35 +184,74 @@ def _split(text: str, unit: str) -> tuple[float, str]:
     rest = text[match.end() :] if match else text
     if match and re.match(r",\d", rest):
         raise ValueError(f"'{text}' has a comma; write numbers with a point only, like '0.5 m'")
-    if match is None or re.match(r"[\d.,_]", rest):
+    if match is None or re.match(r"[\d.,_]|\s+(?!1\s*/)[\d.]", rest):
         raise ValueError(f"'{text}' is not a number with a unit; {expectation(unit)}")
-    return float(match.group()), rest.strip()
+    return float(match.group()), re.sub(r"^\s*/", "1/", rest).strip()  # `500 /min`, `1/3 m`
+
+
+def parse_unit(text: str) -> pint.Unit:
+    """The pint unit of `m.s-1`, `m/s`, `N m` or `m/s^2`, without its factor, if it has one. Raises
+    ValueError where it is unreadable."""
+    return _parsed(text)[1]
 
 
 @lru_cache(maxsize=256)
-def parse_unit(text: str) -> pint.Unit:
-    """The pint unit of `m.s-1`, `m/s`, `N m` or `m/s^2`. Raises ValueError where it is
-    unreadable."""
-    unit, end = registry().Unit(""), 0
-    for match in FACTOR.finditer(text.strip()):
-        if match.start() != end:
+def _parsed(text: str) -> tuple[float, pint.Unit]:
+    """The factor and the pint unit of a text such as `deg/100`; products and quotients from the
+    left, as pint reads them."""
+    from pint.util import ParserHelper
+
+    unreadable = f"has the unreadable unit '{text}'; units are written like m.s-1 or N.m"
+    symbols: list[str] = []
+    expression, end = "", 0
+    for match in TOKEN.finditer(text.strip().translate(RAISED)):
+        if match.start() != end or (match["operator"] and expression[-1:] in ("", *"*/(")):
             break
         end = match.end()
-        separator, symbol, power = match.groups()
-        sign = -1 if "/" in separator else 1
-        for name, exponent in ALIASES.get(symbol, ((symbol, 1),)):
-            unit *= _symbol(name) ** (sign * exponent * int(power or 1))
-    if end != len(text.strip()) or not text.strip():
-        raise ValueError(f"has the unreadable unit '{text}'; units are written like m.s-1 or N.m")
-    return unit
+        expression += _rewritten(match, symbols, expression)
+    if not expression or end != len(text.strip()):
+        raise ValueError(unreadable)
+    try:
+        found = ParserHelper.from_string(expression)
+        size = float(found.scale)  # type: ignore[arg-type]
+    except Exception:  # pint raises anything on an expression that is none
+        raise ValueError(unreadable) from None
+    if not 0.0 < size < math.inf:
+        raise ValueError(unreadable)
+    unit = registry().Unit("")
+    for name, power in found.items():
+        for part in _parts(symbols[int(name[1:])]):
+            unit *= _symbol(part) ** power
+    return size, unit
+
+
+def _rewritten(match: re.Match[str], symbols: list[str], before: str) -> str:
+    """One token in pint's own syntax; symbols are numbered, since pint takes no `%` or `°`."""
+    if match["operator"] is not None:
+        return "/" if "/" in match["operator"] else "*"
+    if match["bracket"] == ")":
+        return ")"
+    product = "*" if before and before[-1] not in "*/(" else ""
+    if match["bracket"]:
+        return product + "("
+    if match["number"]:
+        exponent = f"**{match['exponent']}" if match["exponent"] else ""
+        return f"{product}{match['number']}{exponent}"
+    symbols.append(match["symbol"])
+    power = f"**{match['power']}" if match["power"] else ""
+    return f"{product}u{len(symbols) - 1}{power}"
+
+
+def _parts(symbol: str) -> tuple[str, ...]:
+    """The units of a symbol such as `Nm`, in which two are run together."""
+    match = TORQUE.fullmatch(symbol)
+    return match.groups() if match else (symbol,)
 
 
 def _symbol(name: str) -> pint.Unit:
     """The pint unit of one symbol; ValueError with the nearest one when there is none."""
-    if name == "1":
-        return registry().Unit("")
     try:
-        return registry().Unit("percent" if name == "%" else name)
+        return registry().Unit({"%": "percent", "°": "deg"}.get(name, name))
     except (AttributeError, ValueError):  # pint's UndefinedUnitError is an AttributeError
         raise ValueError(f"has the unknown unit '{name}'; {suggest(name, COMMON)}") from None
 

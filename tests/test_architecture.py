@@ -55,6 +55,12 @@ ONLY_IN = {
     "pandas": {"logs", "trajectory"},
     "pyarrow": {"logs"},
     "mcap": {"logs"},
+    "rosbags": {"logs"},
+    "google": {"logs"},
+    "matio": {"logs"},
+    "asammdf": {"logs"},
+    "nptdms": {"logs"},
+    "pyulog": {"logs"},
 }
 SOURCES = sorted([*ROOT.glob("kemba/**/*.py"), *ROOT.glob("cli/**/*.py")])
 FOLDERS = (".", ".ci", ".github", "cli", "configs", "docs", "kemba", "tests")

@@ -160,3 +160,39 @@ def test_usual_units_are_those_of_pint_to_the_last_bit(name: str) -> None:
         assert number * size == exact
         assert convert(number, name, si) == exact
         assert read_si(f"{number} {name}") == (exact, si)
+
+
+SYMBOLS = ("m", "mm", "s", "ms", "kg", "g", "N", "kN", "bar", "Pa", "deg", "rad", "min", "L", "V")
+part = st.tuples(
+    st.sampled_from((".", "*", "/", " ", " / ", "·")),
+    st.one_of(
+        st.tuples(st.sampled_from(SYMBOLS), st.sampled_from((1, 1, 2, 3, -1, -2))),
+        st.tuples(st.sampled_from(("10", "100", "0.1", "1e-3", "1000", "4096")), st.just(1)),
+    ),
+)
+
+
+@given(st.lists(part, min_size=1, max_size=5), st.booleans())
+def test_any_unit_means_what_pint_reads_in_it(parts: list[tuple], marked: bool) -> None:
+    """Factors of a unit count wherever they stand; the oracle is pint's own parser."""
+    ours, theirs = "", ""
+    for i, (operator, (symbol, power)) in enumerate(parts):
+        operator = "*" if operator == "." and symbol[0].isdigit() else operator
+        mark = "**" if marked or symbol[0].isdigit() else ""
+        ours += (operator if i else "") + symbol + (f"{mark}{power}" if power != 1 else "")
+        theirs += ("/" if "/" in operator else "*") if i else ""
+        theirs += symbol + (f"**({power})" if power != 1 else "")
+    expected = registry().Quantity(1.0, "").units * registry().parse_expression(theirs)
+    base = expected.to_base_units()
+    unit = f"{base.units:~D}".replace(" ", "") or "1"
+    assert convert(1.0, ours, unit) == pytest.approx(base.magnitude, rel=1e-12)
+    if not ours[0].isdigit():
+        assert to_si(f"3 {ours}", unit) == pytest.approx(3 * base.magnitude, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "unit", ["m/0", "m//s", "m..s", "m^999", "(m", "m)", "/", "m/", "2^99.m^-"]
+)
+def test_what_is_no_unit_is_refused(unit: str) -> None:
+    with pytest.raises(ValueError, match="unreadable unit"):
+        convert(1.0, unit, "m")

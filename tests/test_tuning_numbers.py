@@ -62,13 +62,21 @@ CONSTANTS = {  # file -> names, why
     "mechanism/knee.py": ("REACH", "rounding: the slope of an angle stays finite"),
     # formulas and formats
     "logs/formats/__init__.py": ("LARGEST", "a limit, with its reason"),
-    "logs/formats/mat_child.py": ("MEMORY", "the same limit, with room to read"),
+    "logs/formats/mat_child.py": ("MEMORY DEEPEST", "the same limit, with room to read; depth"),
     "logs/formats/mcap.py": ("NS", "nanoseconds of a second"),
     "logs/draft/ranges.py": (
-        "LENGTH EXTENSION ANGLE PRESSURE STEP STAMPED ABSOLUTE",
+        "LENGTH EXTENSION ANGLE PRESSURE STEP ABSOLUTE",
         "readings by which units are guessed",
     ),
-    "logs/draft/layout.py": ("LINES", "lines of a table that are looked at"),
+    "logs/draft/clock.py": (
+        "RISING REPEATED STAMPED ALIKE NEAR PLOTTER NAMED MENTIONED BY_UNIT UNNAMED COUNTER "
+        "LARGEST",
+        "how clocks are ranked by their names; units",
+    ),
+    "logs/draft/frames.py": ("UNIT_NORM", "rounding of a quaternion's norm"),
+    "logs/rates.py": ("FULL LONGEST", "what one rate and no gap mean"),
+    "logs/times.py": ("DAY HOUR", "seconds of them"),
+    "logs/draft/layout.py": ("LINES NEARLY", "how a table is looked at"),
     "ocp/transcription/stage.py": ("ANGLE_ARM COST_SCALE AIM", "units of moments and costs"),
     "ocp/task/requirement.py": ("SCALES MOMENTS FLIGHT ROUND", "moments of a task; units"),
     "contract/cases.py": ("OWN_RIGS", "figures of example rigs"),
@@ -76,7 +84,10 @@ CONSTANTS = {  # file -> names, why
     "identify/robot/dynamics/physics.py": ("FOLDED", "how far a knee folds at most"),
     "learn/rounds.py": ("SUPPLY", "of a model that names none"),
     "identify/rigs/filtering.py": ("GAIN", "a Gaussian's cut"),
-    "logs/draft/matching.py": ("NOTHING", "what a name that says something else scores"),
+    "logs/draft/matching.py": (
+        "NOTHING ENOUGH SAID_TOO UNRELATED ASKED_FOR STRANGER SURE",
+        "how the words of a name are weighed",
+    ),
     "ocp/certificate/grazing.py": ("LASTS TOUCHES", "as in plant/execution/replay.py"),
     "plant/execution/impacts.py": ("SLOW", "slower impacts are not told"),
     "plant/kernel/settings.py": ("GAMMA", "coefficient of the integration scheme"),
@@ -124,7 +135,7 @@ CONSTANTS = {  # file -> names, why
     "ocp/refinement/refine.py": ("SOLVES", "a count that progress shows"),
     "ocp/refinement/sample.py": ("WORST", "violations that a report lists"),
     "sweep/workers/farm.py": ("ENVIRONMENT", "environment of workers"),
-    "units.py": ("ALIASES USUAL", "powers and sizes of units"),
+    "units.py": ("USUAL", "powers and sizes of units"),
 }
 
 

@@ -15,28 +15,33 @@ from kemba.units import read_si, to_si
 
 SEPARATORS = {"tab": "\t", "whitespace": r"\s+"}
 Number = float | str
+Named = str | int
 
 
 class AddedColumn(Section):
     """A column that is added to another one: the nanoseconds of a time stamp."""
 
-    source: str | int = Field(description="header of the foreign column, or its number from 1")
+    source: Named = Field(description="header of the foreign column, or its number from 1")
     unit: str | None = Field(None, description="unit of the foreign column; else our unit")
 
 
 class ColumnSource(Section):
     """Where a column comes from: ours = sign * scale * source [converted to SI] + offset.
 
-    A column with `threshold` is a valve: 1 where the source lies above it, else 0.
+    A column with `threshold` is a valve: 1 where the source lies above it, else 0. Four sources
+    are a quaternion x, y, z, w: the pitch that it turns by.
     """
 
-    source: str | int = Field(description="header of the foreign column, or its number from 1")
+    source: Named | tuple[Named, Named, Named, Named] = Field(
+        description="header of the foreign column, or its number from 1; four for a quaternion"
+    )
     unit: str | None = Field(None, description="unit of the foreign column; else our unit")
     add: AddedColumn | None = Field(None, description="a second column that is added to the first")
     scale: float = Field(1.0, description="factor")
     sign: Literal[-1, 1] = Field(1, description="-1 where the foreign column counts backwards")
     offset: Number = Field(0.0, description="added last, with a unit: `-90 deg`")
     delay: Annotated[float, Param("s", doc="how late the column is")] = 0.0
+    unwrap: bool = Field(False, description="an angle that begins anew after each turn is joined")
     threshold: Number | None = Field(
         None, description="of a valve: on above it, in the foreign column's unit"
     )
@@ -45,7 +50,15 @@ class ColumnSource(Section):
     def _threshold_alone(self) -> ColumnSource:
         if self.threshold is not None and (self.scale != 1 or self.offset != 0 or self.add):
             raise ValueError("goes with no scale, offset or second column: 'threshold'")
+        if isinstance(self.source, tuple) and (self.unit or self.add or self.threshold is not None):
+            raise ValueError("a quaternion goes with no unit, second column or threshold")
         return self
+
+    @property
+    def names(self) -> tuple[Named, ...]:
+        """The foreign columns that are read."""
+        own = self.source if isinstance(self.source, tuple) else (self.source,)
+        return (*own, self.add.source) if self.add else own
 
     def offset_in(self, unit: str) -> float:
         """The offset in our unit. Raises ValueError where its dimension is another."""
@@ -72,7 +85,9 @@ class ColumnMap(Section):
     decimal: Literal[".", ","] = Field(".", description="the decimal sign")
     skip_rows: int = Field(0, ge=0, description="rows above the header that are no table")
     skip_below: int = Field(0, ge=0, description="rows below the header that are no data: units")
-    header: bool = Field(True, description="false: no header, sources are column numbers")
+    header: bool | Annotated[int, Field(ge=1, le=9)] = Field(
+        True, description="false: no header, sources are column numbers; 2: names in two rows"
+    )
     origin: Literal["first"] | None = Field(
         None, description="`first`: time counts from the first row, as for stamps since 1970"
     )

@@ -2,128 +2,204 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from kemba.errors import KembaError, suggest
-from kemba.logs.columns import AddedColumn, ColumnMap, ColumnSource
-from kemba.logs.text import Raw, as_numbers, first_row
+from kemba.logs import rates, times
+from kemba.logs.columns import AddedColumn, ColumnMap, ColumnSource, Named
+from kemba.logs.recording import Column, Recording
+from kemba.logs.text import as_numbers, first_row
 from kemba.quantity import convert
 from kemba.trajectory import TIME, Array, Trajectory
 
-Column = np.ndarray[Any, Any]
 
-
-def mapped(raw: Raw, layout: ColumnMap, path: Path, meta: dict[str, Any]) -> Trajectory:
+def mapped(raw: Recording, layout: ColumnMap, path: Path) -> Trajectory:
     """The trajectory that a map makes of the columns of a file.
 
     Raises KembaError where a column is absent, a cell is no number or a unit does not fit.
     """
     reader = _Reader(raw, layout, path)
     time = reader.time()
-    found = {}
+    found, said = {}, list(raw.remarks)
+    slower = []
     for header, source in layout.columns.items():
         if header == TIME:
             continue
-        values = reader.values(header, source)
+        values, own = reader.values(header, source), reader.own_time(source, time)
+        if source.unwrap:
+            turned = unwrapped(values)
+            said.append(f"{header}: {_turns(values, turned)}")
+            values = turned
+        hold = rates.is_command(header)
+        if own is not None:
+            values = rates.placed(time, own, values, hold)
+            slower.append(str(source.source))
         if source.delay:
-            values = _earlier(time, values, source.delay, hold="/valve/" in f"/{header}")
+            values = _earlier(time, values, source.delay, hold)
         found[header] = values
-    return Trajectory(time, found, meta)
+    if slower:
+        said.append(rates.merged(slower, float(np.median(np.diff(time)))))
+    return Trajectory(time, found, {**raw.meta, **({"read": said} if said else {})})
+
+
+def unwrapped(values: Array) -> Array:
+    """An angle (n,) without the leaps by whole turns; missing readings stay missing."""
+    good = np.isfinite(values)
+    found = np.array(values, dtype=float)
+    found[good] = np.unwrap(values[good])
+    return found
+
+
+def wraps(values: Array, turn: float = 2 * math.pi) -> bool:
+    """Whether an angle (n,) begins anew after each `turn`: it leaps by a turn, back or forth, and
+    stays within one."""
+    known = values[np.isfinite(values)]
+    leaps = np.abs(np.diff(known))
+    far = leaps[leaps > 0.5 * turn]
+    within = np.ptp(known) < 1.1 * turn if len(known) else False
+    return bool(within and len(far) and np.all(far > 0.75 * turn) and np.all(far < 1.1 * turn))
+
+
+def _turns(before: Array, after: Array) -> str:
+    count = np.count_nonzero(np.abs(np.diff((after - before)[np.isfinite(after)])) > 1e-9)
+    return f"begins anew {count} times: joined"
+
+
+def _unit(header: str) -> str:
+    return header[header.index("[") + 1 : -1]
 
 
 class _Reader:
     """Cells of one file as numbers."""
 
-    def __init__(self, raw: Raw, layout: ColumnMap, path: Path) -> None:
+    def __init__(self, raw: Recording, layout: ColumnMap, path: Path) -> None:
         self.raw, self.layout, self.path = raw, layout, path
 
     def time(self) -> Array:
         """The time (n,) in s. Stamps are counted from the first before they become floats."""
         source = self.layout.columns[TIME]
         from_first = self.layout.origin == "first"
-        stamps = self._column(TIME, source, _stamps if from_first else None)
-        values = self._summed(TIME, source, stamps, from_first)
+        name = self._name(TIME, source.names[0])
+        written = times.seconds(self.raw.columns[name]) if self._is_text(name) else None
+        if written is not None:
+            values = written
+        else:
+            values = np.zeros(len(self.raw.columns[name]))
+            for part, at in zip((source, source.add), source.names, strict=False):
+                counted = self._counted(self._column(TIME, at), from_first)
+                values = values + self._converted(TIME, part or source, counted)
         return np.asarray(source.sign * source.scale * values + source.offset_in("s"))
 
     def values(self, header: str, source: ColumnSource) -> Array:
         """The column (n,) in our unit."""
-        numbers = self._column(header, source)
+        if isinstance(source.source, tuple):
+            parts = [self._numbers(header, name) for name in source.source]
+            return np.asarray(source.sign * source.scale * pitch(*parts) + source.offset_in("rad"))
+        numbers = self._numbers(header, source.source)
         if source.threshold is not None:
             return np.where(np.isnan(numbers), np.nan, source.sign * (numbers - source.level()) > 0)
-        values = self._summed(header, source, numbers)
-        unit = header[header.index("[") + 1 : -1]
-        return np.asarray(source.sign * source.scale * values + source.offset_in(unit))
-
-    def _summed(
-        self, header: str, source: ColumnSource, values: Column, from_first: bool = False
-    ) -> Array:
-        total = self._converted(header, source, _counted(values, from_first))
+        values = self._converted(header, source, numbers)
         if source.add is not None:
-            part = self._column(header, source.add)
-            total = total + self._converted(header, source.add, _counted(part, from_first))
-        return total
+            added = self._numbers(header, source.add.source)
+            values = values + self._converted(header, source.add, added)
+        return np.asarray(source.sign * source.scale * values + source.offset_in(_unit(header)))
+
+    def own_time(self, source: ColumnSource, time: Array) -> Array | None:
+        """When readings (n,) were taken [s]; None where they share the log's clock. Raises
+        KembaError where the two clocks do not run at the same time."""
+        clocks = self.raw.clocks
+        base = self._name(TIME, self.layout.columns[TIME].names[0])
+        base = clocks.get(base, base)
+        name = self._name("", source.names[0])
+        own = clocks.get(name, base)
+        if own == base or own not in self.raw.columns:
+            return None
+        stamps = [self.raw.columns[clock] for clock in (base, own)]
+        theirs, ours = (np.asarray(stamp - stamps[0][0], dtype=float) for stamp in stamps)
+        inside = np.mean((ours >= theirs[0]) & (ours <= theirs[-1])) if len(ours) else 0.0
+        if inside < 0.5:
+            what = f"the clocks '{base}' and '{own}' do not run at the same time"
+            raise KembaError(str(self.path), what, "one clock, or two of one start, were expected")
+        rate = (time[-1] - time[0]) / (theirs[-1] - theirs[0])
+        before, after = np.minimum(ours - theirs[0], 0.0), np.maximum(ours - theirs[-1], 0.0)
+        return np.asarray(np.interp(ours, theirs, time) + rate * (before + after))
 
     def _converted(self, header: str, source: ColumnSource | AddedColumn, values: Array) -> Array:
-        unit = header[header.index("[") + 1 : -1]
+        unit = _unit(header)
         try:
             return convert(values, source.unit or unit, unit)
         except ValueError as error:
             what = f"map of '{header}': unit '{source.unit}' {error}"
             raise KembaError(str(self.path), what) from None
 
-    def _column(
-        self,
-        header: str,
-        source: ColumnSource | AddedColumn,
-        other: Callable[[Column], Column | None] | None = None,
-    ) -> Column:
-        name = str(source.source)
-        if name not in self.raw:
-            what = f"has no column '{name}', which the map reads as '{header}'"
-            raise KembaError(f"{self.path}:1", what, hint=suggest(name, list(self.raw)))
-        if f"{name}#" in {other.rpartition("#")[0] + "#" for other in self.raw}:
-            raise KembaError(f"{self.path}:1", f"has the column '{name}' more than once")
-        cells = self.raw[name]
-        if cells.dtype != object:
-            return np.asarray(cells, dtype=float)
-        found = other(cells) if other else None
-        return self._numbers(cells, name) if found is None else found
+    def _name(self, header: str, source: Named) -> str:
+        """The name of a column that is given by name or by its number."""
+        names = list(self.raw.columns)
+        if isinstance(source, int):
+            if not 0 < source <= len(names):
+                what = f"has {len(names)} columns; the map reads column {source} as '{header}'"
+                raise KembaError(f"{self.path}:1", what)
+            return names[source - 1]
+        if source not in names:
+            what = f"has no column '{source}', which the map reads as '{header}'"
+            raise KembaError(f"{self.path}:1", what, hint=suggest(source, names))
+        if any(
+            name.startswith(f"{source}#") and name[len(source) + 1 :].isdigit() for name in names
+        ):
+            what = f"has the column '{source}' more than once"
+            raise KembaError(f"{self.path}:1", what, hint="give its number from 1 as `source`")
+        return source
 
-    def _numbers(self, cells: Column, name: str) -> Array:
+    def _is_text(self, name: str) -> bool:
+        cells = self.raw.columns[name]
+        return cells.dtype == object and any(isinstance(cell, str) for cell in cells[:3])
+
+    def _column(self, header: str, source: Named) -> Column:
+        """The cells (n,): whole numbers as they are, which a float may not hold."""
+        name = self._name(header, source)
+        cells = self.raw.columns[name]
+        if cells.dtype != object:
+            return cells if cells.dtype.kind in "iu" else np.asarray(cells, dtype=float)
+        try:
+            if all(isinstance(cell, int | str) for cell in cells):
+                return np.array([int(cell) for cell in cells], dtype=object)
+        except ValueError:
+            pass
+        return self._as_numbers(cells, name)
+
+    def _numbers(self, header: str, source: Named) -> Array:
+        name = self._name(header, source)
+        cells = self.raw.columns[name]
+        return self._as_numbers(cells, name) if cells.dtype == object else cells.astype(float)
+
+    def _as_numbers(self, cells: Column, name: str) -> Array:
         numbers, wrong = as_numbers(cells, self.layout.decimal)
         if wrong.any():
-            row = int(np.argmax(wrong))
-            where = f"{self.path}:{row + first_row(self.layout)}:{list(self.raw).index(name) + 1}"
+            row, column = int(np.argmax(wrong)), list(self.raw.columns).index(name) + 1
             hint = "`decimal`, `separator` and `skip_below` of the map" if wrong.all() else ""
+            text = isinstance(cells[row], str) and self.path.suffix.lower() in (
+                ".csv",
+                ".txt",
+                ".tsv",
+                ".dat",
+            )
+            line = row + (first_row(self.path, self.layout) if text else 1)
+            where = f"{self.path}:{line}:{column}"
             raise KembaError(where, f"{name}: '{cells[row]}' is not a number", hint=hint)
         return numbers
 
-
-def _stamps(cells: Column) -> Column | None:
-    """Whole numbers exactly, and dates in ns; None where the cells are neither."""
-    import pandas as pd
-
-    try:
-        return np.array([int(cell) for cell in cells], dtype=object)
-    except ValueError:
-        pass
-    if not any(mark in str(cells[0]) for mark in "-:T") or not len(cells):
-        return None
-    try:
-        dates = pd.to_datetime(pd.Series(cells), format="ISO8601", utc=True)
-    except (ValueError, TypeError):
-        return None
-    seconds = (dates - dates.iloc[0]).dt.total_seconds()
-    return np.asarray(seconds, dtype=float)
+    def _counted(self, values: Column, from_first: bool) -> Array:
+        first = values[0] if from_first and len(values) else 0
+        return np.asarray(values - first, dtype=float)
 
 
-def _counted(values: Column, from_first: bool) -> Array:
-    first = values[0] if from_first and len(values) else 0
-    return np.asarray(values - first, dtype=float)
+def pitch(x: Array, y: Array, z: Array, w: Array) -> Array:
+    """The angle (n,) by which unit quaternions turn about y, after yaw about z and before roll
+    about x; past a quarter turn it goes on where roll and yaw are small."""
+    return np.asarray(np.arctan2(2 * (w * y - z * x), 1 - 2 * (x**2 + y**2)))
 
 
 def _earlier(time: Array, values: Array, delay: float, hold: bool) -> Array:

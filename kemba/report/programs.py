@@ -78,6 +78,7 @@ def write_program(named: Named, folder: Path) -> list[Path]:
 
     The functions are `nlp` (x, p) -> (f, g), and the exact derivatives `grad_f`, `jac_g` and
     `hess_lag` with the signatures that `casadi.nlpsol` takes. Bounds are null where there is none.
+    `casadi`: the version that wrote the functions; an older one does not read them.
     Raises KembaError where a file cannot be written.
     """
     problem = named.program.problem
@@ -100,7 +101,8 @@ def write_program(named: Named, folder: Path) -> list[Path]:
     }  # fmt: skip
     facts: dict[str, Any] = {key: _finite(value) for key, value in bounds.items()}
     facts |= {"x0": named.start.tolist(), "p": list(named.parameters), "rows": list(named.rows)}
-    write_json(numbers, {"program": named.name, "functions": list(FUNCTIONS), **facts})
+    head = {"program": named.name, "functions": list(FUNCTIONS), "casadi": ca.CasadiMeta.version()}
+    write_json(numbers, {**head, **facts})
     return [functions, numbers]
 
 

@@ -148,6 +148,22 @@ def test_the_command_answers_and_draws(tmp_path: Path) -> None:
     assert figure.stat().st_size > 10_000
 
 
+def test_a_log_whose_valves_never_switch_is_compared(tmp_path: Path) -> None:
+    """Of a rod that is driven against an open valve nothing else is known: states before the log
+    are fitted that lead elsewhere, and a step from there may give no number."""
+    rng, t = np.random.default_rng(0), np.arange(2000) * 1e-3
+    columns = {
+        "piston/x [m]": 0.035 + 0.03 * np.sin(3 * np.pi * t) + 2e-5 * rng.standard_normal(2000),
+        "piston/F [N]": 200 + 0.3 * rng.standard_normal(2000),
+        "valve/extend [1]": np.ones(2000),
+        "valve/retract [1]": np.ones(2000),
+    }
+    Trajectory(t, columns, {"kind": "bench"}).write(tmp_path / "log.csv")
+    for model in ("planning", "plant"):
+        shown = CliRunner().invoke(app, ["compare", str(tmp_path / "log.csv"), "--model", model])
+        assert shown.exit_code == 0, shown.output
+
+
 def test_its_figure_fits_one_channel() -> None:
     figure = plot_comparison(compared(tests=("locked",)))
     assert figure.get_size_inches()[1] < 6.0

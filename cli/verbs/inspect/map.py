@@ -32,17 +32,29 @@ def draft_map(
 
     out = out or Path(f"{log.stem}_map.yaml")
     fresh(out, force)
-    found = draft(log, load_model(model).mechanism.legs)
+    machine = load_model(model).mechanism
+    stroke = None if machine.rig else machine.stroke
+    found = draft(log, machine.legs, stroke, machine.rig, machine.logged)
     with atomic_text(out) as stream:
         stream.write(found.text(log.name))
     answer = {"map": str(out), "kind": found.kind, "columns": found.columns}
     if json:
-        print_json({**answer, "missing": found.missing, "ignored": found.ignored})
+        more = {"missing": found.missing, "ignored": found.ignored}
+        print_json({**answer, **more, "questions": found.questions, "notes": found.notes})
     else:
         typer.echo(out)
+    for note in found.notes:
+        say(note, quiet)
+    for question in found.questions:
+        say(f"open: {question}", quiet)
     if found.missing:
         listed = ", ".join(f"'{header}'" for header in found.missing)
         say(f"not found: {listed}. Add them to {out}; without them the log says too little.", quiet)
+        left = ", ".join(f"'{name}'" for name in found.ignored[:12])
+        say(f"not used: {left or 'no column is left'}", quiet)
+    if found.missing or found.questions:
+        if found.questions:
+            say(f"answer what is open in {out}: correct its lines, then use it", quiet)
         raise typer.Exit(BAD_ANSWER)
     say(f"look through {out}: signs and zeros of angles cannot be guessed", quiet)
     say_next(after_map(log, out), quiet)

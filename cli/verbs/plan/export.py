@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from kemba_cli.common import Force, Json, OwnEffects, Quiet, print_json
+from kemba_cli.common import Force, Json, OwnEffects, Quiet, print_json, say
 
 
 def export(
@@ -37,6 +37,8 @@ def export(
     from kemba.folders import fresh
 
     if nlp:
+        import casadi
+
         from kemba.report.programs import export_nlp
 
         if column_map is not None:
@@ -44,6 +46,8 @@ def export(
         paths = export_nlp(run, out or Path("nlp"), force)
         names = [str(path) for path in paths]
         print_json({"export": names}) if json else typer.echo("\n".join(names))
+        version = casadi.CasadiMeta.version()
+        say(f"the functions are of CasADi {version}; older ones do not read them", quiet)
         return
     if out is None:
         raise typer.BadParameter("a file was expected, such as jump.mat", param_hint="--out")

@@ -14,6 +14,7 @@ from kemba.identify.logs.own_rigs import own_faults
 from kemba.identify.logs.reading import OWN_RIGS, legs_of, needed
 from kemba.identify.logs.settings import GateSettings, range_of
 from kemba.identify.problem.noise import difference_sigma
+from kemba.logs.rates import rate_missing
 from kemba.trajectory import TIME, Array, Trajectory
 
 
@@ -91,12 +92,17 @@ def _time(log: Trajectory) -> Iterator[KembaError]:
 
 
 def _cells(log: Trajectory) -> Iterator[KembaError]:
+    limits = GateSettings.current()
     for name in needed(log):
         y = log[name]
         missing = ~np.isfinite(y)
-        if missing.mean() > GateSettings.current().missing:
-            what = f"{100 * missing.mean():.0f} % of its readings are missing"
+        step, share = rate_missing(log.time, y)
+        if share > limits.missing:
+            what = f"{100 * share:.0f} % of its readings are missing"
             yield _fault(log, what, column=name, row=int(np.argmax(missing)))
+        elif step > limits.slowest:
+            expected = f"at least {1.0 / limits.slowest:.0f} readings a second"
+            yield _fault(log, f"has a reading every {step:.3g} s", expected, column=name)
         elif "valve/" in name:
             yield from _valve(log, name, y)
 
@@ -224,11 +230,13 @@ def _travel(y: Array) -> float:
 
 def _remarks(log: Trajectory) -> Iterator[str]:
     name = log.meta["name"]
+    yield from (f"{name}: {said}" for said in log.meta.get("read", ()))
     gaps = np.diff(log.time) > 5 * np.median(np.diff(log.time))
     if gaps.any():
         yield f"{name}: {int(gaps.sum())} gaps in time, the longest {np.diff(log.time).max():.3f} s"
     for column in needed(log):
-        missing = int((~np.isfinite(log[column])).sum())
+        step, share = rate_missing(log.time, log[column])
+        missing = round(share * (1 + (log.time[-1] - log.time[0]) / step))
         if missing:
             yield f"{name}: {column}: {missing} readings missing"
 

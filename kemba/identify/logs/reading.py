@@ -12,6 +12,8 @@ from kemba.errors import KembaError, map_hint
 from kemba.identify.logs.settings import GateSettings, range_of
 from kemba.identify.logs.sidecar import check_kind, check_noise
 from kemba.logs import ColumnMap, open_log
+from kemba.logs.foreign import unwrapped, wraps
+from kemba.logs.rates import one_clock
 from kemba.mechanism import Mechanism
 from kemba.trajectory import Array, Trajectory, sidecar
 
@@ -26,7 +28,7 @@ OWN_RIGS = ("cylinder", "drive", "vessel")
 def read_log(path: str | Path, columns: ColumnMap | None = None) -> Trajectory:
     """One log, unchecked; `meta` has its kind and name. Raises KembaError with row and column."""
     path = Path(path)
-    log = open_log(path, columns, strict=False)
+    log = _turned(one_clock(open_log(path, columns, strict=False)))
     log.meta.setdefault("kind", (columns and columns.kind) or kind_of(log, path))
     if log.meta["kind"] == "plan":
         hint = f"logs of it come from the robot, or from: kemba-opt simulate {path.parent}"
@@ -38,7 +40,36 @@ def read_log(path: str | Path, columns: ColumnMap | None = None) -> Trajectory:
     if "noise" in log.meta:
         units = {name: log.unit(name) for name in log.names}
         log.meta["noise"], log.meta["noise_time"] = check_noise(log.meta["noise"], units, beside)
-    return _without_absurd(log)
+    return _without_absurd(_with_torques(log))
+
+
+def _with_torques(log: Trajectory) -> Trajectory:
+    """A robot's log without any torque, as the authors' own is, with torques of zero: the fit then
+    takes them as unknown (`log.meta["torques"]` is False), and says what that costs."""
+    legs = [name.removesuffix("/hip/q") for name in log.names if name.endswith("/hip/q")]
+    if log.meta["kind"] != "robot" or not legs or any(f"{leg}/hip/tau" in log for leg in legs):
+        return log
+    zero = {f"{leg}/hip/tau [N.m]": np.zeros(len(log)) for leg in legs}
+    found = log.with_columns(zero)
+    said = (
+        "no hip torques are logged: they are taken as unknown, so that nothing can be said about "
+        "motors and hips, and less about the body"
+    )
+    found.meta |= {"torques": False, "read": [*log.meta.get("read", []), said]}
+    return found
+
+
+def _turned(log: Trajectory) -> Trajectory:
+    """The log with angles that begin anew after each turn joined, and said so."""
+    angles = [n for n in log.names if log.unit(n) == "rad" and not n.endswith("/v")]
+    found = {f"{name} [rad]": unwrapped(log[name]) for name in angles if wraps(log[name])}
+    if not found:
+        return log
+    named = ", ".join(header.split(" [")[0] for header in found)
+    said = f"{named} begins anew after each turn: joined"
+    joined = log.with_columns(found)
+    joined.meta["read"] = [*log.meta.get("read", []), said]
+    return joined
 
 
 def _without_absurd(log: Trajectory) -> Trajectory:

@@ -99,14 +99,16 @@ class Problem(ABC):
         """d residual / d names (n, k), per unit of each parameter.
 
         A switch that is off has no useful derivative; it gets a secant (`_secant_step`). The
-        default takes finite differences with steps of physical size for all parameters.
+        default takes finite differences with steps of physical size for all parameters; a column is
+        zero where every step leads to no prediction at all.
         """
         base = self.residual(theta, runs)
         columns = []
         for name in names:
             steps = list(self.steps(theta, name))
             slopes = [(self.residual({**theta, **step}, runs) - base) / h for step, h in steps]
-            columns.append(np.mean(slopes, axis=0))
+            known = [slope for slope in slopes if np.isfinite(slope).all()]
+            columns.append(np.mean(known, axis=0) if known else np.zeros_like(base))
         return np.stack(columns, axis=1) if columns else np.empty((len(base), 0))
 
     def steps(self, theta: Theta, name: str) -> Iterable[tuple[dict[str, float], float]]:

@@ -16,7 +16,6 @@ import casadi as ca
 import numpy as np
 from scipy.optimize import least_squares
 
-from kemba.errors import KembaError
 from kemba.identify.problem.sensor_faults import GEOMETRY
 from kemba.identify.problem.types import Array, Candidate, Flags
 from kemba.identify.robot.dynamics.physics import Physics
@@ -46,6 +45,7 @@ class StandingSettings(Settings):
     prior = 2.0  # prior width of a length, in sizes
     reach = 2.5  # largest value of each, in prior widths
     body = 3e-3  # prior sigma of the zero of the body's height [m]
+    zero = 0.02  # the same where it is in doubt [m]
     angle = 4e-3  # prior sigma of the zeros of pitch and hips [rad]
     piston = 6e-4  # prior sigma of the zero of a piston [m]
     sink = 3e-3  # prior sigma of how deep a foot sinks at rest [m]
@@ -158,8 +158,7 @@ def standing_lengths(
     x, cost, rows = _refined(standing, start, width)
     if _is_turned(standing, x, width, rows):
         return StandingLengths(turned=True)
-    _, without, _ = _only(standing, (), x, width, rows)
-    if without - cost < settings.gain or x[-2] > settings.soft:
+    if x[-2] > settings.soft or min(_drawn(standing, x, width, rows)) - cost < settings.gain:
         return StandingLengths()
     singles = [_only(standing, (i,), x, width, rows) for i in range(len(sizes))]
     one, alone, _ = min(singles, key=lambda fit: fit[1])
@@ -170,17 +169,6 @@ def standing_lengths(
     boom, by_boom, _ = _only(standing, (), x, free, rows)
     as_good = LEVER in candidates and by_boom - min(alone, cost) < settings.gain
     return StandingLengths(found, float(boom[-1]) if as_good else 0.0)
-
-
-def mistakes(found: StandingLengths, runs: Sequence[str]) -> Iterator[KembaError]:
-    """The sign of the pitch, where feet stand with the other one only."""
-    if found.turned:
-        yield KembaError(
-            ", ".join(runs),
-            "body/pitch has the reversed sign (nose up is positive)",
-            "corrected, feet stand on level ground; else legs of other lengths would be needed",
-            "correct it with `sign` in a column map (--map)",
-        )
 
 
 def remarks(found: StandingLengths) -> list[str]:
@@ -211,6 +199,20 @@ def _is_turned(standing: Standing, x: Array, width: Array, rows: Flags) -> bool:
     _, best, _ = _refined(standing, x, loose, either)
     _, other, _ = _refined(turned, np.zeros(len(x)), drawn, either)
     return best - other > StandingSettings.current().turned
+
+
+def _drawn(standing: Standing, x: Array, width: Array, rows: Flags) -> Iterator[float]:
+    """Costs of the fits with the lengths of the model: with zeros as exact as they are supposed to
+    be, and with the zero of the height, of the pitch or of the hips in doubt."""
+    settings, first = StandingSettings.current(), len(standing.names)
+    hips = range(first + 2, first + 2 + standing.legs)
+    doubts = ((), [first + 1], [first], list(hips))
+    for places, wide in zip(
+        doubts, (0.0, settings.zero, settings.pitch, settings.pitch), strict=True
+    ):
+        loose = width.copy()
+        loose[list(places)] = wide
+        yield _only(standing, (), np.where(loose == width, x, 0.0), loose, rows)[1]
 
 
 def _only(

@@ -1,27 +1,31 @@
-"""Usual mistakes in the columns of a robot log, recognised by its feet.
+"""Usual mistakes in the columns of a robot log, tried as whole hypotheses before any fit.
 
 While the ground carries the robot, its lowest foot is on the ground and stands still, and each
-foot does so for a part of the time. Where the measured motion says otherwise, each usual mistake is
-put right in turn; the one after which the feet stand is named. Only the geometry of the robot is
-used, no forces.
+foot does so for a part of the time. Where the measured motion says otherwise, each usual mistake,
+and each pair of them, is put right in turn; the simplest after which the feet stand within
+millimetres is named, with what is the same to the feet of a robot that is its own mirror image.
+Only the geometry of the robot as it is drawn is used, no forces and no fitted lengths.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from typing import Any
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import combinations
 
 import numpy as np
 
 from kemba.errors import KembaError
 from kemba.identify.logs.local_fit import local_fit
-from kemba.identify.robot.dynamics.physics import Array, Flags, Physics
+from kemba.identify.robot.dynamics.physics import Array, Physics
 from kemba.identify.robot.motion.resampled import ResampledLog
 from kemba.settings import BY_HAND, Settings, setting
 
-Indices = np.ndarray[Any, np.dtype[np.int_]]
-Change = Callable[[Array], Array]
-MixUp = tuple[str, dict[str, Change]]
+Columns = Mapping[str, Array]
+Change = Callable[[Columns], dict[str, Array]]
+OTHER_ZERO = "body/z counts from another zero"
+HINT = "correct it with `sign`, `scale`, `offset` or `source` in a column map (--map)"
 
 
 class MixUpSettings(Settings):
@@ -41,99 +45,201 @@ class MixUpSettings(Settings):
     better: float = setting(
         4.0, "1", "factor by which a mix-up must make the feet stand better", BY_HAND, decides=True
     )
+    zero: float = setting(
+        0.05, "m", "height by which the zero of body/z must be off", BY_HAND, decides=True
+    )
+    alike: float = setting(
+        1.5, "1", "factor within which hypotheses of as many mistakes cannot be told", BY_HAND
+    )
 
 
-def mixed_up(physics: Physics, log: ResampledLog, p: Array) -> Iterator[KembaError]:
+@dataclass(frozen=True)
+class MixUp:
+    """One mistake in words, what it is a mistake `about`, and the columns put right."""
+
+    text: str
+    about: frozenset[str]
+    change: Change
+
+
+def mixed_up(physics: Physics, log: ResampledLog) -> Iterator[KembaError]:
     """The mistake in the columns of a log, if its feet stand much better without it."""
-    limits = MixUpSettings.current()
-    rows = _rows(log)
-    if len(rows) < limits.fewest:
+    limits, feet = MixUpSettings.current(), _Feet(physics, log)
+    error = feet.restless([])
+    if error is None or error < limits.small:
         return
-    error = _restless(physics, log, rows, {}, p)
-    if error < limits.small:
-        return
-    trials = [
-        (_restless(physics, log, rows, change, p), text, change)
-        for text, change in mix_ups(physics.legs, physics.mechanism.stroke)
-    ]
-    best, text, _ = min(trials, key=lambda t: t[0])
-    if best * limits.better < error:
-        what = f"a foot is {1e3 * error:.0f} mm from where it should stand: {text}"
-        yield KembaError(
-            log.name,
-            what,
-            f"corrected, it is {1e3 * best:.0f} mm",
-            "correct it with `sign`, `scale` or `offset` in a column map (--map)",
-        )
+    known = list(mix_ups(physics.legs, physics.mechanism.stroke))
+    goal = min(limits.small, error / limits.better)
+    for count in (1, 2):
+        trials = []
+        for some in combinations(known, count):
+            if count == 2 and some[0].about & some[1].about:
+                continue
+            left = feet.restless(some)
+            if left is not None:
+                trials.append((left, some))
+        fitting = [(e, some) for e, some in trials if e < goal]
+        if fitting:
+            yield _said(log.name, error, feet, fitting)
+            return
+
+
+def _said(
+    name: str, error: float, feet: _Feet, fitting: Sequence[tuple[float, Sequence[MixUp]]]
+) -> KembaError:
+    """The best hypothesis, and others that the feet cannot tell from it."""
+    best = min(e for e, _ in fitting)
+    close = [some for e, some in fitting if e <= MixUpSettings.current().alike * best]
+    texts = [" and ".join(m.text for m in some) for some in close]
+    offset = next(
+        (f for some in close[:1] for m in some if (f := feet.offset(some, m)) is not None), None
+    )
+    if offset is not None:
+        texts[0] += f" ({1e3 * offset:+.0f} mm too much)"
+    several = f"{'; or '.join(texts)}" + (
+        " (feet cannot tell these apart)" if len(texts) > 1 else ""
+    )
+    what = f"a foot is {1e3 * error:.0f} mm from where it should stand: {several}"
+    return KembaError(name, what, f"corrected, it is {1e3 * best:.0f} mm", HINT)
 
 
 def mix_ups(legs: Sequence[str], stroke: float) -> Iterator[MixUp]:
-    """Mistakes in words, and how to put each right: the change of each column."""
-    yield "body/pitch has the reversed sign (nose up is positive)", {"body/pitch": np.negative}
-    yield "body/pitch is in degrees", {"body/pitch": np.radians}
-    yield "body/x has the reversed sign (forward is positive)", {"body/x": np.negative}
+    """Mistakes of one kind each, and how to put each right."""
+    yield _each(
+        "body/pitch has the reversed sign (nose up is positive)", ["body/pitch"], np.negative
+    )
+    yield _each("body/pitch is in degrees", ["body/pitch"], np.radians)
+    yield _each("body/x has the reversed sign (forward is positive)", ["body/x"], np.negative)
+    yield MixUp(OTHER_ZERO, frozenset({"body/z"}), _nothing)
+    yield _each("body/z counts downwards", ["body/z"], np.negative)
+    yield MixUp(
+        "body/x and body/z are swapped",
+        frozenset({"body/x", "body/z"}),
+        _exchange(("body/x", "body/z")),
+    )
     groups = [("every leg", list(legs)), *((f"the {leg} leg", [leg]) for leg in legs)]
     for whose, some in groups if len(legs) > 1 else groups[1:]:
         hips, pistons = ([f"{leg}/{x}" for leg in some] for x in ("hip/q", "piston/x"))
-        yield f"hip/q of {whose} has the reversed sign", dict.fromkeys(hips, np.negative)
+        yield _each(f"hip/q of {whose} has the reversed sign", hips, np.negative)
         for degrees in (90, -90, 180):
-            zero = _shifted(-np.radians(degrees))
-            yield (
+            yield _each(
                 f"hip/q of {whose} counts from another zero ({degrees:+d} degrees too much)",
-                dict.fromkeys(hips, zero),
+                hips,
+                partial(np.add, -np.radians(degrees)),
             )
-            yield (
+            yield _each(
                 f"hip/q of {whose} has the reversed sign and another zero ({degrees:+d} degrees)",
-                dict.fromkeys(hips, _turned(np.radians(degrees))),
+                hips,
+                partial(np.subtract, np.radians(degrees)),
             )
-        end = _turned(stroke)
-        yield f"piston/x of {whose} counts from the extended end", dict.fromkeys(pistons, end)
+        yield _each(
+            f"piston/x of {whose} counts from the extended end",
+            pistons,
+            partial(np.subtract, stroke),
+        )
+    if len(legs) == 2:
+        pairs = [(f"{legs[0]}/{x}", f"{legs[1]}/{x}") for x in ("hip/q", "piston/x")]
+        both = frozenset(name for pair in pairs for name in pair)
+        yield MixUp("the legs are swapped", both, _exchange(*pairs))
+        yield MixUp(
+            "body/x and body/pitch have the reversed sign and the legs are swapped (the robot is "
+            "seen from its other side)",
+            both | {"body/x", "body/pitch"},
+            _mirrored(pairs),
+        )
 
 
-def _shifted(offset: float) -> Change:
-    return lambda y: y + offset
+def _each(text: str, names: Sequence[str], change: Callable[[Array], Array]) -> MixUp:
+    return MixUp(text, frozenset(names), lambda y: {name: change(y[name]) for name in names})
 
 
-def _turned(offset: float) -> Change:
-    return lambda y: offset - y
+def _nothing(y: Columns) -> dict[str, Array]:
+    """The zero of the height is found by where the lowest foot is."""
+    return {}
 
 
-def _rows(log: ResampledLog) -> Indices:
-    """Rows (n,) at which the ground carries the robot, half a window from the ends at least."""
-    limits = MixUpSettings.current()
-    step = float(np.median(np.diff(log.time)))
-    half = max(1, round(0.5 * limits.window / step))
-    good: Flags = np.asarray(np.isfinite(log.y).all(axis=1))
-    if len(log.time) < 4 * half + 1 or good.sum() < 4 * half + 1:
-        return np.empty(0, dtype=int)
-    z = np.interp(log.time, log.time[good], log.y[good, 1])
-    fall = local_fit(z, half, step, 2, 2)
-    rows = np.arange(half, len(z) - half, max(1, round(limits.row / step)))
-    known = np.asarray(good[rows] & good[rows - half] & good[rows + half])
-    carried = np.asarray(fall[rows] > -limits.carried)
-    return np.asarray(rows[known & carried])
+def _exchange(*pairs: tuple[str, str]) -> Change:
+    return lambda y: {a: y[b] for pair in pairs for a, b in (pair, pair[::-1])}
 
 
-def _restless(
-    physics: Physics, log: ResampledLog, rows: Indices, change: dict[str, Change], p: Array
-) -> float:
-    """How far [m] feet are from the ground and from their place one window before.
-
-    The lowest foot stands in most of the `rows`, and each foot in a quarter of them at least: the
-    largest of these quantiles."""
-    step = float(np.median(np.diff(log.time)))
-    half = max(1, round(0.5 * MixUpSettings.current().window / step))
-    before, now, after = (_feet(physics, log.y[rows + k], change, p) for k in (-half, 0, half))
-    far = np.hypot(now[:, :, 1], np.linalg.norm(after - before, axis=2))
-    lowest = np.take_along_axis(far, np.argmin(now[:, :, 1], axis=1)[:, None], axis=1)
-    return float(max(np.median(lowest), np.quantile(far, 0.25, axis=0).max()))
+def _mirrored(pairs: Sequence[tuple[str, str]]) -> Change:
+    turned = ("body/x", "body/pitch")
+    return lambda y: {**_exchange(*pairs)(y), **{name: np.negative(y[name]) for name in turned}}
 
 
-def _feet(physics: Physics, y: Array, change: dict[str, Change], p: Array) -> Array:
-    """Places (n, legs, 2) of the feet [m] at measured channels y (n, m), changed; `p` (k,) gives
-    the lengths of the legs."""
-    count, same = len(physics.legs), np.positive
-    columns = [change.get(name, same)(y[:, i]) for i, name in enumerate(physics.channels)]
-    known = np.stack(columns, axis=1)
-    q = np.hstack([known[:, : 3 + count], physics.knees(known[:, 3 + count :], p)])
-    return physics.call("feet", q, 0 * q, p=p)[0].reshape(len(y), count, 2)
+def _rezeroed(some: Sequence[MixUp]) -> bool:
+    """Whether the zero of the height is to be found: where the lowest foot is."""
+    return any(m.text.startswith("body/z counts") for m in some)
+
+
+class _Feet:
+    """Feet of a log as its columns say, with mistakes put right."""
+
+    def __init__(self, physics: Physics, log: ResampledLog) -> None:
+        self.physics, self.log = physics, log
+        limits = MixUpSettings.current()
+        self.step = float(np.median(np.diff(log.time)))
+        self.half = max(1, round(0.5 * limits.window / self.step))
+        good = np.isfinite(log.y)
+        self.enough = bool(np.all(good.sum(axis=0) > limits.fewest))
+        self.enough &= len(log.time) > 4 * self.half
+        self.y = {
+            name: np.interp(log.time, log.time[good[:, i]], log.y[good[:, i], i])
+            for i, name in enumerate(physics.channels)
+            if good[:, i].any()
+        }
+
+    def restless(self, some: Sequence[MixUp]) -> float | None:
+        """How far [m] feet are from the ground and from their place one window before.
+
+        The lowest foot stands in most of the rows on the ground, and each foot in a quarter of them
+        at least: the largest of these quantiles. None where too few rows tell it, or where a zero
+        of the height is no mistake.
+        """
+        if not self.enough:
+            return None
+        places, rows = self._places(some)
+        if len(rows) < MixUpSettings.current().fewest:
+            return None
+        before, now, after = (places[rows + k] for k in (-self.half, 0, self.half))
+        lowest = np.argmin(now[:, :, 1], axis=1)[:, None]
+        height = now[:, :, 1]
+        if some and np.median(self._changed(some)["body/z"]) < 0.0 and not _rezeroed(some):
+            return None  # the body is under the ground
+        if _rezeroed(some):
+            zero = float(np.median(np.take_along_axis(height, lowest, axis=1)))
+            if abs(zero) < MixUpSettings.current().zero and some[0].text == OTHER_ZERO:
+                return None
+            height = height - zero
+        far = np.hypot(height, np.linalg.norm(after - before, axis=2))
+        nearest = np.take_along_axis(far, lowest, axis=1)
+        return float(max(np.median(nearest), np.quantile(far, 0.25, axis=0).max()))
+
+    def offset(self, some: Sequence[MixUp], mistake: MixUp) -> float | None:
+        """By how much [m] the height reads too much, where its zero is the mistake."""
+        if mistake.text != OTHER_ZERO:
+            return None
+        places, rows = self._places(some)
+        return float(np.median(places[rows, :, 1].min(axis=1)))
+
+    def _changed(self, some: Sequence[MixUp]) -> dict[str, Array]:
+        y = dict(self.y)
+        for mistake in some:
+            y |= mistake.change(y)
+        return y
+
+    def _places(self, some: Sequence[MixUp]) -> tuple[Array, np.ndarray]:
+        """Places (n, legs, 2) of the feet [m], and the rows at which the ground carries the robot,
+        half a window from the ends at least."""
+        limits, half, y = MixUpSettings.current(), self.half, self._changed(some)
+        columns = np.stack([y[name] for name in self.physics.channels], axis=1)
+        fall = local_fit(columns[:, 1], half, self.step, 2, 2)
+        rows = np.arange(half, len(columns) - half, max(1, round(limits.row / self.step)))
+        rows = rows[fall[rows] > -limits.carried]
+        count, p = len(self.physics.legs), self.physics.nominal
+        wanted = np.unique(np.concatenate([rows - half, rows, rows + half]))
+        known = columns[wanted]
+        q = np.hstack([known[:, : 3 + count], self.physics.knees(known[:, 3 + count :], p)])
+        found = np.full((len(columns), count, 2), np.nan)
+        found[wanted] = self.physics.call("feet", q, 0 * q, p=p)[0].reshape(-1, count, 2)
+        return found, rows

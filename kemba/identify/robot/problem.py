@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from copy import copy
+from dataclasses import replace
 
 import numpy as np
 from typing_extensions import Self
@@ -36,7 +37,7 @@ from kemba.identify.robot.dynamics.reference import first_reference
 from kemba.identify.robot.dynamics.settings import ForceDensity
 from kemba.identify.robot.force_channels import robot_force_channels
 from kemba.identify.robot.formulas import formula_columns
-from kemba.identify.robot.geometry import mistakes, remarks, standing_lengths
+from kemba.identify.robot.geometry import remarks, standing_lengths
 from kemba.identify.robot.labels import describe
 from kemba.identify.robot.missing import robot_missing
 from kemba.identify.robot.motion.batch import Batch
@@ -46,7 +47,7 @@ from kemba.identify.robot.motion.resampled import resample
 from kemba.identify.robot.noise import learnt_from, stated_noise, with_drifts
 from kemba.identify.robot.operating_point import changes, robot_operating_point
 from kemba.identify.robot.state import LinearisedState, linearise_at
-from kemba.identify.robot.validate import contradictions
+from kemba.identify.robot.validate import faults_of
 from kemba.model.model import Model
 from kemba.settings import BY_HAND, Settings, setting
 from kemba.trajectory import Trajectory
@@ -84,6 +85,8 @@ class RobotProblem(Problem):
         self.logs = tuple(logs)
         self.window = RobotProblemSettings.current().window  # innovations are one-step errors
         self.model, self.unknown = model, unknown or ForceDensity.current()
+        if any(log.meta.get("torques") is False for log in logs):
+            self.unknown = replace(self.unknown, hip=10.0)  # N2.m2.s: 10 N.m for 0.1 s
         found = robot_candidates(model)
         effects = in_the_air(found)
         grip, ground = ground_of(model)
@@ -267,13 +270,15 @@ class RobotProblem(Problem):
     def validate(self) -> list[str]:
         """Which lengths make the feet stand, where they are not the model's. Raises BadData where
         a log contradicts itself or any model."""
-        r = self.residual(self.lengths)
-        found = contradictions(self.state, self.rows(), r, self._sensor_columns)
-        if faults := list(mistakes(self.standing, self.runs)) or list(found):
+        if faults := faults_of(self):
             raise BadData(faults)
         return remarks(self.standing)
 
-    def _sensor_columns(self) -> Array:
+    def of_logs(self, logs: Sequence[Trajectory]) -> RobotProblem:
+        """The same question of other logs."""
+        return type(self)(logs, self.model, self.unknown)
+
+    def sensor_columns(self) -> Array:
         """Columns (n, k) of every sensor fault and every length, per size."""
         faults = [c for c in self.candidates.values() if moves_readings(c.key)]
         return self.jacobian(self.lengths, [c.key for c in faults]) * [c.lead.size for c in faults]

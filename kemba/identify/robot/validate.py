@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from typing import Protocol
 
 import numpy as np
 from scipy.optimize import lsq_linear
 
 from kemba.errors import KembaError
-from kemba.identify.problem.types import Array, Flags, Rows
+from kemba.identify.problem.types import Array, Flags, Rows, Theta
+from kemba.identify.robot.commands import HINT, CommandSettings, turned_torques, valve_mix_ups
+from kemba.identify.robot.geometry import StandingLengths
 from kemba.identify.robot.mix_ups import mixed_up
-from kemba.identify.robot.state import LinearisedState, values_at
+from kemba.identify.robot.state import LinearisedState
 from kemba.settings import BY_HAND, Settings, setting
+from kemba.trajectory import Trajectory
 
 
 class RobotValidateSettings(Settings):
@@ -37,6 +41,82 @@ class RobotValidateSettings(Settings):
     faulty: float = setting(4.0, "1", "largest fault of a sensor, in sizes", BY_HAND, decides=True)
 
 
+class JudgedLogs(Protocol):
+    """What is asked of a problem of robot logs."""
+
+    @property
+    def logs(self) -> Sequence[Trajectory]: ...
+    @property
+    def runs(self) -> Sequence[str]: ...
+    @property
+    def state(self) -> LinearisedState: ...
+    @property
+    def standing(self) -> StandingLengths: ...
+    @property
+    def lengths(self) -> Theta: ...
+    def residual(self, theta: Theta) -> Array:
+        """Whitened (n,)."""
+
+    def rows(self) -> Rows: ...
+    def sensor_columns(self) -> Array:
+        """Columns (n, k) of every sensor fault, per size."""
+
+    def of_logs(self, logs: Sequence[Trajectory]) -> JudgedLogs: ...
+
+
+def faults_of(problem: JudgedLogs) -> list[KembaError]:
+    """What is wrong with the logs of a problem, the simplest first: columns by the feet alone, the
+    sign of torques, then what no model explains, and the valves if they are the reason."""
+    logs, physics = problem.state.batch.resampled, problem.state.physics
+    faults = [fault for log in logs for fault in mixed_up(physics, log)]
+    faults = faults or list(_turned(problem.standing, problem.runs))
+    if faults:
+        return faults
+    r, rows = problem.residual(problem.lengths), problem.rows()
+    faults = list(turned_torques(problem.state, rows, r))
+    return (
+        faults
+        or (_valves(problem, r) if _is_absurd(problem, rows, r) else [])
+        or list(contradictions(problem.state, rows, r, problem.sensor_columns))
+    )
+
+
+def _is_absurd(problem: JudgedLogs, rows: Rows, r: Array) -> bool:
+    """Whether a channel errs by more than any missing effect makes it, sensors right or wrong."""
+    channels = problem.state.physics.channels
+    runs = range(len(problem.logs))
+    power = [max(_power(channels, r, rows, rows.run == i).values(), default=0.0) for i in runs]
+    return max(power) > RobotValidateSettings.current().absurd
+
+
+def _turned(found: StandingLengths, runs: Sequence[str]) -> Iterator[KembaError]:
+    """The sign of the pitch, where feet stand with the other one only."""
+    if found.turned:
+        yield KembaError(
+            ", ".join(runs),
+            "body/pitch has the reversed sign (nose up is positive)",
+            "corrected, feet stand on level ground; else legs of other lengths would be needed",
+            "correct it with `sign` in a column map (--map)",
+        )
+
+
+def _valves(problem: JudgedLogs, r: Array) -> list[KembaError]:
+    """The mistake about the valves after which the logs contradict the model no more, and leave a
+    residual much smaller than r (n,); the best of them."""
+    found = []
+    for text, logs in valve_mix_ups(problem.logs, problem.state.physics.legs):
+        other = problem.of_logs(logs)
+        left = other.residual(other.lengths)
+        if not list(contradictions(other.state, other.rows(), left, other.sensor_columns)):
+            found.append((float(np.sqrt(np.mean(left**2))), text))
+    before = float(np.sqrt(np.mean(r**2)))
+    after, text = min(found, default=(before, ""))
+    if after > before / CommandSettings.current().better:
+        return []
+    what = f"the logs err by {before:.1f} times their noise, and by {after:.1f} times then"
+    return [KembaError(", ".join(problem.runs), text, what, HINT)]
+
+
 def contradictions(
     state: LinearisedState, rows: Rows, r: Array, sensor_columns: Callable[[], Array]
 ) -> Iterator[KembaError]:
@@ -47,9 +127,8 @@ def contradictions(
     """
     absurd = RobotValidateSettings.current().absurd
     forgiven: Array | None = None
-    lengths, _ = values_at(state.physics, state.base)
     for i, log in enumerate(state.batch.resampled):
-        sunk = list(mixed_up(state.physics, log, lengths)) or list(_sunk(state, i))
+        sunk = list(_sunk(state, i))
         yield from sunk
         own = rows.run == i
         power = _power(state.physics.channels, r, rows, own)

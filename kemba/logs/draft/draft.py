@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+import re
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,93 +14,210 @@ import numpy as np
 from kemba.errors import KembaError
 from kemba.logs.columns import ColumnMap
 from kemba.logs.draft import ranges
+from kemba.logs.draft.clock import joint_state_labels, numbers, stamp_of, switches
+from kemba.logs.draft.frames import quaternions, upright
 from kemba.logs.draft.layout import Layout, layout_of, units_below
-from kemba.logs.draft.matching import assigned
-from kemba.logs.draft.stamps import Stamp, joint_state_labels, numbers, stamp_of, switches
-from kemba.logs.draft.targets import Target, bench_targets, drive_targets, robot_targets
-from kemba.logs.draft.words import SPELT, Names
-from kemba.logs.opening import TEXTS, raw_columns
+from kemba.logs.draft.matching import Assigned, assigned
+from kemba.logs.draft.targets import (
+    Target,
+    bench_targets,
+    drive_targets,
+    rig_targets,
+    robot_targets,
+)
+from kemba.logs.draft.words import SPELT, Names, is_unit, strange_unit
+from kemba.logs.foreign import wraps
+from kemba.logs.opening import TEXTS, held, raw_columns
+from kemba.logs.recording import Recording
 from kemba.trajectory import TIME, Array
-from kemba.units import is_unit
 
 
 @dataclass(frozen=True)
 class Draft:
-    """A drafted map: its `layout`, its `columns`, and what is `missing` or `ignored`."""
+    """A drafted map: its `layout`, its `columns`, and what is `missing` or `ignored`; `questions`
+    that names and values leave open, and `notes` on what was decided and why."""
 
     kind: str
     layout: Layout
     columns: dict[str, dict[str, Any]]
     missing: tuple[str, ...]
     ignored: tuple[str, ...]
+    questions: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     def text(self, name: str) -> str:
         """The map as YAML, with what is missing as comments."""
         head = {"kind": self.kind, **self.layout}
         lines = [f"# Column map for {name}, drafted from its names, units and values: check it."]
-        lines += ["# Signs, and where an angle is zero, cannot be seen in a table.", ""]
-        lines += [f"{key}: {json.dumps(value)}" for key, value in head.items()]
+        lines += ["# Signs, and where an angle is zero, cannot be seen in a table."]
+        lines += [f"# {_line(note)}" for note in self.notes]
+        lines += [f"# Open: {_line(question)}" for question in self.questions]
+        lines += ["", *(f"{key}: {json.dumps(value)}" for key, value in head.items())]
         lines += ["columns:"]
         for header, source in self.columns.items():
             inner = ", ".join(f"{k}: {_flow(v)}" for k, v in source.items())
             lines.append(f"  {header}: {{{inner}}}")
         lines += [f"  # {header}: {{source: ...}}  # needed, not found" for header in self.missing]
         if self.ignored:
-            lines += ["", f"# Ignored: {', '.join(self.ignored)}"]
+            lines += ["", f"# Ignored: {_line(', '.join(self.ignored))}"]
         return "\n".join(lines) + "\n"
 
 
-def draft_map(path: Path, legs: Sequence[str]) -> Draft:
-    """A map for the log `path` of a machine with these legs. Raises KembaError where the file is
-    no table or has no time."""
-    layout = layout_of(path) if path.suffix.lower() in TEXTS else {}
+def draft_map(
+    path: Path,
+    legs: Sequence[str],
+    stroke: float | None = None,
+    rig: str = "",
+    logged: Mapping[str, str] | None = None,
+) -> Draft:
+    """A map for the log `path` of a robot with these legs and pistons of this `stroke` [m], or of a
+    `rig` of this kind whose logs must have the columns `logged` (units by name).
+
+    Raises KembaError where the file is no table or has no time.
+    """
+    layout = layout_of(path) if path.suffix.lower() in TEXTS and not path.is_dir() else {}
     trial = ColumnMap.model_construct(**layout)
-    raw, _ = raw_columns(path, trial)
-    labels = {} if trial.header else joint_state_labels(raw)
-    names = Names(legs, labels, _units_below(path, layout, list(raw)), switches(raw))
-    values = numbers(raw, trial.decimal)
-    stamp = stamp_of(raw, values, names.below)
+    raw = raw_columns(path, trial)
+    labels = {} if trial.header else joint_state_labels(raw.columns)
+    below = {**_units_below(path, layout, list(raw.columns)), **_stated(raw)}
+    names = Names(legs, labels, below, switches(raw.columns), tuple(raw.columns))
+    values = numbers(raw.columns, trial.decimal)
+    stamp = stamp_of(raw.columns, values, names)
     if stamp is None:
-        raise KembaError(str(path), "no column rises from row to row", "a time was expected")
-    rest = {name: v for name, v in values.items() if name not in stamp.names}
-    kind, targets = _kind(names, rest)
-    pairs = assigned(names, rest, targets)
-    columns = {TIME: stamp.source}
-    guessed = _guessed_units(names, pairs, rest)
-    for target in targets:
-        if target.header in pairs:
-            name = pairs[target.header]
-            unit = names.unit(name) or guessed.get(ranges.alike(target.header))
-            columns[target.header] = _source(target, name, unit, rest[name])
-    _share_level(columns, pairs, rest)
-    used = {*pairs.values(), *stamp.names}
-    missing = tuple(t.header for t in targets if t.needed and t.header not in pairs)
-    return Draft(
-        kind, layout | _origin(stamp), columns, missing, tuple(n for n in raw if n not in used)
+        what = f"no column rises from row to row like a time; it holds {held(raw.columns)}"
+        raise KembaError(str(path), what, "a time was expected")
+    rest = {n: v for n, v in values.items() if n not in {*stamp.names, *raw.clocks.values()}}
+    rest, names, turned = quaternions(rest, names)
+    names, said = upright(rest, names)
+    kind, targets = _kind(names, rest, rig, logged or {})
+    found = assigned(names, rest, targets)
+    columns, asked = _sources(found, targets, names, rest, stroke, turned)
+    number = {name: i for i, name in enumerate(raw.columns, start=1)}
+    columns = {TIME: _by_number(stamp.source, number), **columns}
+    columns = {header: _by_number(source, number) for header, source in columns.items()}
+    read = {*found.pairs.values(), *stamp.names, *(c for four in turned.values() for c in four)}
+    missing = tuple(
+        t.header for t in targets if t.needed and t.header not in {*found.pairs, *found.ties}
     )
+    ties = [f"{header} may be {_either(names_)}" for header, names_ in found.ties.items()]
+    return Draft(
+        kind,
+        layout | ({"origin": "first"} if stamp.from_first else {}),
+        columns,
+        missing,
+        tuple(name for name in raw.columns if name not in read),
+        tuple(filter(None, [stamp.question, *ties, *asked])),
+        (f"Time: {stamp.reason}.", *said, *raw.remarks, *_joined(columns)),
+    )
+
+
+def _joined(columns: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    return [f"{h} begins anew after each turn: joined" for h, s in columns.items() if "unwrap" in s]
+
+
+def _stated(raw: Recording) -> dict[str, str]:
+    """The units that the file states, as far as they are units."""
+    spelt = {name: SPELT.get(unit, unit) for name, unit in raw.units.items()}
+    return {name: unit for name, unit in spelt.items() if is_unit(unit)}
 
 
 def _units_below(path: Path, layout: Layout, names: Sequence[str]) -> dict[str, str]:
     """The units in the row below the header; texts that are no units are left out."""
-    found = {}
-    for name, text in zip(names, units_below(path, layout), strict=False):
-        unit = SPELT.get(text, text)
-        if is_unit(unit):
-            found[name] = unit
+    spelt = {
+        name: SPELT.get(text, text)
+        for name, text in zip(names, units_below(path, layout), strict=False)
+    }
+    return {name: unit for name, unit in spelt.items() if is_unit(unit)}
+
+
+def _kind(
+    names: Names, values: Mapping[str, Array], rig: str, logged: Mapping[str, str]
+) -> tuple[str, list[Target]]:
+    """What machine the columns are of, and the columns that such a log may have: those of the
+    model's rig, if it is one."""
+    if rig:
+        return rig, rig_targets(logged)
+
+    def says(group: str, *words: str) -> bool:
+        return any(names.says(name).get(group, set()) & set(words) for name in values)
+
+    upright = says("direction", "pitch") and says("direction", "x") and says("direction", "z")
+    if says("part", "hip", "body", "foot") or upright:
+        return "robot", robot_targets(names.legs)
+    if says("part", "valve"):
+        return "bench", bench_targets()
+    if says("kind", "pressure"):
+        return "cylinder", [_optional(target) for target in bench_targets()]
+    return "drive", drive_targets(rotary=says("kind", "torque"))
+
+
+def _optional(target: Target) -> Target:
+    return replace(target, needed=target.needed and not target.is_valve)
+
+
+def _sources(
+    found: Assigned,
+    targets: Sequence[Target],
+    names: Names,
+    values: Mapping[str, Array],
+    stroke: float | None,
+    turned: Mapping[str, tuple[str, ...]],
+) -> tuple[dict[str, dict[str, Any]], list[str]]:
+    """The source of each of our columns, and what has to be asked about them."""
+    guessed = _guessed_units(names, found.pairs, values, stroke, turned)
+    columns: dict[str, dict[str, Any]] = {}
+    asked = []
+    for target in targets:
+        name = found.pairs.get(target.header)
+        if name is None:
+            continue
+        unit = names.unit(name) or guessed.get(ranges.alike(target.header))
+        if name in turned:
+            columns[target.header] = {"source": list(turned[name])}
+        else:
+            columns[target.header] = _source(target, name, unit, values[name])
+        asked += _asked(target, name, unit, names, values[name])
+    _share_level(columns, found.pairs, values)
+    return columns, asked
+
+
+def _asked(target: Target, name: str, unit: str | None, names: Names, y: Array) -> list[str]:
+    """What a person has to say about a column that was found."""
+    found = []
+    written = names.labels.get(name, name)
+    strange = strange_unit(written, names.legs)
+    if strange and names.unit(name) is None and not target.is_valve:
+        found.append(f"{target.header}: '{name}' is in '{strange}', which is no unit that is known")
+    if "desired" in names.says(name).get("role", ()) and not target.is_command:
+        found.append(f"{target.header}: '{name}' is what was asked for; which column is measured?")
+    turns = target.header == "axis/q [rad]" and names.unit(name) is None
+    if turns and float(np.nanmax(np.abs(y), initial=0.0)) > dict(ranges.ANGLE)["rad"]:
+        found.append(f"{target.header}: '{name}' has no unit, and may be degrees or several turns")
     return found
 
 
 def _guessed_units(
-    names: Names, pairs: Mapping[str, str], values: Mapping[str, Array]
+    names: Names,
+    pairs: Mapping[str, str],
+    values: Mapping[str, Array],
+    stroke: float | None,
+    turned: Collection[str],
 ) -> dict[str, str]:
     """The units of columns that are alike, where nothing tells them: those of the others in the
-    log, else by the size of all together, since a jump on the spot has small `x` and pitch."""
+    log, else by the size of all together, since a jump on the spot has small `x` and pitch. Of
+    lengths the height tells most: a way forward may be any."""
     found: dict[str, str] = {}
     for group in {ranges.alike(header) for header in pairs}:
-        own = {h: n for h, n in pairs.items() if ranges.alike(h) == group and "valve/" not in h}
+        own = {
+            header: name
+            for header, name in pairs.items()
+            if ranges.alike(header) == group and "valve/" not in header and name not in turned
+        }
         told = {names.unit(name) for name in own.values()} - {None}
-        size = np.concatenate([values[name] for name in own.values()] or [np.zeros(0)])
-        unit = told.pop() if len(told) == 1 else ranges.guessed_unit(next(iter(own), "[1]"), size)
+        sized = {h: n for h, n in own.items() if h == "body/z [m]"} or own
+        size = np.concatenate([values[name] for name in sized.values()] or [np.zeros(0)])
+        header = next(iter(own), "[1]")
+        unit = told.pop() if len(told) == 1 else ranges.guessed_unit(header, size, stroke)
         if unit is not None:
             found[group] = unit
     return found
@@ -111,31 +229,12 @@ def _share_level(
     """A valve that never switches in this log has the threshold of the others."""
     level = next((s["threshold"] for s in columns.values() if "threshold" in s), None)
     for header, name in pairs.items():
-        if "valve/" in header and level is not None and np.ptp(values[name]) == 0:
+        if (
+            "valve/" in header
+            and level is not None
+            and np.nanmax(values[name]) == np.nanmin(values[name])
+        ):
             columns[header]["threshold"] = level
-
-
-def _origin(stamp: Stamp) -> Layout:
-    return {"origin": "first"} if stamp.from_first else {}
-
-
-def _kind(names: Names, values: Mapping[str, Array]) -> tuple[str, list[Target]]:
-    """What machine the columns are of, and the columns that such a log may have."""
-
-    def says(group: str, *words: str) -> bool:
-        return any(names.says(name).get(group, set()) & set(words) for name in values)
-
-    if says("part", "hip", "body", "foot") or says("direction", "pitch"):
-        return "robot", robot_targets(names.legs)
-    if says("part", "valve"):
-        return "bench", bench_targets()
-    if says("kind", "pressure"):
-        return "cylinder", [_optional(target) for target in bench_targets()]
-    return "drive", drive_targets(rotary=says("kind", "torque"))
-
-
-def _optional(target: Target) -> Target:
-    return Target(target.header, target.means, target.may, target.needed and not target.is_valve)
 
 
 def _source(target: Target, name: str, unit: str | None, values: Array) -> dict[str, Any]:
@@ -145,7 +244,26 @@ def _source(target: Target, name: str, unit: str | None, values: Array) -> dict[
         return source if level is None else {**source, "threshold": level}
     if unit and unit != target.unit:
         source["unit"] = unit
+    if target.unit == "rad" and wraps(ranges.in_ours(values, unit, "rad")):
+        source["unwrap"] = True
     return source | (ranges.gauge(values, unit) if target.unit == "Pa" else {})
+
+
+def _by_number(source: dict[str, Any], number: Mapping[str, int]) -> dict[str, Any]:
+    """A column that has no name of its own is given by its number."""
+    name = source["source"]
+    if isinstance(name, str) and (name.isdigit() or re.search(r"#\d+$", name)):
+        return {**source, "source": number.get(name, name)}
+    return source
+
+
+def _either(names: Sequence[str]) -> str:
+    return " or ".join(f"'{name}'" for name in names)
+
+
+def _line(text: str) -> str:
+    """A text that stays one line of a comment, whatever a name has in it."""
+    return " ".join(text.split())
 
 
 def _flow(value: Any) -> str:

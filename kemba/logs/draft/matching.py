@@ -3,61 +3,79 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from kemba.logs.draft.ranges import two_levels
 from kemba.logs.draft.targets import Target
-from kemba.logs.draft.words import Meaning, Names
+from kemba.logs.draft.words import Meaning, Names, named_unit, unknown
 from kemba.quantity import convert
-from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Array
 
+# Scores of a name are shares of what it must say; the rest only breaks ties between columns.
 NOTHING = -1.0  # of a name that says something else
+ENOUGH = 0.6  # two of three words are enough, half not
+SAID_TOO = 0.1  # for a name that also says what it may
+UNRELATED = 0.3  # doubt by a word about something else, as the `a` of `valve_a`
+ASKED_FOR = 0.3  # of what was desired or commanded where a measured column is wanted
+STRANGER = 0.03  # for each word that says nothing, up to three
+SURE = 0.02  # a change of the whole assignment that costs less is as good
 
 
-class MatchingSettings(Settings):
-    """How far the words of a foreign name must agree with one of our columns."""
+@dataclass(frozen=True)
+class Assigned:
+    """Our header -> foreign column, and headers for which several fit as well."""
 
-    enough: float = setting(
-        0.6,
-        "1",
-        "share of what a name must say",
-        "derived: two of three words are enough, half not",
-    )
-    said_too: float = setting(
-        0.1, "1", "preference for a name that also says what it may", "convention: breaks ties only"
-    )
-    unrelated: float = setting(
-        0.3, "1", "doubt by a word about something else, as the `a` of `valve_a`", CHOSEN
-    )
+    pairs: dict[str, str]
+    ties: dict[str, tuple[str, ...]]
 
 
-def assigned(
-    names: Names, values: Mapping[str, Array], targets: Sequence[Target]
-) -> dict[str, str]:
-    """Our header -> name of the foreign column.
+def assigned(names: Names, values: Mapping[str, Array], targets: Sequence[Target]) -> Assigned:
+    """The assignment of the largest sum of scores; each column is used once.
 
-    Each column is used once. Columns with a unit of another dimension are no candidates.
+    Columns with a unit of another dimension are no candidates. A target whose best column can be
+    exchanged for another, of other values, at no cost is a tie, and is not assigned.
     """
-    from scipy.optimize import linear_sum_assignment
-
     columns = list(values)
     scores = np.full((len(targets), len(columns)), NOTHING)
     for j, name in enumerate(columns):
+        strangers = min(unknown(named_unit(names.labels.get(name, name))[0], names.legs), 3)
         for i, target in enumerate(targets):
             unit = names.unit(name)
             if name in names.switches and not target.is_valve:
                 continue
             if fits(target, unit, values[name]):
-                scores[i, j] = agreement(by_unit(names.says(name), target, unit), target)
-    rows, chosen = linear_sum_assignment(scores, maximize=True)
+                score = agreement(by_unit(names.says(name), target, unit), target)
+                scores[i, j] = score - STRANGER * strangers if score > NOTHING else NOTHING
+    scores[scores < ENOUGH] = NOTHING
+    total, best = _best(scores)
+    pairs: dict[str, str] = {}
+    ties: dict[str, tuple[str, ...]] = {}
+    for i, j in best.items():
+        without = scores.copy()
+        without[i, j] = NOTHING
+        other, changed = _best(without)
+        k = changed.get(i)
+        same = k is not None and np.array_equal(
+            values[columns[j]], values[columns[k]], equal_nan=True
+        )
+        if k is not None and total - other < SURE and not same:
+            ties[targets[i].header] = (columns[j], columns[k])
+        else:
+            pairs[targets[i].header] = columns[j]
+    return Assigned(pairs, ties)
+
+
+def _best(scores: np.ndarray[Any, Any]) -> tuple[float, dict[int, int]]:
+    """The largest sum of scores, and the column (value) of each row (key) in it."""
+    from scipy.optimize import linear_sum_assignment
+
+    rows, chosen = linear_sum_assignment(np.maximum(scores, 0.0), maximize=True)
     pairs = zip(rows.tolist(), chosen.tolist(), strict=True)
-    return {
-        targets[i].header: columns[j]
-        for i, j in pairs
-        if scores[i, j] >= MatchingSettings.current().enough
-    }
+    found = {i: j for i, j in pairs if scores[i, j] > 0}
+    return float(sum(scores[i, j] for i, j in found.items())), found
 
 
 def fits(target: Target, unit: str | None, values: Array) -> bool:
@@ -78,29 +96,39 @@ def by_unit(says: Meaning, target: Target, unit: str | None) -> Meaning:
     unit's, as by the `F` of `cyl_F [mm]`; this kind also where the name says of what it is. A
     length is no pitch, as by the `R` of `cyl_R [mm]`."""
     kind = target.means.get("kind") or target.may.get("kind")
-    if unit is None or kind is None or target.is_valve:
+    if unit is None or kind is None or target.is_valve or says.get("kind") == {"other"}:
         return says
     left = {group: found for group, found in says.items() if group != "kind"}
     if target.unit != "rad" and left.get("direction") == {"pitch"}:
         del left["direction"]
     part = target.means.get("part")
-    told = kind in says.get("kind", ()) or part is None or part in says.get("part", ())
+    turns = part == "hip" and target.unit == "rad" and "leg" in says and "direction" not in says
+    if turns and "part" not in says:  # of a leg, the hip alone has an angle
+        left["part"] = {"hip"}
+    told = kind in says.get("kind", ()) or part is None or part in left.get("part", ())
     return {**left, "kind": {kind}} if told else left
 
 
 def agreement(says: Meaning, target: Target) -> float:
-    """How well a name fits a target: at most about 1, `NOTHING` where it says something else."""
-    score, limits = 0.0, MatchingSettings.current()
+    """How well a name fits a target: at most about 1, `NOTHING` where it says something else or
+    leaves unsaid what it must say."""
+    score = 0.0
     for group, wanted in target.means.items():
-        if group in says and wanted not in says[group]:
+        if group not in says:
+            if group == "kind" and wanted == "position" and len(target.means) > 1:
+                continue
             return NOTHING
-        score += len(says[group]) ** -0.5 if group in says else 0.0
+        if wanted not in says[group]:
+            return NOTHING
+        score += len(says[group]) ** -0.5
     score /= len(target.means)
     for group, found in says.items():
         if group in target.may:
             if target.may[group] not in found:
                 return NOTHING
-            score += limits.said_too
+            score += SAID_TOO
         elif group not in target.means:
-            score -= limits.unrelated * (group in ("kind", "leg", "part"))
+            score -= UNRELATED * (group in ("kind", "leg", "part"))
+    if "desired" in says.get("role", ()) and not target.is_valve:
+        score -= ASKED_FOR
     return score

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -13,20 +14,24 @@ from kemba.trajectory import Array
 # Robots of 0.1 to 2 m, strokes below 0.3 m, pressures of 0.5 to 12 bar, 50 Hz to 10 kHz.
 LENGTH = (("m", 3.0), ("cm", 60.0), ("mm", 3e3), ("um", 3e6))
 EXTENSION = (("m", 0.5), ("mm", 500.0), ("um", 5e5))
+STROKE = ("m", "cm", "mm", "um")
 ANGLE = (("rad", 6.6), ("deg", 400.0), ("mrad", 7e3))
 PRESSURE = (("MPa", 0.05), ("bar", 20.0), ("kPa", 2e3), ("mbar", 2e4), ("Pa", 2e6))
 STEP = (("s", 0.05), ("ms", 50.0), ("us", 5e4), ("ns", 5e7))
-STAMPED = 1e8  # s; larger first stamps count from 1970 (three years) or from the start of a clock
 ABSOLUTE = 0.8e5  # Pa; a pressure that falls below it is counted from the atmosphere
 ATMOSPHERE = "1.01325 bar"
 
 
-def guessed_unit(header: str, values: Array) -> str | None:
+def guessed_unit(header: str, values: Array, stroke: float | None = None) -> str | None:
     """The unit of a column by its values, or those of all that are `alike`; None where it is ours
-    or cannot be told."""
+    or cannot be told. That of a piston makes most of them the `stroke` [m]."""
     unit = header[header.index("[") + 1 : -1]
     table = {"m": EXTENSION if "piston/" in header else LENGTH, "rad": ANGLE, "Pa": PRESSURE}
     size = float(np.nanmax(np.abs(values), initial=0.0))
+    if "piston/x" in header and stroke and size:
+        far = {name: abs(math.log10(convert(size, name, "m") / stroke)) for name in STROKE}
+        best = min(far, key=far.__getitem__)
+        return None if best == "m" else best
     for name, largest in table.get(unit, ()):
         if size <= largest:
             return None if name == unit else name
@@ -42,18 +47,19 @@ def alike(header: str) -> str:
 
 def time_unit(values: Array) -> str:
     """The unit of a time column (n,) by the step between its rows."""
-    step = float(np.median(np.diff(values))) if len(values) > 1 else 0.0
+    steps = np.diff(values)
+    step = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
     return next((unit for unit, largest in STEP if step <= largest), "ns")
 
 
-def is_stamp(values: Array, unit: str) -> bool:
-    """Whether times (n,) count from somewhere else than the start of the log."""
-    return len(values) > 0 and bool(abs(convert(float(values[0]), unit, "s")) > STAMPED)
+def in_ours(values: Array, unit: str | None, ours: str) -> Array:
+    """Values (n,) in our unit."""
+    return convert(values, unit or ours, ours)
 
 
 def gauge(values: Array, unit: str | None) -> dict[str, Any]:
     """The offset of a pressure (n,) that is zero at the atmosphere."""
-    low = float(np.nanmin(convert(values, unit or "Pa", "Pa"), initial=np.inf))
+    low = float(np.nanmin(in_ours(values, unit, "Pa"), initial=np.inf))
     return {"offset": ATMOSPHERE} if low < ABSOLUTE else {}
 
 

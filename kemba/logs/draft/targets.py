@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 Meaning = dict[str, str]
@@ -12,8 +12,8 @@ Meaning = dict[str, str]
 class Target:
     """One of our columns.
 
-    `means`: what a foreign name must say, group by group. `may`: what it may say as well;
-    anything else in the same group speaks against it.
+    `means`: what a foreign name must say, group by group; only that a position is one may go
+    unsaid. `may`: what it may say as well; anything else in the same group speaks against it.
     """
 
     header: str
@@ -30,6 +30,11 @@ class Target:
     def is_valve(self) -> bool:
         """Whether it is a command of 0 and 1."""
         return "valve/" in self.header
+
+    @property
+    def is_command(self) -> bool:
+        """Whether what was asked for is what it holds."""
+        return self.is_valve or self.header.endswith("hip/tau [N.m]")
 
 
 def robot_targets(legs: Sequence[str]) -> list[Target]:
@@ -49,7 +54,7 @@ def robot_targets(legs: Sequence[str]) -> list[Target]:
         own, force = {"leg": leg} if len(legs) > 1 else {}, {"kind": "force"}
         found += [
             Target(f"{leg}/hip/q [rad]", {**own, "part": "hip", "kind": "position"}, needed=True),
-            Target(f"{leg}/hip/tau [N.m]", {**own, "part": "hip", "kind": "torque"}, needed=True),
+            Target(f"{leg}/hip/tau [N.m]", {**own, "kind": "torque"}, {"part": "hip"}, needed=True),
             *_piston(f"{leg}/", own, {"part": "piston"}),
             Target(f"{leg}/foot/Fx [N]", {**own, "part": "foot", "direction": "x"}, force),
             Target(f"{leg}/foot/Fz [N]", {**own, "part": "foot", "direction": "z"}, force),
@@ -63,14 +68,28 @@ def bench_targets() -> list[Target]:
     return [*_piston("", {}, {}, bench=True), speed, _supply()]
 
 
+def rig_targets(logged: Mapping[str, str]) -> list[Target]:
+    """The columns of a rig of the user's own: those that its model's logs must have, by unit."""
+    if "axis/q" in logged:
+        return drive_targets(logged["axis/q"] == "rad")
+    if "piston/x" in logged:
+        return [
+            Target(t.header, t.means, t.may, True)
+            for t in bench_targets()
+            if t.header.split(" [")[0] in logged
+        ]
+    means = {"vessel/P": "pressure", "vessel/T": "temperature"}
+    return [Target(f"{n} [{u}]", {"kind": means[n]}, needed=True) for n, u in logged.items()]
+
+
 def drive_targets(rotary: bool) -> list[Target]:
     """The columns of a drive: one axis, a force or a torque."""
     may = {"part": "axis"}
     if rotary:
-        means = {"kind": "torque"}
+        turning = {**may, "direction": "pitch"}
         return [
-            Target("axis/q [rad]", {"kind": "position"}, may, needed=True),
-            Target("axis/tau [N.m]", means, may, needed=True),
+            Target("axis/q [rad]", {"kind": "position"}, turning, needed=True),
+            Target("axis/tau [N.m]", {"kind": "torque"}, may, needed=True),
         ]
     return [
         Target("axis/q [m]", {"kind": "position"}, {**may, "direction": "x"}, needed=True),

@@ -5,89 +5,225 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
+
+from kemba.units import parse_unit
 
 # Of one group a column has one meaning. English, the usual short forms, and a little German.
 WORDS: dict[str, dict[str, str]] = {
     "part": {
-        "hip": "hip motor qdd huefte qm tm",
+        "hip": "hip hips motor qdd huefte hüfte qm tm",
         "piston": "piston cylinder cyl knee rod actuator kolben zylinder zyl xp fp",
-        "body": "body base torso trunk com boom imu",
-        "foot": "foot toe grf ground",
-        "valve": "valve valves sol solenoid ventil u ue ur cmd",
+        "body": "body base torso trunk com boom imu pelvis rumpf floating",
+        "foot": "foot feet toe grf ground fuss fuß",
+        "valve": "valve valves vlv sol solenoid ventil u ue ur",
         "supply": "supply tank reservoir feed regulator line",
-        "axis": "axis drive slide carriage",
+        "axis": "axis drive slide carriage shaft",
     },
     "kind": {
-        "position": "q x pos position angle theta enc encoder stroke travel displacement winkel "
-        "weg laser qm xp",
-        "torque": "tau torque trq effort moment drehmoment tm",
+        "position": "q x pos position ang angle theta enc encoder stroke travel displacement "
+        "winkel weg laser qm xp height",
+        "torque": "tau torque trq tq effort moment drehmoment tm",
         "force": "f force load loadcell cell kraft transducer grf fp fx fy fz",
         "pressure": "p pressure press druck",
-        "speed": "v vel velocity speed rate dx dy dz dq vx vz xd yd",
-        "acceleration": "a acc accel acceleration ax az ddx ddy ddz",
+        "speed": "v vel velocity speed rate dx dy dz dq qd dot xdot ydot zdot vx vy vz xd yd zd "
+        "omega gyro wm geschwindigkeit twist",
+        "acceleration": "a acc accel acceleration ax ay az ddx ddy ddz ddq ddot beschleunigung",
+        "temperature": "temperature temp temperatur",
+        "other": "current currents amp amps volt volts voltage power energy "
+        "status flag mode error err residual fault id count counter seq checksum battery duty pwm "
+        "covariance variance std sigma",
     },
     "direction": {
-        "x": "x horizontal forward vorschub vx ax fx dx ddx",
-        "z": "z y height vertical hoehe altitude vz az fz fy dy dz ddy ddz",
+        "x": "x horizontal forward vorschub vx ax fx dx ddx xdot xd tx",
+        "z": "z height vertical hoehe höhe altitude vz az fz dz ddz zdot zd tz",
+        "y": "y vy ay fy dy ddy ydot yd ty",
         "pitch": "pitch tilt theta nick nickwinkel neigung r",
+        "roll": "roll phi wank rollwinkel",
+        "yaw": "yaw psi heading gier gierwinkel",
     },
     "side": {
         "extend": "extend ext extension ausfahren aus push out cap head ue 1 a",
         "retract": "retract ret retraction einfahren ein pull in rod ur 2 b",
     },
-    "time": {"time": "t time timestamp stamp clock epoch elapsed zeit sec secs"},
-    "rest": {"nanoseconds": "nanosec nanosecs nsec nsecs nanoseconds"},
+    "role": {
+        "desired": "des desired ref reference target setpoint sp goal soll planned plan cmd "
+        "command commanded estimate est estimated predicted model sim",
+        "measured": "meas measured measurement actual act ist fb feedback sensor",
+    },
 }
+TIMES = (
+    "t time timestamp stamp clock epoch elapsed zeit zeitstempel uhrzeit datum date datetime sec "
+    "secs tout"
+)
+FILLERS = frozenset(
+    "robot header state states joint joints data value values m s log sensors topic".split()
+)
 LEG_WORDS = {
     "front": "front f fore fr vorn vorne vo",
     "rear": "rear back hind b r h hinten hi",
     "left": "left l links",
     "right": "right r rechts",
 }
-SPELT = {"degrees": "deg", "degree": "deg", "Grad": "deg", "grad": "deg", "°": "deg"}
-UNITS = "ns us µs ms s min mm cm m in deg rad bar mbar kPa MPa Pa psi kN N Nm N.m mN.m mV V".split()
-BRACKETED = re.compile(r"^(?P<name>.*?)\s*[\[(](?P<unit>[^\])]*)[\])]\s*$")
-WORD = re.compile(r"[A-Z]?[a-zµ°]+|[A-Z]+(?![a-z])|\d+")
+ORDER = ("acceleration", "speed")  # a rate of a position is no position
+SPELT = {
+    "degrees": "deg", "degree": "deg", "Grad": "deg", "grad": "deg", "°": "deg", "radians": "rad",
+    "dps": "deg/s", "mps": "m/s", "meters": "m", "metres": "m", "seconds": "s", "newton": "N",
+    "rad_s": "rad/s", "deg_s": "deg/s", "m_s": "m/s", "mm_s": "mm/s", "m_s2": "m/s2", "Nmm": "N.mm",
+}  # fmt: skip
+UNITS = (
+    "ns us µs ms s min mm cm m in deg rad mrad bar mbar kPa MPa Pa psi kN N Nm N.m mN.m mV V"
+).split()
+INSIDE = frozenset("mm cm deg rad mrad bar mbar kPa MPa Pa psi kN Nm".split())
+LEGS_IN_BRACKETS = frozenset("L R F B H A".split())  # `(L)` is the left one, not litres
+BRACKETS = re.compile(r"\s*(?:\[([^\[\]]*)\]|\(([^()]*)\))")
+WORD = re.compile(r"[A-Z]?[a-zµ°äöüß]+|[A-Z]+(?![a-z])|\d+")
 Meaning = dict[str, set[str]]
 
 
 @dataclass(frozen=True)
 class Names:
     """The names of a log's columns: the machine's legs, what headerless columns are called, units
-    in a row below the header, and columns that say `on` and `off`."""
+    that the file states apart, and columns that say `on` and `off`."""
 
     legs: Sequence[str] = ()
     labels: Mapping[str, str] = field(default_factory=dict)
     below: Mapping[str, str] = field(default_factory=dict)
     switches: Collection[str] = ()
+    columns: Collection[str] = ()
 
     def unit(self, name: str) -> str | None:
-        """The unit that a column's name tells, else the row below the header."""
+        """The unit that a column's name tells, else the one that the file states."""
         return named_unit(self.labels.get(name, name))[1] or self.below.get(name)
 
     def says(self, name: str) -> Meaning:
-        """What a column's name may mean: per group, the candidates of its words."""
-        return meaning(named_unit(self.labels.get(name, name))[0], self.legs)
+        """What a column's name may mean: per group, the candidates of its words. `y` is up where no
+        column is `z`; the angle about it is the pitch."""
+        found = meaning(named_unit(self.labels.get(name, name))[0], self.legs)
+        direction = found.get("direction", set())
+        if "y" in direction:
+            turning = set(words(name)) & {"rpy", "euler"}
+            up = "pitch" if turning else "z" if not self._spatial else "y"
+            found["direction"] = {up if d == "y" else d for d in direction}
+        return found
+
+    @cached_property
+    def _spatial(self) -> bool:
+        vertical = set(WORDS["direction"]["z"].split()) - {"height", "vertical", "altitude"}
+        return any(set(words(named_unit(name)[0])) & vertical for name in self.columns)
+
+
+def words(name: str) -> list[str]:
+    """The words of a name, in small letters."""
+    return [word.lower() for word in WORD.findall(name)]
 
 
 def named_unit(name: str) -> tuple[str, str | None]:
-    """A column's name without its unit, and the unit: of `pos [mm]`, `pos (mm)` or `pos_mm`."""
-    match = BRACKETED.match(name)
-    if match:
-        unit = match["unit"].strip()
-        return match["name"], SPELT.get(unit, unit) or None
-    head, mark, tail = name.rpartition("_")
-    known = mark and head and (tail in UNITS or tail in SPELT)
-    return (head, SPELT.get(tail, tail)) if known else (name, None)
+    """A column's name without its unit, and the unit: of `pos [mm]`, `pos (mm)` or `pos_mm`. What
+    stands in brackets and is no unit belongs to the name."""
+    for match in reversed(list(BRACKETS.finditer(name))):
+        square = match[1] is not None
+        text = (match[1] if square else match[2]).strip()
+        unit = SPELT.get(text, text)
+        spaced = match[0][:1] == " "
+        if is_unit(unit, indexed=not spaced) and (square or unit not in LEGS_IN_BRACKETS):
+            return (name[: match.start()] + name[match.end() :]).strip(), unit
+    pieces = name.split("_")
+    for width in (2, 1):
+        tail = "_".join(pieces[-width:])
+        if len(pieces) > width and pieces[0] and (tail in SPELT or (width == 1 and tail in UNITS)):
+            return "_".join(pieces[:-width]), SPELT.get(tail, tail)
+    inside = [piece for piece in pieces[1:] if piece in INSIDE]
+    if len(inside) == 1:
+        return "_".join(piece for piece in pieces if piece != inside[0]), inside[0]
+    return name, None
+
+
+def is_unit(text: str, indexed: bool = False) -> bool:
+    """Whether a text is a unit; `indexed`: a bare number is the place in an array."""
+    if not text or (
+        re.fullmatch(r"[\d\W]+", text) and (indexed or text != "1") and text not in "°%"
+    ):
+        return False
+    try:
+        parse_unit(text)
+    except ValueError:
+        return False
+    return True
+
+
+def strange_unit(name: str, legs: Sequence[str]) -> str | None:
+    """What stands in brackets like a unit and is none that is known: `[counts]`."""
+    for match in BRACKETS.finditer(name):
+        text = (match[1] or match[2] or "").strip()
+        if not any(letter.isalpha() for letter in text) or named_unit(name)[1] is not None:
+            continue
+        if unknown(text, legs):
+            return text
+    return None
 
 
 def meaning(name: str, legs: Sequence[str]) -> Meaning:
-    """What a name may mean: per group, the candidates that one of its words stands for."""
-    words = [word.lower() for word in WORD.findall(name)]
-    groups = {**WORDS, "leg": {leg: LEG_WORDS.get(leg, leg.lower()) for leg in legs}}
+    """What a name may mean: per group, the candidates that its words stand for. Single letters
+    count where no longer word of their group does, a rate before what it is the rate of."""
+    said = words(name)
     found: Meaning = {}
-    for group, entries in groups.items():
-        hits = {entry for entry, known in entries.items() if set(words) & {*known.split(), entry}}
+    for group, entries in _groups(legs).items():
+        hits = {
+            entry: max(map(len, own))
+            for entry, known in entries.items()
+            if (own := set(said) & {*known.split(), entry})
+        }
+        if any(length > 1 for length in hits.values()):
+            hits = {entry: length for entry, length in hits.items() if length > 1}
+        if group == "kind":
+            first = next((kind for kind in ORDER if kind in hits), None)
+            hits = {first: 1} if first else hits
+            if len(hits) > 1 and set(said) & _other() <= {"current"}:
+                hits.pop("other", None)  # the `current position` is no electric one
         if hits:
-            found[group] = hits
+            found[group] = set(hits)
+    if "other" in found.get("kind", ()):
+        found["kind"] = {"other"}
+    if found.get("part", set()) & {"hip", "piston", "foot", "valve"}:
+        _without_leg(found, said, legs)
+    if "valve" in found.get("part", ()) and len(found["part"]) > 1 and "u" in said:
+        found["part"] -= {"valve"}
     return found
+
+
+def _without_leg(found: Meaning, said: Sequence[str], legs: Sequence[str]) -> None:
+    """Of a part of a leg, take the letter of its leg for nothing else: `CYL_POS_R` is no pitch."""
+    letters = {w for leg in legs for w in LEG_WORDS.get(leg, "").split() if len(w) == 1} & set(said)
+    for group in ("direction", "kind"):
+        by_letter = {e for e in found.get(group, ()) if letters & set(WORDS[group][e].split())}
+        rest = {w for w in said if w not in letters}
+        alone = {e for e in by_letter if not rest & set(WORDS[group][e].split())}
+        if alone:
+            found[group] -= alone
+            if not found[group]:
+                del found[group]
+
+
+def unknown(name: str, legs: Sequence[str]) -> int:
+    """How many words of a name say nothing that is known here."""
+    known = {
+        w
+        for group in _groups(legs).values()
+        for entry, w_ in group.items()
+        for w in (entry, *w_.split())
+    }
+    return len([w for w in words(name) if w not in known and w not in FILLERS and not w.isdigit()])
+
+
+def says_time(name: str) -> bool:
+    """Whether a name calls a time."""
+    return bool(set(words(named_unit(name)[0])) & set(TIMES.split()))
+
+
+def _other() -> set[str]:
+    return set(WORDS["kind"]["other"].split())
+
+
+def _groups(legs: Sequence[str]) -> dict[str, dict[str, str]]:
+    return {**WORDS, "leg": {leg: LEG_WORDS.get(leg, leg.lower()) for leg in legs}}

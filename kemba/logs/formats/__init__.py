@@ -1,4 +1,8 @@
-"""Binary formats of logs: Parquet, MCAP, MATLAB, NumPy and JSON, each read and written whole."""
+"""Formats of logs: one function each that reads a file whole, and some that write one.
+
+A reader takes a path and gives a `Recording`; its package is imported when the first such file is
+opened. A new format is a line of `READERS`.
+"""
 
 from __future__ import annotations
 
@@ -8,25 +12,32 @@ from pathlib import Path
 from typing import Any
 
 from kemba.errors import KembaError
-from kemba.logs.text import Raw
+from kemba.logs.recording import Recording
 from kemba.trajectory import Trajectory
 
-Read = Callable[[Path], tuple[Raw, dict[str, Any]]]
+Read = Callable[[Path], Recording]
 Write = Callable[[Trajectory, Path], None]
 
 LARGEST = 2_000_000_000  # bytes of an unpacked log: 40 columns at 1 kHz for 1.7 hours
 MODULES = {"parquet": "parquet", "mcap": "mcap", "mat": "matlab", "npz": "arrays", "json": "arrays"}
+READERS = {
+    **MODULES, "db3": "rosbag2", "mf4": "measured", "mdf": "measured", "tdms": "measured",
+    "ulg": "measured", "lvm": "lines", "sto": "lines", "mot": "lines",
+}  # fmt: skip
+FOLDER = "db3"  # the ending whose reader takes the folder of a rosbag2
 
 
 def reader(path: Path) -> Read:
-    """The function that reads a file of this ending: its columns, and its metadata."""
-    found: Read = getattr(_module(path), f"read_{_ending(path)}")
+    """The function that reads a file of this ending, or a folder."""
+    ending = FOLDER if path.is_dir() else _ending(path)
+    found: Read = getattr(_module(path, READERS[ending]), f"read_{ending}")
     return found
 
 
 def writer(path: Path) -> Write:
     """The function that writes a trajectory in the format of this ending."""
-    found: Write = getattr(_module(path), f"write_{_ending(path)}")
+    ending = _ending(path)
+    found: Write = getattr(_module(path, MODULES[ending]), f"write_{ending}")
     return found
 
 
@@ -45,10 +56,15 @@ def _ending(path: Path) -> str:
     return path.suffix.lstrip(".").lower()
 
 
-def _module(path: Path) -> Any:
+def _module(path: Path, name: str) -> Any:
     """The module of a format. Raises KembaError where its package is not installed."""
     try:
-        return import_module(f"kemba.logs.formats.{MODULES[_ending(path)]}")
+        return import_module(f"kemba.logs.formats.{name}")
     except ImportError as error:
-        what = f"needs the package '{(error.name or '').split('.')[0]}', which is not installed"
-        raise KembaError(str(path), what, hint="pip install 'kemba[formats]'") from None
+        raise missing(path, error) from None
+
+
+def missing(path: Path, error: ImportError) -> KembaError:
+    """The error about a package that a file needs and that is not installed."""
+    what = f"needs the package '{(error.name or '').split('.')[0]}', which is not installed"
+    return KembaError(str(path), what, hint="pip install 'kemba[formats]'")

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import zipfile
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +15,10 @@ from kemba.errors import KembaError
 from kemba.files import atomic_path, plain
 from kemba.files import write_json as write_json_file
 from kemba.logs.formats import check_size
-from kemba.logs.text import Raw
+from kemba.logs.recording import Column, Raw, Recording, by_length
+from kemba.logs.times import seconds
 from kemba.trajectory import TIME, Trajectory
 
-Found = tuple[Raw, dict[str, Any]]
 BROKEN = (ValueError, TypeError, KeyError, EOFError, NotImplementedError, zipfile.BadZipFile)
 
 
@@ -30,8 +32,8 @@ def write_npz(trajectory: Trajectory, path: Path) -> None:
         np.savez_compressed(stream, **content)
 
 
-def read_npz(path: Path) -> Found:
-    """Our own .npz by its units; else every vector of the length that most vectors have."""
+def read_npz(path: Path) -> Recording:
+    """Our own .npz by its units; else every vector of numbers. Raises KembaError if damaged."""
     try:
         with zipfile.ZipFile(path) as packed:
             check_size(path, sum(member.file_size for member in packed.infolist()))
@@ -40,14 +42,14 @@ def read_npz(path: Path) -> Found:
     except (*BROKEN, OSError) as error:
         raise KembaError(str(path), f"is no .npz file of numbers: {error}") from None
     if "units" not in content or "time" not in content:
-        return vectors(content, path), {}
+        return vectors(content, path)
     names = [name for name in content if name not in ("time", "units", "meta")]
     units = np.atleast_1d(content["units"]).tolist()
     if len(units) != len(names):
         raise KembaError(str(path), f"has {len(units)} units for {len(names)} columns")
     pairs = zip(names, units, strict=True)
     columns = {f"{name} [{unit}]": content[name] for name, unit in pairs}
-    return {TIME: content["time"], **columns}, metadata(content.get("meta"))
+    return Recording({TIME: content["time"], **columns}, metadata(content.get("meta")))
 
 
 def write_json(trajectory: Trajectory, path: Path) -> None:
@@ -57,31 +59,63 @@ def write_json(trajectory: Trajectory, path: Path) -> None:
     write_json_file(path, {"columns": columns, "meta": trajectory.meta})
 
 
-def read_json(path: Path) -> Found:
-    """Columns by name, under `columns` or at the top; null is a missing reading."""
+def read_json(path: Path) -> Recording:
+    """Columns by name, under `columns` or at the top; null is a missing reading. Raises KembaError
+    where the file is no such object."""
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
         columns = content.get("columns", content)
-        found = {k: np.array(v, dtype=float) for k, v in columns.items() if isinstance(v, list)}
+        found = {k: _array(v) for k, v in columns.items() if isinstance(v, list)}
     except OSError as error:
         raise KembaError(str(path), error.strerror or str(error)) from None
     except (ValueError, TypeError, AttributeError, RecursionError) as error:
         raise KembaError(str(path), f"is no JSON object of columns: {error}") from None
     meta = content.get("meta", {})
-    return vectors(found, path), meta if isinstance(meta, dict) else {}
+    return replace(vectors(found, path), meta=meta if isinstance(meta, dict) else {})
 
 
-def vectors(content: dict[str, Any], path: Path) -> Raw:
-    """The vectors of numbers that share the most frequent length."""
+def vectors(content: Mapping[str, Any], path: Path) -> Recording:
+    """Vectors of numbers, and the columns of matrices: under the names in a list of texts as long,
+    else by number. Raises KembaError where there are none, with what the file holds."""
     arrays = {name: np.squeeze(np.asarray(value)) for name, value in content.items()}
-    vectors = {n: a for n, a in arrays.items() if a.ndim == 1 and a.dtype.kind in "fiub"}
-    if not vectors:
-        raise KembaError(
-            str(path), "holds no vector of numbers", "one for each column was expected"
-        )
-    lengths = [len(a) for a in vectors.values()]
-    length = max(set(lengths), key=lambda n: (lengths.count(n), n))
-    return {name: np.asarray(a, dtype=float) for name, a in vectors.items() if len(a) == length}
+    found: Raw = {}
+    for name, array in arrays.items():
+        if array.dtype.names:
+            arrays_of = {f"{name}/{key}": array[key] for key in array.dtype.names}
+            found |= {
+                key: a for key, a in arrays_of.items() if a.ndim == 1 and a.dtype.kind in "fiub"
+            }
+        elif array.dtype.kind not in "fiub":
+            if array.ndim == 1 and len(array) > 2 and seconds(array) is not None:
+                found[name] = array.astype(object)
+        elif array.ndim == 1:
+            found[name] = array
+        elif array.ndim == 2 and min(array.shape) > 1:
+            found |= _matrix(name, array, arrays)
+    if not found:
+        held = ", ".join(f"'{n}' of shape {a.shape}" for n, a in list(arrays.items())[:6])
+        what = f"holds no vector of numbers: {held or 'nothing at all'}"
+        raise KembaError(str(path), what, "one for each column was expected")
+    return by_length(found)
+
+
+def _matrix(name: str, array: Column, arrays: Mapping[str, Column]) -> Raw:
+    """The columns of a matrix (n, k) or (k, n)."""
+    tall = array if array.shape[0] >= array.shape[1] else array.T
+    texts = [a for a in arrays.values() if a.dtype.kind == "U" and a.shape == (tall.shape[1],)]
+    names = [str(n).strip() for n in texts[0]] if texts else []
+    if len(set(names)) != tall.shape[1]:
+        names = [f"{name}/{i}" for i in range(1, tall.shape[1] + 1)]
+    return {label: tall[:, i] for i, label in enumerate(names)}
+
+
+def _array(values: list[Any]) -> Column:
+    """A list of JSON as an array: of texts, of numbers that no float holds, else of floats."""
+    if values and all(isinstance(value, str) for value in values):
+        return np.array(values)
+    if values and all(type(value) is int for value in values):
+        return np.array(values)
+    return np.array(values, dtype=float)
 
 
 def metadata(text: Any) -> dict[str, Any]:

@@ -1,12 +1,12 @@
-"""Logs as MATLAB files, version 5 to 7.2."""
+"""Logs as MATLAB files: written in version 5, read in all, with structs and Simulink's objects."""
 
 from __future__ import annotations
 
-import io
 import json
 import re
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +14,14 @@ import numpy as np
 
 from kemba.errors import KembaError
 from kemba.files import atomic_path, plain
-from kemba.logs.formats.arrays import Found, metadata, vectors
-from kemba.logs.text import Raw
+from kemba.logs.formats import missing
+from kemba.logs.formats.arrays import metadata, vectors
+from kemba.logs.recording import Column, Group, Raw, Recording, recording
 from kemba.trajectory import TIME, Trajectory
 
 LONGEST = 120.0  # s that reading one file may take
-EXPECTED = "version 5 to 7.2 was expected: save(..., '-v7')"
+EXPECTED = "a MATLAB file was expected: save(..., '-v7')"
+WAY_OUT = "in MATLAB: s = struct('time', ts.Time, 'q', ts.Data); save('log.mat', '-struct', 's')"
 
 
 def plain_name(name: str) -> str:
@@ -40,23 +42,55 @@ def write_mat(trajectory: Trajectory, path: Path) -> None:
         savemat(temporary, content, appendmat=False, oned_as="column", long_field_names=True)
 
 
-def read_mat(path: Path) -> Found:
-    """Our own .mat by its headers; else every vector of the length that most vectors have."""
-    content = _content(path)
-    if "headers" not in content:
-        return vectors(content, path), {}
-    headers = [str(header) for header in np.atleast_1d(content["headers"])]
-    return _own(headers, content, path), metadata(content.get("meta"))
+def read_mat(path: Path) -> Recording:
+    """Our own .mat by its headers; else every series that has its times, wherever in structs,
+    cells and objects it stands, and every loose vector. Raises KembaError where there is none."""
+    index, arrays = _content(path)
+    loose = {name: arrays[f"a{at}"] for name, at in index["loose"]}
+    if "headers" in loose:
+        headers = [str(header) for header in np.atleast_1d(loose["headers"])]
+        return Recording(_own(headers, loose, path), metadata(loose.get("meta")))
+    if not index["series"]:
+        try:
+            return vectors(loose, path)
+        except KembaError as error:
+            classes = ", ".join(index["classes"])
+            what = f"{error.what}; it has objects of {classes}" if classes else error.what
+            raise KembaError(
+                error.where, what, "a timeseries, or a vector a column", WAY_OUT
+            ) from None
+    groups: dict[int, Raw] = {}
+    for name, time, values in index["series"]:
+        parts = _parts(name, arrays[f"a{values}"], len(arrays[f"a{time}"]))
+        groups.setdefault(time, {}).update(parts)
+    found = [Group("", arrays[f"a{time}"], "s", columns) for time, columns in groups.items()]
+    left = [name for name, array in loose.items() if array.dtype.kind in "fiub" and array.ndim == 1]
+    said = [f"left out, since they have no times: {', '.join(left[:6])}"] if left else []
+    return recording(found, said)
 
 
-def _content(path: Path) -> dict[str, Any]:
-    """Arrays of numbers and texts, read by another process: damaged files may kill it."""
+def _parts(name: str, values: Column, rows: int) -> Raw:
+    """The columns of a signal (n,), (n, k) or (k, n)."""
+    if values.ndim == 1:
+        return {name: values} if len(values) == rows else {}
+    flat = values.reshape(rows, -1) if values.shape[0] == rows else values.reshape(-1, rows).T
+    return {f"{name}/{i}": column for i, column in enumerate(flat.T, start=1)}
+
+
+def _content(path: Path) -> tuple[dict[str, Any], dict[str, Column]]:
+    """What each array is, and the arrays, read by another process: damaged files may kill it."""
     try:
         with path.open("rb"):
             pass
     except OSError as error:
         raise KembaError(str(path), error.strerror or str(error)) from None
-    child = [sys.executable, str(Path(__file__).with_name("mat_child.py")), str(path.resolve())]
+    with tempfile.TemporaryDirectory(prefix="kemba-") as folder:
+        return _by_child(path, Path(folder) / "arrays.npz")
+
+
+def _by_child(path: Path, written: Path) -> tuple[dict[str, Any], dict[str, Column]]:
+    script = Path(__file__).with_name("mat_child.py")
+    child = [sys.executable, str(script), str(path.resolve()), str(written)]
     try:
         done = subprocess.run(
             child, stdin=subprocess.DEVNULL, capture_output=True, timeout=LONGEST, check=False
@@ -66,10 +100,13 @@ def _content(path: Path) -> dict[str, Any]:
         raise KembaError(str(path), what, EXPECTED) from None
     if done.returncode:
         said = done.stderr.decode(errors="replace").strip().rpartition("\n")[2]
+        if said == "PACKAGE":
+            raise missing(path, ImportError(name="mat-io"))
         reason = said if done.returncode > 0 else "it is damaged: its reader crashes"
-        raise KembaError(str(path), f"is no MATLAB file that SciPy reads: {reason}", EXPECTED)
-    with np.load(io.BytesIO(done.stdout), allow_pickle=False) as found:
-        return {str(name): found[f"a{i}"] for i, name in enumerate(found["names"])}
+        raise KembaError(str(path), f"is no MATLAB file that can be read: {reason}", EXPECTED)
+    with np.load(written, allow_pickle=False) as found:
+        arrays = {name: found[name] for name in found.files if name != "index"}
+        return json.loads(str(found["index"])), arrays
 
 
 def _own(headers: list[str], content: dict[str, Any], path: Path) -> Raw:

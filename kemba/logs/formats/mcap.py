@@ -1,28 +1,29 @@
-"""Logs as MCAP, for PlotJuggler and Foxglove: one topic per part, messages in JSON."""
+"""Logs as MCAP: written for PlotJuggler and Foxglove with JSON, read with most encodings."""
 
 from __future__ import annotations
 
 import json
 import math
 from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from mcap.exceptions import McapError
-from mcap.reader import make_reader
+from mcap.records import Channel, DataEnd, Message, Metadata, Schema
+from mcap.stream_reader import StreamReader
 from mcap.writer import Writer
 
 from kemba.errors import KembaError
 from kemba.files import atomic_path, plain
-from kemba.logs.formats import check_size
-from kemba.logs.text import Raw
+from kemba.logs.formats import check_size, missing
+from kemba.logs.formats.decoding import Topic, decoder
+from kemba.logs.recording import Recording, recording
 from kemba.trajectory import TIME, Trajectory
 
 META = "kemba"
 NS = 1_000_000_000
-# Stamps of one instant may differ by jitter of the recorder; later messages are another row.
-Messages = dict[str, tuple[list[int], list[Any]]]
 
 
 def write_mcap(trajectory: Trajectory, path: Path) -> None:
@@ -60,80 +61,108 @@ def _channel(writer: Writer, trajectory: Trajectory, topic: str, names: list[str
     return writer.register_channel(topic, "json", number)
 
 
-def read_mcap(path: Path) -> tuple[Raw, dict[str, Any]]:
-    """Our own MCAP exactly; else every number of JSON messages as a column `topic/field`.
+def read_mcap(path: Path) -> Recording:
+    """Our own MCAP exactly; else every number of messages in JSON, ROS 2 CDR or protobuf as a
+    column `topic/field`, each topic on its own clock.
 
-    Columns of slower topics keep their last value. Raises KembaError where no message is JSON.
+    Of a file that was cut off, what whole chunks hold. Raises KembaError where nothing is read.
     """
+    topics: dict[str, Topic] = {}
+    skipped: dict[str, str] = {}
+    known: dict[str, dict[str, str]] = {}
+    said: list[str] = []
     try:
         with path.open("rb") as stream:
-            reader = make_reader(stream)
-            summary = reader.get_summary()
-            chunks = summary.chunk_indexes if summary else ()
-            check_size(path, sum(chunk.uncompressed_size for chunk in chunks))
-            known = {found.name: found.metadata for found in reader.iter_metadata()}
-            topics = _messages(reader)
+            for record in _records(stream, path, said):
+                if isinstance(record, Metadata):
+                    known[record.name] = record.metadata
+                else:
+                    schema, channel, message = record
+                    _take(schema, channel, message, topics, skipped)
     except OSError as error:
         raise KembaError(str(path), error.strerror or str(error)) from None
-    except (McapError, ValueError, EOFError) as error:
-        raise KembaError(str(path), f"is no MCAP file: {error or type(error).__name__}") from None
+    except ImportError as error:
+        raise missing(path, error) from None
     if not topics:
-        raise KembaError(str(path), "has no messages in JSON", "record with the JSON encoding")
+        raise _nothing(path, skipped, said)
+    said += [f"topic {name} is not read: {why}" for name, why in skipped.items()]
     if META not in known:
-        return _joined(topics), {}
+        groups = [topic.group() for topic in topics.values() if topic.columns]
+        return recording(groups, said)
     try:
-        return _own(topics, known[META])
+        return replace(_own(topics, known[META]), remarks=tuple(said))
     except (ValueError, TypeError, KeyError, AttributeError):
         what = "its metadata 'kemba' do not fit its messages"
         raise KembaError(str(path), what, "what kemba-opt export writes was expected") from None
 
 
-def _own(topics: Messages, note: dict[str, str]) -> tuple[Raw, dict[str, Any]]:
+def _nothing(path: Path, skipped: dict[str, str], said: list[str]) -> KembaError:
+    if skipped:
+        listed = "; ".join(f"{name}: {why}" for name, why in list(skipped.items())[:4])
+        return KembaError(str(path), f"has no message that kemba reads: {listed}")
+    broken = said[0] if said else "it has no messages"
+    return KembaError(str(path), f"is no MCAP file with messages: {broken}")
+
+
+def _records(stream: Any, path: Path, said: list[str]) -> Iterator[Any]:
+    """Messages with their schema and channel, and metadata, until the file ends or breaks off."""
+    schemas: dict[int, Schema] = {}
+    channels: dict[int, Channel] = {}
+    size = count = 0
+    ended = False
+    try:
+        for record in StreamReader(stream, validate_crcs=True).records:
+            if isinstance(record, Schema):
+                schemas[record.id] = record
+            elif isinstance(record, Channel):
+                channels[record.id] = record
+            elif isinstance(record, Metadata):
+                yield record
+            elif isinstance(record, Message):
+                size, count = size + len(record.data), count + 1
+                check_size(path, size)
+                channel = channels[record.channel_id]
+                yield schemas.get(channel.schema_id), channel, record
+            ended = ended or isinstance(record, DataEnd)
+    except KembaError:
+        raise
+    except Exception as error:  # of damaged bytes the library raises anything
+        if not ended:
+            why = f"{type(error).__name__}: {error}"[:120]
+            said.append(f"it breaks off after {count} messages, which are read ({why})")
+        return
+    if not ended:
+        said.append(f"it breaks off after {count} messages, which are read")
+
+
+def _take(
+    schema: Any, channel: Any, message: Any, topics: dict[str, Topic], skipped: dict[str, str]
+) -> None:
+    topic = topics.get(channel.topic)
+    if topic is None:
+        if channel.topic in skipped:
+            return
+        decode = decoder(channel.message_encoding, schema)
+        if decode is None:
+            kind = f" of {schema.encoding}" if schema else " without a schema"
+            said = f"its messages are {channel.message_encoding or 'bytes'}{kind}"
+            skipped[channel.topic] = f"{said}; JSON, ROS 2 CDR and protobuf are read"
+            return
+        topic = topics[channel.topic] = Topic(channel.topic, decode)
+    topic.add(message.log_time, topic.decode(message.data))
+
+
+def _own(topics: dict[str, Topic], note: dict[str, str]) -> Recording:
     """Columns in the order of the note, and the metadata."""
-    time = [message["time"] for message in next(iter(topics.values()))[1]]
-    columns = {header: _field(topics, header) for header in json.loads(note["headers"])}
-    return {TIME: np.array(time), **columns}, json.loads(note["meta"])
+    time = next(iter(topics.values())).columns["time"]
+    columns = {header: _field(topics, header, len(time)) for header in json.loads(note["headers"])}
+    return Recording({TIME: np.array(time), **columns}, json.loads(note["meta"]))
 
 
-def _messages(reader: Any) -> Messages:
-    topics: Messages = defaultdict(lambda: ([], []))
-    for _, channel, message in reader.iter_messages(log_time_order=False):
-        if channel.message_encoding == "json":
-            topics[channel.topic][0].append(message.log_time)
-            topics[channel.topic][1].append(json.loads(message.data))
-    return dict(topics)
-
-
-def _field(topics: Messages, header: str) -> np.ndarray[Any, Any]:
+def _field(topics: dict[str, Topic], header: str, rows: int) -> np.ndarray[Any, Any]:
     topic, _, field = ("/" + header.split(" [")[0]).rpartition("/")
-    return np.array([message.get(field, math.nan) for message in topics[topic or "/"][1]])
-
-
-def _joined(topics: Messages) -> Raw:
-    """All topics on the stamps of the most frequent one."""
-    longest = max(topics, key=lambda topic: len(topics[topic][0]))
-    order = np.argsort(topics[longest][0], kind="stable")
-    time = [topics[longest][0][i] for i in order]
-    found: Raw = {"time": np.array(time, dtype=object)}
-    for topic, (stamps, messages) in topics.items():
-        rows = [dict(_flat(message)) for message in messages]
-        own = np.argsort(stamps, kind="stable")
-        last = np.searchsorted(np.array(stamps)[own], np.array(time), side="right") - 1
-        for name in dict.fromkeys(key for row in rows for key in row):
-            values = np.array([row.get(name, math.nan) for row in rows])[own]
-            found[f"{topic}/{name}"] = np.where(last >= 0, values[np.clip(last, 0, None)], math.nan)
-    return found
-
-
-def _flat(value: Any, name: str = "") -> list[tuple[str, float]]:
-    """The numbers of a message by their path: `position/0`."""
-    if isinstance(value, bool | int | float):
-        return [(name, float(value))]
-    items = (
-        value.items()
-        if isinstance(value, dict)
-        else enumerate(value)
-        if isinstance(value, list)
-        else ()
-    )
-    return [pair for key, item in items for pair in _flat(item, f"{name}/{key}".strip("/"))]
+    found = topics[topic or "/"]
+    if field in found.texts:
+        raise ValueError(header)
+    values = found.columns.get(field, [])
+    return np.array([*values, *[math.nan] * (rows - len(values))])

@@ -13,7 +13,7 @@ import pyarrow.parquet as pq
 from kemba.errors import KembaError
 from kemba.files import atomic_path, plain
 from kemba.logs.formats import check_size
-from kemba.logs.text import Raw
+from kemba.logs.recording import Recording
 from kemba.trajectory import TIME, Trajectory
 
 META = b"kemba"
@@ -29,8 +29,8 @@ def write_parquet(trajectory: Trajectory, path: Path) -> None:
         pq.write_table(table.replace_schema_metadata(meta), temporary)
 
 
-def read_parquet(path: Path) -> tuple[Raw, dict[str, Any]]:
-    """The columns, numbers as floats and anything else as texts, and the metadata."""
+def read_parquet(path: Path) -> Recording:
+    """The columns, numbers as floats, times as whole ns, anything else as texts; the metadata."""
     try:
         with pq.ParquetFile(path) as file:
             found = file.metadata
@@ -44,14 +44,25 @@ def read_parquet(path: Path) -> tuple[Raw, dict[str, Any]]:
         meta = json.loads((table.schema.metadata or {}).get(META, b"{}"))
     except ValueError:
         raise KembaError(str(path), "its metadata 'kemba' are no JSON") from None
-    columns = zip(table.column_names, table.columns, strict=True)
-    return {name: _values(column) for name, column in columns}, meta
+    columns = dict(zip(table.column_names, table.columns, strict=True))
+    units = {name: "ns" for name, column in columns.items() if _is_time(column)}
+    return Recording({name: _values(c) for name, c in columns.items()}, meta, units=units)
+
+
+def _is_time(column: pa.ChunkedArray) -> bool:
+    kind = column.type
+    return bool(column.null_count == 0) and bool(
+        pa.types.is_timestamp(kind) or pa.types.is_duration(kind)
+    )
 
 
 def _values(column: pa.ChunkedArray) -> np.ndarray[Any, Any]:
     kind = column.type
+    if _is_time(column):
+        unit = pa.duration("ns") if pa.types.is_duration(kind) else pa.timestamp("ns", kind.tz)
+        return np.asarray(column.cast(unit).cast(pa.int64()).to_numpy())
     if pa.types.is_integer(kind) and column.null_count == 0:
-        return np.array(column.to_pylist(), dtype=object)  # stamps since 1970 exceed a float
+        return np.asarray(column.to_numpy())  # stamps since 1970 exceed a float
     if pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_boolean(kind):
         return np.asarray(column.cast(pa.float64()).to_numpy(), dtype=float)
     return np.array(["" if v is None else str(v) for v in column.to_pylist()], dtype=object)

@@ -61,7 +61,7 @@ def changed(
 
 def found(physics: Physics, log: ResampledLog) -> list[KembaError]:
     """The mistakes in a log of a robot with the nominal lengths."""
-    return list(mixed_up(physics, log, physics.nominal))
+    return list(mixed_up(physics, log))
 
 
 MISTAKES: dict[str, tuple[dict[str, Change], str]] = {
@@ -77,6 +77,15 @@ MISTAKES: dict[str, tuple[dict[str, Change], str]] = {
         r"hip/q of the rear leg counts from another zero \(-90 degrees",
     ),
     "hips": ({"hip__q": np.negative}, "hip/q of every leg has the reversed sign"),
+    "start": (
+        {"body__z": lambda z: z - z[0]},
+        r"body/z counts from another zero \(-\d+ mm too much\)",
+    ),
+    "down": ({"body__z": np.negative}, "body/z counts downwards"),
+    "two": (
+        {"rear__hip__q": np.negative, "front__piston__x": lambda x: 0.07 - x},
+        "front leg counts from the extended end and hip/q of the rear leg has the reversed",
+    ),
     "end": (
         {"front__piston__x": lambda x: 0.07 - x},
         "piston/x of the front leg counts from the extended end",
@@ -89,6 +98,28 @@ def test_a_mistake_is_named(mistake: str, physics: Physics, standing: ResampledL
     changes, words = MISTAKES[mistake]
     (fault,) = found(physics, changed(standing, physics, **changes))
     assert re.search(words, str(fault)), str(fault)
+
+
+def test_what_feet_cannot_tell_apart_is_all_named(physics: Physics, standing: ResampledLog) -> None:
+    """A robot that is its own mirror image stands as well seen from its other side."""
+    (fault,) = found(physics, changed(standing, physics, hip__q=np.negative))
+    for words in ("of every leg has the reversed sign", "seen from its other side", "cannot tell"):
+        assert words in str(fault)
+
+
+def test_columns_of_x_and_z_are_told_apart(physics: Physics, standing: ResampledLog) -> None:
+    y = standing.y.copy()
+    y[:, [0, 1]] = y[:, [1, 0]]
+    (fault,) = found(physics, replace(standing, y=y))
+    assert "body/x and body/z are swapped" in str(fault)
+
+
+def test_slow_channels_are_judged_as_well(physics: Physics, standing: ResampledLog) -> None:
+    """A body that is read at 100 Hz beside legs at 1 kHz."""
+    turned = changed(standing, physics, hip__q=np.negative)
+    turned.y[np.arange(len(turned.y)) % 10 != 0, :3] = np.nan
+    (fault,) = found(physics, turned)
+    assert "hip/q of every leg has the reversed sign" in str(fault)
 
 
 def test_what_is_right_is_left_alone(physics: Physics, standing: ResampledLog) -> None:
@@ -117,5 +148,5 @@ def test_a_flight_tells_nothing(physics: Physics, standing: ResampledLog) -> Non
 
 
 def test_one_leg_is_not_told_twice() -> None:
-    texts = [text for text, _ in mix_ups(("leg",), 0.07)]
+    texts = [m.text for m in mix_ups(("leg",), 0.07)]
     assert len(texts) == len(set(texts)) and not any("every leg" in text for text in texts)

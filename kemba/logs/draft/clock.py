@@ -1,0 +1,271 @@
+"""Which column is the time: all candidates, scored, the best with its reason."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from kemba.logs import times
+from kemba.logs.draft import ranges
+from kemba.logs.draft.words import Names, named_unit, says_time, words
+from kemba.logs.recording import Raw
+from kemba.logs.text import as_numbers
+from kemba.quantity import convert
+from kemba.trajectory import Array
+
+FIELDS = ("position", "velocity", "effort")
+REPEATED = 0.15  # share of rising steps where up to six topics have rows of one stamp
+RISING = 0.99  # share of steps that must rise: a few repeats are for the gate to tell
+STAMPED = 1e8  # s; larger first stamps count from 1970 (three years) or from the start of a clock
+ALIKE = 0.02  # share by which two clocks of one log may differ
+NEAR = 15.0  # scores that differ by less do not decide between clocks that contradict each other
+
+# Scores: what a column is called decides, how it is written breaks ties.
+PLOTTER, NAMED, MENTIONED, BY_UNIT, UNNAMED, COUNTER = 100.0, 80.0, 60.0, 50.0, 10.0, 5.0
+SECONDS = frozenset("sec secs second seconds tv_sec s".split())
+PARTS = {
+    "ns": frozenset("nsec nsecs nanosec nanosecs nanosecond nanoseconds ns nano nanos".split()),
+    "us": frozenset(
+        "usec usecs microsec microsecs microsecond microseconds us micro micros".split()
+    ),
+    "ms": frozenset(
+        "msec msecs millisec millisecs millisecond milliseconds ms milli millis".split()
+    ),
+}
+LARGEST = {"ns": 1e9, "us": 1e6, "ms": 1e3}
+COUNTERS = frozenset(
+    "index idx row rows sample samples frame frames count counter seq number nr id no".split()
+)
+
+
+@dataclass(frozen=True)
+class Stamp:
+    """The time of a log: how the map reads it, from which columns, why, and what speaks against."""
+
+    source: dict[str, Any]
+    names: tuple[str, ...]
+    from_first: bool
+    reason: str
+    question: str = ""
+
+
+@dataclass(frozen=True)
+class Clock:
+    """A way to read the time: `seconds` (n,) from its first row."""
+
+    score: float
+    source: dict[str, Any]
+    names: tuple[str, ...]
+    seconds: Array
+    from_first: bool
+    reason: str
+
+
+def numbers(raw: Raw, decimal: str) -> dict[str, Array]:
+    """The columns (n,) that hold numbers; texts are left out."""
+    found = {}
+    for name, cells in raw.items():
+        values = as_numbers(cells, decimal)[0] if cells.dtype == object else cells.astype(float)
+        if np.isfinite(values).any():
+            found[name] = values
+    return found
+
+
+def switches(raw: Raw) -> set[str]:
+    """The columns that say `on` and `off`, or `true` and `false`."""
+    said = {"on", "off", "true", "false"}
+    found = {name for name, cells in raw.items() if cells.dtype == bool}
+    texts = {name: cells for name, cells in raw.items() if cells.dtype == object}
+    return found | {
+        n for n, cells in texts.items() if {str(c).strip().lower() for c in cells} <= said
+    }
+
+
+def stamp_of(raw: Raw, values: Mapping[str, Array], names: Names) -> Stamp | None:
+    """The best of all candidates; None where no column rises that may be a time.
+
+    A question is put where another one, as good by its name, runs at another rate.
+    """
+    found = sorted(_candidates(raw, values, names), key=lambda c: -c.score)
+    if not found:
+        return None
+    best = found[0]
+    against = [c for c in found[1:] if best.score - c.score < NEAR and not _agree(best, c)]
+    alike = [c for c in found[1:] if c.score > UNNAMED and _agree(best, c)]
+    reason, question = best.reason, ""
+    if alike:
+        listed = ", ".join("+".join(c.names) for c in alike[:3])
+        reason += f"; as fast as {listed}{' and more' if len(alike) > 3 else ''}"
+    if COUNTER < best.score <= UNNAMED:
+        question = f"no column is called a time; is '{best.names[0]}', which rises, one?"
+    if against and best.score > UNNAMED:
+        other = against[0]
+        question = (
+            f"is the time {'+'.join(best.names)}, {best.seconds[-1]:.4g} s long, or "
+            f"{'+'.join(other.names)}, {other.seconds[-1]:.4g} s long?"
+        )
+    return Stamp(best.source, best.names, best.from_first, reason, question)
+
+
+def joint_state_labels(raw: Raw) -> dict[str, str]:
+    """Names for the columns of `ros2 topic echo --csv` of a JointState: stamp, frame, the joints'
+    names, then their positions, velocities and efforts. Empty where the columns are others."""
+    texts = {name: cells for name, cells in raw.items() if cells.dtype == object and len(cells)}
+    constant = [n for n, cells in texts.items() if len(set(cells)) == 1 and _is_text(cells[0])]
+    joints = [str(raw[name][0]) for name in constant if name.isdigit() and int(name) > 3]
+    after = [name for name in raw if name.isdigit() and int(name) > 3 + len(joints)]
+    if not joints or len(after) < len(joints):
+        return {}
+    return {
+        column: f"{joints[i % len(joints)]}_{FIELDS[i // len(joints)]}"
+        for i, column in enumerate(after[: len(FIELDS) * len(joints)])
+    }
+
+
+def _candidates(raw: Raw, values: Mapping[str, Array], names: Names) -> list[Clock]:
+    found = _pairs(values)
+    parts = {name for pair in found for name in pair.names}
+    rest = [name for name in raw if name not in parts]
+    found += [c for name in rest if (c := _single(name, raw, values, names)) is not None]
+    if list(raw)[:2] == ["1", "2"] and _is_split(values):
+        found.append(_pair(values, "1", "2", "ns", NAMED + 1))
+    return found
+
+
+def _single(name: str, raw: Raw, values: Mapping[str, Array], names: Names) -> Clock | None:
+    """A column that rises: of numbers, or of texts that are times."""
+    stated = names.unit(name)
+    if name not in values:
+        cells = raw[name]
+        read = times.seconds(cells) if cells.dtype == object else None
+        if read is None or not _rises(read):
+            return None
+        score = NAMED if says_time(name) else MENTIONED
+        return Clock(score, {"source": name}, (name,), read, False, f"'{name}' holds clock times")
+    rows = values[name]
+    if not _rises(rows, says_time(name) or stated is not None) or (
+        stated is not None and not _is_time(stated)
+    ):
+        return None
+    called = _called(name, rows, stated, names)
+    if called is None:
+        return None
+    score, reason = called
+    unit = stated or ranges.time_unit(rows[np.isfinite(rows)])
+    exact = raw[name] if raw[name].dtype.kind in "iu" else rows
+    seconds = convert(np.asarray(exact - exact[0], dtype=float), unit, "s")
+    from_first = abs(convert(float(rows[np.isfinite(rows)][0]), unit, "s")) > STAMPED
+    source = {"source": name, **({} if unit == "s" else {"unit": unit})}
+    if stated is None:
+        reason += f"; no unit is told: taken as {unit}, by the step between rows"
+    return Clock(score, source, (name,), seconds, from_first, reason)
+
+
+def _called(name: str, rows: Array, stated: str | None, names: Names) -> tuple[float, str] | None:
+    """The score of a rising column by its name, and why; None where it is something else."""
+    said = words(named_unit(names.labels.get(name, name))[0])
+    if name == "__time":
+        return PLOTTER, "'__time' is the clock that PlotJuggler puts before all topics"
+    if says_time(name):
+        others = [w for w in said if not says_time(w)]
+        score = MENTIONED - len(others) if others else NAMED
+        return score, f"'{name}' is called a time and rises"
+    if stated is not None:
+        return BY_UNIT, f"'{name}' rises and has the unit {stated}"
+    steps = np.diff(rows[np.isfinite(rows)])
+    says = {} if name.isdigit() else names.says(name)
+    if set(said) & COUNTERS or (np.all(steps == 1.0) and not says):
+        return COUNTER, f"no column is a time: '{name}' counts rows, so check the rate"
+    if says:
+        return None
+    return UNNAMED, f"no column is called a time: '{name}' is the one that rises"
+
+
+def _pairs(values: Mapping[str, Array]) -> list[Clock]:
+    """Whole seconds and what is below them, in columns of one path."""
+    found = []
+    for name in values:
+        head, tail = _split(name)
+        if tail not in SECONDS:
+            continue
+        for other in values:
+            path, part = _split(other)
+            unit = next((u for u, known in PARTS.items() if part in known), None)
+            if path == head and unit is not None and _whole(values[name], values[other], unit):
+                score = NAMED + 1 if not head or head.count("/") < 2 else NAMED - 1
+                found.append(_pair(values, name, other, unit, score))
+    return found
+
+
+def _split(name: str) -> tuple[str, str]:
+    """The path of a name and its last word: `stamp/nanosec`, `tv_nsec`, `time.sec`, `stamp_ns`."""
+    match = re.fullmatch(r"(.*?)([A-Za-z]+)", name.strip())
+    if match is None:
+        return name, ""
+    head, tail = match.groups()
+    inner = re.fullmatch(r"(.*?[a-z])(Sec|Nsec|NanoSec|Nanosec|Usec)", name.strip())
+    head, tail = inner.groups() if inner else (head, tail)
+    return re.sub(r"[\W_]+$", "", head).lower(), tail.lower()
+
+
+def _pair(values: Mapping[str, Array], whole: str, rest: str, unit: str, score: float) -> Clock:
+    source = {"source": whole, "add": {"source": rest, "unit": unit}}
+    if named_unit(whole)[1] is None:
+        source["unit"] = "s"
+    seconds = values[whole] - values[whole][0] + convert(values[rest], unit, "s")
+    reason = f"'{whole}' and '{rest}' are the seconds and {unit} of one stamp"
+    return Clock(score, source, (whole, rest), seconds - seconds[0], True, reason)
+
+
+def _whole(seconds: Array, rest: Array, unit: str) -> bool:
+    """Whether two columns are whole seconds and what is below one, which rise together."""
+    good = np.isfinite(seconds) & np.isfinite(rest)
+    if good.sum() < 2 or not np.all(seconds[good] % 1 == 0):
+        return False
+    if rest[good].min() < 0 or rest[good].max() >= LARGEST[unit]:
+        return False
+    return _rises((seconds - seconds[good][0]) + convert(rest, unit, "s"))
+
+
+def _is_split(values: Mapping[str, Array]) -> bool:
+    """Whether columns 1 and 2 are whole seconds since 1970 and nanoseconds."""
+    if "1" not in values or "2" not in values:
+        return False
+    whole, rest = values["1"], values["2"]
+    return bool(np.all(whole % 1 == 0) and whole[0] > STAMPED and 1e4 < rest.max(initial=0.0) < 1e9)
+
+
+def _agree(a: Clock, b: Clock) -> bool:
+    """Whether two clocks run at one rate, where they are as long."""
+    if len(a.seconds) != len(b.seconds):
+        return True  # of channels of another rate
+    spans = np.nanmax(a.seconds), np.nanmax(b.seconds)
+    return bool(abs(spans[0] - spans[1]) <= ALIKE * max(spans))
+
+
+def _is_time(unit: str) -> bool:
+    try:
+        convert(1.0, unit, "s")
+    except ValueError:
+        return False
+    return True
+
+
+def _is_text(cell: Any) -> bool:
+    return any(letter.isalpha() for letter in str(cell))
+
+
+def _rises(values: Array, named: bool = True) -> bool:
+    """Whether a column rises; one that is called a time may repeat, as where each topic has rows of
+    its own."""
+    steps = np.diff(values[np.isfinite(values)])
+    if not len(steps):
+        return False
+    rising = np.mean(steps > 0)
+    return bool(
+        rising > RISING or (named and rising > REPEATED and np.mean(steps < 0) < 1 - RISING)
+    )

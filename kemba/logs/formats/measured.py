@@ -1,0 +1,143 @@
+"""Logs of data loggers: MDF (asammdf), TDMS (nptdms), ULog (pyulog); channels keep their clocks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kemba.errors import KembaError
+from kemba.logs.formats import check_size
+from kemba.logs.recording import Column, Group, Raw, Recording, recording, shared
+
+
+def read_mf4(path: Path) -> Recording:
+    """Measurement data format, versions 3 and 4: physical values, one clock a channel group."""
+    from asammdf import MDF
+
+    check_size(path, path.stat().st_size)
+    with MDF(path) as file:
+        groups = [_mdf_group(file, number) for number in range(len(file.groups))]
+    return _named(path, [group for group in groups if group is not None])
+
+
+def read_mdf(path: Path) -> Recording:
+    """The same under its older ending."""
+    return read_mf4(path)
+
+
+def _mdf_group(file: Any, number: int) -> Group | None:
+    columns: Raw = {}
+    units: dict[str, str] = {}
+    signals = [
+        signal
+        for signal in file.select(
+            [(None, number, i) for i in range(len(file.groups[number].channels))]
+        )
+        if signal.samples.dtype.kind in "fiub" and signal.samples.ndim == 1
+    ]
+    master = file.masters_db.get(number)
+    names = {file.groups[number].channels[master].name} if master is not None else set()
+    for signal in signals:
+        if signal.name in names or not len(signal.samples):
+            continue
+        name = signal.name if signal.name not in columns else f"{signal.name}#{len(columns) + 1}"
+        columns[name] = signal.samples
+        if signal.unit:
+            units[name] = signal.unit
+    if not columns:
+        return None
+    first = next(s for s in signals if s.name in columns)
+    return Group("", np.asarray(first.timestamps, dtype=float), "s", columns, units)
+
+
+def read_tdms(path: Path) -> Recording:
+    """National Instruments' TDMS: the clock of a waveform is its start, offset and increment; of
+    channels without one, a channel of the group that is called a time."""
+    from nptdms import TdmsFile
+
+    groups: list[Group] = []
+    said: list[str] = []
+    with TdmsFile.open(path) as file:
+        channels = [c for group in file.groups() for c in group.channels() if len(c)]
+        check_size(path, sum(8 * len(channel) for channel in channels))
+        starts = [
+            c.properties["wf_start_time"] for c in channels if "wf_start_time" in c.properties
+        ]
+        several = len({channel.group_name for channel in channels}) > 1
+        for group in file.groups():
+            groups += _tdms_groups(group, min(starts, default=None), several, said)
+    return _named(path, groups, said)
+
+
+def _tdms_groups(group: Any, start: Any, several: bool, said: list[str]) -> Iterator[Group]:
+    """The waveforms of a group, each on its clock, and its other channels on a clock of theirs."""
+    path = f"{group.name}/" if several else ""
+    plain: dict[str, Column] = {}
+    units: dict[str, str] = {}
+    for channel in group.channels():
+        values = channel[:]
+        if not len(values) or values.dtype.kind not in "fiubM":
+            continue
+        name, given = path + channel.name, channel.properties
+        unit = {name: str(given["unit_string"])} if given.get("unit_string") else {}
+        step = float(given.get("wf_increment", 0.0) or 0.0)
+        if step <= 0.0 or values.dtype.kind == "M":
+            plain[name] = values
+            units |= unit
+            continue
+        late = float(given.get("wf_start_offset", 0.0) or 0.0)
+        if start is not None and "wf_start_time" in given:
+            late += float((given["wf_start_time"] - start) / np.timedelta64(1, "s"))
+        yield Group("", late + step * np.arange(len(values)), "s", {name: values}, unit)
+    if plain:
+        yield from _plain(plain, units, group.name, said)
+
+
+def _plain(plain: Raw, units: dict[str, str], name: str, said: list[str]) -> Iterator[Group]:
+    """Channels without a waveform: on a channel of times, if the group has one."""
+    clocks = [n for n, values in plain.items() if values.dtype.kind == "M"] or [
+        n
+        for n in plain
+        if n.rpartition("/")[2].lower().split(" ")[0].split("[")[0] in ("t", "time")
+    ]
+    if not clocks:
+        said.append(f"left out, since they have no times: the channels of {name}")
+        return
+    time = plain[clocks[0]]
+    stamps = time.astype("datetime64[ns]").astype(np.int64) if time.dtype.kind == "M" else time
+    unit = "ns" if time.dtype.kind == "M" else units.get(clocks[0], "")
+    columns = {n: v for n, v in plain.items() if n != clocks[0] and len(v) == len(time)}
+    yield Group("", stamps, unit, columns, {n: u for n, u in units.items() if n in columns})
+
+
+def read_ulg(path: Path) -> Recording:
+    """PX4's ULog: a group for each message and its instance, stamps in us."""
+    from pyulog import ULog
+
+    check_size(path, path.stat().st_size)
+    file = ULog(str(path))
+    groups = []
+    for data in file.data_list:
+        name = data.name if data.multi_id == 0 else f"{data.name}/{data.multi_id}"
+        columns = {
+            field.replace(".", "/"): values
+            for field, values in data.data.items()
+            if field != "timestamp" and values.dtype.kind in "fiub"
+        }
+        stamps = np.asarray(data.data["timestamp"], dtype=np.int64)
+        groups.append(Group(name, stamps, "us", columns))
+    said = [f"{len(file.dropouts)} dropouts"] if file.dropouts else []
+    return _named(path, [g for g in groups if g.columns and len(g.time) > 1], said, together=False)
+
+
+def _named(
+    path: Path, groups: list[Group], said: list[str] | None = None, together: bool = True
+) -> Recording:
+    """One recording; groups of equal times are one. Raises KembaError where there are none."""
+    if not groups:
+        what = "holds no channel of numbers with a clock"
+        raise KembaError(str(path), "; ".join([what, *(said or [])]))
+    return recording(shared(groups) if together else groups, said or [])

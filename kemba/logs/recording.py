@@ -1,0 +1,124 @@
+"""What a file of another program holds, before a map says which column is which."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+Column = np.ndarray[Any, Any]
+Raw = dict[str, Column]
+TIME_WORD = re.compile(
+    r"(?:^|[^a-z])(?:t|time|timestamp|stamp|zeit|tout)(?:$|[^a-z])", re.IGNORECASE
+)
+
+CLOCK = "time"  # of the longest group
+OTHER_CLOCK = "log_time"  # of the others, or where a column has that name
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Columns (n,) by name. `clocks`: for a column with a clock of its own, the column that holds
+    it; without any, all columns are as long. `units` that the file states; `remarks` about what
+    was left out."""
+
+    columns: Raw
+    meta: Mapping[str, Any] = field(default_factory=dict)
+    clocks: Mapping[str, str] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Group:
+    """Columns (n,) that were read at the same `time` (n,): a topic, a task, a message."""
+
+    name: str
+    time: Column
+    time_unit: str
+    columns: Raw
+    units: Mapping[str, str] = field(default_factory=dict)
+
+
+def recording(groups: Sequence[Group], remarks: Iterable[str] = ()) -> Recording:
+    """One recording of several groups; of one alone, the names are those of its columns."""
+    columns: Raw = {}
+    clocks: dict[str, str] = {}
+    units: dict[str, str] = {}
+    ordered = sorted(groups, key=lambda group: -len(group.time))
+    for i, group in enumerate(ordered):
+        path = f"{group.name}/" if group.name and (len(groups) > 1 or "/" in group.name) else ""
+        taken = {path + name for name in group.columns}
+        clock = CLOCK if not i and CLOCK not in taken else f"{path}{OTHER_CLOCK}"
+        columns[clock], units[clock] = group.time, group.time_unit
+        for name, values in group.columns.items():
+            columns[path + name] = values
+            clocks[path + name] = clock
+        units |= {path + name: unit for name, unit in group.units.items()}
+    return Recording(columns, {}, clocks if len(groups) > 1 else {}, units, tuple(remarks))
+
+
+def shared(groups: Iterable[Group]) -> list[Group]:
+    """The groups, those of the very same times as one."""
+    found: list[Group] = []
+    for group in groups:
+        path = f"{group.name}/" if group.name else ""
+        own = Group(
+            "",
+            group.time,
+            group.time_unit,
+            {path + name: values for name, values in group.columns.items()},
+            {path + name: unit for name, unit in group.units.items()},
+        )
+        same = next((i for i, g in enumerate(found) if _same_clock(g, own)), None)
+        if same is None:
+            found.append(own)
+            continue
+        other = found[same]
+        both = {**other.columns, **own.columns}
+        found[same] = Group("", other.time, other.time_unit, both, {**other.units, **own.units})
+    return found
+
+
+def by_length(vectors: Mapping[str, Column]) -> Recording:
+    """Loose vectors: those of the length that most have, and those of another one that a rising
+    vector called a time has too."""
+    lengths = [len(values) for values in vectors.values()]
+    main = max(set(lengths), key=lambda n: (lengths.count(n), n))
+    columns, clocks, left = {}, {}, list[str]()
+    base = _clock_of(vectors, main)
+    for name, values in vectors.items():
+        own = base if len(values) == main else _clock_of(vectors, len(values))
+        if len(values) != main and own is None:
+            left.append(name)
+            continue
+        columns[name] = values
+        if base is not None and own is not None and own != name:
+            clocks[name] = own
+    several = len(set(clocks.values())) > 1
+    said = [
+        f"left out, since no vector of their length is a time: {', '.join(left[:6])}"
+        f"{' and more' if len(left) > 6 else ''}"
+    ]
+    return Recording(columns, clocks=clocks if several else {}, remarks=tuple(said if left else ()))
+
+
+def _clock_of(vectors: Mapping[str, Column], length: int) -> str | None:
+    return next(
+        (
+            name
+            for name, values in vectors.items()
+            if len(values) == length > 2
+            and TIME_WORD.search(name)
+            and values.dtype.kind in "fiu"
+            and bool(np.all(np.diff(values) > 0))
+        ),
+        None,
+    )
+
+
+def _same_clock(a: Group, b: Group) -> bool:
+    return a.time_unit == b.time_unit and np.array_equal(a.time, b.time)

@@ -1,0 +1,374 @@
+"""Formats of data loggers, simulators and middleware, written by their own libraries."""
+
+from __future__ import annotations
+
+import sqlite3
+import struct
+from contextlib import closing
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from foreign_files import robot_log
+from mcap.writer import CompressionType, Writer
+from scipy.io import savemat
+
+from kemba.errors import KembaError
+from kemba.identify.logs.reading import read_log
+from kemba.logs import ColumnMap, ColumnSource, load_map, open_log
+from kemba.logs.draft.draft import draft_map
+from kemba.logs.opening import raw_columns
+from kemba.trajectory import Trajectory
+
+LEGS = ("front", "rear")
+START = 1_766_147_454_000_000_000
+
+
+def columns_of(log: Trajectory) -> dict[str, np.ndarray]:
+    return {name.replace("/", "_"): log[name] for name in log.names}
+
+
+def read_back(path: Path, tmp_path: Path) -> Trajectory:
+    """The log through its drafted map."""
+    draft = draft_map(path, LEGS, 0.07)
+    assert not draft.missing and not draft.questions, draft
+    target = tmp_path / "map.yaml"
+    target.write_text(draft.text(path.name), encoding="utf-8")
+    return read_log(path, load_map(target))
+
+
+def same(back: Trajectory, log: Trajectory, atol: float = 1e-9) -> None:
+    time = back.time - back.time[0]
+    assert time[-1] == pytest.approx(log.time[-1], abs=2e-3)
+    for name in log.names:
+        good = np.isfinite(back[name])
+        assert good.any(), name
+        expected = np.interp(time[good], log.time, log[name])
+        slack = 1.0 if "valve" in name else atol
+        assert np.quantile(np.abs(back[name][good] - expected), 0.98) <= slack, name
+
+
+def test_mdf(tmp_path: Path) -> None:
+    """Two groups at their own rates, units as the file states them."""
+    asammdf = pytest.importorskip("asammdf")
+    log, slow = robot_log(), slice(None, None, 10)
+    with asammdf.MDF() as file:
+        body = {n: v for n, v in columns_of(log).items() if n.startswith("body")}
+        rest = {n: v for n, v in columns_of(log).items() if n not in body}
+        for part, rows in ((body, slow), (rest, slice(None))):
+            signals = []
+            for name, values in part.items():
+                shown = np.degrees(values) if _unit(name) == "deg" else values
+                signal = asammdf.Signal(shown[rows], log.time[rows], name=name, unit=_unit(name))
+                signals.append(signal)
+            file.append(signals)
+        file.save(tmp_path / "log.mf4")
+    back = read_back(tmp_path / "log.mf4", tmp_path)
+    same(back, log, 1e-6)
+    assert np.isfinite(back["body/z"]).sum() == 40 and len(back) == 400
+    assert "have a clock of their own" in back.meta["read"][0]
+
+
+def _unit(name: str) -> str:
+    return "deg" if name.endswith(("_q", "pitch")) else "Nm" if name.endswith("tau") else ""
+
+
+@pytest.mark.parametrize("waveform", [True, False])
+def test_tdms(waveform: bool, tmp_path: Path) -> None:
+    """Waveforms with increments and offsets of their own; else a channel of times."""
+    nptdms = pytest.importorskip("nptdms")
+    log = robot_log()
+    channels = []
+    for name, values in columns_of(log).items():
+        step = 10 if waveform and name.startswith("body") else 1
+        late = 0.004 if step == 10 else 0.0
+        shown = np.interp(log.time + late, log.time, values)[::step] if step == 10 else values
+        start = np.datetime64("2026-01-01T12:00:00")
+        given = {"wf_increment": 1e-3 * step, "wf_start_offset": late, "wf_start_time": start}
+        given = given if waveform else {}
+        channels.append(nptdms.ChannelObject("log", name, shown, properties=given))
+    if not waveform:
+        channels.append(nptdms.ChannelObject("log", "Time", log.time))
+    with nptdms.TdmsWriter(tmp_path / "log.tdms") as writer:
+        writer.write_segment(channels)
+    same(read_back(tmp_path / "log.tdms", tmp_path), log, 2e-4)
+
+
+def test_ulog(tmp_path: Path) -> None:
+    """Messages at their own rates; pyulog has no writer from arrays, so that the bytes are laid out
+    here as its specification says."""
+    pytest.importorskip("pyulog")
+    log = robot_log()
+    columns = columns_of(log)
+    body = {n: v for n, v in columns.items() if n.startswith("body")}
+    legs = {n: v for n, v in columns.items() if n not in body}
+    blocks = [b"\x55\x4c\x6f\x67\x01\x12\x35\x01" + struct.pack("<Q", 0)]
+    parts = ((0, "mocap", body, 10), (1, "legs", legs, 1))
+    for _, name, part, _ in parts:
+        fields = ";".join(["uint64_t timestamp", *(f"double {n}" for n in part)]) + ";"
+        blocks.append(_message("F", f"{name}:{fields}".encode()))
+    for number, name, _, _ in parts:
+        blocks.append(_message("A", struct.pack("<BH", 0, number) + name.encode()))
+    for row in range(len(log)):
+        for number, _, part, step in parts:
+            if row % step == 0:
+                values = [part[n][row] for n in part]
+                stamp = round(1e6 * log.time[row]) + 5_000_000
+                data = struct.pack(f"<HQ{len(values)}d", number, stamp, *values)
+                blocks.append(_message("D", data))
+    (tmp_path / "log.ulg").write_bytes(b"".join(blocks))
+    same(read_back(tmp_path / "log.ulg", tmp_path), log, 1e-6)
+
+
+def _message(kind: str, data: bytes) -> bytes:
+    return struct.pack("<HB", len(data), ord(kind)) + data
+
+
+def test_lvm(tmp_path: Path) -> None:
+    """LabVIEW with decimal commas and a comment behind the numbers."""
+    log = robot_log()
+    columns = columns_of(log)
+    units = [{"m": "mm", "rad": "deg", "N.m": "N.m", "1": ""}[log.unit(n)] for n in log.names]
+    sizes = [{"mm": 1e3, "deg": np.degrees(1)}.get(unit, 1.0) for unit in units]
+    head = ["LabVIEW Measurement", "Writer_Version\t2", "Separator\tTab", "Decimal_Separator\t,",
+            "***End_of_Header***", "", f"Channels\t{len(columns)}",
+            "\t".join(["Y_Unit_Label", *units]), "***End_of_Header***",
+            "\t".join(["X_Value", *columns, "Comment"])]  # fmt: skip
+    rows = []
+    for i, time in enumerate(log.time):
+        cells = [time, *(v[i] * size for v, size in zip(columns.values(), sizes, strict=True))]
+        rows.append("\t".join(f"{cell:.9g}".replace(".", ",") for cell in cells) + "\t")
+    (tmp_path / "log.lvm").write_text("\n".join([*head, *rows]) + "\n")
+    same(read_back(tmp_path / "log.lvm", tmp_path), log, 1e-6)
+
+
+@pytest.mark.parametrize("ending", ["sto", "mot"])
+def test_opensim(ending: str, tmp_path: Path) -> None:
+    """y is up, z to the side, angles in degrees by the header."""
+    t = np.arange(300) * 1e-3
+    columns = {
+        "pelvis_tx": 0.1 * t, "pelvis_ty": 0.9 + 0.1 * np.sin(9 * t), "pelvis_tz": 1e-3 * t,
+        "pelvis_tilt": np.degrees(0.1 * np.sin(8 * t)), "hip_front_q": np.degrees(np.sin(7 * t)),
+    }  # fmt: skip
+    head = ["log", "version=1", "nRows=300", f"nColumns={len(columns) + 1}", "inDegrees=yes",
+            "endheader", "\t".join(["time", *columns])]  # fmt: skip
+    rows = ["\t".join(f"{v:.9g}" for v in row) for row in zip(t, *columns.values(), strict=True)]
+    path = tmp_path / f"log.{ending}"
+    path.write_text("\n".join([*head, *rows]))
+    draft = draft_map(path, LEGS)
+    assert draft.columns["body/z [m]"]["source"] == "pelvis_ty"
+    assert draft.columns["body/pitch [rad]"] == {"source": "pelvis_tilt", "unit": "deg"}
+    assert draft.columns["front/hip/q [rad]"] == {"source": "hip_front_q", "unit": "deg"}
+
+
+@cache
+def _store() -> Any:
+    from rosbags.typesys import Stores, get_typestore
+
+    return get_typestore(Stores.LATEST)
+
+
+def _cdr(header: float, names: list[str], position: np.ndarray, effort: np.ndarray) -> bytes:
+    store = _store()
+    stamp = round(header * 1e9)
+    time = store.types["builtin_interfaces/msg/Time"](stamp // 10**9, stamp % 10**9)
+    top = store.types["std_msgs/msg/Header"](time, "base")
+    joints = store.types["sensor_msgs/msg/JointState"](top, names, position, np.zeros(0), effort)
+    return bytes(store.serialize_cdr(joints, "sensor_msgs/msg/JointState"))
+
+
+def _definition() -> str:
+    store = _store()
+    return str(store.generate_msgdef("sensor_msgs/msg/JointState", ros_version=2)[0])
+
+
+JOINTS = ["front_hip", "rear_hip"]
+
+
+def joint_rows() -> list[bytes]:
+    log = robot_log()
+    both = [np.stack([log[f"{leg}/{c}"] for leg in LEGS], axis=1) for c in ("hip/q", "hip/tau")]
+    return [_cdr(t, JOINTS, q, tau) for t, q, tau in zip(log.time, *both, strict=True)]
+
+
+def check_joints(path: Path, tmp_path: Path) -> None:
+    """Joints by name, and what a JointState does not hold is missing."""
+    log, draft = robot_log(), draft_map(path, LEGS)
+    assert "body/z [m]" in draft.missing and "front/hip/q [rad]" not in draft.missing
+    (tmp_path / "map.yaml").write_text(draft.text(path.name))
+    back = read_log(path, load_map(tmp_path / "map.yaml"))
+    for leg in LEGS:
+        for column in ("hip/q", "hip/tau"):
+            assert np.allclose(back[f"{leg}/{column}"], log[f"{leg}/{column}"]), column
+    assert np.allclose(back.time, log.time, atol=1e-9)
+
+
+@pytest.mark.parametrize("cut", [False, True])
+def test_mcap_of_ros2(cut: bool, tmp_path: Path) -> None:
+    """What rosbag2 records by default; of a file that was cut off, its whole chunks."""
+    path = tmp_path / "log.mcap"
+    with path.open("wb") as stream:
+        writer = Writer(stream, chunk_size=4096, compression=CompressionType.ZSTD)
+        writer.start(profile="ros2")
+        schema = writer.register_schema(
+            "sensor_msgs/msg/JointState", "ros2msg", _definition().encode()
+        )
+        channel = writer.register_channel("/joint_states", "cdr", schema)
+        for row, data in enumerate(joint_rows()):
+            stamp = START + row * 10**6
+            writer.add_message(channel, stamp, data, stamp)
+        writer.finish()
+    if not cut:
+        check_joints(path, tmp_path)
+        return
+    whole = path.read_bytes()
+    path.write_bytes(whole[: len(whole) // 2])
+    found = raw_columns(path, None)
+    assert 50 < len(found.columns["time"]) < 400
+    assert "breaks off" in found.remarks[0]
+
+
+@pytest.mark.parametrize("folder", [False, True])
+@pytest.mark.parametrize("defined", [False, True])
+def test_bags_of_ros2(folder: bool, defined: bool, tmp_path: Path) -> None:
+    """SQLite files with and without definitions of their messages, alone or in their folder."""
+    place = tmp_path / "bag"
+    place.mkdir()
+    with closing(sqlite3.connect(place / "bag_0.db3")) as base:
+        base.execute(
+            "CREATE TABLE topics(id INTEGER, name TEXT, type TEXT, serialization_format TEXT)"
+        )
+        base.execute(
+            "CREATE TABLE messages(id INTEGER, topic_id INTEGER, timestamp INTEGER, data BLOB)"
+        )
+        kind = "sensor_msgs/msg/JointState"
+        base.execute("INSERT INTO topics VALUES (1, '/joint_states', ?, 'cdr')", (kind,))
+        if defined:
+            base.execute("CREATE TABLE message_definitions(topic_type TEXT, encoding TEXT, "
+                         "encoded_message_definition TEXT)")  # fmt: skip
+            base.execute(
+                "INSERT INTO message_definitions VALUES (?, 'ros2msg', ?)", (kind, _definition())
+            )
+        rows = [(i, 1, START + i * 10**6, data) for i, data in enumerate(joint_rows())]
+        base.executemany("INSERT INTO messages VALUES (?, ?, ?, ?)", rows)
+        base.commit()
+    (place / "metadata.yaml").write_text("rosbag2_bagfile_information: {version: 5}\n")
+    check_joints(place if folder else place / "bag_0.db3", tmp_path)
+
+
+def test_mcap_of_protobuf(tmp_path: Path) -> None:
+    pytest.importorskip("google.protobuf")
+    from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
+
+    file = descriptor_pb2.FileDescriptorProto(name="leg.proto", package="log", syntax="proto3")
+    kind = file.message_type.add(name="Leg")
+    for number, field in enumerate(("position", "force"), start=1):
+        kind.field.add(name=field, number=number, type=1, label=1)
+    pool = descriptor_pool.DescriptorPool()
+    pool.Add(file)
+    made = message_factory.GetMessageClass(pool.FindMessageTypeByName("log.Leg"))
+    both = descriptor_pb2.FileDescriptorSet(file=[file]).SerializeToString()
+    path = tmp_path / "log.mcap"
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        channel = writer.register_channel(
+            "/leg", "protobuf", writer.register_schema("log.Leg", "protobuf", both)
+        )
+        other = writer.register_channel("/camera", "h264", 0)
+        for i in range(20):
+            stamp = START + i * 10**6
+            data = made(position=0.001 * i, force=2.0 * i).SerializeToString()
+            writer.add_message(channel, stamp, data, stamp)
+            writer.add_message(other, stamp, b"...", stamp)
+        writer.finish()
+    columns = {
+        "time [s]": ColumnSource(source="time", unit="ns"),
+        "piston/x [m]": ColumnSource(source="/leg/position"),
+        "piston/F [N]": ColumnSource(source="/leg/force"),
+    }
+    log = open_log(path, ColumnMap(origin="first", columns=columns))
+    assert log["piston/x"] == pytest.approx(0.001 * np.arange(20))
+    assert "/camera is not read: its messages are h264" in log.meta["read"][0]
+
+
+def dataset(log: Trajectory) -> dict[str, dict[str, np.ndarray]]:
+    """Signals and fields of the paper's authors' logsOut."""
+    found = {"body": {"x": log["body/x"], "y": log["body/z"], "r": log["body/pitch"],
+                      "dx": np.gradient(log["body/x"], log.time),
+                      "dy": np.gradient(log["body/z"], log.time)}}  # fmt: skip
+    for leg, side in (("front", "R"), ("rear", "L")):
+        found[f"motor state ({side})"] = {"q": log[f"{leg}/hip/q"] - np.pi / 2}
+        found[f"piston state ({side})"] = {"p": log[f"{leg}/piston/x"]}
+        valves = {u: log[f"{leg}/valve/{v}"] for u, v in (("ue", "extend"), ("ur", "retract"))}
+        found[f"piston command ({side})"] = valves
+    return found
+
+
+@pytest.mark.parametrize("version", ["v7", "v7.3"])
+def test_logs_out_of_simulink(version: str, tmp_path: Path) -> None:
+    """A Dataset of signals whose values are structs of timeseries, as Simulink logs buses; the
+    shipped map gives the robot's columns at once. Written by mat-io in imitation of MATLAB."""
+    matio = pytest.importorskip("matio")
+    from matio.utils.matclass import MatlabOpaque
+
+    log = robot_log(200)
+
+    def series(name: str, values: np.ndarray) -> MatlabOpaque:
+        given = {"Name": name, "Data": values[:, None], "Time": log.time[:, None]}
+        return MatlabOpaque(properties=given, classname="timeseries")
+
+    elements = []
+    for name, fields in dataset(log).items():
+        kind = np.dtype([(field, object) for field in fields])
+        bus = np.empty((1, 1), dtype=kind)
+        for field, values in fields.items():
+            bus[field][0, 0] = series(field, values)
+        given = {"Name": name, "Values": bus}
+        elements.append(MatlabOpaque(properties=given, classname="Simulink.SimulationData.Signal"))
+    cell = np.empty((len(elements), 1), dtype=object)
+    for i, element in enumerate(elements):
+        cell[i, 0] = element
+    given = {"Name": "logsOut", "Elements": cell}
+    whole = MatlabOpaque(properties=given, classname="Simulink.SimulationData.Dataset")
+    path = tmp_path / "logsOut.mat"
+    matio.save_to_mat(path, {"logsOut": whole}, version=version)
+    back = open_log(path, load_map("logsout"))
+    assert back.time == pytest.approx(log.time)
+    for name in back.names:
+        if name in log:
+            assert np.allclose(back[name], log[name]), name
+    assert "front/valve/extend" in back and "front/hip/tau" not in back
+
+
+def test_a_simulink_structure_with_time(tmp_path: Path) -> None:
+    log = robot_log(200)
+    columns = columns_of(log)
+    signals = np.array(
+        [(v[:, None], name) for name, v in columns.items()],
+        dtype=[("values", object), ("label", object)],
+    )
+    content = {"simout": {"time": log.time, "signals": signals, "blockName": "m"}}
+    savemat(tmp_path / "log.mat", content)
+    same(read_back(tmp_path / "log.mat", tmp_path), log)
+
+
+def test_vectors_of_two_rates(tmp_path: Path) -> None:
+    log = robot_log()
+    content = {"t": log.time, "t_body": log.time[::10]}
+    for name, values in columns_of(log).items():
+        content[name] = values[::10] if name.startswith("body") else values
+    content["lost"] = np.arange(7.0)
+    savemat(tmp_path / "log.mat", content)
+    back = read_back(tmp_path / "log.mat", tmp_path)
+    same(back, log)
+    assert np.isfinite(back["body/z"]).sum() == 40
+    assert "left out, since no vector of their length is a time: lost" in back.meta["read"][0]
+
+
+def test_what_holds_no_series_is_named_with_the_way_out(tmp_path: Path) -> None:
+    savemat(tmp_path / "log.mat", {"gain": 3.0, "name": "EMPS"})
+    with pytest.raises(KembaError, match="holds no vector of numbers: 'gain'"):
+        draft_map(tmp_path / "log.mat", LEGS)

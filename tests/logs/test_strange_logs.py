@@ -1,0 +1,137 @@
+"""Logs in the ways of other programs are read right, or a person is asked; none is read wrong."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from foreign_files import robot_log
+from strange_logs import judged, way, written
+
+from kemba.errors import KembaError
+from kemba.identify.logs.reading import read_log
+from kemba.logs import load_map
+from kemba.logs.draft.draft import draft_map
+from kemba.logs.times import seconds
+from kemba.trajectory import Trajectory
+
+
+@pytest.mark.parametrize("first", range(0, 40, 10))
+def test_no_log_is_read_wrong(first: int, tmp_path: Path) -> None:
+    """Ten at a time; benchmarks/strange_logs.py takes any number of them."""
+    read = 0
+    for seed in range(first, first + 10):
+        path, log = written(way(seed), tmp_path)
+        verdict = judged(path, log)
+        assert verdict.what not in ("wrong", "crash"), (way(seed), verdict.why)
+        read += verdict.what == "read"
+    assert read >= 8
+
+
+@pytest.mark.nightly
+def test_no_log_of_hundreds_is_read_wrong(tmp_path: Path) -> None:
+    verdicts = [judged(*written(way(seed), tmp_path)).what for seed in range(1000, 1400)]
+    assert not {"wrong", "crash"} & set(verdicts)
+    assert verdicts.count("read") >= 0.8 * len(verdicts)
+
+
+@pytest.mark.parametrize("where", ["name", "number", "end"])
+def test_a_stray_quote_is_told_at_its_line(where: str, tmp_path: Path) -> None:
+    """Readers of CSV take all up to the next quote for one cell, of any length."""
+    log = robot_log()
+    log.write(tmp_path / "log.csv")
+    lines = (tmp_path / "log.csv").read_text().split("\n")
+    at = 0 if where == "name" else 17
+    lines[at] = f'"{lines[at]}' if where != "end" else f'{lines[at]}"'
+    (tmp_path / "log.csv").write_text("\n".join(lines))
+    with pytest.raises(KembaError, match=r"log\.csv:1" if where == "name" else r"log\.csv:18"):
+        read_log(tmp_path / "log.csv")
+
+
+@pytest.mark.parametrize(
+    ("texts", "expected"),
+    [
+        (["10:00:59.5", "10:01:00.25"], 0.75),
+        (["23:59:59.9", "00:00:00.1"], 0.2),
+        (["59:59.5", "00:00.5"], 1.0),
+        (["11:59:59.5 AM", "12:00:00.5 PM"], 1.0),
+        (["31.12.2026 23:59:59,5", "01.01.2027 00:00:00,5"], 1.0),
+        (["2026-12-31T23:59:59.5Z", "2027-01-01T00:00:00.5Z"], 1.0),
+        (["Dec 31, 2026 10:00:00.5", "Dec 31, 2026 10:00:01.5"], 1.0),
+        (["-1 days +23:59:59.700000", "0 days 00:00:00.100000"], 0.4),
+        (["20261231T100000.5", "20261231T100001.25"], 0.75),
+        (["10:00:00:500", "10:00:01:250"], 0.75),
+    ],
+)
+def test_times_in_words(texts: list[str], expected: float) -> None:
+    read = seconds(np.array(texts, dtype=object))
+    assert read is not None and read[1] == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(
+    "texts", [["a:b", "c:d"], ["10:00:00+01:00", "10:00:01+02:00"], ["1", "2"]]
+)
+def test_what_is_no_time_in_words(texts: list[str]) -> None:
+    assert seconds(np.array(texts, dtype=object)) is None
+
+
+def test_two_columns_that_fit_as_well_are_a_question(tmp_path: Path) -> None:
+    log = robot_log()
+    table = {"t": log.time, **{n.replace("/", "_"): log[n] for n in log.names}}
+    table["front_piston_x_k"] = table.pop("front_piston_x") + 0.001
+    table["front_piston_x_j"] = table["front_piston_x_k"] + 0.001
+    pd.DataFrame(table).to_csv(tmp_path / "log.csv", index=False)
+    draft = draft_map(tmp_path / "log.csv", ("front", "rear"), 0.07)
+    assert "front/piston/x [m]" not in draft.columns and not draft.missing
+    assert any("front_piston_x_k' or 'front_piston_x_j" in text for text in draft.questions)
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("front_hip_q [counts]", "which is no unit that is known"),
+        ("front_hip_q_des", "which column is measured"),
+    ],
+)
+def test_what_names_leave_open_is_asked(name: str, words: str, tmp_path: Path) -> None:
+    log = robot_log()
+    table = {"t": log.time, **{n.replace("/", "_"): log[n] for n in log.names}}
+    table[name] = table.pop("front_hip_q")
+    pd.DataFrame(table).to_csv(tmp_path / "log.csv", index=False)
+    draft = draft_map(tmp_path / "log.csv", ("front", "rear"), 0.07)
+    assert any(words in question for question in draft.questions), draft.questions
+
+
+def test_wrapped_angles_are_joined_and_said(tmp_path: Path) -> None:
+    t = np.arange(2000) * 1e-3
+    q = 8 * t + 0.3 * np.sin(9 * t)
+    turned = (q + np.pi) % (2 * np.pi) - np.pi
+    log = Trajectory(t, {"axis/q [rad]": turned, "axis/tau [N.m]": np.cos(t)}, {"kind": "drive"})
+    log.write(tmp_path / "log.csv")
+    back = read_log(tmp_path / "log.csv")
+    assert back["axis/q"] == pytest.approx(q) and "begins anew" in back.meta["read"][0]
+    frame = pd.DataFrame({"t": t, "angle [deg]": np.degrees(turned), "torque [Nm]": np.cos(t)})
+    frame.to_csv(tmp_path / "other.csv", index=False)
+    draft = draft_map(
+        tmp_path / "other.csv", (), None, "drive", {"axis/q": "rad", "axis/tau": "N.m"}
+    )
+    assert draft.columns["axis/q [rad]"]["unwrap"] is True
+
+
+def test_the_pitch_of_a_quaternion(tmp_path: Path) -> None:
+    log = robot_log()
+    table = {"t": log.time, **{n.replace("/", "_"): log[n] for n in log.names}}
+    half = 0.5 * table.pop("body_pitch")
+    table |= {
+        "base.q.x": 0 * half,
+        "base.q.y": np.sin(half),
+        "base.q.z": 0 * half,
+        "base.q.w": np.cos(half),
+    }
+    pd.DataFrame(table).to_csv(tmp_path / "log.csv", index=False)
+    draft = draft_map(tmp_path / "log.csv", ("front", "rear"), 0.07)
+    (tmp_path / "map.yaml").write_text(draft.text("log.csv"))
+    back = read_log(tmp_path / "log.csv", load_map(tmp_path / "map.yaml"))
+    assert back["body/pitch"] == pytest.approx(log["body/pitch"], abs=1e-9)
