@@ -12,7 +12,16 @@ from importlib import import_module
 from typing import Any
 
 __version__ = "0.1.0"
-__all__ = ["compare", "discover", "load_log", "load_model", "load_task", "plan", "simulate"]
+__all__ = [
+    "compare",
+    "discover",
+    "load_log",
+    "load_model",
+    "load_task",
+    "plan",
+    "simulate",
+    "solve_mpcc",
+]
 
 
 def __getattr__(name: str) -> Any:

@@ -110,6 +110,7 @@ PLANNING = [
     "task",
     "functions",
     "nlp",
+    "mpcc",
     "transcription",
     "certificate",
     "relaxation",

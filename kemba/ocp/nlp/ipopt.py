@@ -12,12 +12,11 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from kemba.ocp.functions.blocks import BlockProblem
 from kemba.ocp.functions.proximal import Proximal
 from kemba.ocp.functions.regularised import regularised_hessian
 from kemba.ocp.functions.settings import Newton
 from kemba.ocp.nlp.ending import Ending
-from kemba.ocp.nlp.program import Program
+from kemba.ocp.nlp.program import Derivatives, Program
 from kemba.ocp.nlp.stagnation import Stagnation
 from kemba.ocp.nlp.watcher import Watch, Watcher
 from kemba.stopwatch import Stopwatch
@@ -127,7 +126,7 @@ class Ipopt:
     ) -> None:
         self.program, self.options = program, dict(options or {})
         self.control, self.building = control or Control(), building or Stopwatch()
-        self._regularised: dict[BlockProblem | Proximal, ca.Function] = {}
+        self._regularised: dict[Derivatives, ca.Function] = {}
 
     def solve(
         self,
@@ -152,7 +151,7 @@ class Ipopt:
         lower, upper = bounds or (program.lower, program.upper)
         own = {**common(), **self.options, **(options or {}), **self.control.options()}
         with self.building.running():
-            problem: BlockProblem | Proximal = self._proximal if proximal else program.problem
+            problem: Derivatives = self._proximal if proximal else program.problem
             parameters = [*p, proximal, *start.Y.ravel()] if proximal else list(p)
             hessian = self._regularised_hessian(problem) if regularised else problem.hess_lag
             plugin = _plugin(problem, hessian, own)
@@ -184,7 +183,7 @@ class Ipopt:
     def _proximal(self) -> Proximal:
         return Proximal(self.program.problem)
 
-    def _regularised_hessian(self, problem: BlockProblem | Proximal) -> ca.Function:
+    def _regularised_hessian(self, problem: Derivatives) -> ca.Function:
         if problem not in self._regularised:
             self._regularised[problem] = regularised_hessian(problem.hess_lag)
         return self._regularised[problem]
@@ -198,7 +197,7 @@ class Ipopt:
 
 
 def _plugin(
-    problem: BlockProblem | Proximal, hessian: ca.Function, options: Mapping[str, Any]
+    problem: Derivatives, hessian: ca.Function, options: Mapping[str, Any]
 ) -> dict[str, Any]:
     return {
         "print_time": False,

@@ -2,11 +2,27 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Any, Protocol
 
+import casadi as ca
 import numpy as np
 
-from kemba.ocp.functions.blocks import BlockProblem
+
+class Derivatives(Protocol):
+    """f and g of a program, and their derivatives, under the names that CasADi's nlpsol knows."""
+
+    @property
+    def size(self) -> int: ...
+    @property
+    def rows(self) -> int: ...
+    @property
+    def nlp(self) -> dict[str, Any]: ...
+    @property
+    def grad_f(self) -> ca.Function: ...
+    @property
+    def jac_g(self) -> ca.Function: ...
+    @property
+    def hess_lag(self) -> ca.Function: ...
 
 
 class Program(Protocol):
@@ -17,7 +33,7 @@ class Program(Protocol):
     """
 
     @property
-    def problem(self) -> BlockProblem: ...
+    def problem(self) -> Derivatives: ...
     @property
     def lower(self) -> np.ndarray:
         """Lower bounds of the variables, a vector or a matrix."""
