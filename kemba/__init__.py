@@ -29,7 +29,8 @@ def __getattr__(name: str) -> Any:
     if name in __all__:
         # many small matrices: more BLAS threads only wait for each other
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-        return getattr(import_module("kemba.api"), name)
+        home = "kemba.ocp.mpcc.solve" if name == "solve_mpcc" else "kemba.api"
+        return getattr(import_module(home), name)
     raise AttributeError(f"module 'kemba' has no attribute '{name}'")
 
 

@@ -11,9 +11,7 @@ import numpy as np
 
 from kemba.ocp.mpcc.problem import Mpcc, MpccRows, SparseFunctions
 from kemba.ocp.mpcc.solve import solve_mpcc
-from kemba.ocp.nlp.ipopt import Ipopt, Iterate, warm
-from kemba.ocp.relaxation.schedule import exact, interior
-from kemba.ocp.relaxation.settings import Ends, Relaxation, Starts
+from kemba.ocp.nlp.ipopt import Ipopt, Iterate
 
 SIGMAS = [10.0**-k for k in range(10)]
 GOOD = 1e-6
@@ -71,23 +69,6 @@ def plain(given: dict[str, Any]) -> tuple[np.ndarray, int]:
     return best, iterations
 
 
-def schedule(given: dict[str, Any]) -> tuple[np.ndarray, int]:
-    """What plans do after their valves are known: 1e-3, 1e-4, 8e-7, far inside the bounds first."""
-    program, point = written(given), Iterate(program_of(given).start)
-    relaxation, starts, ends = Relaxation.current(), Starts.current(), Ends.current()
-    steps = (
-        (relaxation.loose, interior()),
-        (relaxation.tight, warm(starts.changed_mu, starts.changed, tol=ends.tol)),
-        (relaxation.margin * GOOD, exact(starts.tighten_mu)),
-    )
-    iterations = 0
-    for sigma, options in steps:
-        ipopt = Ipopt(program.relaxed(sigma), {"max_iter": 600})
-        point = ipopt.solve(point, given["p"][1], options)
-        iterations += point.iterations
-    return point.Y, iterations
-
-
 def heart(given: dict[str, Any]) -> tuple[np.ndarray, int]:
     """kemba.solve_mpcc."""
     found = solve_mpcc(**given)
@@ -108,7 +89,6 @@ def uno(given: dict[str, Any]) -> tuple[np.ndarray, int]:
 
 METHODS: dict[str, Callable[[dict[str, Any]], tuple[np.ndarray, int]]] = {
     "plain homotopy": plain,
-    "schedule of the plans": schedule,
     "solve_mpcc": heart,
     "Uno": uno,
 }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -14,10 +14,10 @@ from kemba.ocp.nlp.ipopt import Control, Ipopt, Iterate, warm
 
 LOOSE = 100.0  # the first relaxation, in units of the products: hardly a pair binds
 FACTOR = 0.1  # from one relaxation to the next
-HASTE = 2  # times that a step which failed is shortened in all
-EXACT = 0.1  # tolerance of a relaxed program, of its relaxation
 OFF = 1e-2  # distance of a warm start from bounds, of relaxations above
 LONG, BRANCH = 500, 150  # iterations of a relaxed program and of a branch
+EXACT = (0.1, 1.0)  # tolerances of a relaxed program, of its relaxation; the second where the
+# path of the first comes to an end at an infeasible point
 SCALED = {"nlp_scaling_method": "gradient-based", "acceptable_iter": 0}
 
 
@@ -29,14 +29,15 @@ class Solves:
     control: Control
     options: dict[str, Any]
     tell: Callable[[str], None]
+    exact: float = EXACT[0]
     iterations: int = 0
     endings: list[tuple[str, Ending, int]] = field(default_factory=list)
 
     def relaxed(self, sigma: float, start: Iterate, warmly: bool = True) -> Iterate:
         """The program with products at most `sigma`, solved as far as that is worth."""
-        tol = max(1e-8, EXACT * sigma)
+        tol = max(1e-8, self.exact * sigma)
         options = {
-            "tol": tol, "compl_inf_tol": tol, "constr_viol_tol": min(1e-4, max(1e-8, tol)),
+            "tol": tol, "compl_inf_tol": tol, "constr_viol_tol": min(1e-4, tol),
             "max_iter": LONG, **(warm(sigma, min(OFF, sigma)) if warmly else {}),
         }  # fmt: skip
         return self._solve(f"relaxed by {sigma:.0e}", self.program.relaxed(sigma), start, options)
@@ -67,23 +68,19 @@ class CutShort(Exception):  # noqa: N818 (a way out, not an error)
         self.point = point
 
 
-def tighten(solves: Solves, point: Iterate, sigma: float, last: float) -> Iterate:
-    """From a point relaxed by `sigma` to one relaxed by `last`. A step that fails is taken again,
-    shorter, from where it began."""
-    hasty = 0
+def tighten(solves: Solves, point: Iterate, sigma: float, last: float) -> Iterate | None:
+    """From a point relaxed by `sigma` to one relaxed by `last`; None where a step on the way ends
+    at a point that violates least and still violates: tighter pairs would not mend it."""
     while sigma > last * 1.0001:
-        least = max(last, FACTOR * sigma)
-        step = least
-        while True:
-            found = solves.relaxed(step, point)
-            if found.solved or hasty == HASTE or step <= 0.0:
-                break
-            hasty, step = hasty + 1, float(np.sqrt(step * sigma))
-        point, sigma = found, step
+        sigma = max(last, FACTOR * sigma)
+        point = solves.relaxed(sigma, point)
+        if point.ending is Ending.INFEASIBLE:
+            return None
     return point
 
 
-def loosest(solves: Solves, start: np.ndarray) -> tuple[Iterate, float]:
+def loosest(solves: Solves) -> tuple[Iterate, float]:
     """The first point, with pairs so loose that hardly one binds, and its relaxation."""
+    start = solves.program.start
     sigma = LOOSE * max(1.0, solves.program.complementarity(start))
-    return replace(solves.relaxed(sigma, Iterate(start), warmly=False), ending=None), sigma
+    return solves.relaxed(sigma, Iterate(start), warmly=False), sigma

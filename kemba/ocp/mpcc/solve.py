@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from kemba.ocp.mpcc.homotopy import CutShort, Solves, loosest, tighten
+from kemba.ocp.mpcc.homotopy import EXACT, CutShort, Solves, loosest, tighten
 from kemba.ocp.mpcc.problem import Mpcc, Symbols
 from kemba.ocp.mpcc.stationary import (
     Multipliers,
@@ -20,7 +20,8 @@ from kemba.ocp.mpcc.stationary import (
 )
 from kemba.ocp.nlp.ipopt import Control, Iterate
 
-BRANCHES = (1e-4, 1e-6)  # relaxations from which a branch is tried; the last one stands alone
+TRIED = 1e-4  # relaxation from which a branch is tried; the next is the last
+MARGIN = 0.5  # the last relaxation, as a part of the tolerance: room for IPOPT's own
 SWITCHES = 5  # branches after the first
 PAYS = 1e-7  # relative fall of the cost that makes another branch worth while
 SLOPE = 1e-7  # relative fall of the linearised cost below which no direction descends
@@ -115,12 +116,21 @@ class OnBranch:
 
 
 def _found(solves: Solves, tolerance: float) -> tuple[Iterate, OnBranch | None]:
-    point, sigma = loosest(solves, solves.program.start)
-    for last in BRANCHES:
-        point, sigma = tighten(solves, point, sigma, last), last
-        best = _best_branch(solves, point, sigma, tolerance)
-        if best is not None:
-            return best
+    """The first feasible point of the paths, on a branch where one is; otherwise the last point."""
+    point = Iterate(solves.program.start)
+    for exact in EXACT:
+        solves.exact = exact
+        point, sigma = loosest(solves)
+        for last in (TRIED, MARGIN * tolerance):
+            tighter = tighten(solves, point, sigma, last)
+            if tighter is None:
+                break
+            point, sigma = tighter, last
+            best = _best_branch(solves, point, sigma, tolerance)
+            if best is not None:
+                return best
+        if _violation(solves.program, point.Y) <= tolerance:
+            break
     return point, None
 
 
