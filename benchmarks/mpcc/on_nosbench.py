@@ -46,9 +46,7 @@ class Written:
 def written(given: dict[str, Any]) -> Written:
     """The same program with every side as a row."""
     rows = ca.vertcat(given["g"], given["G"], given["H"], given["G"] * given["H"])
-    return Written(
-        program_of(given), SparseFunctions(given["x"], given["p"][0], given["f"], rows)
-    )
+    return Written(program_of(given), SparseFunctions(given["x"], given["p"][0], given["f"], rows))
 
 
 def plain(given: dict[str, Any]) -> tuple[np.ndarray, int]:

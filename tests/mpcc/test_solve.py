@@ -40,7 +40,7 @@ def test_a_corner_that_is_the_optimum_is_kept() -> None:
     found = solve((x[0] + 1) ** 2 + (x[1] + 1) ** 2, start=[3.0, 1.0])
     assert found.good and found.stationarity == "strong"
     assert found.x == pytest.approx([0.0, 0.0], abs=1e-6)
-    assert np.all(found.multipliers.nu_G > 1.9) and np.all(found.multipliers.nu_H > 1.9)
+    assert np.all(found.multipliers.nu_first > 1.9) and np.all(found.multipliers.nu_second > 1.9)
 
 
 def test_the_better_side_is_found() -> None:
@@ -65,7 +65,9 @@ def test_a_point_without_products_does_not_exist() -> None:
 
 
 def test_rows_that_contradict_each_other() -> None:
-    found = solve(CORNER, ca.vertcat(x[0] + x[1], x[0] + x[1]), bounds={"lbg": [1, -1], "ubg": [2, 0]})
+    found = solve(
+        CORNER, ca.vertcat(x[0] + x[1], x[0] + x[1]), bounds={"lbg": [1, -1], "ubg": [2, 0]}
+    )
     assert found.status == "infeasible" and found.feasibility > 0.1
 
 

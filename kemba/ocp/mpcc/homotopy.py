@@ -16,8 +16,8 @@ LOOSE = 100.0  # the first relaxation, in units of the products: hardly a pair b
 FACTOR = 0.1  # from one relaxation to the next
 OFF = 1e-2  # distance of a warm start from bounds, of relaxations above
 LONG, BRANCH = 500, 150  # iterations of a relaxed program and of a branch
-EXACT = (0.1, 1.0)  # tolerances of a relaxed program, of its relaxation; the second where the
-# path of the first comes to an end at an infeasible point
+EXACT = (0.1, 1.0)  # tolerances of a relaxed program, of its relaxation (of its square below one);
+# the second where the path of the first comes to an end at an infeasible point
 SCALED = {"nlp_scaling_method": "gradient-based", "acceptable_iter": 0}
 
 
@@ -35,7 +35,7 @@ class Solves:
 
     def relaxed(self, sigma: float, start: Iterate, warmly: bool = True) -> Iterate:
         """The program with products at most `sigma`, solved as far as that is worth."""
-        tol = max(1e-8, self.exact * sigma)
+        tol = max(1e-8, self.exact * sigma * min(1.0, sigma))
         options = {
             "tol": tol, "compl_inf_tol": tol, "constr_viol_tol": min(1e-4, tol),
             "max_iter": LONG, **(warm(sigma, min(OFF, sigma)) if warmly else {}),

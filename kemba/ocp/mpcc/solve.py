@@ -183,9 +183,7 @@ def _violation(program: Mpcc, x: np.ndarray) -> float:
     return max(program.feasibility(x), program.complementarity(x))
 
 
-def _judged(
-    solves: Solves, point: Iterate, on: OnBranch | None, tolerance: float
-) -> MpccSolution:
+def _judged(solves: Solves, point: Iterate, on: OnBranch | None, tolerance: float) -> MpccSolution:
     """What holds at a point, whatever the solver said."""
     program, x = solves.program, point.Y
     stationarity = on.stationarity if on else "none"

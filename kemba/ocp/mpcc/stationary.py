@@ -7,6 +7,9 @@ branch may be cheaper: the linear program with complementarity pairs decides (B-
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import casadi as ca
@@ -15,7 +18,6 @@ import numpy as np
 from kemba.ocp.mpcc.problem import Mpcc
 
 STEP = 1e-3  # how far the linear program looks, relative to each variable's size
-SLOPE = 1e-5  # of a cost's fall per step below which nothing descends, relative to the cost
 LONGEST = 10.0  # s, of the linear program
 
 
@@ -27,8 +29,8 @@ class Multipliers:
 
     lam_x: np.ndarray
     lam_g: np.ndarray
-    nu_G: np.ndarray
-    nu_H: np.ndarray
+    nu_first: np.ndarray
+    nu_second: np.ndarray
     residual: float
 
 
@@ -50,9 +52,9 @@ def multipliers(program: Mpcc, x: np.ndarray, lam_g: np.ndarray, first: np.ndarr
     m = program.g_rows
     of_sides = lam_g[m : program.problem.rows - program.pairs]
     pushes = -np.concatenate([lam_x, of_sides])
-    nu_G, nu_H = pushes[program.a], pushes[program.b]
+    nu_first, nu_second = pushes[program.a], pushes[program.b]
     residual = float(np.max(np.abs(left + lam_x), initial=0.0) / size)
-    return Multipliers(lam_x, lam_g[:m], nu_G, nu_H, residual)
+    return Multipliers(lam_x, lam_g[:m], nu_first, nu_second, residual)
 
 
 def both_zero(program: Mpcc, x: np.ndarray, near: float) -> np.ndarray:
@@ -63,8 +65,8 @@ def both_zero(program: Mpcc, x: np.ndarray, near: float) -> np.ndarray:
 
 def pulled(found: Multipliers, zero: np.ndarray) -> np.ndarray:
     """Which of the pairs `zero` (pairs,) have a side whose multiplier pulls it below zero."""
-    size = 1.0 + max(np.max(np.abs(found.nu_G), initial=0.0), np.max(np.abs(found.nu_H), initial=0))
-    return np.asarray(zero & (np.minimum(found.nu_G, found.nu_H) < -1e-6 * size))
+    size = 1.0 + max(np.max(np.abs(found.nu_first), initial=0.0), np.max(np.abs(found.nu_second), initial=0))
+    return np.asarray(zero & (np.minimum(found.nu_first, found.nu_second) < -1e-6 * size))
 
 
 def descending(
@@ -93,22 +95,38 @@ def descending(
     sides = vstack([eye(n, format="csr"), rows]).tocsr()
     big = 1.0 + float((abs(sides) @ reach).max(initial=0.0))
     switch, k = big * eye(len(ties)), len(ties)
-    found = milp(
-        np.concatenate([np.array(gradient).ravel(), np.zeros(k)]),
-        integrality=np.repeat([0, 1], [n, k]),
-        bounds=Bounds(
-            np.concatenate([np.maximum(low[:n], -reach), np.zeros(k)]),
-            np.concatenate([np.minimum(high[:n], reach), np.ones(k)]),
-        ),
-        constraints=[
-            LinearConstraint(hstack([rows, csc_matrix((inside, k))]), low[n:], high[n:]),
-            LinearConstraint(hstack([sides[a[ties]], -switch]), -np.inf, 0.0),  # a <= big z
-            LinearConstraint(hstack([sides[b[ties]], switch]), -np.inf, big),  # b <= big (1 - z)
-        ],
-        options={"time_limit": LONGEST},
-    )
+    with _quiet():
+        found = milp(
+            np.concatenate([np.array(gradient).ravel(), np.zeros(k)]),
+            integrality=np.repeat([0, 1], [n, k]),
+            bounds=Bounds(
+                np.concatenate([np.maximum(low[:n], -reach), np.zeros(k)]),
+                np.concatenate([np.minimum(high[:n], reach), np.ones(k)]),
+            ),
+            constraints=[
+                LinearConstraint(hstack([rows, csc_matrix((inside, k))]), low[n:], high[n:]),
+                LinearConstraint(hstack([sides[a[ties]], -switch]), -np.inf, 0.0),  # a <= big z
+                LinearConstraint(
+                    hstack([sides[b[ties]], switch]), -np.inf, big
+                ),  # b <= big (1 - z)
+            ],
+            options={"time_limit": LONGEST},
+        )
     if found.x is None:
         return None
     branch = first.copy()
     branch[ties] = found.x[n:] < 0.5
     return float(-found.fun), branch
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """No standard output: HiGHS (SciPy 1.15 to 1.17) prints a line where it repairs a point."""
+    kept, nothing = os.dup(1), os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nothing, 1)
+        yield
+    finally:
+        os.dup2(kept, 1)
+        os.close(kept)
+        os.close(nothing)

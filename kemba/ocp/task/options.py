@@ -22,7 +22,11 @@ if TYPE_CHECKING:
 # the others need libraries that are not in the wheel: a failed load makes the next solve crash
 LINEAR_SOLVERS = ("mumps", "spral")
 OURS = ("output_file", "file_print_level", "file_append", "print_options_documentation")
-KINDS = {"integer": (int, "an integer"), "real": ((int, float), "a number"), "string": (str, "a word")}
+KINDS = {
+    "integer": (int, "an integer"),
+    "real": ((int, float), "a number"),
+    "string": (str, "a word"),
+}
 ENTRY = re.compile(r"^\\anchor OPT_(\w+)\n(.*?)</blockquote>", re.MULTILINE | re.DOTALL)
 KIND = re.compile(r"for this (?:advanced )?(integer|real|string) option")
 RANGE = re.compile(r"The valid range for this \w+ option is (.*?) and its default value")
