@@ -6,7 +6,7 @@
 
 Every solve has a process of its own, CPU seconds at most, and is judged by the program's own
 functions: *solved* is no violation and no product above 1e-6. Files are drawn at random, half of
-them from the larger half; those of `TUNED`, on which the method's figures were chosen, are left out.
+them from the larger half; those of `TUNED`, on which figures were chosen, are left out.
 The set states no licence: it is run, and not kept here.
 """
 
@@ -135,7 +135,8 @@ def table(rows: list[dict[str, Any]]) -> list[str]:
         over = [(row["f"] - best[name]) / max(1.0, abs(best[name])) for name, row in found.items()]
         ratio = [1.0 + v for v in over] or [np.nan]
         cpu = [row["cpu"] for row in mine.values()]
-        cells = (method, share(len(found), len(mine)), share(sum(v > DEARER for v in over), len(over)),
+        cells = (method, share(len(found), len(mine)),
+                 share(sum(v > DEARER for v in over), len(over)),
                  f"{np.median(ratio):.4f}, {np.quantile(ratio, 0.9):.3f}",
                  f"{np.median(cpu):.1f}", f"{sum(cpu):.0f}")  # fmt: skip
         lines.append(f"| {' | '.join(cells)} |")
@@ -152,8 +153,8 @@ def page(rows: list[dict[str, Any]]) -> list[str]:
         count = len(_whole(of))
         lines += [f"The {words} half, {count} files:", "", *table(of), ""]
     limit, seed, there = rows[0]["limit"], rows[0]["seed"], rows[0]["there"]
-    lines += [f"Drawn with seed {seed} from {there} files that were there; {limit} CPU seconds at most "
-              f"each, one process at a time. On {machine()}."]  # fmt: skip
+    lines += [f"Drawn with seed {seed} from {there} files that were there; {limit} CPU seconds "
+              f"at most each, one process at a time. On {machine()}."]  # fmt: skip
     return lines
 
 
@@ -192,7 +193,8 @@ def main() -> None:
             if (path.name, method) in have:
                 continue
             row = {"file": path.name, "large": large, "method": method, "seed": asked.seed,
-                   "there": there, "limit": asked.limit, **tried(path, method, asked.limit)}  # fmt: skip
+                   "there": there, "limit": asked.limit,
+                   **tried(path, method, asked.limit)}  # fmt: skip
             rows.append(row)
             with asked.results.open("a") as file:
                 file.write(json.dumps(row) + "\n")

@@ -51,7 +51,7 @@ class Solves:
     def _solve(self, name: str, rows: Any, start: Iterate, options: dict[str, Any]) -> Iterate:
         self.tell(name)
         ipopt = Ipopt(rows, {**SCALED, **self.options}, self.control)
-        found = ipopt.solve(start, self.program.p, options)
+        found = ipopt.solve(start, self.program.p.tolist(), options)
         self.iterations += found.iterations
         assert found.ending is not None
         self.endings.append((name, found.ending, found.iterations))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, cast
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -106,10 +106,8 @@ class Mpcc:
                 "one side of every pair in each",
             )  # fmt: skip
         self.functions = _function(x, symbols, parts)
-        if self.functions.is_a("MXFunction"):
-            at = [ca.MX.sym("x", x.numel()), ca.MX.sym("p", symbols.numel())]
-        else:
-            at = [ca.SX.sym("x", x.numel()), ca.SX.sym("p", symbols.numel())]
+        made: Any = ca.MX if self.functions.is_a("MXFunction") else ca.SX
+        at = [made.sym("x", x.numel()), made.sym("p", symbols.numel())]
         f, g, G, H = self.functions(*at)
         self.size, self.g_rows, self.pairs = at[0].numel(), g.numel(), G.numel()
         self._bound(bounds)
@@ -226,14 +224,16 @@ def _function(x: Symbols, p: Symbols, parts: Sequence[Symbols]) -> ca.Function:
         free = str(error).splitlines()[-1]
         raise _wrong("expressions", "hold symbols that are neither in x nor in p", free) from None
     try:
-        return cast(ca.Function, f.expand())
+        return f.expand()
     except RuntimeError:  # a part of it, such as an interpolant, has no scalar instructions
         return f
 
 
 def _places(x: Symbols, G: Symbols, H: Symbols) -> tuple[np.ndarray, np.ndarray, Symbols]:
     """Where sides are found, and those that are no variables. Sides that occur twice are one."""
-    both, known, more = ca.vertcat(G, H), {}, []
+    both: Symbols = ca.vertcat(G, H)
+    known: dict[Any, int] = {}
+    more: list[Symbols] = []
     if isinstance(x, ca.SX):
         both = ca.cse(both)
         known = {x[j].element_hash(): j for j in range(x.numel())}
@@ -245,5 +245,5 @@ def _places(x: Symbols, G: Symbols, H: Symbols) -> tuple[np.ndarray, np.ndarray,
             more.append(both[i])
         at.append(known[key])
     index = np.array(at, int)
-    sides = ca.vertcat(*more) if more else type(x)(0, 1)
+    sides: Symbols = ca.vertcat(*more) if more else type(x)(0, 1)
     return index[: G.numel()], index[G.numel() :], sides

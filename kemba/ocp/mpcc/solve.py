@@ -32,9 +32,10 @@ RESIDUAL = 1e-5  # of the Lagrangian's gradient at a stationary point
 class MpccSolution:
     """A point and what was verified at it, by the program's own functions.
 
-    `x` (n,), `f`; `multipliers` of bounds, rows and sides; `complementarity`: the largest product of
-    a pair; `feasibility`: the largest violation of bounds, rows and signs; `stationarity`: strong
-    (multipliers prove it), B (no direction of the linearised program descends), none (not shown);
+    `x` (n,), `f`; `multipliers` of bounds, rows and sides; `complementarity`: the largest
+    product of a pair; `feasibility`: the largest violation of bounds, rows and signs;
+    `stationarity`: strong (multipliers prove it), B (no direction of the linearised program
+    descends), none (not shown);
     `status`: solved, feasible, infeasible or time-limit; `iterations` of IPOPT.
     """
 
@@ -82,7 +83,8 @@ def solve_mpcc(
 ) -> MpccSolution:
     """Solve min f(x), lbg <= g(x) <= ubg, lbx <= x <= ubx, 0 <= G(x), 0 <= H(x), G(x) H(x) = 0.
 
-    `x` (n,): CasADi's SX or MX symbols; `f`, `g` (rows,), `G`, `H` (pairs,): expressions of x and p.
+    `x` (n,): CasADi's SX or MX symbols; `f`, `g` (rows,), `G`, `H` (pairs,): expressions of x
+    and p.
     `bounds`: lbx, ubx, lbg, ubg, vectors or one number; what is missing is free. `start` (n,); `p`:
     symbols and their values. `tolerance` of what is verified: violations and products. `options` go
     to IPOPT, `progress` gets the name of every solve, `time_limit` [s].

@@ -65,7 +65,9 @@ def both_zero(program: Mpcc, x: np.ndarray, near: float) -> np.ndarray:
 
 def pulled(found: Multipliers, zero: np.ndarray) -> np.ndarray:
     """Which of the pairs `zero` (pairs,) have a side whose multiplier pulls it below zero."""
-    size = 1.0 + max(np.max(np.abs(found.nu_first), initial=0.0), np.max(np.abs(found.nu_second), initial=0))
+    size = 1.0 + max(
+        np.max(np.abs(found.nu_first), initial=0.0), np.max(np.abs(found.nu_second), initial=0)
+    )
     return np.asarray(zero & (np.minimum(found.nu_first, found.nu_second) < -1e-6 * size))
 
 

@@ -12,11 +12,12 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from kemba.ocp.functions.problem import Derivatives
 from kemba.ocp.functions.proximal import Proximal
 from kemba.ocp.functions.regularised import regularised_hessian
 from kemba.ocp.functions.settings import Newton
 from kemba.ocp.nlp.ending import Ending
-from kemba.ocp.nlp.program import Derivatives, Program
+from kemba.ocp.nlp.program import Program
 from kemba.ocp.nlp.stagnation import Stagnation
 from kemba.ocp.nlp.watcher import Watch, Watcher
 from kemba.stopwatch import Stopwatch
@@ -151,7 +152,9 @@ class Ipopt:
         lower, upper = bounds or (program.lower, program.upper)
         own = {**common(), **self.options, **(options or {}), **self.control.options()}
         with self.building.running():
-            problem: Derivatives = self._proximal if proximal else program.problem
+            problem: Derivatives = program.problem
+            if proximal:
+                problem = self._proximal
             parameters = [*p, proximal, *start.Y.ravel()] if proximal else list(p)
             hessian = self._regularised_hessian(problem) if regularised else problem.hess_lag
             plugin = _plugin(problem, hessian, own)

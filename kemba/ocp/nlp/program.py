@@ -2,27 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Protocol
 
-import casadi as ca
 import numpy as np
 
-
-class Derivatives(Protocol):
-    """f and g of a program, and their derivatives, under the names that CasADi's nlpsol knows."""
-
-    @property
-    def size(self) -> int: ...
-    @property
-    def rows(self) -> int: ...
-    @property
-    def nlp(self) -> dict[str, Any]: ...
-    @property
-    def grad_f(self) -> ca.Function: ...
-    @property
-    def jac_g(self) -> ca.Function: ...
-    @property
-    def hess_lag(self) -> ca.Function: ...
+from kemba.ocp.functions.problem import Problem
 
 
 class Program(Protocol):
@@ -33,7 +17,7 @@ class Program(Protocol):
     """
 
     @property
-    def problem(self) -> Derivatives: ...
+    def problem(self) -> Problem: ...
     @property
     def lower(self) -> np.ndarray:
         """Lower bounds of the variables, a vector or a matrix."""

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 # the others need libraries that are not in the wheel: a failed load makes the next solve crash
 LINEAR_SOLVERS = ("mumps", "spral")
 OURS = ("output_file", "file_print_level", "file_append", "print_options_documentation")
-KINDS = {
+KINDS: dict[str, tuple[Any, str]] = {
     "integer": (int, "an integer"),
     "real": ((int, float), "a number"),
     "string": (str, "a word"),
@@ -57,8 +57,8 @@ def timing_errors(task: Task, document: Document) -> list[KembaError]:
     if task.min_dwell < task.duration:
         return []
     what = (
-        f"min_dwell: {task.min_dwell:g} s is not less than the motion's {task.duration:g} s, so that "
-        "no valve could open and close again"
+        f"min_dwell: {task.min_dwell:g} s is not less than the motion's {task.duration:g} s, so "
+        "that no valve could open and close again"
     )
     return [document.error(("min_dwell",), what, hint="give less, such as 0.01 s")]
 
@@ -100,7 +100,10 @@ def documented() -> dict[str, tuple[str, str]]:
             "print_options_documentation": "yes", "print_advanced_options": "yes",
             "print_options_mode": "doxygen",
         }  # fmt: skip
-        plugin = {"print_time": False, **{f"ipopt.{key}": v for key, v in options.items()}}
+        plugin: dict[str, Any] = {
+            "print_time": False,
+            **{f"ipopt.{key}": v for key, v in options.items()},
+        }
         solver = ca.nlpsol("options", "ipopt", {"x": x, "f": x**2}, plugin)
         solver(x0=0.0)
         del solver  # closes the file
