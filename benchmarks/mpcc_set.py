@@ -3,8 +3,8 @@
     python benchmarks/mpcc_set.py [--starts 10] [--save docs/plan-quality.md]
     python benchmarks/mpcc_set.py --branches      # the best values, by all branches
 
-*Solved*: no row, bound or product of a pair is violated by more than 1e-6, and the cost is at
-most 1e-4 above the best known one, relative to it or to 1. The first start is the published one, or zero;
+*Solved*: no row, bound or product of a pair is violated by more than 1e-6, and the cost is within
+1e-4 of the best known one, relative to it or to 1. The first start is the published one, or zero;
 the others are normal around it with a standard deviation of 1. `--branches` solves the 2^n smooth
 programs of a problem with n pairs, which gives the best value where these are convex.
 """
@@ -42,7 +42,7 @@ def starts(program: Mpcc, count: int) -> list[np.ndarray]:
 def judged(program: Mpcc, found: Iterate) -> tuple[bool, bool]:
     """Whether a point is feasible, and whether its cost is also near the best one."""
     feasible = program.violation(found.Y) <= FEASIBLE
-    off = (program.cost(found.Y) - program.best) / max(1.0, abs(program.best))
+    off = abs(program.cost(found.Y) - program.best) / max(1.0, abs(program.best))
     return feasible, feasible and off <= NEAR
 
 

@@ -161,6 +161,10 @@ def test_check_tells_the_same_mistakes() -> None:
         ),
         ("solver.options.tol=-1", "solver.options.tol: IPOPT does not accept '-1'; 0 < tol"),
         (
+            "solver.complementarity=1e-9",
+            "solver.complementarity: '1e-09' is out of range; 1e-07 to 0.001 was expected",
+        ),
+        (
             "min_dwell=1 s",
             "min_dwell: 1 s is not less than the motion's 0.7 s, so that no valve could open and "
             "close again; give less, such as 0.01 s",

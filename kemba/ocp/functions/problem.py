@@ -20,7 +20,7 @@ class Derivatives(Protocol):
     def hess_lag(self) -> ca.Function: ...
 
 
-class Problem(Derivatives, Protocol):
+class NlpFunctions(Derivatives, Protocol):
     """The same, with its symbols x and p and how many variables and rows there are."""
 
     @property
