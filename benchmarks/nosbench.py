@@ -94,13 +94,16 @@ def tried(path: Path, method: str, limit: int) -> dict[str, Any]:
         resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
 
     command = [sys.executable, __file__, "--one", str(path), method]
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
     done = subprocess.run(command, capture_output=True, text=True, check=False, preexec_fn=bounded)
     try:
         answer: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
     except (IndexError, ValueError):
         last = (done.stderr.strip().splitlines() or ["no answer"])[-1][-120:]
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        spent = after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
         why = f"stopped after {limit} CPU seconds" if done.returncode < 0 else last
-        answer = {"f": None, "violation": None, "products": None, "cpu": float(limit), "why": why}
+        answer = {"f": None, "violation": None, "products": None, "cpu": spent, "why": why}
     return answer
 
 
