@@ -134,6 +134,8 @@ def table(rows: list[dict[str, Any]]) -> list[str]:
             for name, of in whole.items()}  # fmt: skip
     for method in METHODS:
         mine = {name: of[method] for name, of in whole.items() if method in of}
+        if not mine:
+            continue
         found = {name: row for name, row in mine.items() if good(row)}
         over = [(row["f"] - best[name]) / max(1.0, abs(best[name])) for name, row in found.items()]
         ratio = [1.0 + v for v in over] or [np.nan]
