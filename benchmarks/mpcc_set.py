@@ -80,7 +80,6 @@ def table(count: int) -> list[str]:
                  f"{np.median(f[:, :, 2]):.0f}", f"{f[:, :, 3].sum():.0f}")  # fmt: skip
         lines.append(f"| {' | '.join(cells)} |")
     first = next(iter(figures.values()))
-    first = next(iter(figures.values()))
     hard = [
         f"{name} ({first[i, :, 1].sum():.0f})" for i, name in enumerate(known) if not first[i, 0, 1]
     ]

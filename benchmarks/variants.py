@@ -15,15 +15,20 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from unittest.mock import patch
 
 import numpy as np
 
 from kemba.config import parse
-from kemba.ocp import Task, plan
+from kemba.ocp import Task, load_task, plan
 from kemba.ocp.functions.settings import Newton
-from kemba.ocp.relaxation.settings import Starts
+from kemba.ocp.nlp.ipopt import Iterate, warm
+from kemba.ocp.relaxation.schedule import find, interior
+from kemba.ocp.relaxation.session import Schedule
+from kemba.ocp.relaxation.settings import Ends, Relaxation, Starts
+from kemba.ocp.transcription.parameters import Parameters
 from kemba.settings import Settings, changed
 from kemba.sweep import expand, load_sweep, machine
 
@@ -35,6 +40,7 @@ class Variant:
     settings: dict[type[Settings], dict[str, object]] = field(default_factory=dict)
     solver: dict[str, object] = field(default_factory=dict)
     grown: bool = True
+    ladder: tuple[float, ...] = ()  # relaxations of the pairs solved before the first
 
 
 SHIPPED = Variant()
@@ -51,6 +57,8 @@ VARIANTS: dict[str, dict[str, Variant]] = {
         "as shipped": SHIPPED,
         "two rounds of moving switches": Variant(solver={"valve_search": 2}),
         "no round": Variant(solver={"valve_search": 0}),
+        "pairs relaxed by 1, 0.1 and 0.01 before": Variant(ladder=(1.0, 0.1, 0.01)),
+        "pairs relaxed by 0.01 at first": Variant({Relaxation: {"loose": 1e-2}}),
         "changed plans at their bounds": Variant({Starts: {"changed": 1e-6}}),
     },
 }
@@ -64,10 +72,23 @@ def jumps(block: str, count: int) -> Iterator[Task]:
     return (parse(case.work["task"], Task) for case in cases[:count])
 
 
+def from_loose(schedule: Schedule, start: Iterate, ladder: tuple[float, ...]) -> Iterate:
+    """The schedule's first steps after looser pairs, from loose to tight as `solve_mpcc` does."""
+    options, point = interior(), start
+    for eps in ladder:
+        parameters = Parameters(eps, forces=Relaxation.current().forces)
+        point = schedule.solve(f"pairs by {eps:g}", point, parameters, options=options)
+        options = warm(min(Starts.current().interior_mu, eps), 1e-2, tol=Ends.current().tol)
+    return find(schedule, point)
+
+
 def figures(task: Task, variant: Variant) -> list[float]:
     """Iterations, those shifted, logarithm of the cost and CPU seconds of one cold solve."""
     solver = task.solver.model_copy(update=variant.solver)
     with tempfile.TemporaryDirectory() as folder, ExitStack() as patches:
+        if variant.ladder:
+            longer = partial(from_loose, ladder=variant.ladder)
+            patches.enter_context(patch("kemba.ocp.planner.find", longer))
         log = Path(folder) / "solver.log"
         for settings, values in variant.settings.items():
             patches.enter_context(changed(settings, **values))
@@ -80,16 +101,29 @@ def figures(task: Task, variant: Variant) -> list[float]:
     return [found.iterations, shifted, np.log(cost), found.solve_cpu_s]
 
 
+def set_by(name: str) -> tuple[str, list[str]]:
+    """A task and what is set: `jump.yaml:height=0.6`."""
+    task, *settings = name.split(":")
+    return task, settings
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--block", choices=VARIANTS, default="general")
     parser.add_argument("--cases", type=int, default=16)
+    parser.add_argument("--tasks", nargs="+", help="shipped tasks in the place of the sweep's")
+    parser.add_argument("--variants", nargs="+", help="some of the block's, the first of all too")
     asked = parser.parse_args()
     variants = VARIANTS[asked.block]
-    tasks = jumps(asked.block, asked.cases)
+    if asked.variants:
+        variants = {
+            name: v for name, v in variants.items() if v is SHIPPED or name in asked.variants
+        }
+    tasks = [load_task(*set_by(name))[0] for name in asked.tasks or ()]
+    tasks = tasks or list(jumps(asked.block, asked.cases))
     found = [[figures(task, variant) for variant in variants.values()] for task in tasks]
     iterations, shifted, cost, seconds = np.moveaxis(np.array(found), -1, 0)  # (cases, variants)
-    print(f"{asked.cases} {asked.block} jumps, {machine()}\n")
+    print(f"{len(tasks)} {asked.block} jumps, {machine()}\n")
     print("| variant | iterations | shifted | cost [N².m².s] | CPU time |\n|---|" + "---:|" * 4)
     for k, name in enumerate(variants):
         ratio = seconds[:, k].sum() / seconds[:, 0].sum()

@@ -12,7 +12,16 @@ from importlib import import_module
 from typing import Any
 
 __version__ = "0.1.0"
-__all__ = ["compare", "discover", "load_log", "load_model", "load_task", "plan", "simulate"]
+__all__ = [
+    "compare",
+    "discover",
+    "load_log",
+    "load_model",
+    "load_task",
+    "plan",
+    "simulate",
+    "solve_mpcc",
+]
 
 
 def __getattr__(name: str) -> Any:
@@ -20,7 +29,8 @@ def __getattr__(name: str) -> Any:
     if name in __all__:
         # many small matrices: more BLAS threads only wait for each other
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-        return getattr(import_module("kemba.api"), name)
+        home = "kemba.ocp.mpcc.solve" if name == "solve_mpcc" else "kemba.api"
+        return getattr(import_module(home), name)
     raise AttributeError(f"module 'kemba' has no attribute '{name}'")
 
 

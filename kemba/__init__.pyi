@@ -5,5 +5,6 @@ from kemba.api import load_model as load_model
 from kemba.api import load_task as load_task
 from kemba.api import plan as plan
 from kemba.api import simulate as simulate
+from kemba.api import solve_mpcc as solve_mpcc
 
 __version__: str

@@ -117,6 +117,7 @@ PLANNING = [
     "task",
     "functions",
     "nlp",
+    "mpcc",
     "transcription",
     "certificate",
     "relaxation",

@@ -53,6 +53,12 @@ CONSTANTS = {  # file -> names, why
     "plant/execution/sensors.py": ("ENCODERS", "steps of the robot's encoders"),
     "plant/execution/repeat.py": ("VALVE_SCATTER", "scatter of the robot's valves"),
     "plant/execution/controller.py": ("PERIOD", "rate of the robot's controller"),
+    "ocp/mpcc/homotopy.py": (
+        "LOOSE FACTOR EXACT OFF LONG BRANCH SCALED",
+        "figures of a general method, chosen on NOSBENCH (docs/nosbench.md)",
+    ),
+    "ocp/mpcc/solve.py": ("TRIED MARGIN SWITCHES PAYS SLOPE RESIDUAL", "the same"),
+    "ocp/mpcc/stationary.py": ("STEP LONGEST", "the same"),
     "ocp/nlp/stagnation.py": ("USUAL", "iterations of which a median is taken"),
     "ocp/controller.py": ("PERIOD", "rate of the robot's controller"),
     "ocp/shipped/kind.py": ("LETTERS", "length of a fingerprint"),

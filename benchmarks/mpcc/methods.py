@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+import casadi as ca
 import numpy as np
 
 from kemba.ocp.functions.settings import Newton
+from kemba.ocp.mpcc.solve import solve_mpcc
 from kemba.ocp.nlp.ipopt import Ipopt, Iterate, warm
 from kemba.ocp.relaxation.schedule import exact, interior
 from kemba.ocp.relaxation.settings import Ends, Relaxation, Starts
@@ -56,9 +58,20 @@ def products(program: Mpcc, start: np.ndarray) -> Iterate:
     return ipopt.solve(Iterate(start), [0.0])
 
 
+def heart(program: Mpcc, start: np.ndarray) -> Iterate:
+    """kemba.solve_mpcc."""
+    parts = program.parts
+    rows = ca.vertcat(parts.zero, parts.positive)
+    high = np.repeat([0.0, np.inf], [parts.zero.numel(), parts.positive.numel()])
+    bounds = {"lbx": program.lower, "ubx": program.upper, "lbg": 0.0, "ubg": high}
+    found = solve_mpcc(parts.x, parts.f, rows, parts.a, parts.b, bounds, start)
+    return Iterate(found.x, iterations=found.iterations)
+
+
 METHODS: dict[str, Callable[[Mpcc, np.ndarray], Iterate]] = {
     "kemba's schedule": schedule,
     "the same, then its branch exactly": on_branch,
+    "kemba.solve_mpcc": heart,
     "one solve, products at most 8e-7": fixed,
     "one solve, products at most 0": products,
 }

@@ -4,11 +4,13 @@ from kemba.api.executions import Executions, simulate
 from kemba.api.learning import Compared, Discovered, compare, discover
 from kemba.api.loading import load_log, load_model, load_task
 from kemba.api.planning import Planned, plan
+from kemba.ocp.mpcc.solve import MpccSolution, solve_mpcc
 
 __all__ = [
     "Compared",
     "Discovered",
     "Executions",
+    "MpccSolution",
     "Planned",
     "compare",
     "discover",
@@ -17,4 +19,5 @@ __all__ = [
     "load_task",
     "plan",
     "simulate",
+    "solve_mpcc",
 ]

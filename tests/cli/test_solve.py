@@ -103,7 +103,7 @@ mine.yaml:14:3: cost: unknown cost 'torque_sqared'; did you mean 'torque_squared
 mine.yaml:17:13: solver.options: unknown option 'tolx'; did you mean 'tol'?
       options: {tolx: 1e-3, max_iter: many, linear_solver: ma97}
                 ^
-mine.yaml:17:25: solver.options.max_iter: 'many' is not an integer
+mine.yaml:17:25: solver.options.max_iter: 'many' is not an integer; 0 <= max_iter
       options: {tolx: 1e-3, max_iter: many, linear_solver: ma97}
                             ^
 mine.yaml:17:41: solver.options.linear_solver: 'ma97' is not in the installed IPOPT; one of: \
@@ -154,6 +154,21 @@ def test_check_tells_the_same_mistakes() -> None:
         ("goals.apx.equals=1", "goals.apx.quantity: missing"),
         ("cost.torque=1", "cost: unknown cost 'torque'; did you mean 'torque_squared'?"),
         ("solver.options.tool=1", "solver.options: unknown option 'tool'; did you mean 'tol'?"),
+        (
+            "solver.options.bound_mult_init_method=least",
+            "solver.options.bound_mult_init_method: IPOPT does not accept 'least'; one of: "
+            "constant, mu-based",
+        ),
+        ("solver.options.tol=-1", "solver.options.tol: IPOPT does not accept '-1'; 0 < tol"),
+        (
+            "solver.complementarity=1e-9",
+            "solver.complementarity: '1e-09' is out of range; 1e-07 to 0.001 was expected",
+        ),
+        (
+            "min_dwell=1 s",
+            "min_dwell: 1 s is not less than the motion's 0.7 s, so that no valve could open and "
+            "close again; give less, such as 0.01 s",
+        ),
         (
             "goals.apex.quantity=body/y",
             "goals.apex.quantity: unknown quantity 'body/y'; did you mean 'body/z'?",

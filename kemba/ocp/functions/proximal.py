@@ -10,14 +10,14 @@ from functools import cached_property
 
 import casadi as ca
 
-from kemba.ocp.functions.blocks import BlockProblem
+from kemba.ocp.functions.problem import NlpFunctions
 
 
 class Proximal:
     """A problem with weight / 2 |x - start|^2 added to its cost; its parameters become
     [p, weight, start]. Ready for `ca.nlpsol` like the problem itself."""
 
-    def __init__(self, problem: BlockProblem) -> None:
+    def __init__(self, problem: NlpFunctions) -> None:
         self.problem = problem
         weight, start = ca.MX.sym("weight"), ca.MX.sym("start", problem.size)
         self.x, self.weight = problem.x, weight
@@ -57,4 +57,4 @@ class Proximal:
 
     @property
     def _cost(self) -> ca.MX:
-        return self.weight / 2 * ca.sumsqr(self.away)
+        return ca.MX(self.weight / 2 * ca.sumsqr(self.away))

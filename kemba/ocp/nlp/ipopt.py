@@ -12,7 +12,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from kemba.ocp.functions.blocks import BlockProblem
+from kemba.ocp.functions.problem import Derivatives
 from kemba.ocp.functions.proximal import Proximal
 from kemba.ocp.functions.regularised import regularised_hessian
 from kemba.ocp.functions.settings import Newton
@@ -127,7 +127,7 @@ class Ipopt:
     ) -> None:
         self.program, self.options = program, dict(options or {})
         self.control, self.building = control or Control(), building or Stopwatch()
-        self._regularised: dict[BlockProblem | Proximal, ca.Function] = {}
+        self._regularised: dict[Derivatives, ca.Function] = {}
 
     def solve(
         self,
@@ -152,7 +152,9 @@ class Ipopt:
         lower, upper = bounds or (program.lower, program.upper)
         own = {**common(), **self.options, **(options or {}), **self.control.options()}
         with self.building.running():
-            problem: BlockProblem | Proximal = self._proximal if proximal else program.problem
+            problem: Derivatives = program.problem
+            if proximal:
+                problem = self._proximal
             parameters = [*p, proximal, *start.Y.ravel()] if proximal else list(p)
             hessian = self._regularised_hessian(problem) if regularised else problem.hess_lag
             plugin = _plugin(problem, hessian, own)
@@ -184,7 +186,7 @@ class Ipopt:
     def _proximal(self) -> Proximal:
         return Proximal(self.program.problem)
 
-    def _regularised_hessian(self, problem: BlockProblem | Proximal) -> ca.Function:
+    def _regularised_hessian(self, problem: Derivatives) -> ca.Function:
         if problem not in self._regularised:
             self._regularised[problem] = regularised_hessian(problem.hess_lag)
         return self._regularised[problem]
@@ -198,7 +200,7 @@ class Ipopt:
 
 
 def _plugin(
-    problem: BlockProblem | Proximal, hessian: ca.Function, options: Mapping[str, Any]
+    problem: Derivatives, hessian: ca.Function, options: Mapping[str, Any]
 ) -> dict[str, Any]:
     return {
         "print_time": False,

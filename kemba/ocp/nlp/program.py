@@ -6,7 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
-from kemba.ocp.functions.blocks import BlockProblem
+from kemba.ocp.functions.problem import NlpFunctions
 
 
 class Program(Protocol):
@@ -17,7 +17,7 @@ class Program(Protocol):
     """
 
     @property
-    def problem(self) -> BlockProblem: ...
+    def problem(self) -> NlpFunctions: ...
     @property
     def lower(self) -> np.ndarray:
         """Lower bounds of the variables, a vector or a matrix."""

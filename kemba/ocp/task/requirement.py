@@ -15,7 +15,7 @@ from kemba.config.document import Location, written
 from kemba.errors import ConfigErrors, KembaError, suggest
 from kemba.model import Model
 from kemba.ocp.task.height import longest_leg, with_height
-from kemba.ocp.task.options import cost_errors, option_errors
+from kemba.ocp.task.options import cost_errors, option_errors, timing_errors
 from kemba.ocp.task.task import Bound, Goal, Task
 from kemba.quantity import Quantity, to_si
 
@@ -145,6 +145,7 @@ def resolve(
         errors.append(document.error(("grip",), f"grip: {UNREFINED}"))
     errors += cost_errors(task.cost, document)
     errors += option_errors(task.solver.options, document)
+    errors += timing_errors(task, document)
     if errors:
         raise ConfigErrors(errors)
     acting = _acting(model, {r.quantity.name for r in requirements})

@@ -88,7 +88,7 @@ class Solver(Section):
     symmetry: bool = True
     coarse: bool = True
     valve_search: Annotated[int, Field(ge=0)] = 1
-    complementarity: Annotated[float, Param("1", lower=1e-9, upper=1e-3)] = 1e-6
+    complementarity: Annotated[float, Param("1", lower=1e-7, upper=1e-3)] = 1e-6
     options: dict[str, float | int | str] = Field(default_factory=dict)
 
 

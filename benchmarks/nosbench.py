@@ -1,0 +1,213 @@
+"""Ways to solve programs with complementarity pairs on NOSBENCH, a public set that others wrote.
+
+    git clone https://github.com/nosnoc/nosbench
+    python benchmarks/nosbench.py nosbench/problems/casadi --count 40 --results nosbench.jsonl
+    python benchmarks/nosbench.py --results nosbench.jsonl --save docs/nosbench.md
+
+Every solve has a process of its own, CPU seconds at most, and is judged by the program's own
+functions: *solved* is no violation and no product above 1e-6. Files are drawn at random, half of
+them from the larger half; those of `TUNED`, on which figures were chosen, are left out.
+The set states no licence: it is run, and not kept here.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import random
+import resource
+import subprocess
+import sys
+import time
+from collections import defaultdict
+from pathlib import Path
+from typing import Any
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+from block import put_block
+
+BEGIN, END = "<!-- written by benchmarks/nosbench.py -->", "<!-- end of nosbench -->"
+FEASIBLE, DEARER = 1e-6, 1e-4
+COMPARED = ("plain homotopy", "schedule of the plans", "solve_mpcc")  # on every file
+METHODS = (*COMPARED, "Uno")  # on the first files alone: it takes longest
+TUNED = (57, 30, 12)  # seed, and how many files of the smaller and of the larger half
+
+
+def files_of(folder: Path) -> tuple[list[Path], list[Path]]:
+    """The smaller and the larger half of the files."""
+    files = sorted(folder.glob("*.json"), key=lambda path: (path.stat().st_size, path.name))
+    half = len(files) // 2
+    return files[:half], files[half:]
+
+
+def drawn(folder: Path, seed: int, count: int) -> list[tuple[Path, bool]]:
+    """Files and whether they are large: `count`, half of them large, none that was tuned on."""
+    halves, (tuning, *counts) = files_of(folder), TUNED
+    rng = random.Random(tuning)
+    used = {path for half, n in zip(halves, counts, strict=True) for path in rng.sample(half, n)}
+    rng, chosen = random.Random(seed), []
+    for half in halves:
+        left = [path for path in half if path not in used]
+        rng.shuffle(left)
+        chosen.append(left[: count // 2])
+    both = zip(*chosen, strict=False)  # small and large in turn: any part of a run is balanced
+    return [pair for small, large in both for pair in ((small, False), (large, True))]
+
+
+def load(path: Path) -> dict[str, Any]:
+    """A program of the set: symbols, expressions, bounds, start and parameters."""
+    import casadi as ca
+    import numpy as np
+
+    data = json.loads(path.read_text())
+    x, p = ca.SX.sym("x", len(data["w0"])), ca.SX.sym("p", len(data["p0"]))
+    names = {"f": "augmented_objective_fun", "g": "g_fun", "G": "G_fun", "H": "H_fun"}
+    parts = {key: ca.Function.deserialize(data[name])(x, p) for key, name in names.items()}
+    bounds = {key: np.array(data[name], float).ravel() for key, name in
+              (("lbx", "lbw"), ("ubx", "ubw"), ("lbg", "lbg"), ("ubg", "ubg"))}  # fmt: skip
+    start, at = np.array(data["w0"], float).ravel(), np.array(data["p0"], float).ravel()
+    return {"x": x, **parts, "bounds": bounds, "start": start, "p": (p, at)}
+
+
+def solved(path: Path, method: str) -> dict[str, Any]:
+    """One solve: cost, violation, products, iterations and CPU seconds."""
+    from mpcc import on_nosbench
+
+    known = on_nosbench.METHODS
+    if method not in known:  # it imports the robot, which takes seconds
+        from mpcc import on_schedule
+
+        known = on_schedule.METHODS
+    begin = time.process_time()
+    given = load(path)
+    x, iterations = known[method](given)
+    cpu = time.process_time() - begin
+    return {**on_nosbench.judged(given, x), "iterations": iterations, "cpu": cpu}
+
+
+def tried(path: Path, method: str, limit: int) -> dict[str, Any]:
+    """The same in a process of its own with `limit` CPU seconds."""
+
+    def bounded() -> None:
+        resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
+
+    command = [sys.executable, __file__, "--one", str(path), method]
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    done = subprocess.run(command, capture_output=True, text=True, check=False, preexec_fn=bounded)
+    try:
+        answer: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    except (IndexError, ValueError):
+        last = (done.stderr.strip().splitlines() or ["no answer"])[-1][-120:]
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        spent = after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
+        why = f"stopped after {limit} CPU seconds" if done.returncode < 0 else last
+        answer = {"f": None, "violation": None, "products": None, "cpu": spent, "why": why}
+    return answer
+
+
+def good(row: dict[str, Any]) -> bool:
+    """Whether a point is feasible and its products are small."""
+    return row["f"] is not None and max(row["violation"], row["products"]) <= FEASIBLE
+
+
+def table(rows: list[dict[str, Any]]) -> list[str]:
+    """The lines of the page for some of the rows."""
+    import numpy as np
+    from statsmodels.stats.proportion import proportion_confint
+
+    whole = _whole(rows)
+
+    def share(count: int, of: int) -> str:
+        if not of:
+            return "none"
+        low, high = proportion_confint(count, of, method="wilson")
+        return f"{count} of {of} ({low:.0%} to {high:.0%})"
+
+    lines = [
+        "| method | solved | dearer than the best by > 1e-4 | cost, relative to the best: median, "
+        "worst tenth | CPU s, median | in all |",
+        "|---|---|---|---|---:|---:|",
+    ]
+    best = {name: min((r["f"] for r in of.values() if good(r)), default=None)
+            for name, of in whole.items()}  # fmt: skip
+    for method in METHODS:
+        mine = {name: of[method] for name, of in whole.items() if method in of}
+        if not mine:
+            continue
+        found = {name: row for name, row in mine.items() if good(row)}
+        over = [(row["f"] - best[name]) / max(1.0, abs(best[name])) for name, row in found.items()]
+        ratio = [1.0 + v for v in over] or [np.nan]
+        cpu = [row["cpu"] for row in mine.values()]
+        cells = (method, share(len(found), len(mine)),
+                 share(sum(v > DEARER for v in over), len(over)),
+                 f"{np.median(ratio):.4f}, {np.quantile(ratio, 0.9):.3f}",
+                 f"{np.median(cpu):.1f}", f"{sum(cpu):.0f}")  # fmt: skip
+        lines.append(f"| {' | '.join(cells)} |")
+    return lines
+
+
+def page(rows: list[dict[str, Any]]) -> list[str]:
+    """All lines: the smaller files, the larger ones, which were run."""
+    from kemba.sweep import machine
+
+    lines = []
+    for large, words in ((False, "smaller"), (True, "larger")):
+        of = [row for row in rows if row["large"] == large]
+        count = len(_whole(of))
+        lines += [f"The {words} half, {count} files:", "", *table(of), ""]
+    limit, seed, there = rows[0]["limit"], rows[0]["seed"], rows[0]["there"]
+    lines += [f"Drawn with seed {seed} from {there} files that were there; {limit} CPU seconds "
+              f"at most each, one process at a time. On {machine()}."]  # fmt: skip
+    return lines
+
+
+def _whole(rows: list[dict[str, Any]]) -> dict[str, dict[str, dict[str, Any]]]:
+    """The answers by file and method, of files on which all that are compared were run."""
+    by_file: dict[str, dict[str, dict[str, Any]]] = defaultdict(dict)
+    for row in rows:
+        by_file[row["file"]][row["method"]] = row
+    return {name: of for name, of in by_file.items() if set(COMPARED) <= set(of)}
+
+
+def main() -> None:
+    """Solve what was not solved yet, or print and save the tables."""
+    if sys.argv[1:2] == ["--one"]:
+        print("\n" + json.dumps(solved(Path(sys.argv[2]), sys.argv[3])))
+        return
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder", type=Path, nargs="?", help="problems/casadi of the clone")
+    parser.add_argument("--count", type=int, default=40, help="files, half of them large")
+    parser.add_argument("--half", choices=("both", "smaller", "larger"), default="both")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--limit", type=int, default=100, help="CPU seconds of one solve")
+    parser.add_argument("--methods", nargs="+", choices=METHODS, default=METHODS)
+    parser.add_argument("--results", type=Path, required=True, help="a line of JSON for each solve")
+    parser.add_argument("--save", type=Path, help="page whose tables are replaced")
+    asked = parser.parse_args()
+    kept = asked.results.read_text().splitlines() if asked.results.is_file() else []
+    rows = [json.loads(line) for line in kept]
+    have = {(row["file"], row["method"]) for row in rows}
+    there = len(list(asked.folder.glob("*.json"))) if asked.folder else 0
+    files = drawn(asked.folder, asked.seed, asked.count) if asked.folder else []
+    for path, large in files:
+        if asked.half not in ("both", "larger" if large else "smaller"):
+            continue
+        for method in asked.methods:
+            if (path.name, method) in have:
+                continue
+            row = {"file": path.name, "large": large, "method": method, "seed": asked.seed,
+                   "there": there, "limit": asked.limit,
+                   **tried(path, method, asked.limit)}  # fmt: skip
+            rows.append(row)
+            with asked.results.open("a") as file:
+                file.write(json.dumps(row) + "\n")
+    lines = page(rows)
+    print("\n".join(lines))
+    if asked.save is not None:
+        put_block(asked.save, BEGIN, END, lines)
+
+
+if __name__ == "__main__":
+    main()

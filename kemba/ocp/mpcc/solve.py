@@ -1,0 +1,198 @@
+"""`kemba.solve_mpcc`: a program with complementarity pairs, solved and verified."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from kemba.ocp.mpcc.homotopy import EXACT, CutShort, Solves, loosest, tighten
+from kemba.ocp.mpcc.problem import Mpcc, Symbols
+from kemba.ocp.mpcc.stationary import (
+    Multipliers,
+    both_zero,
+    descending,
+    multipliers,
+    pulled,
+)
+from kemba.ocp.nlp.ipopt import Control, Iterate
+
+TRIED = 1e-4  # relaxation from which a branch is tried; the next is the last
+MARGIN = 0.5  # the last relaxation, as a part of the tolerance: room for IPOPT's own
+SWITCHES = 5  # branches after the first
+PAYS = 1e-7  # relative fall of the cost that makes another branch worth while
+SLOPE = 1e-7  # relative fall of the linearised cost below which no direction descends
+RESIDUAL = 1e-5  # of the Lagrangian's gradient at a stationary point
+
+
+@dataclass(frozen=True)
+class MpccSolution:
+    """A point and what was verified at it, by the program's own functions.
+
+    `x` (n,), `f`; `multipliers` of bounds, rows and sides; `complementarity`: the largest
+    product of a pair; `feasibility`: the largest violation of bounds, rows and signs;
+    `stationarity`: strong (multipliers prove it), B (no direction of the linearised program
+    descends), none (not shown);
+    `status`: solved, feasible, infeasible or time-limit; `iterations` of IPOPT.
+    """
+
+    x: np.ndarray
+    f: float
+    multipliers: Multipliers | None
+    complementarity: float
+    feasibility: float
+    stationarity: str
+    status: str
+    iterations: int
+
+    @property
+    def good(self) -> bool:
+        """Whether the point is feasible and stationary."""
+        return self.status == "solved"
+
+    @property
+    def sentence(self) -> str:
+        """What was found, in words."""
+        of = f"violation {self.feasibility:.1e}, products {self.complementarity:.1e}"
+        return {
+            "solved": f"solved: f = {self.f:.6g}, {self.stationarity}-stationary; {of}",
+            "feasible": f"feasible, but not shown to be stationary: f = {self.f:.6g}; {of}",
+            "infeasible": f"no feasible point was found near the last one; there: {of}; another "
+            "start may help",
+            "time-limit": f"the time limit was reached; at the last point: {of}",
+        }[self.status]
+
+
+def solve_mpcc(
+    x: Symbols,
+    f: Symbols,
+    g: Symbols,
+    G: Symbols,
+    H: Symbols,
+    bounds: Mapping[str, Any],
+    start: Any,
+    p: tuple[Symbols, Any] | None = None,
+    *,
+    tolerance: float = 1e-6,
+    time_limit: float = np.inf,
+    options: Mapping[str, Any] | None = None,
+    progress: Callable[[str], None] = lambda text: None,
+) -> MpccSolution:
+    """Solve min f(x), lbg <= g(x) <= ubg, lbx <= x <= ubx, 0 <= G(x), 0 <= H(x), G(x) H(x) = 0.
+
+    `x` (n,): CasADi's SX or MX symbols; `f`, `g` (rows,), `G`, `H` (pairs,): expressions of x
+    and p.
+    `bounds`: lbx, ubx, lbg, ubg, vectors or one number; what is missing is free. `start` (n,); `p`:
+    symbols and their values. `tolerance` of what is verified: violations and products. `options` go
+    to IPOPT, `progress` gets the name of every solve, `time_limit` [s].
+
+    The pairs are relaxed, G H <= sigma, from so loose that hardly one binds to tight (Scholtes,
+    SIAM J. Optim. 11, 2001); then one side of every pair is zero, which is an ordinary program,
+    and the products are exact. Where pairs have both sides at zero, multipliers or the linear
+    program with pairs say whether another branch descends, which is then taken. Local minima may
+    be found, as by every method of this kind.
+
+    Raises KembaError for parts that do not fit each other or are no numbers, and for bounds that
+    are empty; a program that has no solution is no mistake: `status` says it.
+    """
+    program = Mpcc(x, f, g, G, H, bounds, start, p)
+    deadline = time.monotonic() + time_limit
+    solves = Solves(program, Control(deadline=deadline), dict(options or {}), progress)
+    try:
+        point, on = _found(solves, tolerance)
+    except CutShort as cut:
+        return replace(_judged(solves, cut.point, None, tolerance), status="time-limit")
+    return _judged(solves, point, on, tolerance)
+
+
+@dataclass(frozen=True)
+class OnBranch:
+    """A branch (pairs,), the multipliers of its solution, and how stationary that is."""
+
+    first: np.ndarray
+    multipliers: Multipliers
+    stationarity: str
+
+
+def _found(solves: Solves, tolerance: float) -> tuple[Iterate, OnBranch | None]:
+    """The first feasible point of the paths, on a branch where one is; otherwise the last point."""
+    point = Iterate(solves.program.start)
+    for exact in EXACT:
+        solves.exact = exact
+        point, sigma = loosest(solves)
+        for last in (TRIED, MARGIN * tolerance):
+            tighter = tighten(solves, point, sigma, last)
+            if tighter is None:
+                break
+            point, sigma = tighter, last
+            best = _best_branch(solves, point, sigma, tolerance)
+            if best is not None:
+                return best
+        if _violation(solves.program, point.Y) <= tolerance:
+            break
+    return point, None
+
+
+def _best_branch(
+    solves: Solves, point: Iterate, sigma: float, tolerance: float
+) -> tuple[Iterate, OnBranch] | None:
+    """The branch nearest to a relaxed point, and better ones from there on; None where it is
+    infeasible."""
+    program = solves.program
+    values = program.places(point.Y)
+    first = values[program.a] <= values[program.b]
+    best: tuple[Iterate, OnBranch] | None = None
+    for _ in range(SWITCHES + 1):
+        found = solves.branch(first, point, sigma)
+        if not found.solved or _violation(program, found.Y) > tolerance:
+            return best
+        if best is not None and found.objective > best[0].objective - PAYS * _size(best[0]):
+            return best
+        on, other = _stationary(program, found, first, tolerance)
+        best = found, on
+        if other is None:
+            return best
+        point, first, sigma = found, other, 1e-6
+    return best
+
+
+def _stationary(
+    program: Mpcc, found: Iterate, first: np.ndarray, tolerance: float
+) -> tuple[OnBranch, np.ndarray | None]:
+    """How stationary a branch's solution is; and a branch that descends, where there is one."""
+    assert found.lam_g is not None
+    of = multipliers(program, found.Y, found.lam_g, first)
+    zero = both_zero(program, found.Y, tolerance)
+    if of.residual <= RESIDUAL and not pulled(of, zero).any():
+        return OnBranch(first, of, "strong"), None
+    answer = descending(program, found.Y, first, zero)
+    if answer is None:
+        return OnBranch(first, of, "none"), None
+    fall, other = answer
+    if fall <= SLOPE * _size(found):
+        return OnBranch(first, of, "B"), None
+    return OnBranch(first, of, "none"), None if np.array_equal(first, other) else other
+
+
+def _size(point: Iterate) -> float:
+    return max(1.0, abs(point.objective))
+
+
+def _violation(program: Mpcc, x: np.ndarray) -> float:
+    return max(program.feasibility(x), program.complementarity(x))
+
+
+def _judged(solves: Solves, point: Iterate, on: OnBranch | None, tolerance: float) -> MpccSolution:
+    """What holds at a point, whatever the solver said."""
+    program, x = solves.program, point.Y
+    stationarity = on.stationarity if on else "none"
+    feasible = _violation(program, x) <= tolerance
+    status = ("solved" if stationarity != "none" else "feasible") if feasible else "infeasible"
+    return MpccSolution(
+        x, float(program.at(x)[0][0]), on.multipliers if on else None,
+        program.complementarity(x), program.feasibility(x), stationarity, status,
+        solves.iterations,
+    )  # fmt: skip
