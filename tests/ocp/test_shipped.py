@@ -47,7 +47,7 @@ def test_the_shelf_is_small_and_fits_what_is_shipped() -> None:
     size = sum(path.stat().st_size for path in SHELF.iterdir())
     assert size < 7e4 * len(listed), "a plan with its solved program in single precision"
     assert all(e.stages is not None for e in listed), STALE
-    kinds = {shipped_kind(name) for name in ("jump", "jump_forward", "hop", "stand")}
+    kinds = {shipped_kind(name) for name in ("jump", "jump_forward", "hop")}
     assert {e.kind for e in listed} == kinds, STALE
     assert all(e.cost > 0.0 and e.of >= 1 for e in listed)
 
@@ -62,8 +62,7 @@ def test_shipped_plans_can_be_read(entry: Entry) -> None:
     if len(labels) == len(read_constraints(model, half)):
         phases = noted_phases(plan.meta, read_constraints(model, half), 2, 100)
         assert phases is not None
-        apex = entry.kind != shipped_kind("stand")  # asked for at the middle
-        assert any(p.first == 50 for p in phases) or not apex
+        assert any(p.first == 50 for p in phases), "the apex is asked for at the middle"
     assert set(np.unique(plan["front/valve/extend"])) <= {0.0, 1.0}
     assert np.all(np.diff(plan.time) > 0.0)
 
@@ -195,18 +194,6 @@ def test_a_plan_whose_valves_are_ruled_out_begins_no_task() -> None:
     task, document = load_task("jump.yaml", ["bounds.*/valve/*=0"])
     assert kin("jump.yaml", "bounds.*/valve/*=0")
     assert not list(plans_nearby(task, document))
-
-
-def test_a_plan_with_fitted_air_begins_one_with_the_same_air(tmp_path: Path) -> None:
-    words = ["solve", "jump_forward.yaml", "--set", "distance=0.52 m", "--no-figure", "--json"]
-    done = CliRunner().invoke(app, [*words, "--out", str(tmp_path / "run")])
-    answer = json.loads(done.stdout)
-    assert done.exit_code == 0, answer["sentence"]
-    entry = next(e for e in shelf(SHELF) if answer["start"] == f"shipped: {e.name}")
-    assert entry.effects and entry.fitted_air
-    assert "the air of its model is fitted to the simulated robot" in answer["sentence"]
-    assert answer["fitted_air"]["factors"] == entry.fitted_air["factors"]
-    assert load_task(tmp_path / "run" / "task.yaml")[0].effects == entry.effects
 
 
 def test_plans_of_a_dearer_minimum_come_after_a_guess(monkeypatch: pytest.MonkeyPatch) -> None:
