@@ -63,7 +63,8 @@ def judge(
     """Certificate, status and sentence of what was found; `requirements` are all of the task's."""
     task, model = transcription.task, transcription.model
     trajectory = to_trajectory(transcription, point.Y)
-    certificate = certify(model, task, requirements, trajectory)
+    # `grip` comes last, on the refined plan
+    certificate = certify(model, task.model_copy(update={"grip": 1.0}), requirements, trajectory)
     status, sentence = verdict(task, certificate, trajectory, point.ending)
     return Plan(
         task=task,

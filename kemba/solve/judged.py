@@ -107,12 +107,11 @@ def judged(
     done = executions(model, plan, table, plant or plant_of(task), tell, known)
     facts = summaries(model, done)
     limits = allowances(task.tolerances, bool(ends_standing(model, plan)), landing_speed(plan))
-    verdicts = {
-        key: judge(
-            EXECUTIONS[key], facts[key], limits[key], asked_of(found, done[key], limits[key])
-        )
-        for key in EXECUTIONS
-    }
+    verdicts = {}
+    for key, who in EXECUTIONS.items():
+        # a plant may miss by more than most bounds leave: it is judged by where it goes alone
+        asked = asked_of(found, done[key], limits[key]) if key in OWN else ()
+        verdicts[key] = judge(who, facts[key], limits[key], asked)
     there, truth = done["plant_replay"], truth_of(task)
     band: ApexBand | None = None
     if truth.learnt and truth.evidence is not None:

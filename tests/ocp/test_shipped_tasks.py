@@ -73,7 +73,7 @@ def test_limits_of_the_hardware(shipped: Solved) -> None:
         assert np.max(drive) <= 49.7 * (1 + slack), "torque-speed line"
         assert np.all(plan[f"{leg}/piston/x"] >= -slack)
         assert np.all(plan[f"{leg}/piston/x"] <= 0.07 + slack)
-        for chamber, top in (("extend", 324.0), ("retract", 260.0)):
+        for chamber, top in (("extend", 324.0), ("retract", 269.6)):
             force = plan[f"{leg}/chamber/{chamber}/F"]
             assert np.all(force >= -slack) and np.all(force <= top + slack)
         assert np.all(plan[f"{leg}/knee/z"] >= 0.03 - slack)

@@ -62,15 +62,16 @@ class MixUp:
     change: Change
 
 
-def mixed_up(physics: Physics, log: ResampledLog) -> Iterator[KembaError]:
-    """The mistake in the columns of a log, if its feet stand much better without it."""
+def mixed_up(physics: Physics, log: ResampledLog, most: int = 2) -> Iterator[KembaError]:
+    """The mistake in the columns of a log, or up to `most` of them, if its feet stand much better
+    without."""
     limits, feet = MixUpSettings.current(), _Feet(physics, log)
     error = feet.restless([])
     if error is None or error < limits.small:
         return
     known = list(mix_ups(physics.legs, physics.mechanism.stroke))
     goal = min(limits.small, error / limits.better)
-    for count in (1, 2):
+    for count in range(1, most + 1):
         trials = []
         for some in combinations(known, count):
             if count == 2 and some[0].about & some[1].about:

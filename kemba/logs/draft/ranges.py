@@ -14,7 +14,7 @@ from kemba.trajectory import Array
 # Robots of 0.1 to 2 m, strokes below 0.3 m, pressures of 0.5 to 12 bar, 50 Hz to 10 kHz.
 LENGTH = (("m", 3.0), ("cm", 60.0), ("mm", 3e3), ("um", 3e6))
 EXTENSION = (("m", 0.5), ("mm", 500.0), ("um", 5e5))
-STROKE = ("m", "cm", "mm", "um")
+LENGTHS = ("m", "cm", "mm", "um")
 ANGLE = (("rad", 6.6), ("deg", 400.0), ("mrad", 7e3))
 PRESSURE = (("MPa", 0.05), ("bar", 20.0), ("kPa", 2e3), ("mbar", 2e4), ("Pa", 2e6))
 STEP = (("s", 0.05), ("ms", 50.0), ("us", 5e4), ("ns", 5e7))
@@ -29,7 +29,7 @@ def guessed_unit(header: str, values: Array, stroke: float | None = None) -> str
     table = {"m": EXTENSION if "piston/" in header else LENGTH, "rad": ANGLE, "Pa": PRESSURE}
     size = float(np.nanmax(np.abs(values), initial=0.0))
     if "piston/x" in header and stroke and size:
-        far = {name: abs(math.log10(convert(size, name, "m") / stroke)) for name in STROKE}
+        far = {name: abs(math.log10(convert(size, name, "m") / stroke)) for name in LENGTHS}
         best = min(far, key=far.__getitem__)
         return None if best == "m" else best
     for name, largest in table.get(unit, ()):
