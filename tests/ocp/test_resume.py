@@ -141,7 +141,7 @@ def test_resume_a_solved_run_with_a_change(tmp_path: Path) -> None:
 
 def test_resume_in_the_folder_of_a_killed_run(tmp_path: Path) -> None:
     folder = tmp_path / "killed"
-    assert solve("jump", "--set", "nodes=24", "--out", str(folder)).exit_code == 0
+    assert solve("jump", "--set", "nodes=40", "--out", str(folder)).exit_code == 0
     manifest = json.loads((folder / "manifest.json").read_text())
     (folder / "manifest.json").write_text(json.dumps({**manifest, "status": "running"}))
     for name in FILES:

