@@ -47,7 +47,9 @@ def repaired(
                 return
             if not found.status.plan:
                 continue
-            now = executed(summed(now.plan, found), execution, repair=ANOTHER)
+            both = summed(now.plan, found)
+            made = replace(both, start="guess", continued=None if both.continued is None else False)
+            now = executed(made, execution, repair=ANOTHER)
         yield now
         if now.fine or not now.judged or not now.plan.refined:
             return
