@@ -69,7 +69,6 @@ def row(height: float, run: Path) -> dict[str, Any]:
         "height": height,
         **{key: facts.get(key) for key in ("good", "start", "cost", "solve_cpu_s")},
         **{key: facts[key] for key in ("replay", "table_replay", "plant_replay")},
-        "fitted": "fitted_air" in facts,
         "here": _hardest(facts["impacts"], apex["here"]),
         "there": _hardest(impacts, apex["there"]),
     }
@@ -82,19 +81,17 @@ def _hardest(impacts: list[dict[str, Any]], after: float) -> dict[str, Any]:
 
 def summary(rows: list[dict[str, Any]]) -> Iterator[str]:
     """The lines of the page."""
-    good, fitted = (sum(bool(r[key]) for r in rows) for key in ("good", "fitted"))
-    yield f"Of {len(rows)} heights {good} are good, {fitted} of them with fitted air."
+    yield f"Of {len(rows)} heights {sum(bool(r['good']) for r in rows)} are good."
     yield ""
     yield (
-        "| height [m] | begun from | air | good | torque² | table: apex [mm], touchdown [ms] "
+        "| height [m] | begun from | good | torque² | table: apex [mm], touchdown [ms] "
         "| plant: apex [mm], touchdown [ms], end [mm] | hardest at landing [m/s]: plan, plant |"
     )
-    yield "|---|---|---|---|---:|---|---|---|"
+    yield "|---|---|---|---:|---|---|---|"
     for r in rows:
         cells = (
             f"{r['height']:.2f}",
             str(r["start"]).removeprefix("shipped: "),
-            "fitted" if r["fitted"] else "tables",
             "yes" if r["good"] else "no",
             f"{r['cost']['torque_squared_integral']:.3g}",
             _errors(r["table_replay"], ("apex", "touchdown")),

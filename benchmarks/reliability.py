@@ -25,9 +25,7 @@ TIMES = {
 
 WORDS = """\
 *Refined and replaying*: refined, and both the plan's inputs and its `controller.csv` come out as
-planned on the plan's own model; *with fitted air*: that model's air is
-[fitted to the plant](continuing.md#air-that-fits-the-plant). *Good*: also the simulated robot (the
-plant) keeps to the tolerances of the task, which is what `kemba-opt solve` needs for exit code 0.
+planned on the plan's own model. *Good*: also the simulated robot (the plant) keeps to the tolerances of the task, which is what `kemba-opt solve` needs for exit code 0.
 """.splitlines()
 
 
@@ -64,19 +62,18 @@ def _state(results: dict[str, Any]) -> str:
 
 def _rates(blocks: dict[str, Any], rows: list[dict[str, Any]]) -> Iterator[str]:
     yield (
-        "| block | a plan | refined and replaying | from a shipped plan | with fitted air | good "
+        "| block | a plan | refined and replaying | from a shipped plan | good "
         "| 95 % Wilson interval | expected |"
     )
-    yield "|---|---:|---:|---:|---:|---:|---:|---:|"
+    yield "|---|---:|---:|---:|---:|---:|---:|"
     for name, block in blocks.items():
         own = [row for row in rows if row["block"] == name]
         plans = sum(row["status"] in ("solved", "acceptable") for row in own)
         replaying = sum(bool(row["refined"] and row["replays"]) for row in own)
         shipped = sum((row["start"] or "").startswith("shipped") for row in own)
-        fitted = sum(bool(row["fitted"]) for row in own)
         low, high = block["interval"]
         yield (
-            f"| {name} | {plans} | {replaying} | {shipped} | {fitted} "
+            f"| {name} | {plans} | {replaying} | {shipped} "
             f"| {block['succeeded']} of {block['cases']} ({block['rate']:.1%}) "
             f"| {low:.1%} to {high:.1%} | {block['expected']:.0%} |"
         )

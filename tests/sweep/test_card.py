@@ -36,7 +36,7 @@ def test_card(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sys.argv", ["reliability.py", str(folder), "--out", str(out)])
     runpy.run_path(str(GENERATOR), run_name="__main__")
     text = out.read_text()
-    assert "| low | 1 | 1 | 1 | 0 | 1 of 2 (50.0%) | 9.5% to 90.5% | 100% |" in text
+    assert "| low | 1 | 1 | 1 | 1 of 2 (50.0%) | 9.5% to 90.5% | 100% |" in text
     assert "- `height`: 0.4 m to 0.5 m" in text and "- `supply`: one of 0.7 MPa" in text
     assert "with nodes = 30" in text and "cores" in text
     assert f"| 1 | height {cases[1].values['height']}, supply 0.7 MPa | a \\| b c |" in text
