@@ -52,9 +52,14 @@ def test_more_hidden_effects_are_named(effect: str, tmp_path: Path) -> None:
 def test_nothing_is_found_where_nothing_is_hidden(tmp_path: Path) -> None:
     found, _ = answer(tmp_path, None, 5)
     assert found.verdict == "nothing" and not found.added, found.sentence
-    # the figures of this bench lie within their tolerances, which `compare` does not fit
-    assert found.p_value_nothing > 0.05 and found.error_after == found.error_before
+    assert found.p_value_nothing > 0.05
     assert not (tmp_path / "answer" / "model.yaml").exists()
+
+
+@pytest.mark.xfail(reason="compare does not fit figures that lie within their tolerances: 2.03")
+def test_the_error_of_a_sound_machine_is_that_of_its_noise(tmp_path: Path) -> None:
+    found, _ = answer(tmp_path, None, 5)
+    assert found.error_after < 1.3
 
 
 def test_what_the_catalogue_lacks_is_not_given_a_name(tmp_path: Path) -> None:
