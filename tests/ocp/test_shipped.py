@@ -18,7 +18,7 @@ from kemba.ocp.known import compared
 from kemba.ocp.phases.modes import Phase
 from kemba.ocp.phases.notes import noted_phases
 from kemba.ocp.planning import plans_nearby
-from kemba.ocp.shipped.entry import Entry, read_plan, write_plan
+from kemba.ocp.shipped.entry import Entry
 from kemba.ocp.shipped.kind import kind_of
 from kemba.ocp.shipped.shelf import Near, Neighbour, neighbours, relatives, shelf, ways
 from kemba.ocp.transcription.symmetry import find_symmetry
@@ -137,14 +137,6 @@ def test_a_task_that_asks_something_else_has_relatives_of_the_same_figures() -> 
         found = kin("jump_forward.yaml", option)
         assert [n.entry.file for n in found] == [n.entry.file for n in plain]
         assert all(n.asked().start == load_task("jump_forward.yaml")[0].start for n in found)
-
-
-def test_what_is_kept_of_a_plan(tmp_path: Path) -> None:
-    entry = shelf(SHELF)[0]
-    model = task_model(load_task("jump")[0])
-    write_plan(tmp_path / "again.npz", entry.plan, model, stages=entry.stages)
-    assert (tmp_path / "again.npz").read_bytes() == entry.file.read_bytes()
-    assert read_plan(tmp_path / "again.npz").meta == entry.plan.meta
 
 
 def test_nodes_are_shared_by_how_long_phases_last() -> None:

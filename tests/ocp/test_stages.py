@@ -12,14 +12,14 @@ import pytest
 from kemba.ocp.certificate.objective import objective
 from kemba.ocp.continuation.between import Origin
 from kemba.ocp.continuation.continue_plan import Continuation
-from kemba.ocp.continuation.kept import packed, read_stages, write_stages
+from kemba.ocp.continuation.kept import read_stages, write_stages
 from kemba.ocp.nlp.ipopt import Control, Iterate
 from kemba.ocp.phases.modes import Phase
 from kemba.ocp.phases.program import PhasePart, PhaseProgram
 from kemba.ocp.phases.radau import RADAU3, RADAU5, Scheme
 from kemba.ocp.phases.stages import Stages
 from kemba.ocp.planned import Plan
-from kemba.ocp.planning import plan_from, plans_nearby
+from kemba.ocp.planning import plans_nearby
 from kemba.ocp.reading import load_task, task_model
 from kemba.ocp.refinement.refine import Refiner, reduction_of
 from kemba.ocp.task.requirement import resolve
@@ -116,19 +116,6 @@ def test_a_run_keeps_them(low: Plan, tmp_path: Path) -> None:
     np.testing.assert_array_equal(read.values, low.stages.values)
     np.testing.assert_array_equal(read.of_bounds, low.stages.of_bounds)
     np.testing.assert_equal(read.of_rows, dict(low.stages.of_rows))
-
-
-def test_three_digits_of_multipliers_are_enough(low: Plan, tmp_path: Path) -> None:
-    """A small file, as shipped plans have them: it begins at the solution all the same."""
-    assert low.stages is not None
-    np.savez(tmp_path / STAGES, **packed(low.stages, small=True))  # type: ignore[arg-type]
-    small = read_stages(tmp_path / STAGES)
-    assert small is not None and small.phases == low.stages.phases
-    np.testing.assert_allclose(small.values, low.stages.values, rtol=1e-6, atol=1e-30)
-    origin = Origin(low.trajectory, low.model, low.requirements, stages=small)
-    found, why = plan_from(origin, low.task)
-    assert found is not None, why
-    assert sum(attempt.iterations for attempt in found.attempts) <= 15
 
 
 @pytest.mark.parametrize("content", [None, b"", b"PK\x03\x04 cut", b"no archive"])

@@ -19,7 +19,7 @@ PREFIX = "solved_"  # of the arrays, beside others in the same file
 def write_stages(file: Path, stages: Stages) -> None:
     """Write `stages.npz` of a run folder. Raises KembaError where it cannot be written."""
     with atomic_path(file) as path, path.open("wb") as stream:
-        np.savez(stream, **packed(stages))
+        np.savez(stream, **_packed(stages))
 
 
 def read_stages(file: Path) -> Stages | None:
@@ -34,14 +34,8 @@ def read_stages(file: Path) -> Stages | None:
     return stages if stages.phases and all(np.isfinite(a).all() for a in numbers) else None
 
 
-def packed(stages: Stages, small: bool = False) -> dict[str, Any]:
-    """The arrays of a solved program by name.
-
-    `small`: with seven digits of values and three of multipliers, a fifth of the size; a plan that
-    begins there takes as many iterations (compared by hand on five changes of a forward jump).
-    """
-    precise, rough = (np.float32, np.float16) if small else (np.float64, np.float64)
-    most = float(np.finfo(rough).max)
+def _packed(stages: Stages) -> dict[str, Any]:
+    """The arrays of a solved program by name."""
     phases, rows = stages.phases, stages.of_rows
     table = np.concatenate([np.zeros((0, 2)), *rows.values()])
     arrays = {
@@ -49,12 +43,12 @@ def packed(stages: Stages, small: bool = False) -> dict[str, Any]:
         "modes": np.array([p.modes for p in phases]),
         "valves": np.array([p.valves for p in phases]),
         "stages": np.array(stages.stages),
-        "values": stages.values.astype(precise),
-        "of_bounds": np.clip(stages.of_bounds, -most, most).astype(rough),
+        "values": stages.values,
+        "of_bounds": stages.of_bounds,
         "labels": np.array(list(rows)),
         "rows": np.array([len(own) for own in rows.values()], dtype=int),  # of each label
         "nodes": table[:, 0].astype(np.int32),
-        "of_rows": np.clip(table[:, 1], -most, most).astype(rough),
+        "of_rows": table[:, 1],
     }
     return {f"{PREFIX}{name}": array for name, array in arrays.items()}
 

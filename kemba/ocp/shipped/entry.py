@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from kemba.model import Model
-from kemba.ocp.continuation.kept import packed, read_stages
+from kemba.ocp.continuation.kept import read_stages
 from kemba.ocp.phases.stages import Stages
-from kemba.ocp.transcription.solution import groups
 from kemba.trajectory import Trajectory
-
-KEPT = ("phase_constraints", "phases")
 
 
 @dataclass(frozen=True)
@@ -64,33 +59,8 @@ class Entry:
         return self.file.stem
 
 
-def write_plan(
-    path: Path,
-    plan: Trajectory,
-    model: Model,
-    air: Mapping[str, Any] | None = None,
-    stages: Stages | None = None,
-) -> None:
-    """Keep what a start needs in single precision: states, inputs and forces, the phases, and the
-    solved program (`stages`).
-
-    `air`: `effects` and `fitted_air` of a plan whose air was fitted.
-    """
-    headers = [q.header for group in groups(model).values() for q in group]
-    values = np.array([plan[q.name] for group in groups(model).values() for q in group])
-    notes = json.dumps({**{key: plan.meta[key] for key in KEPT}, **(air or {})})
-    np.savez_compressed(
-        path,
-        time=plan.time,
-        values=values.astype(np.float32),
-        headers=np.array(headers),
-        notes=np.array(notes),
-        **(packed(stages, small=True) if stages else {}),
-    )
-
-
 def read_plan(path: Path) -> Trajectory:
-    """The plan that `write_plan` kept."""
+    """A kept plan: states, inputs and forces in single precision, with the notes on its phases."""
     with np.load(path, allow_pickle=False) as kept:
         meta: dict[str, Any] = json.loads(str(kept["notes"]))
         values = kept["values"].astype(float)

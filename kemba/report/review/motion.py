@@ -11,7 +11,6 @@ from kemba.plotting import Machine
 from kemba.plotting.robot.machine import stance_spans
 from kemba.report.review.charts import Book, Chart, Curve, Spans
 from kemba.report.review.tracks import Track, on_grid, plan_of
-from kemba.trajectory import Array
 
 DEGREES = 180.0 / np.pi
 
@@ -148,16 +147,3 @@ def valve_chart(book: Book, leg: str, stands: Spans) -> Iterable[Chart]:
 def _stands(tracks: Sequence[Track], machine: Machine, leg: str) -> Spans:
     """When the foot stands in the first motion."""
     return stance_spans(tracks[0].source, machine, leg)
-
-
-def largest_error(book: Book, name: str, track: int) -> tuple[float, float] | None:
-    """Largest distance of a motion from the plan in a column, in SI, and when [s]."""
-    plan = plan_of(book.tracks)
-    if plan is None or name not in plan.t or name not in book.tracks[track].t:
-        return None
-    wanted = on_grid(plan, name, book.grid)
-    error: Array = np.abs(on_grid(book.tracks[track], name, book.grid) - wanted)
-    if not np.isfinite(error).any():
-        return None
-    at = int(np.nanargmax(error))
-    return float(error[at]), float(book.grid[at])
