@@ -90,20 +90,19 @@ def test_a_plan_that_is_broken_on_purpose_is_told(name: str) -> None:
 
 
 def test_bounds_are_looked_at_between_nodes() -> None:
-    """Half a swing of a leg between two nodes that keep the bound."""
-    run = solved("jump")
-    header = "front/hip/q [rad]"
-    bent = run.plan["front/hip/q"].copy()
-    bent[::2] += 0.2
-    plan = run.plan.with_columns({header: bent, "front/hip/w [rad.s-1]": np.zeros(len(bent))})
-    (at_nodes,) = asked(run, "bounds", "front/hip/q", at_most=float(bent.max()))
-    assert at_nodes.met
-    swung = run.plan["front/hip/w"].copy() * 0 - 40.0
-    plan = plan.with_columns({"front/hip/w [rad.s-1]": swung})
-    data = {"duration": 0.7, "nodes": 40, "bounds": {"front/hip/q": {"at_most": bent.max()}}}
+    """A leg that swings out and back between two nodes: its angle there follows from its rate."""
+    run, node = solved("jump"), 20
+    rate = run.plan["front/hip/w"].copy()
+    rate[node] -= 40.0
+    plan = run.plan.with_columns({"front/hip/w [rad.s-1]": rate})
+    most = float(run.plan["front/hip/q"].max())
+    data = {"duration": 0.7, "nodes": 40, "bounds": {"front/hip/q": {"at_most": most}}}
     task = Task.model_validate(data)
-    found = measured(run.model, task, resolve(task, run.model, Document(data)), plan)[0]
-    assert not found.met and found.node == 0
+    asked = resolve(task, run.model, Document(data))
+    assert measured(run.model, task, asked, run.plan)[0].met
+    swung = measured(run.model, task, asked, plan)[0]
+    assert not swung.met and swung.node == node - 1
+    assert plan.time[node - 1] < swung.time_s < plan.time[node]
 
 
 def test_an_execution_may_be_late_where_a_bound_begins() -> None:
@@ -142,3 +141,16 @@ def test_an_end_that_shipped_plans_do_not_have_is_kept_or_told(
         assert entries[0]["value"] == pytest.approx(float(plan[name][-1]), abs=1e-9)
     assert entries[0]["met"] or answer["status"] != "solved"
     assert (done.exit_code == 0) == answer["good"]
+
+
+def test_what_keys_ask_by_themselves_has_its_line_and_figure() -> None:
+    run = solved("jump")
+    task, document = load_task("jump.yaml", ["nodes=40", "refine=none", "landing.impact_speed=0.2"])
+    found = measured(run.model, task, resolve(task, run.model, document), run.plan)
+    own = {m.text: m for m in found if ":" not in m.text}
+    assert set(own) == {"duration", "min_dwell", "landing.impact_speed"}
+    assert own["duration"].met and own["duration"].line.endswith("jump.yaml:8")
+    assert own["min_dwell"].line == "", "the file does not say it"
+    speed = own["landing.impact_speed"]
+    assert not speed.met and 0.2 < speed.value <= 0.8 + 1e-6
+    assert speed.line == "--set landing.impact_speed=0.2"

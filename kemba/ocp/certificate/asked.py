@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
@@ -34,7 +34,8 @@ class MeasuredRequirement:
 
     `line`: where the task asks for it (`jump.yaml:31`); `text`: what it asks, with the quantity
     (`end.*/foot/z:front/foot/z`); `value`, `lower`, `upper` and `allowed`, by which the value may
-    be beyond its limits, in `unit`; `node`, `time_s`: where it is.
+    be beyond its limits, in `unit`; `node`, `time_s`: where it is,
+    the node before it where it is between two.
     """
 
     line: str
@@ -162,7 +163,9 @@ def _on_plan(
     if not inside.any():
         return nodes
     between = task.tolerances.apex / SCALES["m"] * requirement.scale
-    way = _worst(requirement, course.values[name][inside], course.time[inside], between)
+    time = course.time[inside]
+    before = np.searchsorted(plan.time, time) - 1
+    way = _worst(requirement, course.values[name][inside], time, between, before)
     return way if not way.met or way.miss > nodes.miss else nodes
 
 
@@ -229,33 +232,30 @@ def _of_the_task(
     model: Model, task: Task, requirements: Sequence[Requirement], plan: Trajectory
 ) -> Iterator[MeasuredRequirement]:
     """What keys of their own ask: the duration, how long valves stay, soft landings, grip."""
-    exact, last = task.tolerances.bounds, len(plan) - 1
-    blank = MeasuredRequirement(
-        "", "", 0.0, -np.inf, np.inf, "s", exact, 1.0, last, float(plan.time[-1])
-    )
-    lasts = float(plan.time[-1] - plan.time[0])
+    last, inf = len(plan) - 1, np.inf
+
+    def of(
+        key: str, value: float, lower: float, upper: float, unit: str = "s", node: int = last
+    ) -> MeasuredRequirement:
+        scale = task.duration if unit == "s" else 1.0
+        allowed, time = task.tolerances.bounds * scale, float(plan.time[node])
+        limits = lower, upper, unit, allowed, scale
+        return MeasuredRequirement(task.place(key), key, value, *limits, node, time)
+
     spread = task.step_variation * task.duration
-    ends = task.duration - spread, task.duration + spread
-    yield replace(
-        blank, text="duration", value=lasts, lower=ends[0], upper=ends[1],
-        allowed=exact * task.duration,
-    )  # fmt: skip
+    lasts = float(plan.time[-1] - plan.time[0])
+    yield of("duration", lasts, task.duration - spread, task.duration + spread)
     dwell = _shortest_dwell(model, plan)
     if dwell is not None and task.min_dwell:
         # an implicit Euler plan switches at nodes, whose steps vary
         slack = 0.0 if "phases" in plan.meta else task.step
-        shortest = max(task.min_dwell - slack, 0.0)
-        yield replace(
-            blank, text="min_dwell", value=dwell, lower=shortest, allowed=exact * task.duration
-        )
+        yield of("min_dwell", dwell, max(task.min_dwell - slack, 0.0), inf)
     if task.landing.impact_speed is not None:
         speed, node = _fastest_impact(model, plan, apex_node(requirements, last))
-        yield replace(
-            blank, text="landing.impact_speed", value=speed, upper=task.landing.impact_speed,
-            unit="m.s-1", node=node, time_s=float(plan.time[node]),
-        )  # fmt: skip
+        key = "landing.impact_speed"
+        yield of(key, speed, -inf, task.landing.impact_speed, "m.s-1", node)
     if task.grip < 1.0 and (grip := grip_of(model, plan)) is not None:
-        yield replace(blank, text="grip", value=grip, upper=task.grip, unit="1")
+        yield of("grip", grip, -inf, task.grip, "1")
 
 
 def _shortest_dwell(model: Model, plan: Trajectory) -> float | None:

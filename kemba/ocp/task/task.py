@@ -169,6 +169,7 @@ class Task(Section):
     refine: Literal["none", "radau"] = "radau"
     solver: Solver = Field(default_factory=Solver)
     _retired: tuple[str, ...] = PrivateAttr(default=())
+    _places: dict[str, str] = PrivateAttr(default_factory=dict)  # of `PLACED` in the task's file
     tolerances: Tolerances = Field(default_factory=Tolerances)
 
     @model_validator(mode="after")
@@ -176,6 +177,10 @@ class Task(Section):
         if self.height is not None and self.feet is not None:
             raise ValueError("'feet' does not go with 'height': both say how high the robot jumps")
         return self
+
+    def place(self, key: str) -> str:
+        """Where the file asks for a key of `PLACED`, `jump.yaml:9`; empty where it does not."""
+        return self._places.get(key, "")
 
     @property
     def step(self) -> float:
@@ -204,10 +209,12 @@ def _last_height(document: Document) -> Document:
     return document
 
 
+# keys that ask something of a motion by themselves
+PLACED = ("duration", "min_dwell", "landing.impact_speed", "grip")
 # keys of earlier versions: what an old file is told
 RETIRED = {
     ("fit_air",): "plans are no longer bent to the simulated robot; learn from logs instead, or "
-    "plan with `model: fitted`, the air of the paper's tables fitted to its rigs",
+    "plan with `model: fitted`, whose air is as the simulated robot's own rigs measure it",
     ("landing", "air"): "it served plans that were bent to the simulated robot",
 }
 
@@ -235,6 +242,7 @@ def parse_task(document: Document) -> Task:
     document, retired = _without_retired(_last_height(document))
     task = parse(document, Task)
     task._retired = retired
+    task._places = {key: document.place(tuple(key.split("."))) for key in PLACED}
     if not document.source:
         return task
     folder = Path(document.source).parent
