@@ -15,10 +15,9 @@ from kemba.errors import KembaError
 from kemba.files import read_json
 from kemba.learn.flight import flight_of
 from kemba.model import Model, load_spec
-from kemba.model.drawn import drawn_models
-from kemba.plant.execution.controller import execute_many
 from kemba.plotting.robot.machine import Machine
 from kemba.runs import Run
+from kemba.solve.truth import on_drawn_models
 from kemba.trajectory import Trajectory
 
 FEWEST = 10  # of them that must be simulated for a spread
@@ -77,8 +76,7 @@ def _spread(table: Trajectory, model: Model, name: str, machine: Machine, rest: 
     evidence = load_spec(name).evidence
     if evidence is None or evidence.covariance is None:
         return 0.0
-    cases = [{"model": drawn, "extra": rest} for drawn in drawn_models(model, name)]
-    done = [d for d in execute_many(table, cases) if not isinstance(d, KembaError)]
-    apex = np.array([flight_of(d.trajectory, machine).apex for d in done])
+    done = on_drawn_models(model, name, table, rest)
+    apex = np.array([flight_of(run.trajectory, machine).apex for _, run in done])
     apex = apex[np.isfinite(apex)]
     return float(apex.std(ddof=1)) if len(apex) >= FEWEST else 0.0

@@ -10,12 +10,12 @@ import numpy as np
 from kemba.errors import KembaError
 from kemba.files import sha256
 from kemba.mechanism.robot_file import robot_files
-from kemba.model import Evidence, load_spec
-from kemba.model.drawn import drawn_models
+from kemba.model import Evidence, Model, load_spec
+from kemba.model.drawn import DRAWN, drawn_models
 from kemba.model.spec import evidence_folder
 from kemba.ocp import Plan, Task
 from kemba.plant.execution.certificate import rest_after
-from kemba.plant.execution.controller import execute_many
+from kemba.plant.execution.controller import Execution, execute_many
 from kemba.plant.execution.replay import ends_standing, peak
 from kemba.trajectory import Trajectory
 
@@ -113,25 +113,33 @@ def beyond(found: Plan, evidence: Evidence) -> list[str]:
     return sentences
 
 
+def on_drawn_models(
+    model: Model, name: str, table: Trajectory, rest: float
+) -> list[tuple[Model, Execution]]:
+    """A controller's table executed on `DRAWN` models from the covariance of the model YAML `name`
+    about `model`, and `rest` [s] longer; without those that cannot be simulated.
+
+    Raises KembaError where there is no covariance.
+    """
+    drawn = drawn_models(model, name)
+    done = execute_many(table, [{"model": each, "extra": rest} for each in drawn])
+    return [(m, d) for m, d in zip(drawn, done, strict=True) if not isinstance(d, KembaError)]
+
+
 def band_of(found: Plan, table: Trajectory) -> tuple[ApexBand | None, str]:
     """The band of a plan's table on models drawn from the covariance of its own; None and why where
     there is no covariance."""
     model, plan = found.model, found.trajectory
     try:
-        drawn = drawn_models(model, found.task.model)
+        done = on_drawn_models(model, found.task.model, table, rest_after(model, plan, table))
     except KembaError as error:
         return None, f"how sure the plan is cannot be said: {error.what}"
-    rest = rest_after(model, plan, table)
-    lands = bool(ends_standing(model, plan))
-    done = execute_many(table, [{"model": each, "extra": rest} for each in drawn])
-    apex, kept = [], 0
-    for each, run in zip(drawn, done, strict=True):
-        if isinstance(run, KembaError):
-            continue
-        kept += run.against(each, plan).landed or not lands
-        apex.append(peak(run.trajectory.time, run.trajectory["body/z"])[1])
-    if len(apex) < 2:
+    if len(done) < 2:
         return None, "how sure the plan is cannot be said: no drawn model can be simulated"
+    motions = [run.trajectory for _, run in done]
+    apex = [peak(motion.time, motion["body/z"])[1] for motion in motions]
+    lands = bool(ends_standing(model, plan))
+    kept = sum(not lands or run.against(each, plan).landed for each, run in done)
     middle = peak(plan.time, plan["body/z"])[1]
     reach = 1.96 * float(np.std(apex, ddof=1))
-    return ApexBand(len(drawn), kept, middle - reach, middle + reach), ""
+    return ApexBand(DRAWN, kept, middle - reach, middle + reach), ""
