@@ -1,0 +1,47 @@
+"""Equalities at one node: the dependent ones are left out, those that contradict are told."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from kemba.ocp.phases.independent import ContradictionError, Independent
+
+X, Y = ca.SX.sym("x"), ca.SX.sym("y")
+
+
+def view() -> Any:
+    """Two coordinates, neither rates nor states."""
+    return SimpleNamespace(z=lambda groups: ca.vertcat(X, Y))
+
+
+def equalities(x: float, y: float) -> Independent:
+    """About the circle of radius one, at a guess that need not be on it."""
+    found = Independent({"q": np.array([x, y]), "v": np.zeros(0), "s": np.zeros(0)})
+    assert found.adds(X**2 + Y**2 - 1.0, view(), "the circle")
+    return found
+
+
+def test_what_follows_is_left_out_and_decided() -> None:
+    found = equalities(1.0, 0.0)
+    assert not found.adds(2.0 * (X**2 + Y**2) - 2.0, view(), "twice the circle")
+    assert found.grants(X**2 + Y**2, view()) and not found.grants(Y, view())
+    assert found.adds(Y - 0.1, view(), "a height"), "another direction"
+
+
+def test_another_value_of_the_same_is_a_contradiction() -> None:
+    found = equalities(1.0, 0.0)
+    with pytest.raises(ContradictionError, match="excludes a larger circle"):
+        found.adds(X**2 + Y**2 - 1.1, view(), "a larger circle")
+
+
+def test_values_are_compared_where_the_others_hold() -> None:
+    """At a guess far off the circle the same equality has another value than on it."""
+    found = equalities(3.0, 4.0)
+    assert not found.adds(ca.sqrt(X**2 + Y**2) - 1.0, view(), "the radius")
+    with pytest.raises(ContradictionError):
+        found.adds(ca.sqrt(X**2 + Y**2) - 5.0, view(), "the radius of the guess")
