@@ -159,7 +159,7 @@ def page(rows: list[dict[str, Any]]) -> list[str]:
         lines += [f"The {words} half, {count} files:", "", *table(of), ""]
     limit, seed, there = rows[0]["limit"], rows[0]["seed"], rows[0]["there"]
     lines += [f"Drawn with seed {seed} from {there} files that were there; {limit} CPU seconds "
-              f"at most each, one process at a time. On {machine()}."]  # fmt: skip
+              f"at most each, one process of this script at a time. On {machine()}."]  # fmt: skip
     return lines
 
 
