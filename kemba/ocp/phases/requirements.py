@@ -29,6 +29,9 @@ def add_requirements(
     for requirement in requirements:
         g = view.of(quantity_expression(program.model, requirement.quantity.name))
         z = view.z("q v s u lam")
+        if requirement.minus is not None:
+            _between_moments(program, view, requirement, g, z)
+            continue
         key = requirement.at, requirement.during, str(g), requirement.lower, requirement.upper
         if ca.jacobian(g, z).nnz() == 0 or key in seen or _about_valves(program, view, g):
             continue
@@ -45,6 +48,30 @@ def add_requirements(
             if moment is not None and not moment.adds(left, view, f"`{requirement.text}`"):
                 continue
         _put(program, view, requirement, g, nodes)
+
+
+def _between_moments(
+    program: PhaseProgram, view: View, requirement: Requirement, later: ca.SX, z: ca.SX
+) -> None:
+    """The rows, and the cost, of a requirement between two moments."""
+    assert requirement.minus is not None
+    earlier = view.of(quantity_expression(program.model, requirement.minus.name))
+    if _about_valves(program, view, later) and _about_valves(program, view, earlier):
+        return
+    before = ca.SX.sym("before", z.numel())
+    g = later - ca.substitute(earlier, z, before)
+    names, full = "q v s u lam", True
+    if not (ca.depends_on(later, view.z("u lam")) or ca.depends_on(earlier, view.z("u lam"))):
+        names, full = "q v s", False
+    state = view.z(names).numel()
+    both = ca.vertcat(before[:state], z[:state])
+    nodes = requirement.minus.node(program.nodes), requirement.node(program.nodes)
+    at = np.concatenate([_columns(program, node, full) for node in nodes])
+    scale = requirement.scale
+    ends = requirement.lower / scale, requirement.upper / scale
+    if requirement.aim:
+        program.add_cost(both, aim_cost(requirement, g), at)
+    program.add(requirement.label, both, g / scale, *ends, [at])
 
 
 def _about_valves(program: PhaseProgram, view: View, g: ca.SX) -> bool:
@@ -71,8 +98,7 @@ def _put(
             raise ContradictionError(f"other bounds exclude `{requirement.text}`")
         program.lower[at], program.upper[at] = tighter
         return
-    scale = requirement.scale
-    label = f"{requirement.text}:{requirement.quantity.name}"
+    scale, label = requirement.scale, requirement.label
     low, high = requirement.lower / scale, requirement.upper / scale
     if not ca.depends_on(g, view.z("u lam")):
         columns = [_columns(program, node, full=False) for node in nodes]

@@ -119,6 +119,7 @@ def automatic_guess(
 ) -> np.ndarray:
     """Start guess Y (nodes + 1, n) in the layout's scaled coordinates."""
     robot = model.mechanism.need_robot()
+    requirements = [r for r in requirements if r.minus is None]
     t = np.linspace(0.0, task.duration, nodes + 1)
     lengths = [
         np.hypot(f + b * np.cos(k), b * np.sin(k))
