@@ -92,7 +92,8 @@ def measured(
     anything, lengths and angles of a bound by what the re-simulation may.
     """
     course = _Course.of(model, requirements, plan)
-    found = [_on_plan(requirement, task, plan, course) for requirement in requirements]
+    listed = (r for r in requirements if r.location[0] != "contacts")  # measured by their order
+    found = [_on_plan(requirement, task, plan, course) for requirement in listed]
     return (*found, *_of_the_task(model, task, requirements, plan))
 
 
@@ -268,8 +269,22 @@ def _of_the_task(
         speed, node = _fastest_impact(model, plan, apex_node(requirements, last))
         key = "landing.impact_speed"
         yield of(key, speed, -inf, task.landing.impact_speed, "m.s-1", node)
+    if task.contacts:
+        parts = float(len(task.contacts))
+        yield of("contacts", float(_stances_in_order(task, plan)), parts, parts, "1")
     if task.grip < 1.0 and (grip := grip_of(model, plan)) is not None:
         yield of("grip", grip, -inf, task.grip, "1")
+
+
+def _stances_in_order(task: Task, plan: Trajectory) -> int:
+    """How many parts of `contacts` a plan has in their order before it first departs from it."""
+    legs = sorted({name.split("/")[0] for name in plan.names if name.endswith("/foot/Fz")})
+    stands = np.array([plan[f"{leg}/foot/Fz"] > 0.0 for leg in legs]).T[1:]
+    found = [tuple(leg for leg, on in zip(legs, row, strict=True) if on) for row in stands]
+    order = [stance for stance, _ in itertools.groupby(found)]
+    asked = [tuple(sorted(part.on)) for part in task.contacts]
+    same = itertools.takewhile(lambda pair: pair[0] == pair[1], zip(order, asked, strict=False))
+    return min(sum(1 for _ in same), 2 * len(asked) - len(order))
 
 
 def _shortest_dwell(model: Model, plan: Trajectory) -> float | None:

@@ -24,9 +24,15 @@ def add_requirements(
     view = View(program)
     program.requirements = requirements
     program.apex = apex_node(requirements, program.nodes)
-    _granted_at_end(program, view, end)
+    granted = _granted_at_end(program, view, end)
+    tied = {r.quantity.name for r in requirements if r.minus and (r.minus.at, r.at) == (0.0, 1.0)}
+    for expression in granted:  # what is closed at the end of a stride is closed at its start
+        if _states_of(program, expression) <= tied:
+            start.adds(view.of(expression), view, "the start of a stride")
     seen: set[tuple[object, ...]] = set()
     for requirement in requirements:
+        if requirement.location[0] == "contacts":
+            continue  # phases keep the contacts of the plan
         g = view.of(quantity_expression(program.model, requirement.quantity.name))
         z = view.z("q v s u lam")
         if requirement.minus is not None:
@@ -116,8 +122,9 @@ def _columns(program: PhaseProgram, node: int, full: bool) -> np.ndarray:
     return np.concatenate(parts)
 
 
-def _granted_at_end(program: PhaseProgram, view: View, end: Independent) -> None:
-    """What the last phase's closed constraints imply at the last node."""
+def _granted_at_end(program: PhaseProgram, view: View, end: Independent) -> list[ca.SX]:
+    """What the last phase's closed constraints imply at the last node: expressions that are 0."""
+    found = []
     for constraint, mode in zip(program.constraints, program.phases[-1].modes, strict=True):
         if mode == 0:
             continue
@@ -126,3 +133,23 @@ def _granted_at_end(program: PhaseProgram, view: View, end: Independent) -> None
             granted.append(constraint.friction.slip)
         for expression in granted:
             end.adds(view.of(expression), view, f"that {constraint.label} is closed at the end")
+        found += granted
+    return found
+
+
+def _states_of(program: PhaseProgram, expression: ca.SX) -> set[str]:
+    """The coordinates, rates and states of effects on which an expression of the node depends."""
+    model, node = program.model, program.model.node
+    mechanism = model.mechanism
+    listed = [
+        (mechanism.coordinates, node.q),
+        (mechanism.velocities, node.v),
+        (model.states.values(), node.s),
+    ]
+    read = {str(symbol) for symbol in ca.symvar(expression)}
+    return {
+        q.name
+        for quantities, symbols in listed
+        for q, symbol in zip(quantities, ca.vertsplit(symbols), strict=True)
+        if str(symbol) in read
+    }
