@@ -93,7 +93,8 @@ def variants(task: Task) -> Iterator[tuple[str, Task]]:
     """The same motion sought anew."""
     settings = RobustSettings.current()
     held = task.model_copy(update={"hold": max(task.hold, settings.hold)})
-    if task.cost.get("air", 0.0) < settings.air:
+    air = task.cost.get("air", 0.0)
+    if isinstance(air, float) and air < settings.air:
         yield "with less air", held.model_copy(update={"cost": {**task.cost, "air": settings.air}})
     for seed in range(1, settings.starts + 1):
         guess = {"guess_noise": max(task.guess_noise, settings.noise), "seed": task.seed + seed}

@@ -99,6 +99,13 @@ class Periodic(Section):
         return {} if data is True else data
 
 
+class CostTerm(Section):
+    """The time integral of an expression of quantities, `front/hip/w^2`, times `weight`."""
+
+    expression: str
+    weight: Annotated[float, Param("1", lower=0.0)] = 1.0
+
+
 class Landing(Section):
     """How softly the motion lands."""
 
@@ -195,7 +202,7 @@ class Task(Section):
     goals: dict[str, Goal] = Field(default_factory=dict)
     contacts: tuple[Stance, ...] = ()
     periodic: Periodic | None = None
-    cost: dict[str, float] = Field(default_factory=lambda: {"torque_squared": 1.0})
+    cost: dict[str, float | CostTerm] = Field({"torque_squared": 1.0})
     robust: Annotated[int, Field(ge=0, le=10_000)] = 0
     uncertainties: str = "usual"
     guess: Literal["automatic", "standing"] = "automatic"
