@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, PrivateAttr, model_validator
+from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from kemba.config import Document, FileName, Section, beside, parse
 from kemba.config.document import written
@@ -161,7 +161,7 @@ class Tolerances(Section):
 class Task(Section):
     """A motion to plan: grid, requirements at start and end, bounds on the way, goals, costs.
 
-    `step_variation`: each step lasts duration/nodes within this fraction. `start` and `end` map
+    `task`: the version of this language, 2. `step_variation`: each step lasts duration/nodes within this fraction. `start` and `end` map
     quantities to values; `rest: true` there means that all rates are zero,
     `settled: true` that every state of an effect is at its value at rest. `hold`: for so long
     before the plan the controller keeps the first pose, valves closed, so that the robot settles.
@@ -179,6 +179,7 @@ class Task(Section):
     """
 
     name: FileName = "task"
+    language: Annotated[int, Field(alias="task")] = 2
     notes: str = ""
     model: str = "planning"
     plant: str = "plant"
@@ -215,6 +216,13 @@ class Task(Section):
     _retired: tuple[str, ...] = PrivateAttr(default=())
     _places: dict[str, str] = PrivateAttr(default_factory=dict)  # of `PLACED` in the task's file
     tolerances: Tolerances = Field(default_factory=Tolerances)
+
+    @field_validator("language")
+    @classmethod
+    def _known(cls, version: int) -> int:
+        if version not in (1, 2):
+            raise ValueError(f"tasks of version {version} need a later kemba; this one reads 2")
+        return version
 
     @model_validator(mode="after")
     def _one_height(self) -> Task:
