@@ -189,8 +189,9 @@ class Task(Section):
 
     `task`: the version of this language, 2. `step_variation`: each step lasts duration/nodes within
     this fraction. `start` and `end` map quantities to values; `rest: true` there means that all
-    rates are zero, `settled: true` that every state of an effect is at its value at rest. `hold`: for so long
-    before the plan the controller keeps the first pose, valves closed, so that the robot settles.
+    rates are zero, `settled: true` that every state of an effect is at its value at rest. `hold`:
+    for so long before the plan the controller keeps the first pose, valves closed, so that the
+    robot settles.
     `grip`: the share of the ground's friction that sticking feet may use in the plan; its model and
     the plant keep all of it.
     `folding`: whether legs may have to fold for `clearance`; if not, a low jump has what stretched
