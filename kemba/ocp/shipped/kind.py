@@ -14,7 +14,18 @@ from kemba.ocp.task.task import Task
 FIGURES = ("height", "distance", "supply", "payload", "duration")
 # What says how a plan is made, named or judged, but not what is asked of it.
 APART = (
-    *("name", "notes", "model", "plant", "effects", "nodes", "hold", "robust", "uncertainties"),
+    *(
+        "language",
+        "name",
+        "notes",
+        "model",
+        "plant",
+        "effects",
+        "nodes",
+        "hold",
+        "robust",
+        "uncertainties",
+    ),
     *("grip", "feet", "guess", "guess_noise", "seed", "solver", "tolerances"),
 )
 LETTERS = 12  # of a fingerprint
@@ -28,7 +39,8 @@ def kind_of(task: Task, model: Model) -> str:
     when it is continued.
     """
     apart = dict.fromkeys((*FIGURES, *APART), True)
-    asked = task.model_dump(mode="json", exclude=apart, exclude_none=True)
+    dumped = task.model_dump(mode="json", exclude=apart, exclude_none=True)
+    asked = {key: value for key, value in dumped.items() if value != []}
     robot = model.mechanism.robot
     physics = {
         "robot": robot.model_dump(mode="json") if robot is not None else model.mechanism.name,

@@ -119,6 +119,7 @@ def _nearest(tasks: Iterable[tuple[Task, Model]]) -> list[Neighbour]:
 def _may_begin(task: Task) -> bool:
     """Whether a task may begin from a shipped plan: it asks for no start or method of its own."""
     own = task.method == "relaxation" and task.refine == "radau"
+    own = own and not (task.contacts or task.periodic or task.sequence)
     return own and not task.guess_noise and not task.seed and task.guess == "automatic"
 
 
