@@ -61,13 +61,7 @@ class Aim:
         done = execute(table, self.model, extra=rest)
         seen, add = flight_of(done.trajectory, self.machine), self.correction
         lands = done.against(self.model, self.plan).landed
-        flight = FlownJump(
-            seen.apex + add.apex,
-            seen.apex_time,
-            seen.touchdown + add.touchdown,
-            seen.pitch,
-            seen.upright,
-        )
+        flight = FlownJump(seen.apex + add.apex, seen.touchdown + add.touchdown, seen.pitch)
         return flight, lands
 
     def corrected(self, table: Trajectory) -> Aimed:

@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 
 from kemba.errors import KembaError
+from kemba.events import PLANNED, read
 from kemba.model import Model
 from kemba.plant.execution.controller import PERIOD, Gains, hip_control, read_controller
 from kemba.plant.execution.sensors import Sensors
@@ -153,10 +154,7 @@ def _to_state(course: EventCourse) -> Array:
 
 
 def _landing(course: EventCourse) -> float:
-    """When [s] the first foot comes down after the apex; the end where none does."""
+    """A tick before the first foot comes down after the apex [s]; the end where none does."""
     motion = course.motion
-    apex = float(motion.time[int(np.argmax(motion["body/z"]))])
-    feet = [motion[n] for n in motion.names if n.endswith("foot/z")]
-    low = np.min(feet, axis=0) <= 1e-4
-    down = np.flatnonzero(low & (motion.time > apex) & np.r_[False, ~low[:-1]])
-    return float(motion.time[down[0]]) - PERIOD if len(down) else float(motion.time[-1])
+    landing = read(motion, PLANNED, course.hybrid.model.mechanism.weight).landing
+    return landing - PERIOD if landing < np.inf else float(motion.time[-1])

@@ -11,8 +11,9 @@ import numpy as np
 
 from kemba.effects.mechanics.motor import Motor
 from kemba.errors import KembaError
+from kemba.events import STANDS
 from kemba.model import Model
-from kemba.plant.execution.replay import LandingSettings, Replay, first_row, judge
+from kemba.plant.execution.replay import Replay, first_row, judge
 from kemba.plant.simulation.commands import SAME_TIME, Commands, JointControl, Profile
 from kemba.plant.simulation.simulate import Condition, Simulated, run_many, simulate_one
 from kemba.plant.simulation.start import lowest_foot
@@ -110,7 +111,7 @@ def condition_of(
         if quantity.binary
     }
     pose = {**first_row(model, table), **(start or {})}
-    falls = lowest_foot(model, pose) > LandingSettings.current().on_ground
+    falls = lowest_foot(model, pose) > STANDS
     begin = 0.0 if falls else float(table.time[0])
     both = {**profiles, **(valves or {})}
     sent = {name: Profile(p.times - begin, p.values) for name, p in both.items()}
