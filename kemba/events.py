@@ -30,7 +30,7 @@ ORDINALS = "first second third fourth fifth sixth seventh eighth ninth".split()
 
 
 @dataclass(frozen=True)
-class Reading:
+class Thresholds:
     """How a motion is read: feet below `touches` [m] touch, at a row or `between` two; an apex is
     that of a parabola through the rows within `around` [s] of the highest and those beside it, or
     the highest row itself where it is None."""
@@ -40,10 +40,10 @@ class Reading:
     between: bool = False
 
 
-PLANNED = Reading(1e-4)
-EXECUTED = Reading(1e-6, 0.0)  # the gap that the simulator's kernel calls closed
+PLANNED = Thresholds(1e-4)
+EXECUTED = Thresholds(1e-6, 0.0)  # the gap that the simulator's kernel calls closed
 # ten times the noise of the body's height; 40 readings average 0.3 mm of it to 0.05 mm
-MEASURED = Reading(3e-3, 0.02, between=True)
+MEASURED = Thresholds(3e-3, 0.02, between=True)
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class Course:
     motion: Trajectory
     time: Array
     contacts: Mapping[str, Sequence[Span]]
-    reading: Reading
+    reading: Thresholds
 
     @property
     def flights(self) -> list[Span]:
@@ -111,7 +111,7 @@ def gap(motion: Trajectory, leg: str, point: str = "foot") -> Array:
 
 def read(
     motion: Trajectory,
-    reading: Reading,
+    reading: Thresholds,
     weight: float = math.inf,
     clock: Array | None = None,
     hits: Mapping[str, Sequence[float]] | None = None,
@@ -132,7 +132,7 @@ def read(
 def contacts(
     time: Array,
     height: Array,
-    reading: Reading,
+    reading: Thresholds,
     load: Array | None = None,
     weight: float = math.inf,
     hits: Sequence[float] = (),
@@ -161,7 +161,9 @@ def _first(span: Span) -> float:
     return span.begin
 
 
-def _begin(time: Array, height: Array, reading: Reading, hits: Sequence[float], row: int) -> float:
+def _begin(
+    time: Array, height: Array, reading: Thresholds, hits: Sequence[float], row: int
+) -> float:
     """When [s] a foot that is in the air in the row before touches."""
     before, at = float(time[row - 1]), float(time[row])
     if reading.between:
@@ -198,7 +200,7 @@ def flights(contacts: Sequence[Span]) -> list[Span]:
 
 
 def peak(time: Array, z: Array, around: float | None = 0.0) -> tuple[float, float]:
-    """Time [s] and height [m] of the highest point; see `Reading`."""
+    """Time [s] and height [m] of the highest point; see `Thresholds`."""
     i = int(np.argmax(z))
     if around is None or not 0 < i < len(z) - 1:
         return float(time[i]), float(z[i])
@@ -265,7 +267,7 @@ class Event:
 
 
 @dataclass(frozen=True)
-class Landing:
+class PlannedLanding:
     """Feet that are planned to come down together: when [s], and when the first of them did."""
 
     legs: tuple[str, ...]
@@ -279,7 +281,7 @@ class Landing:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class EventComparison:
     """The events of a plan and its execution, in order of time."""
 
     events: tuple[Event, ...] = ()
@@ -290,7 +292,7 @@ class Comparison:
         return [e for e in self.events if e.kind == "apex" and e.height_error_m is not None]
 
     @property
-    def landings(self) -> list[Landing]:
+    def landings(self) -> list[PlannedLanding]:
         """The planned touchdowns that were executed; those within `LASTS` are one landing."""
         found: list[list[Event]] = []
         for event in (e for e in self.events if e.kind == "touchdown" and e.error_s is not None):
@@ -299,7 +301,7 @@ class Comparison:
             else:
                 found.append([event])
         return [
-            Landing(tuple(str(e.leg) for e in one), one[0].time,
+            PlannedLanding(tuple(str(e.leg) for e in one), one[0].time,
                     min(e.executed_s for e in one if e.executed_s is not None))
             for one in found
         ]  # fmt: skip
@@ -308,7 +310,8 @@ class Comparison:
     def missed(self) -> str:
         """The first planned event that does not come, or comes before one that is planned earlier,
         in words; empty without any. Events within `LASTS` have no order."""
-        for event in (e for e in self.events if e.planned_s is not None and e.executed_s is None):
+        missing = [e for e in self.events if e.executed_s is None]
+        for event in sorted(missing, key=lambda e: e.kind == "apex"):
             if event.kind == "apex":
                 return f"has a foot on the ground in the flight of {event.time:.3f} s"
             return f"never {event.words}, planned at {event.time:.3f} s"
@@ -340,7 +343,7 @@ class Comparison:
         return self.missed or self.unplanned
 
 
-def compared(plan: Course, real: Course) -> Comparison:
+def compared(plan: Course, real: Course) -> EventComparison:
     """A plan that begins at 0 s and its execution by their events; what an execution does before
     the plan or after it is left out.
 
@@ -359,14 +362,14 @@ def compared(plan: Course, real: Course) -> Comparison:
     for was, now in aligned(flights(firm[0]), flights(firm[1]), until):
         if was and was.firm and was.end > 0.0 and was.begin < until:
             found.append(_apex(plan, real, was, now))
-    return Comparison(tuple(sorted(found, key=lambda event: event.time)))
+    return EventComparison(tuple(sorted(found, key=lambda event: event.time)))
 
 
 def _edges(leg: str, was: Span | None, now: Span | None, until: float) -> Iterator[Event]:
     """The touchdown and the lift-off of a contact; `was` and `now` of plan and execution."""
     for kind, edge in (("touchdown", "begin"), ("liftoff", "end")):
         planned, executed = (getattr(s, edge) if s else math.nan for s in (was, now))
-        asked = 0.0 < planned < until or (kind == "touchdown" and planned == until)
+        asked = 0.0 < planned < until or (planned == until and math.isfinite(executed))
         done = 0.0 < executed < until
         if asked or done:
             yield Event(
@@ -417,7 +420,7 @@ def aligned(
     best: dict[tuple[int, int], tuple[int, float, Pairs]] = {(0, 0): (0, 0.0, ())}
     for i, j in list(product(range(len(was) + 1), range(len(now) + 1)))[1:]:
         ways = []
-        for di, dj in ((1, 0), (0, 1), (1, 1)):
+        for di, dj in ((1, 1), (1, 0), (0, 1)):
             if i >= di and j >= dj:
                 a, b = was[i - 1] if di else None, now[j - 1] if dj else None
                 (firm, time, pairs), (more, off) = best[i - di, j - dj], cost(a, b)

@@ -13,7 +13,7 @@ from kemba.events import (
     PLANNED,
     STAYS,
     UPRIGHT,
-    Comparison,
+    EventComparison,
     compared,
     ends_standing,
     gap,
@@ -55,7 +55,7 @@ class Replay:
     fault: str | None
     trajectory: Trajectory
     impacts: tuple[Impact, ...]
-    compared: Comparison = field(default_factory=Comparison)
+    compared: EventComparison = field(default_factory=EventComparison)
     end: EndError | None = None
 
     @property
