@@ -291,35 +291,36 @@ class EventComparison:
         """The apexes of flights that both have."""
         return [e for e in self.events if e.kind == "apex" and e.height_error_m is not None]
 
-    @property
-    def landings(self) -> list[PlannedLanding]:
-        """The planned touchdowns that were executed; those within `LASTS` are one landing."""
-        found: list[list[Event]] = []
-        for event in (e for e in self.events if e.kind == "touchdown" and e.error_s is not None):
-            if found and event.time - found[-1][0].time < LASTS:
+    def landings(self, together: float = math.inf) -> list[PlannedLanding]:
+        """The planned touchdowns that were executed. Those within `together` [s] are one landing,
+        unless a foot is to leave the ground in between."""
+        found: list[list[Event]] = [[]]
+        for event in (e for e in self.events if e.planned_s is not None and e.kind != "apex"):
+            if event.kind == "liftoff" or (found[-1] and event.time - found[-1][0].time > together):
+                found.append([])
+            if event.kind == "touchdown" and event.executed_s is not None:
                 found[-1].append(event)
-            else:
-                found.append([event])
         return [
-            PlannedLanding(tuple(str(e.leg) for e in one), one[0].time,
-                    min(e.executed_s for e in one if e.executed_s is not None))
-            for one in found
+            PlannedLanding(
+                tuple(str(e.leg) for e in one), one[0].time,
+                min(e.executed_s for e in one if e.executed_s is not None),
+            )
+            for one in found if one
         ]  # fmt: skip
 
-    @property
-    def missed(self) -> str:
-        """The first planned event that does not come, or comes before one that is planned earlier,
-        in words; empty without any. Events within `LASTS` have no order."""
+    def missed(self, together: float = LASTS) -> str:
+        """The first planned event that does not come, or comes before one that is planned earlier
+        by more than `together` [s], in words; empty without any."""
         missing = [e for e in self.events if e.executed_s is None]
         for event in sorted(missing, key=lambda e: e.kind == "apex"):
             if event.kind == "apex":
                 return f"has a foot on the ground in the flight of {event.time:.3f} s"
             return f"never {event.words}, planned at {event.time:.3f} s"
-        both = [e for e in self.events if e.error_s is not None and e.kind != "apex"]
-        for a, b in combinations(both, 2):
-            if b.time - a.time > LASTS and a.time + (a.error_s or 0.0) > b.time + (
-                b.error_s or 0.0
-            ):
+        feet = [
+            (e, e.time, e.time + e.error_s) for e in self.events if e.leg and e.error_s is not None
+        ]
+        for (a, was, now), (b, later, sooner) in combinations(feet, 2):
+            if later - was > together and sooner < now:
                 return f"{b.words} before it {a.words}, not after"
         return ""
 
@@ -340,7 +341,7 @@ class EventComparison:
     @property
     def difference(self) -> str:
         """What keeps the execution from having the plan's events in the plan's order."""
-        return self.missed or self.unplanned
+        return self.missed() or self.unplanned
 
 
 def compared(plan: Course, real: Course) -> EventComparison:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from kemba.errors import enumerated
-from kemba.events import ORDINALS
+from kemba.events import LASTS, ORDINALS
 from kemba.ocp.certificate.asked import MeasuredRequirement
 from kemba.ocp.task.task import Tolerances
 from kemba.plant.execution.replay import Replay
@@ -31,6 +31,11 @@ class Allowed:
     apex: float
     touchdown: float
     final: float
+
+    @property
+    def together(self) -> float:
+        """Events [s] that are planned nearer to each other have no order: each may err by half."""
+        return max(LASTS, 2.0 * self.touchdown)
 
     @property
     def pitch(self) -> float:
@@ -95,7 +100,7 @@ def judge(
     worst = max(figures, key=lambda figure: figure.share)
     missed = max((m for m in asked if not m.met), key=lambda m: m.miss / m.allowed, default=None)
     events = done.compared
-    fault = done.fault or (events.difference if same_model else events.missed)
+    fault = done.fault or (events.missed(allowed.together) or (same_model and events.unplanned))
     if fault:
         causes.insert(0, fault)
     elif missed is not None and not causes:
@@ -111,7 +116,7 @@ def judge(
 
 def _figures(done: Replay, allowed: Allowed) -> Iterator[_Figure]:
     """Every error: of the flights' apexes and landings, and of the end."""
-    flown, landings = done.compared.apexes, done.compared.landings
+    flown, landings = done.compared.apexes, done.compared.landings(allowed.together)
     if not flown:
         yield _apex(done.apex_error_m, allowed.apex)
     for number, apex in enumerate(flown):

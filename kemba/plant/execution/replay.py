@@ -110,7 +110,7 @@ def judge(model: Model, plan: Trajectory, clock: Array, done: Simulated) -> Repl
     was = read(plan, PLANNED, weight, clock)
     now = read(real, EXECUTED, weight, hits=_hits(done.impacts))
     found = compared(was, now)
-    late = (one.late for one in found.landings if one.planned > was.top[0])
+    late = (one.late for one in found.landings() if one.planned > was.top[0])
     standing = ends_standing(plan, model.mechanism.legs)
     at = float(real.time[-1] if standing else clock[-1])
 

@@ -192,7 +192,7 @@ def _errors(plan: Trajectory, done: Replay) -> Array:
     flown = [(e.time, e.height_error_m) for e in done.compared.events if e.kind == "apex"]
     found, real = [], done.trajectory
     for time, higher in flown or [(float(clock[top]), done.apex_error_m)]:
-        late = (one.late for one in done.compared.landings if one.planned > time)
+        late = (one.late for one in done.compared.landings() if one.planned > time)
         there, planned = (
             float(np.interp(time, t, motion["body/x"]))
             for t, motion in ((real.time, real), (clock, plan))
