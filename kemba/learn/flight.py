@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kemba.events import MEASURED, Course, contacts
+from kemba.events import MEASURED, read
 from kemba.plotting.robot.machine import Machine
 from kemba.trajectory import Trajectory
 
@@ -24,13 +24,12 @@ class FlownJump:
 def flight_of(motion: Trajectory, machine: Machine) -> FlownJump:
     """The highest flight of a motion with body/z, body/pitch and every leg's hip and piston (or
     knee)."""
-    coordinates = machine.coordinates(motion)
-    assert coordinates is not None  # a log of a robot has these columns
-    clock, places = motion.time, machine.points(coordinates)
-    heights = {leg: places[f"{leg}/foot"][:, 1] for leg in machine.mechanism.legs}
-    feet = {leg: contacts(clock, height, MEASURED) for leg, height in heights.items()}
-    course = Course(motion, clock, feet, MEASURED)
+    feet = machine.feet(motion)
+    assert feet is not None  # a log of a robot has these columns
+    course = read(feet, MEASURED)
     if not np.isfinite(course.landing):
         return FlownJump(course.top[1], np.nan, np.nan)
-    pitch = motion.get("body/pitch", np.zeros(len(clock)))
-    return FlownJump(course.top[1], course.landing, float(np.interp(course.landing, clock, pitch)))
+    pitch = motion.get("body/pitch", np.zeros(len(motion)))
+    return FlownJump(
+        course.top[1], course.landing, float(np.interp(course.landing, motion.time, pitch))
+    )

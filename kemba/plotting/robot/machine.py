@@ -12,7 +12,7 @@ import numpy as np
 from kemba.config import load_yaml
 from kemba.effects.pneumatics.chamber import STEADY, Chamber
 from kemba.effects.pneumatics.tables import at_supply
-from kemba.events import STAYS, bridged
+from kemba.events import STAYS, bridged, gap
 from kemba.mechanism import Mechanism, Robot, knee
 from kemba.model import Model, build_model, load_spec
 from kemba.plotting.source import Mask, Source
@@ -94,10 +94,22 @@ class Machine:
             return np.zeros(len(trajectory), dtype=bool)
         return np.asarray(height < ON_GROUND)
 
+    def feet(self, trajectory: Trajectory) -> Trajectory | None:
+        """The motion with the places of its feet [m], or None where columns are missing."""
+        coordinates = self.coordinates(trajectory)
+        if coordinates is None:
+            return None
+        points = self.points(coordinates)
+        places = {leg: points[f"{leg}/foot"] for leg in self.mechanism.legs}
+        return trajectory.with_columns(
+            {f"{leg}/foot/{axis} [m]": at[:, i] for leg, at in places.items()
+             for i, axis in enumerate("xz")}
+        )  # fmt: skip
+
     def _height(self, trajectory: Trajectory, leg: str) -> Array | None:
-        """The height (n,) [m] of a leg's foot, or None where columns are missing."""
-        coordinates = self.coordinates(trajectory) if leg in self.mechanism.legs else None
-        return None if coordinates is None else self.points(coordinates)[f"{leg}/foot"][:, 1]
+        """How high (n,) [m] a leg's foot is, or None where columns are missing."""
+        feet = self.feet(trajectory) if leg in self.mechanism.legs else None
+        return None if feet is None else gap(feet, leg)
 
 
 def _averaged(time: Array, values: Array) -> tuple[Array, int]:

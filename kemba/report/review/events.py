@@ -16,6 +16,7 @@ from kemba.events import (
     Span,
     contacts,
     ends_standing,
+    gap,
     read,
     turned,
 )
@@ -76,11 +77,10 @@ def _course(track: Track, machine: Machine) -> Course:
 
 def _feet(t: Trajectory, machine: Machine) -> float | None:
     """How far [m] the lower foot rises."""
-    coordinates = machine.coordinates(t)
-    if coordinates is None:
+    feet = machine.feet(t)
+    if feet is None:
         return None
-    points = machine.points(coordinates)
-    lower = np.min([points[f"{leg}/foot"][:, 1] for leg in machine.mechanism.legs], axis=0)
+    lower = np.min([gap(feet, leg) for leg in machine.mechanism.legs], axis=0)
     return float(np.nanmax(lower)) if np.isfinite(lower).any() else None
 
 
