@@ -11,16 +11,10 @@ from kemba.plant.execution.repeat import plant_of
 from kemba.runs import load_run
 from kemba.scenarios.conditions import standing
 from kemba.scenarios.draw import scenarios
-from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Trajectory
 
 FILE = "twice"  # of configs/uncertainties
-
-
-class FeedbackScenarioSettings(Settings):
-    """From how many executions feedback learns what to expect."""
-
-    count: int = setting(64, "1", "scenarios that are executed", CHOSEN)
+COUNT = 64  # scenarios from which feedback learns what to expect
 
 
 def executions_of(run: str | Path, jobs: int | None = None) -> list[Trajectory]:
@@ -30,7 +24,7 @@ def executions_of(run: str | Path, jobs: int | None = None) -> list[Trajectory]:
     KembaError where the run has no table or no plan.
     """
     table, plant = read_controller(run), plant_of(run)
-    cases = scenarios(FILE, plant, FeedbackScenarioSettings.current().count)
+    cases = scenarios(FILE, plant, COUNT)
     asked = [{"model": c.model, "start": standing(c.model, table, c.start)} for c in cases]
     pitch = float(load_run(run).trajectory["body/pitch"][-1])
     done = [d for d in execute_many(table, asked, jobs) if not isinstance(d, KembaError)]

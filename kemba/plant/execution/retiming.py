@@ -35,27 +35,20 @@ class RetimingSettings(Settings):
     """How long other roundings of a table are tried, and how near is near enough."""
 
     apex: float = setting(0.5e-3, "m", "apex error that needs no search", CHOSEN)
-    ahead: float = setting(
-        1e-3, "m", "error of the place ahead, at the planned apex's time, that needs no search",
-        CHOSEN,
-    )  # fmt: skip
     touchdown: float = setting(1e-3, "s", "touchdown error that needs no search", "derived: a tick")
     final: float = setting(0.01, "m", "error of the end that needs no search", CHOSEN)
-    fallen: float = setting(
-        1e3, "1", "error of a robot that falls, in units of those", "convention: beyond any other"
-    )
     executions: int = setting(
         24, "1", "simulations at most", "derived: edges on ticks of the plan cost as much; of 30 "
         "tables 17 took 2 to 24 (benchmarks/retiming.py)",
     )  # fmt: skip
-    sure: float = setting(
-        0.7, "1", "predicted error, in the same units, at which a table is tried before the "
-        "effects of all edges are known", "convention: below 1 by what predictions miss",
-    )  # fmt: skip
-    price: float = setting(
-        0.03, "1", "predicted error that a tick counts as", "convention: small beside `sure`; of "
-        "equal predictions the one with fewer ticks is surer",
-    )  # fmt: skip
+
+
+AHEAD = 1e-3  # m; error of the place ahead, at the planned apex's time, that needs no search
+FALLEN = 1e3  # error of a robot that falls, in units of those: beyond any other
+# predicted error at which a table is tried before the effects of all edges are known: below 1 by
+# what predictions miss
+SURE = 0.7
+PRICE = 0.03  # predicted error that a tick counts as: of equal predictions fewer ticks are surer
 
 
 @dataclass(frozen=True)
@@ -73,7 +66,7 @@ class ExecutedTable:
     def lands(self) -> bool:
         """Whether it can be compared with others: it was simulated, and falls only where the plan
         does."""
-        return self.error < RetimingSettings.current().fallen
+        return self.error < FALLEN
 
 
 def retimed(model: Model, plan: Trajectory, table: Trajectory) -> ExecutedTable:
@@ -144,16 +137,15 @@ class _Effects:
 
     def promising(self, unknown: Sequence[int], error: float) -> Array | None:
         """The ticks (groups,) that were not tried and are predicted to come nearest to the plan;
-        None where that is not near enough: `sure` as long as effects are `unknown`, then below
+        None where that is not near enough: `SURE` as long as effects are `unknown`, then below
         `error`."""
-        settings = RetimingSettings.current()
-        useless = np.abs(self.slopes).max(axis=1) <= settings.price
+        useless = np.abs(self.slopes).max(axis=1) <= PRICE
         possible = self.open & ~self.moves[:, useless].any(axis=1)
         away = self.nearest + (self.moves - self.there) @ self.slopes
-        predicted = np.abs(away).max(axis=1) + settings.price * np.abs(self.moves).sum(axis=1)
+        predicted = np.abs(away).max(axis=1) + PRICE * np.abs(self.moves).sum(axis=1)
         predicted[~possible] = np.inf
         best = int(predicted.argmin())
-        near = settings.sure if unknown else error
+        near = SURE if unknown else error
         return np.asarray(self.moves[best]) if predicted[best] < near else None
 
     def done(self, ticks: Array) -> None:
@@ -178,11 +170,9 @@ def executed_table(
         facts = execute(table, model, extra=extra).against(model, plan)
     except KembaError:
         return ExecutedTable(table, None, np.full(3, np.inf), np.inf)
-    signed = _errors(plan, facts) / np.array([limits.apex, limits.touchdown, limits.ahead])
+    signed = _errors(plan, facts) / np.array([limits.apex, limits.touchdown, AHEAD])
     error = float(max(np.abs(signed).max(), abs(facts.final_error_m) / limits.final))
-    return ExecutedTable(
-        table, facts, signed.ravel(), error + (0.0 if facts.landed else limits.fallen)
-    )
+    return ExecutedTable(table, facts, signed.ravel(), error + (0.0 if facts.landed else FALLEN))
 
 
 def _errors(plan: Trajectory, done: Replay) -> Array:
