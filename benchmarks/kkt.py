@@ -23,7 +23,7 @@ from scipy.sparse.linalg import splu
 from kemba.model import load_model
 from kemba.ocp import load_task
 from kemba.ocp.planner import Planner
-from kemba.ocp.task.requirement import resolve
+from kemba.ocp.task.resolve import resolve
 from kemba.ocp.transcription.parameters import Parameters
 from kemba.ocp.transcription.symmetry import whole
 from kemba.ocp.transcription.transcribe import Transcription

@@ -219,7 +219,7 @@ def planning(name: str) -> Case:
     from kemba.ocp.reading import task_model
     from kemba.ocp.refined import refined
     from kemba.ocp.relaxation.session import Session
-    from kemba.ocp.task.requirement import resolve
+    from kemba.ocp.task.resolve import resolve
 
     task, document = load_task(f"{name.removeprefix('schedule:')}.yaml", UNHURRIED)
     model = task_model(task)

@@ -136,13 +136,23 @@ def read_si(value: float | int | str) -> tuple[float, str]:
     if written in USUAL:
         si = USUAL[written][0]
         return to_si(value, si), si
-    unit = parse_unit(written)
-    named = (u for u in NAMES if parse_unit(u).dimensionality == unit.dimensionality)
-    si = next(named, "") or ".".join(
-        f"{BASE[dimension]}{power if power != 1 else ''}"
-        for dimension, power in unit.dimensionality.items()
-    )
+    si = si_name(parse_unit(written))
     return to_si(value, si), si
+
+
+def si_name(unit: pint.Unit) -> str:
+    """The SI unit of a unit's dimension as headers write it: `N.m`; angles keep their `rad`."""
+    named = [u for u in NAMES if parse_unit(u).dimensionality == unit.dimensionality]
+    same = (u for u in named if registry().Quantity(1, unit).to_root_units().units
+            == registry().Quantity(1, parse_unit(u)).to_root_units().units)  # fmt: skip
+    return (
+        next(same, "")
+        or next(iter(named), "")
+        or ".".join(
+            f"{BASE[dimension]}{power if power != 1 else ''}"
+            for dimension, power in unit.dimensionality.items()
+        )
+    )
 
 
 def called_dimension(unit: pint.Unit) -> str:

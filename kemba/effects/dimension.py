@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from kemba.effects.formula import SAME
-from kemba.units import called_dimension, parse_unit
+from kemba.units import called_dimension, parse_unit, si_name
 
 
 def check_dimension(tree: ast.expr, units: Mapping[str, str], unit: str) -> None:
@@ -22,6 +22,14 @@ def check_dimension(tree: ast.expr, units: Mapping[str, str], unit: str) -> None
             f"'{ast.unparse(tree)}' is {called_dimension(found.unit)}; "
             f"{called_dimension(parse_unit(unit))} ({unit}) was expected"
         )
+
+
+def unit_of(tree: ast.expr, units: Mapping[str, str]) -> str:
+    """The SI unit of a formula's value, `units` are those of its names.
+
+    Raises ValueError with the part of the formula whose dimensions do not fit together.
+    """
+    return si_name(_Dimensions(units).of(tree).unit)
 
 
 @dataclass(frozen=True)

@@ -197,7 +197,7 @@ def _coordinates(robot: Robot) -> tuple[tuple[Quantity, ...], tuple[Quantity, ..
     q = [
         Quantity("body/x", "m", -5.0, 5.0, 0.1, doc="body centre, forward"),
         Quantity("body/z", "m", 0.0, 3.0, 0.1, doc="body centre, height above the ground"),
-        Quantity("body/pitch", "rad", -np.pi / 2, np.pi / 2, 0.2, doc="nose up positive"),
+        Quantity("body/pitch", "rad", -np.inf, np.inf, 0.2, doc="nose up positive"),
     ]
     q += [
         Quantity(f"{leg}/hip/q", "rad", -HIP_RANGE, HIP_RANGE, 0.5, doc="femur against body")

@@ -27,7 +27,8 @@ from kemba.ocp.reading import asked_of, task_model
 from kemba.ocp.relaxation.session import Session
 from kemba.ocp.shipped.entry import Entry
 from kemba.ocp.shipped.shelf import Near, Neighbour, neighbours, relatives, ways
-from kemba.ocp.task.requirement import Requirement, resolve
+from kemba.ocp.task.requirement import Requirement
+from kemba.ocp.task.resolve import resolve
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.symmetry import whole
 from kemba.ocp.transcription.transcribe import Transcription

@@ -10,7 +10,8 @@ from kemba.effects.mechanics.load import Payload
 from kemba.errors import ConfigErrors, KembaError, listed_errors
 from kemba.model import Model, load_model
 from kemba.model.changes import changed_effects
-from kemba.ocp.task.requirement import Requirement, resolve
+from kemba.ocp.task.requirement import Requirement
+from kemba.ocp.task.resolve import resolve
 from kemba.ocp.task.task import Task, parse_task
 
 

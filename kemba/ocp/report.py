@@ -67,6 +67,7 @@ def answer(plan: Plan, run: str) -> dict[str, Any]:
         "verdict_on": None,
         "band": None,
         "robust": None,
+        "strides": None,
         "good": plan.status is Status.SOLVED,
         "continued": plan.continued,
         "start": plan.start,

@@ -24,7 +24,7 @@ from kemba.ocp.functions.settings import Functions
 from kemba.ocp.nlp.program import Program
 from kemba.ocp.planner import Planner
 from kemba.ocp.relaxation.settings import Relaxation
-from kemba.ocp.task.requirement import resolve
+from kemba.ocp.task.resolve import resolve
 from kemba.ocp.transcription.parameters import Parameters
 from kemba.runs import load_run, write_json
 from kemba.sensitivity.replanned import PlanProgram

@@ -8,7 +8,7 @@ from kemba.ocp import load_task, task_model
 from kemba.ocp.continuation.between import Origin
 from kemba.ocp.continuation.kept import read_stages
 from kemba.ocp.shipped.kind import figures_of
-from kemba.ocp.task.requirement import resolve
+from kemba.ocp.task.resolve import resolve
 from kemba.runs import STAGES, load_run
 
 

@@ -15,11 +15,13 @@ from kemba.plant.execution.certificate import executions, plant_run, summaries
 from kemba.plant.execution.counterpart import counterpart
 from kemba.plant.execution.replay import Replay
 from kemba.plant.execution.retiming import ExecutedTable, retimed
+from kemba.plant.execution.strides import Stability, stability
 from kemba.solve.truth import PLANT, ApexBand, Truth, band_of, beyond, truth_of
 from kemba.solve.verdict import EXECUTIONS, Allowed, Verdict, allowances, judge
 from kemba.stopwatch import Tell, silent
 from kemba.trajectory import Trajectory
 
+STRIDES = 5  # of a periodic motion, played in a row
 OWN = ("replay", "table_replay")  # the executions on the plan's own model
 
 
@@ -27,13 +29,14 @@ OWN = ("replay", "table_replay")  # the executions on the plan's own model
 class Judged:
     """The entries of a plan's executions in the certificate, the verdict on each, and the motion of
     the plant if it could be started. `truth`: whose verdict counts; `band`: of the apex on models
-    within the uncertainty of a learnt one."""
+    within the uncertainty of a learnt one; `stability`: of a periodic motion."""
 
     facts: Mapping[str, Any]
     verdicts: Mapping[str, Verdict]
     motion: Trajectory | None
     truth: Truth = field(default_factory=lambda: Truth(PLANT))
     band: ApexBand | None = None
+    stability: Stability | None = None
 
     @property
     def deciding(self) -> Mapping[str, Verdict]:
@@ -60,6 +63,8 @@ class Judged:
             found.append(f"on the simulated robot with physical chambers: {self._plant}")
         if self.band is not None and self.band.good:
             found.append(self.band.sentence)
+        if self.stability is not None:
+            found.append(self.stability.sentence)
         return [*found, *self.truth.remarks]
 
     @property
@@ -104,8 +109,14 @@ def judged(
     there was one. Raises KembaError where the plant cannot be built.
     """
     model, plan, task = found.model, found.trajectory, found.task
-    done = executions(model, plan, table, plant or plant_of(task), tell, known)
+    machine = plant or plant_of(task)
+    done = executions(model, plan, table, machine, tell, known)
     facts = summaries(model, done)
+    stable: Stability | None = None
+    if task.periodic is not None:
+        tell("replay: strides in a row")
+        stable = stability(model, plan, STRIDES, lambda motion: _played(found, motion, machine))
+        facts |= {"strides": stable.json()}
     limits = allowances(task.tolerances, landing_speed(plan))
     verdicts = {}
     for key, who in EXECUTIONS.items():
@@ -118,7 +129,13 @@ def judged(
         band, why = band_of(found, table)
         said = [*truth.remarks, *beyond(found, truth.evidence), why]
         truth = replace(truth, remarks=tuple(text for text in said if text))
-    return Judged(facts, verdicts, plant_run(there) if there else None, truth, band)
+    return Judged(facts, verdicts, plant_run(there) if there else None, truth, band, stable)
+
+
+def _played(found: Plan, motion: Trajectory, plant: Model) -> dict[str, Replay | None]:
+    """The executions of a longer motion made of a plan."""
+    table = controller_table(found.model, motion, found.task.hold)
+    return executions(found.model, motion, table, plant)
 
 
 def asked_of(found: Plan, done: Replay | None, allowed: Allowed) -> Sequence[MeasuredRequirement]:

@@ -15,7 +15,7 @@ from kemba.config import load_yaml
 from kemba.model import Model
 from kemba.ocp import Task, load_task, task_model
 from kemba.ocp.certificate.certify import Certificate, certify
-from kemba.ocp.task.requirement import resolve
+from kemba.ocp.task.resolve import resolve
 from kemba.runs import Run, load_run
 from kemba.trajectory import Trajectory
 from kemba_cli.main import app

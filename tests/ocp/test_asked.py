@@ -16,7 +16,8 @@ from typer.testing import CliRunner
 from kemba.config import Document
 from kemba.ocp import load_task
 from kemba.ocp.certificate.asked import MeasuredRequirement, measured, on_execution
-from kemba.ocp.task.requirement import quantities, resolve
+from kemba.ocp.task.requirement import quantities
+from kemba.ocp.task.resolve import resolve
 from kemba.ocp.task.task import Task
 from kemba.trajectory import Trajectory
 from kemba_cli.main import app

@@ -12,7 +12,7 @@ from kemba.model import Model
 from kemba.ocp.certificate.certify import Certificate, certify
 from kemba.ocp.certificate.status import verdict
 from kemba.ocp.nlp.ending import Ending
-from kemba.ocp.task.requirement import resolve
+from kemba.ocp.task.resolve import resolve
 from kemba.ocp.task.task import Task, Tolerances
 from kemba.trajectory import Trajectory
 

@@ -17,7 +17,7 @@ from kemba.ocp.functions.code import Code
 from kemba.ocp.functions.compiled import cache_folder, compiled, is_whole
 from kemba.ocp.functions.constants import parameterised
 from kemba.ocp.reading import task_model
-from kemba.ocp.task.requirement import resolve
+from kemba.ocp.task.resolve import resolve
 from kemba.ocp.transcription.symmetry import whole
 from kemba.ocp.transcription.transcribe import Transcription
 

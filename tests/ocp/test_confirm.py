@@ -16,7 +16,7 @@ from kemba.ocp.nlp.ipopt import Ipopt, Iterate
 from kemba.ocp.nlp.program import violation
 from kemba.ocp.relaxation.lifting import confirm
 from kemba.ocp.relaxation.session import Schedule
-from kemba.ocp.task.requirement import resolve
+from kemba.ocp.task.resolve import resolve
 from kemba.ocp.transcription.parameters import Parameters
 from kemba.ocp.transcription.symmetry import whole
 from kemba.ocp.transcription.transcribe import Transcription

@@ -16,7 +16,7 @@ from kemba.ocp import Task, load_task, task_model
 from kemba.ocp.infeasibility.checks import check_task
 from kemba.ocp.infeasibility.diagnostic import Diagnostic, Relax
 from kemba.ocp.infeasibility.flight import air_work, inertia_and_weight
-from kemba.ocp.task.requirement import resolve
+from kemba.ocp.task.resolve import resolve
 from kemba_cli.main import app
 
 SHIPPED = ("jump", "hop", "jump_forward", "max_jump", "drop", "stand")

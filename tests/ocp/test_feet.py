@@ -16,7 +16,7 @@ from kemba.ocp.infeasibility.checks import check_task
 from kemba.ocp.planning import plans_nearby
 from kemba.ocp.shipped.shelf import neighbours
 from kemba.ocp.task.height import longest_leg, rise_of_feet, with_height
-from kemba.ocp.task.requirement import resolve
+from kemba.ocp.task.resolve import resolve
 
 
 def test_a_body_at_45_cm_has_its_feet_at_1_cm() -> None:

@@ -11,7 +11,7 @@ from kemba.config import Document
 from kemba.model import load_model
 from kemba.ocp import Plan, Task, load_task, plan
 from kemba.ocp.certificate.certify import certify
-from kemba.ocp.task.requirement import resolve
+from kemba.ocp.task.resolve import resolve
 from kemba.ocp.transcription.symmetry import whole
 from kemba.ocp.transcription.transcribe import Transcription
 

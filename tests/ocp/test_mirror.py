@@ -10,7 +10,7 @@ from kemba.effects.pneumatics.valve import Valve
 from kemba.mechanism import load_robot, robot_mechanism
 from kemba.model import Model, load_model
 from kemba.ocp import load_task
-from kemba.ocp.task.requirement import resolve
+from kemba.ocp.task.resolve import resolve
 from kemba.ocp.transcription.symmetry import (
     find_symmetry,
     mirrored_requirements,

@@ -15,7 +15,7 @@ from kemba.ocp.phases.modes import read_phases
 from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.radau import RADAU3
 from kemba.ocp.refinement.refine import Refiner, reduction_of
-from kemba.ocp.task.requirement import resolve
+from kemba.ocp.task.resolve import resolve
 from kemba.ocp.transcription.solution import arrays
 from kemba.ocp.transcription.unilateral import read_constraints
 

@@ -15,7 +15,7 @@ from kemba.ocp.certificate.certify import certify
 from kemba.ocp.certificate.status import law
 from kemba.ocp.planner import Planner
 from kemba.ocp.relaxation.schedule import find, fix, tighten
-from kemba.ocp.task.requirement import resolve
+from kemba.ocp.task.resolve import resolve
 from kemba.ocp.transcription.solution import to_trajectory
 from kemba.ocp.transcription.symmetry import find_symmetry
 

@@ -14,7 +14,7 @@ from kemba.ocp.planner import grids
 from kemba.ocp.relaxation.guess import automatic_guess
 from kemba.ocp.relaxation.lifting import widen
 from kemba.ocp.relaxation.schedule import prolong
-from kemba.ocp.task.requirement import resolve
+from kemba.ocp.task.resolve import resolve
 from kemba.ocp.transcription.symmetry import find_symmetry, whole
 from kemba.ocp.transcription.transcribe import Transcription
 

@@ -15,7 +15,7 @@ from kemba.ocp.functions.regularised import regularised_hessian
 from kemba.ocp.functions.settings import Functions, Newton
 from kemba.ocp.functions.signs import canonical_signs
 from kemba.ocp.functions.vectorised import vectorised
-from kemba.ocp.task.requirement import resolve
+from kemba.ocp.task.resolve import resolve
 from kemba.ocp.transcription.symmetry import find_symmetry
 from kemba.ocp.transcription.transcribe import Transcription
 from kemba.settings import changed

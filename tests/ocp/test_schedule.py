@@ -13,9 +13,9 @@ from kemba.ocp.certificate.status import Status
 from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.nlp.stagnation import Stagnation
 from kemba.ocp.planned import Plan
-from kemba.ocp.relaxation.guess import body_course
+from kemba.ocp.relaxation.course import body_course
 from kemba.ocp.relaxation.settings import Ends
-from kemba.ocp.task.requirement import resolve
+from kemba.ocp.task.resolve import resolve
 from kemba.settings import changed
 
 FORWARD = ("nodes=50", "refine=none")

@@ -22,7 +22,7 @@ from kemba.ocp.planned import Plan
 from kemba.ocp.planning import plans_nearby
 from kemba.ocp.reading import load_task, task_model
 from kemba.ocp.refinement.refine import Refiner, reduction_of
-from kemba.ocp.task.requirement import resolve
+from kemba.ocp.task.resolve import resolve
 from kemba.ocp.task.task import Task
 from kemba.runs import STAGES
 

@@ -14,7 +14,7 @@ from kemba.effects.base import At, Contribution, Effect
 from kemba.mechanism import Mechanism, Port
 from kemba.model import Model
 from kemba.ocp.nlp.ipopt import Ipopt, Iterate
-from kemba.ocp.task.requirement import resolve
+from kemba.ocp.task.resolve import resolve
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.parameters import Parameters
 from kemba.ocp.transcription.symmetry import whole

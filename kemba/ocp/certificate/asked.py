@@ -18,6 +18,7 @@ from kemba.events import PLANNED, read
 from kemba.model import Model
 from kemba.model.impact import felt
 from kemba.ocp.certificate.grip import grip_of
+from kemba.ocp.task.expressions import along
 from kemba.ocp.task.requirement import SCALES, Requirement, apex_node, quantity_expression
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.solution import arrays, groups
@@ -92,7 +93,8 @@ def measured(
     anything, lengths and angles of a bound by what the re-simulation may.
     """
     course = _Course.of(model, requirements, plan)
-    found = [_on_plan(requirement, task, plan, course) for requirement in requirements]
+    listed = (r for r in requirements if r.location[0] != "contacts")  # measured by their order
+    found = [_on_plan(requirement, task, plan, course) for requirement in listed]
     return (*found, *_of_the_task(model, task, requirements, plan))
 
 
@@ -115,19 +117,22 @@ def on_execution(
     landed = min(read(plan, PLANNED, clock=clock).landing, float(clock[-1]))
     for requirement in asked:
         quantity = requirement.quantity
-        if quantity.unit not in ("m", "rad") or quantity.name not in real:
+        if quantity.unit not in ("m", "rad") or requirement.minus is not None:
+            continue
+        there = along(quantity.name, real)
+        if there is None:
             continue
         if requirement.lower == -np.inf and requirement.upper == np.inf:
             continue
         if requirement.at is not None:
             time = np.array([clock[requirement.node(len(plan) - 1)]])
-            values = np.interp(time, real.time, real[quantity.name])
+            values = np.interp(time, real.time, there)
         else:
             at = requirement.nodes(len(plan) - 1)
             begin, until = clock[at[0]] + late * (at[0] > 0), clock[at[-1]]
             until -= late * (at[-1] < len(plan) - 1)
             rows = (real.time >= begin) & (real.time <= until)
-            time, values = real.time[rows], real[quantity.name][rows]
+            time, values = real.time[rows], there[rows]
         parts = [(time < landed, way), (time >= landed, end)]
         each = [
             _worst(requirement, values[part], time[part], most / SCALES["m"] * requirement.scale)
@@ -143,11 +148,12 @@ def _on_plan(
 ) -> MeasuredRequirement:
     name, last = requirement.quantity.name, len(plan) - 1
     exact = task.tolerances.bounds * requirement.scale
-    if name not in plan:
+    values = _values(requirement, plan)
+    if values is None:
         blank = np.array([np.nan])
         return _worst(requirement, blank, plan.time[[-1]], exact)
     at = np.array(requirement.nodes(last))
-    nodes = _worst(requirement, plan[name][at], plan.time[at], exact, at)
+    nodes = _worst(requirement, values[at], plan.time[at], exact, at)
     if requirement.at is not None or name not in course.values or not nodes.met:
         return nodes
     inside = (course.time >= plan.time[at[0]]) & (course.time <= plan.time[at[-1]])
@@ -158,6 +164,15 @@ def _on_plan(
     before = np.searchsorted(plan.time, time) - 1
     way = _worst(requirement, course.values[name][inside], time, between, before)
     return way if not way.met or way.miss > nodes.miss else nodes
+
+
+def _values(requirement: Requirement, plan: Trajectory) -> Array | None:
+    """What is asked about at every node (n,), less what is subtracted; None without its columns."""
+    values = along(requirement.quantity.name, plan)
+    if requirement.minus is None or values is None:
+        return values
+    earlier = along(requirement.minus.name, plan)
+    return None if earlier is None else values - earlier[requirement.minus.node(len(plan) - 1)]
 
 
 def _worst(
@@ -173,7 +188,7 @@ def _worst(
     quantity = requirement.quantity
     return MeasuredRequirement(
         line=requirement.line,
-        text=f"{requirement.text}:{quantity.name}",
+        text=requirement.label,
         value=float(values[i]),
         lower=requirement.lower,
         upper=requirement.upper,
@@ -245,8 +260,22 @@ def _of_the_task(
         speed, node = _fastest_impact(model, plan, apex_node(requirements, last))
         key = "landing.impact_speed"
         yield of(key, speed, -inf, task.landing.impact_speed, "m.s-1", node)
+    if task.contacts:
+        parts = float(len(task.contacts))
+        yield of("contacts", float(_stances_in_order(task, plan)), parts, parts, "1")
     if task.grip < 1.0 and (grip := grip_of(model, plan)) is not None:
         yield of("grip", grip, -inf, task.grip, "1")
+
+
+def _stances_in_order(task: Task, plan: Trajectory) -> int:
+    """How many parts of `contacts` a plan has in their order before it first departs from it."""
+    legs = sorted({name.split("/")[0] for name in plan.names if name.endswith("/foot/Fz")})
+    stands = np.array([plan[f"{leg}/foot/Fz"] > 0.0 for leg in legs]).T[1:]
+    found = [tuple(leg for leg, on in zip(legs, row, strict=True) if on) for row in stands]
+    order = [stance for stance, _ in itertools.groupby(found)]
+    asked = [tuple(sorted(part.on)) for part in task.contacts]
+    same = itertools.takewhile(lambda pair: pair[0] == pair[1], zip(order, asked, strict=False))
+    return min(sum(1 for _ in same), 2 * len(asked) - len(order))
 
 
 def _shortest_dwell(model: Model, plan: Trajectory) -> float | None:

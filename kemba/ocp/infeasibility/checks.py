@@ -33,6 +33,7 @@ def check_task(
     task: Task, model: Model, requirements: Sequence[Requirement], document: Document
 ) -> list[Diagnostic]:
     """Diagnostics, certain ones first; after a certain kind no other kind is looked for."""
+    requirements = [r for r in requirements if r.minus is None]
     found = list(contradictions(task, requirements, document))
     if found:
         return found

@@ -86,14 +86,15 @@ class Elastic(Transcription):
             g / scale + below - above,
             requirement.lower / scale,
             requirement.upper / scale,
-            (f"{requirement.text}:{requirement.quantity.name}",),
+            (requirement.label,),
             (requirement.quantity.unit,),
             (scale,),
         )
         shared = np.tile(index[0, column : column + 2], (len(where), 1))
-        at = np.hstack([index[where, : self.layout.size], shared])
+        z, _, _, at = self.local(requirement, rows.g, where, index)
         price = ElasticSolve.current().price * (below + above) / len(where)
-        return RowBlock(ca.vertcat(self.stage.y, below, above), rows.g, price, at), rows, where
+        z, at = ca.vertcat(z, below, above), np.hstack([at, shared])
+        return RowBlock(z, rows.g, price, at), rows, where
 
     def start(self, Y: np.ndarray) -> np.ndarray:
         """A start guess with slack for every soft requirement.

@@ -36,16 +36,21 @@ class Bound(Section):
 Share = Annotated[float, Param("1", lower=0.0, upper=1.0, doc="share of the nodes")]
 
 
+Moment = Share | str  # a share of the nodes, or a moment by name, see `moments`
+
+
 class Goal(Section):
     """What one quantity should be at a moment, or during a part of the motion.
 
-    `at`: start, middle, end or a fraction of the nodes; `during`: two fractions, from and to.
+    `quantity` may be an expression, `front/foot/x - rear/foot/x`, also between two moments,
+    `at(end, body/x) - at(start, body/x)`. `at`: start, middle, end, a fraction of the nodes or an
+    event of `contacts`, `touchdown front`; `during`: two of them, from and to.
     `maximise`, `minimise`: as large or as small as possible, besides what else is asked of it.
     """
 
     quantity: str
-    at: Literal["start", "middle", "end"] | Share = "end"
-    during: tuple[Share, Share] | None = None
+    at: Moment = "end"
+    during: tuple[Moment, Moment] | None = None
     equals: Value | None = None
     at_least: Value | None = None
     at_most: Value | None = None
@@ -61,9 +66,37 @@ class Goal(Section):
                 raise ValueError("'during' does not go with 'at'")
             if self.maximise or self.minimise:
                 raise ValueError("'maximise' and 'minimise' need a moment, 'at', not 'during'")
-            if self.during[0] > self.during[1]:
-                raise ValueError("'during' goes from an earlier to a later part of the motion")
         return self
+
+
+class Stance(Section):
+    """A part of the motion in which the same feet stand: `on` names their legs, `[]` is flight.
+
+    Bare in a list: `rear`, `[rear, front]`, `air`. `share`: of the nodes; parts without one share
+    the rest equally. How long a part lasts is found within the task's `step_variation`.
+    """
+
+    on: tuple[str, ...]
+    share: Share | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _bare(cls, data: Any) -> Any:
+        legs = data.get("on") if isinstance(data, dict) else data
+        legs = [] if legs == "air" else [legs] if isinstance(legs, str) else legs
+        return {**(data if isinstance(data, dict) else {}), "on": legs}
+
+
+class Periodic(Section):
+    """The motion ends in the state in which it begins, every coordinate, rate, force and valve;
+    `except`: quantities that may differ. `periodic: true` leaves out `body/x`."""
+
+    excepted: tuple[str, ...] = Field(("body/x",), alias="except")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _bare(cls, data: Any) -> Any:
+        return {} if data is True else data
 
 
 class Landing(Section):
@@ -133,6 +166,8 @@ class Task(Section):
     how high the feet are at the top, and `height` is that and a stretched leg.
     `effects` changes parameters of the model's effects, by name or by place in its list:
     `{contact: {mu: 0.6}}`.
+    `contacts`: which feet stand, in order; without it the solver finds that. `periodic`: the end is
+    the start of the next stride.
     `robust`: by how many scenarios, drawn from the file `uncertainties`, plans are chosen.
     """
 
@@ -158,6 +193,8 @@ class Task(Section):
     end: dict[str, Bound] = Field(default_factory=dict)
     bounds: dict[str, Bound] = Field(default_factory=dict)
     goals: dict[str, Goal] = Field(default_factory=dict)
+    contacts: tuple[Stance, ...] = ()
+    periodic: Periodic | None = None
     cost: dict[str, float] = Field(default_factory=lambda: {"torque_squared": 1.0})
     robust: Annotated[int, Field(ge=0, le=10_000)] = 0
     uncertainties: str = "usual"
@@ -214,7 +251,7 @@ def _last_height(document: Document) -> Document:
 
 
 # keys that ask something of a motion by themselves
-PLACED = ("duration", "min_dwell", "landing.impact_speed", "grip")
+PLACED = ("duration", "min_dwell", "landing.impact_speed", "grip", "contacts")
 # keys of earlier versions: what an old file is told
 RETIRED = {
     ("fit_air",): "plans are no longer bent to the simulated robot; learn from logs instead, or "

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import casadi as ca
 import numpy as np
@@ -174,7 +175,8 @@ def requirements_are_symmetric(model: Model, requirements: Sequence[Requirement]
 def mirrored_requirements(model: Model, requirements: Sequence[Requirement]) -> list[Requirement]:
     """The requirements whose mirror image is required too, tried at a random point."""
     images = image_matrices(model)
-    names = list(dict.fromkeys(w.quantity.name for w in requirements))
+    parts = [[w.quantity.name, *([w.minus.name] if w.minus else ())] for w in requirements]
+    names = list(dict.fromkeys(name for part in parts for name in part))
     node = model.node
     values = ca.Function(
         "values",
@@ -189,18 +191,23 @@ def mirrored_requirements(model: Model, requirements: Sequence[Requirement]) -> 
     order = ("q", "v", "s", "lam", "u")
     here = np.array(values(*(point[k] for k in order))).ravel()
     there = np.array(values(*(image[k] for k in order))).ravel()
-    asked = {(names.index(w.quantity.name), *_when(w), w.lower, w.upper) for w in requirements}
+    asked = {
+        (*(names.index(name) for name in part), *_when(w), w.lower, w.upper)
+        for w, part in zip(requirements, parts, strict=True)
+    }
+
+    def images_of(w: Requirement, sign: int) -> set[tuple[object, ...]]:
+        part = [w.quantity.name, *([w.minus.name] if w.minus else ())]
+        alike = [np.flatnonzero(np.isclose(here, sign * there[names.index(n)])) for n in part]
+        ends = (w.lower, w.upper) if sign > 0 else (-w.upper, -w.lower)
+        return {(*each, *_when(w, sign), *ends) for each in product(*alike)}
 
     def has_image(w: Requirement) -> bool:
-        value = there[names.index(w.quantity.name)]
-        same = {(i, *_when(w), w.lower, w.upper) for i in np.flatnonzero(np.isclose(here, value))}
-        back = (-w.upper, -w.lower)
-        turned = {(i, *_when(w, -1), *back) for i in np.flatnonzero(np.isclose(here, -value))}
-        return bool(asked & (same | turned))
+        return bool(asked & (images_of(w, 1) | images_of(w, -1)))
 
     return [w for w in requirements if has_image(w)]
 
 
 def _when(w: Requirement, sign: int = 1) -> tuple[object, ...]:
     """When a requirement holds, and whether the quantity or its negative is to be large."""
-    return w.at, w.during, sign * w.aim
+    return w.at, w.minus and w.minus.at, w.during, sign * w.aim

@@ -131,14 +131,29 @@ class Transcription:
         `g`: a scalar expression. `where`: the nodes at which it holds. `index` (nodes + 1, n):
         position of each node's variables in the full vector.
         """
-        if 0 in where:
-            self.held.append(Held(g, requirement.lower, requirement.upper))
-        variable = as_variable(g, self.stage.y)
-        if variable is not None and self._tighten(where, variable, requirement):
-            return None
+        if requirement.minus is None:
+            if 0 in where:
+                self.held.append(Held(g, requirement.lower, requirement.upper))
+            variable = as_variable(g, self.stage.y)
+            if variable is not None and self._tighten(where, variable, requirement):
+                return None
         rows = _requirement_row(g, requirement)
-        at = index[where, : self.layout.size]
-        return RowBlock(self.stage.y, rows.g, ca.SX(0), at), rows, where
+        return RowBlock(*self.local(requirement, rows.g, where, index)), rows, where
+
+    def local(
+        self, requirement: Requirement, g: ca.SX, where: list[int], index: np.ndarray
+    ) -> tuple[ca.SX, ca.SX, ca.SX, np.ndarray]:
+        """The block of a requirement: its local variables, rows `g`, no cost, and where they stand.
+
+        Between two moments the variables are those of the earlier one and of each later one.
+        """
+        z, at = self.stage.y, index[where, : self.layout.size]
+        if requirement.minus is not None:
+            before = np.tile(
+                index[requirement.minus.node(self.nodes), : self.layout.size], (len(where), 1)
+            )
+            z, at = ca.vertcat(self.stage.y0, z), np.hstack([before, at])
+        return z, g, ca.SX(0), at
 
     def _first_node_blocks(self, index: np.ndarray) -> list[RequirementBlock]:
         """What holds in every state, at the first node; without what requirements there imply."""
@@ -159,11 +174,12 @@ class Transcription:
         if not any(r.aim for r in self.requirements):
             return []
         nothing = StageRows("requirement", ca.SX(0, 1), 0.0, 0.0, (), (), ())
-        return [
-            (RowBlock(self.stage.y, nothing.g, aim_cost(r, g), index[at, : self.layout.size]),
-             nothing, [])
-            for r, g, at in self.requirement_expressions() if r.aim
-        ]  # fmt: skip
+        found: list[RequirementBlock] = []
+        for requirement, g, where in self.requirement_expressions():
+            if requirement.aim:
+                z, _, _, at = self.local(requirement, g, where, index)
+                found.append((RowBlock(z, nothing.g, aim_cost(requirement, g), at), nothing, []))
+        return found
 
     def _soft_landing(self, index: np.ndarray) -> list[RequirementBlock]:
         """The speed of impacts after the apex, in the intervals that end at its later nodes."""
@@ -198,9 +214,13 @@ class Transcription:
         seen: set[tuple[object, ...]] = set()
         for requirement in self.requirements:
             g = self.of_state(quantity_expression(self.model, requirement.quantity.name))
+            if requirement.minus is not None:
+                earlier = self.of_state(quantity_expression(self.model, requirement.minus.name))
+                g = g - ca.substitute(earlier, self.stage.y, self.stage.y0)
             key = (
                 requirement.location,
                 requirement.at,
+                requirement.minus,
                 requirement.during,
                 str(g),
                 requirement.lower,
@@ -246,13 +266,12 @@ class Transcription:
 
 def _requirement_row(g: ca.SX, requirement: Requirement) -> StageRows:
     scale = requirement.scale
-    label = f"{requirement.text}:{requirement.quantity.name}"
     return StageRows(
         "requirement",
         g / scale,
         requirement.lower / scale if requirement.lower > -INF else -INF,
         requirement.upper / scale if requirement.upper < INF else INF,
-        (label,),
+        (requirement.label,),
         (requirement.quantity.unit,),
         (scale,),
     )

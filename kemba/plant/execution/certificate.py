@@ -14,6 +14,7 @@ from kemba.model import Model, load_model
 from kemba.plant.execution.controller import execute
 from kemba.plant.execution.impacts import told
 from kemba.plant.execution.replay import Replay, replay
+from kemba.plant.execution.start import begins_moving, moving_start
 from kemba.stopwatch import Stage, Tell, silent
 from kemba.trajectory import Array, Trajectory
 
@@ -51,8 +52,14 @@ def executions(
     full = load_model(plant) if isinstance(plant, str) else plant
     rest = rest_after(model, plan, controller)
 
+    moving = begins_moving(model, plan)
+
     def on(machine: Model) -> Replay | None:
-        return _tried(lambda: execute(controller, machine, extra=rest).against(machine, plan))
+        def executed() -> Replay:
+            start = moving_start(machine, plan) if moving else None
+            return execute(controller, machine, extra=rest, start=start).against(machine, plan)
+
+        return _tried(executed)
 
     tell(Stage("replay: the plan's inputs", 1, 3))
     own = _tried(lambda: replay(model, plan))

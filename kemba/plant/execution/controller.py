@@ -62,7 +62,8 @@ def execute(
     """Play a controller table (a run folder, `controller.csv`, or its trajectory) on `model`.
 
     The robot starts at rest in the table's first pose, changed by `start`. A robot that starts in
-    the air is held until plan time 0; its motion begins there. After the last row the last commands
+    the air is held until plan time 0, and one with a rate in `start` has it at that time; its
+    motion begins there. After the last row the last commands
     stay for `extra` [s]. `valves` replace the table's. Raises KembaError when the table lacks a
     column.
     """
@@ -112,7 +113,8 @@ def condition_of(
     }
     pose = {**first_row(model, table), **(start or {})}
     falls = lowest_foot(model, pose) > STANDS
-    begin = 0.0 if falls else float(table.time[0])
+    moves = any(pose.get(v.name) for v in model.mechanism.velocities)
+    begin = 0.0 if falls or moves else float(table.time[0])
     both = {**profiles, **(valves or {})}
     sent = {name: Profile(p.times - begin, p.values) for name, p in both.items()}
     control = hip_control(model, table, gains)

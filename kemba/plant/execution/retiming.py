@@ -26,6 +26,7 @@ from kemba.plant.execution.moved_edges import (
     with_moved,
 )
 from kemba.plant.execution.replay import Replay
+from kemba.plant.execution.start import begins_moving, moving_start
 from kemba.plant.stepping.arrays import Array
 from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Trajectory
@@ -167,7 +168,8 @@ def executed_table(
     """A table of a plan executed on `model`; its last commands stay for `extra` [s]."""
     limits = RetimingSettings.current()
     try:
-        facts = execute(table, model, extra=extra).against(model, plan)
+        start = moving_start(model, plan) if begins_moving(model, plan) else None
+        facts = execute(table, model, extra=extra, start=start).against(model, plan)
     except KembaError:
         return ExecutedTable(table, None, np.full(3, np.inf), np.inf)
     signed = _errors(plan, facts) / np.array([limits.apex, limits.touchdown, AHEAD])

@@ -43,7 +43,7 @@ def expand(sweep: Sweep, document: Document, folder: Path) -> list[Case]:
 
 def _solve_cases(expansion: Expansion, name: str, block: SolveBlock) -> list[Case]:
     from kemba.ocp import task_model
-    from kemba.ocp.task.requirement import resolve
+    from kemba.ocp.task.resolve import resolve
 
     base = expansion.task_document(name)
     cases = []

@@ -1,0 +1,178 @@
+"""From a task's names to requirements on a model's quantities, every mistake at its line."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from fnmatch import fnmatchcase
+
+import casadi as ca
+
+from kemba.config import Document
+from kemba.config.document import Location, written
+from kemba.errors import ConfigErrors, KembaError, suggest
+from kemba.model import Model
+from kemba.ocp.task.expressions import expressed, is_expression, two_moments
+from kemba.ocp.task.height import with_height
+from kemba.ocp.task.moments import share_of
+from kemba.ocp.task.options import cost_errors, option_errors, timing_errors
+from kemba.ocp.task.requirement import Earlier, Requirement, quantities, quantity_expression
+from kemba.ocp.task.task import Bound, Goal, Moment, Task
+from kemba.ocp.task.templates import TEMPLATES
+from kemba.quantity import Quantity, to_si
+
+# `rest`: every rate is zero; `settled`: every state of an effect is where it comes to rest
+SPECIAL = ("rest", "settled")
+UNREFINED = "needs the refined plan, and this task says refine: none"
+
+
+class NotGivenError(ValueError):
+    """What a requirement needs is not in the task."""
+
+
+def resolve(
+    task: Task, model: Model, document: Document, partial: bool = False
+) -> list[Requirement]:
+    """All requirements of a task. `partial`: nothing is said of what the task does not give.
+
+    Raises ConfigErrors with every wrong name, unit or range, of its costs and solver options too.
+    """
+    known, task = quantities(model), with_height(task, model)
+    requirements: list[Requirement] = []
+    errors: list[KembaError] = []
+    for location, pattern, at, bound in _asked(task):
+        try:
+            requirements += _requirements(task, location, pattern, at, bound, known, model)
+        except KembaError as error:
+            place = (*location, "quantity") if isinstance(bound, Goal) else location
+            errors.append(document.error(place, f"{written(place)}: {error.what}", hint=error.hint))
+        except ValueError as error:
+            if not (partial and isinstance(error, NotGivenError)):
+                errors.append(document.error(location, f"{written(location)}: {error}"))
+    read = not errors and not partial  # else the goal may be one that was not read
+    for key, template in TEMPLATES.items():
+        try:
+            requirements += template(task, model, requirements)
+        except ValueError as error:
+            if read:
+                errors.append(document.error((key,), f"{key}: {error}"))
+    if task.grip < 1.0 and task.refine == "none":
+        errors.append(document.error(("grip",), f"grip: {UNREFINED}"))
+    errors += cost_errors(task.cost, document)
+    errors += option_errors(task.solver.options, document)
+    errors += timing_errors(task, document)
+    if errors:
+        raise ConfigErrors(errors)
+    names = {r.quantity.name for r in requirements}
+    names |= {r.minus.name for r in requirements if r.minus}
+    acting = _acting(model, names)
+    return [
+        replace(
+            r,
+            acts=r.quantity.name in acting,
+            minus=r.minus and replace(r.minus, acts=r.minus.name in acting),
+            line=document.place(r.location),
+        )
+        for r in requirements
+    ]
+
+
+def _acting(model: Model, names: Iterable[str]) -> set[str]:
+    """The quantities that inputs or forces decide."""
+    causes = ca.vertcat(model.node.u, model.node.lam)
+    return {n for n in names if ca.depends_on(ca.SX(quantity_expression(model, n)), causes)}
+
+
+Asked = tuple[Location, str, Moment | None, Bound | Goal]
+
+
+def _asked(task: Task) -> Iterator[Asked]:
+    for side, at in (("start", 0.0), ("end", 1.0)):
+        for name, bound in getattr(task, side).items():
+            yield (side, name), name, at, bound
+    for name, bound in task.bounds.items():
+        yield ("bounds", name), name, None, bound
+    for name, goal in task.goals.items():
+        yield ("goals", name), goal.quantity, None if goal.during else goal.at, goal
+
+
+def _requirements(
+    task: Task,
+    location: Location,
+    text: str,
+    moment: Moment | None,
+    bound: Bound | Goal,
+    known: dict[str, Quantity],
+    model: Model,
+) -> Iterator[Requirement]:
+    """What one line asks: of every quantity that a pattern matches, of an expression, or of the
+    difference between two moments."""
+    during = (0.0, 1.0)
+    if isinstance(bound, Goal) and bound.during:
+        begin, end = (share_of(each, task) for each in bound.during)
+        if begin > end:
+            raise ValueError("'during' goes from an earlier to a later part of the motion")
+        during = begin, end
+    difference = two_moments(text)
+    if difference is not None:
+        later, earlier = (expressed(t, known) for t in (difference.later, difference.earlier))
+        if later.unit != earlier.unit:
+            raise ValueError(f"'{text}' takes {earlier.unit} from {later.unit}")
+        late, early = (share_of(m, task) for m in (difference.late, difference.early))
+        found = _requirement(task, location, later, late, bound, during)
+        yield replace(found, minus=Earlier(earlier.name, early))
+        return
+    at = None if moment is None else share_of(moment, task)
+    named = [expressed(text, known)] if is_expression(text) else _matching(text, known, model)
+    for quantity in named:
+        yield _requirement(task, location, quantity, at, bound, during)
+
+
+def _matching(pattern: str, known: dict[str, Quantity], model: Model) -> list[Quantity]:
+    if pattern == "rest":
+        return list(model.mechanism.velocities)
+    if pattern == "settled":
+        return list(model.states.values())
+    found = [q for name, q in known.items() if fnmatchcase(name, pattern)]
+    if not found:
+        hint = suggest(pattern, (*known, *SPECIAL))
+        raise KembaError("", f"unknown quantity '{pattern}'", hint=hint)
+    return found
+
+
+def _requirement(
+    task: Task,
+    location: Location,
+    quantity: Quantity,
+    at: float | None,
+    bound: Bound | Goal,
+    during: tuple[float, float],
+) -> Requirement:
+    if location[-1] in SPECIAL:
+        if bound.equals is not True and bound.equals != 1:
+            raise ValueError(f"'{location[-1]}' is either true or left out")
+        value = 0.0 if location[-1] == "rest" else quantity.value
+        return Requirement(location, quantity, at, value, value)
+    aim = int(bound.maximise) - int(bound.minimise) if isinstance(bound, Goal) else 0
+    if bound.equals is not None:
+        if bound.at_least is not None or bound.at_most is not None:
+            raise ValueError("'equals' does not go with 'at_least' or 'at_most'")
+        value = _number(task, bound.equals, quantity)
+        return Requirement(location, quantity, at, value, value, during, aim)
+    lower = -math.inf if bound.at_least is None else _number(task, bound.at_least, quantity)
+    upper = math.inf if bound.at_most is None else _number(task, bound.at_most, quantity)
+    if lower == -math.inf and upper == math.inf and not aim:
+        raise ValueError("asks for nothing; 'equals', 'at_least' or 'at_most' was expected")
+    if lower > upper:
+        raise ValueError(f"at_least {lower:g} is above at_most {upper:g} {quantity.unit}")
+    return Requirement(location, quantity, at, lower, upper, during, aim)
+
+
+def _number(task: Task, value: float | str, quantity: Quantity) -> float:
+    if value in ("height", "distance"):
+        number = getattr(task, str(value))
+        if number is None:
+            raise NotGivenError(f"refers to '{value}', which the task does not give")
+        return float(number)
+    return to_si(value, quantity.unit)

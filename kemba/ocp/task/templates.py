@@ -1,0 +1,113 @@
+"""Words of a task that stand for several requirements: `clearance`, `contacts`, `periodic`, ..."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+from kemba.errors import suggest
+from kemba.model import Model
+from kemba.ocp.task.height import longest_leg
+from kemba.ocp.task.moments import spans
+from kemba.ocp.task.requirement import Earlier, Requirement, highest, quantities
+from kemba.ocp.task.task import Task
+
+FLIGHT = 0.7  # the part of the flight in which `clearance` holds; feet come down in the rest
+AFTER = 1e-6  # of the motion: forces act from the node after the one at which a part begins
+
+
+def flight_clearance(task: Task, model: Model, others: Sequence[Requirement]) -> list[Requirement]:
+    """Every foot at least as high as the task's clearance in the middle of the flight.
+
+    The flight is the ballistic one about the highest goal of the body, from stretched legs; of it
+    the middle part counts. A flight that is longer than the motion fills it; that the duration is
+    too short is said by the checks. Without `folding`, a jump too low for the clearance has what
+    stretched legs leave: nothing where they reach the ground. Raises ValueError where no goal says
+    when the robot flies.
+    """
+    apex = highest(others)
+    if not task.clearance:
+        return []
+    if apex is None or apex.at is None:
+        raise ValueError("needs a goal for body/z at the top of the flight")
+    robot = model.mechanism.need_robot()
+    above = apex.lower - robot.leg.femur.length - robot.leg.tibia.length
+    rise = math.sqrt(2 * max(above, task.clearance) / model.mechanism.gravity)
+    rise /= task.duration
+    before, after = min(rise, apex.at), min(rise, 1.0 - apex.at)
+    during = apex.at - FLIGHT * before, apex.at + FLIGHT * after
+    least = task.clearance
+    if not task.folding:  # stretched legs have this at the first and last moment that counts
+        least = min(least, (1.0 - FLIGHT**2) * (apex.lower - longest_leg(robot)))
+    known = quantities(model)
+    return [
+        Requirement(("clearance",), known[f"{leg}/foot/z"], None, least, math.inf, during)
+        for leg in (model.mechanism.legs if least > 0.0 else ())
+    ]
+
+
+def feet_at_apex(task: Task, model: Model, others: Sequence[Requirement]) -> list[Requirement]:
+    """Every foot as high as the task's `feet`, at the highest goal of the body.
+
+    Raises ValueError where there is no such goal.
+    """
+    apex = highest(others)
+    if task.feet is None:
+        return []
+    if apex is None:
+        raise ValueError("needs a goal for body/z, at which the feet are to be so high")
+    known = quantities(model)
+    return [
+        Requirement(("feet",), known[f"{leg}/foot/z"], apex.at, task.feet, math.inf)
+        for leg in model.mechanism.legs
+    ]
+
+
+def standing_feet(task: Task, model: Model, others: Sequence[Requirement]) -> list[Requirement]:
+    """The feet of every part of `contacts` on the ground, the others without force.
+
+    Raises ValueError where a part names a leg that there is not, or shares do not add up.
+    """
+    if not task.contacts:
+        return []
+    legs, known, found = model.mechanism.legs, quantities(model), []
+    for leg in (leg for part in task.contacts for leg in part.on if leg not in legs):
+        raise ValueError(f"no leg '{leg}'; {suggest(leg, legs)}")
+    for part, (begin, end) in zip(task.contacts, spans(task.contacts), strict=True):
+        for leg in legs:
+            stands = leg in part.on
+            quantity = known[f"{leg}/foot/z" if stands else f"{leg}/foot/Fz"]
+            during = begin + AFTER, end
+            found.append(Requirement(("contacts",), quantity, None, 0.0, 0.0, during))
+    return found
+
+
+def closed_in_itself(task: Task, model: Model, others: Sequence[Requirement]) -> list[Requirement]:
+    """Every coordinate, rate, force of air and valve at the end as at the start.
+
+    Raises ValueError where `except` names what there is not.
+    """
+    if task.periodic is None:
+        return []
+    mechanism, excepted = model.mechanism, task.periodic.excepted
+    inputs = [q for q in model.inputs.values() if q.binary]
+    listed = [*mechanism.coordinates, *mechanism.velocities, *model.states.values(), *inputs]
+    names = [q.name for q in listed]
+    for name in (name for name in excepted if name not in names):
+        raise ValueError(f"except: no state '{name}'; {suggest(name, names)}")
+    return [
+        Requirement(("periodic",), q, 1.0, 0.0, 0.0, minus=Earlier(q.name, 0.0))
+        for q in listed
+        if q.name not in excepted
+    ]
+
+
+Template = Callable[[Task, Model, Sequence[Requirement]], list[Requirement]]
+
+# key of a task: what it stands for, given what the task asks by name
+TEMPLATES: dict[str, Template] = {
+    "feet": feet_at_apex,
+    "clearance": flight_clearance,
+    "contacts": standing_feet,
+    "periodic": closed_in_itself,
+}
