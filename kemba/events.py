@@ -86,11 +86,14 @@ class Course:
         """When [s] the body is highest, and how high [m]."""
         return self.apex(Span(-math.inf, math.inf)) or (math.nan, math.nan)
 
-    def apex(self, flight: Span) -> tuple[float, float] | None:
-        """When [s] the body is highest in a flight, and how high [m]; None without a row in it."""
+    def apex(self, flight: Span, around: float | None = None) -> tuple[float, float] | None:
+        """When [s] the body is highest in a flight, and how high [m]; None without a row in it.
+        `around`: other than that of the reading."""
         z = self.motion["body/z"]
         rows = (self.time >= flight.begin) & (self.time <= flight.end) & np.isfinite(z)
-        return peak(self.time[rows], z[rows], self.reading.around) if rows.any() else None
+        if around is None:
+            around = self.reading.around
+        return peak(self.time[rows], z[rows], around) if rows.any() else None
 
     def touchdowns(self, after: float = -math.inf, leg: str | None = None) -> list[float]:
         """When [s] feet, or that of one `leg`, come down firmly later than `after`."""
@@ -261,9 +264,9 @@ class Event:
 
     def json(self) -> dict[str, Any]:
         """The entry of the certificate."""
-        facts = {key: value for key, value in asdict(self).items() if value is not None}
-        always = {"leg": self.leg, "planned_s": self.planned_s, "executed_s": self.executed_s}
-        return {**facts, **always, "error_s": self.error_s}
+        state = ("height_error_m", "x_error_m", "pitch_error_rad")
+        own = {k: v for k, v in asdict(self).items() if self.kind == "apex" or k not in state}
+        return {**own, "error_s": self.error_s}
 
 
 @dataclass(frozen=True)
@@ -382,22 +385,21 @@ def _edges(leg: str, was: Span | None, now: Span | None, until: float) -> Iterat
 
 
 def _apex(plan: Course, real: Course, was: Span, now: Span | None) -> Event:
-    """The apex of a planned flight, and that of the executed one."""
-    top = plan.apex(was)
-    there = real.apex(now) if now else None
-    assert top is not None
-    if there is None:
-        return Event("apex", None, top[0], None)
+    """The apex of a planned flight, and that of the executed one. The time is between nodes, where
+    a body moves on by millimetres from one to the next."""
+    top, there = plan.apex(was), real.apex(now) if now else None
+    time = (plan.apex(was, 0.0) or (math.nan,))[0]
+    if top is None or there is None:
+        return Event("apex", None, time, None)
 
     def off(name: str) -> float | None:
         if name not in plan.motion or name not in real.motion:
             return None
-        planned = np.interp(top[0], plan.time, plan.motion[name])
+        planned = np.interp(time, plan.time, plan.motion[name])
         return float(np.interp(there[0], real.time, real.motion[name]) - planned)
 
-    return Event(
-        "apex", None, top[0], there[0], there[1] - top[1], off("body/x"), off("body/pitch")
-    )
+    higher = there[1] - top[1]
+    return Event("apex", None, time, there[0], higher, off("body/x"), off("body/pitch"))
 
 
 def aligned(

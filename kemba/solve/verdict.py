@@ -138,10 +138,11 @@ def _figures(done: Replay, allowed: Allowed) -> Iterator[_Figure]:
                       f"touches down{which} {{}} {side}")  # fmt: skip
     yield _figure(done.final_error_m, allowed.final, "mm", "end {} away", "ends {} from the plan")
     if (end := done.end) is not None:
+        rate = allowed.velocity / ARM
         yield _figure(end.pitch_rad, allowed.pitch, "rad", "end turned by {}", "ends turned by {}")
-        yield _figure(end.velocity_m_s, allowed.velocity, "m/s", "end {} too fast or slow",
+        yield _figure(end.velocity_m_s, allowed.velocity, "m/s", "velocity at the end off by {}",
                       "ends with a velocity {} off the plan's")  # fmt: skip
-        yield _figure(end.rate_rad_s, allowed.velocity / ARM, "rad/s", "end turns {} too fast",
+        yield _figure(end.rate_rad_s, rate, "rad/s", "pitch rate at the end off by {}",
                       "ends with a pitch rate {} off the plan's")  # fmt: skip
 
 

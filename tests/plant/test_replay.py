@@ -138,7 +138,8 @@ def fault_of(**changes: float) -> str | None:
 def test_a_landing_is_judged_by_how_it_ends() -> None:
     assert fault_of() is None
     assert fault_of(body__pitch=0.3) is None
-    assert fault_of(body__pitch=2 * np.pi + 0.3) is None  # a full turn is no fall
+    far = "ends upright, but another number of turns away"
+    assert fault_of(body__pitch=2 * np.pi + 0.3) == far  # a full turn is no fall
     for pitch in (0.5, -0.5, np.pi, 2 * np.pi - 0.5):  # forward and backward
         assert fault_of(body__pitch=pitch) == "tips over"
     for point in ("front/hip", "rear/hip", "front/knee", "rear/knee"):
@@ -146,6 +147,14 @@ def test_a_landing_is_judged_by_how_it_ends() -> None:
         assert fault_of(**{name: -1e-3}) == f"meets the ground with the {point.replace('/', ' ')}"
     for leg in ("front", "rear"):
         assert fault_of(**{f"{leg}__foot__z": 0.02}) == f"ends with the {leg} foot in the air"
+
+
+def test_a_backflip_ends_upright_after_a_full_turn() -> None:
+    plan, stands = landing()
+    turn = plan["body/pitch"] + 2 * np.pi * np.clip(plan.time / 0.05, 0.0, 1.0)
+    flip = plan.with_columns({"body/pitch [rad]": turn})
+    assert judge(planning(), flip, plan.time, replace(stands, trajectory=flip)).fault is None
+    assert judge(planning(), flip, plan.time, stands).fault is not None
 
 
 def test_the_controller_brings_a_hip_back() -> None:

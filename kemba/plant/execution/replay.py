@@ -44,9 +44,9 @@ class Replay:
 
     `apex_error_m`: of the highest point. `touchdown_error_s`: of the first landing after it, None
     where there is none. `fault`: what the robot does wrong (`tips over`). It is None when at the
-    end the feet that stand in the plan stand, the body is turned as planned but for full turns, and
-    neither a hip nor a knee met the ground. `end`: errors of a motion that does not end at rest on
-    its feet; such a one is judged by them.
+    end the feet that stand in the plan stand, the body is as upright as planned after as many
+    turns, and neither a hip nor a knee met the ground. `end`: errors of a motion that does not end
+    at rest on its feet; such a one is judged by them.
     """
 
     apex_error_m: float
@@ -149,6 +149,8 @@ def _fault(
     pitch, planned = float(real["body/pitch"][-1]), float(plan["body/pitch"][-1])
     if turned(pitch, planned) > UPRIGHT:
         return "tips over"
+    if abs(pitch - planned) > np.pi:
+        return "ends upright, but another number of turns away"
     for point in ("hip", "knee"):
         for leg in model.mechanism.legs:
             low = gap(real, leg, point) <= 0.0
