@@ -26,7 +26,7 @@ from kemba.effects.mechanics.load import Payload
 from kemba.ocp import controller_table, load_task, plan
 from kemba.plant import Execution, execute, execute_many, replay, replays
 from kemba.plant.execution.counterpart import counterpart
-from kemba.plant.execution.replay import peak
+from kemba.events import peak
 from kemba.sweep.workers.machine import machine
 from kemba.trajectory import Trajectory
 
