@@ -67,7 +67,7 @@ class Span:
 
 
 @dataclass(frozen=True)
-class Course:
+class ContactCourse:
     """A motion with the contacts of every leg, grazes among them, by the clock `time` (n,) [s]."""
 
     motion: Trajectory
@@ -118,7 +118,7 @@ def read(
     weight: float = math.inf,
     clock: Array | None = None,
     hits: Mapping[str, Sequence[float]] | None = None,
-) -> Course:
+) -> ContactCourse:
     """The course of a motion that has the places of feet, and their forces or not.
 
     `weight` [N] of the robot. `clock` (n,) [s]: other times of its rows. `hits`: by leg, when [s]
@@ -129,7 +129,7 @@ def read(
         exact = (hits or {}).get(leg, ())
         load = motion.get(f"{leg}/foot/Fz")
         found[leg] = contacts(time, gap(motion, leg), reading, load, weight, exact)
-    return Course(motion, time, found, reading)
+    return ContactCourse(motion, time, found, reading)
 
 
 def contacts(
@@ -347,7 +347,7 @@ class EventComparison:
         return self.missed() or self.unplanned
 
 
-def compared(plan: Course, real: Course) -> EventComparison:
+def compared(plan: ContactCourse, real: ContactCourse) -> EventComparison:
     """A plan that begins at 0 s and its execution by their events; what an execution does before
     the plan or after it is left out.
 
@@ -384,7 +384,7 @@ def _edges(leg: str, was: Span | None, now: Span | None, until: float) -> Iterat
             )
 
 
-def _apex(plan: Course, real: Course, was: Span, now: Span | None) -> Event:
+def _apex(plan: ContactCourse, real: ContactCourse, was: Span, now: Span | None) -> Event:
     """The apex of a planned flight, and that of the executed one. The time is between nodes, where
     a body moves on by millimetres from one to the next."""
     top, there = plan.apex(was), real.apex(now) if now else None

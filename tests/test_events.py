@@ -13,7 +13,7 @@ from kemba.events import (
     LASTS,
     MEASURED,
     PLANNED,
-    Course,
+    ContactCourse,
     EventComparison,
     Span,
     aligned,
@@ -238,7 +238,7 @@ def test_a_foot_that_hardly_rises_has_not_left_the_ground() -> None:
     assert told(against(low, low)) == [("liftoff", "rear"), ("touchdown", "rear")]
 
 
-def foot(force: float, *spans: tuple[float, float]) -> Course:
+def foot(force: float, *spans: tuple[float, float]) -> ContactCourse:
     """A foot in the air but for contacts, in which it takes `force` [N]; 1 ms rows to 0.2 s."""
     time = np.arange(201) * 1e-3
     down = np.any([(time >= a) & (time < b) for a, b in spans], axis=0)

@@ -12,7 +12,7 @@ from kemba.events import (
     MEASURED,
     PLANNED,
     UPRIGHT,
-    Course,
+    ContactCourse,
     Span,
     contacts,
     ends_standing,
@@ -63,7 +63,7 @@ def events_of(track: Track, machine: Machine, plan: Track | None = None) -> Even
     )
 
 
-def _course(track: Track, machine: Machine) -> Course:
+def _course(track: Track, machine: Machine) -> ContactCourse:
     """Exact motions are read as they are judged; feet of measured ones by force and height."""
     t, legs = track.t, machine.mechanism.legs
     if t.meta.get("kind") in EXACT and all(f"{leg}/foot/z" in t for leg in legs):
@@ -72,7 +72,7 @@ def _course(track: Track, machine: Machine) -> Course:
     for leg in legs:
         stands = machine.stance(t, leg)
         feet[leg] = contacts(t.time, np.where(stands, 0.0, 1.0), PLANNED)
-    return Course(t, t.time, feet, MEASURED)
+    return ContactCourse(t, t.time, feet, MEASURED)
 
 
 def _feet(t: Trajectory, machine: Machine) -> float | None:
