@@ -7,6 +7,7 @@ program near the solution, so that only a few iterations are made on many nodes.
 from __future__ import annotations
 
 from dataclasses import replace
+from math import ceil
 
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.continuation.between import Origin
@@ -26,6 +27,14 @@ class Sought(Settings):
         "tuned: benchmarks/scaling.py --cold --refine none; on 200 a forward jump took 2.6 times "
         "as long, on 400 one of three ended at the limit", decides=True,
     )  # fmt: skip
+    step: float = setting(
+        7e-3, "s", "a longer motion is sought on more nodes, of steps as long as this",
+        "derived: 100 nodes of 0.7 s, the motion of those trials", decides=True,
+    )  # fmt: skip
+
+    def most(self, duration: float) -> int:
+        """The nodes at most on which a motion of `duration` [s] is sought."""
+        return max(self.nodes, ceil(duration / self.step))
 
 
 def found_and_refined(planner: Planner, refused: bool) -> Plan:
@@ -44,7 +53,8 @@ def found_and_refined(planner: Planner, refused: bool) -> Plan:
 def _from_fewer(planner: Planner) -> Plan | None:
     """The plan on the task's nodes from one on fewer; None where they are few, or where there is
     none or it cannot be solved on all of them. Where time is up before that, what there is."""
-    task, fewer = planner.task, Sought.current().nodes
+    task = planner.task
+    fewer = Sought.current().most(task.duration)
     if task.nodes <= fewer:
         return None
     coarse = replace(planner, task=task.model_copy(update={"nodes": fewer}))

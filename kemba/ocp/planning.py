@@ -25,6 +25,7 @@ from kemba.ocp.planned import Plan, clear, explained
 from kemba.ocp.planner import Planner
 from kemba.ocp.reading import asked_of, task_model
 from kemba.ocp.relaxation.session import Session
+from kemba.ocp.sequence import motions
 from kemba.ocp.shipped.entry import Entry
 from kemba.ocp.shipped.shelf import Near, Neighbour, neighbours, relatives, ways
 from kemba.ocp.task.requirement import Requirement
@@ -174,8 +175,13 @@ def check_feasible(
 ) -> tuple[Model, list[Requirement]]:
     """The model and the requirements of a task; nothing is solved.
 
-    Raises KembaError for wrong names and units, and for what certainly cannot be met.
+    Of a sequence every motion is checked, and those of the last are given. Raises KembaError for
+    wrong names and units, and for what certainly cannot be met.
     """
+    for part, own in motions(task, document, (document.source,)):
+        checked = check_feasible(part, own)
+    if task.sequence:
+        return checked
     built, requirements = asked_of(task, document, model)
     refused = refusal(check_task(task, built, requirements, document))
     if refused is not None:
@@ -188,6 +194,13 @@ def program_size(task: Task, document: Document, model: str | Path | None = None
 
     Raises KembaError as `check_feasible` does.
     """
-    built, requirements = check_feasible(task, document, model)
-    transcription = Transcription(built, task, requirements, whole(built.node), task.nodes)
-    return {"variables": transcription.variables, "constraints": transcription.constraints}
+    built, _ = check_feasible(task, document, model)
+    parts = motions(task, document, (document.source,)) or [(task, document)]
+    programs = [
+        Transcription(built, part, resolve(part, built, own), whole(built.node), part.nodes)
+        for part, own in parts
+    ]
+    return {
+        "variables": sum(program.variables for program in programs),
+        "constraints": sum(program.constraints for program in programs),
+    }

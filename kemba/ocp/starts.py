@@ -11,6 +11,7 @@ from pathlib import Path
 
 from kemba.config import Document
 from kemba.effects import BY_KIND, load_effects
+from kemba.ocp.certificate.objective import objective
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.planned import Plan
 from kemba.ocp.planning import plan
@@ -74,8 +75,5 @@ def plan_best(
 
 def _start(task: Task) -> Start:
     found = plan(task)
-    cost = sum(w * found.cost.get(COST_KEYS.get(n, n), 0.0) for n, w in task.cost.items())
+    cost = objective(found.model, task, found.requirements, found.trajectory)
     return Start(task.seed, found.status, cost)
-
-
-COST_KEYS = {"torque_squared": "torque_squared_integral", "air": "valve_open_s"}

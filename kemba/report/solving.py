@@ -35,7 +35,7 @@ def solve_into(
     `approach`: how the plan is sought. `drawer`: what draws the figure, this process when None.
     Raises KembaError where the task or a file is wrong; the manifest then says `failed`.
     """
-    dump_yaml(task.model_dump(exclude_none=True), folder / "task.yaml")
+    dump_yaml(task.model_dump(exclude_none=True, by_alias=True), folder / "task.yaml")
     approach = replace(approach or Approach(), log=folder / "solver.log")
     drawing = (drawer or Here()) if figure else Nowhere()
 
@@ -46,7 +46,7 @@ def solve_into(
         best = best_plan(task, document, approach, listener, begun, str(folder.path))
         found, result = best.plan, best.result
         if found.task != task:
-            dump_yaml(found.task.model_dump(exclude_none=True), folder / "task.yaml")
+            dump_yaml(found.task.model_dump(exclude_none=True, by_alias=True), folder / "task.yaml")
         if figure:
             listener.tell("drawing")
         _keep(found, result, best.motions, folder, drawing)

@@ -74,7 +74,8 @@ WAYS = ((longer, gripping), (lifted, gripping), (gripping,))
 def variants(task: Task) -> Iterator[tuple[str, Task]]:
     """The same motion sought anew."""
     held = task.model_copy(update={"hold": max(task.hold, HOLD)})
-    if task.cost.get("air", 0.0) < AIR:
+    air = task.cost.get("air", 0.0)
+    if isinstance(air, float) and air < AIR:
         yield "with less air", held.model_copy(update={"cost": {**task.cost, "air": AIR}})
     for seed in range(1, STARTS + 1):
         guess = {"guess_noise": max(task.guess_noise, NOISE), "seed": task.seed + seed}

@@ -63,3 +63,38 @@ def test_brachistochrone() -> None:
     coarse, fine = (brachistochrone(nodes)[0] for nodes in (25, 50))
     assert abs(fine - optimum) < 0.03 * optimum
     assert abs(coarse - optimum) / abs(fine - optimum) == pytest.approx(2.0, abs=0.5)
+
+
+def test_a_periodic_stride_through_a_given_speed() -> None:
+    """0.1 m in 1 s, as fast at the end as at the start, 0.2 m/s in the middle, least force squared.
+
+    By symmetry v = 0.2 - 0.6 s + 0.6 s**2 with s the time from the middle: 0.05 m/s at both ends,
+    and the integral of the squared force is 0.12 N2.s.
+    """
+    costs, ends = [], []
+    for nodes in (40, 80):
+        program, point = solve(
+            bead(),
+            [Push()],
+            {"body/x": 0.0},
+            goals={
+                "stride": {"quantity": "at(end, body/x) - at(start, body/x)", "equals": 0.1},
+                "fast": {"quantity": "body/vx", "at": "middle", "equals": 0.2},
+            },
+            periodic=True,
+            duration=1.0,
+            nodes=nodes,
+            step_variation=0.0,
+            cost={"gentle": {"expression": "push/F^2", "weight": 1.0}},
+        )
+        force, v = program.layout.full(point.Y, "u")[1:, 0], program.layout.full(point.Y, "v")[:, 0]
+        costs.append(float(force @ force / nodes))
+        ends.append((float(v[0]), float(v[-1])))
+    assert abs(costs[1] - 0.12) < 0.003
+    ratio = (costs[0] - 0.12) / (costs[1] - 0.12)
+    assert ratio == pytest.approx(
+        4.0, abs=0.4
+    )  # the motion is symmetric: errors of first order cancel
+    assert ends[1] == pytest.approx((0.05, 0.05), abs=2e-3) and ends[1][0] == pytest.approx(
+        ends[1][1]
+    )

@@ -18,6 +18,7 @@ from kemba.ocp.relaxation.guess import automatic_guess
 from kemba.ocp.relaxation.schedule import fix, interior, tighten
 from kemba.ocp.relaxation.session import Schedule, Session, Stopped
 from kemba.ocp.relaxation.settings import Ends, Relaxation, Starts
+from kemba.ocp.task.costs import scaled
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Landing, Task
 from kemba.ocp.transcription.parameters import Parameters
@@ -48,7 +49,7 @@ class Elastic(Transcription):
         self.soft = soft
         self.slack: list[tuple[Requirement, int, float]] = []  # requirement, first column, scale
         factor = ElasticSolve.current().cheap
-        cheap = {name: factor * weight for name, weight in task.cost.items()}
+        cheap = scaled(task.cost, factor)
         super().__init__(
             model, task.model_copy(update={"cost": cheap}), requirements, reduction, nodes
         )

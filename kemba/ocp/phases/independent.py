@@ -31,30 +31,40 @@ class Independent:
         """Whether g = 0 (g is a scalar) is independent of the equalities so far; if so it joins
         them. Raises ContradictionError, which names `what` is asked, where these exclude it."""
         equality = _with_slope(g, view)
-        row = self._rest(equality)
-        if row is not None:
-            self.basis.append(row / np.linalg.norm(row))
-            self.kept.append(equality)
-            return True
-        if abs(self._left(equality)) > AGREES:
+        row = self._rest(equality, self.guess, self.basis)
+        if row is None:
+            there = self._where_all_hold()
+            if abs(float(equality(there)[0])) <= AGREES:
+                return False
+            # gradients may depend at one point alone: legs that stand right below their hips
+            basis: list[np.ndarray] = []
+            for kept in self.kept:
+                own = self._rest(kept, there, basis)
+                basis += [] if own is None else [own]
+            row = self._rest(equality, there, basis)
+        if row is None:
             raise ContradictionError(f"the order of contacts and stops excludes {what}")
-        return False
+        self.basis.append(row)
+        self.kept.append(equality)
+        return True
 
     def grants(self, g: ca.SX, view: View) -> bool:
         """Whether the equalities so far decide a scalar g."""
-        return self._rest(_with_slope(g, view)) is None
+        return self._rest(_with_slope(g, view), self.guess, self.basis) is None
 
-    def _rest(self, equality: ca.Function) -> np.ndarray | None:
-        """The part (n,) of the gradient that is orthogonal to all others; None if zero."""
-        row = np.array(equality(self.guess)[1]).ravel()
+    def _rest(
+        self, equality: ca.Function, at: np.ndarray, basis: list[np.ndarray]
+    ) -> np.ndarray | None:
+        """The direction (n,) in which the gradient at a point (n,) leaves a basis; None if none."""
+        row = np.array(equality(at)[1]).ravel()
         size = float(np.linalg.norm(row))
-        for b in self.basis:
+        for b in basis:
             row = row - (row @ b) * b
-        small = ModeConstraints.current().independent
-        return None if np.linalg.norm(row) <= small * max(size, small) else row
+        small, left = ModeConstraints.current().independent, float(np.linalg.norm(row))
+        return None if left <= small * max(size, small) else row / left
 
-    def _left(self, equality: ca.Function) -> float:
-        """The value of an equality at the point near the guess at which all others hold."""
+    def _where_all_hold(self) -> np.ndarray:
+        """The point (n,) near the guess at which all equalities so far hold."""
         x = self.guess
         for _ in range(STEPS if self.kept else 0):
             parts = [kept(x) for kept in self.kept]
@@ -63,7 +73,7 @@ class Independent:
                 break
             slopes = np.vstack([np.array(slope) for _, slope in parts])
             x = x - np.linalg.lstsq(slopes, left, rcond=None)[0]
-        return float(equality(x)[0])
+        return x
 
 
 def _with_slope(g: ca.SX, view: View) -> ca.Function:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -9,7 +10,8 @@ import casadi as ca
 import numpy as np
 
 from kemba.model import Model
-from kemba.ocp.task.costs import COSTS
+from kemba.ocp.task.costs import running
+from kemba.ocp.task.task import CostTerm
 from kemba.ocp.transcription.layout import GROUPS, STEP, Layout
 from kemba.ocp.transcription.stage import ANGLE_ARM, COST_SCALE
 from kemba.ocp.transcription.symmetry import Reduction
@@ -86,7 +88,11 @@ def node_vector(layout: Layout, parts: dict[str, ca.SX]) -> ca.SX:
 
 
 def element(
-    model: Model, layout: Layout, reduction: Reduction, cost: dict[str, float], scheme: Scheme
+    model: Model,
+    layout: Layout,
+    reduction: Reduction,
+    cost: Mapping[str, float | CostTerm],
+    scheme: Scheme,
 ) -> Element:
     """The collocation of one element."""
     x0 = {g: scaled(layout, g, f"{g}0") for g in STATE}
@@ -123,8 +129,14 @@ def element(
         if kept:
             rows.append(h * rate[kept] / ca.DM([s_rows[j].scale for j in kept]))
             labels += [s_rows[j].label for j in kept]
-    own = layout.full(start, "u")
-    f = sum((w * COSTS[name](model, own, h) for name, w in cost.items()), ca.SX(0)) / COST_SCALE
+    # the quadrature of the scheme: exact for the polynomials through its points
+    points = np.array(scheme.points)
+    share = np.linalg.solve(np.vander(points, increasing=True).T, 1 / np.arange(1, len(points) + 1))
+    each = ({g: layout.full(y, g) for g in ("q", "v", "s", "u", "lam")} for y in at)
+    f = (
+        sum(w * running(model, cost, now, h) for w, now in zip(share, each, strict=True))
+        / COST_SCALE
+    )
     parts = [*x0.values(), *(part for stage in stages for part in stage.values()), u, h_scaled]
     return Element(ca.vertcat(*parts), ca.vertcat(*rows), ca.densify(ca.SX(f)), tuple(labels))
 

@@ -1,12 +1,14 @@
-"""Costs by name: what one step adds to the time integral of each."""
+"""Costs: what one step adds to the time integral of each, by name or by an expression."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import casadi as ca
 
 from kemba.model import Model
+from kemba.ocp.task.requirement import quantity_expression
+from kemba.ocp.task.task import CostTerm
 
 Cost = Callable[[Model, ca.SX, ca.SX], ca.SX]  # model, inputs u of a step, its length h [s]
 
@@ -31,3 +33,34 @@ COSTS: dict[str, Cost] = {
     "air": air,
     "duration": duration,
 }
+
+
+def running(
+    model: Model, cost: Mapping[str, float | CostTerm], now: Mapping[str, ca.SX], h: ca.SX
+) -> ca.SX:
+    """What a step of length h [s] adds to the weighted costs.
+
+    `now`: q, v, s, u, lam of the whole robot, each a column vector, at the end of the step.
+    """
+    total = ca.SX(0)
+    for name, term in cost.items():
+        if isinstance(term, CostTerm):
+            value = quantity_expression(model, term.expression)
+            node = model.node
+            symbols = [node.q, node.v, node.s, node.u, node.lam]
+            here = [now[group] for group in ("q", "v", "s", "u", "lam")]
+            total += term.weight * h * ca.substitute([ca.SX(value)], symbols, here)[0]
+        else:
+            total += term * COSTS[name](model, now["u"], h)
+    return total
+
+
+def scaled(cost: Mapping[str, float | CostTerm], factor: float) -> dict[str, float | CostTerm]:
+    """The same costs, each weighted `factor` times as much."""
+
+    def one(term: float | CostTerm) -> float | CostTerm:
+        if isinstance(term, CostTerm):
+            return term.model_copy(update={"weight": factor * term.weight})
+        return factor * term
+
+    return {name: one(term) for name, term in cost.items()}

@@ -29,11 +29,11 @@ def share_of(moment: Moment, task: Task) -> float:
         if not 0.0 <= share <= 1.0:
             raise ValueError(f"'{moment}' is no share of the motion; 0 % to 100 % was expected")
         return share
+    if not task.contacts:
+        raise ValueError(f"'{moment}' is an event of `contacts`, which the task does not give")
     found = events_of(task.contacts)
     if moment in found:
         return found[moment]
-    if not task.contacts:
-        raise ValueError(f"'{moment}' is an event of `contacts`, which the task does not give")
     raise ValueError(f"`contacts` have no '{moment}'; {suggest(moment, found)}")
 
 
@@ -42,6 +42,8 @@ def spans(contacts: Sequence[Stance]) -> list[tuple[float, float]]:
 
     Raises ValueError where the shares add up to more than the motion, or to less.
     """
+    if not contacts:
+        return []
     given = sum(part.share or 0.0 for part in contacts)
     free = sum(part.share is None for part in contacts)
     if given > 1.0 + 1e-9 or (free and given >= 1.0) or (not free and given < 1.0 - 1e-9):

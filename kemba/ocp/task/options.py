@@ -4,7 +4,7 @@ checked before anything is built."""
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -14,7 +14,6 @@ import casadi as ca
 
 from kemba.config import Document
 from kemba.errors import KembaError, suggest
-from kemba.ocp.task.costs import COSTS
 
 if TYPE_CHECKING:
     from kemba.ocp.task.task import Task
@@ -30,15 +29,6 @@ KINDS: dict[str, tuple[Any, str]] = {
 ENTRY = re.compile(r"^\\anchor OPT_(\w+)\n(.*?)</blockquote>", re.MULTILINE | re.DOTALL)
 KIND = re.compile(r"for this (?:advanced )?(integer|real|string) option")
 RANGE = re.compile(r"The valid range for this \w+ option is (.*?) and its default value")
-
-
-def cost_errors(costs: Iterable[str], document: Document) -> list[KembaError]:
-    """Every cost that there is not."""
-    return [
-        document.error(("cost", name), f"cost: unknown cost '{name}'", hint=suggest(name, COSTS))
-        for name in costs
-        if name not in COSTS
-    ]
 
 
 def option_errors(options: Mapping[str, Any], document: Document) -> list[KembaError]:

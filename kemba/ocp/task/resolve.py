@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from fnmatch import fnmatchcase
 
@@ -13,12 +13,13 @@ from kemba.config import Document
 from kemba.config.document import Location, written
 from kemba.errors import ConfigErrors, KembaError, suggest
 from kemba.model import Model
+from kemba.ocp.task.costs import COSTS
 from kemba.ocp.task.expressions import expressed, is_expression, two_moments
 from kemba.ocp.task.height import with_height
 from kemba.ocp.task.moments import share_of
-from kemba.ocp.task.options import cost_errors, option_errors, timing_errors
+from kemba.ocp.task.options import option_errors, timing_errors
 from kemba.ocp.task.requirement import Earlier, Requirement, quantities, quantity_expression
-from kemba.ocp.task.task import Bound, Goal, Moment, Task
+from kemba.ocp.task.task import Bound, CostTerm, Goal, Moment, Task
 from kemba.ocp.task.templates import TEMPLATES
 from kemba.quantity import Quantity, to_si
 
@@ -59,7 +60,7 @@ def resolve(
                 errors.append(document.error((key,), f"{key}: {error}"))
     if task.grip < 1.0 and task.refine == "none":
         errors.append(document.error(("grip",), f"grip: {UNREFINED}"))
-    errors += cost_errors(task.cost, document)
+    errors += _cost_errors(task, known, document)
     errors += option_errors(task.solver.options, document)
     errors += timing_errors(task, document)
     if errors:
@@ -76,6 +77,25 @@ def resolve(
         )
         for r in requirements
     ]
+
+
+def _cost_errors(
+    task: Task, known: Mapping[str, Quantity], document: Document
+) -> Iterator[KembaError]:
+    """Every cost that there is not, and every expression that cannot be read."""
+    for name, term in task.cost.items():
+        if not isinstance(term, CostTerm):
+            if name not in COSTS:
+                what, hint = f"cost: unknown cost '{name}'", suggest(name, COSTS)
+                yield document.error(("cost", name), what, hint=hint)
+            continue
+        at = ("cost", name, "expression")
+        try:
+            expressed(term.expression, known)
+        except KembaError as error:
+            yield document.error(at, f"{written(at)}: {error.what}", hint=error.hint)
+        except ValueError as error:
+            yield document.error(at, f"{written(at)}: {error}")
 
 
 def _acting(model: Model, names: Iterable[str]) -> set[str]:

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, PrivateAttr, model_validator
+from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from kemba.config import Document, FileName, Section, beside, parse
 from kemba.config.document import written
@@ -99,6 +99,26 @@ class Periodic(Section):
         return {} if data is True else data
 
 
+class Part(Section):
+    """A motion of a sequence: the file of its task, how often in a row, and changed keys."""
+
+    motion: str
+    repeat: Annotated[int, Field(ge=1, le=100)] = 1
+    set: dict[str, float | int | str] = Field(default_factory=dict)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _bare(cls, data: Any) -> Any:
+        return {"motion": data} if isinstance(data, str) else data
+
+
+class CostTerm(Section):
+    """The time integral of an expression of quantities, `front/hip/w^2`, times `weight`."""
+
+    expression: str
+    weight: Annotated[float, Param("1", lower=0.0)] = 1.0
+
+
 class Landing(Section):
     """How softly the motion lands."""
 
@@ -151,13 +171,27 @@ class Tolerances(Section):
     plant_final: Annotated[float, Param("m", lower=0.0, doc="where the plant ends")] = 0.05
 
 
+OF_A_MOTION = (
+    "start",
+    "end",
+    "bounds",
+    "goals",
+    "contacts",
+    "periodic",
+    "cost",
+    "duration",
+    "nodes",
+)
+
+
 class Task(Section):
     """A motion to plan: grid, requirements at start and end, bounds on the way, goals, costs.
 
-    `step_variation`: each step lasts duration/nodes within this fraction. `start` and `end` map
-    quantities to values; `rest: true` there means that all rates are zero,
-    `settled: true` that every state of an effect is at its value at rest. `hold`: for so long
-    before the plan the controller keeps the first pose, valves closed, so that the robot settles.
+    `task`: the version of this language, 2. `step_variation`: each step lasts duration/nodes within
+    this fraction. `start` and `end` map quantities to values; `rest: true` there means that all
+    rates are zero, `settled: true` that every state of an effect is at its value at rest. `hold`:
+    for so long before the plan the controller keeps the first pose, valves closed, so that the
+    robot settles.
     `grip`: the share of the ground's friction that sticking feet may use in the plan; its model and
     the plant keep all of it.
     `folding`: whether legs may have to fold for `clearance`; if not, a low jump has what stretched
@@ -166,12 +200,14 @@ class Task(Section):
     how high the feet are at the top, and `height` is that and a stretched leg.
     `effects` changes parameters of the model's effects, by name or by place in its list:
     `{contact: {mu: 0.6}}`.
+    `sequence`: other tasks in a row, planned to meet; then this one has neither start nor end.
     `contacts`: which feet stand, in order; without it the solver finds that. `periodic`: the end is
     the start of the next stride.
     `robust`: by how many scenarios, drawn from the file `uncertainties`, plans are chosen.
     """
 
     name: FileName = "task"
+    language: Annotated[int, Field(alias="task")] = 2
     notes: str = ""
     model: str = "planning"
     plant: str = "plant"
@@ -194,8 +230,9 @@ class Task(Section):
     bounds: dict[str, Bound] = Field(default_factory=dict)
     goals: dict[str, Goal] = Field(default_factory=dict)
     contacts: tuple[Stance, ...] = ()
+    sequence: tuple[Part, ...] = ()
     periodic: Periodic | None = None
-    cost: dict[str, float] = Field(default_factory=lambda: {"torque_squared": 1.0})
+    cost: dict[str, float | CostTerm] = Field({"torque_squared": 1.0})
     robust: Annotated[int, Field(ge=0, le=10_000)] = 0
     uncertainties: str = "usual"
     guess: Literal["automatic", "standing"] = "automatic"
@@ -208,6 +245,20 @@ class Task(Section):
     _retired: tuple[str, ...] = PrivateAttr(default=())
     _places: dict[str, str] = PrivateAttr(default_factory=dict)  # of `PLACED` in the task's file
     tolerances: Tolerances = Field(default_factory=Tolerances)
+
+    @model_validator(mode="after")
+    def _only_a_sequence(self) -> Task:
+        own = [key for key in OF_A_MOTION if key in self.model_fields_set]
+        if self.sequence and own:
+            raise ValueError(f"'{own[0]}' belongs into the motions of a sequence, not beside it")
+        return self
+
+    @field_validator("language")
+    @classmethod
+    def _known(cls, version: int) -> int:
+        if version not in (1, 2):
+            raise ValueError(f"tasks of version {version} need a later kemba; this one reads 2")
+        return version
 
     @model_validator(mode="after")
     def _one_height(self) -> Task:

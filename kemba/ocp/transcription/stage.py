@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -10,8 +10,9 @@ import numpy as np
 
 from kemba.model import Model
 from kemba.model.node import Row
-from kemba.ocp.task.costs import COSTS
+from kemba.ocp.task.costs import running
 from kemba.ocp.task.requirement import Requirement
+from kemba.ocp.task.task import CostTerm
 from kemba.ocp.transcription.layout import STEP, Layout
 from kemba.ocp.transcription.symmetry import Reduction
 
@@ -62,7 +63,7 @@ class Interval:
 
 
 def build_stage(
-    model: Model, layout: Layout, reduction: Reduction, cost: dict[str, float]
+    model: Model, layout: Layout, reduction: Reduction, cost: Mapping[str, float | CostTerm]
 ) -> Interval:
     """The stage of any grid."""
     y0, y = ca.SX.sym("y0", layout.size), ca.SX.sym("y", layout.size)
@@ -97,7 +98,7 @@ def build_stage(
         _rows("limit", limits[reduction.limits], [r.label for r in limit_rows],
               ["1"] * len(limit_rows), 0.0, INF),
     )  # fmt: skip
-    own = sum(w * COSTS[name](model, now["u"], h) for name, w in cost.items()) / COST_SCALE
+    own = running(model, cost, now, h) / COST_SCALE
     objective = own + _penalties(layout, y0, y, a * b, weights)
     kept = tuple(r for r in rows if r.g.numel())
     return Interval(layout, y0, y, eps, weights, kept, ca.densify(ca.SX(objective)))

@@ -11,6 +11,7 @@ import numpy as np
 from kemba.errors import KembaError
 from kemba.events import UPRIGHT
 from kemba.model import Model
+from kemba.ocp.chain import joined
 from kemba.plant.execution.replay import Replay, first_row
 from kemba.plant.simulation.commands import Commands, Profile
 from kemba.plant.simulation.simulate import run
@@ -19,36 +20,6 @@ from kemba.trajectory import Trajectory
 
 SUNK = 0.1  # m; a body so far below its plan at the end of a stride has fallen
 STEP = 1e-5  # of a state's scale; central differences of the stride map
-
-
-def strides(plan: Trajectory, count: int) -> Trajectory:
-    """`count` strides of a periodic plan in a row: what lies ahead moves on by a stride each."""
-    ahead = {
-        name
-        for name in plan.names
-        if name == "body/x" or name.endswith(("foot/x", "hip/x", "knee/x"))
-    }
-    lasts, length = plan.time[-1] - plan.time[0], plan["body/x"][-1] - plan["body/x"][0]
-    time = [plan.time, *(plan.time[1:] + k * lasts for k in range(1, count))]
-    columns = {}
-    for header, name in zip(plan.headers, plan.names, strict=True):
-        on = length * (name in ahead)
-        later = (plan[name][1:] + k * on for k in range(1, count))
-        columns[header] = np.concatenate([plan[name], *later])
-    phases = [
-        _later(str(text), k * (len(plan) - 1))
-        for k in range(count)
-        for text in plan.meta.get("phases", [])
-    ]
-    meta = {**plan.meta, **({"phases": phases} if phases else {})}
-    return Trajectory(np.concatenate(time), columns, meta)
-
-
-def _later(phase: str, nodes: int) -> str:
-    """A phase of the sidecar, `12-18 ho 10`, some nodes later."""
-    span, rest = phase.split(" ", 1)
-    first, last = span.split("-")
-    return f"{int(first) + nodes}-{int(last) + nodes} {rest}"
 
 
 def kept(plan: Trajectory, done: Replay | None, count: int) -> int:
@@ -135,7 +106,7 @@ def stability(
     execute: Callable[[Trajectory], dict[str, Replay | None]],
 ) -> Stability:
     """How stable a periodic plan is; `execute` plays strides in a row, by name of the execution."""
-    done = execute(strides(plan, count))
+    done = execute(joined([plan] * count))
     try:
         largest: float | None = float(np.abs(multipliers(model, plan)).max())
     except (KembaError, np.linalg.LinAlgError):

@@ -1,0 +1,65 @@
+"""Words that stand for several requirements, and what is wrong with them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from kemba.errors import KembaError
+from kemba.ocp import load_task
+from kemba.ocp.reading import asked_of
+
+BOUND = """
+distance: 0.5 m
+nodes: 40
+contacts: [air, rear, air, front, air]
+periodic: true
+start: {body/x: 0 m}
+goals:
+  stride: {quantity: "at(end, body/x) - at(start, body/x)", equals: distance}
+  apart: {quantity: "front/foot/x - rear/foot/x", at: touchdown front, at_least: 10 cm}
+cost:
+  calm: {expression: "front/hip/w^2 + rear/hip/w^2", weight: 0.01}
+"""
+
+
+def asked(path: Path, text: str) -> list[str]:
+    path.joinpath("own.yaml").write_text(text)
+    task, document = load_task(path / "own.yaml")
+    return [requirement.label for requirement in asked_of(task, document)[1]]
+
+
+def test_a_stride_is_closed_in_every_state_and_valve(tmp_path: Path) -> None:
+    labels = asked(tmp_path, BOUND)
+    closed = [label for label in labels if label.startswith("periodic:")]
+    assert len(closed) == 6 + 7 + 4 + 4  # coordinates without x, rates, forces of air, valves
+    assert "periodic:body/x" not in closed and "periodic:rear/valve/extend" in closed
+
+
+def test_feet_stand_or_bear_nothing(tmp_path: Path) -> None:
+    labels = asked(tmp_path, BOUND)
+    assert labels.count("contacts:rear/foot/z") == labels.count("contacts:front/foot/z") == 1
+    assert labels.count("contacts:rear/foot/Fz") == 4
+
+
+@pytest.mark.parametrize(
+    ("was", "now", "said"),
+    [
+        ("rear, air, front", "reer, air, front", "own.yaml:4:1: contacts: no leg 'reer'"),
+        (
+            "periodic: true",
+            "periodic: {except: [body/y]}",
+            "own.yaml:5:1: periodic: except: no state",
+        ),
+        ("touchdown front", "touchdown side", "own.yaml:9:3: goals.apart"),
+        ("- rear/foot/x", "- rear/foot/vx", "mixes a length with a speed"),
+        ("front/hip/w^2", "front/hip/ww^2", "own.yaml:11:"),
+        ("contacts: [air, rear, air, front, air]", "", "an event of `contacts`"),
+    ],
+)
+def test_a_mistake_is_told_at_its_line(tmp_path: Path, was: str, now: str, said: str) -> None:
+    assert was in BOUND
+    with pytest.raises(KembaError) as caught:
+        asked(tmp_path, BOUND.replace(was, now))
+    assert said in str(caught.value)

@@ -1,0 +1,62 @@
+"""Motions in a row: one trajectory, requirements at their own times, the files of a sequence."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from kemba.errors import KembaError
+from kemba.ocp import load_task
+from kemba.ocp.chain import joined
+from kemba.ocp.planning import check_feasible
+from kemba.ocp.sequence import motions
+from kemba.trajectory import Trajectory
+
+
+def stride(begin: float = 0.0) -> Trajectory:
+    time = np.linspace(0.0, 0.4, 5)
+    columns = {"body/x [m]": begin + time, "front/foot/x [m]": begin + 2 * time,
+               "front/piston/x [m]": time, "body/z [m]": np.cos(time)}  # fmt: skip
+    return Trajectory(time, columns, {"phases": ["0-2 o 1", "2-4 h 0"]})
+
+
+def test_what_lies_ahead_moves_on_and_the_rest_repeats() -> None:
+    row = joined([stride(), stride(begin=7.0), stride()])
+    assert row.time == pytest.approx(np.linspace(0.0, 1.2, 13))
+    assert row["body/x"] == pytest.approx(np.linspace(0.0, 1.2, 13))
+    assert row["front/foot/x"][5] == pytest.approx(0.4 + 0.2), "by the body's way, not the foot's"
+    assert row["front/piston/x"][4:6] == pytest.approx([0.4, 0.1])
+    assert row.meta["phases"] == [
+        "0-2 o 1", "2-4 h 0", "4-6 o 1", "6-8 h 0", "8-10 o 1", "10-12 h 0"
+    ]  # fmt: skip
+
+
+def test_a_sequence_reads_its_motions(tmp_path: Path) -> None:
+    tmp_path.joinpath("own.yaml").write_text(
+        "sequence: [hop.yaml, {motion: bound.yaml, repeat: 2, set: {nodes: 30}}]\npayload: 0.2 kg\n"
+    )
+    task, document = load_task(tmp_path / "own.yaml")
+    found = [part for part, _ in motions(task, document)]
+    assert [part.name for part in found] == ["hop", "bound", "bound"]
+    assert [part.nodes for part in found[1:]] == [30, 30]
+    assert {part.payload for part in found} == {0.2}
+    check_feasible(task, document)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("sequence: [own.yaml]", "own.yaml:1:12: sequence: own.yaml leads back to itself"),
+        ("sequence: [houp.yaml]", "did you mean 'hop.yaml'"),
+        ("sequence: [{motion: hop.yaml, repeat: 0}]", "repeat"),
+        ("sequence: [hop.yaml]\nend: {rest: true}", "'end' belongs into the motions"),
+    ],
+)
+def test_a_sequence_that_cannot_be_is_told(tmp_path: Path, text: str, said: str) -> None:
+    tmp_path.joinpath("own.yaml").write_text(text)
+    with pytest.raises(KembaError) as caught:
+        task, document = load_task(tmp_path / "own.yaml")
+        check_feasible(task, document)
+    assert said in str(caught.value)
