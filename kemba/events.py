@@ -108,8 +108,10 @@ class ContactCourse:
 
 
 def gap(motion: Trajectory, leg: str, point: str = "foot") -> Array:
-    """Height (n,) [m] of a leg's foot, hip or knee above the ground beneath it."""
-    return motion[f"{leg}/{point}/z"]
+    """Height (n,) [m] of a leg's foot, hip or knee above the ground beneath it: a column of its own
+    where that is not level at 0."""
+    place = f"{leg}/{point}"
+    return motion[f"{place}/gap"] if f"{place}/gap" in motion else motion[f"{place}/z"]
 
 
 def read(
