@@ -18,7 +18,7 @@ from kemba.policy.events import EventCourse
 from kemba.policy.expected import expected_from
 from kemba.policy.gains import gains_of
 from kemba.policy.modes import Array
-from kemba.policy.settings import PolicySettings
+from kemba.policy.settings import BLIND, FEWEST, WINDOW, PolicySettings
 from kemba.trajectory import Trajectory
 
 FILE = "policy.npz"
@@ -65,7 +65,7 @@ def policy_arrays(
     names = measured(model)
     reference = np.column_stack([motion[n] for n in names])[rows]
     to_x = _to_state(course)[rows]
-    if len(executions) >= settings.fewest:
+    if len(executions) >= FEWEST:
         clock = (first + np.arange(ticks)) * PERIOD
         noise = Sensors.usual().noise
         names = [*names, *also]
@@ -78,7 +78,7 @@ def policy_arrays(
         if 0 <= tick - first < ticks:
             hips[tick - first] = K @ to_x[tick - first]
     touch = round(landing / PERIOD) - first
-    near = np.abs(np.arange(ticks) - touch) <= settings.blind
+    near = np.abs(np.arange(ticks) - touch) <= BLIND
     hips[near] = 0.0
     by_edge = {(edge.valve, edge.index): gain for edge, gain in gains.edges}
     edges = _edges(course, by_edge, to_x, first)
@@ -97,7 +97,7 @@ def policy_arrays(
         "hip_gains": hips,
         "most_torque": np.array(settings.added),
         "most_shift": np.array(settings.latest),
-        "window": np.array(settings.window),
+        "window": np.array(WINDOW),
         **edges,
     }
 
