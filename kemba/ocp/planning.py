@@ -25,7 +25,7 @@ from kemba.ocp.planned import Plan, clear, explained
 from kemba.ocp.planner import Planner
 from kemba.ocp.reading import asked_of, task_model
 from kemba.ocp.relaxation.session import Session
-from kemba.ocp.sequence import motions
+from kemba.ocp.sequence import as_one, motions
 from kemba.ocp.shipped.entry import Entry
 from kemba.ocp.shipped.shelf import Near, Neighbour, neighbours, relatives, ways
 from kemba.ocp.task.requirement import Requirement
@@ -161,7 +161,10 @@ def _job(
     document = document or Document(task.model_dump())
     building = Stopwatch()
     with building.running():
-        built, requirements = asked_of(task, document, model)
+        if task.sequence:
+            task, built, requirements = as_one(task, document)
+        else:
+            built, requirements = asked_of(task, document, model)
     session = Session(control, tell, building=building)
     return _Job(document, Planner(task, built, requirements, session, start))
 
@@ -178,7 +181,7 @@ def check_feasible(
     Of a sequence every motion is checked, and those of the last are given. Raises KembaError for
     wrong names and units, and for what certainly cannot be met.
     """
-    for part, own in motions(task, document, (document.source,)):
+    for part, own in motions(task, document):
         checked = check_feasible(part, own)
     if task.sequence:
         return checked
@@ -194,13 +197,8 @@ def program_size(task: Task, document: Document, model: str | Path | None = None
 
     Raises KembaError as `check_feasible` does.
     """
-    built, _ = check_feasible(task, document, model)
-    parts = motions(task, document, (document.source,)) or [(task, document)]
-    programs = [
-        Transcription(built, part, resolve(part, built, own), whole(built.node), part.nodes)
-        for part, own in parts
-    ]
-    return {
-        "variables": sum(program.variables for program in programs),
-        "constraints": sum(program.constraints for program in programs),
-    }
+    built, requirements = check_feasible(task, document, model)
+    if task.sequence:
+        task, built, requirements = as_one(task, document)
+    transcription = Transcription(built, task, requirements, whole(built.node), task.nodes)
+    return {"variables": transcription.variables, "constraints": transcription.constraints}

@@ -1,35 +1,41 @@
-"""The motions of a sequence, read from their files."""
+"""A sequence of motions as one problem: grids and contacts in a row, each part at its own times."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from kemba.config import Document, apply_overrides, beside, find_config, load_yaml
 from kemba.errors import KembaError
-from kemba.ocp.reading import read_task
-from kemba.ocp.task.task import Task
+from kemba.model import Model
+from kemba.ocp.chain import AHEAD
+from kemba.ocp.reading import asked_of, read_task
+from kemba.ocp.task.moments import spans
+from kemba.ocp.task.requirement import Earlier, Requirement
+from kemba.ocp.task.task import Stance, Task
 
 DEEPEST = 5  # sequences within sequences
-# what a sequence gives to all of its motions
-GIVEN = ("model", "plant", "supply", "payload", "effects")
+GIVEN = ("model", "plant", "supply", "payload", "effects")  # by a sequence to all its motions
+
+Motion = tuple[Task, Document]
 
 
-def motions(
-    task: Task, document: Document, within: Sequence[str] = ()
-) -> list[tuple[Task, Document]]:
+def motions(task: Task, document: Document, within: Sequence[str] = ()) -> list[Motion]:
     """The motions of a sequence in order, repeated ones as often as asked, with their documents.
 
     Raises KembaError, at the line of the sequence, for a file that is missing or names itself.
     """
-    found: list[tuple[Task, Document]] = []
+    found: list[Motion] = []
+    within = within or (document.source,)
+    folder = Path(document.source).parent if document.source else Path()
     for i, part in enumerate(task.sequence):
         place = ("sequence", i)
         try:
-            file = str(find_config(beside(part.motion, _folder(document)), "tasks"))
+            file = str(find_config(beside(part.motion, folder), "tasks"))
         except KembaError as error:
             raise document.error(place, f"sequence: {error.what}", hint=error.hint) from None
-        if file in within or len(within) >= DEEPEST:
+        if file in within or len(within) > DEEPEST:
             raise document.error(place, f"sequence: {part.motion} leads back to itself")
         settings = [f"{key}={value}" for key, value in part.set.items()]
         own = apply_overrides(load_yaml(file), settings)
@@ -41,5 +47,51 @@ def motions(
     return found
 
 
-def _folder(document: Document) -> Path:
-    return Path(document.source).parent if document.source else Path()
+def as_one(task: Task, document: Document) -> tuple[Task, Model, list[Requirement]]:
+    """A sequence as one task with its model and the requirements of all its motions.
+
+    Each motion begins in the state in which the one before ends. What it asks of places ahead
+    counts from where it begins. Raises KembaError for mistakes in any of the motions.
+    """
+    parts = motions(task, document)
+    nodes, duration = sum(p.nodes for p, _ in parts), sum(p.duration for p, _ in parts)
+    contacts: list[Stance] = []
+    requirements: list[Requirement] = []
+    begin = 0
+    for part, own in parts:
+        model, asked = asked_of(part, own)
+        requirements += _moved(asked, begin / nodes, part.nodes / nodes)
+        for stance, (a, b) in zip(part.contacts, spans(part.contacts), strict=True):
+            share = (b - a) * part.nodes / nodes
+            if contacts and contacts[-1].on == stance.on:
+                share += contacts.pop().share or 0.0
+            contacts.append(Stance(on=stance.on, share=share))
+        begin += part.nodes
+    first = parts[0][0]
+    whole = {
+        "duration": duration,
+        "nodes": nodes,
+        "step_variation": max(p.step_variation for p, _ in parts),
+        "contacts": tuple(contacts) if all(p.contacts for p, _ in parts) else (),
+        "cost": first.cost,
+        **{key: getattr(first, key) for key in GIVEN},
+    }
+    return task.model_copy(update=whole), model, requirements
+
+
+def _moved(asked: Sequence[Requirement], begin: float, share: float) -> Iterator[Requirement]:
+    """Requirements of a motion that takes a `share` of the nodes from `begin` on."""
+
+    def at(moment: float) -> float:
+        return begin + share * moment
+
+    for r in asked:
+        ahead = begin > 0.0 and r.quantity.name.endswith(AHEAD) and r.minus is None
+        if ahead and r.at == 0.0 and r.quantity.name == "body/x":
+            continue  # where a motion begins
+        minus = r.minus and replace(r.minus, at=at(r.minus.at))
+        if ahead and r.at is not None:
+            minus = Earlier("body/x", begin)
+        moment = None if r.at is None else at(r.at)
+        during = at(r.during[0]), at(r.during[1])
+        yield replace(r, at=moment, during=during, minus=minus)

@@ -45,7 +45,7 @@ def solve_into(
     try:
         best = best_plan(task, document, approach, listener, begun, str(folder.path))
         found, result = best.plan, best.result
-        if found.task != task:
+        if found.task != task and not task.sequence:
             dump_yaml(found.task.model_dump(exclude_none=True, by_alias=True), folder / "task.yaml")
         if figure:
             listener.tell("drawing")

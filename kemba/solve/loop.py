@@ -29,7 +29,6 @@ from kemba.ocp.shipped.shelf import Near, neighbours
 from kemba.ocp.starts import plan_best
 from kemba.solve.listener import Listener
 from kemba.solve.repairs import repaired, summed
-from kemba.solve.sequence import planned
 from kemba.solve.trial import Begun, Trial, TrialOrder, executed
 from kemba.trajectory import Trajectory
 
@@ -88,8 +87,6 @@ def best_plan(
     """
     begun = begun or (lambda plan: None)
     execution = TrialOrder(approach.replay, listener.tell, begun, place)
-    if task.sequence:
-        return executed(_in_a_row(task, document, approach, listener), execution)
     best = last = None
     for one in _candidates(task, document, approach, listener):
         first = executed(one.plan, execution, one.table, one.share)
@@ -119,16 +116,6 @@ def best_plan(
         )
     best.result.update(best_known=known, sentence=best.result["sentence"] + remark)
     return best
-
-
-def _in_a_row(task: Task, document: Document, approach: Approach, listener: Listener) -> Plan:
-    """The plan of a sequence."""
-
-    def one(task: Task, document: Document) -> Plan:
-        listener.tell(f"motion: {task.name}")
-        return plan(task, document, log=approach.log, **_how(listener))
-
-    return planned(task, document, one)
 
 
 def _how(listener: Listener) -> dict[str, Any]:

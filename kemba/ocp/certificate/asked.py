@@ -148,6 +148,7 @@ def _on_plan(
 ) -> MeasuredRequirement:
     name, last = requirement.quantity.name, len(plan) - 1
     exact = task.tolerances.bounds * requirement.scale
+    exact += 0.0 if "phases" in plan.meta else requirement.loose
     values = _values(requirement, plan)
     if values is None:
         blank = np.array([np.nan])

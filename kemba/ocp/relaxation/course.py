@@ -66,7 +66,7 @@ class HeightCourse:
 
 def asked(requirements: Sequence[Requirement], name: str, at: float) -> float | None:
     """The value required of a quantity at a moment, or None; of a range its lower end, if any."""
-    for requirement in requirements:
+    for requirement in (r for r in requirements if r.minus is None):
         if requirement.quantity.name == name and requirement.at == at:
             return requirement.lower if np.isfinite(requirement.lower) else requirement.upper
     return None
@@ -165,8 +165,7 @@ def in_order(
         for i in range(len(parts))
     ]
     turning = [not part.on for part in task.contacts] if rests else moving
-    x = _shared(parts, moving, t) * _from_to(requirements, "body/x")[1]
-    x += _from_to(requirements, "body/x")[0]
+    x = _ahead(requirements, parts, moving, t)
     first, turn = _from_to(requirements, "body/pitch")
     pitch = first + turn * _shared(parts, turning if any(turning) else moving, t)
     feet, load = {}, {}
@@ -186,6 +185,36 @@ def _from_to(requirements: Sequence[Requirement], name: str) -> tuple[float, flo
     first, last = (asked(requirements, name, at) for at in (0.0, 1.0))
     first = first if first is not None else 0.0
     return first, (last if last is not None else first) - first
+
+
+def _ahead(
+    requirements: Sequence[Requirement],
+    parts: Sequence[tuple[float, float]],
+    moving: Sequence[bool],
+    t: Array,
+) -> Array:
+    """Where the body is ahead (n,) [m]: by the speeds that are asked for, or that ways need, then
+    stretched to the way that is asked of the whole."""
+    first, way = _from_to(requirements, "body/x")
+    lasts = parts[-1][1]
+    knots = {w.at: 0.0 for w in requirements if w.location[-1] == "rest" and w.at is not None}
+    for w in requirements:
+        value = w.lower if np.isfinite(w.lower) else w.upper
+        if w.at is None or w.location[-1] == "rest":
+            continue
+        if w.quantity.name == "body/vx":
+            knots[w.at] = value
+        elif w.quantity.name == "body/x" and w.minus is not None and w.minus.name == "body/x":
+            share = w.at - w.minus.at
+            knots[w.minus.at + share / 2] = value / max(share * lasts, 1e-9)
+    if not any(knots.values()):
+        return first + way * _shared(parts, moving, t)
+    still = [b for (a, b), on in zip(parts, moving, strict=True) if not on]
+    knots |= {b / lasts: 0.0 for b in still if b < lasts}  # rests to the end of the first stance
+    when = sorted(knots)
+    speed = np.interp(t / lasts, when, [knots[k] for k in when])
+    x = np.concatenate([[0.0], np.cumsum(np.diff(t) * 0.5 * (speed[1:] + speed[:-1]))])
+    return first + x * (way / x[-1] if way and x[-1] else 1.0)
 
 
 def _shared(parts: Sequence[tuple[float, float]], counts: Sequence[bool], t: Array) -> Array:

@@ -36,7 +36,8 @@ def automatic_guess(
 ) -> np.ndarray:
     """Start guess Y (nodes + 1, n) in the layout's scaled coordinates."""
     robot = model.mechanism.need_robot()
-    requirements = [r for r in requirements if r.minus is None]
+    if not task.contacts:
+        requirements = [r for r in requirements if r.minus is None]
     t = np.linspace(0.0, task.duration, nodes + 1)
     f, b = robot.leg.femur.length, robot.leg.tibia.length
     bends = [flexion(robot.leg, x) for x in (0.0, robot.stroke)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import ceil, floor
 
 import casadi as ca
@@ -38,7 +38,8 @@ class Requirement:
     `during` (fractions of the nodes; the whole motion by default).
 
     The name of `quantity` may be an expression. Between two moments it is that of the later one,
-    and `minus` is what is subtracted.
+    and `minus` is what is subtracted. `loose`: by how much a plan whose valves switch at nodes may
+    be off; the refined plan, which times them, may not.
 
     `aim`: 1 where the quantity is to be as large as possible, -1 as small as possible, else 0.
     `acts`: whether it is an input or a force, which act on the interval before a node, or depends
@@ -54,6 +55,7 @@ class Requirement:
     aim: int = 0
     acts: bool = False
     minus: Earlier | None = None
+    loose: float = 0.0
     line: str = field(default="", compare=False)
 
     @property
@@ -66,6 +68,11 @@ class Requirement:
         """One unit of its violation, in the quantity's unit: the same in every program, in the
         elastic solve's prices and in the certificate."""
         return SCALES.get(self.quantity.unit, self.quantity.scale)
+
+    @property
+    def on_nodes(self) -> Requirement:
+        """The same as a plan whose valves switch at nodes has to keep it."""
+        return replace(self, lower=self.lower - self.loose, upper=self.upper + self.loose)
 
     @property
     def text(self) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Set as AbstractSet
 from dataclasses import replace
 from fnmatch import fnmatchcase
 
@@ -25,6 +26,7 @@ from kemba.quantity import Quantity, to_si
 
 # `rest`: every rate is zero; `settled`: every state of an effect is where it comes to rest
 SPECIAL = ("rest", "settled")
+AIR = 0.2  # of a force's scale, 20 N: what an edge half a step away changes
 UNREFINED = "needs the refined plan, and this task says refine: none"
 
 
@@ -67,16 +69,26 @@ def resolve(
         raise ConfigErrors(errors)
     names = {r.quantity.name for r in requirements}
     names |= {r.minus.name for r in requirements if r.minus}
-    acting = _acting(model, names)
+    acting, states = _acting(model, names), {q.name for q in model.states.values()}
     return [
         replace(
             r,
             acts=r.quantity.name in acting,
             minus=r.minus and replace(r.minus, acts=r.minus.name in acting),
+            loose=_loose(r, states),
             line=document.place(r.location),
         )
         for r in requirements
     ]
+
+
+def _loose(requirement: Requirement, states: AbstractSet[str]) -> float:
+    """How far a plan on nodes may miss a force of air that is asked for under way: it depends on
+    when valves switch, to less than a step."""
+    fixed = requirement.lower == requirement.upper and requirement.at not in (None, 0.0)
+    return (
+        AIR * requirement.quantity.scale if fixed and requirement.quantity.name in states else 0.0
+    )
 
 
 def _cost_errors(

@@ -229,7 +229,7 @@ class Transcription:
             if ca.jacobian(g, self.stage.y).nnz() == 0 or key in seen:
                 continue
             seen.add(key)
-            yield requirement, g, requirement.nodes(self.nodes)
+            yield requirement.on_nodes, g, requirement.nodes(self.nodes)
 
     def _tighten(
         self, where: list[int], variable: tuple[int, float, float], requirement: Requirement

@@ -1,0 +1,88 @@
+"""A planned bound (`kemba-opt solve bound.yaml`): executions begin in motion, strides repeat."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from kemba.model import Model, load_model
+from kemba.ocp.chain import joined
+from kemba.ocp.controller import controller_table
+from kemba.plant.execution.certificate import executions
+from kemba.plant.execution.replay import Replay, first_row, replay
+from kemba.plant.execution.start import begins_moving, moving_start
+from kemba.plant.execution.strides import kept, multipliers
+from kemba.plant.simulation.commands import Commands, Profile
+from kemba.plant.simulation.simulate import run
+from kemba.trajectory import Trajectory
+
+PLAN = Path(__file__).with_name("plans") / "bound.csv"
+
+
+@cache
+def bound() -> tuple[Model, Trajectory]:
+    return load_model("planning"), Trajectory.read(PLAN)
+
+
+def test_a_stride_replays_from_its_moving_start() -> None:
+    model, plan = bound()
+    assert begins_moving(model, plan)
+    done = replay(model, plan)
+    assert abs(done.apex_error_m) < 1e-3 and done.final_error_m < 1e-3
+    real = done.trajectory
+    for q in (*model.mechanism.coordinates, *model.mechanism.velocities, *model.states.values()):
+        if q.name != "body/x":
+            assert real[q.name][-1] == pytest.approx(real[q.name][0], abs=0.02 * q.scale), q.name
+
+
+def test_table_and_plant_begin_in_the_same_state() -> None:
+    """The plant has other states; its chambers must press as the plan's do."""
+    model, plan = bound()
+    plant = load_model("plant")
+    start = moving_start(plant, plan)
+    area = plant.mechanism.need_cylinder().area_extend
+    pressed = [(start[f"{leg}/chamber/extend/P"] - 101325.0) * area for leg in ("front", "rear")]
+    assert pressed == pytest.approx(
+        [plan[f"{leg}/chamber/extend/F"][0] for leg in ("front", "rear")]
+    )
+    table = controller_table(model, plan)
+    done = executions(model, plan, table, plant)
+    for name, most in (("table_replay", 0.01), ("plant_replay", 0.05)):
+        found = done[name]
+        assert found is not None and found.final_error_m < most
+        assert found.trajectory.time[0] == 0.0 and found.trajectory["body/vx"][0] > 0.5
+
+
+def test_strides_are_kept_until_the_robot_falls() -> None:
+    model, plan = bound()
+    row = joined([plan] * 3)
+    done = replay(model, row)
+    assert kept(plan, done, 3) == 3
+    fallen = done.trajectory["body/z"].copy()
+    second = done.trajectory.time > 1.5 * plan.time[-1]
+    fallen[second] = 0.1
+    lower = done.trajectory.with_columns({"body/z [m]": fallen})
+    changed = Replay(**{**vars(done), "trajectory": lower})
+    assert kept(plan, changed, 3) == 1
+    assert kept(plan, None, 3) == 0
+
+
+def test_multipliers_say_how_an_error_grows() -> None:
+    """The growth of a small error over one stride, simulated, is that of the largest multiplier."""
+    model, plan = bound()
+    found = np.sort(np.abs(multipliers(model, plan)))[::-1]
+    assert found[0] > 1.0, "a bound without feedback is unstable"
+    clock = plan.time - plan.time[0]
+    inputs = {q.name: Profile.of(clock[:-1], plan[q.name][1:]) for q in model.inputs.values()}
+
+    def pitch(off: float) -> float:
+        start = first_row(model, plan)
+        start["body/pitch"] += off
+        done = run(model, start, Commands(inputs), float(clock[-1]), dead_time=False).trajectory
+        return float(done["body/pitch"][-1])
+
+    grown = abs(pitch(1e-5) - pitch(-1e-5)) / 2e-5
+    assert grown < 3 * found[0]
