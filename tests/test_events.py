@@ -105,6 +105,12 @@ def also(stances: Stances, leg: str, begin: float, end: float) -> Stances:
     return {**stances, leg: sorted([*stances[leg], (begin, end)])}
 
 
+def test_a_foot_on_the_ground_is_no_stand_of_a_body_that_goes_on() -> None:
+    slow, fast = motion(JUMP, ahead=0.2), motion(JUMP, ahead=0.8)  # 0.25 and 1 m/s
+    assert ends_standing(slow, ("rear", "front")) == ["rear", "front"]
+    assert ends_standing(fast, ("rear", "front")) == []
+
+
 def test_every_landing_has_its_own_time() -> None:
     found = against(motion(BOUND), motion(late(BOUND, "front", 1, 0.012)))
     assert not found.difference
@@ -296,6 +302,8 @@ def test_as_few_spans_as_possible_stay_alone() -> None:
         (was[0], bounce[0]), (was[1], bounce[1]), (None, bounce[2]),
     ]  # fmt: skip
     assert aligned(was, [], 1.0) == [(was[0], None), (was[1], None)]
+    late = Span(0.8, 0.9)  # by three times what it lasts
+    assert aligned(was[1:], [late], 1.0) == [(was[1], late)]
 
 
 def test_breaks_are_filled_where_the_foot_stays_low() -> None:
