@@ -293,6 +293,8 @@ def test_flights_are_between_the_contacts_of_all_legs() -> None:
     assert flights(spans) == [Span(0.2, 0.3), Span(0.4, math.inf)]
     assert flights([Span(0.1, math.inf)]) == [Span(-math.inf, 0.1)]
     assert flights([]) == [Span(-math.inf, math.inf)]
+    stands = [Span(-math.inf, 0.5), Span(0.1, 0.2), Span(0.6, math.inf)]  # one within another
+    assert flights(stands) == [Span(0.5, 0.6)]
 
 
 def test_as_few_spans_as_possible_stay_alone() -> None:
