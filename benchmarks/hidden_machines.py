@@ -25,8 +25,8 @@ from twin.run import Truth
 from twin.run import simulate as run_twin
 from twin.scripts import Script, from_table
 
+from kemba.events import STAYS, UPRIGHT
 from kemba.plant.execution.controller import Gains
-from kemba.plant.execution.replay import LandingSettings
 from kemba.plotting.robot.machine import load_machine
 from kemba.trajectory import Trajectory
 
@@ -103,7 +103,7 @@ def machine(seed: int, run: Path, folder: Path) -> HiddenMachine:
 
 def landed(truth: Truth) -> bool:
     """Whether the robot stands on both feet at the end, upright, hips and knees off the ground."""
-    settings, robot = LandingSettings.current(), load_machine("planning")
+    robot = load_machine("planning")
     names = ("body/x", "body/z", "body/pitch", "front/hip/q", "rear/hip/q",
              "front/piston/x", "rear/piston/x")  # fmt: skip
     columns = {f"{name} [1]": truth.y[:, i] for i, name in enumerate(names)}
@@ -115,8 +115,8 @@ def landed(truth: Truth) -> bool:
     heights = {name: place[:, 1] for name, place in points.items()}
     feet = [z[-1] for name, z in heights.items() if name.endswith("foot")]
     others = [z[late].min() for name, z in heights.items() if name.endswith(("hip", "knee"))]
-    upright = abs(float(truth.y[-1, 2])) <= settings.upright
-    return bool(upright and max(feet) <= settings.lifted and min(others) > 0.0)
+    upright = abs(float(truth.y[-1, 2])) <= UPRIGHT
+    return bool(upright and max(feet) <= STAYS and min(others) > 0.0)
 
 
 def _rested(script: Script) -> Script:

@@ -13,9 +13,9 @@ import time
 
 import numpy as np
 
+from kemba.events import peak
 from kemba.model import Model, load_model
 from kemba.plant import Commands, Profile, Simulated, run
-from kemba.plant.execution.replay import peak
 from kemba.plant.simulation.commands import Sense
 from kemba.trajectory import Trajectory
 

@@ -23,7 +23,6 @@ from kemba.ocp import load_task, task_model
 from kemba.plant.execution.certificate import rest_after
 from kemba.plant.execution.controller import Execution, execute
 from kemba.plant.execution.repeat import plant_of
-from kemba.plant.execution.replay import ends_standing
 from kemba.policy.course import course_of
 from kemba.policy.execute import execute_policy
 from kemba.policy.player import Policy
@@ -33,7 +32,6 @@ from kemba.scenarios.conditions import standing
 from kemba.scenarios.draw import Scenario, scenarios
 from kemba.scenarios.expected import executions_of
 from kemba.scenarios.rate import wilson
-from kemba.scenarios.share import fault_of
 from kemba.trajectory import Trajectory
 
 DWELL = 8  # ticks between two switchings of a valve, which shuts in about 6 ms
@@ -111,11 +109,11 @@ class Study:
 
 def row(study: Study, way: str, cases: list[Scenario]) -> str:
     """A line of the table."""
-    lands, good, apex, off, pulses = bool(ends_standing(study.model, study.plan)), 0, [], [], []
+    good, apex, off, pulses = 0, [], [], []
     for seed, case in enumerate(cases):
         done = study.executed(way, case, seed)
         found = done.against(case.model, study.plan)
-        good += not fault_of(found, lands)
+        good += found.landed
         apex.append(1e3 * found.apex_error_m)
         off.append(1e-3 * study.deviation(done))
         valves = [done.table[n] for n in done.table.names if "/valve/" in n]

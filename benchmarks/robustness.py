@@ -35,7 +35,6 @@ from kemba.ocp import load_task, task_model
 from kemba.plant.execution.certificate import rest_after
 from kemba.plant.execution.controller import Execution, execute
 from kemba.plant.execution.repeat import plant_of
-from kemba.plant.execution.replay import ends_standing
 from kemba.policy.execute import execute_policy
 from kemba.policy.player import Policy
 from kemba.policy.write import FILE
@@ -43,7 +42,6 @@ from kemba.runs import Run, load_run
 from kemba.scenarios.conditions import standing
 from kemba.scenarios.draw import Scenario, scenarios
 from kemba.scenarios.feedback import policy_of
-from kemba.scenarios.share import fault_of
 from kemba.sweep.workers.machine import machine
 
 TASKS = ("jump", "jump_forward", "hop", "stand", "drop", "max_jump")
@@ -110,7 +108,6 @@ def records(
     bench: Bench, file: str, way: str, cases: range, drawn: int, known: set[tuple[Any, ...]]
 ) -> Iterator[dict[str, Any]]:
     """What happens in those of the `drawn` executions that are not known yet."""
-    lands = bool(ends_standing(bench.model, bench.run.trajectory))
     policy = bench.run.path / FILE if way == "open loop" else policy_of(bench.run.path)
     parts = [bench.table, shipped_folder("uncertainties") / f"{file}.yaml"]
     parts += [policy] if way != "open loop" else []
@@ -130,7 +127,7 @@ def records(
             continue
         yield {
             **facts,
-            "fault": fault_of(found, lands),
+            "fault": found.fault or "",
             "apex_error_m": found.apex_error_m,
             "touchdown_error_s": found.touchdown_error_s,
             "final_error_m": found.final_error_m,

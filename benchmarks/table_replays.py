@@ -18,11 +18,12 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 from block import put_block
 
+from kemba.events import EXECUTED, PLANNED, read
 from kemba.model import Model
 from kemba.ocp import load_task
 from kemba.plant.execution.certificate import rest_after
 from kemba.plant.execution.controller import execute
-from kemba.plant.execution.replay import LandingSettings, Replay, peak, touches
+from kemba.plant.execution.replay import Replay
 from kemba.solve import Approach, Listener, best_plan
 from kemba.sweep import machine
 from kemba.trajectory import Trajectory
@@ -39,12 +40,9 @@ ASKED = {"apex": 1.0, "before landing": 2.0, "touchdown": 2.0}  # mm, mm, ms
 
 def before_landing(model: Model, plan: Trajectory, real: Trajectory) -> float:
     """The largest distance [m] of the body from the plan before either lands."""
-    settings, weight = LandingSettings.current(), model.mechanism.weight
-    ends = [float(plan.time[-1] - plan.time[0])]
-    clock = plan.time - plan.time[0]
-    for motion, time, low in ((plan, clock, settings.touches), (real, real.time, settings.exact)):
-        apex = peak(time, motion["body/z"])[0]
-        ends += [when for when, carries in touches(motion, time, apex, low, weight) if carries][:1]
+    weight, clock = model.mechanism.weight, plan.time - plan.time[0]
+    courses = read(plan, PLANNED, weight, clock), read(real, EXECUTED, weight)
+    ends = [float(clock[-1]), *(course.landing for course in courses)]
     flown = (real.time >= 0.0) & (real.time < min(ends))
     away = [
         np.interp(real.time[flown], clock, plan[name]) - real[name][flown]

@@ -28,6 +28,7 @@ LEVELS = [
     {"mechanism"},
     {"effects"},
     {"model"},
+    {"events"},
     {"ocp", "plant"},
     {"contract", "identify"},
     {"runs"},

@@ -94,7 +94,7 @@ CONSTANTS = {  # file -> names, why
         "NOTHING ENOUGH SAID_TOO UNRELATED ASKED_FOR STRANGER SURE",
         "how the words of a name are weighed",
     ),
-    "ocp/certificate/grazing.py": ("LASTS TOUCHES", "as in plant/execution/replay.py"),
+    "events.py": ("PLANNED", "what the solver's tolerance leaves of a closed gap"),
     "plant/execution/impacts.py": ("SLOW", "slower impacts are not told"),
     "plant/kernel/settings.py": ("GAMMA", "coefficient of the integration scheme"),
     "ocp/phases/radau.py": ("RADAU3 _R RADAU5", "coefficients of the integration schemes"),

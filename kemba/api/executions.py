@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from kemba.api.planning import Planned
 from kemba.api.result import Result
 from kemba.folders import claimed
-from kemba.plant.execution.repeat import Repeat, plant_of, repeat_run
+from kemba.plant.execution.repeat import Repeat, kept, plant_of, repeat_run
 from kemba.stopwatch import Tell, silent
 
 if TYPE_CHECKING:
@@ -31,19 +31,19 @@ class Executions(Result):
 
     @property
     def landed(self) -> int:
-        """How many ended standing."""
+        """How many ended standing, or upright where the plan does not land."""
         return sum(repeat.replay is not None and repeat.replay.landed for repeat in self.repeats)
 
     @property
     def good(self) -> bool:
-        """Whether all ended standing."""
+        """Whether all did."""
         return self.landed == len(self.repeats)
 
     @property
     def sentence(self) -> str:
         """What was reached, in words."""
         apex = ", ".join(f"{repeat.summary['apex_m']:.3f}" for repeat in self.repeats)
-        return f"reached {apex} m on {self.plant}; {self.landed} of {len(self.repeats)} landed"
+        return f"reached {apex} m on {self.plant}; {kept(self.repeats)}"
 
     def figure(self) -> Figure:
         """Plan and executions on one sheet."""

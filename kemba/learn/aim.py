@@ -15,7 +15,7 @@ from kemba.model import Model
 from kemba.plant.execution.certificate import rest_after
 from kemba.plant.execution.controller import execute, read_controller
 from kemba.plant.execution.moved_edges import Group, edges_of, shared_edges, single_edges
-from kemba.plant.execution.retiming import ExecutedTable, RetimingSettings, Roundings
+from kemba.plant.execution.retiming import FALLEN, ExecutedTable, Roundings
 from kemba.plotting.robot.machine import Machine
 from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Trajectory
@@ -61,13 +61,7 @@ class Aim:
         done = execute(table, self.model, extra=rest)
         seen, add = flight_of(done.trajectory, self.machine), self.correction
         lands = done.against(self.model, self.plan).landed
-        flight = FlownJump(
-            seen.apex + add.apex,
-            seen.apex_time,
-            seen.touchdown + add.touchdown,
-            seen.pitch,
-            seen.upright,
-        )
+        flight = FlownJump(seen.apex + add.apex, seen.touchdown + add.touchdown, seen.pitch)
         return flight, lands
 
     def corrected(self, table: Trajectory) -> Aimed:
@@ -113,7 +107,7 @@ class Aim:
         One that falls where it `must` land, or has an edge far from where `first` has it, counts as
         fallen.
         """
-        fallen = RetimingSettings.current().fallen
+        fallen = FALLEN
         try:
             flight, lands = self.expected(table, rest)
         except KembaError:

@@ -15,7 +15,7 @@ from kemba.plant.simulation.commands import JointControl, Profile
 from kemba.plant.simulation.inputs import among
 from kemba.policy.events import Edge, Event, Flow, Saltation, Tick
 from kemba.policy.modes import Array, Hybrid, Point
-from kemba.policy.settings import CourseSettings
+from kemba.policy.settings import CLOSING, SAME
 from kemba.trajectory import Trajectory
 
 
@@ -106,17 +106,16 @@ class Builder:
 
     def _edges(self, i: int, now: float) -> Iterator[Edge]:
         """The valves that switch at row i."""
-        same = CourseSettings.current().same
         time = float(self.motion.time[i])
         for name, profile in self.acting.items():
             acts, sent = switches(profile), switches(self.sent[name])
-            at = np.flatnonzero(np.abs(acts - time) < same)
+            at = np.flatnonzero(np.abs(acts - time) < SAME)
             if not len(at) or len(acts) != len(sent):  # pulses that merged cannot be told apart
                 continue
             modes_of, k = max(i - 1, 0), int(at[0])
-            after = self.point(i, time + 2 * same, modes_of)
+            after = self.point(i, time + 2 * SAME, modes_of)
             before = replace(after, u=after.u.copy())
-            before.u[self.inputs.index(name)] = profile(time - 2 * same)
+            before.u[self.inputs.index(name)] = profile(time - 2 * SAME)
             late = self.hybrid.flow(before)[0] - self.hybrid.flow(after)[0]
             yield Edge(now, name, k, round((float(sent[k]) + self.begin) / PERIOD), late)
 
@@ -125,14 +124,13 @@ class Builder:
 
         Of several at once each order is taken, and the mean of all.
         """
-        settings = CourseSettings.current()
         before, after = self.point(i, self.motion.time[i]), self.point(i + 1, self.motion.time[i])
         _, J = self.hybrid.gaps(before.x)
         n = self.hybrid.n
         rates = J @ before.x[n : 2 * n]
         new = [
             k for k, c in enumerate(self.hybrid.constraints)
-            if c.label in labels and before.modes[k] == OPEN and rates[k] < -settings.closing
+            if c.label in labels and before.modes[k] == OPEN and rates[k] < -CLOSING
         ]  # fmt: skip
         orders = list(permutations(new)) if 1 < len(new) <= 3 else [tuple(new)]
         return np.asarray(
@@ -143,7 +141,7 @@ class Builder:
         self, before: Point, after: Point, order: Sequence[int], labels: set[str]
     ) -> Array:
         """The saltation of impacts one after the other, at one instant."""
-        n, size, settings = self.hybrid.n, self.hybrid.size, CourseSettings.current()
+        n, size = self.hybrid.n, self.hybrid.size
         found, here = np.eye(size), before
         for position, k in enumerate(order):
             _, J = self.hybrid.gaps(here.x)
@@ -161,7 +159,7 @@ class Builder:
             last = position == len(order) - 1
             there = Point(x, here.u, after.modes if last else tuple(modes))
             rate = float(guard @ self.hybrid.flow(here)[0])
-            if rate < -settings.closing:
+            if rate < -CLOSING:
                 jump = self.hybrid.flow(there)[0] - reset @ self.hybrid.flow(here)[0]
                 reset = reset + np.outer(jump, guard) / rate
             found, here = reset @ found, there

@@ -17,7 +17,7 @@ from kemba.plant.simulation.valves import delayed
 from kemba.policy.builder import Builder, switches
 from kemba.policy.events import EventCourse
 from kemba.policy.modes import Array, Hybrid
-from kemba.policy.settings import CourseSettings
+from kemba.policy.settings import BESIDE, FINER, PASSES
 from kemba.trajectory import Trajectory
 
 
@@ -27,8 +27,7 @@ def course_of(model: Model, table: Trajectory, extra: float = 0.0) -> EventCours
     Raises KembaError where the table cannot be simulated, ValueError for a model with other pairs
     than rigid contacts and stops.
     """
-    table, hybrid, settings = read_controller(table), Hybrid(model), CourseSettings.current()
-    beside_s = settings.beside
+    table, hybrid = read_controller(table), Hybrid(model)
     condition, begin = condition_of(table, model, extra=extra)
     commands, last = condition.commands, condition.duration
     assert commands is not None and isinstance(commands.feedback, JointControl)
@@ -36,12 +35,12 @@ def course_of(model: Model, table: Trajectory, extra: float = 0.0) -> EventCours
     switched = np.concatenate([switches(p) for p in acting.values()])
     clock = np.arange(round((last - 1e-9) / PERIOD) + 1) * PERIOD
     done, finer = simulate_one(condition), np.zeros(0)
-    for number in range(settings.passes):  # marks near an impact move it by some microseconds
+    for number in range(PASSES):  # marks near an impact move it by some microseconds
         hits = np.array([time[:2] for time in _clusters(done.impacts, last)]).reshape(-1, 2)
-        beside = np.concatenate([hits[:, 0] - beside_s, hits[:, 1] + beside_s])
+        beside = np.concatenate([hits[:, 0] - BESIDE, hits[:, 1] + BESIDE])
         marks = merged(clock, switched[switched > 0.0], beside, finer)
         inside = (
-            (marks[:, None] > hits[:, 0] - beside_s) & (marks[:, None] < hits[:, 1] + beside_s)
+            (marks[:, None] > hits[:, 0] - BESIDE) & (marks[:, None] < hits[:, 1] + BESIDE)
         ).any(1)
         marks = marks[~inside]
         done = simulate_one(replace(condition, sample=marks[marks < last - 1e-9]))
@@ -62,18 +61,15 @@ def _changes(hybrid: Hybrid, motion: Trajectory) -> Array:
     """Times [s] within every step in which a contact changes, so that the change is found."""
     modes = [hybrid.modes(motion, i) for i in range(len(motion))]
     steps = [i for i in range(len(modes) - 1) if modes[i] != modes[i + 1]]
-    inner = [
-        np.linspace(motion.time[i], motion.time[i + 1], CourseSettings.current().finer + 1)[1:-1]
-        for i in steps
-    ]
+    inner = [np.linspace(motion.time[i], motion.time[i + 1], FINER + 1)[1:-1] for i in steps]
     return np.concatenate([np.zeros(0), *inner])
 
 
 def _clusters(impacts: Sequence[Hit], last: float) -> list[tuple[float, float, set[str]]]:
     """Impacts that happen at once as one: from when to when [s], and at which pairs."""
-    beside, found = CourseSettings.current().beside, list[tuple[float, float, set[str]]]()
-    for impact in (i for i in impacts if beside < i.time < last - beside):
-        if found and impact.time - found[-1][1] < 4 * beside:
+    found = list[tuple[float, float, set[str]]]()
+    for impact in (i for i in impacts if BESIDE < i.time < last - BESIDE):
+        if found and impact.time - found[-1][1] < 4 * BESIDE:
             begin, _, labels = found.pop()
             found.append((begin, impact.time, labels | set(impact.labels)))
         else:

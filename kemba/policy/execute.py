@@ -16,7 +16,7 @@ from kemba.plant.simulation.commands import Commands
 from kemba.plant.simulation.simulate import simulate_one
 from kemba.policy.modes import Array
 from kemba.policy.player import Policy
-from kemba.policy.settings import PolicySettings
+from kemba.policy.settings import FINE
 from kemba.trajectory import Trajectory
 
 
@@ -37,7 +37,7 @@ class Driver:
         self.sent = [[(-np.inf, 0.0)] for _ in self.policy.valves]
         self.names = self.policy.measured
         self.joints = [str(j) for j in self.policy.data["joints"]]
-        self.fine = PolicySettings.current().fine
+        self.fine = FINE
         self.commands: list[Array] = []
 
     def __call__(self, time: float, sense: Mapping[str, float]) -> dict[str, float]:
@@ -92,7 +92,7 @@ def execute_policy(
     rng = np.random.default_rng(seed)
     held = round((begin - table.time[0]) / PERIOD)
     driver = Driver(policy, model, _knees(model), usual, rng, scatter, held)
-    commands = Commands({}, driver, PERIOD / PolicySettings.current().fine)
+    commands = Commands({}, driver, PERIOD / FINE)
     done = simulate_one(replace(condition, commands=commands))
     return Execution(later(done, begin), _sent(table, policy, driver.commands))
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kemba.policy.modes import Array
-from kemba.policy.settings import PolicySettings
+from kemba.policy.settings import WINDOW
 from kemba.trajectory import Trajectory
 
 
@@ -61,10 +61,10 @@ def _columns(motion: Trajectory, clock: Array, names: Sequence[str]) -> Array:
 
 def _rates(y: Array, clock: Array) -> Array:
     """Rates (executions, rows, k) as the player has them: by a line through the last ticks."""
-    window, period = PolicySettings.current().window, float(np.median(np.diff(clock)))
+    period = float(np.median(np.diff(clock)))
     found = np.zeros_like(y)
     for row in range(2, y.shape[1]):
-        first = max(0, row - window + 1)
+        first = max(0, row - WINDOW + 1)
         weights = _line(row - first + 1, period)
         found[:, row] = np.einsum("t,etk->ek", weights, y[:, first : row + 1])
     return found
@@ -78,7 +78,7 @@ def _line(count: int, period: float) -> Array:
 
 def _noise(sigma: Array, period: float) -> Array:
     """Covariance (2 k, 2 k) of the noise of values and their rates."""
-    weights = _line(PolicySettings.current().window, period)
+    weights = _line(WINDOW, period)
     values = np.diag(sigma**2)
     between, rates = values * weights[-1], values * (weights @ weights)
     return np.block([[values, between], [between, rates]])

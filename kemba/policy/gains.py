@@ -9,7 +9,17 @@ import numpy as np
 
 from kemba.policy.events import Edge, Event, EventCourse, Flow, Saltation, Tick, plain
 from kemba.policy.modes import Array
-from kemba.policy.settings import PolicySettings
+from kemba.policy.settings import (
+    EDGE,
+    FADING,
+    JOINT,
+    JOINT_RATE,
+    PITCH,
+    PITCH_RATE,
+    PLACE,
+    SPEED,
+    TORQUE,
+)
 
 
 @dataclass(frozen=True)
@@ -40,23 +50,23 @@ def _time(event: Event) -> float:
 
 def weights(course: EventCourse) -> Array:
     """The weight (n,) of every squared deviation of x; chambers count by what they do only."""
-    settings, model = PolicySettings.current(), course.hybrid.model
+    model = course.hybrid.model
     sizes = {
-        "body/x": settings.place, "body/z": settings.place, "body/pitch": settings.pitch,
-        "body/vx": settings.speed, "body/vz": settings.speed,
-        "body/pitch_rate": settings.pitch_rate,
+        "body/x": PLACE, "body/z": PLACE, "body/pitch": PITCH,
+        "body/vx": SPEED, "body/vz": SPEED,
+        "body/pitch_rate": PITCH_RATE,
     }  # fmt: skip
     found = np.zeros(course.hybrid.size)
     names = [q.name for q in (*model.mechanism.coordinates, *model.mechanism.velocities)]
     for i, name in enumerate(names):
-        joint = settings.joint if name.endswith("/q") else settings.joint_rate
+        joint = JOINT if name.endswith("/q") else JOINT_RATE
         found[i] = sizes.get(name, joint) ** -2
     return found
 
 
 def _gains(course: EventCourse, events: Sequence[Event]) -> PolicyGains:
     """Backwards through the events: the cost to come is x^ P x^ with x^ = (x, torques)."""
-    settings, n, m = PolicySettings.current(), course.hybrid.size, len(course.joints)
+    n, m = course.hybrid.size, len(course.joints)
     Q = np.zeros((n + m, n + m))
     Q[:n, :n] = np.diag(weights(course))
     P = Q.copy()
@@ -68,7 +78,7 @@ def _gains(course: EventCourse, events: Sequence[Event]) -> PolicyGains:
         through = plain(event, n, m)
         if isinstance(event, Tick):
             E = np.vstack([np.zeros((n, m)), np.eye(m)])
-            R = np.eye(m) / settings.torque**2 * 1e-3 / settings.fading
+            R = np.eye(m) / TORQUE**2 * 1e-3 / FADING
             K = -np.linalg.solve(R + E.T @ P @ E, E.T @ P @ through)
             if not event.hold.any():
                 K[:] = 0.0  # the motors give all they can
@@ -77,14 +87,14 @@ def _gains(course: EventCourse, events: Sequence[Event]) -> PolicyGains:
             P = through.T @ P @ through + K.T @ R @ K
         elif isinstance(event, Edge):
             b = np.concatenate([event.late, np.zeros(m)])
-            k = -(b @ P) / (settings.edge**-2 + b @ P @ b)
+            k = -(b @ P) / (EDGE**-2 + b @ P @ b)
             acted[position] = k
             through = np.eye(n + m) + np.outer(b, k)
-            P = through.T @ P @ through + np.outer(k, k) / settings.edge**2
+            P = through.T @ P @ through + np.outer(k, k) / EDGE**2
         else:
             P = through.T @ P @ through
             if isinstance(event, Flow):
-                P += Q * (event.end - event.begin) / settings.fading
+                P += Q * (event.end - event.begin) / FADING
         P = (P + P.T) / 2
         closed.append(through)
     closed.reverse()

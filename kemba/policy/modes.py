@@ -13,23 +13,14 @@ from kemba.model import Model
 from kemba.ocp.phases.modes import AHEAD, BACK, HELD, OPEN
 from kemba.ocp.transcription.symmetry import whole
 from kemba.ocp.transcription.unilateral import Constraint, read_constraints
-from kemba.settings import Settings, setting
 from kemba.trajectory import Trajectory
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Modes = tuple[int, ...]
 
 
-class ModeSettings(Settings):
-    """How the mode of a constraint is read off a simulation."""
-
-    force: float = setting(
-        1e-3, "N", "a smaller force is none", "derived: far below the weight, far above rounding"
-    )
-    slip: float = setting(
-        1e-3, "m.s-1", "a slower foot sticks", "derived: the simulation holds a sticking foot "
-        "within 1e-9 m/s"
-    )  # fmt: skip
+FORCE = 1e-3  # N; a smaller one is none: far below the weight, far above rounding
+SLIP = 1e-3  # m/s; a slower foot sticks: the simulation holds one within 1e-9 m/s
 
 
 @dataclass(frozen=True)
@@ -103,16 +94,16 @@ class Hybrid:
 
     def modes(self, row: Trajectory, i: int) -> Modes:
         """The modes in row `i` of a simulation."""
-        settings, found = ModeSettings.current(), []
+        found = []
         names = [quantity.name for quantity in self.model.forces.values()]
         for c in self.constraints:
-            if row[names[c.force]][i] <= settings.force:
+            if row[names[c.force]][i] <= FORCE:
                 found.append(OPEN)
                 continue
             foot = c.label.rsplit("/", 1)[0]
             slip = float(row[f"{foot}/foot/vx"][i]) if c.friction is not None else 0.0
             sliding = AHEAD if slip > 0 else BACK
-            found.append(sliding if abs(slip) > settings.slip else HELD)
+            found.append(sliding if abs(slip) > SLIP else HELD)
         return tuple(found)
 
     def flow(self, at: Point) -> tuple[Array, Array, Array]:

@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 
 from kemba.errors import KembaError
+from kemba.events import PLANNED, read
 from kemba.model import Model
 from kemba.plant.execution.controller import PERIOD, Gains, hip_control, read_controller
 from kemba.plant.execution.sensors import Sensors
@@ -17,7 +18,7 @@ from kemba.policy.events import EventCourse
 from kemba.policy.expected import expected_from
 from kemba.policy.gains import gains_of
 from kemba.policy.modes import Array
-from kemba.policy.settings import PolicySettings
+from kemba.policy.settings import BLIND, FEWEST, WINDOW, PolicySettings
 from kemba.trajectory import Trajectory
 
 FILE = "policy.npz"
@@ -64,7 +65,7 @@ def policy_arrays(
     names = measured(model)
     reference = np.column_stack([motion[n] for n in names])[rows]
     to_x = _to_state(course)[rows]
-    if len(executions) >= settings.fewest:
+    if len(executions) >= FEWEST:
         clock = (first + np.arange(ticks)) * PERIOD
         noise = Sensors.usual().noise
         names = [*names, *also]
@@ -77,7 +78,7 @@ def policy_arrays(
         if 0 <= tick - first < ticks:
             hips[tick - first] = K @ to_x[tick - first]
     touch = round(landing / PERIOD) - first
-    near = np.abs(np.arange(ticks) - touch) <= settings.blind
+    near = np.abs(np.arange(ticks) - touch) <= BLIND
     hips[near] = 0.0
     by_edge = {(edge.valve, edge.index): gain for edge, gain in gains.edges}
     edges = _edges(course, by_edge, to_x, first)
@@ -96,7 +97,7 @@ def policy_arrays(
         "hip_gains": hips,
         "most_torque": np.array(settings.added),
         "most_shift": np.array(settings.latest),
-        "window": np.array(settings.window),
+        "window": np.array(WINDOW),
         **edges,
     }
 
@@ -153,10 +154,7 @@ def _to_state(course: EventCourse) -> Array:
 
 
 def _landing(course: EventCourse) -> float:
-    """When [s] the first foot comes down after the apex; the end where none does."""
+    """A tick before the first foot comes down after the apex [s]; the end where none does."""
     motion = course.motion
-    apex = float(motion.time[int(np.argmax(motion["body/z"]))])
-    feet = [motion[n] for n in motion.names if n.endswith("foot/z")]
-    low = np.min(feet, axis=0) <= 1e-4
-    down = np.flatnonzero(low & (motion.time > apex) & np.r_[False, ~low[:-1]])
-    return float(motion.time[down[0]]) - PERIOD if len(down) else float(motion.time[-1])
+    landing = read(motion, PLANNED, course.hybrid.model.mechanism.weight).landing
+    return landing - PERIOD if landing < np.inf else float(motion.time[-1])

@@ -9,8 +9,9 @@ from kemba.effects import Effect
 from kemba.effects.catalogue import BY_KIND
 from kemba.effects.mechanics.load import Payload
 from kemba.errors import KembaError, suggest
+from kemba.events import STANDS
 from kemba.model import Model
-from kemba.plant.execution.replay import LandingSettings, first_row
+from kemba.plant.execution.replay import first_row
 from kemba.quantity import to_si
 from kemba.scenarios.schema import Conditions
 from kemba.trajectory import Trajectory
@@ -56,7 +57,7 @@ def standing(model: Model, table: Trajectory, offsets: Mapping[str, float]) -> d
         return {}
     pose = first_row(model, table)
     moved = {name: pose.get(name, 0.0) + offset for name, offset in offsets.items()}
-    if lowest_foot(model, pose) > LandingSettings.current().on_ground:
+    if lowest_foot(model, pose) > STANDS:
         return moved  # it is dropped: held in the air as the table says
     q, *_ = initial_values(model, pose | moved)
     height = q[[c.name for c in model.mechanism.coordinates].index("body/z")]

@@ -5,32 +5,27 @@ from __future__ import annotations
 from pathlib import Path
 
 from kemba.errors import KembaError
+from kemba.events import UPRIGHT, turned
 from kemba.plant.execution.controller import execute_many, read_controller
 from kemba.plant.execution.repeat import plant_of
-from kemba.plant.execution.replay import LandingSettings
+from kemba.runs import load_run
 from kemba.scenarios.conditions import standing
 from kemba.scenarios.draw import scenarios
-from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Trajectory
 
 FILE = "twice"  # of configs/uncertainties
-
-
-class FeedbackScenarioSettings(Settings):
-    """From how many executions feedback learns what to expect."""
-
-    count: int = setting(64, "1", "scenarios that are executed", CHOSEN)
+COUNT = 64  # scenarios from which feedback learns what to expect
 
 
 def executions_of(run: str | Path, jobs: int | None = None) -> list[Trajectory]:
     """The table of a run executed open loop on its task's plant under drawn uncertainties.
 
-    Those that cannot be simulated or do not end upright are left out. Raises KembaError where the
-    run has no table.
+    Those that cannot be simulated or do not end as upright as the plan are left out. Raises
+    KembaError where the run has no table or no plan.
     """
     table, plant = read_controller(run), plant_of(run)
-    cases = scenarios(FILE, plant, FeedbackScenarioSettings.current().count)
+    cases = scenarios(FILE, plant, COUNT)
     asked = [{"model": c.model, "start": standing(c.model, table, c.start)} for c in cases]
-    upright = LandingSettings.current().upright
+    pitch = float(load_run(run).trajectory["body/pitch"][-1])
     done = [d for d in execute_many(table, asked, jobs) if not isinstance(d, KembaError)]
-    return [d.trajectory for d in done if abs(d.trajectory["body/pitch"][-1]) <= upright]
+    return [d.trajectory for d in done if turned(d.trajectory["body/pitch"][-1], pitch) <= UPRIGHT]

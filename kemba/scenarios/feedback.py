@@ -19,7 +19,6 @@ from kemba.model import Model
 from kemba.ocp import load_task, task_model
 from kemba.plant.execution.certificate import rest_after
 from kemba.plant.execution.repeat import VALVE_SCATTER, plant_of
-from kemba.plant.execution.replay import ends_standing
 from kemba.policy.execute import execute_policy
 from kemba.policy.player import Policy
 from kemba.policy.write import FILE, write_policy
@@ -28,7 +27,6 @@ from kemba.scenarios.conditions import standing
 from kemba.scenarios.draw import Scenario, scenarios
 from kemba.scenarios.expected import FILE as UNCERTAINTIES
 from kemba.scenarios.expected import executions_of
-from kemba.scenarios.share import fault_of
 from kemba.settings import Settings, setting
 from kemba.stopwatch import Stage, Tell, silent
 
@@ -107,7 +105,7 @@ def _tried(
     """In how many scenarios the plan on `model` succeeds, played with noisy sensors; and in how
     many of these its end is where the task's tolerance has it."""
     plan, table, task = run.trajectory, run.controller, load_task(run.task)[0]
-    rest, lands = rest_after(model, plan, table), bool(ends_standing(model, plan))
+    rest = rest_after(model, plan, table)
     succeeded = ended = 0
     for seed, case in enumerate(cases):
         policy, start = Policy(file, *WAYS[way]), standing(case.model, table, case.start)
@@ -118,7 +116,6 @@ def _tried(
         except KembaError:
             continue  # it cannot be simulated
         replay = done.against(case.model, plan)
-        good = not fault_of(replay, lands)
-        succeeded += good
-        ended += good and replay.final_error_m <= task.tolerances.plant_final
+        succeeded += replay.landed
+        ended += replay.landed and replay.final_error_m <= task.tolerances.plant_final
     return succeeded, ended

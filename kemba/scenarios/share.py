@@ -12,7 +12,6 @@ from kemba.errors import KembaError
 from kemba.model import Model
 from kemba.plant.execution.certificate import rest_after
 from kemba.plant.execution.controller import execute_many
-from kemba.plant.execution.replay import LandingSettings, Replay, ends_standing
 from kemba.scenarios.conditions import standing
 from kemba.scenarios.draw import Scenario
 from kemba.scenarios.rate import wilson
@@ -82,14 +81,13 @@ def outcomes(
     asked = [
         {"model": c.model, "extra": rest, "start": standing(c.model, table, c.start)} for c in cases
     ]
-    lands = bool(ends_standing(model, plan))
     told = []
     for case, done in zip(cases, execute_many(table, asked, jobs), strict=True):
         if isinstance(done, KembaError):
             told.append(ScenarioOutcome(case, -np.inf, "cannot be simulated"))
             continue
         found = done.against(case.model, plan)
-        told.append(ScenarioOutcome(case, found.apex_error_m, fault_of(found, lands)))
+        told.append(ScenarioOutcome(case, found.apex_error_m, found.fault or ""))
     return told
 
 
@@ -101,11 +99,3 @@ def share_of(done: Sequence[ScenarioOutcome]) -> Share:
     flown = [one.apex for one in done if np.isfinite(one.apex)]
     sigma = float(np.std(flown)) if flown else 0.0
     return Share(len(done), good, wilson(good, len(done)), f"{what}: {worst.case.sentence}", sigma)
-
-
-def fault_of(found: Replay, lands: bool) -> str:
-    """What goes wrong in an execution; "" where nothing does. `lands`: whether the plan lands."""
-    if lands:
-        return found.fault or ""
-    turned = np.abs(found.trajectory["body/pitch"]).max() > LandingSettings.current().upright
-    return "tips over" if turned else ""

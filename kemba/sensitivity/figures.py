@@ -10,18 +10,13 @@ from kemba.effects.mechanics.load import Payload
 from kemba.errors import KembaError, suggest
 from kemba.model import Model
 from kemba.ocp.task.task import Task
-from kemba.settings import Settings, setting
 
 Problem = tuple[Task, Model]
 
 
-class Steps(Settings):
-    """By how much figures change."""
-
-    length: float = setting(0.01, "m", "of height and distance", "convention: a centimetre")
-    pressure: float = setting(10e3, "Pa", "of the supply", "convention: as regulators are read")
-    mass: float = setting(0.1, "kg", "of the payload", "convention: what a sensor weighs")
-    share: float = setting(0.1, "1", "of the numbers of effects", "convention: a tenth")
+# by how much figures change: height and distance [m], supply [Pa], payload [kg], the numbers of
+# effects as a share
+LENGTH, PRESSURE, MASS, SHARE = 0.01, 10e3, 0.1, 0.1
 
 
 @dataclass(frozen=True)
@@ -67,7 +62,7 @@ def _asked(task: Task, model: Model) -> Iterator[FigureStep]:
                 name,
                 "m",
                 float(value),
-                Steps.current().length,
+                LENGTH,
                 False,
                 _task_with(task, model, name),
             )
@@ -78,7 +73,6 @@ def _task_with(task: Task, model: Model, name: str) -> Callable[[float], Problem
 
 
 def _air_and_load(task: Task, model: Model) -> Iterator[FigureStep]:
-    steps = Steps.current()
 
     def fed(pressure: float) -> Problem:
         return task, Model(model.mechanism, model.effects, pressure, model.name)
@@ -86,13 +80,12 @@ def _air_and_load(task: Task, model: Model) -> Iterator[FigureStep]:
     def loaded(mass: float) -> Problem:
         return task, model.with_effects([Payload.model_construct(kind="payload", m=mass)])
 
-    yield FigureStep("supply", "Pa", model.supply, steps.pressure, True, fed)
-    yield FigureStep("payload", "kg", task.payload, steps.mass, True, loaded)
+    yield FigureStep("supply", "Pa", model.supply, PRESSURE, True, fed)
+    yield FigureStep("payload", "kg", task.payload, MASS, True, loaded)
 
 
 def _effects(task: Task, model: Model) -> Iterator[FigureStep]:
     """Numbers by themselves; a table as a factor on all of it."""
-    share = Steps.current().share
     for effect in model.effects:
         if not effect.moves or effect.kind == "payload":
             continue
@@ -101,9 +94,9 @@ def _effects(task: Task, model: Model) -> Iterator[FigureStep]:
             value, label = effect.value(name), f"{effect.name}.{name}"
             change = _effect_with(task, model, effect, name)
             if isinstance(value, tuple):
-                yield FigureStep(label, "1", 1.0, share, True, change)
+                yield FigureStep(label, "1", 1.0, SHARE, True, change)
             elif value:
-                step = share * abs(float(value))
+                step = SHARE * abs(float(value))
                 yield FigureStep(label, numbers[name].unit, float(value), step, True, change)
 
 

@@ -20,26 +20,13 @@ import numpy as np
 
 from kemba.ocp.nlp.ipopt import Iterate
 from kemba.ocp.phases.program import PhasePart, PhaseProgram
-from kemba.settings import Settings, setting
 
 Vector = np.ndarray
 
 
-class KktSettings(Settings):
-    """What keeps the matrix regular."""
-
-    near: float = setting(
-        1e-10, "1", "scaled distance from a bound below which it counts as touched",
-        "convention: far below IPOPT's distance from an active bound, 1e-8",
-    )  # fmt: skip
-    off: float = setting(
-        1e-9, "1", "least multiplier of a row, by which distances are divided",
-        "convention: such a row is not active",
-    )  # fmt: skip
-    soft: float = setting(
-        1e-9, "1", "on the diagonal, against rows that say the same",
-        "convention: far below the entries, about one",
-    )  # fmt: skip
+NEAR = 1e-10  # scaled distance from a bound below which it is touched: IPOPT's is 1e-8
+OFF = 1e-9  # least multiplier of a row, by which distances are divided: such a row is not active
+SOFT = 1e-9  # on the diagonal, against rows that say the same: far below the entries, about one
 
 
 @dataclass(frozen=True)
@@ -128,21 +115,21 @@ class Kkt:
 
         assert point.lam_g is not None
         assert point.lam_x is not None
-        x, lam, mu, s = point.Y, point.lam_g, point.lam_x, KktSettings.current()
+        x, lam, mu = point.Y, point.lam_g, point.lam_x
         problem = program.problem
         half = _sparse(problem.hess_lag(x, [], 1.0, lam))
         g, jacobian = problem.jac_g(x, [])
         g, J = np.array(g).ravel(), _sparse(jacobian)
         W = half + sparse.triu(half, 1).T
         free = program.lower < program.upper
-        pull = np.abs(mu) / np.maximum(_distance(x, mu, program.lower, program.upper), s.near)
+        pull = np.abs(mu) / np.maximum(_distance(x, mu, program.lower, program.upper), NEAR)
         away = _distance(g, lam, program.g_lower, program.g_upper)
         equal = program.g_lower == program.g_upper
-        loose = np.where(equal, s.soft, away / np.maximum(np.abs(lam), s.off) + s.soft)
+        loose = np.where(equal, SOFT, away / np.maximum(np.abs(lam), OFF) + SOFT)
         both = sparse.vstack([W, J]).tocsc()
         matrix = sparse.bmat(
             [
-                [W[free][:, free] + sparse.diags(pull[free] + s.soft), J[:, free].T],
+                [W[free][:, free] + sparse.diags(pull[free] + SOFT), J[:, free].T],
                 [J[:, free], -sparse.diags(loose)],
             ]
         )

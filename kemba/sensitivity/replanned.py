@@ -31,30 +31,16 @@ from kemba.ocp.transcription.symmetry import Reduction
 from kemba.ocp.transcription.unilateral import read_constraints
 from kemba.sensitivity.figures import FigureStep
 from kemba.sensitivity.kkt import Kkt, change_between
-from kemba.settings import Settings, setting
 from kemba.trajectory import Trajectory
 
 NAN = float("nan")
 
 
-class SensitivitySettings(Settings):
-    """How the plan is solved once more for its multipliers."""
-
-    pull: float = setting(
-        1e-3, "1", "proximal weight where the program alone does not converge",
-        "convention: a thousandth of the weight of the refinement",
-    )  # fmt: skip
-    iterations: int = setting(
-        100, "1", "iterations of that solve", "convention: twice those of a plan made from another"
-    )
-    tol: float = setting(
-        1e-6, "1", "IPOPT's tolerance of that solve, for sharp multipliers",
-        "convention: a hundredth of the refinement's",
-    )  # fmt: skip
-    change: float = setting(
-        0.02, "1", "of a step: the change by which the rows are differenced",
-        "convention: large beside rounding errors, small beside any bend",
-    )  # fmt: skip
+# proximal weight where the program alone does not converge: a thousandth of the refinement's
+PULL = 1e-3
+ITERATIONS = 100  # of the solve for the multipliers: twice those of a plan made from another
+TOL = 1e-6  # IPOPT's tolerance of that solve: a hundredth of the refinement's
+CHANGE = 0.02  # of a step, by which the rows are differenced: above rounding, below any bend
 
 
 @dataclass(frozen=True)
@@ -118,9 +104,8 @@ def solution(
 ) -> Solution:
     """A plan's program solved for a task and a model. Raises KembaError where it does not
     converge."""
-    settings = SensitivitySettings.current()
-    options = {**warm(settings.iterations), "tol": settings.tol}
-    for weight in (0.0, settings.pull):
+    options = {**warm(ITERATIONS), "tol": TOL}
+    for weight in (0.0, PULL):
         program, x = source.built(task, model)
         if weight:
             x = program.proximal(x, weight)
@@ -137,15 +122,14 @@ def of_plan(found: Solution, changed: Sequence[FigureStep]) -> list[Replanned]:
 
 
 def _of_figure(found: Solution, figure: FigureStep) -> Replanned:
-    share = SensitivitySettings.current().change
-    low, high = (found.source.built(*side)[0] for side in figure.sides(share))
+    low, high = (found.source.built(*side)[0] for side in figure.sides(CHANGE))
     change = change_between(low, high, found.point)
     if change is None:
         return Replanned()
     dx = found.kkt.answer(change)
     times = _times(found.program)
-    facts = {name: float(weights @ dx) / share for name, weights in times.items()}
-    cost = (change.f + float(found.kkt.slope @ dx)) * COST_SCALE / share
+    facts = {name: float(weights @ dx) / CHANGE for name, weights in times.items()}
+    cost = (change.f + float(found.kkt.slope @ dx)) * COST_SCALE / CHANGE
     return Replanned(cost=cost, **facts)
 
 

@@ -13,7 +13,7 @@ from kemba.ocp import Plan, Task, controller_table
 from kemba.ocp.certificate.asked import MeasuredRequirement, on_execution
 from kemba.plant.execution.certificate import executions, plant_run, summaries
 from kemba.plant.execution.counterpart import counterpart
-from kemba.plant.execution.replay import Replay, ends_standing
+from kemba.plant.execution.replay import Replay
 from kemba.plant.execution.retiming import ExecutedTable, retimed
 from kemba.plant.execution.strides import Stability, stability
 from kemba.solve.truth import PLANT, ApexBand, Truth, band_of, beyond, truth_of
@@ -117,12 +117,12 @@ def judged(
         tell("replay: strides in a row")
         stable = stability(model, plan, STRIDES, lambda motion: _played(found, motion, machine))
         facts |= {"strides": stable.json()}
-    limits = allowances(task.tolerances, bool(ends_standing(model, plan)), landing_speed(plan))
+    limits = allowances(task.tolerances, landing_speed(plan))
     verdicts = {}
     for key, who in EXECUTIONS.items():
         # a plant may miss by more than most bounds leave: it is judged by where it goes alone
         asked = asked_of(found, done[key], limits[key]) if key in OWN else ()
-        verdicts[key] = judge(who, facts[key], limits[key], asked)
+        verdicts[key] = judge(who, done[key], limits[key], asked, same_model=key in OWN)
     there, truth = done["plant_replay"], truth_of(task)
     band: ApexBand | None = None
     if truth.learnt and truth.evidence is not None:

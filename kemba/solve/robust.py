@@ -12,7 +12,7 @@ from kemba.plant.stepping.family import share_equations
 from kemba.scenarios.draw import Scenario, scenarios
 from kemba.scenarios.share import ScenarioOutcome, Share, outcomes, share, share_of
 from kemba.solve.judged import judged, plant_of, table_of
-from kemba.solve.robust_ways import WAYS, Changed, RobustSettings, variants
+from kemba.solve.robust_ways import ENOUGH, FEW, HOLD, WAYS, Changed, variants
 from kemba.solve.trial import Trial
 from kemba.trajectory import Trajectory
 
@@ -72,7 +72,7 @@ def most_robust(
         search.along(way, first, change)
     for name, variant in variants(task):
         best = search.best()
-        if search.over or (best and best.succeeds(RobustSettings.current().enough)):
+        if search.over or (best and best.succeeds(ENOUGH)):
             break
         search.take(name, solve(variant))
     return search.best() or RobustCandidate(first)
@@ -108,17 +108,17 @@ class _Search:
         self.over = found.status is Status.INTERRUPTED
         if self.over or not found.status.plan:
             return
-        own, settings = found.task.hold, RobustSettings.current()
-        for hold in sorted({own, max(own, settings.hold)}):
+        own = found.task.hold
+        for hold in sorted({own, max(own, HOLD)}):
             held = replace(found, task=found.task.model_copy(update={"hold": hold}))
             near = table_of(held)
             good = judged(held, near.table, self.plant, known=near.replay).good
             one = RobustCandidate(held, f"{name}, hold {hold:g} s", near.table, (), good)
-            one = self._executed(one, settings.few)
+            one = self._executed(one, FEW)
             if one.landed == 1.0:
                 one = self._executed(one, len(self.cases))
             self.candidates.append(one)
-            if one.succeeds(settings.enough):
+            if one.succeeds(ENOUGH):
                 self.over = True
                 return
 

@@ -11,43 +11,25 @@ from kemba.model import Model
 from kemba.ocp import Plan, Task
 from kemba.ocp.certificate.grip import grip_of
 from kemba.scenarios.draw import Scenario
-from kemba.settings import Settings, setting
 
 Changed = tuple[str, Task] | None  # the changed task, and words for the sentence of its plan
-TRIALS = "tuned: by hand on jumps of 0.36 to 0.9 m (docs/tasks.md), no benchmark"
-
-
-class RobustSettings(Settings):
-    """Which plans are tried, and when one is good enough."""
-
-    enough: float = setting(
-        0.98, "1", "share of scenarios at which no other plan is sought", TRIALS
-    )
-    few: int = setting(
-        15, "1", "scenarios in which a plan is executed first; in the others at once only if it "
-        "succeeds in all of these", "derived: one that succeeds in 98 % does so three times in "
-        "four, one of 90 % once in five",
-    )  # fmt: skip
-    hold: float = setting(
-        0.3, "s", "hold of a plan whose task has none",
-        "derived: a robot that was put down askew has settled by then (docs/tasks.md)",
-    )  # fmt: skip
-    longer: float = setting(
-        0.15, "1", "more time for a plan that takes all it has, as a share",
-        "tuned: a jump of 0.9 m, which has 0.84 s, takes 0.91 s where it may",
-    )  # fmt: skip
-    full: float = setting(
-        1e-3, "1", "of the longest time, by which a plan that takes all of it is shorter at most",
-        "convention: IPOPT ends that near to a bound",
-    )  # fmt: skip
-    room: float = setting(
-        0.05, "m", "more height of knees and hips above the ground, where the task asks for some",
-        "tuned: of jump_forward 95 % land with 5 cm under the knees, all of 120 with 8 to 11 cm "
-        "(by hand)",
-    )  # fmt: skip
-    air: float = setting(0.3, "1", "cost of open valves of a candidate that has less", TRIALS)
-    noise: float = setting(0.1, "1", "guess noise of other starts", TRIALS)
-    starts: int = setting(1, "1", "other starts", "convention: three times a plain plan at most")
+# share of scenarios at which no other plan is sought; by hand on jumps of 0.36 to 0.9 m
+# (docs/tasks.md), as AIR and NOISE
+ENOUGH = 0.98
+# scenarios in which a plan is executed first; in the others at once only if it succeeds in all of
+# these: one that succeeds in 98 % does so three times in four, one of 90 % once in five
+FEW = 15
+HOLD = 0.3  # s; of a plan whose task has none: a robot that was put down askew has settled by then
+# more time for a plan that takes all it has, as a share: a jump of 0.9 m, which has 0.84 s, takes
+# 0.91 s where it may
+LONGER = 0.15
+FULL = 1e-3  # of the longest time, by which a plan that takes all of it is shorter at most
+# m; more height of knees and hips above the ground, where the task asks for some: of jump_forward
+# 95 % land with 5 cm under the knees, all of 120 with 8 to 11 cm (by hand)
+ROOM = 0.05
+AIR = 0.3  # cost of open valves of a candidate that has less
+NOISE = 0.1  # guess noise of other starts
+STARTS = 1  # other starts: three times a plain plan at most
 
 
 def gripping(found: Plan, cases: Sequence[Scenario]) -> Changed:
@@ -61,25 +43,25 @@ def gripping(found: Plan, cases: Sequence[Scenario]) -> Changed:
 def lifted(found: Plan, cases: Sequence[Scenario]) -> Changed:
     """What a plan is continued for where its task keeps knees or hips above the ground: that they
     keep off it by more, since a landing askew lowers one of them."""
-    task, room = found.task, RobustSettings.current().room
+    task = found.task
     bounds = {}
     for r in found.requirements:
         where, name = str(r.location[0]), str(r.location[-1])
         if where == "bounds" and r.quantity.name.endswith("/z") and np.isfinite(r.lower):
-            bounds[name] = task.bounds[name].model_copy(update={"at_least": r.lower + room})
+            bounds[name] = task.bounds[name].model_copy(update={"at_least": r.lower + ROOM})
     if not bounds:
         return None
-    words = f"with {100 * room:g} cm more room under knees and hips"
+    words = f"with {100 * ROOM:g} cm more room under knees and hips"
     return words, task.model_copy(update={"bounds": {**task.bounds, **bounds}})
 
 
 def longer(found: Plan, cases: Sequence[Scenario]) -> Changed:
     """What a plan is continued for where it takes all the time that its task has."""
-    task, settings = found.task, RobustSettings.current()
+    task = found.task
     longest = task.duration * (1.0 + task.step_variation)
-    if found.trajectory.time[-1] < longest * (1.0 - settings.full):
+    if found.trajectory.time[-1] < longest * (1.0 - FULL):
         return None
-    duration = task.duration * (1.0 + settings.longer)
+    duration = task.duration * (1.0 + LONGER)
     words = f"with a duration of {duration:.3g} s instead of {task.duration:g} s"
     return words, task.model_copy(update={"duration": duration})
 
@@ -91,13 +73,12 @@ WAYS = ((longer, gripping), (lifted, gripping), (gripping,))
 
 def variants(task: Task) -> Iterator[tuple[str, Task]]:
     """The same motion sought anew."""
-    settings = RobustSettings.current()
-    held = task.model_copy(update={"hold": max(task.hold, settings.hold)})
+    held = task.model_copy(update={"hold": max(task.hold, HOLD)})
     air = task.cost.get("air", 0.0)
-    if isinstance(air, float) and air < settings.air:
-        yield "with less air", held.model_copy(update={"cost": {**task.cost, "air": settings.air}})
-    for seed in range(1, settings.starts + 1):
-        guess = {"guess_noise": max(task.guess_noise, settings.noise), "seed": task.seed + seed}
+    if isinstance(air, float) and air < AIR:
+        yield "with less air", held.model_copy(update={"cost": {**task.cost, "air": AIR}})
+    for seed in range(1, STARTS + 1):
+        guess = {"guess_noise": max(task.guess_noise, NOISE), "seed": task.seed + seed}
         yield "from another start", held.model_copy(update=guess)
 
 
@@ -108,7 +89,7 @@ def least_grip(model: Model, cases: Sequence[Scenario]) -> float:
     there = [f for f in (_friction(case.model) for case in cases) if f is not None]
     if not own or not there:
         return 1.0
-    sure = float(np.quantile(there, 1.0 - RobustSettings.current().enough))
+    sure = float(np.quantile(there, 1.0 - ENOUGH))
     return min(1.0, sure / own)
 
 

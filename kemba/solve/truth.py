@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from kemba.errors import KembaError
+from kemba.events import peak
 from kemba.files import sha256
 from kemba.mechanism.robot_file import robot_files
 from kemba.model import Evidence, Model, load_spec
@@ -16,7 +17,6 @@ from kemba.model.spec import evidence_folder
 from kemba.ocp import Plan, Task
 from kemba.plant.execution.certificate import rest_after
 from kemba.plant.execution.controller import Execution, execute_many
-from kemba.plant.execution.replay import ends_standing, peak
 from kemba.trajectory import Trajectory
 
 LEARNT, PLANT = "learnt model", "plant"
@@ -138,8 +138,7 @@ def band_of(found: Plan, table: Trajectory) -> tuple[ApexBand | None, str]:
         return None, "how sure the plan is cannot be said: no drawn model can be simulated"
     motions = [run.trajectory for _, run in done]
     apex = [peak(motion.time, motion["body/z"])[1] for motion in motions]
-    lands = bool(ends_standing(model, plan))
-    kept = sum(not lands or run.against(each, plan).landed for each, run in done)
+    kept = sum(run.against(each, plan).landed for each, run in done)
     middle = peak(plan.time, plan["body/z"])[1]
     reach = 1.96 * float(np.std(apex, ddof=1))
     return ApexBand(DRAWN, kept, middle - reach, middle + reach), ""

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from kemba.errors import enumerated
+from kemba.events import LASTS, ORDINALS
 from kemba.ocp.certificate.asked import MeasuredRequirement
 from kemba.ocp.task.task import Tolerances
-
-Facts = Mapping[str, Any]
+from kemba.plant.execution.replay import Replay
 
 # the executions of a plan, by their keys in the certificate, in words
 EXECUTIONS = {
@@ -20,19 +19,33 @@ EXECUTIONS = {
     "plant_replay": "simulated robot",
 }
 SLOWEST = 0.025  # s; touchdown of a plant is allowed to err by no more
+ARM = 0.2  # m; half the distance between the hips
+SOON = 0.1  # s; a flight between two strides takes about as long
 
 
 @dataclass(frozen=True)
 class Allowed:
-    """How far an execution may miss: apex and end [m], touchdown [s].
-
-    `lands`: whether the plan ends standing, so that the execution must.
-    """
+    """How far an execution may miss: apexes and end [m], touchdowns [s]. `final` holds for the
+    place ahead at each apex too, and tells what an end in the air or moving may miss."""
 
     apex: float
     touchdown: float
     final: float
-    lands: bool
+
+    @property
+    def together(self) -> float:
+        """Events [s] that are planned nearer to each other have no order: each may err by half."""
+        return max(LASTS, 2.0 * self.touchdown)
+
+    @property
+    def pitch(self) -> float:
+        """Pitch [rad] that moves the hips by as much as the place may be off."""
+        return self.final / ARM
+
+    @property
+    def velocity(self) -> float:
+        """Velocity [m/s] that moves the body by as much within `SOON`."""
+        return self.final / SOON
 
 
 @dataclass(frozen=True)
@@ -47,7 +60,7 @@ class Verdict:
     share: float = math.inf
 
 
-def allowances(tolerances: Tolerances, lands: bool, landing_speed: float) -> dict[str, Allowed]:
+def allowances(tolerances: Tolerances, landing_speed: float) -> dict[str, Allowed]:
     """What each execution may miss, by its key in the certificate.
 
     `landing_speed` [m/s] of the plan: what the plant's apex may err makes its touchdown early or
@@ -58,42 +71,79 @@ def allowances(tolerances: Tolerances, lands: bool, landing_speed: float) -> dic
     if late is None:
         late = min(SLOWEST, t.plant_apex / max(landing_speed, 1e-9))
     return {
-        "replay": Allowed(t.apex, t.touchdown, t.final, lands),
-        "table_replay": Allowed(t.table_apex, t.table_touchdown, t.table_final, lands),
-        "plant_replay": Allowed(t.plant_apex, late, t.plant_final, lands),
+        "replay": Allowed(t.apex, t.touchdown, t.final),
+        "table_replay": Allowed(t.table_apex, t.table_touchdown, t.table_final),
+        "plant_replay": Allowed(t.plant_apex, late, t.plant_final),
     }
 
 
 def judge(
-    who: str, facts: Facts | None, allowed: Allowed, asked: Sequence[MeasuredRequirement] = ()
+    who: str,
+    done: Replay | None,
+    allowed: Allowed,
+    asked: Sequence[MeasuredRequirement] = (),
+    same_model: bool = True,
 ) -> Verdict:
     """An execution against what is allowed, and the requirements as measured on it.
 
     The sentence of a good one gives the figure nearest to its limit, if it is not zero in the
     digits shown: `re-simulation matches the plan (apex 0.3 mm lower, 2 mm allowed)`. That of a bad
-    one gives each cause: `the simulated robot tips over`. Without `facts` nothing could be
-    executed, which is no confirmation.
+    one gives each cause: `the simulated robot tips over`. Without an execution nothing could be
+    executed, which is no confirmation. Planned events must come in their order; more events than
+    planned are a fault on the plan's own model, and told of another, on which feet that hardly
+    carry in the plan may leave the ground.
     """
-    if facts is None:
+    if done is None:
         return Verdict(False, f"the {who} cannot be started")
-    figures = [_apex(facts["apex_error_m"], allowed.apex)]
-    if (late := facts["touchdown_error_s"]) is not None:
-        figures.append(_touchdown(late, allowed.touchdown))
-    figures.append(_end(facts["final_error_m"], allowed.final))
+    figures = list(_figures(done, allowed))
     causes = [figure.miss for figure in figures if figure.share > 1.0]
     worst = max(figures, key=lambda figure: figure.share)
-    falls = allowed.lands and not facts["landed"]
     missed = max((m for m in asked if not m.met), key=lambda m: m.miss / m.allowed, default=None)
-    if falls:
-        causes.insert(0, facts["fault"] or "does not land")
+    events = done.compared
+    fault = done.fault or (events.missed(allowed.together) or (same_model and events.unplanned))
+    if fault:
+        causes.insert(0, fault)
     elif missed is not None and not causes:
         causes.append(f"does not keep to what was asked: {missed.sentence}")
     if causes:
         beyond = missed.miss / missed.allowed if missed is not None and missed.allowed else 0.0
-        share = math.inf if falls else max(worst.share, beyond)
+        share = math.inf if fault else max(worst.share, beyond)
         return Verdict(False, f"the {who} {enumerated(causes)}", share)
     seen = f" ({worst.match})" if worst.seen else ""
-    return Verdict(True, f"{who} matches the plan{seen}", worst.share)
+    more = f", but it {events.unplanned}" if events.unplanned else ""
+    return Verdict(True, f"{who} matches the plan{seen}{more}", worst.share)
+
+
+def _figures(done: Replay, allowed: Allowed) -> Iterator[_Figure]:
+    """Every error: of the flights' apexes and landings, and of the end."""
+    flown, landings = done.compared.apexes, done.compared.landings(allowed.together)
+    if not flown:
+        yield _apex(done.apex_error_m, allowed.apex)
+    for number, apex in enumerate(flown):
+        which = f"{ORDINALS[number]} " if 1 < len(flown) <= len(ORDINALS) else ""
+        yield _apex(apex.height_error_m or 0.0, allowed.apex, which)
+        x, pitch = apex.x_error_m or 0.0, apex.pitch_error_rad or 0.0
+        way = "ahead" if x >= 0 else "behind"
+        yield _figure(x, allowed.final, "mm", f"{which}apex {{}} {way}",
+                      f"is {{}} {way} at the {which}apex")  # fmt: skip
+        yield _figure(pitch, allowed.pitch, "rad", f"{which}apex turned by {{}}",
+                      f"is turned by {{}} at the {which}apex")  # fmt: skip
+    for landing in landings:
+        side = "late" if landing.late >= 0 else "early"
+        feet = (
+            f" with the {enumerated(landing.legs)} {'foot' if len(landing.legs) == 1 else 'feet'}"
+        )
+        which = feet if len(landings) > 1 else ""
+        yield _figure(landing.late, allowed.touchdown, "ms", f"touchdown{which} {{}} {side}",
+                      f"touches down{which} {{}} {side}")  # fmt: skip
+    yield _figure(done.final_error_m, allowed.final, "mm", "end {} away", "ends {} from the plan")
+    if (end := done.end) is not None:
+        rate = allowed.velocity / ARM
+        yield _figure(end.pitch_rad, allowed.pitch, "rad", "end turned by {}", "ends turned by {}")
+        yield _figure(end.velocity_m_s, allowed.velocity, "m/s", "velocity at the end off by {}",
+                      "ends with a velocity {} off the plan's")  # fmt: skip
+        yield _figure(end.rate_rad_s, rate, "rad/s", "pitch rate at the end off by {}",
+                      "ends with a pitch rate {} off the plan's")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -109,36 +159,23 @@ class _Figure:
     seen: bool
 
 
-def _apex(error: float, allowed: float) -> _Figure:
-    height, limit = f"{abs(1e3 * error):.1f} mm", f"{1e3 * allowed:.3g} mm allowed"
+def _apex(error: float, allowed: float, which: str = "") -> _Figure:
+    up = error >= 0
+    return _figure(
+        error, allowed, "mm", f"{which}apex {{}} {'higher' if up else 'lower'}",
+        f"reaches {{}} {'above' if up else 'below'} the {which}planned apex",
+    )  # fmt: skip
+
+
+def _figure(error: float, allowed: float, unit: str, match: str, miss: str) -> _Figure:
+    """An error in SI, shown in `unit`, which replaces the braces in `match` and `miss`."""
+    factor, digits = (1e3, 1) if unit in ("mm", "ms") else (1.0, 2)
+    text = f"{abs(factor * error):.{digits}f}"
+    limit = f"{factor * allowed:.3g} {unit} allowed"
+    match, miss = (words.format(f"{text} {unit}") for words in (match, miss))
     return _Figure(
-        _share(error, allowed),
-        f"apex {height} {'higher' if error >= 0 else 'lower'}, {limit}",
-        f"reaches {height} {'above' if error >= 0 else 'below'} the planned apex ({limit})",
-        _seen(error),
+        _share(error, allowed), f"{match}, {limit}", f"{miss} ({limit})", float(text) != 0.0
     )
-
-
-def _touchdown(late: float, allowed: float) -> _Figure:
-    text = f"{abs(1e3 * late):.1f} ms {'late' if late >= 0 else 'early'}"
-    limit = f"{1e3 * allowed:.3g} ms allowed"
-    share = _share(late, allowed)
-    return _Figure(
-        share, f"touchdown {text}, {limit}", f"touches down {text} ({limit})", _seen(late)
-    )
-
-
-def _end(error: float, allowed: float) -> _Figure:
-    text, limit = f"{1e3 * error:.1f} mm", f"{1e3 * allowed:.3g} mm allowed"
-    share = _share(error, allowed)
-    return _Figure(
-        share, f"end {text} away, {limit}", f"ends {text} from the plan ({limit})", _seen(error)
-    )
-
-
-def _seen(error: float) -> bool:
-    """Whether an error [m] or [s] is shown as more than 0.0 mm or ms."""
-    return f"{abs(1e3 * error):.1f}" != "0.0"
 
 
 def _share(error: float, allowed: float) -> float:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kemba.policy.expected import Expected, expected_from
-from kemba.policy.settings import PolicySettings
+from kemba.policy.settings import WINDOW
 from kemba.trajectory import Trajectory
 
 CLOCK = np.arange(60) * 1e-3
@@ -52,7 +52,7 @@ def test_noise_is_weighed_against_what_is_usual() -> None:
     plain, noisy = expected({}).estimate[-1], expected(NOISE).estimate[-1]
     ahead = np.array([3e-3, 3e-3 / 0.029])
     assert 0.8 * (plain @ ahead)[1] < (noisy @ ahead)[1] < (plain @ ahead)[1]
-    window, rng = PolicySettings.current().window, np.random.default_rng(1)
+    window, rng = WINDOW, np.random.default_rng(1)
     time = (np.arange(window) - (window - 1) / 2) * 1e-3
     values = rng.normal(0.0, 1e-3, (4000, window))
     measured = np.column_stack([values[:, -1], values @ time / (time @ time)])

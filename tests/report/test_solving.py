@@ -13,8 +13,8 @@ from typer.testing import CliRunner
 from kemba.files import WriteError
 from kemba.ocp import load_task, task_model
 from kemba.plant import execute, replay
+from kemba.plant.execution.certificate import SETTLE
 from kemba.plant.execution.counterpart import counterpart
-from kemba.plant.execution.replay import LandingSettings
 from kemba.report import solve_into
 from kemba.runs import RunFolder
 from kemba.solve import Approach, Listener
@@ -34,11 +34,7 @@ def test_the_certificate_tells_what_execution_gave(tmp_path: Path) -> None:
     assert answer["replay"] == pytest.approx(again, abs=1e-9)
     full = counterpart(task.model, task.payload, task.supply)
     plan = Trajectory.read(folder / "trajectory.csv")
-    there = (
-        execute(folder.path, full, extra=LandingSettings.current().settle)
-        .against(full, plan)
-        .summary()
-    )
+    there = execute(folder.path, full, extra=SETTLE).against(full, plan).summary()
     assert answer["plant_replay"] == pytest.approx(there, abs=1e-6)
     allowed, (same, plant) = task.tolerances, (answer["replay"], answer["plant_replay"])
     assert answer["good"], answer["sentence"]

@@ -4,88 +4,129 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 from typer.testing import CliRunner
 
+from kemba.events import Event, EventComparison
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.task.task import Tolerances
+from kemba.plant.execution.replay import EndError, Replay
 from kemba.solve.judged import Judged
 from kemba.solve.trial import Motions, Trial
 from kemba.solve.verdict import EXECUTIONS, Verdict, allowances, judge
+from kemba.trajectory import Trajectory
 from kemba_cli.main import app
 
-LANDED = {
-    "apex_error_m": 1e-5,
-    "touchdown_error_s": -1e-6,
-    "final_error_m": 1e-6,
-    "landed": True,
-    "fault": None,
-}
+NOTHING = Trajectory([0.0], {})
+LANDED = Replay(1e-5, -1e-6, 1e-6, None, NOTHING, ())
 FAILED = "FAILED: a plan was found, but the re-simulation reaches "
-FELL = {"landed": False, "fault": "tips over"}
-AIR = {"touchdown_error_s": None, "landed": False, "fault": "ends in the air"}
+FELL = {"fault": "tips over"}
+STILL = EndError(0.0, 0.0, 0.0)
+
+
+def events(*late: float, **other: float | None) -> dict[str, object]:
+    """Landings of front and rear foot in turn that are `late` [s], with flights between."""
+    found = []
+    for i, late_s in enumerate(late):
+        flown = {"height_error_m": 0.0, "x_error_m": 0.0, "pitch_error_rad": 0.0}
+        flown |= other if i == 1 else {}
+        found += [
+            Event("apex", None, i + 0.4, i + 0.4, **flown),
+            Event("touchdown", ("front", "rear")[i % 2], i + 0.5, i + 0.5 + late_s),
+        ]
+    return {"compared": EventComparison(tuple(found))}
+
+
+def late(by: float) -> dict[str, object]:
+    """A jump whose landing is late by so much [s]."""
+    feet = [Event("touchdown", leg, 0.5, 0.5 + by) for leg in ("front", "rear")]
+    return {"touchdown_error_s": by, "compared": EventComparison(tuple(feet))}
+
+
+SECOND = Event("touchdown", "rear", None, 2.7)
+EXTRA = {"compared": EventComparison((*events(0.0, 0.0)["compared"].events, SECOND))}  # type: ignore[attr-defined]
+MISSING = {"compared": EventComparison((Event("touchdown", "front", 0.5, None),))}
 
 
 @pytest.mark.parametrize(
-    ("key", "facts", "lands", "good", "told"),
+    ("key", "facts", "good", "told"),
     [
-        ("replay", {}, True, True, "re-simulation matches the plan"),
-        ("replay", {"touchdown_error_s": -4e-5}, True, True, "re-simulation matches the plan"),
-        ("replay", {"touchdown_error_s": 1e-3}, True, True,
+        ("replay", {}, True, "re-simulation matches the plan"),
+        ("replay", late(-4e-5), True, "re-simulation matches the plan"),
+        ("replay", late(1e-3), True,
          "re-simulation matches the plan (touchdown 1.0 ms late, 2 ms allowed)"),
-        ("replay", {"final_error_m": 0.029}, True, True,
+        ("replay", {"final_error_m": 0.029}, True,
          "re-simulation matches the plan (end 29.0 mm away, 30 mm allowed)"),
-        ("replay", AIR, False, True, "re-simulation matches the plan"),
-        ("replay", AIR, True, False, "the re-simulation ends in the air"),
-        ("replay", {"apex_error_m": -0.0262}, True, False,
+        ("replay", {"end": STILL}, True, "re-simulation matches the plan"),
+        ("replay", {"end": EndError(-6.2, 0.0, 0.0)}, False,
+         "the re-simulation ends turned by 6.20 rad (0.15 rad allowed)"),
+        ("replay", {"end": EndError(0.0, 0.7, 0.0)}, False,
+         "the re-simulation ends with a velocity 0.70 m/s off the plan's (0.3 m/s allowed)"),
+        ("replay", {"end": EndError(0.0, 0.0, -2.0)}, False,
+         "the re-simulation ends with a pitch rate 2.00 rad/s off the plan's (1.5 rad/s allowed)"),
+        ("replay", events(0.0, 0.012), False,
+         "the re-simulation touches down with the rear foot 12.0 ms late (2 ms allowed)"),
+        ("replay", events(0.0, 0.0, height_error_m=-0.004), False,
+         "the re-simulation reaches 4.0 mm below the second planned apex (2 mm allowed)"),
+        ("plant_replay", events(0.0, 0.0, x_error_m=-0.07), False,
+         "the simulated robot is 70.0 mm behind at the second apex (50 mm allowed)"),
+        ("plant_replay", events(0.0, pitch_error_rad=0.0), True,
+         "simulated robot matches the plan"),
+        ("replay", EXTRA, False, "the re-simulation touches the ground with the rear foot a second "
+         "time, at 2.700 s, which is not planned"),
+        ("plant_replay", EXTRA, True, "simulated robot matches the plan, but it touches the ground "
+         "with the rear foot a second time, at 2.700 s, which is not planned"),
+        ("plant_replay", MISSING, False,
+         "the simulated robot never touches down with the front foot, planned at 0.500 s"),
+        ("replay", {"apex_error_m": -0.0262}, False,
          "the re-simulation reaches 26.2 mm below the planned apex (2 mm allowed)"),
-        ("replay", {"touchdown_error_s": 0.0174}, True, False,
+        ("replay", late(0.0174), False,
          "the re-simulation touches down 17.4 ms late (2 ms allowed)"),
-        ("replay", {"final_error_m": 0.12, "apex_error_m": 0.003}, True, False,
+        ("replay", {"final_error_m": 0.12, "apex_error_m": 0.003}, False,
          "the re-simulation reaches 3.0 mm above the planned apex (2 mm allowed) and ends 120.0 mm "
          "from the plan (30 mm allowed)"),
-        ("plant_replay", {"apex_error_m": 0.04, "touchdown_error_s": 0.003, "final_error_m": 0.01},
-         True, True, "simulated robot matches the plan (apex 40.0 mm higher, 50 mm allowed)"),
-        ("plant_replay", {"touchdown_error_s": 0.074, "final_error_m": 0.194}, True, False,
+        ("plant_replay", {**late(0.003), "apex_error_m": 0.04, "final_error_m": 0.01},
+         True, "simulated robot matches the plan (apex 40.0 mm higher, 50 mm allowed)"),
+        ("plant_replay", {**late(0.074), "final_error_m": 0.194}, False,
          "the simulated robot touches down 74.0 ms late (25 ms allowed) and ends 194.0 mm from the "
          "plan (50 mm allowed)"),
-        ("table_replay", {"apex_error_m": -0.0029}, True, False,
+        ("table_replay", {"apex_error_m": -0.0029}, False,
          "the re-simulation of controller.csv reaches 2.9 mm below the planned apex (2 mm "
          "allowed)"),
-        ("table_replay", {"touchdown_error_s": -0.021, "final_error_m": 0.031}, True, False,
+        ("table_replay", {**late(-0.021), "final_error_m": 0.031}, False,
          "the re-simulation of controller.csv touches down 21.0 ms early (3 ms allowed) and ends "
          "31.0 mm from the plan (30 mm allowed)"),
-        ("plant_replay", {"apex_error_m": -0.06}, True, False,
+        ("plant_replay", {"apex_error_m": -0.06}, False,
          "the simulated robot reaches 60.0 mm below the planned apex (50 mm allowed)"),
-        ("plant_replay", FELL, True, False, "the simulated robot tips over"),
+        ("plant_replay", FELL, False, "the simulated robot tips over"),
     ],
 )  # fmt: skip
 def test_a_verdict_says_what_matches_or_what_fails(
-    key: str, facts: dict[str, object], lands: bool, good: bool, told: str
+    key: str, facts: dict[str, object], good: bool, told: str
 ) -> None:
-    found = judged_as(key, facts, lands=lands)
+    found = judged_as(key, facts)
     assert (found.good, found.sentence) == (good, told)
 
 
-def judged_as(
-    key: str, facts: dict[str, object], tolerances: Tolerances | None = None, lands: bool = True
-) -> Verdict:
+def judged_as(key: str, facts: dict[str, object], tolerances: Tolerances | None = None) -> Verdict:
     """The verdict on an execution that is `LANDED` but for some facts, of a fall at 1 m/s."""
-    allowed = allowances(tolerances or Tolerances(), lands, 1.0)[key]
-    return judge(EXECUTIONS[key], {**LANDED, **facts}, allowed)
+    allowed = allowances(tolerances or Tolerances(), 1.0)[key]
+    done = replace(LANDED, **facts)  # type: ignore[arg-type]
+    return judge(EXECUTIONS[key], done, allowed, same_model=key != "plant_replay")
 
 
 def test_what_cannot_be_started_confirms_nothing() -> None:
-    found = judge(EXECUTIONS["replay"], None, allowances(Tolerances(), True, 1.0)["replay"])
+    found = judge(EXECUTIONS["replay"], None, allowances(Tolerances(), 1.0)["replay"])
     assert (found.good, found.sentence) == (False, "the re-simulation cannot be started")
 
 
 @pytest.mark.parametrize(
     ("facts", "share"),
-    [({}, 0.005), ({"touchdown_error_s": -0.004}, 2.0), (FELL, math.inf)],
+    [({}, 0.005), (late(-0.004), 2.0), (FELL, math.inf)],
 )
 def test_a_verdict_measures_the_largest_error(facts: dict[str, object], share: float) -> None:
     found = judged_as("replay", facts)
@@ -121,8 +162,8 @@ def test_tolerances_are_the_tasks() -> None:
 @pytest.mark.parametrize(("speed", "late"), [(1.0, 0.025), (4.0, 0.0125), (0.0, 0.025)])
 def test_a_plant_may_land_as_late_as_its_apex_may_be_off(speed: float, late: float) -> None:
     """5 cm at the speed of the landing, 25 ms at most; what the task says itself comes first."""
-    assert allowances(Tolerances(), True, speed)["plant_replay"].touchdown == pytest.approx(late)
-    own = allowances(Tolerances(plant_touchdown=0.04), True, speed)["plant_replay"]
+    assert allowances(Tolerances(), speed)["plant_replay"].touchdown == pytest.approx(late)
+    own = allowances(Tolerances(plant_touchdown=0.04), speed)["plant_replay"]
     assert own.touchdown == 0.04
 
 

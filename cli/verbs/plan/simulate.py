@@ -81,7 +81,7 @@ def _run(
     policy: bool,
     tell: Callable[[str], None],
 ) -> dict[str, Any]:
-    from kemba.plant.execution.repeat import plant_of, repeat_run
+    from kemba.plant.execution.repeat import kept, plant_of, repeat_run
 
     plant = plant_of(source, model)
     play, fed_back = None, ""
@@ -97,8 +97,7 @@ def _run(
     sentence = f"reached {apex} m on {plant.name}"
     if "landed" in runs[0]:
         worst = max((abs(r["apex_error_m"]) for r in runs), default=0.0)
-        landed = sum(r["landed"] for r in runs)
-        sentence += f", off the plan by at most {1e3 * worst:.0f} mm; {landed} of {repeat} landed"
+        sentence += f", off the plan by at most {1e3 * worst:.0f} mm; {kept(repeats)}"
     sentence += fed_back
     return {
         "model": plant.name,

@@ -14,6 +14,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from kemba.events import PLANNED, read
 from kemba.model import Model
 from kemba.model.impact import felt
 from kemba.ocp.certificate.grip import grip_of
@@ -113,7 +114,7 @@ def on_execution(
     that touches down a millisecond later has others.
     """
     clock, found = plan.time - plan.time[0], []
-    landed = min(_landing(plan, clock), clock[-1])
+    landed = min(read(plan, PLANNED, clock=clock).landing, float(clock[-1]))
     for requirement in asked:
         quantity = requirement.quantity
         if quantity.unit not in ("m", "rad") or requirement.minus is not None:
@@ -140,16 +141,6 @@ def on_execution(
         ]
         found += [m for m in each if not m.met][:1] or each[:1]
     return tuple(found)
-
-
-def _landing(plan: Trajectory, clock: Array) -> float:
-    """When [s] the first foot of a plan comes down after its apex; infinite where none does."""
-    names = [name for name in plan.names if name.endswith("/foot/z")]
-    if not names:
-        return np.inf
-    lowest, apex = np.min([plan[name] for name in names], axis=0), int(np.argmax(plan["body/z"]))
-    down = apex + np.flatnonzero((lowest[apex:-1] > CLOSED) & (lowest[apex + 1 :] <= CLOSED)) + 1
-    return float(clock[down[0]]) if len(down) else np.inf
 
 
 def _on_plan(

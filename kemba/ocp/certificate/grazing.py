@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass
 
 import numpy as np
 
+from kemba.events import LASTS, PLANNED, read
 from kemba.trajectory import Trajectory
-
-LASTS = 0.02  # s; a shorter contact between two times in the air does not carry the robot
-TOUCHES = 1e-5  # m; planned feet below this touch
 
 
 @dataclass(frozen=True)
@@ -35,12 +32,10 @@ def grazes(plan: Trajectory, euler: bool = False) -> list[Graze]:
     first row at which a foot is down.
     """
     found = []
-    for name in (name for name in plan.names if name.endswith("foot/z")):
-        down = plan[name] <= TOUCHES
-        change = np.flatnonzero(np.diff(down.astype(int)))  # the last row before each change
-        for before, last in itertools.pairwise(change):
-            begin = float(plan.time[before if euler else before + 1])
-            lasts = float(plan.time[last]) - begin
-            if down[last] and lasts < LASTS:
-                found.append(Graze(name[:-2], begin, lasts))
+    for leg, spans in read(plan, PLANNED).contacts.items():
+        for span in (s for s in spans if not s.firm):
+            row = int(np.searchsorted(plan.time, span.begin))
+            begin = float(plan.time[row - 1]) if euler else span.begin
+            if span.end - begin < LASTS:
+                found.append(Graze(f"{leg}/foot", begin, span.end - begin))
     return found

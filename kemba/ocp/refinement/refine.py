@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from kemba.events import LASTS
 from kemba.model import Model
 from kemba.ocp.certificate.certify import Certificate
-from kemba.ocp.certificate.grazing import LASTS
 from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.nlp.ipopt import Control, Iterate
 from kemba.ocp.phases.independent import ContradictionError, Independent

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from kemba.errors import KembaError
+from kemba.events import ends_standing
 from kemba.model import Model, load_model
 from kemba.plant.execution.controller import execute
 from kemba.plant.execution.impacts import told
-from kemba.plant.execution.replay import LandingSettings, Replay, ends_standing, replay
+from kemba.plant.execution.replay import Replay, replay
 from kemba.plant.execution.start import begins_moving, moving_start
 from kemba.stopwatch import Stage, Tell, silent
 from kemba.trajectory import Array, Trajectory
@@ -20,6 +21,7 @@ from kemba.trajectory import Array, Trajectory
 PLANT = "plant"
 POINTS = re.compile(r".*/(hip|knee)/(x|z|vx|vz)")
 DIGITS = 7
+SETTLE = 0.3  # s; the last commands are held so long before a landing is judged
 
 
 def replays(
@@ -102,8 +104,8 @@ def _digits(values: Array) -> Array:
 
 def rest_after(model: Model, plan: Trajectory, controller: Trajectory) -> float:
     """For how long [s] the last commands are held: a plan that ends standing may come to rest."""
-    rests = ends_standing(model, plan) and _closed(controller)
-    return LandingSettings.current().settle if rests else 0.0
+    rests = ends_standing(plan, model.mechanism.legs) and _closed(controller)
+    return SETTLE if rests else 0.0
 
 
 def _closed(controller: Trajectory) -> bool:

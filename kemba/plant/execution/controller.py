@@ -11,8 +11,9 @@ import numpy as np
 
 from kemba.effects.mechanics.motor import Motor
 from kemba.errors import KembaError
+from kemba.events import STANDS
 from kemba.model import Model
-from kemba.plant.execution.replay import LandingSettings, Replay, first_row, judge
+from kemba.plant.execution.replay import Replay, first_row, judge
 from kemba.plant.simulation.commands import SAME_TIME, Commands, JointControl, Profile
 from kemba.plant.simulation.simulate import Condition, Simulated, run_many, simulate_one
 from kemba.plant.simulation.start import lowest_foot
@@ -111,7 +112,7 @@ def condition_of(
         if quantity.binary
     }
     pose = {**first_row(model, table), **(start or {})}
-    falls = lowest_foot(model, pose) > LandingSettings.current().on_ground
+    falls = lowest_foot(model, pose) > STANDS
     moves = any(pose.get(v.name) for v in model.mechanism.velocities)
     begin = 0.0 if falls or moves else float(table.time[0])
     both = {**profiles, **(valves or {})}

@@ -9,25 +9,19 @@ from math import comb
 import numpy as np
 
 from kemba.plant.stepping.arrays import Array
-from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Trajectory
 
 Edges = dict[str, list[int]]  # by valve column: ticks at which it opens, closes, opens ...
 Group = list[tuple[str, int]]  # edges that move together: column, and which of its edges
 
 
-class Moves(Settings):
-    """Which moves of edges are compared by what they are predicted to do."""
-
-    together: int = setting(
-        4, "1", "groups of edges that move by a tick at once", "tuned: a jump of 0.487 m has no "
-        "near table with three (benchmarks/retiming.py)",
-    )  # fmt: skip
-    far: int = setting(2, "1", "of which so many may move by two ticks", CHOSEN)
-    many: int = setting(
-        20_000, "1", "moves of so many groups at most, else of fewer at once",
-        "derived: they take 10 ms to compare, a third of an execution",
-    )  # fmt: skip
+# groups of edges that move by a tick at once: a jump of 0.487 m has no near table with three
+# (benchmarks/retiming.py)
+TOGETHER = 4
+FAR = 2  # of which so many may move by two ticks
+# moves of so many groups at most, else of fewer at once: they take 10 ms to compare, a third of an
+# execution
+MANY = 20_000
 
 
 def edges_of(table: Trajectory) -> Edges:
@@ -53,11 +47,11 @@ def shared_edges(table: Trajectory) -> list[Group]:
 
 
 def moves(count: int) -> Array:
-    """Ticks (moves, count) by which some of `count` groups may move: see `Moves`."""
-    settings, found = Moves.current(), list[Array]()
-    for groups in range(1, settings.together + 1):
-        ticks = (-2, -1, 1, 2) if groups <= settings.far else (-1, 1)
-        if comb(count, groups) * len(ticks) ** groups > settings.many:
+    """Ticks (moves, count) by which some of `count` groups may move."""
+    found = list[Array]()
+    for groups in range(1, TOGETHER + 1):
+        ticks = (-2, -1, 1, 2) if groups <= FAR else (-1, 1)
+        if comb(count, groups) * len(ticks) ** groups > MANY:
             break
         where = np.array(list(combinations(range(count), groups)), dtype=int).reshape(-1, groups)
         by = np.array(list(product(ticks, repeat=groups)), dtype=int)

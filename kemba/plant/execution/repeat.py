@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -42,6 +42,13 @@ class Repeat:
         motion = self.execution.trajectory
         facts = {"log": str(self.path), "apex_m": float(motion["body/z"].max())}
         return facts | (self.replay.summary() if self.replay else {})
+
+
+def kept(repeats: Sequence[Repeat]) -> str:
+    """How many of some executions keep the end of their plan: `2 of 3 landed`."""
+    found = [repeat.replay for repeat in repeats if repeat.replay]
+    does = "stayed upright" if any(one.end for one in found) else "landed"
+    return f"{sum(one.landed for one in found)} of {len(repeats)} {does}"
 
 
 def repeat_run(

@@ -2,48 +2,51 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
+from kemba.events import (
+    EXECUTED,
+    PLANNED,
+    STAYS,
+    UPRIGHT,
+    EventComparison,
+    compared,
+    ends_standing,
+    gap,
+    read,
+    turned,
+)
 from kemba.model import Model
 from kemba.plant.simulation.commands import Commands, Profile
 from kemba.plant.simulation.record import Impact
 from kemba.plant.simulation.simulate import Simulated, run
 from kemba.plant.stepping.arrays import Array
-from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Trajectory
 
 
-class LandingSettings(Settings):
-    """What counts as standing, as a touchdown and as a landing."""
+@dataclass(frozen=True)
+class EndError:
+    """Of a motion that ends in the air or moving: executed minus planned pitch [rad], velocity of
+    the body [m/s] and rate of its pitch [rad/s] at the end of the plan."""
 
-    on_ground: float = setting(1e-3, "m", "planned feet below this stand", CHOSEN)
-    touches: float = setting(1e-4, "m", "planned feet below this touch", CHOSEN)
-    exact: float = setting(
-        1e-6, "m", "executed feet below this touch", "derived: the kernel's closed gap"
-    )
-    lifted: float = setting(5e-3, "m", "a foot above this at the end stands no more", CHOSEN)
-    upright: float = setting(0.35, "rad", "a landing with more pitch has failed", CHOSEN)
-    lasts: float = setting(
-        0.02,
-        "s",
-        "a shorter contact is no touchdown, unless it takes as much as the weight in that",
-        "derived: the weight takes 0.2 m/s of the fall in that time",
-    )
-    settle: float = setting(
-        0.3, "s", "the last commands are held so long before a landing is judged", CHOSEN
-    )
+    pitch_rad: float
+    velocity_m_s: float
+    rate_rad_s: float
 
 
 @dataclass(frozen=True)
 class Replay:
-    """How far an executed plan ends from the plan; errors are executed minus planned.
+    """How far an execution is from its plan; errors are executed minus planned.
 
-    `touchdown_error_s`, of the first touchdown that carries the body, is None when either has none
-    after its apex. `fault`: what the robot does wrong (`tips over`). It is None when at the end the
-    feet that stand in the plan stand, the body is upright, and neither a hip nor a knee met the
-    ground.
+    `apex_error_m`: of the highest point. `touchdown_error_s`: of the first landing after it, None
+    where there is none. `fault`: what the robot does wrong (`tips over`). It is None when at the
+    end the feet that stand in the plan stand, the body is as upright as planned after as many
+    turns, and neither a hip nor a knee met the ground. `end`: errors of a motion that does not end
+    at rest on its feet; such a one is judged by them.
     """
 
     apex_error_m: float
@@ -52,13 +55,16 @@ class Replay:
     fault: str | None
     trajectory: Trajectory
     impacts: tuple[Impact, ...]
+    compared: EventComparison = field(default_factory=EventComparison)
+    end: EndError | None = None
 
     @property
     def landed(self) -> bool:
-        """Whether nothing is wrong with the landing."""
+        """Whether nothing is wrong with the end: a landing is kept, or the body is as upright as
+        planned where the plan does not land."""
         return self.fault is None
 
-    def summary(self) -> dict[str, float | bool | str | None]:
+    def summary(self) -> dict[str, Any]:
         """The figures of the certificate."""
         return {
             "apex_error_m": self.apex_error_m,
@@ -66,6 +72,9 @@ class Replay:
             "final_error_m": self.final_error_m,
             "landed": self.landed,
             "fault": self.fault,
+            "order_kept": not self.compared.difference,
+            "events": [event.json() for event in self.compared.events],
+            "end": self.end and vars(self.end),
         }
 
 
@@ -97,94 +106,57 @@ def first_row(model: Model, plan: Trajectory) -> dict[str, float]:
 
 def judge(model: Model, plan: Trajectory, clock: Array, done: Simulated) -> Replay:
     """Compare what was executed with the plan, whose times are `clock` [s] of the execution."""
-    real, settings = done.trajectory, LandingSettings.current()
-    planned = int(np.argmax(plan["body/z"]))
-    apex_time, apex = peak(real.time, real["body/z"])
-    weight = model.mechanism.weight
-    was = _landings(touches(plan, clock, float(clock[planned]), settings.touches, weight))
-    now = _landings(touches(real, real.time, apex_time, settings.exact, weight))
-    impacts = [i.time for i in done.impacts if any("contact:" in label for label in i.labels)]
-    exact = [_exact(time, real.time, apex_time, impacts) for time in now]
-    late = [n - w for n, w in zip(exact, was, strict=False)] if was and now else []
-    final = np.array([real[name][-1] - plan[name][-1] for name in ("body/x", "body/z")])
+    real, weight = done.trajectory, model.mechanism.weight
+    was = read(plan, PLANNED, weight, clock)
+    now = read(real, EXECUTED, weight, hits=_hits(done.impacts))
+    found = compared(was, now)
+    late = (one.late for one in found.landings() if one.planned > was.top[0])
+    standing = ends_standing(plan, model.mechanism.legs)
+    at = float(real.time[-1] if standing else clock[-1])
+
+    def off(name: str) -> float:
+        return float(np.interp(at, real.time, real[name]) - plan[name][-1])
+
+    end = None
+    if not standing:
+        velocity = float(np.hypot(off("body/vx"), off("body/vz")))
+        end = EndError(off("body/pitch"), velocity, off("body/pitch_rate"))
     return Replay(
-        apex_error_m=apex - float(plan["body/z"][planned]),
-        touchdown_error_s=min(late, key=abs, default=None),
-        final_error_m=float(np.hypot(*final)),
-        fault=_fault(model, plan, real, apex_time),
+        apex_error_m=now.top[1] - was.top[1],
+        touchdown_error_s=next(late, None),
+        final_error_m=float(np.hypot(off("body/x"), off("body/z"))),
+        fault=_fault(model, plan, clock, real, standing),
         trajectory=real,
         impacts=done.impacts,
+        compared=found,
+        end=end,
     )
 
 
-def peak(time: Array, z: Array) -> tuple[float, float]:
-    """Time [s] and height [m] of the highest point, by the parabola through its neighbours."""
-    i = int(np.argmax(z))
-    if not 0 < i < len(z) - 1:
-        return float(time[i]), float(z[i])
-    c, b, a = np.polynomial.polynomial.polyfit(time[i - 1 : i + 2] - time[i], z[i - 1 : i + 2], 2)
-    shift = -b / (2 * a) if a < 0 else 0.0
-    return float(time[i] + shift), float(c + shift * (b + a * shift))
+def _hits(impacts: Iterable[Impact]) -> dict[str, list[float]]:
+    """When [s] the foot of each leg hits the ground."""
+    found: dict[str, list[float]] = {}
+    for impact in impacts:
+        for leg, _, pair in (label.rpartition("/") for label in impact.labels):
+            if pair.startswith("contact:"):
+                found.setdefault(leg, []).append(impact.time)
+    return found
 
 
-def touches(
-    t: Trajectory, clock: Array, after: float, low: float, weight: float
-) -> list[tuple[float, bool]]:
-    """When [s] a foot that was in the air touches, after `after`, and whether it carries the body.
-
-    A foot touches while it is below `low` [m]. A contact carries if it lasts 20 ms or to the
-    end, or if its force, without impacts, adds up to what the weight [N] does in 20 ms (0.2 m/s).
-    A foot that grazes the ground on its way does neither.
-    """
-    found, least = [], LandingSettings.current().lasts
-    for name in (name for name in t.names if name.endswith("foot/z")):
-        down = t[name] <= low
-        force = t[f"{name[:-1]}Fz"] if f"{name[:-1]}Fz" in t else np.zeros(len(t))
-        edges = np.flatnonzero(np.diff(down.astype(int), prepend=1, append=0))
-        for i in (i for i in edges if i < len(t) and down[i] and clock[i] > after):
-            end = int(edges[edges > i][0])  # the first row in the air again
-            took = float(np.trapezoid(force[i:end], clock[i:end]))
-            lasts = end == len(t) or clock[end] - clock[i] >= least
-            found.append((float(clock[i]), bool(lasts or took >= least * weight)))
-    return sorted(found)
-
-
-def _landings(found: list[tuple[float, bool]]) -> list[float]:
-    """The first touch that carries the body, and the first touch at all; none if none carries.
-
-    Whether a short touch carries is a matter of degree: plan and execution are compared by both,
-    and the nearer pair counts.
-    """
-    carrying = [time for time, carries in found if carries]
-    return [carrying[0], found[0][0]] if carrying else []
-
-
-def _exact(time: float, rows: Array, after: float, impacts: list[float]) -> float:
-    """The time [s] of the impact in the row before `time`: rows are coarser than impacts."""
-    before = max(after, float(rows[rows < time - 1e-9].max(initial=-np.inf)))
-    return min([i for i in impacts if before < i <= time + 1e-9], default=time)
-
-
-def ends_standing(model: Model, plan: Trajectory) -> list[str]:
-    """The legs on which a plan stands at its end."""
-    low = LandingSettings.current().on_ground
-    return [
-        leg
-        for leg in model.mechanism.legs
-        if f"{leg}/foot/z" not in plan or plan[f"{leg}/foot/z"][-1] <= low
-    ]
-
-
-def _fault(model: Model, plan: Trajectory, real: Trajectory, apex_time: float) -> str | None:
-    standing, settings = ends_standing(model, plan), LandingSettings.current()
-    if not standing:
-        return "ends in the air"
-    if abs(real["body/pitch"][-1]) > settings.upright:
+def _fault(
+    model: Model, plan: Trajectory, clock: Array, real: Trajectory, standing: list[str]
+) -> str | None:
+    pitch, planned = float(real["body/pitch"][-1]), float(plan["body/pitch"][-1])
+    if turned(pitch, planned) > UPRIGHT:
         return "tips over"
-    late = real.time > apex_time
+    if abs(pitch - planned) > np.pi:
+        return "ends upright, but another number of turns away"
     for point in ("hip", "knee"):
         for leg in model.mechanism.legs:
-            if (real[f"{leg}/{point}/z"][late] <= 0.0).any():
+            low = gap(real, leg, point) <= 0.0
+            if f"{leg}/{point}/z" in plan:  # a plan may lie on the ground itself
+                low &= np.interp(real.time, clock, gap(plan, leg, point)) > 0.0
+            if low.any():
                 return f"meets the ground with the {leg} {point}"
-    up = [leg for leg in standing if real[f"{leg}/foot/z"][-1] > settings.lifted]
+    up = [leg for leg in standing if gap(real, leg)[-1] > STAYS]
     return f"ends with the {up[0]} foot in the air" if up else None

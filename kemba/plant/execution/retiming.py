@@ -13,6 +13,7 @@ from functools import partial
 import numpy as np
 
 from kemba.errors import KembaError
+from kemba.events import PLANNED, read
 from kemba.model import Model
 from kemba.plant.execution.certificate import rest_after
 from kemba.plant.execution.controller import execute
@@ -24,7 +25,7 @@ from kemba.plant.execution.moved_edges import (
     single_edges,
     with_moved,
 )
-from kemba.plant.execution.replay import LandingSettings, Replay, ends_standing, touches
+from kemba.plant.execution.replay import Replay
 from kemba.plant.execution.start import begins_moving, moving_start
 from kemba.plant.stepping.arrays import Array
 from kemba.settings import CHOSEN, Settings, setting
@@ -35,33 +36,27 @@ class RetimingSettings(Settings):
     """How long other roundings of a table are tried, and how near is near enough."""
 
     apex: float = setting(0.5e-3, "m", "apex error that needs no search", CHOSEN)
-    ahead: float = setting(
-        1e-3, "m", "error of the place ahead, at the planned apex's time, that needs no search",
-        CHOSEN,
-    )  # fmt: skip
     touchdown: float = setting(1e-3, "s", "touchdown error that needs no search", "derived: a tick")
     final: float = setting(0.01, "m", "error of the end that needs no search", CHOSEN)
-    fallen: float = setting(
-        1e3, "1", "error of a robot that falls, in units of those", "convention: beyond any other"
-    )
     executions: int = setting(
         24, "1", "simulations at most", "derived: edges on ticks of the plan cost as much; of 30 "
         "tables 17 took 2 to 24 (benchmarks/retiming.py)",
     )  # fmt: skip
-    sure: float = setting(
-        0.7, "1", "predicted error, in the same units, at which a table is tried before the "
-        "effects of all edges are known", "convention: below 1 by what predictions miss",
-    )  # fmt: skip
-    price: float = setting(
-        0.03, "1", "predicted error that a tick counts as", "convention: small beside `sure`; of "
-        "equal predictions the one with fewer ticks is surer",
-    )  # fmt: skip
+
+
+AHEAD = 1e-3  # m; error of the place ahead, at the planned apex's time, that needs no search
+FALLEN = 1e3  # error of a robot that falls, in units of those: beyond any other
+# predicted error at which a table is tried before the effects of all edges are known: below 1 by
+# what predictions miss
+SURE = 0.7
+PRICE = 0.03  # predicted error that a tick counts as: of equal predictions fewer ticks are surer
 
 
 @dataclass(frozen=True)
 class ExecutedTable:
-    """A table; its execution, None where it cannot be simulated; errors (3,) of apex, touchdown and
-    place ahead, and the largest of all errors, in units of `RetimingSettings`."""
+    """A table; its execution, None where it cannot be simulated; errors (3 k,) of apex, touchdown
+    and place ahead of each of k flights, and the largest of all errors, in units of
+    `RetimingSettings`."""
 
     table: Trajectory
     replay: Replay | None
@@ -72,21 +67,21 @@ class ExecutedTable:
     def lands(self) -> bool:
         """Whether it can be compared with others: it was simulated, and falls only where the plan
         does."""
-        return self.error < RetimingSettings.current().fallen
+        return self.error < FALLEN
 
 
 def retimed(model: Model, plan: Trajectory, table: Trajectory) -> ExecutedTable:
     """The table, or one with edges some ticks away whose execution on `model` is nearer to the
     plan; with that execution.
 
-    What an edge does to apex, touchdown and place ahead is seen by an execution with it moved by a
-    tick. What several would do together is the sum of these; the best sums are executed. Errors are
-    in units of `RetimingSettings`.
+    What an edge does to each apex, touchdown and place ahead is seen by an execution with it moved
+    by a tick. What several would do together is the sum of these; the best sums are executed.
+    Errors are in units of `RetimingSettings`.
     """
     run = partial(executed_table, model, plan, extra=rest_after(model, plan, table))
     search = Roundings(run, RetimingSettings.current().executions)
     best = search.tried(table)
-    last, before = _landing(model, plan), np.inf
+    last, before = _last(model, plan), np.inf
     while 1.0 < best.error < before and search.left > 0:
         before = best.error
         for edges in (shared_edges(table), single_edges(table)):
@@ -132,7 +127,7 @@ class Roundings:
 
 
 class _Effects:
-    """What a tick of each group of edges does to the errors (3,) of `start`, as far as it was
+    """What a tick of each group of edges does to the errors (n,) of `start`, as far as it was
     seen."""
 
     def __init__(self, count: int, start: Array) -> None:
@@ -143,16 +138,15 @@ class _Effects:
 
     def promising(self, unknown: Sequence[int], error: float) -> Array | None:
         """The ticks (groups,) that were not tried and are predicted to come nearest to the plan;
-        None where that is not near enough: `sure` as long as effects are `unknown`, then below
+        None where that is not near enough: `SURE` as long as effects are `unknown`, then below
         `error`."""
-        settings = RetimingSettings.current()
-        useless = np.abs(self.slopes).max(axis=1) <= settings.price
+        useless = np.abs(self.slopes).max(axis=1) <= PRICE
         possible = self.open & ~self.moves[:, useless].any(axis=1)
         away = self.nearest + (self.moves - self.there) @ self.slopes
-        predicted = np.abs(away).max(axis=1) + settings.price * np.abs(self.moves).sum(axis=1)
+        predicted = np.abs(away).max(axis=1) + PRICE * np.abs(self.moves).sum(axis=1)
         predicted[~possible] = np.inf
         best = int(predicted.argmin())
-        near = settings.sure if unknown else error
+        near = SURE if unknown else error
         return np.asarray(self.moves[best]) if predicted[best] < near else None
 
     def done(self, ticks: Array) -> None:
@@ -160,7 +154,7 @@ class _Effects:
         self.open &= (self.moves != ticks).any(axis=1)
 
     def seen(self, ticks: Array, signed: Array, alone: int | None) -> None:
-        """Errors (3,) with these ticks (groups,); `alone`: of one group that moves alone for the
+        """Errors (n,) with these ticks (groups,); `alone`: of one group that moves alone for the
         first time."""
         if alone is not None:
             self.slopes[alone] = signed - self.start
@@ -178,29 +172,34 @@ def executed_table(
         facts = execute(table, model, extra=extra, start=start).against(model, plan)
     except KembaError:
         return ExecutedTable(table, None, np.full(3, np.inf), np.inf)
-    late, ahead = facts.touchdown_error_s or 0.0, _ahead(plan, facts.trajectory)
-    signed = np.array([facts.apex_error_m, late, ahead])
-    signed /= [limits.apex, limits.touchdown, limits.ahead]
+    signed = _errors(plan, facts) / np.array([limits.apex, limits.touchdown, AHEAD])
     error = float(max(np.abs(signed).max(), abs(facts.final_error_m) / limits.final))
-    falls = not facts.landed and bool(ends_standing(model, plan))
-    return ExecutedTable(table, facts, signed, error + (limits.fallen if falls else 0.0))
+    return ExecutedTable(table, facts, signed.ravel(), error + (0.0 if facts.landed else FALLEN))
 
 
-def _ahead(plan: Trajectory, real: Trajectory) -> float:
-    """How far [m] the body is ahead of its plan at the time of the planned apex."""
-    top = int(np.argmax(plan["body/z"]))
-    there = np.interp(plan.time[top] - plan.time[0], real.time, real["body/x"])
-    return float(there - plan["body/x"][top])
+def _errors(plan: Trajectory, done: Replay) -> Array:
+    """Of every planned flight (k, 3) the errors of apex [m], landing [s] and place ahead [m] at the
+    time of the planned apex; of the highest point where there is none."""
+    clock, top = plan.time - plan.time[0], int(np.argmax(plan["body/z"]))
+    flown = [(e.time, e.height_error_m) for e in done.compared.events if e.kind == "apex"]
+    found, real = [], done.trajectory
+    for time, higher in flown or [(float(clock[top]), done.apex_error_m)]:
+        late = (one.late for one in done.compared.landings() if one.planned > time)
+        there, planned = (
+            float(np.interp(time, t, motion["body/x"]))
+            for t, motion in ((real.time, real), (clock, plan))
+        )
+        found.append([higher or 0.0, next(late, 0.0), there - planned])
+    return np.array(found)
 
 
-def _landing(model: Model, plan: Trajectory) -> float:
-    """When [s] the plan touches down, or is highest where it does not land: later edges change
-    neither apex nor touchdown."""
-    clock = plan.time - plan.time[0]
-    apex = float(clock[np.argmax(plan["body/z"])])
-    low, weight = LandingSettings.current().touches, model.mechanism.weight
-    landed = [time for time, carries in touches(plan, clock, apex, low, weight) if carries]
-    return min(landed, default=apex)
+def _last(model: Model, plan: Trajectory) -> float:
+    """When [s] the last flight of a plan ends, or is highest where it does not land: later edges
+    change neither apex nor touchdown."""
+    course = read(plan, PLANNED, model.mechanism.weight, plan.time - plan.time[0])
+    last = course.flights[-1:]
+    top = (course.apex(last[0]) if last else None) or course.top
+    return last[0].end if last and last[0].end < np.inf else top[0]
 
 
 def _earliest(table: Trajectory, group: Group) -> float:

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from kemba.errors import KembaError
+from kemba.events import UPRIGHT
 from kemba.model import Model
 from kemba.ocp.chain import joined
-from kemba.plant.execution.replay import LandingSettings, Replay, first_row
+from kemba.plant.execution.replay import Replay, first_row
 from kemba.plant.simulation.commands import Commands, Profile
 from kemba.plant.simulation.simulate import run
 from kemba.plant.stepping.arrays import Array
@@ -29,11 +30,10 @@ def kept(plan: Trajectory, done: Replay | None, count: int) -> int:
     if done is None:
         return 0
     real, lasts = done.trajectory, plan.time[-1] - plan.time[0]
-    upright = LandingSettings.current().upright
     for k in range(1, count + 1):
         row = int(np.argmin(np.abs(real.time - k * lasts)))
         sunk = plan["body/z"][-1] - real["body/z"][row] > SUNK
-        turned = abs(real["body/pitch"][row] - plan["body/pitch"][-1]) > upright
+        turned = abs(real["body/pitch"][row] - plan["body/pitch"][-1]) > UPRIGHT
         if sunk or turned:
             return k - 1
     return count

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import pairwise
 
 import casadi as ca
 import numpy as np
@@ -13,6 +12,7 @@ import numpy as np
 from kemba.config import load_yaml
 from kemba.effects.pneumatics.chamber import STEADY, Chamber
 from kemba.effects.pneumatics.tables import at_supply
+from kemba.events import STAYS, bridged, gap
 from kemba.mechanism import Mechanism, Robot, knee
 from kemba.model import Model, build_model, load_spec
 from kemba.plotting.source import Mask, Source
@@ -21,7 +21,6 @@ from kemba.trajectory import Array, Trajectory
 
 OVERTRAVEL = 0.004  # m; a sensor may read this far beyond the stops
 ON_GROUND = 0.01  # m; a foot below this height counts as standing when its force is not known
-STAYS = 0.005  # m; a foot that stays below this between two contacts has not left the ground
 PRESSED = 0.02  # of the weight; more than this on a foot means it stands
 CLEAR = 4.0  # times its noise: what a measured force must exceed
 MOMENT = 7e-3  # s, over which a measured force is averaged
@@ -89,26 +88,28 @@ class Machine:
             height = self._height(trajectory, leg)
             if height is None:
                 return pressed
-            return _bridged(pressed, _averaged(trajectory.time, height)[0] < STAYS)
+            return bridged(pressed, _averaged(trajectory.time, height)[0] < STAYS)
         height = self._height(trajectory, leg)
         if height is None:
             return np.zeros(len(trajectory), dtype=bool)
         return np.asarray(height < ON_GROUND)
 
+    def feet(self, trajectory: Trajectory) -> Trajectory | None:
+        """The motion with the places of its feet [m], or None where columns are missing."""
+        coordinates = self.coordinates(trajectory)
+        if coordinates is None:
+            return None
+        points = self.points(coordinates)
+        places = {leg: points[f"{leg}/foot"] for leg in self.mechanism.legs}
+        return trajectory.with_columns(
+            {f"{leg}/foot/{axis} [m]": at[:, i] for leg, at in places.items()
+             for i, axis in enumerate("xz")}
+        )  # fmt: skip
+
     def _height(self, trajectory: Trajectory, leg: str) -> Array | None:
-        """The height (n,) [m] of a leg's foot, or None where columns are missing."""
-        coordinates = self.coordinates(trajectory) if leg in self.mechanism.legs else None
-        return None if coordinates is None else self.points(coordinates)[f"{leg}/foot"][:, 1]
-
-
-def _bridged(stands: Mask, low: Mask) -> Mask:
-    """`stands` (n,) with each break filled during which `low` (n,) holds all the time."""
-    edges = np.flatnonzero(np.diff(stands.astype(int)))
-    found = stands.copy()
-    for a, b in pairwise(edges.tolist()):
-        if not stands[a + 1] and low[a + 1 : b + 1].all():
-            found[a + 1 : b + 1] = True
-    return np.asarray(found)
+        """How high (n,) [m] a leg's foot is, or None where columns are missing."""
+        feet = self.feet(trajectory) if leg in self.mechanism.legs else None
+        return None if feet is None else gap(feet, leg)
 
 
 def _averaged(time: Array, values: Array) -> tuple[Array, int]:

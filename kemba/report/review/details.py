@@ -46,7 +46,14 @@ def _executed(facts: Facts) -> Rows:
     if facts["touchdown_error_s"] is not None:
         yield "touchdown", f"{1e3 * facts['touchdown_error_s']:+.2f} ms"
     yield "end", f"{1e3 * facts['final_error_m']:.2f} mm"
-    yield "landing", "good" if facts["landed"] else facts.get("fault") or "failed"
+    events = [e for e in facts.get("events", ()) if e["kind"] != "apex"]
+    if events:
+        kept = "as planned" if facts["order_kept"] else "not as planned"
+        yield "order of touchdowns and lift-offs", kept
+    yield (
+        "end" if facts.get("end") else "landing",
+        "good" if facts["landed"] else facts.get("fault") or "failed",
+    )
 
 
 def origin(run: Run) -> Iterable[str]:

@@ -1,120 +1,111 @@
-"""What happened when: apex, lift-off, touchdown of each foot, and how the motion ended."""
+"""What happened when: apexes, lift-offs, touchdowns of each foot, and how the motion ended."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from kemba.plant.execution.replay import LandingSettings, peak
-from kemba.plotting import Machine, Source
-from kemba.plotting.source import Mask
+from kemba.events import (
+    EXECUTED,
+    MEASURED,
+    PLANNED,
+    UPRIGHT,
+    ContactCourse,
+    Span,
+    contacts,
+    ends_standing,
+    gap,
+    read,
+    turned,
+)
+from kemba.plotting import Machine
+from kemba.plotting.robot.machine import EXACT
 from kemba.report.review.tracks import Track
-from kemba.settings import CHOSEN, Settings, setting
-from kemba.trajectory import Array, Trajectory
+from kemba.trajectory import Trajectory
 
-
-class EventSettings(Settings):
-    """How the end of a motion is judged."""
-
-    low: float = setting(
-        0.05, "m", "a body that ends so far below its start has not landed on its feet", CHOSEN
-    )
-
-
-@dataclass(frozen=True)
-class FootFlight:
-    """Of one foot around the apex: when it left and when it came down again [s], None where it did
-    not; `grazes`: when it touched the ground for a moment on its way."""
-
-    left: float | None
-    landed: float | None
-    grazes: tuple[float, ...] = ()
+LOW = 0.05  # m; a body that ends so far below where it should has not landed on its feet
 
 
 @dataclass(frozen=True)
 class Events:
-    """Of one motion: apex [s, m], how far the lower foot rises [m], flight by leg, and what is
-    wrong with its end (`tips over`), None for nothing."""
+    """Of one motion: the highest point [s, m]; apexes of all flights [s, m]; how far the lower foot
+    rises [m]; lift-offs of the last foot [s]; firm contacts and grazes by leg; and what is wrong
+    with its end (`tips over`), None for nothing."""
 
     apex_time: float
     apex: float
-    feet: float | None
-    flights: dict[str, FootFlight]
-    fault: str | None
-
-    @property
-    def lift_off(self) -> float | None:
-        """When [s] the last foot left the ground."""
-        left = [flight.left for flight in self.flights.values()]
-        known = [time for time in left if time is not None]
-        return max(known) if known and len(known) == len(left) else None
+    feet: float | None = None
+    apexes: tuple[tuple[float, float], ...] = ()
+    lift_offs: tuple[float, ...] = ()
+    touchdowns: dict[str, list[float]] = field(default_factory=dict)
+    grazes: dict[str, list[float]] = field(default_factory=dict)
+    fault: str | None = None
 
 
-def events_of(track: Track, machine: Machine) -> Events | None:
+def events_of(track: Track, machine: Machine, plan: Track | None = None) -> Events | None:
     """The events of a robot's motion; None where its height is not known."""
     t = track.t
     if "body/z" not in t or not np.isfinite(t["body/z"]).sum() > 2:
         return None
-    known = np.isfinite(t["body/z"])
-    time, z = peak(t.time[known], _calm(t.time[known], t["body/z"][known]))
-    legs = machine.mechanism.legs
-    flights = {leg: _flight(track.source, machine.stance(t, leg), time) for leg in legs}
-    return Events(time, z, _feet(t, machine), flights, _fault(t, z))
+    course = _course(track, machine)
+    first, flights = float(course.time[0]), course.flights
+    tops = (course.apex(flight) for flight in flights)
+    return Events(
+        *course.top,
+        _feet(t, machine),
+        tuple(top for top in tops if top),
+        tuple(flight.begin for flight in flights if flight.begin > first),
+        {leg: course.touchdowns(leg=leg) for leg in course.contacts},
+        {leg: [s.begin for s in spans if not s.firm] for leg, spans in course.contacts.items()},
+        _fault(t, course.top[1], machine, plan.t if plan else None),
+    )
 
 
-def _flight(source: Source, stands: Mask, apex: float) -> FootFlight:
-    """The contacts around the apex; one that is shorter than a touchdown grazes."""
-    spans, time = source.spans(stands), source.trajectory.time
-    ends = float(time[0]), float(time[-1])
-    lasts = LandingSettings.current().lasts
-    firm = [(a, b) for a, b in spans if b - a >= lasts or a <= ends[0] or b >= ends[1]]
-    if any(a <= apex <= b for a, b in firm):
-        return FootFlight(None, None)
-    left = [float(b) for a, b in firm if a < apex and b < ends[1]]
-    down = [float(a) for a, _ in firm if a > apex]
-    first, last = left[-1] if left else None, down[0] if down else None
-    short = [float(a) for a, b in spans if (a, b) not in firm]
-    during = [a for a in short if (first or ends[0]) < a < (last or ends[1])]
-    return FootFlight(first, last, tuple(during))
+def _course(track: Track, machine: Machine) -> ContactCourse:
+    """Exact motions are read as they are judged; feet of measured ones by force and height."""
+    t, legs = track.t, machine.mechanism.legs
+    if t.meta.get("kind") in EXACT and all(f"{leg}/foot/z" in t for leg in legs):
+        return read(t, PLANNED if track.source.plan else EXECUTED, machine.mechanism.weight)
+    feet: dict[str, list[Span]] = {}
+    for leg in legs:
+        stands = machine.stance(t, leg)
+        feet[leg] = contacts(t.time, np.where(stands, 0.0, 1.0), PLANNED)
+    return ContactCourse(t, t.time, feet, MEASURED)
 
 
 def _feet(t: Trajectory, machine: Machine) -> float | None:
     """How far [m] the lower foot rises."""
-    coordinates = machine.coordinates(t)
-    if coordinates is None:
+    feet = machine.feet(t)
+    if feet is None:
         return None
-    points = machine.points(coordinates)
-    lower = np.min([points[f"{leg}/foot"][:, 1] for leg in machine.mechanism.legs], axis=0)
+    lower = np.min([gap(feet, leg) for leg in machine.mechanism.legs], axis=0)
     return float(np.nanmax(lower)) if np.isfinite(lower).any() else None
 
 
-def _fault(t: Trajectory, apex: float) -> str | None:
-    z = t["body/z"][np.isfinite(t["body/z"])]
+def _fault(t: Trajectory, apex: float, machine: Machine, plan: Trajectory | None) -> str | None:
+    """What is wrong at the end of a motion, or of its plan if that goes on moving there."""
+    known = np.isfinite(t["body/z"])
+    if plan is not None and not ends_standing(plan, machine.mechanism.legs):
+        known &= t.time <= plan.time[-1]
+    time, z = t.time[known], t["body/z"][known]
+    if not len(z):
+        return None
     if "body/pitch" in t:
-        pitch = t["body/pitch"][np.isfinite(t["body/pitch"])]
-        if len(pitch) and abs(pitch[-1]) > LandingSettings.current().upright:
+        pitch = t["body/pitch"][np.isfinite(t["body/pitch"]) & (t.time <= time[-1])]
+        if len(pitch) and turned(pitch[-1], plan["body/pitch"][-1] if plan else 0.0) > UPRIGHT:
             return "tips over"
-    low = EventSettings.current().low
-    return "ends on the ground" if z[-1] < z[0] - low and z[-1] < apex - low else None
-
-
-def _calm(time: Array, values: Array) -> Array:
-    """Values whose noise is averaged over 5 ms, so that the peak is not the largest error."""
-    width = max(1, round(5e-3 / float(np.median(np.diff(time)))))
-    if width < 3:
-        return values
-    padded = np.pad(values, width // 2, mode="edge")
-    return np.convolve(padded, np.full(width, 1 / width), mode="valid")[: len(values)]
+    asked = z[0] if plan is None else plan["body/z"][-1]
+    return "ends on the ground" if z[-1] < asked - LOW and z[-1] < apex - LOW else None
 
 
 def marks_of(listed: Sequence[Events | None]) -> list[tuple[float, int]]:
     """Touchdowns as vertical lines: time [s] and the number of the motion."""
     return [
-        (round(flight.landed, 4), i)
+        (round(time, 4), i)
         for i, events in enumerate(listed)
         if events
-        for flight in events.flights.values()
-        if flight.landed is not None
+        for times in events.touchdowns.values()
+        for time in times
     ]

@@ -154,7 +154,8 @@ def page_of(given: Material) -> tuple[str, str, ReviewVerdict]:
     run = None if given.rig else given.run
     tracks = gather(run, given.logs)
     machine = None if given.rig else load_machine(given.model, given.supply)
-    events = [events_of(track, machine) if machine else None for track in tracks]
+    planned = plan_of(tracks)
+    events = [events_of(t, machine, planned) if machine else None for t in tracks]
     verdict = _verdict(given, tracks, events)
     parts = [verdict.html()]
     if tracks:

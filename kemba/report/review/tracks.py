@@ -11,22 +11,15 @@ import numpy as np
 from kemba.identify.logs.clock import in_plans_clock
 from kemba.plotting import Source, load_source
 from kemba.runs import PLANT_RUN, Run
-from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Array, Trajectory
 
 Role = Literal["plan", "plant", "log"]
 
 
-class PageSettings(Settings):
-    """What a page shows of long motions and of many."""
-
-    points: int = setting(1000, "1", "points of every curve, so that the page opens fast", CHOSEN)
-    before: float = setting(0.1, "s", "shown of a log before the plan begins", CHOSEN)
-    after: float = setting(0.4, "s", "shown of a log after the plan's end", CHOSEN)
-    drawn: int = setting(5, "1", "logs drawn over each other; more cannot be told apart", CHOSEN)
-    compared: int = setting(
-        2, "1", "logs that the model is compared with: more take longer than 10 s", CHOSEN
-    )
+POINTS = 1000  # of every curve, so that the page opens fast
+BEFORE, AFTER = 0.1, 0.4  # s; shown of a log before the plan begins and after its end
+DRAWN = 5  # logs drawn over each other; more cannot be told apart
+COMPARED = 2  # logs that the model is compared with: more take longer than 10 s
 
 
 @dataclass(frozen=True)
@@ -49,7 +42,7 @@ def gather(run: Run | None, logs: Sequence[Trajectory]) -> list[Track]:
     table = None
     if run and (run.path / "controller.csv").is_file():
         table = run.controller
-    for log in logs[: PageSettings.current().drawn]:
+    for log in logs[:DRAWN]:
         shown = log if table is None else in_plans_clock(log, table)
         tracks.append(Track(str(log.meta["name"]), "log", Source(log.meta["name"], shown)))
     return tracks
@@ -71,13 +64,13 @@ def plan_of(tracks: Sequence[Track]) -> Track | None:
 
 def grid_of(tracks: Sequence[Track]) -> Array:
     """Times (n,) [s] that all curves share: of the plan with a little around it, else of all."""
-    settings, plan = PageSettings.current(), plan_of(tracks)
+    plan = plan_of(tracks)
     low = min(float(track.t.time[0]) for track in tracks)
     high = max(float(track.t.time[-1]) for track in tracks)
     if plan:
-        low = max(low, float(plan.t.time[0]) - settings.before)
-        high = min(high, float(plan.t.time[-1]) + settings.after)
-    step = 1e-3 * max(1.0, np.ceil((high - low) / settings.points * 1e3))
+        low = max(low, float(plan.t.time[0]) - BEFORE)
+        high = min(high, float(plan.t.time[-1]) + AFTER)
+    step = 1e-3 * max(1.0, np.ceil((high - low) / POINTS * 1e3))
     first, last = np.ceil(low / step - 1e-6), np.floor(high / step + 1e-6)
     return np.asarray(np.arange(first, last + 1) * step)
 

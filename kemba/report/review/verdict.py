@@ -72,7 +72,7 @@ def of_plan(certificate: Facts, run: str, events: Events | None) -> ReviewVerdic
     if plant:
         error = 1e3 * plant["apex_error_m"]
         side = "higher" if error >= 0 else "lower"
-        lands = "lands and " if plant.get("landed") else ""
+        lands = "lands and " if plant.get("landed") and not plant.get("end") else ""
         robot = f"the simulated robot {lands}reaches {abs(error):.0f} mm {side}"
     height = certificate["apex_m"]
     return ReviewVerdict(

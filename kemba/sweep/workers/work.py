@@ -36,7 +36,7 @@ def execute_case(work: Work) -> Record:
 
     replay = run_on_plant(work)
     apex = float(max(replay.trajectory["body/z"]))
-    status = "landed" if replay.landed else "fell"
+    status = ("flew" if replay.end else "landed") if replay.landed else "fell"
     sentence = f"{status}: apex {apex:.3f} m, {1e3 * replay.apex_error_m:+.0f} mm against the plan"
     if replay.fault:
         sentence += f", {replay.fault}"

@@ -15,7 +15,7 @@ from kemba.identify.workflow import check_all, model_of
 from kemba.report.review.charts import Book, Chart, Curve
 from kemba.report.review.html import meter, table
 from kemba.report.review.lacking.heat import heat_table
-from kemba.report.review.tracks import PageSettings
+from kemba.report.review.tracks import COMPARED
 from kemba.stopwatch import Tell, silent
 from kemba.trajectory import Array, Trajectory
 
@@ -32,7 +32,7 @@ class ModelError:
 
 def model_error(logs: Sequence[Trajectory], model: str, tell: Tell = silent) -> ModelError:
     """Compare the first logs with a model. Raises KembaError; BadData for impossible logs."""
-    chosen = list(logs[: PageSettings.current().compared])
+    chosen = list(logs[:COMPARED])
     check_all(logs, model_of(logs, model))
     found, _ = compare_read(chosen, model, tell)
     return ModelError(found, tuple(str(log.meta["name"]) for log in chosen))

@@ -11,7 +11,7 @@ import numpy as np
 from kemba.model import Model
 from kemba.plotting import Machine
 from kemba.report.review.charts import Book, Chart, Curve
-from kemba.report.review.events import Events, FootFlight
+from kemba.report.review.events import Events
 from kemba.report.review.html import table
 from kemba.report.review.limits.energy import Energy, energy_of, put_in
 from kemba.report.review.limits.torque_speed import torque_speed
@@ -27,10 +27,12 @@ from kemba.report.review.limits.use import (
 from kemba.report.review.tracks import Track
 from kemba.trajectory import Array
 
+MOST = 6  # times in a cell of a table
+
 
 def event_table(tracks: Sequence[Track], events: Sequence[Events | None]) -> str:
     """Apex, lift-off and touchdown of every motion."""
-    legs = list(dict.fromkeys(leg for e in events if e for leg in e.flights))
+    legs = list(dict.fromkeys(leg for e in events if e for leg in e.touchdowns))
     heads = ["motion", "apex of the body's centre", "feet rise", "lift-off"]
     heads += [f"touchdown {leg}" for leg in legs] + ["end"]
     rows = []
@@ -40,10 +42,10 @@ def event_table(tracks: Sequence[Track], events: Sequence[Events | None]) -> str
         rows.append(
             [
                 escape(track.name),
-                f"{e.apex:.3f} m at {e.apex_time:.3f} s",
+                _tops(e),
                 _or_dash(e.feet, 100, "cm", 1),
-                _or_dash(e.lift_off, 1, "s", 3),
-                *(_touchdown(e.flights.get(leg)) for leg in legs),
+                _times(e.lift_offs),
+                *(_touchdown(e, leg) for leg in legs),
                 f"<b>{escape(e.fault)}</b>" if e.fault else "upright",
             ]
         )
@@ -52,16 +54,23 @@ def event_table(tracks: Sequence[Track], events: Sequence[Events | None]) -> str
     return table(title, heads, rows)
 
 
-def _touchdown(flight: FootFlight | None) -> str:
-    if flight is None:
+def _tops(e: Events) -> str:
+    """The apexes of several flights, else the highest point."""
+    tops = e.apexes if len(e.apexes) > 1 else [(e.apex_time, e.apex)]
+    return ", ".join(f"{z:.3f} m at {time:.3f} s" for time, z in tops)
+
+
+def _touchdown(e: Events, leg: str) -> str:
+    text, grazes = _times(e.touchdowns.get(leg, ())), e.grazes.get(leg, ())
+    return text + (f'<span class="aside">grazes at {_times(grazes)}</span>' if grazes else "")
+
+
+def _times(listed: Sequence[float]) -> str:
+    """The first few times [s]."""
+    if not listed:
         return "-"
-    text = _or_dash(flight.landed, 1, "s", 3)
-    if flight.grazes:
-        first = ", ".join(f"{time:.3f}" for time in flight.grazes[:2])
-        others = len(flight.grazes) - 2
-        more = f" and {others} more" if others > 0 else ""
-        text += f'<span class="aside">grazes at {first} s{more}</span>'
-    return text
+    more = f" and {len(listed) - MOST} more" if len(listed) > MOST else ""
+    return ", ".join(f"{time:.3f}" for time in listed[:MOST]) + " s" + more
 
 
 def limit_parts(book: Book, model: Model, machine: Machine) -> list[str]:

@@ -17,26 +17,16 @@ from kemba.plotting import Machine
 from kemba.plotting.robot.machine import EXACT
 from kemba.plotting.source import Mask
 from kemba.report.review.tracks import Track
-from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Array, Trajectory
 
 NORMAL = 1.204e-3  # kg in a litre of air at 20 deg C and one atmosphere
 AT_START = 20  # rows whose median is the pressure of the supply before valves open
 
 
-class UseSettings(Settings):
-    """When a limit counts as reached, and a foot as loaded."""
-
-    full: float = setting(0.99, "1", "share of a limit that counts as reached", CHOSEN)
-    loaded: float = setting(
-        0.1, "1", "share of the weight on a foot below which its friction says nothing", CHOSEN
-    )
-    smooth: float = setting(
-        0.011, "s", "window over which a measured position is made a speed", CHOSEN
-    )
-    clear: float = setting(
-        8.0, "1", "times its noise that a ground force must be, for friction as its share", CHOSEN
-    )
+FULL = 0.99  # share of a limit that counts as reached
+LOADED = 0.1  # share of the weight on a foot below which its friction says nothing
+SMOOTH = 0.011  # s; window over which a measured position is made a speed
+CLEAR = 8.0  # times its noise that a ground force must be, for friction as its share
 
 
 @dataclass(frozen=True)
@@ -82,10 +72,10 @@ def _cone(t: Trajectory, model: Model, machine: Machine, leg: str) -> Array:
     if ground is None or not all(name in t for name in names):
         return np.full(len(t), np.nan)
     along, normal = (t[name] for name in names)
-    settings, least = UseSettings.current(), 0.0
+    least = 0.0
     if t.meta.get("kind") not in EXACT:
-        least = settings.clear * difference_sigma(normal)
-    loaded = normal > max(settings.loaded * model.mechanism.weight, least)
+        least = CLEAR * difference_sigma(normal)
+    loaded = normal > max(LOADED * model.mechanism.weight, least)
     loaded &= machine.stance(t, leg)
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(loaded, np.abs(along) / (ground.mu * normal), np.nan)
@@ -101,7 +91,7 @@ def rate(track: Track, speed: str, position: str) -> Array:
     from scipy.signal import savgol_filter  # it takes half a second
 
     step = float(np.median(np.diff(t.time)))
-    width = max(5, 2 * round(0.5 * UseSettings.current().smooth / step) + 1)
+    width = max(5, 2 * round(0.5 * SMOOTH / step) + 1)
     if width > len(t):
         return np.gradient(t[position], t.time)
     return np.asarray(savgol_filter(t[position], width, 2, deriv=1, delta=step))
@@ -109,7 +99,7 @@ def rate(track: Track, speed: str, position: str) -> Array:
 
 def full_for(track: Track, share: Array) -> float:
     """For how long [s] a share is at its limit."""
-    at = np.nan_to_num(share) >= UseSettings.current().full
+    at = np.nan_to_num(share) >= FULL
     return float(np.sum(np.gradient(track.t.time)[at]))
 
 
