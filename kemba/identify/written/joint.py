@@ -6,9 +6,10 @@ differ from leg to leg and link to link, which its evidence says. What belongs t
 and clocks of sensors, stays as stated. Of rigs whose motion is measured, rows count by the noise as
 stated: noise that was learnt under this model would forget what changes slowly.
 
-Intervals come from the slopes at the fit, all nominal figures free within their tolerances. They
-are widened by as much as blocks of time scatter more than rows do ("sandwich"), and span what the
-runs say one by one where these disagree.
+Intervals come from the slopes at the fit, all nominal figures free within their tolerances, and
+from what every absent effect, there with a small share of its size as under every hypothesis of the
+search, would add to the estimate. They are widened by as much as blocks of time scatter more than
+rows do ("sandwich"), and span what the runs say one by one where these disagree.
 """
 
 from __future__ import annotations
@@ -161,9 +162,12 @@ def _judged(
     problem = problem.in_detail()
     others = tuple(n for n in problem.nuisance if n not in own)
     names = (*keys, *own, *others)
-    jacobian, r = problem.jacobian(theta, names), problem.residual(theta)
+    absent = [c for name, c in problem.candidates.items()
+              if c.key not in keys and name not in problem.structures]  # fmt: skip
+    slopes = problem.jacobian(theta, (*names, *(c.key for c in absent)))
+    jacobian, r = slopes[:, : len(names)], problem.residual(theta)
     parameters = problem.parameters()
-    slab = SpikeSlabSettings.current().slab
+    slab, spike = SpikeSlabSettings.current().slab, SpikeSlabSettings.current().spike
     width = [
         slab * parameters[k].size * (theta[k] if is_shape(problem, k) else 1.0) for k in keys
     ] + [problem.nuisance[n][1] for n in (*own, *others)]
@@ -171,14 +175,17 @@ def _judged(
     j = jacobian * scale
     h = np.linalg.inv(j.T @ j + np.eye(len(names)))
     count = len(keys) + len(own)
+    small = slopes[:, len(names) :] * [spike * c.lead.size for c in absent]
+    bias = (h @ (j.T @ small))[:count] * scale[:count, None]  # by each absent effect, 1 sigma
     spread = np.max([half_widths(labels, j, r, h)[:count] for labels in divisions(problem)], axis=0)
     inflated = np.maximum(spread / np.sqrt(np.diag(h)[:count]) / 1.96, 1.0)
     unit = scale[:count] * inflated
     value = np.array([theta[n] if n in theta else problem.nuisance[n][0] for n in names[:count]])
     size = np.array([abs(theta[k] - parameters[k].off) if np.isfinite(parameters[k].off) and
                      not is_shape(problem, k) else abs(theta[k]) for k in keys])  # fmt: skip
-    imperfect = SpikeSlabSettings.current().spike * np.append(size, np.zeros(len(own)))
-    reach = 1.96 * np.hypot(unit * np.sqrt(np.diag(h)[:count]), imperfect)
+    imperfect = spike * np.append(size, np.zeros(len(own)))
+    covariance = np.outer(unit, unit) * h[:count, :count] + bias @ bias.T
+    reach = 1.96 * np.hypot(np.sqrt(np.diag(covariance)), imperfect)
     low, high = value - reach, value + reach
     remarks = [_far(problem, names[i], value[i], low[i], high[i]) for i in range(len(keys), count)]
     remarks = [text for text in remarks if text]
@@ -188,7 +195,6 @@ def _judged(
             low[i], high[i] = min(low[i], apart.min()), max(high[i], apart.max())
             told = " to ".join(f"{x:.3g}" for x in sorted(apart))
             remarks.append(f"{names[i]} differs between runs ({told}); its interval spans them")
-    covariance = np.outer(unit, unit) * h[:count, :count]
     return _as_written(problem, names[:count], theta, (value, low, high), covariance, remarks)
 
 
