@@ -82,12 +82,6 @@ class Evidence(Section):
     figures: dict[str, float] = Field(default_factory=dict)
     measured: Measured = Measured()
 
-    @property
-    def plant_is_worse(self) -> bool:
-        """Whether the simulated robot is known to explain the logs worse than the model."""
-        known = self.error_plant is not None and self.error_held_out is not None
-        return known and self.error_plant > self.error_held_out  # type: ignore[operator]
-
     def faults(self, folder: Path) -> list[str]:
         """A sentence for the logs that are gone or that changed since, for a model in `folder`;
         empty where none did."""
