@@ -66,8 +66,9 @@ class Answer:
 
     Errors are of data that the fit has not seen, in units of the noise; `ranking`, `ladder` and
     sentence show the same number. `added`: what `model` has; `sure`: what of it is sure. `figures`
-    of the model's own that were fitted as well; `covariance` of all that is written, and its
-    `evidence`. `rest`: where the error sits that is left; `next`: what to measure to learn more.
+    of the model's own that were fitted as well, and those of single legs and links of the
+    `machine`; `covariance` of all that is written, and its `evidence`. `rest`: where the error sits
+    that is left; `next`: what to measure to learn more.
     """
 
     verdict: Verdict
@@ -89,6 +90,7 @@ class Answer:
     next: str = ""
     sure: tuple[str, ...] = ()
     figures: Mapping[str, Any] = field(default_factory=dict)
+    machine: Mapping[str, float] = field(default_factory=dict)
     covariance: Covariance | None = None
     evidence: Mapping[str, Any] | None = None
     idle: bool = False  # left-out data gained nothing by what would fit
@@ -106,7 +108,7 @@ class Answer:
     @property
     def writes(self) -> bool:
         """Whether a model is written: something was found, or figures were fitted anew."""
-        return bool(self.added) or self.covariance is not None
+        return bool(self.added or self.figures or self.machine)
 
     def drop_model(self) -> None:
         """Take back what was found: with it quoted logs are predicted worse than without."""
@@ -116,7 +118,8 @@ class Answer:
         )
         self.remarks = [f"{raised}: no model is written", *self.remarks]
         self.verdict = "unknown" if self.added else self.verdict
-        self.added, self.sure, self.figures, self.covariance = (), (), {}, None
+        self.added, self.sure, self.covariance = (), (), None
+        self.figures, self.machine = {}, {}
         self.error_after = self.error_before
 
     def told_in(self, before: tuple[float, float]) -> None:
@@ -150,10 +153,10 @@ def phrase(answer: Answer) -> str:
         what = "Nothing is missing as far as these data can tell"
         if answer.p_value_nothing <= DiscoverSettings.current().significant:
             what = f"What differs {'may be chance' if answer.idle else 'is too small to matter'}"
-        return (
-            f"{what} (p = {answer.p_value_nothing:.2g}); "
-            f"the error is {answer.error_after:.2f} times the noise."
-        )
+        before, after = f"{answer.error_before:.2f}", f"{answer.error_after:.2f}"
+        told = f"{what} (p = {answer.p_value_nothing:.2g}); the error is {after} times the noise"
+        fitted = f" with figures fitted within their tolerance ({before} as they were)"
+        return f"{told}{fitted if answer.writes and after != before else ''}."
     if answer.verdict == "unknown":
         more = f" A formula that fits: {answer.formula}." if answer.formula else ""
         why = f": {answer.remarks[0]}" if answer.remarks else ""

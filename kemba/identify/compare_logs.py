@@ -12,8 +12,9 @@ from kemba.identify.compare.compare import Comparison, compare
 from kemba.identify.logs.reading import read_logs
 from kemba.identify.problem.problem import Problem
 from kemba.identify.workflow import admitted, check_all, model_of
-from kemba.identify.written.quoted import heard
+from kemba.identify.written.quoted import heard, known
 from kemba.logs import load_map
+from kemba.model import load_spec
 from kemba.stopwatch import Tell, silent
 from kemba.trajectory import Trajectory
 
@@ -51,7 +52,9 @@ def compare_read(
     tell("learning the noise of the sensors")
     problem = heard(problem)
     tell("comparing with the model")
-    return compare(problem, model, [str(log.meta["path"]) for log in read]), problem
+    evidence = load_spec(model).evidence
+    figures = known(problem, evidence.figures) if evidence else {}
+    return compare(problem, model, [str(log.meta["path"]) for log in read], figures), problem
 
 
 def missed(plan: Trajectory, logs: Sequence[Trajectory]) -> Mapping[str, float]:

@@ -122,7 +122,7 @@ def _built_anew(search: Search, other: Rebuilt, holdout: Problem | None) -> Disc
     first_error = search.points[NULL].fitted_error
     search.say(f"built anew, the error is {answer.error_after:.2f} times the noise")
     fitted = (first_error, *found.fitted)
-    answer.figures, answer.covariance = joint.figures, joint.matrix
+    _add(answer, joint)
     return replace(found, answer=answer, fitted=fitted, joint=joint)
 
 
@@ -156,7 +156,7 @@ def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> 
     joint = None
     if whole and verdict_on(best, formula, doubts) in WRITTEN:
         joint = joint_fit(search.problem, whole, search.points[whole].fit.theta)
-    elif not best and formula is None and _was_learnt(search.problem):
+    elif not best and formula is None and not doubts.reasons:
         joint = joint_fit(search.problem, NULL, search.points[NULL].fit.theta)
     whole = whole if joint else best
     search.say("ranking the effects")
@@ -164,7 +164,7 @@ def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> 
     answer = _answer(search, best, p_value, test, ranking, formula, kept, doubts, whole)
     answer.remarks = [*answer.remarks, *belief.remarks]
     if joint is not None:
-        answer.figures, answer.covariance = joint.figures, joint.matrix
+        _add(answer, joint)
         answer.remarks += joint.remarks
     if belief.idle and answer.verdict == "nothing":
         answer.idle = True
@@ -174,10 +174,10 @@ def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> 
     return Discovery(answer, search, whole, kept, fitted_errors(search, whole), joint)
 
 
-def _was_learnt(problem: Problem) -> bool:
-    """Whether the model has effects of an earlier answer: more logs know their figures better."""
-    model = getattr(problem, "model", None)
-    return model is not None and any(effect.support for effect in model.effects)
+def _add(answer: Answer, joint: JointFit) -> None:
+    """Figures of the joint fit, as they are written."""
+    answer.figures, answer.machine = joint.figures, joint.machine
+    answer.covariance = joint.matrix
 
 
 def _undecided(search: Search, test: NullTest, kept: HeldOut | None) -> Discovery:

@@ -20,7 +20,7 @@ from kemba.identify.problem.problem import Problem
 from kemba.identify.written.adopt import COVARIANCE, reference, write_model
 from kemba.identify.written.quoted import measured_in, noise_ratio, plant_of
 from kemba.logs import load_map
-from kemba.model import Model, load_model
+from kemba.model import Model, load_model, load_spec
 from kemba.model.spec import evidence_faults
 from kemba.trajectory import Trajectory
 
@@ -90,14 +90,16 @@ def _quote(answer: Answer, judge: Problem, logs: Sequence[Trajectory], model: st
     """Tell the errors on quoted logs as `compare` does, of the model as it is (`judge`), and of
     the one that is written; what does not predict better there is not written."""
     before = answer.error_before, answer.error_after
-    answer.error_before = answer.error_after = noise_ratio(judge)
+    evidence = load_spec(model).evidence
+    stated = noise_ratio(judge, evidence.figures if evidence else {})
+    answer.error_before = answer.error_after = stated
     if answer.writes:
         with tempfile.TemporaryDirectory() as folder:
             data = answer.json()
             file = Path(folder) / "model.yaml"
             write_model(file, model, data["ranking"], answer.added, data)
             written = make_problem(excerpts(logs)[0], model_of(logs, str(file)))
-        answer.error_after = noise_ratio(written)
+        answer.error_after = noise_ratio(written, answer.machine)
         if answer.error_after > answer.error_before:
             answer.drop_model()
     answer.told_in(before)
@@ -119,6 +121,7 @@ def _evidence(
         "error_before": answer.error_before,
         "error_held_out": answer.error_after,
         "error_plant": plant,
+        "figures": {name: float(f"{x:.6g}") for name, x in answer.machine.items()},
         "measured": measured_in([*fitted, *kept], model).model_dump(exclude_none=True),
     }
 

@@ -37,6 +37,16 @@ def test_effects_are_estimated_together_and_their_intervals_hold() -> None:
     assert np.linalg.eigvalsh(found.covariance).min() > 0.0
 
 
+def test_intervals_count_what_absent_effects_add() -> None:
+    """Small shares of two effects that look alike hide some of a third, and say so."""
+    held, rng = [], np.random.default_rng(3)
+    for seed in range(40):
+        small = {f"{name}.a": 0.5 * rng.standard_normal() for name in ("bend", "kick")}
+        found = joint_fit(Toy({"ramp.a": 8.0, "drag.a": 0.5, **small}, seed), ("ramp",), {})
+        held.append(found.low[0] < 8.0 < found.high[0])
+    assert np.mean(held) >= 0.9
+
+
 def test_an_interval_spans_what_runs_say_that_disagree() -> None:
     """Half the force in one run of three, twice in another."""
     problem = Toy({"kick.a": 8.0})

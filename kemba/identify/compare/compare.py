@@ -85,10 +85,12 @@ class Comparison:
         }
 
 
-def compare(problem: Problem, model: str, logs: Sequence[str] = ()) -> Comparison:
+def compare(
+    problem: Problem, model: str, logs: Sequence[str] = (), figures: Theta | None = None
+) -> Comparison:
     """Compare the logs of `problem` with its model as it stands; only how each log begins is
-    fitted."""
-    start = free_starts(problem)
+    fitted. `figures`: those of the machine that its evidence knows (nuisance parameters)."""
+    start = free_starts(problem, figures)
     rows, r = problem.rows(), problem.residual(start)
     region = problem.operating_point().regions()
     window = aggregation_windows(problem, rows, region)

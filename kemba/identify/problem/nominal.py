@@ -10,6 +10,8 @@ from collections.abc import Iterable
 from kemba.effects.base import Effect
 from kemba.model.model import Model
 
+LINK = "tolerance."  # how names of a link's figures begin
+
 
 def nominal_figures(model: Model, except_for: Iterable[str] = ()) -> dict[str, tuple[float, float]]:
     """Factor 1 and its 1 sigma by figure, named as `Model.build(scaled=...)` takes them.
@@ -28,7 +30,7 @@ def nominal_figures(model: Model, except_for: Iterable[str] = ()) -> dict[str, t
 def link_figures(model: Model) -> dict[str, tuple[float, float]]:
     """Share 0 by which a link's figure is off, and its 1 sigma, by name; {} for a rig."""
     found = model.mechanism.tolerances
-    return {f"tolerance.{name}": (0.0, share) for name, share in found.items()}
+    return {f"{LINK}{name}": (0.0, share) for name, share in found.items()}
 
 
 def leg_by_leg(model: Model) -> Model:

@@ -81,7 +81,7 @@ def _evidence(path: Path, answer: Mapping[str, Any]) -> dict[str, Any]:
     evidence, covariance = answer.get("evidence"), answer.get("covariance")
     if not evidence:
         return {}
-    found = {k: v for k, v in evidence.items() if k != "logs" and v is not None}
+    found = {k: v for k, v in evidence.items() if k != "logs" and v not in (None, {})}
     found["logs"] = [
         EvidenceLog.of(log["file"], path.parent, log["use"]).model_dump()
         | {"sha256": log["sha256"]}
@@ -121,7 +121,8 @@ def adopted(folder: str | Path, only_sure: bool) -> str:
     there is no answer."""
     answer = read_answer(folder)
     if not answer.get("added"):
-        return f"{folder} found no effect that a model could be written with"
+        fitted = answer.get("figures") or answer.get("machine")
+        return "" if fitted else f"{folder} found nothing that a model could be written with"
     if only_sure and not answer.get("sure"):
         likely = enumerated(answer["added"])
         return f"{folder} is sure of no effect; likely are {likely}: adopt without --only-sure"

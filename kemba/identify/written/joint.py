@@ -1,13 +1,15 @@
 """The model that is written: every effect of an answer at its joint estimate, with its covariance.
 
 One least-squares fit of the whitened residuals over the parameters of all these effects and over
-the figures of the model's own that its file can say; what a file cannot say stays as it is, so that
-what is said of the fit is true of the file. Of rigs whose motion is measured, rows count by the
-noise as stated: noise that was learnt under this model would forget what changes slowly.
+the machine's nominal figures: those of the model's effects, which its list says, and those that
+differ from leg to leg and link to link, which its evidence says. What belongs to a recording, zeros
+and clocks of sensors, stays as stated. Of rigs whose motion is measured, rows count by the noise as
+stated: noise that was learnt under this model would forget what changes slowly.
 
-Intervals come from the slopes at the fit, all nominal figures free within their tolerances. They
-are widened by as much as blocks of time scatter more than rows do ("sandwich"), and span what the
-runs say one by one where these disagree.
+Intervals come from the slopes at the fit, all nominal figures free within their tolerances, and
+from what every absent effect, there with a small share of its size as under every hypothesis of the
+search, would add to the estimate. They are widened by as much as blocks of time scatter more than
+rows do ("sandwich"), and span what the runs say one by one where these disagree.
 """
 
 from __future__ import annotations
@@ -25,6 +27,7 @@ from kemba.identify.evidence.linear import is_shape
 from kemba.identify.evidence.refit import Frozen, refit
 from kemba.identify.evidence.spike_slab import Hypothesis, SpikeSlabSettings
 from kemba.identify.evidence.windows import START
+from kemba.identify.problem.nominal import LINK
 from kemba.identify.problem.problem import Array, Candidate, Problem, Theta
 from kemba.identify.problem.sensor_faults import is_fault
 from kemba.identify.problem.structure import ORIFICE
@@ -47,8 +50,8 @@ class JointFit:
 
     `theta`: of the fit. `names` (k,) of all written parameters (`effect.parameter`), with `value`
     (k,), 95 % interval `low`, `high` (k,) and `covariance` (k, k), SI units; `figures`: those that
-    the model had already, by name, of a table all its values. `remarks`: parameters in which runs
-    disagree.
+    the model had already, by name, of a table all its values; `machine`: those of single legs and
+    links, as `Evidence.figures`. `remarks`: parameters in which runs disagree.
     """
 
     theta: Mapping[str, float]
@@ -58,16 +61,18 @@ class JointFit:
     high: Array
     covariance: Array
     figures: Mapping[str, Any] = field(default_factory=dict)
+    machine: Mapping[str, float] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
 
     @property
-    def matrix(self) -> Covariance:
-        """The covariance of all scalar parameters of effects, as a model names them."""
+    def matrix(self) -> Covariance | None:
+        """The covariance of all scalar parameters of effects, as a model names them; None where
+        there are none."""
         tables = {n for n, value in self.figures.items() if "[" in n or isinstance(value, tuple)}
         told = [name.replace(f"{ORIFICE}.", "orifice_chamber.") for name in self.names]
         keep = [i for i, name in enumerate(told) if name not in {*UNTOLD, *tables}]
         rows = self.covariance[np.ix_(keep, keep)].tolist()
-        return Covariance(tuple(told[i] for i in keep), tuple(map(tuple, rows)))
+        return Covariance(tuple(told[i] for i in keep), tuple(map(tuple, rows))) if rows else None
 
     def values(self, candidate: Candidate) -> dict[str, Value]:
         """The parameters of one effect, as the catalogue has them."""
@@ -103,6 +108,14 @@ def own_figures(problem: Problem) -> tuple[str, ...]:
     return tuple(n for n in problem.nuisance if n in written)
 
 
+def single_figures(problem: Problem) -> tuple[str, ...]:
+    """The other nominal figures of the machine: of effects leg by leg, and of links."""
+    own, model = own_figures(problem), getattr(problem, "model", None)
+    kinds = {e.kind for e in model.effects} if model is not None else set()
+    others = (n for n in problem.nuisance if n not in own and not is_fault(n))
+    return tuple(n for n in others if n.partition(":")[0] in kinds or n.startswith(LINK))
+
+
 def told_by_figures(problem: Problem, hypothesis: Hypothesis, start: Theta) -> Hypothesis:
     """The hypothesis without faults of sensors that look like a figure which the fit leaves free: a
     force sensor's scale and the bore's gain are one in logs of a cylinder."""
@@ -123,8 +136,9 @@ def _fitted(
     """The problem of the fit, the figures that are free in it, and the best theta."""
     own = own_figures(problem)
     keys = {k for e in hypothesis for k in tuple(problem.candidates[e].keys())}
-    theta = {k: v for k, v in start.items() if k in keys or k in own or k.startswith(START)}
-    free = (*own, *(n for n in problem.nuisance if n.startswith(START)))
+    starts = (n for n in problem.nuisance if n.startswith(START))
+    free = (*own, *single_figures(problem), *starts)
+    theta = {k: v for k, v in start.items() if k in keys or k in free}
     loose = {n: (problem.nuisance[n][0], LOOSE) for n in own if n in TOLD}
     candidates = problem.candidates | {
         name: _whole(problem.candidates[name]) for name in problem.structures & set(hypothesis)
@@ -148,9 +162,12 @@ def _judged(
     problem = problem.in_detail()
     others = tuple(n for n in problem.nuisance if n not in own)
     names = (*keys, *own, *others)
-    jacobian, r = problem.jacobian(theta, names), problem.residual(theta)
+    absent = [c for name, c in problem.candidates.items()
+              if c.key not in keys and name not in problem.structures]  # fmt: skip
+    slopes = problem.jacobian(theta, (*names, *(c.key for c in absent)))
+    jacobian, r = slopes[:, : len(names)], problem.residual(theta)
     parameters = problem.parameters()
-    slab = SpikeSlabSettings.current().slab
+    slab, spike = SpikeSlabSettings.current().slab, SpikeSlabSettings.current().spike
     width = [
         slab * parameters[k].size * (theta[k] if is_shape(problem, k) else 1.0) for k in keys
     ] + [problem.nuisance[n][1] for n in (*own, *others)]
@@ -158,14 +175,17 @@ def _judged(
     j = jacobian * scale
     h = np.linalg.inv(j.T @ j + np.eye(len(names)))
     count = len(keys) + len(own)
+    small = slopes[:, len(names) :] * [spike * c.lead.size for c in absent]
+    bias = (h @ (j.T @ small))[:count] * scale[:count, None]  # by each absent effect, 1 sigma
     spread = np.max([half_widths(labels, j, r, h)[:count] for labels in divisions(problem)], axis=0)
     inflated = np.maximum(spread / np.sqrt(np.diag(h)[:count]) / 1.96, 1.0)
     unit = scale[:count] * inflated
     value = np.array([theta[n] if n in theta else problem.nuisance[n][0] for n in names[:count]])
     size = np.array([abs(theta[k] - parameters[k].off) if np.isfinite(parameters[k].off) and
                      not is_shape(problem, k) else abs(theta[k]) for k in keys])  # fmt: skip
-    imperfect = SpikeSlabSettings.current().spike * np.append(size, np.zeros(len(own)))
-    reach = 1.96 * np.hypot(unit * np.sqrt(np.diag(h)[:count]), imperfect)
+    imperfect = spike * np.append(size, np.zeros(len(own)))
+    covariance = np.outer(unit, unit) * h[:count, :count] + bias @ bias.T
+    reach = 1.96 * np.hypot(np.sqrt(np.diag(covariance)), imperfect)
     low, high = value - reach, value + reach
     remarks = [_far(problem, names[i], value[i], low[i], high[i]) for i in range(len(keys), count)]
     remarks = [text for text in remarks if text]
@@ -175,7 +195,6 @@ def _judged(
             low[i], high[i] = min(low[i], apart.min()), max(high[i], apart.max())
             told = " to ".join(f"{x:.3g}" for x in sorted(apart))
             remarks.append(f"{names[i]} differs between runs ({told}); its interval spans them")
-    covariance = np.outer(unit, unit) * h[:count, :count]
     return _as_written(problem, names[:count], theta, (value, low, high), covariance, remarks)
 
 
@@ -214,9 +233,10 @@ def _as_written(
             slope[i] = -1.0 / max(value[i], 1e-12) ** 2
             value[i], low[i], high[i] = 1.0 / np.maximum([value[i], high[i], low[i]], 1e-12)
         told.append(f"{effect}.{parameter}")
+    machine = {n: theta[n] for n in single_figures(problem) if n in theta}
     return JointFit(
         dict(theta), tuple(told), value, low, high, covariance * np.outer(slope, slope), figures,
-        (enumerated(remarks),) if remarks else (),
+        machine, (enumerated(remarks),) if remarks else (),
     )  # fmt: skip
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -26,9 +26,17 @@ def heard(problem: Problem) -> Problem:
     return with_learnt_colour(problem, free_starts(problem))
 
 
-def noise_ratio(problem: Problem) -> float:
-    """Error of the model as it is, in units of the noise: `noise_ratio` of `compare`."""
-    return error_ratio(heard(problem))
+def noise_ratio(problem: Problem, figures: Mapping[str, float] | None = None) -> float:
+    """Error of the model as it is, in units of the noise: `noise_ratio` of `compare`.
+
+    `figures`: of the machine, as `Evidence.figures`; without them all are nominal.
+    """
+    return error_ratio(heard(problem), known(problem, figures or {}))
+
+
+def known(problem: Problem, figures: Mapping[str, float]) -> dict[str, float]:
+    """Those figures of a machine that these logs can feel."""
+    return {name: value for name, value in figures.items() if name in problem.nuisance}
 
 
 def plant_of(model: str | Path) -> Model:
