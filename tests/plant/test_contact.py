@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from plant.scripts import drop, jump, planning
 
 from kemba.effects.mechanics.ground import GroundCompliance, GroundFriction
-from kemba.plant import Commands, Profile, run, simulate
 from kemba.events import peak
+from kemba.plant import Commands, Profile, run, simulate
 from kemba.plant.kernel.events import CLOSED
 from kemba.plant.stepping.family import equations_of
 from kemba.trajectory import Trajectory
