@@ -18,6 +18,7 @@ from kemba.policy.expected import expected_from
 from kemba.policy.gains import gains_of
 from kemba.policy.modes import Array
 from kemba.policy.settings import PolicySettings
+from kemba.scene import above_ground
 from kemba.trajectory import Trajectory
 
 FILE = "policy.npz"
@@ -156,7 +157,7 @@ def _landing(course: EventCourse) -> float:
     """When [s] the first foot comes down after the apex; the end where none does."""
     motion = course.motion
     apex = float(motion.time[int(np.argmax(motion["body/z"]))])
-    feet = [motion[n] for n in motion.names if n.endswith("foot/z")]
+    feet = [*above_ground(motion).values()]
     low = np.min(feet, axis=0) <= 1e-4
     down = np.flatnonzero(low & (motion.time > apex) & np.r_[False, ~low[:-1]])
     return float(motion.time[down[0]]) - PERIOD if len(down) else float(motion.time[-1])

@@ -22,6 +22,7 @@ from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.solution import arrays, groups
 from kemba.ocp.transcription.symmetry import whole
 from kemba.ocp.transcription.unilateral import rigid_constraints
+from kemba.scene import above_ground
 from kemba.trajectory import Array, Trajectory
 
 BETWEEN = 4  # places in every interval at which bounds are looked at
@@ -139,10 +140,10 @@ def on_execution(
 
 def _landing(plan: Trajectory, clock: Array) -> float:
     """When [s] the first foot of a plan comes down after its apex; infinite where none does."""
-    names = [name for name in plan.names if name.endswith("/foot/z")]
-    if not names:
+    heights = [*above_ground(plan).values()]
+    if not heights:
         return np.inf
-    lowest, apex = np.min([plan[name] for name in names], axis=0), int(np.argmax(plan["body/z"]))
+    lowest, apex = np.min(heights, axis=0), int(np.argmax(plan["body/z"]))
     down = apex + np.flatnonzero((lowest[apex:-1] > CLOSED) & (lowest[apex + 1 :] <= CLOSED)) + 1
     return float(clock[down[0]]) if len(down) else np.inf
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kemba.scene import above_ground
 from kemba.trajectory import Trajectory
 
 LASTS = 0.02  # s; a shorter contact between two times in the air does not carry the robot
@@ -35,12 +36,12 @@ def grazes(plan: Trajectory, euler: bool = False) -> list[Graze]:
     first row at which a foot is down.
     """
     found = []
-    for name in (name for name in plan.names if name.endswith("foot/z")):
-        down = plan[name] <= TOUCHES
+    for foot, height in above_ground(plan).items():
+        down = height <= TOUCHES
         change = np.flatnonzero(np.diff(down.astype(int)))  # the last row before each change
         for before, last in itertools.pairwise(change):
             begin = float(plan.time[before if euler else before + 1])
             lasts = float(plan.time[last]) - begin
             if down[last] and lasts < LASTS:
-                found.append(Graze(name[:-2], begin, lasts))
+                found.append(Graze(foot, begin, lasts))
     return found

@@ -141,8 +141,13 @@ def _size(gaps: Sequence[Gap]) -> float:
 
 def _reason(gaps: Sequence[Gap]) -> str:
     """What prevents it, as far as the requirement shows."""
-    if any(g.requirement.quantity.name.endswith("foot/z") and g.asked < -1e-6 for g in gaps):
-        return "; the ground is at 0 m"
+    if any(g.requirement.location[0] == "obstacles" for g in gaps):
+        return "; the obstacle stands in the pose"
+    feet = [g for g in gaps if g.requirement.quantity.name.endswith(("foot/z", "foot/gap"))]
+    sunk = next((g for g in feet if g.asked < g.reachable - 1e-6), None)
+    if sunk is not None:
+        where = number(sunk.reachable, "m")
+        return f"; the ground is at {where}" if sunk.requirement.quantity.name[-1] == "z" else ""
     return " with the other requirements kept"
 
 

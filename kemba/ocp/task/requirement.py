@@ -17,6 +17,7 @@ from kemba.model import Model
 from kemba.ocp.task.height import longest_leg, with_height
 from kemba.ocp.task.options import cost_errors, option_errors, timing_errors
 from kemba.ocp.task.task import Bound, Goal, Task
+from kemba.ocp.task.terrain import ground_at, heights_above, rooms, scene_errors
 from kemba.quantity import Quantity, to_si
 
 # `rest`: every rate is zero; `settled`: every state of an effect is where it comes to rest
@@ -89,7 +90,8 @@ def quantities(model: Model) -> dict[str, Quantity]:
     ports = [q for p in mechanism.ports.values() for q in (p.quantity, p.rate)]
     groups = (model.states, model.inputs, model.forces)
     named = [q for group in groups for q in group.values()]
-    return {q.name: q for q in (*ports, *own, *named)}
+    known = {q.name: q for q in (*ports, *own, *named)}
+    return {**heights_above(model, known), **known}
 
 
 def quantity_expression(model: Model, name: str) -> ca.SX:
@@ -137,7 +139,7 @@ def resolve(
     read = not errors and not partial  # else the goal may be one that was not read
     for key, of_the_flight in (("feet", feet_at_apex), ("clearance", flight_clearance)):
         try:
-            requirements += of_the_flight(task, model, apex)
+            requirements += of_the_flight(task, model, apex, ground_at(model, requirements, 0.0))
         except ValueError as error:
             if read:
                 errors.append(document.error((key,), f"{key}: {error}"))
@@ -146,8 +148,12 @@ def resolve(
     errors += cost_errors(task.cost, document)
     errors += option_errors(task.solver.options, document)
     errors += timing_errors(task, document)
+    errors += scene_errors(task, document)
     if errors:
         raise ConfigErrors(errors)
+    requirements += [
+        Requirement(("obstacles", i), room, None, 0.0, math.inf) for i, room in rooms(model, known)
+    ]
     acting = _acting(model, {r.quantity.name for r in requirements})
     return [
         replace(r, acts=r.quantity.name in acting, line=document.place(r.location))
@@ -227,12 +233,14 @@ def apex_node(requirements: Sequence[Requirement], nodes: int) -> int:
     return 0 if apex is None else apex.node(nodes)
 
 
-def flight_clearance(task: Task, model: Model, apex: Requirement | None) -> list[Requirement]:
+def flight_clearance(
+    task: Task, model: Model, apex: Requirement | None, ground: float
+) -> list[Requirement]:
     """Every foot at least as high as the task's clearance in the middle of the flight.
 
     The flight is the ballistic one about the highest goal of the body, from stretched legs; of it
-    the middle part counts. A flight that is longer than the motion fills it; that the duration is
-    too short is said by the checks. Without `folding`, a jump too low for the clearance has what
+    the middle part counts, and heights are those above `ground` [m], where it starts. A flight that
+    is longer than the motion fills it; that the duration is too short is said by the checks. Without `folding`, a jump too low for the clearance has what
     stretched legs leave: nothing where they reach the ground. Raises ValueError where no goal says
     when the robot flies.
     """
@@ -241,23 +249,25 @@ def flight_clearance(task: Task, model: Model, apex: Requirement | None) -> list
     if apex is None or apex.at is None:
         raise ValueError("needs a goal for body/z at the top of the flight")
     robot = model.mechanism.need_robot()
-    above = apex.lower - robot.leg.femur.length - robot.leg.tibia.length
+    above = apex.lower - robot.leg.femur.length - robot.leg.tibia.length - ground
     rise = math.sqrt(2 * max(above, task.clearance) / model.mechanism.gravity)
     rise /= task.duration
     before, after = min(rise, apex.at), min(rise, 1.0 - apex.at)
     during = apex.at - FLIGHT * before, apex.at + FLIGHT * after
     least = task.clearance
     if not task.folding:  # stretched legs have this at the first and last moment that counts
-        least = min(least, (1.0 - FLIGHT**2) * (apex.lower - longest_leg(robot)))
+        least = min(least, (1.0 - FLIGHT**2) * (apex.lower - longest_leg(robot) - ground))
     known = quantities(model)
     return [
-        Requirement(("clearance",), known[f"{leg}/foot/z"], None, least, math.inf, during)
+        Requirement(("clearance",), known[f"{leg}/foot/gap"], None, least, math.inf, during)
         for leg in (model.mechanism.legs if least > 0.0 else ())
     ]
 
 
-def feet_at_apex(task: Task, model: Model, apex: Requirement | None) -> list[Requirement]:
-    """Every foot as high as the task's `feet`, at the highest goal of the body.
+def feet_at_apex(
+    task: Task, model: Model, apex: Requirement | None, ground: float
+) -> list[Requirement]:
+    """Every foot as high above the ground as the task's `feet`, at the highest goal of the body.
 
     Raises ValueError where there is no such goal.
     """
@@ -267,7 +277,7 @@ def feet_at_apex(task: Task, model: Model, apex: Requirement | None) -> list[Req
         raise ValueError("needs a goal for body/z, at which the feet are to be so high")
     known = quantities(model)
     return [
-        Requirement(("feet",), known[f"{leg}/foot/z"], apex.at, task.feet, math.inf)
+        Requirement(("feet",), known[f"{leg}/foot/gap"], apex.at, task.feet, math.inf)
         for leg in model.mechanism.legs
     ]
 

@@ -12,6 +12,7 @@ from kemba.config import Document, FileName, Section, beside, parse
 from kemba.config.document import written
 from kemba.model.spec import Supply
 from kemba.quantity import Param
+from kemba.scene import AnyTerrain, Obstacle, Scene
 
 Value = float | str
 CENTRE = "of the body's centre: at 0.45 m the feet of the shipped robot rise 1 cm"
@@ -133,6 +134,7 @@ class Task(Section):
     how high the feet are at the top, and `height` is that and a stretched leg.
     `effects` changes parameters of the model's effects, by name or by place in its list:
     `{contact: {mu: 0.6}}`.
+    `terrain`, `obstacles`: what the robot moves in; the ground is level at 0 without.
     `robust`: by how many scenarios, drawn from the file `uncertainties`, plans are chosen.
     """
 
@@ -158,6 +160,8 @@ class Task(Section):
     end: dict[str, Bound] = Field(default_factory=dict)
     bounds: dict[str, Bound] = Field(default_factory=dict)
     goals: dict[str, Goal] = Field(default_factory=dict)
+    terrain: tuple[AnyTerrain, ...] | None = None
+    obstacles: tuple[Obstacle, ...] | None = None
     cost: dict[str, float] = Field(default_factory=lambda: {"torque_squared": 1.0})
     robust: Annotated[int, Field(ge=0, le=10_000)] = 0
     uncertainties: str = "usual"
@@ -185,6 +189,11 @@ class Task(Section):
     def place(self, key: str) -> str:
         """Where the file asks for a key of `PLACED`, `jump.yaml:9`; empty where it does not."""
         return self._places.get(key, "")
+
+    @property
+    def scene(self) -> Scene:
+        """The ground and its obstacles."""
+        return Scene(self.terrain or (), self.obstacles or ())
 
     @property
     def step(self) -> float:

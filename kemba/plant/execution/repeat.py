@@ -20,6 +20,7 @@ from kemba.plant.execution.sensors import Sensors, take_log
 from kemba.plant.simulation.valves import scattered
 from kemba.plant.stepping.arrays import Array
 from kemba.quantity import to_si
+from kemba.scene import scene_in
 from kemba.stopwatch import Stage, Tell, silent
 from kemba.trajectory import Trajectory
 
@@ -83,6 +84,7 @@ def repeat_run(
         else:
             done = play(model, sample, [seed, number, 1], noise)
         log = _as_sent(take_log(done.trajectory, sensors, rng, model.effects), done.table)
+        log.meta |= model.mechanism.scene.json()
         log.meta |= {"run": number, "repeat_of": controller.parent.name, "plant": model.name}
         path = Path(out) / f"log-{number}.csv"
         log.write(path)
@@ -111,6 +113,7 @@ def plant_of(run: str | Path, name: str | None = None) -> Model:
     task = load_yaml(file).data if file.is_file() else None
     if not task:
         return load_model(name or PLANT)
+    scene = scene_in(task, str(file))
     payload, supply = to_si(task.get("payload") or 0.0, "kg"), task.get("supply")
     own = str(task.get("plant", PLANT))
     return counterpart(
@@ -120,4 +123,5 @@ def plant_of(run: str | Path, name: str | None = None) -> Model:
         name or own,
         own_effects=name in (None, own),
         changes=task.get("effects"),
+        scene=scene,
     )

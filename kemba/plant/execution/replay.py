@@ -11,6 +11,7 @@ from kemba.plant.simulation.commands import Commands, Profile
 from kemba.plant.simulation.record import Impact
 from kemba.plant.simulation.simulate import Simulated, run
 from kemba.plant.stepping.arrays import Array
+from kemba.scene import above_ground
 from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Trajectory
 
@@ -137,9 +138,9 @@ def touches(
     A foot that grazes the ground on its way does neither.
     """
     found, least = [], LandingSettings.current().lasts
-    for name in (name for name in t.names if name.endswith("foot/z")):
-        down = t[name] <= low
-        force = t[f"{name[:-1]}Fz"] if f"{name[:-1]}Fz" in t else np.zeros(len(t))
+    for foot, height in above_ground(t).items():
+        down = height <= low
+        force = t[f"{foot}/Fz"] if f"{foot}/Fz" in t else np.zeros(len(t))
         edges = np.flatnonzero(np.diff(down.astype(int), prepend=1, append=0))
         for i in (i for i in edges if i < len(t) and down[i] and clock[i] > after):
             end = int(edges[edges > i][0])  # the first row in the air again
@@ -167,11 +168,11 @@ def _exact(time: float, rows: Array, after: float, impacts: list[float]) -> floa
 
 def ends_standing(model: Model, plan: Trajectory) -> list[str]:
     """The legs on which a plan stands at its end."""
-    low = LandingSettings.current().on_ground
+    low, feet = LandingSettings.current().on_ground, above_ground(plan)
     return [
         leg
         for leg in model.mechanism.legs
-        if f"{leg}/foot/z" not in plan or plan[f"{leg}/foot/z"][-1] <= low
+        if f"{leg}/foot" not in feet or feet[f"{leg}/foot"][-1] <= low
     ]
 
 
@@ -183,8 +184,9 @@ def _fault(model: Model, plan: Trajectory, real: Trajectory, apex_time: float) -
         return "tips over"
     late = real.time > apex_time
     for point in ("hip", "knee"):
-        for leg in model.mechanism.legs:
-            if (real[f"{leg}/{point}/z"][late] <= 0.0).any():
-                return f"meets the ground with the {leg} {point}"
-    up = [leg for leg in standing if real[f"{leg}/foot/z"][-1] > settings.lifted]
+        for place, height in above_ground(real, point).items():
+            if (height[late] <= 0.0).any():
+                return f"meets the ground with the {place.replace('/', ' ')}"
+    feet = above_ground(real)
+    up = [leg for leg in standing if feet[f"{leg}/foot"][-1] > settings.lifted]
     return f"ends with the {up[0]} foot in the air" if up else None
