@@ -76,29 +76,37 @@ class Mechanism:
     tolerances: dict[str, float] = field(default_factory=dict)
     scene: Scene = FLAT
 
-    def on(self, scene: Scene) -> Mechanism:
-        """The same mechanism in another scene.
+    def on(self, scene: Scene, at: float = 0.0) -> Mechanism:
+        """The same mechanism in a scene, standing at a place x [m] of it: from there its
+        coordinates are counted by whoever scales them, and about there it has its mirror.
 
         Unless that is level at 0 and free, it has ports for the height of feet, knees and hips
         above the ground under them (`front/foot/gap`), and above its obstacles (`front/foot/room`).
-        It stands at x = 0 on the ground there; it has a mirror where the scene has one.
+        It has a mirror where every place of the scene is like every other.
         """
-        if scene == self.scene or self.robot is None:
+        if (scene, at) == (self.scene, self.coordinates[0].value) or self.robot is None:
             return self
         if self.scene != FLAT:
             raise ValueError("stands in a scene already")
         lowest, highest = scene.ground.extent
+        ground = float(scene.ground.height(at))
         x, z, *others = self.coordinates
-        z = replace(z, lower=z.lower + lowest, upper=z.upper + highest)
-        height = self.standing["body/z"] + float(scene.ground.height(0.0))
+        x = replace(x, lower=x.lower + at, upper=x.upper + at, value=at)
+        z = replace(z, lower=z.lower + lowest, upper=z.upper + highest, value=ground)
+        pose = {"body/x": at, "body/z": self.standing["body/z"] + ground}
         return replace(
             self,
             scene=scene,
             coordinates=(x, z, *others),
             ports={**self.ports, **_scene_ports(self, scene)},
             mirror=self.mirror if scene.even else {},
-            standing={**self.standing, "body/z": height},
+            standing={**self.standing, **pose},
         )
+
+    @property
+    def origin(self) -> tuple[float, ...]:
+        """Coordinates (n,) from which programs count."""
+        return tuple(c.value for c in self.coordinates)
 
     @property
     def n(self) -> int:

@@ -157,8 +157,10 @@ def build_model(
     supply: float | None = None,
     rig: bool = False,
     scene: Scene = FLAT,
+    at: float = 0.0,
 ) -> Model:
-    """The model of a spec: `extra` effects added, `supply` [Pa] instead of the spec's, in `scene`.
+    """The model of a spec: `extra` effects added, `supply` [Pa] instead of the spec's, standing
+    `at` a place [m] of a `scene`.
 
     `rig`: the same effects on the piston of the bench; effects whose ports it lacks are left out.
     Raises KembaError where the spec names no robot, or a file or an effect is wrong.
@@ -169,7 +171,7 @@ def build_model(
         expected = "robot: a robot's file, or base: a model that names one, was expected"
         raise KembaError(f"model {spec.name}", "robot: missing", expected)
     robot = load_robot(spec.robot)
-    mechanism = rig_mechanism(robot.cylinder) if rig else robot_mechanism(robot).on(scene)
+    mechanism = rig_mechanism(robot.cylinder) if rig else robot_mechanism(robot).on(scene, at)
     effects: list[Effect] = [*spec.effects, *CHAMBERS[spec.chambers or "first_order"]()]
     named = {e.name: e for e in (*effects, *spec.effects)}
     listed = [*named.values()]
@@ -185,11 +187,12 @@ def load_model(
     supply: float | None = None,
     rig: bool = False,
     scene: Scene = FLAT,
+    at: float = 0.0,
 ) -> Model:
     """Load and build in one step. Raises KembaError with every mistake of the YAML."""
     spec = load_spec(name)
     try:
-        return build_model(spec, extra, supply, rig, scene)
+        return build_model(spec, extra, supply, rig, scene, at)
     except KembaError as error:
         raise _at_its_line(error, name) from None
 

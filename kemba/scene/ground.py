@@ -69,11 +69,11 @@ class Ground:
 
     def height(self, x: Any) -> Any:
         """Height [m] at x."""
-        return self.level if self.level is not None else _called(self._functions[0], x)
+        return self.level if self.level is not None else called(self._functions[0], x)
 
     def slope(self, x: Any) -> Any:
         """Its derivative along x [1]."""
-        return 0.0 if self.level is not None else _called(self._functions[1], x)
+        return 0.0 if self.level is not None else called(self._functions[1], x)
 
     def normal(self, x: Any) -> tuple[Any, Any]:
         """Components (x, z) of the unit vector out of the ground; along the ground, forward, is
@@ -91,7 +91,7 @@ class Ground:
             if piece.begin is None:
                 mu = piece.friction
             else:
-                share = _called(ca.Function("share", *_rise_about(piece.begin)), x)
+                share = share_of(x, piece.begin - EDGE)
                 mu = mu + share * (piece.friction - last)
             last = piece.friction
         return mu
@@ -114,16 +114,17 @@ class Ground:
         return x, np.broadcast_to(self.height(x), x.shape)
 
 
-def _rise_about(place: float) -> tuple[list[ca.SX], list[ca.SX]]:
-    x = ca.SX.sym("x")
-    return [x], [rise(x, place - EDGE / 2)]
-
-
 def _at(expression: Any, x: ca.SX, place: float) -> float:
     return float(ca.Function("at", [x], [ca.SX(expression)])(place))
 
 
-def _called(function: ca.Function, x: Any) -> Any:
+def share_of(x: Any, begin: float) -> Any:
+    """`rise` at places of any form."""
+    place = ca.SX.sym("x")
+    return called(ca.Function("share", [place], [rise(place, begin)]), x)
+
+
+def called(function: ca.Function, x: Any) -> Any:
     """A scalar function at a number, at every entry of an array (n,), or of an expression."""
     if isinstance(x, ca.SX):
         return function(x)

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-import casadi as ca
 import numpy as np
 from pydantic import Field, model_validator
 
 from kemba.config import Section
 from kemba.quantity import Param
-from kemba.scene.ground import EDGE, Ground, _called, rise
+from kemba.scene.ground import EDGE, Ground, share_of
 
 BELOW = 0.05  # m; so far below the ground is the surface beside a box, where it asks for nothing
 
@@ -42,9 +41,7 @@ class Obstacle(Section):
     def room(self, ground: Ground, x: Any, z: Any) -> Any:
         """How far [m] points are above the box, rounded outwards as edges of the ground are;
         beside it, above a surface `BELOW` the ground. Arrays or SX."""
-        place = ca.SX.sym("x")
-        share = rise(place, self.begin - EDGE) * (1 - rise(place, self.to))
-        lifted = _called(ca.Function("share", [place], [share]), x)
+        lifted = share_of(x, self.begin - EDGE) * (1 - share_of(x, self.to))
         low = ground.height(x) - BELOW
         return z - low - lifted * (self.top(ground) - low)
 

@@ -17,6 +17,7 @@ from kemba.scene.obstacles import Obstacle
 from kemba.scene.terrain import AnyTerrain, Terrain
 from kemba.trajectory import Trajectory
 
+AROUND = 0.03  # m; how far a start guess keeps from an obstacle
 POINTS = ("foot", "knee", "hip")  # of a leg; hips are the corners of the body
 
 
@@ -42,6 +43,15 @@ class Scene:
         """Whether every place of it is like every other."""
         friction = any(t.friction is not None and t.begin is not None for t in self.terrain)
         return self.ground.level is not None and not self.obstacles and not friction
+
+    def skyline(self, x: np.ndarray) -> np.ndarray:
+        """Height [m] of what is lowest for a foot at places x (n,): the ground, or `AROUND` an
+        obstacle as much above its top."""
+        low = np.broadcast_to(self.ground.height(x), x.shape)
+        for box in self.obstacles:
+            near = (x > box.begin - AROUND) & (x < box.to + AROUND)
+            low = np.where(near, box.top(self.ground) + AROUND, low)
+        return low
 
     def json(self) -> dict[str, Any]:
         """Its keys as a file writes them."""

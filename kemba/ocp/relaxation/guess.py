@@ -18,6 +18,7 @@ from kemba.model import Model
 from kemba.ocp.relaxation.settings import Guess
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
+from kemba.ocp.task.terrain import ground_at
 from kemba.ocp.transcription.layout import Layout
 
 
@@ -54,33 +55,43 @@ def asked(requirements: Sequence[Requirement], name: str, at: float) -> float | 
 
 
 def body_course(
-    requirements: Sequence[Requirement], duration: float, reach: tuple[float, float], g: float
+    requirements: Sequence[Requirement],
+    duration: float,
+    reach: tuple[float, float],
+    g: float,
+    ground: tuple[float, float] = (0.0, 0.0),
 ) -> HeightCourse:
-    """Height of the body over the motion; `reach` = leg length retracted and stretched [m]."""
-    low, high = reach
-    top = low + Guess.current().stretch * (high - low)
+    """Height of the body over the motion; `reach` = leg length retracted and stretched [m],
+    `ground` = height [m] where it starts and where it ends."""
+    settings, (first, last) = Guess.current(), ground
+    low, high = reach[0] + first, reach[1] + first
+    top = low + settings.stretch * (high - low)
+    lands_at, bent = top + last - first, low + settings.landing * (top - low) + last - first
     z0 = asked(requirements, "body/z", 0.0) or low
     z1 = asked(requirements, "body/z", 1.0)
     peaks = [
         w for w in requirements if w.quantity.name == "body/z" and w.at and np.isfinite(w.lower)
     ]
     peak = max(peaks, key=lambda w: w.lower, default=None)
-    lands = any(w.quantity.name.endswith("foot/z") and w.at == 1.0 for w in requirements)
+    feet = [w for w in requirements if w.quantity.name.endswith(("foot/z", "foot/gap"))]
+    lands = any(w.at == 1.0 for w in feet)
     if z0 > top:
-        fall = float(np.sqrt(2 * (z0 - top) / g))
-        course = HeightCourse([0.0, fall], [z0, top], [0.0, -g * fall], (0.0, fall))
-        return _landed(course, duration, z1 or low + Guess.current().landing * (top - low))
+        fall = float(np.sqrt(2 * (z0 - lands_at) / g))
+        course = HeightCourse([0.0, fall], [z0, lands_at], [0.0, -g * fall], (0.0, fall))
+        return _landed(course, duration, z1 or bent)
     if peak is None or peak.at is None:
         return HeightCourse([0.0, duration], [z0, z1 or z0], [0.0, 0.0], (duration, duration))
     apex, t_apex = peak.lower, peak.at * duration
-    feet = (w for w in requirements if w.quantity.name.endswith("foot/z") and w.holds(peak.at))
-    lift = max((w.lower for w in feet), default=0.0)
+    lifted = (w for w in feet if w.holds(peak.at))
+    lift = max((w.lower - first * (w.quantity.name[-1] == "z") for w in lifted), default=0.0)
     if lift > 0.0 and z0 < apex <= top:  # standing reaches it, but is not what is asked
         top = max(apex - lift, (z0 + apex) / 2)
     if apex <= top:
         course = HeightCourse([0.0, t_apex], [z0, apex], [0.0, 0.0], (t_apex, t_apex))
     else:
-        rise = min(float(np.sqrt(2 * (apex - top) / g)), Guess.current().rise * t_apex)
+        longest = settings.rise * t_apex
+        rise = min(float(np.sqrt(2 * (apex - top) / g)), longest)
+        fall = min(float(np.sqrt(2 * max(apex - lands_at, 0.0) / g)), longest)
         speed = g * rise
         push = min(2 * (top - z0) / speed, t_apex - rise)
         start = t_apex - rise - push
@@ -88,12 +99,12 @@ def body_course(
         knots = [*wait, start, t_apex - rise, t_apex]
         z = [*(z0 for _ in wait), z0, top, apex]
         vz = [*(0.0 for _ in wait), 0.0, speed, 0.0]
-        end = t_apex + rise if lands and t_apex < duration else t_apex
+        end = t_apex + fall if lands and t_apex < duration else t_apex
         course = HeightCourse(knots, z, vz, (t_apex - rise, max(end, t_apex)))
         if lands and end < duration:
-            course = HeightCourse([*knots, end], [*z, top], [*vz, -speed], course.flight)
+            course = HeightCourse([*knots, end], [*z, lands_at], [*vz, -g * fall], course.flight)
     if t_apex < duration and (lands or z1 is not None):
-        return _landed(course, duration, z1 or low + Guess.current().landing * (top - low))
+        return _landed(course, duration, z1 or bent)
     return course
 
 
@@ -125,15 +136,19 @@ def automatic_guess(
         for f, b in [(robot.leg.femur.length, robot.leg.tibia.length)]
         for k in (flexion(robot.leg, x) for x in (0.0, robot.stroke))
     ]
-    gravity = model.mechanism.gravity
+    gravity, scene = model.mechanism.gravity, model.mechanism.scene
+    ground = ground_at(model, requirements, 0.0), ground_at(model, requirements, 1.0)
     if task.guess == "standing":
         still = task.duration
-        course = HeightCourse([0.0, still], [lengths[0]] * 2, [0.0] * 2, (still, still))
+        course = HeightCourse([0.0, still], [lengths[0] + ground[0]] * 2, [0.0] * 2, (still, still))
     else:
-        course = body_course(requirements, task.duration, (lengths[0], lengths[1]), gravity)
+        reach = (lengths[0], lengths[1])
+        course = body_course(requirements, task.duration, reach, gravity, ground)
     z, az = course(t), course(t, 2)
     airborne = (t > course.flight[0]) & (t < course.flight[1])
-    x0, x1 = (asked(requirements, "body/x", at) or 0.0 for at in (0.0, 1.0))
+    x0 = asked(requirements, "body/x", 0.0) or 0.0
+    x1 = asked(requirements, "body/x", 1.0)
+    x1 = x0 if x1 is None else x1
     span = max(course.flight[1] - course.flight[0], Guess.current().least_flight)
     x = x0 + (x1 - x0) * np.clip((t - course.flight[0]) / span, 0.0, 1.0)
 
@@ -144,8 +159,9 @@ def automatic_guess(
     share = load / len(robot.legs)
     forces: dict[str, np.ndarray] = {}
     for leg, place in robot.legs.items():
-        reach = np.minimum(z, lengths[0] + Guess.current().stretch * (lengths[1] - lengths[0]))
-        hip, bend = leg_pose(robot, place.fold, np.zeros_like(z), -reach)
+        stretched = lengths[0] + Guess.current().stretch * (lengths[1] - lengths[0])
+        length = np.minimum(z - scene.skyline(x + place.hip), stretched)
+        hip, bend = leg_pose(robot, place.fold, np.zeros_like(z), -length)
         q[:, names.index(f"{leg}/hip/q")] = hip
         q[:, names.index(f"{leg}/knee/q")] = place.fold * bend
         forces[leg] = share * _lever(robot, bend)

@@ -238,10 +238,11 @@ def flight_clearance(
 ) -> list[Requirement]:
     """Every foot at least as high as the task's clearance in the middle of the flight.
 
-    The flight is the ballistic one about the highest goal of the body, from stretched legs; of it
-    the middle part counts, and heights are those above `ground` [m], where it starts. A flight that
-    is longer than the motion fills it; that the duration is too short is said by the checks. Without `folding`, a jump too low for the clearance has what
-    stretched legs leave: nothing where they reach the ground. Raises ValueError where no goal says
+    The flight is the ballistic one about the highest goal of the body, from stretched legs on
+    `ground` [m]; of it the middle part counts. A flight that is longer than the motion fills it;
+    that the duration is too short is said by the checks. Without `folding`, a jump too low for the
+    clearance has what stretched legs leave: nothing where they reach the ground. Raises ValueError
+    where no goal says
     when the robot flies.
     """
     if not task.clearance:

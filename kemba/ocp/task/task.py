@@ -11,7 +11,7 @@ from pydantic import Field, PrivateAttr, model_validator
 from kemba.config import Document, FileName, Section, beside, parse
 from kemba.config.document import written
 from kemba.model.spec import Supply
-from kemba.quantity import Param
+from kemba.quantity import Param, to_si
 from kemba.scene import AnyTerrain, Obstacle, Scene
 
 Value = float | str
@@ -194,6 +194,15 @@ class Task(Section):
     def scene(self) -> Scene:
         """The ground and its obstacles."""
         return Scene(self.terrain or (), self.obstacles or ())
+
+    @property
+    def place_x(self) -> float:
+        """Place x [m] at which the body is to start; 0 where the task does not say it."""
+        asked = self.start.get("body/x", Bound()).equals
+        try:
+            return to_si(asked or 0.0, "m")
+        except ValueError:
+            return 0.0
 
     @property
     def step(self) -> float:

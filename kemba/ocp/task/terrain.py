@@ -16,7 +16,7 @@ from kemba.scene import POINTS
 STANDS = 1e-6  # m; a foot that is asked to be lower than this above the ground stands
 
 
-class Asked(Protocol):
+class AskedOf(Protocol):
     """What is asked of a requirement here."""
 
     @property
@@ -50,7 +50,7 @@ def rooms(model: Model, known: dict[str, Quantity]) -> Iterator[tuple[int, Quant
                 yield i, quantity
 
 
-def ground_at(model: Model, requirements: Sequence[Asked], at: float) -> float:
+def ground_at(model: Model, requirements: Sequence[AskedOf], at: float) -> float:
     """Height [m] of the ground under the body where it is asked to be at a moment, else at the
     start, else at x = 0."""
     places = [r for r in requirements if r.quantity.name == "body/x" and r.lower == r.upper]
@@ -58,7 +58,7 @@ def ground_at(model: Model, requirements: Sequence[Asked], at: float) -> float:
     return float(model.mechanism.scene.ground.height(here[0] if here else 0.0))
 
 
-def stands(model: Model, requirement: Asked) -> bool:
+def stands(model: Model, requirement: AskedOf) -> bool:
     """Whether it asks for a foot that stands on the ground."""
     place, _, what = requirement.quantity.name.rpartition("/")
     level = model.mechanism.scene.ground.level

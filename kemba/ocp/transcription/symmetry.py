@@ -12,6 +12,7 @@ from kemba.model import Model, Node
 from kemba.ocp.task.requirement import Requirement, quantity_expression
 
 Matrix = np.ndarray
+PLACES = ("body/x", "hip/x", "knee/x", "foot/x")  # what is turned about the mirror's place
 
 
 @dataclass(frozen=True)
@@ -150,7 +151,7 @@ def _residual_is_symmetric(model: Model, images: Mapping[str, Matrix]) -> bool:
         lam, u = draw["lam"] * 50.0, draw["u"]
         here = residual(q, v, a, s, sd, lam, u, [])
         m = images
-        motion = (m["q"] @ q, m["q"] @ v, m["q"] @ a)
+        motion = (_mirrored(model, m, q), m["q"] @ v, m["q"] @ a)
         there = residual(*motion, m["s"] @ s, m["s"] @ sd, m["lam"] @ lam, m["u"] @ u, [])
         dynamics = np.allclose(m["q"] @ np.array(here[0]).ravel(), np.array(there[0]).ravel())
         rates = np.allclose(m["s"] @ np.array(here[1]).ravel(), np.array(there[1]).ravel())
@@ -164,6 +165,12 @@ def _residual_is_symmetric(model: Model, images: Mapping[str, Matrix]) -> bool:
         if not (dynamics and rates and pairs and limits):
             return False
     return True
+
+
+def _mirrored(model: Model, images: Mapping[str, Matrix], q: Matrix) -> Matrix:
+    """Coordinates (n,) in the mirror that stands where the mechanism stands."""
+    origin = np.array(model.mechanism.origin)
+    return np.asarray(origin + images["q"] @ (q - origin))
 
 
 def requirements_are_symmetric(model: Model, requirements: Sequence[Requirement]) -> bool:
@@ -186,15 +193,23 @@ def mirrored_requirements(model: Model, requirements: Sequence[Requirement]) -> 
     draw = {k: rng.uniform(0.1, 1.0, len(m)) for k, m in images.items()}
     point = {**draw, "q": q + 0.1 * draw["q"], "v": rng.normal(size=len(q))}
     image = {k: images.get(k, images["q"]) @ x for k, x in point.items()}
+    image["q"] = _mirrored(model, images, point["q"])
     order = ("q", "v", "s", "lam", "u")
-    here = np.array(values(*(point[k] for k in order))).ravel()
-    there = np.array(values(*(image[k] for k in order))).ravel()
-    asked = {(names.index(w.quantity.name), *_when(w), w.lower, w.upper) for w in requirements}
+    zero = np.array([model.mechanism.origin[0] * name.endswith(PLACES) for name in names])
+    here = np.array(values(*(point[k] for k in order))).ravel() - zero
+    there = np.array(values(*(image[k] for k in order))).ravel() - zero
+
+    def beyond(w: Requirement) -> tuple[float, float]:
+        at = float(zero[names.index(w.quantity.name)])
+        return w.lower - at, w.upper - at
+
+    asked = {(names.index(w.quantity.name), *_when(w), *beyond(w)) for w in requirements}
 
     def has_image(w: Requirement) -> bool:
         value = there[names.index(w.quantity.name)]
-        same = {(i, *_when(w), w.lower, w.upper) for i in np.flatnonzero(np.isclose(here, value))}
-        back = (-w.upper, -w.lower)
+        lower, upper = beyond(w)
+        same = {(i, *_when(w), lower, upper) for i in np.flatnonzero(np.isclose(here, value))}
+        back = (-upper, -lower)
         turned = {(i, *_when(w, -1), *back) for i in np.flatnonzero(np.isclose(here, -value))}
         return bool(asked & (same | turned))
 

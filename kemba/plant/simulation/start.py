@@ -53,7 +53,10 @@ def initial_values(model: Model, values: Mapping[str, float]) -> tuple[Array, Ar
 
 
 def lowest_foot(model: Model, values: Mapping[str, float]) -> float:
-    """Height [m] of the lowest foot above its ground in the pose of `initial_values`. Raises KembaError likewise."""
+    """Height [m] of the lowest foot above its ground in the pose of `initial_values`.
+
+    Raises KembaError likewise.
+    """
     return _lowest_foot(model, initial_values(model, values)[0])
 
 

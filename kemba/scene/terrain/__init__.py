@@ -18,7 +18,8 @@ def kinds() -> dict[str, type[Terrain]]:
     """Every kind by the key that tells it from the others; `friction` alone is the plain one."""
     for module in iter_modules(__path__, f"{__name__}."):
         import_module(module.name)
-    return {kind.key: kind for kind in (*Terrain.__subclasses__(), Terrain)}
+    known: list[type[Terrain]] = [*Terrain.__subclasses__(), Terrain]
+    return {kind.key: kind for kind in known}
 
 
 class _OfAnyKind:
@@ -49,5 +50,7 @@ class _OfAnyKind:
     ) -> dict[str, Any]:
         return {"anyOf": [kind.model_json_schema() for kind in self.members()]}
 
+
+__all__ = ["AnyTerrain", "Terrain", "kinds"]
 
 AnyTerrain = Annotated[Terrain, _OfAnyKind()]
