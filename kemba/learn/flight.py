@@ -58,12 +58,10 @@ def _peak(time: Array, z: Array, around: float) -> tuple[float, float]:
 
 
 def _lowest_foot(motion: Trajectory, machine: Machine) -> Array:
-    """Height [m] of the lowest foot (rows,)."""
-    coordinates = machine.coordinates(motion)
-    assert coordinates is not None  # a log of a robot has these columns
-    points = machine.points(coordinates)
-    feet = [points[f"{leg}/foot"][:, 1] for leg in machine.mechanism.legs]
-    return np.asarray(np.min(feet, axis=0))
+    """Height [m] of the lowest foot above its ground (rows,)."""
+    feet = [machine.height(motion, leg) for leg in machine.mechanism.legs]
+    assert None not in feet  # a log of a robot has the columns
+    return np.asarray(np.min(np.array(feet, dtype=float), axis=0))
 
 
 def _touchdown(time: Array, foot: Array, after: float, down: float) -> float:

@@ -113,7 +113,6 @@ def plant_of(run: str | Path, name: str | None = None) -> Model:
     task = load_yaml(file).data if file.is_file() else None
     if not task:
         return load_model(name or PLANT)
-    scene = scene_in(task, str(file))
     payload, supply = to_si(task.get("payload") or 0.0, "kg"), task.get("supply")
     own = str(task.get("plant", PLANT))
     return counterpart(
@@ -123,5 +122,5 @@ def plant_of(run: str | Path, name: str | None = None) -> Model:
         name or own,
         own_effects=name in (None, own),
         changes=task.get("effects"),
-        scene=scene,
+        scene=scene_in(task, str(file)),
     )
