@@ -3,7 +3,8 @@
 Lines of terrain begin one behind the other. Between two of them the ground goes from the one to the
 other over the width `EDGE` by a polynomial with two continuous derivatives, so that a wall is a
 steep, rounded contact like any other, and the same in plans, executions and identification. The
-rounding lies on the lower side: the ground is nowhere lower than the one that is written.
+rounding lies on the lower side: the ground is nowhere lower than the one that is written, but for
+0.2 mm at the foot of a ramp.
 """
 
 from __future__ import annotations

@@ -160,7 +160,9 @@ def automatic_guess(
     forces: dict[str, np.ndarray] = {}
     for leg, place in robot.legs.items():
         stretched = lengths[0] + Guess.current().stretch * (lengths[1] - lengths[0])
-        length = np.minimum(z - scene.skyline(x + place.hip), stretched)
+        foot = x + place.hip
+        low = np.where(airborne, scene.skyline(foot), scene.ground.height(foot))
+        length = np.minimum(z - low, stretched)
         hip, bend = leg_pose(robot, place.fold, np.zeros_like(z), -length)
         q[:, names.index(f"{leg}/hip/q")] = hip
         q[:, names.index(f"{leg}/knee/q")] = place.fold * bend
