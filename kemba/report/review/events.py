@@ -61,7 +61,7 @@ def events_of(track: Track, machine: Machine) -> Events | None:
     time, z = peak(t.time[known], _calm(t.time[known], t["body/z"][known]))
     legs = machine.mechanism.legs
     flights = {leg: _flight(track.source, machine.stance(t, leg), time) for leg in legs}
-    return Events(time, z, _feet(t, machine), flights, _fault(t, z))
+    return Events(time, z, _feet(t, machine), flights, _fault(t, z, machine))
 
 
 def _flight(source: Source, stands: Mask, apex: float) -> FootFlight:
@@ -81,17 +81,19 @@ def _flight(source: Source, stands: Mask, apex: float) -> FootFlight:
 
 
 def _feet(t: Trajectory, machine: Machine) -> float | None:
-    """How far [m] the lower foot rises."""
-    coordinates = machine.coordinates(t)
-    if coordinates is None:
+    """How far [m] the lower foot rises above the ground."""
+    feet = [machine.height(t, leg) for leg in machine.mechanism.legs]
+    known = [height for height in feet if height is not None]
+    if len(known) < len(feet):
         return None
-    points = machine.points(coordinates)
-    lower = np.min([points[f"{leg}/foot"][:, 1] for leg in machine.mechanism.legs], axis=0)
+    lower = np.min(known, axis=0)
     return float(np.nanmax(lower)) if np.isfinite(lower).any() else None
 
 
-def _fault(t: Trajectory, apex: float) -> str | None:
-    z = t["body/z"][np.isfinite(t["body/z"])]
+def _fault(t: Trajectory, apex: float, machine: Machine) -> str | None:
+    x = t.get("body/x", np.zeros(len(t)))
+    z = t["body/z"] - machine.mechanism.scene.ground.height(np.nan_to_num(x))
+    z = z[np.isfinite(z)]
     if "body/pitch" in t:
         pitch = t["body/pitch"][np.isfinite(t["body/pitch"])]
         if len(pitch) and abs(pitch[-1]) > LandingSettings.current().upright:
