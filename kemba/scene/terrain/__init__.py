@@ -16,10 +16,11 @@ if TYPE_CHECKING:
 
 def kinds() -> dict[str, type[Terrain]]:
     """Every kind by the key that tells it from the others; `friction` alone is the plain one."""
-    for module in iter_modules(__path__, f"{__name__}."):
-        import_module(module.name)
-    known: list[type[Terrain]] = [*Terrain.__subclasses__(), Terrain]
-    return {kind.key: kind for kind in known}
+    modules = [import_module(module.name) for module in iter_modules(__path__, f"{__name__}.")]
+    own = ((m.__name__, value) for m in modules for value in vars(m).values())
+    found = [v for name, v in own if isinstance(v, type) and v.__module__ == name]
+    known = [v for v in found if issubclass(v, Terrain)]
+    return {kind.key: kind for kind in sorted(known, key=lambda kind: kind is Terrain)}
 
 
 class _OfAnyKind:
