@@ -86,11 +86,14 @@ def _from_level(
     stop: Callable[[], bool] | None,
 ) -> Plan | None:
     """The plan of the same task on level ground, from which terrain and obstacles grow; None where
-    there is none, or where it does not lead to what is asked."""
+    there is none in half of the time, or where it does not lead to what is asked."""
     planner, session = job.planner, job.planner.session
+    half = max((session.control.deadline - time.monotonic()) / 2, 0.1)
     ground = ground_at(planner.model, planner.requirements, 0.0)
     level = (Level(height=ground),) if ground else None
-    task = planner.task.model_copy(update={"terrain": level, "obstacles": None})
+    solver = planner.task.solver.model_copy(update={"time_limit": half})
+    flat = {"terrain": level, "obstacles": None, "solver": solver}
+    task = planner.task.model_copy(update=flat)
     first = plan(task, None, model, log, session.tell, watch, stop=stop)
     session.attempts += first.attempts
     if first.status is not Status.SOLVED:
@@ -101,7 +104,8 @@ def _from_level(
     if near is None:
         return None
     wall, cpu = first.solve_s + near.solve_s, first.solve_cpu_s + near.solve_cpu_s
-    return replace(near, continued=None, solve_s=wall, solve_cpu_s=cpu, start="level ground")
+    near = replace(near, continued=None, solve_s=wall, solve_cpu_s=cpu, start="level ground")
+    return clear(near) if task.clearance else near
 
 
 def plans_nearby(
