@@ -124,6 +124,7 @@ def raised_log(log: Trajectory) -> Trajectory:
     return Trajectory(log.time, log.with_columns({"body/z [m]": log["body/z"] + UP}).columns, meta)
 
 
+@pytest.mark.slow
 def test_logs_from_raised_ground_are_explained_as_well_as_flat_ones() -> None:
     logs = hops(SEALS, runs=1)[0]
     there = [raised_log(log) for log in logs]
