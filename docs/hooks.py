@@ -73,7 +73,7 @@ def task_keys() -> str:
 
     schema = Task.model_json_schema()
     parts = {"": schema, **{f"{k.lower()}.": v for k, v in schema["$defs"].items()}}
-    places = {"bound.": "start.NAME.", "goal.": "goals.NAME."}
+    places = {"bound.": "start.NAME.", "goal.": "goals.NAME.", "obstacle.": "obstacles[0]."}
     rows = [
         f"| `{places.get(part, part)}{key}` | {_kind(about)} | {_default(about)} |"
         for part, table in parts.items()
@@ -94,7 +94,8 @@ def _kind(about: dict[str, Any]) -> str:
         kinds = [_kind(one) for one in about["anyOf"] if one.get("type") != "null"]
         return " or ".join(dict.fromkeys(kinds))
     if about.get("type") == "array":
-        return "list of " + " and ".join(dict.fromkeys(map(_kind, about["prefixItems"])))
+        items = about.get("prefixItems") or [about["items"]]
+        return "list of " + " and ".join(dict.fromkeys(map(_kind, items)))
     ends = [f", {end} {about[end]}" for end in ("minimum", "maximum") if end in about]
     return TYPES[about.get("type", "object")] + "".join(ends)
 

@@ -24,6 +24,7 @@ LEVELS = [
     {"quantity"},
     {"config"},
     {"table", "trajectory"},
+    {"scene"},
     {"logs"},
     {"mechanism"},
     {"effects"},

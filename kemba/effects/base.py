@@ -17,6 +17,7 @@ REMEASURED = Tolerance(0.1, source="assumed: a discovery from a few logs is that
 
 if TYPE_CHECKING:
     from kemba.mechanism import Bore, Cylinder
+    from kemba.scene import Ground
 
 
 @dataclass(frozen=True)
@@ -73,6 +74,7 @@ class At(Protocol):
     leg, then at the robot.
     """
 
+    ground: Ground  # its height, slope, normal and friction at any place
     supply: Any  # Pa; a symbol in simulations that share their equations, see `at_supply`
     gravity: float  # m.s-2
     body_mass: float  # kg, of the body link alone

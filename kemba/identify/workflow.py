@@ -22,6 +22,7 @@ from kemba.identify.written.quoted import measured_in, noise_ratio, plant_of
 from kemba.logs import load_map
 from kemba.model import Model, load_model, load_spec
 from kemba.model.spec import evidence_faults
+from kemba.scene import scene_in
 from kemba.trajectory import Trajectory
 
 Paths = Sequence[str | Path]
@@ -115,7 +116,8 @@ def _evidence(
     paths = [(Path(log.meta["path"]).resolve(), use) for log, use in used]
     quoted, plant = kept or fitted, None
     if quoted[0].meta["kind"] == "robot":
-        plant = noise_ratio(make_problem(excerpts(quoted)[0], plant_of(model)))
+        simulated = plant_of(model, scene_in(quoted[0].meta))
+        plant = noise_ratio(make_problem(excerpts(quoted)[0], simulated))
     return {
         "logs": [{"file": str(p), "sha256": sha256(p), "use": use} for p, use in paths],
         "error_before": answer.error_before,
@@ -127,8 +129,14 @@ def _evidence(
 
 
 def model_of(logs: Sequence[Trajectory], name: str) -> Model:
-    """The model `name` of the robot, or for bench logs of one of its pistons."""
-    return load_model(name, rig=logs[0].meta["kind"] == "bench")
+    """The model `name` of the robot in the scene of the logs, or for bench logs of one of its
+    pistons. Raises KembaError where logs were taken in several scenes."""
+    scenes = [scene_in(log.meta, str(log.meta.get("name", ""))) for log in logs]
+    if any(scene != scenes[0] for scene in scenes):
+        names = ", ".join(str(log.meta.get("name")) for log in logs)
+        hint = "look at the logs of each scene by themselves"
+        raise KembaError(names, "were taken on different terrain", hint=hint)
+    return load_model(name, rig=logs[0].meta["kind"] == "bench", scene=scenes[0])
 
 
 def check_all(logs: Sequence[Trajectory], model: Model) -> list[str]:

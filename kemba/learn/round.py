@@ -177,7 +177,7 @@ def _learnt(
         data = answer.json()
         file = write_model(out / "model.yaml", old.model, data["ranking"], answer.added, data)
         model = str(file.resolve())
-    machine = load_machine(old.model)
+    machine = load_machine(old.model, scene=old.scene)
     table, plan = run.controller, run.trajectory
     before = simulated = _simulated(task_model(old), plan, table, machine)
     if model != old.model:
@@ -207,7 +207,9 @@ def _with_correction(found: Round, old: Task, run: Run) -> Round:
     if not plain.is_file():
         return replace(found, correction=correction)
     model = task_model(old.model_copy(update={"model": found.model}))
-    there = _simulated(model, run.trajectory, Trajectory.read(plain), load_machine(old.model))
+    there = _simulated(
+        model, run.trajectory, Trajectory.read(plain), load_machine(old.model, scene=old.scene)
+    )
     without = abs(there.apex - found.planned.apex)
     if without > abs(found.executed_apex_error):
         return replace(found, correction=correction)
@@ -259,7 +261,7 @@ def _planned(
 
 def _corrected(found: Round, task: Task, folder: RunFolder) -> Round:
     """controller.csv with the correction in it; the plan's own table is kept beside it."""
-    machine, model = load_machine(task.model), task_model(task)
+    machine, model = load_machine(task.model, scene=task.scene), task_model(task)
     plain = Trajectory.read(folder / "controller.csv")
     plan = Trajectory.read(folder / "trajectory.csv")
     aimed = Aim(model, machine, plan, found.correction).corrected(plain)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import casadi as ca
@@ -13,6 +13,7 @@ from kemba.mechanism.bore import Bore
 from kemba.mechanism.cylinder import Cylinder
 from kemba.mechanism.links import Robot
 from kemba.quantity import Quantity
+from kemba.scene import FLAT, POINTS, Scene
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,7 @@ class Mechanism:
     `standing`: coordinates with retracted pistons and each foot on the ground under its hip.
     `tolerances`: 1 sigma of figures of its links that may be off, as shares of them, by name.
     `points`: (x, z) of places that pictures need, such as `front/pin`; nothing pushes there.
+    `scene`: the ground it moves on, and obstacles; see `on`.
     """
 
     name: str
@@ -72,6 +74,39 @@ class Mechanism:
     standing: dict[str, float] = field(default_factory=dict)
     points: dict[str, ca.SX] = field(default_factory=dict)
     tolerances: dict[str, float] = field(default_factory=dict)
+    scene: Scene = FLAT
+
+    def on(self, scene: Scene, at: float = 0.0) -> Mechanism:
+        """The same mechanism in a scene, standing at a place x [m] of it: from there its
+        coordinates are counted by whoever scales them, and about there it has its mirror.
+
+        Unless that is level at 0 and free, it has ports for the height of feet, knees and hips
+        above the ground under them (`front/foot/gap`), and above its obstacles (`front/foot/room`).
+        It has a mirror where every place of the scene is like every other.
+        """
+        if (scene, at) == (self.scene, self.coordinates[0].value) or self.robot is None:
+            return self
+        if self.scene != FLAT:
+            raise ValueError("stands in a scene already")
+        lowest, highest = scene.ground.extent
+        ground = float(scene.ground.height(at))
+        x, z, *others = self.coordinates
+        x = replace(x, lower=x.lower + at, upper=x.upper + at, value=at)
+        z = replace(z, lower=z.lower + lowest, upper=z.upper + highest, value=ground)
+        pose = {"body/x": at, "body/z": self.standing["body/z"] + ground}
+        return replace(
+            self,
+            scene=scene,
+            coordinates=(x, z, *others),
+            ports={**self.ports, **_scene_ports(self, scene)},
+            mirror=self.mirror if scene.even else {},
+            standing={**self.standing, **pose},
+        )
+
+    @property
+    def origin(self) -> tuple[float, ...]:
+        """Coordinates (n,) from which programs count."""
+        return tuple(c.value for c in self.coordinates)
 
     @property
     def n(self) -> int:
@@ -123,3 +158,23 @@ class Mechanism:
             return ca.SX.zeros(self.n)
         phi = ca.vertcat(*(self.port(name).phi for name in efforts))
         return ca.jtimes(phi, self.q, ca.vertcat(*efforts.values()), True)
+
+
+def _scene_ports(mechanism: Mechanism, scene: Scene) -> dict[str, Port]:
+    found: dict[str, ca.SX] = {}
+    for leg in mechanism.legs if not scene.plain else ():
+        for point in POINTS:
+            x, z = (mechanism.ports[f"{leg}/{point}/{axis}"].phi for axis in "xz")
+            found[f"{leg}/{point}/gap"] = z - scene.ground.height(x)
+            rooms = [box.room(scene.ground, x, z) for box in scene.obstacles]
+            for i, room in enumerate(rooms):
+                found[f"{leg}/{point}/room{i or ''}"] = room
+    doc = {"gap": "height above the ground under it", "room": "height above an obstacle"}
+    return {
+        name: Port(
+            Quantity(name, "m", doc=doc[name.rpartition("/")[2].rstrip("0123456789")]),
+            Quantity(f"{name}_rate", "m.s-1"),
+            phi,
+        )
+        for name, phi in found.items()
+    }

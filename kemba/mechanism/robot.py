@@ -113,7 +113,9 @@ def reshaped(mechanism: Mechanism, offsets: Offsets, symbols: Offsets | None = N
     expressions. A rig has none of these lengths and stays as it is."""
     if mechanism.drawn is None or (not symbols and dict(offsets) == dict(mechanism.offsets)):
         return mechanism
-    return robot_mechanism(mechanism.drawn, offsets, symbols)
+    return robot_mechanism(mechanism.drawn, offsets, symbols).on(
+        mechanism.scene, mechanism.origin[0]
+    )
 
 
 def _placed(joints: list[Joint], robot: Robot, weighed: bool) -> list[Joint]:

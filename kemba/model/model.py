@@ -12,8 +12,8 @@ import casadi as ca
 from kemba.effects.base import Effect
 from kemba.errors import KembaError, suggest
 from kemba.mechanism import Mechanism, reshaped
+from kemba.model.evaluation import Evaluation, Instance, Key, full_name, place_effects, port_name
 from kemba.model.node import Node, Row
-from kemba.model.scene import Instance, Key, Scene, full_name, place_effects, port_name
 from kemba.quantity import Param, Quantity
 
 SUPPLY = "supply"  # its name beside those of parameters
@@ -189,8 +189,8 @@ def _assemble(
     u, inputs = _symbols("u", model.inputs)
     sd = ca.SX.sym("sd", s.numel())
     values = {**states, **forces, **inputs}
-    scene = Scene(mechanism, instances, values, set(model.inputs), supply)
-    parts = [(instance, scene.contribution(i)) for i, instance in enumerate(instances)]
+    evaluation = Evaluation(mechanism, instances, values, set(model.inputs), supply)
+    parts = [(instance, evaluation.contribution(i)) for i, instance in enumerate(instances)]
 
     efforts: dict[str, Any] = {}
     rod = {leg: ca.SX(0) for leg in mechanism.legs}
@@ -215,7 +215,7 @@ def _assemble(
         for symbol, rate in part.rate.items():
             rates[(instance.leg, symbol)] = rates.get((instance.leg, symbol), 0) + rate
         for symbol, rate in part.add_rate.items():
-            state, slope = scene.carrier(instance.leg, symbol)
+            state, slope = evaluation.carrier(instance.leg, symbol)
             rates[(instance.leg, state)] = rates.get((instance.leg, state), 0) + rate / slope
     _check_rates(model, rates)
 

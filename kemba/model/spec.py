@@ -19,6 +19,7 @@ from kemba.model.evidence import Array, Evidence, located, matrix_in
 from kemba.model.model import Model
 from kemba.model.own_rig import own_model
 from kemba.quantity import Param
+from kemba.scene import FLAT, Scene
 
 Supply = Annotated[float, Param("Pa", 0.1e6, lower=ATMOSPHERE, doc="supply pressure")]
 
@@ -155,8 +156,11 @@ def build_model(
     extra: Iterable[Effect] = (),
     supply: float | None = None,
     rig: bool = False,
+    scene: Scene = FLAT,
+    at: float = 0.0,
 ) -> Model:
-    """The model of a spec: `extra` effects added, `supply` [Pa] instead of the spec's.
+    """The model of a spec: `extra` effects added, `supply` [Pa] instead of the spec's, standing
+    `at` a place [m] of a `scene`.
 
     `rig`: the same effects on the piston of the bench; effects whose ports it lacks are left out.
     Raises KembaError where the spec names no robot, or a file or an effect is wrong.
@@ -167,7 +171,7 @@ def build_model(
         expected = "robot: a robot's file, or base: a model that names one, was expected"
         raise KembaError(f"model {spec.name}", "robot: missing", expected)
     robot = load_robot(spec.robot)
-    mechanism = rig_mechanism(robot.cylinder) if rig else robot_mechanism(robot)
+    mechanism = rig_mechanism(robot.cylinder) if rig else robot_mechanism(robot).on(scene, at)
     effects: list[Effect] = [*spec.effects, *CHAMBERS[spec.chambers or "first_order"]()]
     named = {e.name: e for e in (*effects, *spec.effects)}
     listed = [*named.values()]
@@ -182,11 +186,13 @@ def load_model(
     extra: Iterable[Effect] = (),
     supply: float | None = None,
     rig: bool = False,
+    scene: Scene = FLAT,
+    at: float = 0.0,
 ) -> Model:
     """Load and build in one step. Raises KembaError with every mistake of the YAML."""
     spec = load_spec(name)
     try:
-        return build_model(spec, extra, supply, rig)
+        return build_model(spec, extra, supply, rig, scene, at)
     except KembaError as error:
         raise _at_its_line(error, name) from None
 

@@ -43,7 +43,11 @@ def controller_table(model: Model, plan: Trajectory, hold: float = 0.0) -> Traje
     return Trajectory(
         (ticks - lead) / round(1 / PERIOD),
         columns,
-        {"kind": "controller", "lead": lead / round(1 / PERIOD)},
+        {
+            "kind": "controller",
+            "lead": lead / round(1 / PERIOD),
+            **model.mechanism.scene.json(),
+        },
     )
 
 

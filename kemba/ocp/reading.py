@@ -58,7 +58,9 @@ def asked_of(
     except KembaError as error:
         errors = listed_errors(error)
         try:
-            built = load_model(model or task.model, (), task.supply)
+            built = load_model(
+                model or task.model, (), task.supply, scene=task.scene, at=task.place_x
+            )
         except KembaError:
             raise ConfigErrors(errors) from None
     try:
@@ -79,7 +81,7 @@ def task_model(
         look_up(task, document)
     extra = changed_effects(name or task.model, task.effects, document)
     extra += [Payload(m=task.payload)] if task.payload else []
-    return load_model(name or task.model, extra, task.supply)
+    return load_model(name or task.model, extra, task.supply, scene=task.scene, at=task.place_x)
 
 
 def look_up(task: Task, document: Document) -> None:

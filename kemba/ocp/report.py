@@ -8,6 +8,7 @@ from typing import Any
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.planned import Plan
 from kemba.ocp.task.height import rise_of_feet
+from kemba.scene import above_ground
 
 GROUND = 1e-3  # m; lower feet stand
 
@@ -21,10 +22,10 @@ def sentence_of(plan: Plan) -> str:
 def warnings(plan: Plan) -> list[str]:
     """What a task that was met may not have meant."""
     rests = any(r.location == ("end", "rest") for r in plan.requirements)
-    feet = [name for name in plan.trajectory.names if name.endswith("/foot/z")]
-    if not rests or not feet or min(plan.trajectory[name][-1] for name in feet) <= GROUND:
+    feet = [height[-1] for height in above_ground(plan.trajectory).values()]
+    if not rests or not feet or min(feet) <= GROUND:
         return []
-    hint = 'a robot in the air falls; ask for `"*/foot/z": 0 m` at the end'
+    hint = 'a robot in the air falls; ask for `"*/foot/gap": 0 m` at the end'
     return [f"the motion ends at rest with no foot on the ground: {hint}"]
 
 

@@ -22,6 +22,7 @@ from kemba.trajectory import Array
 
 PAGES = Path(__file__).parent / "pages"
 RATE = 250.0  # poses per second of motion
+BESIDE = 2.0  # m of ground before and behind the motion
 AROUND = 0.3  # s, shown before and after the ghost moves
 
 
@@ -91,13 +92,18 @@ def scene(source: Source, model: str | None = None, ghost: Source | None = None)
         raise KembaError(source.name, "cannot be shown", expected)
     places = np.array([list(pose.points.values()) for robot in shown for pose in robot])
     low, high = places.min(axis=(0, 1)), places.max(axis=(0, 1))
-    legs = machine.mechanism.legs
+    legs, ground = machine.mechanism.legs, machine.mechanism.scene.ground
     return {
         "time": [round(float(time), 4) for time in times],
         "motions": [_robot(robot, legs) for robot in shown if robot],
         "legs": legs,
         "cylinder": CYLINDER,
         "range": [low[0], high[0]],
+        "ground": [c.round(4).tolist() for c in ground.line(low[0] - BESIDE, high[0] + BESIDE)],
+        "obstacles": [
+            [c.round(4).tolist() for c in box.outline(ground)]
+            for box in machine.mechanism.scene.obstacles
+        ],
         "centre": [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2],
         "size": float(max(high - low)),
     }

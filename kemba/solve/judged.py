@@ -87,7 +87,9 @@ class Judged:
 
 def plant_of(task: Task) -> Model:
     """The plant of a task: on its own robot, supply, payload and effects. Raises KembaError."""
-    return counterpart(task.model, task.payload, task.supply, task.plant, changes=task.effects)
+    return counterpart(
+        task.model, task.payload, task.supply, task.plant, changes=task.effects, scene=task.scene
+    )
 
 
 def table_of(found: Plan) -> ExecutedTable:

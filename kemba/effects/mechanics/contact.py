@@ -11,14 +11,16 @@ from kemba.quantity import Param, Quantity
 class Contact(Effect):
     """Foot on rigid ground: normal force against gap, friction cone against slip.
 
-    `gamma` is the slip speed; friction is split into its forward and backward part.
+    The gap is the height above the ground under the foot; forces and slip are in the frame of the
+    ground there. `gamma` is the slip speed; friction is split into its forward and backward part.
+    `mu` holds where the terrain says no other.
     """
 
     kind: Literal["contact"] = "contact"
     mu: Annotated[float, Param("1", 0.4, lower=0.0, doc="friction coefficient")] = 1.0
 
     family: ClassVar[str] = "ground"
-    equation: ClassVar[str] = "0 <= z_foot _|_ lam_n >= 0; |lam_t| <= mu lam_n, slip against it"
+    equation: ClassVar[str] = "0 <= z - h(x) _|_ lam_n >= 0; |lam_t| <= mu lam_n, slip against it"
     source: ClassVar[str] = "paper IV-A.1 with the contact-implicit method of its ref. 24"
     ports: ClassVar[tuple[str, ...]] = ("foot_x", "foot_z")
     reads: ClassVar[tuple[str, ...]] = ("mu_gain",)
@@ -34,15 +36,21 @@ class Contact(Effect):
         }
 
     def evaluate(self, at: At) -> Contribution:
-        slip, gamma = at.foot_x.v, at.gamma
-        cone = at.mu_gain * self.mu * at.lam_n - at.lam_p - at.lam_m
+        ground, x, gamma = at.ground, at.foot_x.x, at.gamma
+        across, up = ground.normal(x)
+        push = at.lam_p - at.lam_m
+        slip = up * at.foot_x.v - across * at.foot_z.v
+        cone = at.mu_gain * ground.friction(x, self.mu) * at.lam_n - at.lam_p - at.lam_m
         return Contribution(
-            effort={"foot_z": at.lam_n, "foot_x": at.lam_p - at.lam_m},
+            effort={
+                "foot_z": up * at.lam_n - across * push,
+                "foot_x": across * at.lam_n + up * push,
+            },
             pairs=(
-                Pair("gap", at.foot_z.x, at.lam_n),
+                Pair("gap", at.foot_z.x - ground.height(x), at.lam_n),
                 Pair("cone", gamma, cone, unit_a="m.s-1"),
                 Pair("slip forward", gamma + slip, at.lam_p, unit_a="m.s-1"),
                 Pair("slip backward", gamma - slip, at.lam_m, unit_a="m.s-1"),
             ),
-            outputs=((Quantity("foot/Fx", "N", doc="ground reaction"), at.lam_p - at.lam_m),),
+            outputs=((Quantity("foot/Fx", "N", doc="force along the ground"), push),),
         )

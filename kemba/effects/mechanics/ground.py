@@ -43,7 +43,7 @@ class GroundCompliance(Effect):
     mu: Annotated[float, Param("1", 0.4, lower=0.0, doc="friction coefficient")] = 1.0
 
     family: ClassVar[str] = "ground"
-    equation: ClassVar[str] = "lam_n = max(0, k pen (1 + d pen')), pen = max(0, -z_foot)"
+    equation: ClassVar[str] = "lam_n = max(0, k pen (1 + d pen')), pen = max(0, h(x) - z)"
     source: ClassVar[str] = "Hunt and Crossley 1975, with a linear spring"
     ports: ClassVar[tuple[str, ...]] = ("foot_x", "foot_z")
     reads: ClassVar[tuple[str, ...]] = ("mu_gain",)
@@ -62,6 +62,9 @@ class GroundCompliance(Effect):
 
     def evaluate(self, at: At) -> Contribution:
         rigid = Contact(mu=1.0).bind({"mu": self.mu}).evaluate(at)
-        gap = at.foot_z.x + self.penetration(at.lam_n, -at.foot_z.v)
-        pairs = [Pair("gap", gap, at.lam_n) if p.name == "gap" else p for p in rigid.pairs]
+        sinking = at.ground.slope(at.foot_x.x) * at.foot_x.v - at.foot_z.v
+        pairs = [
+            Pair("gap", p.a + self.penetration(at.lam_n, sinking), p.b) if p.name == "gap" else p
+            for p in rigid.pairs
+        ]
         return Contribution(effort=rigid.effort, pairs=pairs, outputs=rigid.outputs)

@@ -11,8 +11,8 @@ from kemba.identify.problem.line import LINE, LineResistance
 from kemba.identify.problem.problem import Candidate, Parameter, Theta
 from kemba.identify.problem.sensor_faults import possible_faults
 from kemba.identify.problem.structure import ORIFICE, OrificeShare
+from kemba.model.evaluation import port_name
 from kemba.model.model import Model
-from kemba.model.scene import port_name
 from kemba.quantity import Param
 
 SEARCHED: dict[str, Effect] = {ORIFICE: OrificeShare(), LINE: LineResistance()}

@@ -121,7 +121,10 @@ class Standing:
         q = ca.vertcat((body - off) * longer, *knees)
         nominal = zip(physics.names, physics.nominal.tolist(), strict=True)
         p = ca.vertcat(*(lengths.get(n, ca.SX(value)) for n, value in nominal))
-        feet = ca.vertcat(*(node.outputs[f"{leg}/foot/z"] for leg in physics.legs))
+        height, places = physics.mechanism.scene.ground.height, node.outputs
+        feet = ca.vertcat(
+            *(places[f"{g}/foot/z"] - height(places[f"{g}/foot/x"]) for g in physics.legs)
+        )
         heights = ca.substitute(feet, ca.vertcat(node.q, node.p), ca.vertcat(q, p))
         heights += load * zeros[-2]
         return ca.Function("standing", [body, pistons, load, x], [heights, ca.jacobian(heights, x)])

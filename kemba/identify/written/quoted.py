@@ -15,6 +15,7 @@ from kemba.identify.problem.problem import Array, Problem
 from kemba.mechanism.robot_file import robot_files
 from kemba.model import Model, build_model, load_spec
 from kemba.model.evidence import Measured
+from kemba.scene import Scene
 from kemba.trajectory import Trajectory
 
 PLANT = "plant"  # the shipped simulated robot, with physical chambers
@@ -39,10 +40,10 @@ def known(problem: Problem, figures: Mapping[str, float]) -> dict[str, float]:
     return {name: value for name, value in figures.items() if name in problem.nuisance}
 
 
-def plant_of(model: str | Path) -> Model:
-    """The shipped plant on the robot of `model`."""
+def plant_of(model: str | Path, scene: Scene) -> Model:
+    """The shipped plant on the robot of `model` in a scene."""
     robot = load_spec(model).robot
-    return build_model(load_spec(PLANT).model_copy(update={"robot": robot}))
+    return build_model(load_spec(PLANT).model_copy(update={"robot": robot}), scene=scene)
 
 
 def measured_in(logs: Sequence[Trajectory], model: str | Path) -> Measured:

@@ -41,6 +41,8 @@ def grip_of(model: Model, plan: Trajectory) -> float | None:
             on = load > settings.loaded * model.mechanism.weight
             if f"{leg}/foot/slip" in plan:
                 on &= plan[f"{leg}/foot/slip"] < settings.slides
-            shares += [np.abs(push[on]) / (ground.mu * load[on])]
+            x = plan.get(f"{leg}/foot/x", np.zeros(len(plan)))
+            mu = np.broadcast_to(model.mechanism.scene.ground.friction(x, ground.mu), x.shape)
+            shares += [np.abs(push[on]) / (mu[on] * load[on])]
     used = np.concatenate(shares) if shares else np.array([])
     return float(used.max()) if len(used) else None

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from kemba.effects import Effect
+from kemba.mechanism import Mechanism, robot_mechanism
 from kemba.model import Model
 from kemba.ocp.phases.stages import Stages
 from kemba.ocp.task.requirement import Requirement
@@ -41,7 +42,8 @@ class Origin:
 
 
 def model_between(old: Model, new: Model, share: float) -> Model:
-    """The new model with its numbers at `share` of the way from the old ones.
+    """The new model with its numbers at `share` of the way from the old ones, terrain and obstacles
+    from level ground.
 
     An effect that only the new model has grows from the value at which it is absent. Tables of
     another size, and effects that only the old model has, change at once.
@@ -51,7 +53,15 @@ def model_between(old: Model, new: Model, share: float) -> Model:
     before = {effect.name: effect for effect in old.effects}
     effects = [_effect_between(before.get(e.name), e, share) for e in new.effects]
     supply = old.supply + share * (new.supply - old.supply)
-    return Model(new.mechanism, effects, supply, new.name)
+    return Model(_mechanism_between(old.mechanism, new.mechanism, share), effects, supply, new.name)
+
+
+def _mechanism_between(old: Mechanism, new: Mechanism, share: float) -> Mechanism:
+    level = old.scene.ground.level
+    if new.drawn is None or new.scene.even or level is None or old.scene.obstacles:
+        return new
+    scene = new.scene.at_share(share, level)
+    return robot_mechanism(new.drawn, new.offsets).on(scene, new.origin[0])
 
 
 def _effect_between(old: Effect | None, new: Effect, share: float) -> Effect:

@@ -119,7 +119,10 @@ def impossible_poses(
             relax(document, g.requirement, g.asked, g.reachable) for g in single
         )
         why = "; ".join(r.placed() for r in given) or "the requirements exclude each other"
-        reason = "" if together is None else _reason(single)
+        reason = "" if together is None else _reason(single, document)
+        free = [w for w in here if w.location[0] != "obstacles"]
+        if len(free) < len(here) and poses.gaps(free, free) == []:
+            why, reason = _in_the_way(here, poses, document), ""
         certain = together is not None
         yield Diagnostic(
             f"no pose of the robot does what {when} asks: {why}{reason}", certain, given
@@ -140,11 +143,24 @@ def _size(gaps: Sequence[Gap]) -> float:
     return sum(abs(g.asked - g.reachable) for g in gaps)
 
 
-def _reason(gaps: Sequence[Gap]) -> str:
+def _in_the_way(here: Sequence[Requirement], poses: Poses, document: Document) -> str:
+    """Which obstacle excludes every pose that there is without it."""
+    boxes = dict.fromkeys(w.location for w in here if w.location[0] == "obstacles")
+    rests = {box: [w for w in here if w.location != box] for box in boxes}
+    alone = [box for box, rest in rests.items() if poses.gaps(rest, rest) == []]
+    named = [f"{spoken(box)} ({place(document, box)})" for box in alone or boxes]
+    return f"{' and '.join(named)} stands in its way"
+
+
+def _reason(gaps: Sequence[Gap], document: Document) -> str:
     """What prevents it, as far as the requirement shows."""
-    if any(g.requirement.quantity.name.endswith("foot/z") and g.asked < -1e-6 for g in gaps):
-        return "; the ground is at 0 m"
-    return " with the other requirements kept"
+    feet = [g for g in gaps if g.requirement.quantity.name.endswith(("foot/z", "foot/gap"))]
+    sunk = next((g for g in feet if g.asked < g.reachable - 1e-6), None)
+    if sunk is not None:
+        where = number(sunk.reachable, "m")
+        return f"; the ground is at {where}" if sunk.requirement.quantity.name[-1] == "z" else ""
+    ground = place(document, ("terrain",)) if "terrain" in (document.data or {}) else ""
+    return " with the other requirements kept" + (f", on the ground of {ground}" if ground else "")
 
 
 def coarse_grid(task: Task, flight: AskedFlight | None, document: Document) -> Iterator[Diagnostic]:

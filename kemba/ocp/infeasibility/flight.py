@@ -11,6 +11,7 @@ from kemba.model import Model
 from kemba.model.rest import at_rest
 from kemba.ocp.infeasibility.pose import Poses
 from kemba.ocp.task.requirement import Requirement
+from kemba.ocp.task.terrain import ground_at, stands
 
 
 @dataclass(frozen=True)
@@ -56,23 +57,24 @@ def flight_of(
     ]
     start = [w for w in requirements if w.at == 0.0]
     resting = any(w.location[-1] == "rest" for w in start)
-    grounded = any(w.quantity.name.endswith("foot/z") and w.upper <= 1e-6 for w in start)
+    grounded = any(stands(model, w) for w in start)
     if not highest or not resting or not grounded:
         return None
     requirement = max(highest, key=lambda w: w.lower)
     robot = model.mechanism.need_robot()
     leg = robot.leg.femur.length + robot.leg.tibia.length
-    if requirement.lower <= leg:
+    first, last = (ground_at(model, requirements, at) for at in (0.0, 1.0))
+    if requirement.lower <= max(first, last) + leg:
         return None
     mass, weight = inertia_and_weight(model)
     end = [w for w in requirements if w.at == 1.0]
-    lands = any(w.quantity.name.endswith("foot/z") and w.upper <= 1e-6 for w in end)
+    lands = any(stands(model, w) for w in end)
     below = [w for w in requirements if w.quantity.name == "body/z" and w.always]
     return AskedFlight(
         requirement,
         requirement.lower,
-        poses.highest(start) or leg,
-        (poses.highest(end) or leg) if lands else None,
+        poses.highest(start) or leg + first,
+        (poses.highest(end) or leg + last) if lands else None,
         mass,
         weight / mass,
         leg_swing(model) / mass,

@@ -104,10 +104,15 @@ def _friction(program: PhaseProgram, view: View, i: int, constraint: Constraint)
     if constraint.friction is None:
         return
     c, phases = program.columns, program.phases
-    forces: Where = [
-        (c.phase_of[e], stage["lam"]) for e in range(program.nodes) for stage in c.stages[e]
+    somewhere = ca.depends_on(constraint.friction.cone_forward, program.model.node.q)
+    own = "q lam" if somewhere else "lam"  # where friction differs from place to place
+    stages = [(c.phase_of[e], stage) for e in range(program.nodes) for stage in c.stages[e]]
+    hits = [
+        (p, {"q": c.end(phases[p].first)["q"], "lam": impulse}) for p, impulse in c.impulse.items()
     ]
-    forces += list(c.impulse.items())
+    forces: Where = [
+        (p, np.concatenate([at[g] for g in own.split()])) for p, at in (*stages, *hits)
+    ]
     weight = program.model.mechanism.weight
     edges = (("forward", constraint.friction.cone_forward, BACK),
              ("backward", constraint.friction.cone_backward, AHEAD))  # fmt: skip
@@ -116,7 +121,7 @@ def _friction(program: PhaseProgram, view: View, i: int, constraint: Constraint)
         held = view.of(cone - (1.0 - program.task.grip) * most) / weight
         for wanted, g, high in ((HELD, held, INF), (sliding, view.of(cone) / weight, 0.0)):
             where = [(p, lam) for p, lam in forces if phases[p].modes[i] == wanted]
-            program.mode_constraint(i, f"cone {way}", view.z("lam"), g, 0.0, high, where)
+            program.mode_constraint(i, f"cone {way}", view.z(own), g, 0.0, high, where)
 
 
 def _tangential(program: PhaseProgram, friction: Friction) -> ca.SX:

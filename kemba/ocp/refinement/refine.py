@@ -269,6 +269,7 @@ def reduction_of(
     if half is None or not requirements_are_symmetric(model, requirements):
         return whole(model.node)
     x, mirrored = arrays(model, plan), Refining.current().mirrored
+    x["q"] = x["q"] - np.array(model.mechanism.origin)
     for name, matrix in half.B.items():
         mean = half.expand(name, half.restrict(name, x[name]))
         if matrix.size and np.abs(mean - x[name]).max() > mirrored * max(1.0, np.abs(mean).max()):

@@ -19,6 +19,7 @@ from kemba.ocp.relaxation.settings import Guess
 from kemba.ocp.task.moments import spans
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
+from kemba.ocp.task.terrain import ground_at
 
 Array = np.ndarray
 LIFT = 0.05  # m; how high a foot swings over the line between its places
@@ -80,52 +81,68 @@ def jump(
     reach: tuple[float, float],
 ) -> Course:
     """The course of a jump along t (n,) [s]; `reach` = leg length retracted and stretched [m]."""
-    legs = model.mechanism.legs
+    robot, scene = model.mechanism.need_robot(), model.mechanism.scene
+    ground = ground_at(model, requirements, 0.0), ground_at(model, requirements, 1.0)
     if task.guess == "standing":
         still = task.duration
-        course = HeightCourse([0.0, still], [reach[0]] * 2, [0.0] * 2, (still, still))
+        course = HeightCourse([0.0, still], [reach[0] + ground[0]] * 2, [0.0] * 2, (still, still))
     else:
-        course = body_course(requirements, task.duration, reach, model.mechanism.gravity)
+        course = body_course(requirements, task.duration, reach, model.mechanism.gravity, ground)
     z, az = course(t), course(t, 2)
     airborne = (t > course.flight[0]) & (t < course.flight[1])
-    x0, x1 = (asked(requirements, "body/x", at) or 0.0 for at in (0.0, 1.0))
+    x0, way = _from_to(requirements, "body/x")
     span = max(course.flight[1] - course.flight[0], Guess.current().least_flight)
-    x = x0 + (x1 - x0) * np.clip((t - course.flight[0]) / span, 0.0, 1.0)
-    length = np.minimum(z, reach[0] + Guess.current().stretch * (reach[1] - reach[0]))
-    below = np.column_stack([np.zeros_like(length), -length])
+    x = x0 + way * np.clip((t - course.flight[0]) / span, 0.0, 1.0)
+    stretched = reach[0] + Guess.current().stretch * (reach[1] - reach[0])
+    feet = {}
+    for leg, place in robot.legs.items():
+        under = x + place.hip
+        low = np.where(airborne, scene.skyline(under), scene.ground.height(under))
+        length = np.minimum(z - low, stretched)
+        feet[leg] = np.column_stack([np.zeros_like(length), -length])
     bears = model.mechanism.mass * np.maximum(az + model.mechanism.gravity, 0.0)
-    load = np.where(airborne, 0.0, bears) / len(legs)
-    return Course(x, z, np.zeros_like(z), dict.fromkeys(legs, below), dict.fromkeys(legs, load))
+    load = np.where(airborne, 0.0, bears) / len(robot.legs)
+    return Course(x, z, np.zeros_like(z), feet, dict.fromkeys(robot.legs, load))
 
 
 def body_course(
-    requirements: Sequence[Requirement], duration: float, reach: tuple[float, float], g: float
+    requirements: Sequence[Requirement],
+    duration: float,
+    reach: tuple[float, float],
+    g: float,
+    ground: tuple[float, float] = (0.0, 0.0),
 ) -> HeightCourse:
-    """Height of the body over the motion; `reach` = leg length retracted and stretched [m]."""
-    low, high = reach
-    top = low + Guess.current().stretch * (high - low)
+    """Height of the body over the motion; `reach` = leg length retracted and stretched [m],
+    `ground` = height [m] where it starts and where it ends."""
+    settings, (first, last) = Guess.current(), ground
+    low, high = reach[0] + first, reach[1] + first
+    top = low + settings.stretch * (high - low)
+    lands_at, bent = top + last - first, low + settings.landing * (top - low) + last - first
     z0 = asked(requirements, "body/z", 0.0) or low
     z1 = asked(requirements, "body/z", 1.0)
     peaks = [
         w for w in requirements if w.quantity.name == "body/z" and w.at and np.isfinite(w.lower)
     ]
     peak = max(peaks, key=lambda w: w.lower, default=None)
-    lands = any(w.quantity.name.endswith("foot/z") and w.at == 1.0 for w in requirements)
+    feet = [w for w in requirements if w.quantity.name.endswith(("foot/z", "foot/gap"))]
+    lands = any(w.at == 1.0 for w in feet)
     if z0 > top:
-        fall = float(np.sqrt(2 * (z0 - top) / g))
-        course = HeightCourse([0.0, fall], [z0, top], [0.0, -g * fall], (0.0, fall))
-        return _landed(course, duration, z1 or low + Guess.current().landing * (top - low))
+        fall = float(np.sqrt(2 * (z0 - lands_at) / g))
+        course = HeightCourse([0.0, fall], [z0, lands_at], [0.0, -g * fall], (0.0, fall))
+        return _landed(course, duration, z1 or bent)
     if peak is None or peak.at is None:
         return HeightCourse([0.0, duration], [z0, z1 or z0], [0.0, 0.0], (duration, duration))
     apex, t_apex = peak.lower, peak.at * duration
-    feet = (w for w in requirements if w.quantity.name.endswith("foot/z") and w.holds(peak.at))
-    lift = max((w.lower for w in feet), default=0.0)
+    lifted = (w for w in feet if w.holds(peak.at))
+    lift = max((w.lower - first * (w.quantity.name[-1] == "z") for w in lifted), default=0.0)
     if lift > 0.0 and z0 < apex <= top:  # standing reaches it, but is not what is asked
         top = max(apex - lift, (z0 + apex) / 2)
     if apex <= top:
         course = HeightCourse([0.0, t_apex], [z0, apex], [0.0, 0.0], (t_apex, t_apex))
     else:
-        rise = min(float(np.sqrt(2 * (apex - top) / g)), Guess.current().rise * t_apex)
+        longest = settings.rise * t_apex
+        rise = min(float(np.sqrt(2 * (apex - top) / g)), longest)
+        fall = min(float(np.sqrt(2 * max(apex - lands_at, 0.0) / g)), longest)
         speed = g * rise
         push = min(2 * (top - z0) / speed, t_apex - rise)
         start = t_apex - rise - push
@@ -133,12 +150,12 @@ def body_course(
         knots = [*wait, start, t_apex - rise, t_apex]
         z = [*(z0 for _ in wait), z0, top, apex]
         vz = [*(0.0 for _ in wait), 0.0, speed, 0.0]
-        end = t_apex + rise if lands and t_apex < duration else t_apex
+        end = t_apex + fall if lands and t_apex < duration else t_apex
         course = HeightCourse(knots, z, vz, (t_apex - rise, max(end, t_apex)))
         if lands and end < duration:
-            course = HeightCourse([*knots, end], [*z, top], [*vz, -speed], course.flight)
+            course = HeightCourse([*knots, end], [*z, lands_at], [*vz, -g * fall], course.flight)
     if t_apex < duration and (lands or z1 is not None):
-        return _landed(course, duration, z1 or low + Guess.current().landing * (top - low))
+        return _landed(course, duration, z1 or bent)
     return course
 
 
@@ -159,13 +176,15 @@ def in_order(
     robot, gravity = model.mechanism.need_robot(), model.mechanism.gravity
     parts = [(task.duration * a, task.duration * b) for a, b in spans(task.contacts)]
     rests = {w.at for w in requirements if w.location[-1] == "rest"}
-    z = _height(task, requirements, parts, reach, gravity, rests)(t)
     moving = [
         bool(not ((i == 0 and 0.0 in rests) or (i == len(parts) - 1 and 1.0 in rests)))
         for i in range(len(parts))
     ]
     turning = [not part.on for part in task.contacts] if rests else moving
-    x = _ahead(requirements, parts, moving, t)
+    x, ground = _ahead(requirements, parts, moving, t), model.mechanism.scene.ground
+    under = np.asarray(np.broadcast_to(ground.height(x), x.shape))
+    ends = float(under[0]), float(under[-1])
+    z = under + _height(task, requirements, parts, reach, gravity, rests, ends)(t)
     first, turn = _from_to(requirements, "body/pitch")
     pitch = first + turn * _shared(parts, turning if any(turning) else moving, t)
     feet, load = {}, {}
@@ -175,6 +194,7 @@ def in_order(
     for i, (leg, place) in enumerate(robot.legs.items()):
         hips = np.column_stack([x + place.hip * np.cos(pitch), z + place.hip * np.sin(pitch)])
         foot = _foot(task, parts, standing[:, i], t, hips, reach)
+        foot[:, 1] += ground.height(foot[:, 0]) if standing[:, i].any() else 0.0
         feet[leg] = foot - hips
         load[leg] = np.where(standing[here, i], bears[here], 0.0)
     return Course(x, z, pitch, feet, load)
@@ -231,8 +251,10 @@ def _height(
     reach: tuple[float, float],
     g: float,
     rests: set[float | None],
+    ground: tuple[float, float],
 ) -> HeightCourse:
-    """The body's height: parabolas in flights, from legs that are stretched well."""
+    """The body's height over the ground beneath it: parabolas in flights, from legs that are
+    stretched well. `ground`: its height [m] at the start and at the end."""
     top = reach[0] + STANDS * (reach[1] - reach[0])
     low = reach[0] + FOLDED * (reach[1] - reach[0])
     flies = [not part.on for part in task.contacts]
@@ -240,7 +262,8 @@ def _height(
     lasts = [b - a for a, b in parts]
     if wrapped:
         lasts[0] = lasts[-1] = lasts[0] + lasts[-1]
-    ends = [asked(requirements, "body/z", at) for at in (0.0, 1.0)]
+    asks = [asked(requirements, "body/z", at) for at in (0.0, 1.0)]
+    ends = [z and z - low for z, low in zip(asks, ground, strict=True)]
     t, z, vz = [0.0], [ends[0] or (low if 0.0 in rests else top)], [0.0]
     if wrapped:
         z[0] = top + g * lasts[0] ** 2 / 8

@@ -85,7 +85,8 @@ def along(text: str, motion: Trajectory) -> Array | None:
         return motion[text]
     if not is_expression(text):
         return None
-    tree, names = _parsed(text)
+    tree, parsed = _parsed(text)
+    names = {s: n if n in motion else re.sub(r"/gap$", "/z", n) for s, n in parsed.items()}
     if any(name not in motion for name in names.values()):
         return None
     symbols = {symbol: ca.SX.sym(symbol) for symbol in names}

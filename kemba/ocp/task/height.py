@@ -10,6 +10,7 @@ from kemba.mechanism.knee import flexion
 from kemba.mechanism.links import Robot
 from kemba.model import Model
 from kemba.ocp.task.task import Task
+from kemba.scene import above_ground
 from kemba.trajectory import Trajectory
 
 
@@ -22,7 +23,7 @@ def longest_leg(robot: Robot) -> float:
 
 def rise_of_feet(plan: Trajectory) -> float | None:
     """How far [m] all feet are off the ground at most; None where the columns do not say."""
-    heights = [plan[name] for name in plan.names if name.endswith("/foot/z")]
+    heights = [*above_ground(plan).values()]
     return float(np.min(heights, axis=0).max()) if heights else None
 
 
@@ -31,5 +32,6 @@ def with_height(task: Task, model: Model) -> Task:
     leave its feet as high as `feet` asks; the task itself where it does not ask for that."""
     if task.feet is None:
         return task
-    height = task.feet + longest_leg(model.mechanism.need_robot())
+    ground = float(task.scene.ground.height(0.0))
+    height = task.feet + longest_leg(model.mechanism.need_robot()) + ground
     return task.model_copy(update={"height": height})

@@ -12,6 +12,7 @@ import casadi as ca
 from kemba.config.document import Location, written
 from kemba.model import Model
 from kemba.ocp.task.expressions import is_expression, symbolic
+from kemba.ocp.task.terrain import heights_above
 from kemba.quantity import Quantity
 
 # How much of each unit matters in a requirement; other units have the scale of the quantity.
@@ -108,7 +109,8 @@ def quantities(model: Model) -> dict[str, Quantity]:
     ports = [q for p in mechanism.ports.values() for q in (p.quantity, p.rate)]
     groups = (model.states, model.inputs, model.forces)
     named = [q for group in groups for q in group.values()]
-    return {q.name: q for q in (*ports, *own, *named)}
+    known = {q.name: q for q in (*ports, *own, *named)}
+    return {**heights_above(model, known), **known}
 
 
 def quantity_expression(model: Model, name: str) -> ca.SX:
@@ -127,7 +129,8 @@ def quantity_expression(model: Model, name: str) -> ca.SX:
         for i, quantity in enumerate(group):
             if quantity.name == name:
                 return symbol[i]
-    return node.outputs[name]
+    level = f"{name.removesuffix('gap')}z"  # on level ground at 0 gaps are heights
+    return node.outputs[name if name in node.outputs else level]
 
 
 def highest(requirements: Sequence[Requirement]) -> Requirement | None:

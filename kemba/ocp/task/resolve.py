@@ -22,6 +22,7 @@ from kemba.ocp.task.options import option_errors, timing_errors
 from kemba.ocp.task.requirement import Earlier, Requirement, quantities, quantity_expression
 from kemba.ocp.task.task import Bound, CostTerm, Goal, Moment, Task
 from kemba.ocp.task.templates import TEMPLATES
+from kemba.ocp.task.terrain import rooms, scene_errors
 from kemba.quantity import Quantity, to_si
 
 # `rest`: every rate is zero; `settled`: every state of an effect is where it comes to rest
@@ -65,8 +66,12 @@ def resolve(
     errors += _cost_errors(task, known, document)
     errors += option_errors(task.solver.options, document)
     errors += timing_errors(task, document)
+    errors += scene_errors(task, document)
     if errors:
         raise ConfigErrors(errors)
+    requirements += [
+        Requirement(("obstacles", i), room, None, 0.0, math.inf) for i, room in rooms(model, known)
+    ]
     names = {r.quantity.name for r in requirements}
     names |= {r.minus.name for r in requirements if r.minus}
     acting, states = _acting(model, names), {q.name for q in model.states.values()}

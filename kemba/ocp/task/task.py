@@ -11,7 +11,8 @@ from pydantic import Field, PrivateAttr, field_validator, model_validator
 from kemba.config import Document, FileName, Section, beside, parse
 from kemba.config.document import written
 from kemba.model.spec import Supply
-from kemba.quantity import Param
+from kemba.quantity import Param, to_si
+from kemba.scene import AnyTerrain, Obstacle, Scene
 
 Value = float | str
 CENTRE = "of the body's centre: at 0.45 m the feet of the shipped robot rise 1 cm"
@@ -203,6 +204,7 @@ class Task(Section):
     `sequence`: other tasks in a row, planned to meet; then this one has neither start nor end.
     `contacts`: which feet stand, in order; without it the solver finds that. `periodic`: the end is
     the start of the next stride.
+    `terrain`, `obstacles`: what the robot moves in; the ground is level at 0 without.
     `robust`: by how many scenarios, drawn from the file `uncertainties`, plans are chosen.
     """
 
@@ -232,6 +234,8 @@ class Task(Section):
     contacts: tuple[Stance, ...] = ()
     sequence: tuple[Part, ...] = ()
     periodic: Periodic | None = None
+    terrain: tuple[AnyTerrain, ...] | None = None
+    obstacles: tuple[Obstacle, ...] | None = None
     cost: dict[str, float | CostTerm] = Field({"torque_squared": 1.0})
     robust: Annotated[int, Field(ge=0, le=10_000)] = 0
     uncertainties: str = "usual"
@@ -273,6 +277,20 @@ class Task(Section):
     def place(self, key: str) -> str:
         """Where the file asks for a key of `PLACED`, `jump.yaml:9`; empty where it does not."""
         return self._places.get(key, "")
+
+    @property
+    def scene(self) -> Scene:
+        """The ground and its obstacles."""
+        return Scene(self.terrain or (), self.obstacles or ())
+
+    @property
+    def place_x(self) -> float:
+        """Place x [m] at which the body is to start; 0 where the task does not say it."""
+        asked = self.start.get("body/x", Bound()).equals
+        try:
+            return to_si(asked or 0.0, "m")
+        except ValueError:
+            return 0.0
 
     @property
     def step(self) -> float:

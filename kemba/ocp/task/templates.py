@@ -11,6 +11,7 @@ from kemba.ocp.task.height import longest_leg
 from kemba.ocp.task.moments import spans
 from kemba.ocp.task.requirement import Earlier, Requirement, highest, quantities
 from kemba.ocp.task.task import Task
+from kemba.ocp.task.terrain import ground_at
 
 FLIGHT = 0.7  # the part of the flight in which `clearance` holds; feet come down in the rest
 AFTER = 1e-6  # of the motion: forces act from the node after the one at which a part begins
@@ -19,11 +20,11 @@ AFTER = 1e-6  # of the motion: forces act from the node after the one at which a
 def flight_clearance(task: Task, model: Model, others: Sequence[Requirement]) -> list[Requirement]:
     """Every foot at least as high as the task's clearance in the middle of the flight.
 
-    The flight is the ballistic one about the highest goal of the body, from stretched legs; of it
-    the middle part counts. A flight that is longer than the motion fills it; that the duration is
-    too short is said by the checks. Without `folding`, a jump too low for the clearance has what
-    stretched legs leave: nothing where they reach the ground. Raises ValueError where no goal says
-    when the robot flies.
+    The flight is the ballistic one about the highest goal of the body, from legs stretched on the
+    ground at the start; of it the middle part counts. A flight that is longer than the motion fills
+    it; that the duration is too short is said by the checks. Without `folding`, a jump too low for
+    the clearance has what stretched legs leave: nothing where they reach the ground. Raises
+    ValueError where no goal says when the robot flies.
     """
     apex = highest(others)
     if not task.clearance:
@@ -31,23 +32,24 @@ def flight_clearance(task: Task, model: Model, others: Sequence[Requirement]) ->
     if apex is None or apex.at is None:
         raise ValueError("needs a goal for body/z at the top of the flight")
     robot = model.mechanism.need_robot()
-    above = apex.lower - robot.leg.femur.length - robot.leg.tibia.length
+    ground = ground_at(model, others, 0.0)
+    above = apex.lower - robot.leg.femur.length - robot.leg.tibia.length - ground
     rise = math.sqrt(2 * max(above, task.clearance) / model.mechanism.gravity)
     rise /= task.duration
     before, after = min(rise, apex.at), min(rise, 1.0 - apex.at)
     during = apex.at - FLIGHT * before, apex.at + FLIGHT * after
     least = task.clearance
     if not task.folding:  # stretched legs have this at the first and last moment that counts
-        least = min(least, (1.0 - FLIGHT**2) * (apex.lower - longest_leg(robot)))
+        least = min(least, (1.0 - FLIGHT**2) * (apex.lower - longest_leg(robot) - ground))
     known = quantities(model)
     return [
-        Requirement(("clearance",), known[f"{leg}/foot/z"], None, least, math.inf, during)
+        Requirement(("clearance",), known[f"{leg}/foot/gap"], None, least, math.inf, during)
         for leg in (model.mechanism.legs if least > 0.0 else ())
     ]
 
 
 def feet_at_apex(task: Task, model: Model, others: Sequence[Requirement]) -> list[Requirement]:
-    """Every foot as high as the task's `feet`, at the highest goal of the body.
+    """Every foot as high above the ground as the task's `feet`, at the highest goal of the body.
 
     Raises ValueError where there is no such goal.
     """
@@ -58,7 +60,7 @@ def feet_at_apex(task: Task, model: Model, others: Sequence[Requirement]) -> lis
         raise ValueError("needs a goal for body/z, at which the feet are to be so high")
     known = quantities(model)
     return [
-        Requirement(("feet",), known[f"{leg}/foot/z"], apex.at, task.feet, math.inf)
+        Requirement(("feet",), known[f"{leg}/foot/gap"], apex.at, task.feet, math.inf)
         for leg in model.mechanism.legs
     ]
 
@@ -76,7 +78,7 @@ def standing_feet(task: Task, model: Model, others: Sequence[Requirement]) -> li
     for part, (begin, end) in zip(task.contacts, spans(task.contacts), strict=True):
         for leg in legs:
             stands = leg in part.on
-            quantity = known[f"{leg}/foot/z" if stands else f"{leg}/foot/Fz"]
+            quantity = known[f"{leg}/foot/gap" if stands else f"{leg}/foot/Fz"]
             during = begin + AFTER, end
             found.append(Requirement(("contacts",), quantity, None, 0.0, 0.0, during))
     return found

@@ -20,7 +20,7 @@ class Layout:
     """Slices, scales and bounds of y = [q, v, s, u, lam, h] in half coordinates.
 
     `slices` and `quantities` by group; `scale`, `lower`, `upper` (n,): physical = scale * y, the
-    bounds are on y.
+    bounds are on y. Coordinates are counted from the mechanism's `origin`.
     """
 
     def __init__(self, model: Model, reduction: Reduction, step: float, variation: float) -> None:
@@ -45,8 +45,11 @@ class Layout:
         listed = [q for group in GROUPS for q in self.quantities[group]]
         self.size = start
         self.scale = np.array([q.scale for q in listed])
-        self.lower = np.array([q.lower for q in listed]) / self.scale
-        self.upper = np.array([q.upper for q in listed]) / self.scale
+        self.origin = np.array(mechanism.origin)
+        zero = np.zeros(self.size)
+        zero[self.slices["q"]] = [q.value for q in self.quantities["q"]]
+        self.lower = (np.array([q.lower for q in listed]) - zero) / self.scale
+        self.upper = (np.array([q.upper for q in listed]) - zero) / self.scale
         inputs, first = self.quantities["u"], self.slices["u"].start
         self.binary = [first + i for i, q in enumerate(inputs) if q.binary]
 
@@ -60,7 +63,8 @@ class Layout:
         return [full[int(np.argmax(np.abs(matrix[:, j])))] for j in range(matrix.shape[1])]
 
     def half(self, y: Any, group: str) -> Any:
-        """Physical half values of a group: of a symbol y (n,), or of rows Y (..., n)."""
+        """Physical half values of a group, of coordinates what they are beyond the origin: of a
+        symbol y (n,), or of rows Y (..., n)."""
         part = self.slices[group]
         if isinstance(y, ca.SX):
             return y[part] * ca.DM(self.scale[part])
@@ -68,9 +72,10 @@ class Layout:
 
     def full(self, y: Any, group: str) -> Any:
         """Physical values of a group for the whole robot."""
+        zero = self.origin if group == "q" else 0.0
         if isinstance(y, ca.SX):
-            return ca.mtimes(ca.sparsify(ca.DM(self._matrix(group))), self.half(y, group))
-        return self.half(y, group) @ self._matrix(group).T
+            return ca.mtimes(ca.sparsify(ca.DM(self._matrix(group))), self.half(y, group)) + zero
+        return self.half(y, group) @ self._matrix(group).T + zero
 
     def pack(self, groups: dict[str, np.ndarray]) -> np.ndarray:
         """Rows Y (..., n) of physical full values per group."""
@@ -78,5 +83,6 @@ class Layout:
         for group in GROUPS:
             matrix = self._matrix(group)
             mean = matrix / np.maximum((matrix**2).sum(axis=0), 1e-300)
-            parts.append(groups[group] @ mean / self.scale[self.slices[group]])
+            values = groups[group] - self.origin if group == "q" else groups[group]
+            parts.append(values @ mean / self.scale[self.slices[group]])
         return np.concatenate(parts, axis=-1)

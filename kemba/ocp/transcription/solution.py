@@ -41,7 +41,8 @@ def written(
         columns[quantity.header] = values
     for name, group in groups(model).items():
         columns |= {q.header: values for q, values in zip(group, x[name].T, strict=True)}
-    return Trajectory(time, columns, {"kind": "plan", "run": run})
+    meta = {"kind": "plan", "run": run, **model.mechanism.scene.json()}
+    return Trajectory(time, columns, meta)
 
 
 def groups(model: Model) -> dict[str, list[Quantity]]:

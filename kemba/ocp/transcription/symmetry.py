@@ -13,6 +13,7 @@ from kemba.model import Model, Node
 from kemba.ocp.task.requirement import Requirement, quantity_expression
 
 Matrix = np.ndarray
+PLACES = ("body/x", "hip/x", "knee/x", "foot/x")  # what is turned about the mirror's place
 
 
 @dataclass(frozen=True)
@@ -151,7 +152,7 @@ def _residual_is_symmetric(model: Model, images: Mapping[str, Matrix]) -> bool:
         lam, u = draw["lam"] * 50.0, draw["u"]
         here = residual(q, v, a, s, sd, lam, u, [])
         m = images
-        motion = (m["q"] @ q, m["q"] @ v, m["q"] @ a)
+        motion = (_mirrored(model, m, q), m["q"] @ v, m["q"] @ a)
         there = residual(*motion, m["s"] @ s, m["s"] @ sd, m["lam"] @ lam, m["u"] @ u, [])
         dynamics = np.allclose(m["q"] @ np.array(here[0]).ravel(), np.array(there[0]).ravel())
         rates = np.allclose(m["s"] @ np.array(here[1]).ravel(), np.array(there[1]).ravel())
@@ -165,6 +166,12 @@ def _residual_is_symmetric(model: Model, images: Mapping[str, Matrix]) -> bool:
         if not (dynamics and rates and pairs and limits):
             return False
     return True
+
+
+def _mirrored(model: Model, images: Mapping[str, Matrix], q: Matrix) -> Matrix:
+    """Coordinates (n,) in the mirror that stands where the mechanism stands."""
+    origin = np.array(model.mechanism.origin)
+    return np.asarray(origin + images["q"] @ (q - origin))
 
 
 def requirements_are_symmetric(model: Model, requirements: Sequence[Requirement]) -> bool:
@@ -188,18 +195,26 @@ def mirrored_requirements(model: Model, requirements: Sequence[Requirement]) -> 
     draw = {k: rng.uniform(0.1, 1.0, len(m)) for k, m in images.items()}
     point = {**draw, "q": q + 0.1 * draw["q"], "v": rng.normal(size=len(q))}
     image = {k: images.get(k, images["q"]) @ x for k, x in point.items()}
+    image["q"] = _mirrored(model, images, point["q"])
     order = ("q", "v", "s", "lam", "u")
-    here = np.array(values(*(point[k] for k in order))).ravel()
-    there = np.array(values(*(image[k] for k in order))).ravel()
+    zero = np.array([model.mechanism.origin[0] * name.endswith(PLACES) for name in names])
+    here = np.array(values(*(point[k] for k in order))).ravel() - zero
+    there = np.array(values(*(image[k] for k in order))).ravel() - zero
+
+    def beyond(w: Requirement) -> tuple[float, float]:
+        at = 0.0 if w.minus else float(zero[names.index(w.quantity.name)])
+        return w.lower - at, w.upper - at
+
     asked = {
-        (*(names.index(name) for name in part), *_when(w), w.lower, w.upper)
+        (*(names.index(name) for name in part), *_when(w), *beyond(w))
         for w, part in zip(requirements, parts, strict=True)
     }
 
     def images_of(w: Requirement, sign: int) -> set[tuple[object, ...]]:
         part = [w.quantity.name, *([w.minus.name] if w.minus else ())]
         alike = [np.flatnonzero(np.isclose(here, sign * there[names.index(n)])) for n in part]
-        ends = (w.lower, w.upper) if sign > 0 else (-w.upper, -w.lower)
+        lower, upper = beyond(w)
+        ends = (lower, upper) if sign > 0 else (-upper, -lower)
         return {(*each, *_when(w, sign), *ends) for each in product(*alike)}
 
     def has_image(w: Requirement) -> bool:

@@ -44,6 +44,7 @@ from kemba.ocp.transcription.stage import (
 )
 from kemba.ocp.transcription.symmetry import Reduction
 
+WITHIN = (0.25, 0.5, 0.75)  # of an interval: where obstacles are looked at besides its end
 RequirementBlock = tuple[RowBlock, StageRows, list[int]]  # with the nodes at which its rows hold
 
 
@@ -86,7 +87,7 @@ class Transcription:
         index = np.arange((nodes + 1) * self.shape[1]).reshape(self.shape)
         self.held: list[Held] = []  # requirements that hold exactly at the first node
         moments = self.requirement_blocks(index) + self._first_node_blocks(index)
-        moments += self._aims(index) + self._soft_landing(index)
+        moments += self._aims(index) + self._soft_landing(index) + self._between_nodes(index)
         pairs = np.hstack([index[:-1, :n], index[1:, :n]])
         both, p = ca.vertcat(stage.y0, stage.y), ca.vertcat(stage.eps, stage.weights)
         blocks = [RowBlock(both, stage.g, stage.cost, pairs)]
@@ -193,6 +194,20 @@ class Transcription:
             return []
         both = np.hstack([index[:-1, :n], index[1:, :n]])[np.array(where) - 1]
         return [(RowBlock(ca.vertcat(stage.y0, stage.y), rows.g, ca.SX(0), both), rows, where)]
+
+    def _between_nodes(self, index: np.ndarray) -> list[RequirementBlock]:
+        """Obstacles within every interval, so that no point gets through one in a single step."""
+        stage, n, blocks = self.stage, self.layout.size, []
+        ends = [self.layout.full(y, "q") for y in (stage.y0, stage.y)]
+        both, where = np.hstack([index[:-1, :n], index[1:, :n]]), list(range(1, self.nodes + 1))
+        for requirement in (r for r in self.requirements if r.location[0] == "obstacles"):
+            room = quantity_expression(self.model, requirement.quantity.name)
+            for share in WITHIN:
+                q = (1 - share) * ends[0] + share * ends[1]
+                rows = _requirement_row(ca.substitute(room, self.model.node.q, q), requirement)
+                block = RowBlock(ca.vertcat(stage.y0, stage.y), rows.g, ca.SX(0), both)
+                blocks.append((block, rows, where))
+        return blocks
 
     def of_state(self, expression: ca.SX) -> ca.SX:
         """An expression of the node's q, v, s, u, lam in the stage's y."""

@@ -12,6 +12,7 @@ from kemba.mechanism import load_robot
 from kemba.model import Model, build_model, load_spec
 from kemba.model.changes import changed_effects
 from kemba.model.spec import ModelSpec, own_robot
+from kemba.scene import FLAT, Scene
 
 PLAIN = "planning"
 
@@ -23,6 +24,7 @@ def counterpart(
     plant: str = "plant",
     own_effects: bool = True,
     changes: Mapping[str, Mapping[str, Any]] | None = None,
+    scene: Scene = FLAT,
 ) -> Model:
     """The model YAML `plant` on the robot of the planning model `model`, with its own effects.
 
@@ -30,7 +32,7 @@ def counterpart(
     is the model's, so that one without a boom has a plant without one. An effect that was learnt
     from logs replaces the plant's own. A plant whose file names a robot keeps that one.
     `own_effects` False: the plant as its file has it. `payload` [kg], `supply` [Pa] and `changes`
-    of effects are the task's. Raises KembaError as `load_model` does.
+    of effects and `scene` are the task's. Raises KembaError as `load_model` does.
     """
     spec, own = load_spec(plant), load_spec(model)
     extra: list[Effect] = [Payload(m=payload)] if payload else []
@@ -43,7 +45,7 @@ def counterpart(
         kept = {e.name: e for e in (*theirs, *mine)}
         spec = spec.model_copy(update={"effects": tuple(kept.values())})
     spec = spec.model_copy(update={"robot": own_robot(plant) or own.robot})
-    return build_model(spec, extra, supply or own.supply)
+    return build_model(spec, extra, supply or own.supply, scene=scene)
 
 
 def lacking(model: str, plant: str) -> list[str]:

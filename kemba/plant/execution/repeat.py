@@ -20,6 +20,7 @@ from kemba.plant.execution.sensors import Sensors, take_log
 from kemba.plant.simulation.valves import scattered
 from kemba.plant.stepping.arrays import Array
 from kemba.quantity import to_si
+from kemba.scene import scene_in
 from kemba.stopwatch import Stage, Tell, silent
 from kemba.trajectory import Trajectory
 
@@ -90,6 +91,7 @@ def repeat_run(
         else:
             done = play(model, sample, [seed, number, 1], noise)
         log = _as_sent(take_log(done.trajectory, sensors, rng, model.effects), done.table)
+        log.meta |= model.mechanism.scene.json()
         log.meta |= {"run": number, "repeat_of": controller.parent.name, "plant": model.name}
         path = Path(out) / f"log-{number}.csv"
         log.write(path)
@@ -127,4 +129,5 @@ def plant_of(run: str | Path, name: str | None = None) -> Model:
         name or own,
         own_effects=name in (None, own),
         changes=task.get("effects"),
+        scene=scene_in(task, str(file)),
     )

@@ -53,14 +53,19 @@ def initial_values(model: Model, values: Mapping[str, float]) -> tuple[Array, Ar
 
 
 def lowest_foot(model: Model, values: Mapping[str, float]) -> float:
-    """Height [m] of the lowest foot in the pose of `initial_values`. Raises KembaError likewise."""
+    """Height [m] of the lowest foot above its ground in the pose of `initial_values`.
+
+    Raises KembaError likewise.
+    """
     return _lowest_foot(model, initial_values(model, values)[0])
 
 
 def _lowest_foot(model: Model, q: Array) -> float:
-    """Height [m] of the lowest foot at coordinates q (nq,)."""
+    """Height [m] of the lowest foot above its ground at coordinates q (nq,)."""
     mechanism = model.mechanism
-    feet = [mechanism.port(f"{leg}/foot/z").phi for leg in mechanism.legs]
+    ground, port = mechanism.scene.ground, mechanism.port
+    places = [[port(f"{leg}/foot/{axis}").phi for axis in "xz"] for leg in mechanism.legs]
+    feet = [z - ground.height(x) for x, z in places]
     height = ca.Function("feet", [mechanism.q], [ca.mmin(ca.vertcat(*feet))])
     return float(height(q))
 

@@ -66,13 +66,15 @@ def _stage(shown: list[Pose], machine: Machine) -> tuple[Figure, StickFigure]:
     """A figure in which every pose has room."""
     places = np.array([list(pose.points.values()) for pose in shown])
     low, high = places.min(axis=(0, 1)), places.max(axis=(0, 1))
-    width, height = high[0] - low[0] + 2 * MARGIN, high[1] + MARGIN + BELOW
+    left, right = low[0] - MARGIN, high[0] + MARGIN
+    ground = machine.mechanism.scene.ground.line(left, right)[1].min()
+    width, height = right - left, high[1] - ground + MARGIN + BELOW
     inches = 4.0
     figure = Figure(figsize=(inches, inches * height / width))
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-    draw_ground(axes)
-    axes.set_xlim(low[0] - MARGIN, high[0] + MARGIN)
-    axes.set_ylim(-BELOW, high[1] + MARGIN)
+    draw_ground(axes, machine.mechanism.scene, left, right)
+    axes.set_xlim(left, right)
+    axes.set_ylim(ground - BELOW, high[1] + MARGIN)
     return figure, StickFigure(axes, machine.mechanism.legs, scale=2.0)
 
 

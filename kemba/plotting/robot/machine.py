@@ -85,29 +85,31 @@ class Machine:
             calm, rows = _averaged(trajectory.time, np.nan_to_num(force))
             noise = difference_sigma(force) / np.sqrt(rows)
             pressed = np.asarray(calm > max(least, CLEAR * noise))
-            height = self._height(trajectory, leg)
+            height = self.height(trajectory, leg)
             if height is None:
                 return pressed
             return bridged(pressed, _averaged(trajectory.time, height)[0] < STAYS)
-        height = self._height(trajectory, leg)
+        height = self.height(trajectory, leg)
         if height is None:
             return np.zeros(len(trajectory), dtype=bool)
         return np.asarray(height < ON_GROUND)
 
     def feet(self, trajectory: Trajectory) -> Trajectory | None:
-        """The motion with the places of its feet [m], or None where columns are missing."""
+        """The motion with the places of its feet and their heights above the ground [m], or None
+        where columns are missing."""
         coordinates = self.coordinates(trajectory)
         if coordinates is None:
             return None
         points = self.points(coordinates)
-        places = {leg: points[f"{leg}/foot"] for leg in self.mechanism.legs}
-        return trajectory.with_columns(
-            {f"{leg}/foot/{axis} [m]": at[:, i] for leg, at in places.items()
-             for i, axis in enumerate("xz")}
-        )  # fmt: skip
+        found: dict[str, Array] = {}
+        for leg in self.mechanism.legs:
+            x, z = points[f"{leg}/foot"].T
+            above = z - self.mechanism.scene.ground.height(x)
+            found |= {f"{leg}/foot/x [m]": x, f"{leg}/foot/z [m]": z, f"{leg}/foot/gap [m]": above}
+        return trajectory.with_columns(found)
 
-    def _height(self, trajectory: Trajectory, leg: str) -> Array | None:
-        """How high (n,) [m] a leg's foot is, or None where columns are missing."""
+    def height(self, trajectory: Trajectory, leg: str) -> Array | None:
+        """How high (n,) [m] a leg's foot is above the ground, or None where columns are missing."""
         feet = self.feet(trajectory) if leg in self.mechanism.legs else None
         return None if feet is None else gap(feet, leg)
 

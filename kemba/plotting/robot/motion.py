@@ -64,7 +64,7 @@ def plot_motion(
     shown = film(sources[0], machine)
     heights = [row[0].height for row in rows]
     if shown:
-        heights.insert(0, strip_height(shown, STRIP))
+        heights.insert(0, strip_height(shown, machine, STRIP))
     figure = paper_figure(sum(heights) + 0.14 * len(heights) + 0.4, figure=figure)
     grid = figure.add_gridspec(len(heights), max(map(len, rows)), height_ratios=heights)
     if shown:

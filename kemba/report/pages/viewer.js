@@ -47,8 +47,19 @@ function view(stage, scene) {
 
   function ground() {
     const low = Math.floor(scene.range[0] - 1), high = Math.ceil(scene.range[1] + 1);
-    for (let x = low; x <= high; x += 0.25) line([[x, -0.75, 0], [x, 0.75, 0]], "#d9d9d9", 1);
-    for (let y = -0.75; y <= 0.75; y += 0.25) line([[low, y, 0], [high, y, 0]], "#d9d9d9", 1);
+    const [places, heights] = scene.ground, last = places.length - 1;
+    const height = (x) => {
+      const i = Math.min(Math.max(places.findIndex((p) => p >= x), 1), last);
+      return heights[i - 1] + (heights[i] - heights[i - 1]) * (x - places[i - 1]) / (places[i] - places[i - 1]);
+    };
+    const along = places.map((x, i) => [x, heights[i]]).filter(([x]) => x > low && x < high);
+    const path = [[low, height(low)], ...along, [high, height(high)]];
+    for (let x = low; x <= high; x += 0.25) line([[x, -0.75, height(x)], [x, 0.75, height(x)]], "#d9d9d9", 1);
+    for (let y = -0.75; y <= 0.75; y += 0.25) line(path.map(([x, z]) => [x, y, z]), "#d9d9d9", 1);
+    for (const [xs, zs] of scene.obstacles) {
+      for (const y of [-0.75, 0.75]) line(xs.map((x, i) => [x, y, zs[i]]), "#8c8c8c", 1);
+      xs.forEach((x, i) => line([[x, -0.75, zs[i]], [x, 0.75, zs[i]]], "#8c8c8c", 1));
+    }
     scene.motions.forEach((r, i) => line(r.centres.map((c) => [c[0], 0, c[1]]), i ? PALE : "#8c8c8c", 1));
   }
 

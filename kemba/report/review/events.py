@@ -59,7 +59,7 @@ def events_of(track: Track, machine: Machine, plan: Track | None = None) -> Even
         tuple(flight.begin for flight in flights if flight.begin > first),
         {leg: course.touchdowns(leg=leg) for leg in course.contacts},
         {leg: [s.begin for s in spans if not s.firm] for leg, spans in course.contacts.items()},
-        _fault(t, course.top[1], machine, plan.t if plan else None),
+        _fault(t, machine, plan.t if plan else None),
     )
 
 
@@ -84,20 +84,23 @@ def _feet(t: Trajectory, machine: Machine) -> float | None:
     return float(np.nanmax(lower)) if np.isfinite(lower).any() else None
 
 
-def _fault(t: Trajectory, apex: float, machine: Machine, plan: Trajectory | None) -> str | None:
+def _fault(t: Trajectory, machine: Machine, plan: Trajectory | None) -> str | None:
     """What is wrong at the end of a motion, or of its plan if that goes on moving there."""
     known = np.isfinite(t["body/z"])
     if plan is not None and not ends_standing(plan, machine.mechanism.legs):
         known &= t.time <= plan.time[-1]
-    time, z = t.time[known], t["body/z"][known]
+    ground, x = machine.mechanism.scene.ground, t.get("body/x", np.zeros(len(t)))
+    time, z = t.time[known], (t["body/z"] - ground.height(np.nan_to_num(x)))[known]
     if not len(z):
         return None
     if "body/pitch" in t:
         pitch = t["body/pitch"][np.isfinite(t["body/pitch"]) & (t.time <= time[-1])]
         if len(pitch) and turned(pitch[-1], plan["body/pitch"][-1] if plan else 0.0) > UPRIGHT:
             return "tips over"
-    asked = z[0] if plan is None else plan["body/z"][-1]
-    return "ends on the ground" if z[-1] < asked - LOW and z[-1] < apex - LOW else None
+    asked = z[0]
+    if plan is not None:
+        asked = plan["body/z"][-1] - float(ground.height(plan["body/x"][-1]))
+    return "ends on the ground" if z[-1] < min(asked, z.max()) - LOW else None
 
 
 def marks_of(listed: Sequence[Events | None]) -> list[tuple[float, int]]:

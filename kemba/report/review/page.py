@@ -41,6 +41,7 @@ from kemba.report.review.tracks import Track, gather, grid_of, plan_of
 from kemba.report.review.verdict import ReviewVerdict, of_answer, of_bad_data, of_logs, of_plan
 from kemba.report.stage import page_text, stage, write_page
 from kemba.runs import Run, load_run
+from kemba.scene import FLAT, Scene, scene_in
 from kemba.stopwatch import Tell, silent
 from kemba.trajectory import Trajectory
 
@@ -61,6 +62,7 @@ class Material:
     error: ModelError | None = None
     fault: BadData | None = None
     strangers: Sequence[Stranger] = ()
+    scene: Scene = FLAT
 
     @property
     def rig(self) -> bool:
@@ -146,14 +148,16 @@ def gather_material(
     folder = Path(answer) if answer is not None else Path()
     folder = folder if folder.is_dir() else folder.parent
     alien = strangers(found, read) if found else []
-    return Material(found, read, facts, folder, judged, column_map, supply, error, fault, alien)
+    scene = scene_in(asked or (read[0].meta if read else {}), str(found.task) if found else "")
+    given = found, read, facts, folder, judged, column_map, supply, error, fault, alien
+    return Material(*given, scene)
 
 
 def page_of(given: Material) -> tuple[str, str, ReviewVerdict]:
     """Title, body and verdict of the page."""
     run = None if given.rig else given.run
     tracks = gather(run, given.logs)
-    machine = None if given.rig else load_machine(given.model, given.supply)
+    machine = None if given.rig else load_machine(given.model, given.supply, given.scene)
     planned = plan_of(tracks)
     events = [events_of(t, machine, planned) if machine else None for t in tracks]
     verdict = _verdict(given, tracks, events)
@@ -174,7 +178,7 @@ def page_of(given: Material) -> tuple[str, str, ReviewVerdict]:
 
 
 def _robot_parts(given: Material, book: Book, machine: Machine) -> list[str]:
-    model = build_model(load_spec(given.model), supply=given.supply)
+    model = build_model(load_spec(given.model), supply=given.supply, scene=given.scene)
     certificate = given.run.certificate if given.run else {}
     plan = plan_of(book.tracks)
     below = (

@@ -20,6 +20,7 @@ from kemba.runs import load_run
 from kemba.scenarios.conditions import changed_effects, standing, start_offsets
 from kemba.scenarios.sampling import sample
 from kemba.scenarios.schema import Conditions
+from kemba.scene import Scene, scene_in
 from kemba.sweep.cases.case import Case, Work, content_hash
 from kemba.sweep.cases.expand import Expansion, model_hash, model_name
 from kemba.sweep.cases.schema import ExecuteBlock
@@ -118,9 +119,10 @@ def _plan_folder(expansion: Expansion, name: str, block: ExecuteBlock, folder: P
 def run_on_plant(work: Work) -> Replay:
     """The execution that a case asks for, compared with its plan."""
     conditions = parse(work["conditions"], Conditions)
-    plain = _plant(work["model"], conditions.supply, work["plant"], work["plant_hash"])
-    model = plain.with_effects(changed_effects(plain, conditions))
     table = read_controller(work["plan"])
+    where = scene_in(table.meta)
+    plain = _plant(work["model"], conditions.supply, work["plant"], work["plant_hash"], where)
+    model = plain.with_effects(changed_effects(plain, conditions))
     rng = np.random.default_rng(conditions.seed)
     done = execute(
         table,
@@ -134,9 +136,9 @@ def run_on_plant(work: Work) -> Replay:
 
 
 @lru_cache(maxsize=8)
-def _plant(model: str, supply: float | None, plant: str, content: str) -> Model:
+def _plant(model: str, supply: float | None, plant: str, content: str, scene: Scene) -> Model:
     """The plant as it is, kept by a worker: cases that change its numbers share its machine code.
 
     `content`: the hash of its files, so that a changed file is read again.
     """
-    return counterpart(model, supply=supply, plant=plant)
+    return counterpart(model, supply=supply, plant=plant, scene=scene)

@@ -105,7 +105,8 @@ def linearise_along(
         pushing = k + 2 * leg
         density[..., pushing] = np.where(slip[..., leg] != 0.0, slipping, density[..., pushing])
     Jf_force = Jf.copy()
-    Jf_force[..., 1::2, :] -= physics.grip * slip[..., None] * Jf[..., 0::2, :]
+    grip = physics.mechanism.scene.ground.friction(feet[..., 0::2], physics.grip)
+    Jf_force[..., 1::2, :] -= (grip * slip)[..., None] * Jf[..., 0::2, :]
     channels = np.concatenate([Jy, Jf_force], axis=2).swapaxes(-1, -2)
     rigid, acts = rigid_forces(channels, density, force, k, legs)
     dt = float(np.median(batch.h[batch.valid]))

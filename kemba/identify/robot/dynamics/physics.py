@@ -99,7 +99,7 @@ class Physics:
         r = self._force
         full = [node.q, node.v, node.a, node.s, node.u, self.p]
         y = ca.vertcat(*(node.outputs[name] for name in self.channels))
-        feet = ca.vertcat(*(node.outputs[f"{g}/foot/{x}"] for g in self.legs for x in "xz"))
+        feet, feet_rate, feet_slope = self._feet()
         motion = [node.q, node.v, self.p]
         named = {
             "residual": (full, [r]),
@@ -107,12 +107,28 @@ class Physics:
             "stiffness": (full, [ca.jacobian(r, x) for x in (node.q, node.v)]),
             "by_parameter": (full, [ca.jacobian(r, self.p)]),
             "measured": (motion, [y, ca.jtimes(y, node.q, node.v), ca.jacobian(y, node.q)]),
-            "feet": (motion, [feet, ca.jtimes(feet, node.q, node.v), ca.jacobian(feet, node.q)]),
+            "feet": (motion, [feet, feet_rate, feet_slope]),
             "seen": (motion, [y, feet]),
         }
         made = {k: ca.Function(k, a, b, {"cse": True}) for k, (a, b) in named.items()}
         made["links"] = link_regressors(self.mechanism)
         return made
+
+    def _feet(self) -> tuple[ca.SX, ca.SX, ca.SX]:
+        """Of every foot: place x and height above its ground (2 legs,); their rates and slopes
+        (2 legs, n) along the ground and out of it."""
+        node, ground, found = self.node, self.mechanism.scene.ground, []
+        for leg in self.legs:
+            x, z = (node.outputs[f"{leg}/foot/{axis}"] for axis in "xz")
+            across, up = ground.normal(x)
+            (vx, vz), (Jx, Jz) = (
+                (ca.jtimes(x, node.q, node.v), ca.jtimes(z, node.q, node.v)),
+                (ca.jacobian(x, node.q), ca.jacobian(z, node.q)),
+            )
+            found.append((x, up * vx - across * vz, up * Jx - across * Jz))
+            found.append((z - ground.height(x), across * vx + up * vz, across * Jx + up * Jz))
+        places, rates, slopes = (ca.vertcat(*parts) for parts in zip(*found, strict=True))
+        return places, rates, slopes
 
     @cached_property
     def straight(self) -> tuple[Flags, Flags]:

@@ -77,8 +77,10 @@ def _cone(t: Trajectory, model: Model, machine: Machine, leg: str) -> Array:
         least = CLEAR * difference_sigma(normal)
     loaded = normal > max(LOADED * model.mechanism.weight, least)
     loaded &= machine.stance(t, leg)
+    x = t.get(f"{leg}/foot/x", np.zeros(len(t)))
+    mu = model.mechanism.scene.ground.friction(x, ground.mu)
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(loaded, np.abs(along) / (ground.mu * normal), np.nan)
+        return np.where(loaded, np.abs(along) / (mu * normal), np.nan)
 
 
 def rate(track: Track, speed: str, position: str) -> Array:

@@ -107,7 +107,7 @@ def _providers(symbol: str) -> str:
     return f"add {' or '.join(found)}" if found else ""
 
 
-class Scene:
+class Evaluation:
     """All instances with the symbols of one evaluation.
 
     `values` holds the SX of every state, input and force by (leg, symbol). Published values and
@@ -211,48 +211,49 @@ class Scene:
 
 
 class _Place:
-    """`At` for one leg of a scene."""
+    """`At` for one leg of an evaluation."""
 
-    def __init__(self, scene: Scene, leg: str | None) -> None:
-        self._scene, self._leg = scene, leg
-        self.supply = scene.supply
-        self.gravity = scene.mechanism.gravity
-        self.body_mass = scene.mechanism.body_mass
-        self.sign_speed = scene.mechanism.sign_speed
+    def __init__(self, evaluation: Evaluation, leg: str | None) -> None:
+        self._evaluation, self._leg = evaluation, leg
+        self.supply = evaluation.supply
+        self.ground = evaluation.mechanism.scene.ground
+        self.gravity = evaluation.mechanism.gravity
+        self.body_mass = evaluation.mechanism.body_mass
+        self.sign_speed = evaluation.mechanism.sign_speed
 
     @property
     def cylinder(self) -> Bore:
         """Dimensions of every leg's cylinder. Raises KembaError where there are no pistons."""
-        return self._scene.mechanism.need_bore()
+        return self._evaluation.mechanism.need_bore()
 
     @property
     def stroke(self) -> float:
         """Stroke of every piston [m]. Raises KembaError for a mechanism without pistons."""
-        return self._scene.mechanism.stroke
+        return self._evaluation.mechanism.stroke
 
     @property
     def sense(self) -> Any:
         """Direction in which the piston's seals slide: what an effect publishes, else the sign of
         its rate."""
-        for instance in self._scene.instances:
+        for instance in self._evaluation.instances:
             if instance.leg == self._leg and "sense" in instance.effect.publishes:
-                return self._scene.lookup(self._leg, "sense")
+                return self._evaluation.lookup(self._leg, "sense")
         return direction(self.piston.v, self.sign_speed)
 
     @property
     def legs(self) -> list[At]:
         """The same view at each leg."""
-        return [self._scene.at(leg) for leg in self._scene.mechanism.legs]
+        return [self._evaluation.at(leg) for leg in self._evaluation.mechanism.legs]
 
     def source(self, signal: str) -> Any:
         """A signal before any lag, as it is sent."""
-        return self._scene.signal(self._leg, signal, lag=False)
+        return self._evaluation.signal(self._leg, signal, lag=False)
 
     def standing(self, name: str) -> float:
         """Value of a coordinate of this leg [its unit] in the standing pose."""
-        return self._scene.mechanism.standing[full_name(self._leg, name)]
+        return self._evaluation.mechanism.standing[full_name(self._leg, name)]
 
     def __getattr__(self, symbol: str) -> Any:
         if symbol in LEG_PORTS or symbol in BODY_PORTS:
-            return PortAt(*self._scene.mechanism.motion(port_name(self._leg, symbol)))
-        return self._scene.lookup(self._leg, symbol)
+            return PortAt(*self._evaluation.mechanism.motion(port_name(self._leg, symbol)))
+        return self._evaluation.lookup(self._leg, symbol)

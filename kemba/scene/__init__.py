@@ -1,0 +1,17 @@
+"""What the robot moves in: the ground, its friction, and obstacles."""
+
+from kemba.scene.ground import Ground
+from kemba.scene.obstacles import Obstacle
+from kemba.scene.scene import FLAT, POINTS, Scene, above_ground, scene_in
+from kemba.scene.terrain import AnyTerrain
+
+__all__ = [
+    "FLAT",
+    "POINTS",
+    "AnyTerrain",
+    "Ground",
+    "Obstacle",
+    "Scene",
+    "above_ground",
+    "scene_in",
+]

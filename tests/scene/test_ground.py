@@ -1,0 +1,120 @@
+"""The ground: numbers and symbols agree, derivatives are finite, edges lie on the lower side."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+import pytest
+
+import kemba.scene.terrain as terrain
+from kemba.errors import ConfigErrors, KembaError
+from kemba.scene import FLAT, Ground, Scene, scene_in
+
+HOUSE = {
+    "terrain": [
+        {"from": "0.45 m", "height": "0.15 m"},
+        {"from": "0.9 m", "height": "-0.1 m"},
+        {"from": "1.2 m", "slope": "10 deg"},
+        {"from": "0 m", "friction": 0.6},
+    ],
+    "obstacles": [{"from": "0.2 m", "to": "0.25 m", "height": "0.2 m"}],
+}
+PLACES = np.linspace(-0.5, 2.0, 2501)
+
+
+def written(x: np.ndarray) -> np.ndarray:
+    """The ground of `HOUSE` with sharp edges."""
+    ramp = -0.1 + np.tan(np.deg2rad(10.0)) * (x - 1.2)
+    return np.select([x < 0.45, x < 0.9, x < 1.2], [0.0, 0.15, -0.1], ramp)
+
+
+def test_heights_are_those_written_beside_the_edges_and_never_lower() -> None:
+    ground = scene_in(HOUSE).ground
+    found, sharp = ground.height(PLACES), written(PLACES)
+    near = np.min(np.abs(PLACES[:, None] - [0.45, 0.9, 1.2]), axis=1) < 0.0201
+    assert found[~near] == pytest.approx(sharp[~near], abs=1e-12)
+    assert (found - sharp).min() > -2e-4  # at the foot of the ramp
+    assert (found >= sharp - 1e-12)[PLACES < 1.18].all()
+    assert ground.extent == pytest.approx((-0.1, written(np.array([5.0]))[0]), abs=2e-4)
+
+
+def test_numbers_arrays_and_symbols_agree_with_finite_derivatives() -> None:
+    ground, x = scene_in(HOUSE).ground, ca.SX.sym("x")
+    expressions = [ground.height(x), ground.slope(x), ca.jacobian(ground.slope(x), x)]
+    expressions += [*ground.normal(x), ground.friction(x, 1.0)]
+    values = np.array(ca.Function("f", [x], [ca.vertcat(*expressions)])(PLACES[None, :]))
+    assert np.isfinite(values).all()
+    assert values[0] == pytest.approx(ground.height(PLACES), abs=1e-14)
+    assert values[1] == pytest.approx(ground.slope(PLACES), abs=1e-12)
+    step = 1e-6
+    differences = (ground.height(PLACES + step) - ground.height(PLACES - step)) / (2 * step)
+    assert values[1] == pytest.approx(differences, abs=1e-4)
+    assert values[3] ** 2 + values[4] ** 2 == pytest.approx(np.ones(len(PLACES)))
+    assert values[5] == pytest.approx(ground.friction(PLACES, 1.0))
+    assert ground.height(0.5) == pytest.approx(0.15)
+
+
+def test_level_ground_is_plain_numbers() -> None:
+    assert FLAT.ground.height(PLACES) == 0.0 and FLAT.ground.normal(ca.SX.sym("x")) == (0.0, 1.0)
+    raised = scene_in({"terrain": [{"height": "0.37 m"}]})
+    assert raised.ground.level == 0.37 and raised.even and not raised.plain
+    assert FLAT.plain and scene_in({}) is FLAT
+    assert scene_in(HOUSE).ground.level is None and not scene_in(HOUSE).even
+
+
+def test_room_is_the_height_above_a_box_and_asks_for_nothing_beside_it() -> None:
+    scene = scene_in(HOUSE)
+    box, on = scene.obstacles[0], np.array([0.2, 0.21, 0.25])
+    assert box.room(scene.ground, on, 0.3) == pytest.approx([0.1] * 3)
+    assert (box.room(scene.ground, np.array([0.17, 0.28]), 0.0) > 0.0).all()
+    x = ca.SX.sym("x")
+    room = ca.Function("room", [x], [box.room(scene.ground, x, 0.1)])
+    assert np.array(room(on[None, :])).ravel() == pytest.approx(box.room(scene.ground, on, 0.1))
+
+
+def test_a_scene_is_read_back_from_what_it_writes() -> None:
+    scene = scene_in(HOUSE)
+    assert scene_in(scene.json()) == scene and hash(scene_in(scene.json())) == hash(scene)
+    assert Scene(scene.terrain).json().keys() == {"terrain"}
+
+
+@pytest.mark.parametrize(
+    ("keys", "told"),
+    [
+        ({"terrain": [{"from": "0.5 m", "height": 0.1}, {"from": "0.52 m", "height": 0.2}]},
+         "terrain[1]: says the height from 0.52 m on, within the edge of terrain[0]"),
+        ({"terrain": [{"height": 0.1}, {"slope": "3 deg"}]}, "terrain[1]: says the height every"),
+        ({"terrain": [{"friction": 1.0}, {"friction": 0.3}]}, "terrain[1]: says the friction"),
+        ({"obstacles": [{"from": 0.1, "to": 0.2, "height": 0.1},
+                        {"from": 0.15, "to": 0.3, "height": 0.1}]},
+         "obstacles[1]: overlaps obstacles[0]"),
+        ({"terrain": [{"from": 0.1, "height": 0.1}],
+          "obstacles": [{"from": 0.05, "to": 0.2, "height": 0.1}]},
+         "obstacles[0]: stands on an edge"),
+    ],
+)  # fmt: skip
+def test_what_overlaps_is_refused(keys: dict[str, object], told: str) -> None:
+    with pytest.raises(KembaError) as caught:
+        scene_in(keys, "log.meta.yaml")
+    assert told in str(caught.value) and "log.meta.yaml" in str(caught.value)
+
+
+def test_lines_that_say_nothing_or_have_wrong_units_are_refused() -> None:
+    for line in ({"from": 0.1}, 3, {"height": "3 kg"}, {"slope": "80 deg"}, {"height": 1, "to": 2}):
+        with pytest.raises(ConfigErrors, match=r"terrain\[0\]"):
+            scene_in({"terrain": [line]})
+
+
+def test_a_new_kind_of_terrain_is_one_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As docs/terrain.md shows it: a file in the folder of kinds, and nothing else."""
+    page = (Path(__file__).parents[2] / "docs/terrain.md").read_text(encoding="utf-8")
+    source = page.split("```python\n")[1].split("```")[0]
+    (tmp_path / "waves.py").write_text(source, encoding="utf-8")
+    monkeypatch.setattr(terrain, "__path__", [*terrain.__path__, str(tmp_path)])
+    scene = scene_in({"terrain": [{"from": "0.5 m", "waves": "2 cm", "length": "0.3 m"}]})
+    x = np.array([0.4, 0.65, 0.8])
+    assert scene.ground.height(x) == pytest.approx([0.0, 0.02, 0.0], abs=1e-12)
+    assert scene_in(scene.json()) == scene
+    assert isinstance(scene.ground, Ground)
