@@ -117,7 +117,7 @@ class Ground:
 
     def line(self, a: float, b: float) -> tuple[np.ndarray, np.ndarray]:
         """Places and heights (n,) [m] from `a` to `b` that draw it."""
-        x = np.linspace(a, b, 2 if self.level is not None else max(2, int((b - a) / EDGE * 8)))
+        x = np.linspace(a, b, 2 if self.level is not None else max(2, int((b - a) / EDGE * 4)))
         return x, np.broadcast_to(self.height(x), x.shape)
 
 
