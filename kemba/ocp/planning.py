@@ -31,10 +31,8 @@ from kemba.ocp.shipped.shelf import Near, Neighbour, neighbours, relatives, ways
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.resolve import resolve
 from kemba.ocp.task.task import Task
-from kemba.ocp.task.terrain import ground_at
 from kemba.ocp.transcription.symmetry import whole
 from kemba.ocp.transcription.transcribe import Transcription
-from kemba.scene.terrain.level import Level
 from kemba.stopwatch import Stopwatch, Tell, silent
 from kemba.trajectory import Trajectory
 
@@ -64,10 +62,6 @@ def plan(
         near, failed = continued(planner, origin)
         if near is not None:
             return near
-    elif refused is None and start is None and not planner.model.mechanism.scene.even:
-        near = _from_level(job, model, log, watch, stop)
-        if near is not None:
-            return near
     found = found_and_refined(planner, refused is not None)
     if found.status is Status.SOLVED and task.grip < 1.0:
         found = with_grip(planner, found)
@@ -78,36 +72,6 @@ def plan(
         why = refused or explanation(*own)
         found = found if why is None else explained(found, why)
     return from_scratch(found, failed) if failed else found
-
-
-def _from_level(
-    job: _Job,
-    model: str | Path | None,
-    log: Path | None,
-    watch: Watch | None,
-    stop: Callable[[], bool] | None,
-) -> Plan | None:
-    """The plan of the same task on level ground, from which terrain and obstacles grow; None where
-    there is none in half of the time, or where it does not lead to what is asked."""
-    planner, session = job.planner, job.planner.session
-    half = max((session.control.deadline - time.monotonic()) / 2, 0.1)
-    ground = ground_at(planner.model, planner.requirements, 0.0)
-    level = (Level(height=ground),) if ground else None
-    solver = planner.task.solver.model_copy(update={"time_limit": half})
-    flat = {"terrain": level, "obstacles": None, "solver": solver}
-    task = planner.task.model_copy(update=flat)
-    first = plan(task, None, model, log, session.tell, watch, stop=stop)
-    session.attempts += first.attempts
-    if first.status is not Status.SOLVED:
-        return None
-    known = first.trajectory, first.model, first.requirements
-    name, dear = "the plan on level ground", "one from a guess may take less"
-    near, _ = continued(planner, Origin(*known, name, dear, stages=first.stages))
-    if near is None:
-        return None
-    wall, cpu = first.solve_s + near.solve_s, first.solve_cpu_s + near.solve_cpu_s
-    near = replace(near, continued=None, solve_s=wall, solve_cpu_s=cpu, start="level ground")
-    return clear(near) if task.clearance else near
 
 
 def plans_nearby(

@@ -29,17 +29,13 @@ def rise(x: ca.SX, begin: float, width: float = EDGE) -> ca.SX:
 
 
 class Ground:
-    """The ground of lines of terrain; flat at 0 without any. Heights beyond `base` [m] have `grown`
-    to a share of what is written.
+    """The ground of lines of terrain; flat at 0 without any.
 
     Places x [m] are numbers, arrays (n,) or SX; what is found has their form, but for ground that
     is `level`, where height, slope and normal are plain numbers.
     """
 
-    def __init__(
-        self, terrain: Sequence[Terrain] = (), grown: float = 1.0, base: float = 0.0
-    ) -> None:
-        self.grown, self.base = grown, base
+    def __init__(self, terrain: Sequence[Terrain] = ()) -> None:
         self.pieces = sorted(terrain, key=lambda t: -np.inf if t.begin is None else t.begin)
 
     @cached_property
@@ -64,8 +60,6 @@ class Ground:
                 back = 0.5 if abs(jump) < LEVEL else float(jump > 0)
                 h = h + rise(x, at - back * EDGE) * (new - last)
             last = ca.SX(new)
-        if self.grown != 1.0:
-            h = self.base + self.grown * (h - self.base)
         return x, h
 
     @cached_property

@@ -23,30 +23,20 @@ POINTS = ("foot", "knee", "hip")  # of a leg; hips are the corners of the body
 
 @dataclass(frozen=True)
 class Scene:
-    """Lines of terrain and obstacles; flat at 0 without any. Equal scenes say the same.
-
-    On the way to a plan, its heights beyond `base` [m] may have `grown` to a share only.
-    """
+    """Lines of terrain and obstacles; flat at 0 without any. Equal scenes say the same."""
 
     terrain: tuple[Terrain, ...] = ()
     obstacles: tuple[Obstacle, ...] = ()
-    grown: float = 1.0
-    base: float = 0.0
-
-    def at_share(self, share: float, base: float) -> Scene:
-        """The scene on its way from level ground at `base` [m]."""
-        boxes = (o.model_copy(update={"height": share * o.height}) for o in self.obstacles)
-        return Scene(self.terrain, tuple(boxes), share, base)
 
     @cached_property
     def ground(self) -> Ground:
         """Height, slope, normal and friction at any place."""
-        return Ground(self.terrain, self.grown, self.base)
+        return Ground(self.terrain)
 
     @property
     def plain(self) -> bool:
         """Whether the ground is level at 0 and free: heights above it are heights."""
-        return self.grown == 1.0 and self.ground.level == 0.0 and not self.obstacles
+        return self.ground.level == 0.0 and not self.obstacles
 
     @property
     def even(self) -> bool:

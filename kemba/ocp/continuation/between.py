@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from kemba.effects import Effect
-from kemba.mechanism import Mechanism, robot_mechanism
 from kemba.model import Model
 from kemba.ocp.phases.stages import Stages
 from kemba.ocp.task.requirement import Requirement
@@ -42,8 +41,7 @@ class Origin:
 
 
 def model_between(old: Model, new: Model, share: float) -> Model:
-    """The new model with its numbers at `share` of the way from the old ones, terrain and obstacles
-    from level ground.
+    """The new model with its numbers at `share` of the way from the old ones.
 
     An effect that only the new model has grows from the value at which it is absent. Tables of
     another size, and effects that only the old model has, change at once.
@@ -53,15 +51,7 @@ def model_between(old: Model, new: Model, share: float) -> Model:
     before = {effect.name: effect for effect in old.effects}
     effects = [_effect_between(before.get(e.name), e, share) for e in new.effects]
     supply = old.supply + share * (new.supply - old.supply)
-    return Model(_mechanism_between(old.mechanism, new.mechanism, share), effects, supply, new.name)
-
-
-def _mechanism_between(old: Mechanism, new: Mechanism, share: float) -> Mechanism:
-    level = old.scene.ground.level
-    if new.drawn is None or new.scene.even or level is None or old.scene.obstacles:
-        return new
-    scene = new.scene.at_share(share, level)
-    return robot_mechanism(new.drawn, new.offsets).on(scene, new.origin[0])
+    return Model(new.mechanism, effects, supply, new.name)
 
 
 def _effect_between(old: Effect | None, new: Effect, share: float) -> Effect:
