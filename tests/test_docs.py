@@ -30,7 +30,7 @@ PAGES = sorted([*ROOT.glob("docs/*.md"), ROOT / "README.md"])
 def test_every_key_of_a_task_is_described(section: type[Task]) -> None:
     page = (ROOT / "docs" / "tasks.md").read_text(encoding="utf-8")
     named = set(re.findall(r"`(\w+)`", page))
-    assert set(section.model_fields) <= named
+    assert {field.alias or name for name, field in section.model_fields.items()} <= named
 
 
 def test_the_site_lists_the_keys_of_a_task_from_the_schema() -> None:
@@ -40,7 +40,8 @@ def test_the_site_lists_the_keys_of_a_task_from_the_schema() -> None:
     assert '| `guess` | `automatic`, `standing` | `"automatic"` |' in table
     assert "| `feet` | of the feet at the top [m], minimum 0 |  |" in table
     for part, section in (("", Task), ("solver.", Solver), ("tolerances.", Tolerances)):
-        assert all(f"| `{part}{name}` |" in table for name in section.model_fields)
+        fields = section.model_fields.items()
+        assert all(f"| `{part}{field.alias or name}` |" in table for name, field in fields)
 
 
 SECTIONS: dict[str, type[Any]] = {

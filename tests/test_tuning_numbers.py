@@ -84,7 +84,7 @@ CONSTANTS = {  # file -> names, why
     "logs/times.py": ("DAY HOUR", "seconds of them"),
     "logs/draft/layout.py": ("LINES NEARLY", "how a table is looked at"),
     "ocp/transcription/stage.py": ("ANGLE_ARM COST_SCALE AIM", "units of moments and costs"),
-    "ocp/task/requirement.py": ("SCALES MOMENTS FLIGHT ROUND", "moments of a task; units"),
+    "ocp/task/requirement.py": ("SCALES ROUND", "units; rounding"),
     "contract/cases.py": ("OWN_RIGS", "figures of example rigs"),
     # tuning numbers that are to become settings
     "identify/robot/dynamics/physics.py": ("FOLDED", "how far a knee folds at most"),

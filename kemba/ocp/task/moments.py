@@ -9,7 +9,7 @@ from kemba.errors import suggest
 from kemba.ocp.task.task import Moment, Stance, Task
 from kemba.quantity import to_si
 
-NAMED = {"start": 0.0, "middle": 0.5, "end": 1.0}
+NAMED = {"start": 0.0, "middle": 0.5, "end": 1.0}  # shares of the nodes
 EVENT = re.compile(r"(touchdown|liftoff)(?: (\w+))?(?: (\d+))?")
 
 

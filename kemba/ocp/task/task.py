@@ -63,6 +63,9 @@ class Goal(Section):
         if self.maximise and self.minimise:
             raise ValueError("'maximise' does not go with 'minimise'")
         if self.during is not None:
+            shares = [moment for moment in self.during if not isinstance(moment, str)]
+            if len(shares) == 2 and shares[0] > shares[1]:
+                raise ValueError("'during' goes from an earlier to a later part of the motion")
             if "at" in self.model_fields_set:
                 raise ValueError("'during' does not go with 'at'")
             if self.maximise or self.minimise:
