@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from kemba.config import shipped_configs
 from kemba.errors import KembaError
 from kemba.ocp.planning import check_feasible
 from kemba.ocp.reading import load_task
 
-SHIPPED = shipped_configs("tasks")["hurdle.yaml"].read_text(encoding="utf-8")
+MOTIONS = Path(__file__).parents[2] / "benchmarks" / "motions"
+SHIPPED = MOTIONS.joinpath("hurdle.yaml").read_text(encoding="utf-8")
 KEPT, _, REST = SHIPPED.partition("obstacles:\n")
 AFTER = REST[REST.index("\nstart:") :]
 NUMBER = KEPT.count("\n") + 1  # of the line with `obstacles:` or `terrain:`
@@ -55,8 +55,8 @@ def test_a_wrong_scene_is_refused_at_its_line(
     assert f"own.yaml:{NUMBER + line}" in said
 
 
-def test_the_shipped_motions_over_terrain_can_be_asked() -> None:
+def test_motions_over_terrain_can_be_asked() -> None:
     for name in ("platform.yaml", "drop_off.yaml", "hurdle.yaml"):
-        model, requirements = check_feasible(*load_task(name))
+        model, requirements = check_feasible(*load_task(MOTIONS / name))
         assert not model.mechanism.scene.even
         assert any(r.quantity.name.endswith("foot/gap") for r in requirements)

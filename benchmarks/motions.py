@@ -1,0 +1,53 @@
+"""How far each motion is planned and certified: python benchmarks/motions.py [FILE.yaml ...]
+
+Without arguments the shipped `bound.yaml` and `popup.yaml`, and the tasks in benchmarks/motions, which
+are not solved whole yet. Everything from a guess (`--cold`). One row each: how far it came, cost,
+CPU seconds of the solves, and the sentence of `solve`.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from kemba.config import shipped_configs
+from kemba.errors import KembaError
+from kemba.ocp import load_task
+from kemba.solve import Approach, Listener, best_plan
+
+HERE = Path(__file__).with_name("motions")
+
+
+def row(file: str) -> str:
+    """One motion, as a row of a table."""
+    task, document = load_task(file, ["solver.time_limit=900 s"])
+    try:
+        best = best_plan(task, document, Approach(cold=True), Listener())
+    except KembaError as error:
+        return f"| {task.name} | refused | | | {error} |"
+    found = best.plan
+    verdicts = best.judged.verdicts if best.judged else {}
+    steps = {
+        "plan on nodes": bool(found.status.plan),
+        "refined": found.refined,
+        "own replay": "replay" in verdicts and verdicts["replay"].good,
+        "table": "table_replay" in verdicts and verdicts["table_replay"].good,
+        "plant": "plant_replay" in verdicts and verdicts["plant_replay"].good,
+    }
+    reached = [name for name, good in steps.items() if good]
+    cost = found.cost.get("torque_squared_integral", float("nan"))
+    sentence = best.result["sentence"][:200]
+    return f"| {task.name} | {', '.join(reached)} | {cost:.2f} | {found.solve_cpu_s:.0f} | {sentence} |"
+
+
+def main() -> None:
+    """Print the table."""
+    shipped = [str(shipped_configs("tasks")[name]) for name in ("bound.yaml", "popup.yaml")]
+    files = sys.argv[1:] or [*shipped, *map(str, sorted(HERE.glob("*.yaml")))]
+    print("| motion | reached | torque² [N².m².s] | CPU [s] | sentence |\n|---|---|---|---|---|")
+    for file in files:
+        print(row(file), flush=True)
+
+
+if __name__ == "__main__":
+    main()
