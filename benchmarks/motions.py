@@ -1,8 +1,8 @@
 """How far each motion is planned and certified: python benchmarks/motions.py [FILE.yaml ...]
 
-Without arguments the shipped `bound.yaml` and `popup.yaml`, and the tasks in benchmarks/motions, which
-are not solved whole yet. Everything from a guess (`--cold`). One row each: how far it came, cost,
-CPU seconds of the solves, and the sentence of `solve`.
+Without arguments the shipped `bound.yaml` and `popup.yaml`, and the tasks in benchmarks/motions,
+which are not solved whole yet. Everything from a guess (`--cold`). One row each: how far it came,
+cost, CPU seconds of the solves, and the sentence of `solve`.
 """
 
 from __future__ import annotations
@@ -35,9 +35,14 @@ def row(file: str) -> str:
         "plant": "plant_replay" in verdicts and verdicts["plant_replay"].good,
     }
     reached = [name for name, good in steps.items() if good]
-    cost = found.cost.get("torque_squared_integral", float("nan"))
-    sentence = best.result["sentence"][:200]
-    return f"| {task.name} | {', '.join(reached)} | {cost:.2f} | {found.solve_cpu_s:.0f} | {sentence} |"
+    cells = [
+        task.name,
+        ", ".join(reached),
+        f"{found.cost.get('torque_squared_integral', float('nan')):.2f}",
+        f"{found.solve_cpu_s:.0f}",
+        best.result["sentence"][:200],
+    ]
+    return f"| {' | '.join(cells)} |"
 
 
 def main() -> None:

@@ -226,7 +226,8 @@ def turned(pitch: float, planned: float) -> float:
 def ends_standing(plan: Trajectory, legs: Iterable[str]) -> list[str]:
     """The legs on which a plan stands at rest at its end; none where it ends in the air or goes on
     moving."""
-    if np.hypot(plan["body/vx"][-1], plan["body/vz"][-1]) > AT_REST:
+    speed = [plan[name][-1] for name in ("body/vx", "body/vz") if name in plan]
+    if np.linalg.norm(speed) > AT_REST:
         return []
     return [leg for leg in legs if f"{leg}/foot/z" not in plan or gap(plan, leg)[-1] <= STANDS]
 

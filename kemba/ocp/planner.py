@@ -112,8 +112,8 @@ class Planner:
         """A plan with binary valves: grown from half a robot's where legs are equal and only the
         requirements differ, else from the guess."""
         t, rounds = schedule.transcription, self.task.solver.valve_search
-        alike = bool(self.task.contacts) or self.alike == self.requirements
-        if self.half is not None and not alike:
+        ordered = bool(self.task.contacts)  # half a robot says nothing of who stands when
+        if self.half is not None and not ordered and self.alike != self.requirements:
             half = self.schedule(t.nodes, self.half)
             point = find(half, self.guess(half.transcription))
             if point.solved:

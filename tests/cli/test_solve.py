@@ -43,15 +43,15 @@ mine.yaml:3:1: hieght: unknown key; did you mean 'height'?
 mine.yaml:4:1: nodes: 'many' is of the wrong kind; a whole number was expected
     nodes: many
     ^
-mine.yaml:8:28: goals.apex.at: 'midle' is not allowed; did you mean 'middle'?
-      apex: {quantity: body/z, at: midle, equals: height}
-                               ^
 mine.yaml:9:10: solver.time_limt: unknown key; did you mean 'time_limit'?
     solver: {time_limt: 3 s}
              ^
 mine.yaml:10:1: method: 'penlty' is not allowed; did you mean 'penalty'?
     method: penlty
     ^
+mine.yaml:8:28: goals.apex: no moment 'midle'; did you mean 'middle'?
+      apex: {quantity: body/z, at: midle, equals: height}
+                               ^
 """
 
 BAD_NAMES = """\

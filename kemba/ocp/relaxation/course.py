@@ -137,6 +137,7 @@ def body_course(
     lift = max((w.lower - first * (w.quantity.name[-1] == "z") for w in lifted), default=0.0)
     if lift > 0.0 and z0 < apex <= top:  # standing reaches it, but is not what is asked
         top = max(apex - lift, (z0 + apex) / 2)
+        lands_at = top + last - first
     if apex <= top:
         course = HeightCourse([0.0, t_apex], [z0, apex], [0.0, 0.0], (t_apex, t_apex))
     else:

@@ -45,7 +45,13 @@ def resolve(
     known, task = quantities(model), with_height(task, model)
     requirements: list[Requirement] = []
     errors: list[KembaError] = []
-    for location, pattern, at, bound in _asked(task):
+    for location, pattern, moment, bound in _asked(task):
+        try:
+            at = None if moment is None else share_of(moment, task)
+        except ValueError as error:
+            what = f"{written(location)}: {error}"
+            errors.append(document.error((*location, "at"), what))
+            at = 0.5  # what else is wrong with it is told as well
         try:
             requirements += _requirements(task, location, pattern, at, bound, known, model)
         except KembaError as error:
@@ -138,7 +144,7 @@ def _requirements(
     task: Task,
     location: Location,
     text: str,
-    moment: Moment | None,
+    at: float | None,
     bound: Bound | Goal,
     known: dict[str, Quantity],
     model: Model,
@@ -160,7 +166,6 @@ def _requirements(
         found = _requirement(task, location, later, late, bound, during)
         yield replace(found, minus=Earlier(earlier.name, early))
         return
-    at = None if moment is None else share_of(moment, task)
     named = [expressed(text, known)] if is_expression(text) else _matching(text, known, model)
     for quantity in named:
         yield _requirement(task, location, quantity, at, bound, during)

@@ -17,6 +17,7 @@ from kemba.mechanism import Mechanism, Robot, knee
 from kemba.model import Model, build_model, load_spec
 from kemba.plotting.source import Mask, Source
 from kemba.quantity import to_si
+from kemba.scene import FLAT, Scene, scene_in
 from kemba.trajectory import Array, Trajectory
 
 OVERTRAVEL = 0.004  # m; a sensor may read this far beyond the stops
@@ -123,11 +124,13 @@ def _averaged(time: Array, values: Array) -> tuple[Array, int]:
 
 
 @lru_cache(maxsize=4)
-def load_machine(model: str = "planning", supply: float | None = None) -> Machine:
-    """The robot of a model YAML (a path or a shipped model), fed with `supply` [Pa] instead of
-    the model's own pressure. Raises KembaError."""
+def load_machine(
+    model: str = "planning", supply: float | None = None, scene: Scene = FLAT
+) -> Machine:
+    """The robot of a model YAML (a path or a shipped model) in a scene, fed with `supply` [Pa]
+    instead of the model's own pressure. Raises KembaError."""
     spec = load_spec(model)
-    built = build_model(spec, supply=supply)
+    built = build_model(spec, supply=supply, scene=scene)
     mechanism = built.mechanism
     places = ca.Function("places", [mechanism.q], [ca.vertcat(*mechanism.points.values())])
     return Machine(mechanism.need_robot(), mechanism, _limits(built), places)
@@ -137,12 +140,14 @@ def machine_of(source: Source, model: str | None = None) -> Machine:
     """The robot of `model` (a path or a shipped model), else of the run's own task with its
     supply pressure, else the shipped one. Raises KembaError."""
     task = source.path.with_name("task.yaml") if source.path else None
-    if model is not None or task is None or not task.is_file():
-        return load_machine(model or "planning")
-    data = load_yaml(task).data
+    found = task is not None and task.is_file()
+    data = load_yaml(task).data if task is not None and found else None
     asked = data if isinstance(data, dict) else {}
+    scene = scene_in(asked or source.trajectory.meta, str(task or source.name))
+    if model is not None or not found:
+        return load_machine(model or "planning", scene=scene)
     supply = to_si(asked["supply"], "Pa") if "supply" in asked else None
-    return load_machine(asked.get("model", "planning"), supply)
+    return load_machine(asked.get("model", "planning"), supply, scene)
 
 
 def stance_spans(source: Source, machine: Machine, leg: str) -> list[tuple[float, float]]:

@@ -52,7 +52,7 @@ def test_feet_stand_or_bear_nothing(tmp_path: Path) -> None:
             "periodic: {except: [body/y]}",
             "own.yaml:5:1: periodic: except: no state",
         ),
-        ("touchdown front", "touchdown side", "own.yaml:9:3: goals.apart"),
+        ("touchdown front", "touchdown side", "goals.apart: `contacts` have no 'touchdown side'"),
         ("- rear/foot/x", "- rear/foot/vx", "mixes a length with a speed"),
         ("front/hip/w^2", "front/hip/ww^2", "own.yaml:11:"),
         ("contacts: [air, rear, air, front, air]", "", "an event of `contacts`"),
