@@ -114,6 +114,12 @@ def gap(motion: Trajectory, leg: str, point: str = "foot") -> Array:
     return motion[f"{place}/gap"] if f"{place}/gap" in motion else motion[f"{place}/z"]
 
 
+def feet(motion: Trajectory) -> dict[str, Array]:
+    """The `gap` (n,) [m] of the foot of every leg that a motion has."""
+    names = (name for name in motion.names if name.endswith("/foot/z"))
+    return {leg: gap(motion, leg) for leg in (name.removesuffix("/foot/z") for name in names)}
+
+
 def read(
     motion: Trajectory,
     reading: Thresholds,
@@ -127,10 +133,10 @@ def read(
     its foot hits the ground exactly, as a simulation knows.
     """
     time, found = motion.time if clock is None else clock, {}
-    for leg in (name[: -len("/foot/z")] for name in motion.names if name.endswith("/foot/z")):
+    for leg, height in feet(motion).items():
         exact = (hits or {}).get(leg, ())
         load = motion.get(f"{leg}/foot/Fz")
-        found[leg] = contacts(time, gap(motion, leg), reading, load, weight, exact)
+        found[leg] = contacts(time, height, reading, load, weight, exact)
     return ContactCourse(motion, time, found, reading)
 
 

@@ -182,9 +182,10 @@ def check_feasible(
     wrong names and units, and for what certainly cannot be met.
     """
     for part, own in motions(task, document):
-        checked = check_feasible(part, own)
+        check_feasible(part, own)
     if task.sequence:
-        return checked
+        _, built, requirements = as_one(task, document)
+        return built, requirements
     built, requirements = asked_of(task, document, model)
     refused = refusal(check_task(task, built, requirements, document))
     if refused is not None:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
+from kemba.events import feet
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.planned import Plan
 from kemba.ocp.task.height import rise_of_feet
-from kemba.scene import above_ground
 
 GROUND = 1e-3  # m; lower feet stand
 
@@ -22,8 +22,8 @@ def sentence_of(plan: Plan) -> str:
 def warnings(plan: Plan) -> list[str]:
     """What a task that was met may not have meant."""
     rests = any(r.location == ("end", "rest") for r in plan.requirements)
-    feet = [height[-1] for height in above_ground(plan.trajectory).values()]
-    if not rests or not feet or min(feet) <= GROUND:
+    heights = [gap[-1] for gap in feet(plan.trajectory).values()]
+    if not rests or not heights or min(heights) <= GROUND:
         return []
     hint = 'a robot in the air falls; ask for `"*/foot/gap": 0 m` at the end'
     return [f"the motion ends at rest with no foot on the ground: {hint}"]

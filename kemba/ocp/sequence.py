@@ -16,7 +16,10 @@ from kemba.ocp.task.requirement import Earlier, Requirement
 from kemba.ocp.task.task import Stance, Task
 
 DEEPEST = 5  # sequences within sequences
-GIVEN = ("model", "plant", "supply", "payload", "effects")  # by a sequence to all its motions
+# by a sequence to all its motions
+GIVEN = ("model", "plant", "supply", "payload", "effects", "terrain", "obstacles")
+# what one problem has once, so that all its motions must agree
+ALIKE = (*GIVEN, "cost", "landing", "grip", "min_dwell")
 
 Motion = tuple[Task, Document]
 
@@ -55,6 +58,12 @@ def as_one(task: Task, document: Document) -> tuple[Task, Model, list[Requiremen
     """
     parts = motions(task, document)
     nodes, duration = sum(p.nodes for p, _ in parts), sum(p.duration for p, _ in parts)
+    first = parts[0][0]
+    for part, _ in parts[1:]:
+        for key in (key for key in ALIKE if getattr(part, key) != getattr(first, key)):
+            what = f"sequence: `{key}` of {part.name} is another than that of {first.name}"
+            hint = "one problem has one; give it in `set` of the motion, or in both files"
+            raise document.error(("sequence",), what, hint=hint)
     contacts: list[Stance] = []
     requirements: list[Requirement] = []
     begin = 0
@@ -67,14 +76,12 @@ def as_one(task: Task, document: Document) -> tuple[Task, Model, list[Requiremen
                 share += contacts.pop().share or 0.0
             contacts.append(Stance(on=stance.on, share=share))
         begin += part.nodes
-    first = parts[0][0]
     whole = {
         "duration": duration,
         "nodes": nodes,
         "step_variation": max(p.step_variation for p, _ in parts),
         "contacts": tuple(contacts) if all(p.contacts for p, _ in parts) else (),
-        "cost": first.cost,
-        **{key: getattr(first, key) for key in GIVEN},
+        **{key: getattr(first, key) for key in ALIKE},
     }
     return task.model_copy(update=whole), model, requirements
 

@@ -2,7 +2,7 @@
 
 from kemba.scene.ground import Ground
 from kemba.scene.obstacles import Obstacle
-from kemba.scene.scene import FLAT, POINTS, Scene, above_ground, scene_in
+from kemba.scene.scene import FLAT, POINTS, Scene, scene_in
 from kemba.scene.terrain import AnyTerrain
 
 __all__ = [
@@ -12,6 +12,5 @@ __all__ = [
     "Ground",
     "Obstacle",
     "Scene",
-    "above_ground",
     "scene_in",
 ]

@@ -15,7 +15,6 @@ from kemba.errors import KembaError
 from kemba.scene.ground import EDGE, Ground
 from kemba.scene.obstacles import Obstacle
 from kemba.scene.terrain import AnyTerrain, Terrain
-from kemba.trajectory import Trajectory
 
 AROUND = 0.03  # m; how far a start guess keeps from an obstacle
 POINTS = ("foot", "knee", "hip")  # of a leg; hips are the corners of the body
@@ -101,20 +100,6 @@ def scene_in(meta: Mapping[str, Any], where: str = "") -> Scene:
     for location, what in scene.faults():
         raise KembaError(where, f"{location[0]}[{location[1]}]: {what}")
     return scene
-
-
-def above_ground(motion: Trajectory, point: str = "foot") -> dict[str, np.ndarray]:
-    """Height (n,) [m] of every leg's point above the ground under it, by the point's full name
-    (`front/foot`), as far as columns say it.
-
-    Motions on ground that is not level at 0 have columns `LEG/foot/gap`.
-    """
-    found = {}
-    for name in motion.names:
-        if name.endswith(f"{point}/z"):
-            place = name.removesuffix("/z")
-            found[place] = motion[f"{place}/gap"] if f"{place}/gap" in motion else motion[name]
-    return found
 
 
 def _shaping(line: Terrain) -> bool:

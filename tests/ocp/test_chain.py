@@ -35,11 +35,12 @@ def test_what_lies_ahead_moves_on_and_the_rest_repeats() -> None:
 
 def test_a_sequence_reads_its_motions(tmp_path: Path) -> None:
     tmp_path.joinpath("own.yaml").write_text(
-        "sequence: [hop.yaml, {motion: bound.yaml, repeat: 2, set: {nodes: 30}}]\npayload: 0.2 kg\n"
+        "payload: 0.2 kg\n"
+        "sequence: [popup.yaml, {motion: bound.yaml, repeat: 2, set: {nodes: 30}}]\n"
     )
     task, document = load_task(tmp_path / "own.yaml")
     found = [part for part, _ in motions(task, document)]
-    assert [part.name for part in found] == ["hop", "bound", "bound"]
+    assert [part.name for part in found] == ["popup", "bound", "bound"]
     assert [part.nodes for part in found[1:]] == [30, 30]
     assert {part.payload for part in found} == {0.2}
     check_feasible(task, document)
@@ -51,6 +52,7 @@ def test_a_sequence_reads_its_motions(tmp_path: Path) -> None:
         ("sequence: [own.yaml]", "own.yaml:1:12: sequence: own.yaml leads back to itself"),
         ("sequence: [houp.yaml]", "did you mean 'hop.yaml'"),
         ("sequence: [{motion: hop.yaml, repeat: 0}]", "repeat"),
+        ("sequence: [bound.yaml, hop.yaml]", "`cost` of hop is another than that of bound"),
         ("sequence: [hop.yaml]\nend: {rest: true}", "'end' belongs into the motions"),
     ],
 )

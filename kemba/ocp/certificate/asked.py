@@ -243,26 +243,32 @@ def _of_the_task(
     last, inf = len(plan) - 1, np.inf
 
     def of(
-        key: str, value: float, lower: float, upper: float, unit: str = "s", node: int = last
+        key: str,
+        value: float,
+        lower: float,
+        upper: float,
+        unit: str = "s",
+        node: int = last,
+        loose: float = 0.0,
     ) -> MeasuredRequirement:
         scale = task.duration if unit == "s" else 1.0
         allowed, time = task.tolerances.bounds * scale, float(plan.time[node])
-        limits = lower, upper, unit, allowed, scale
+        limits = lower, upper, unit, allowed + loose, scale
         return MeasuredRequirement(task.place(key), key, value, *limits, node, time)
 
+    euler = "phases" not in plan.meta
     spread = task.step_variation * task.duration
     lasts = float(plan.time[-1] - plan.time[0])
     yield of("duration", lasts, task.duration - spread, task.duration + spread)
     dwell = _shortest_dwell(model, plan)
     if dwell is not None and task.min_dwell:
         # an implicit Euler plan switches at nodes, whose steps vary
-        slack = 0.0 if "phases" in plan.meta else task.step
-        yield of("min_dwell", dwell, max(task.min_dwell - slack, 0.0), inf)
+        yield of("min_dwell", dwell, task.min_dwell, inf, loose=task.step * euler)
     if task.landing.impact_speed is not None:
         speed, node = _fastest_impact(model, plan, apex_node(requirements, last))
         # an implicit Euler plan knows the speed of an impact to what gravity adds in a step
-        most = task.landing.impact_speed + (0.0 if "phases" in plan.meta else EULER_SPEED)
-        yield of("landing.impact_speed", speed, -inf, most, "m.s-1", node)
+        most, loose = task.landing.impact_speed, EULER_SPEED * euler
+        yield of("landing.impact_speed", speed, -inf, most, "m.s-1", node, loose)
     if task.contacts:
         parts = float(len(task.contacts))
         yield of("contacts", float(_stances_in_order(task, plan)), parts, parts, "1")

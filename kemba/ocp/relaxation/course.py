@@ -23,10 +23,8 @@ from kemba.ocp.task.terrain import ground_at
 
 Array = np.ndarray
 LIFT = 0.05  # m; how high a foot swings over the line between its places
-FOLDED, STANDS = (
-    0.4,
-    0.7,
-)  # leg length in flight and at its ends, between retracted (0) and stretched (1)
+FOLDED = 0.4  # leg length in flight, between retracted (0) and stretched (1)
+STANDS = 0.7  # the same where a flight begins or ends
 
 
 @dataclass(frozen=True)
@@ -177,10 +175,8 @@ def in_order(
     robot, gravity = model.mechanism.need_robot(), model.mechanism.gravity
     parts = [(task.duration * a, task.duration * b) for a, b in spans(task.contacts)]
     rests = {w.at for w in requirements if w.location[-1] == "rest"}
-    moving = [
-        bool(not ((i == 0 and 0.0 in rests) or (i == len(parts) - 1 and 1.0 in rests)))
-        for i in range(len(parts))
-    ]
+    moving = [True] * len(parts)
+    moving[0], moving[-1] = 0.0 not in rests, 1.0 not in rests
     turning = [not part.on for part in task.contacts] if rests else moving
     x, ground = _ahead(requirements, parts, moving, t), model.mechanism.scene.ground
     under = np.asarray(np.broadcast_to(ground.height(x), x.shape))
@@ -281,7 +277,7 @@ def _height(
 
 
 def _load(parts: Sequence[tuple[float, float]], standing: Array, weight: float) -> Array:
-    """What each standing foot bears (parts,) [N], stances carry the weight on average."""
+    """What each standing foot bears (parts,) [N], so that stances carry the weight."""
     lasts = np.array([b - a for a, b in parts])
     count = standing.sum(axis=1)
     share = weight * lasts.sum() / max(lasts[count > 0].sum(), 1e-9)

@@ -21,7 +21,6 @@ from kemba.quantity import Quantity
 from kemba.trajectory import Array, Trajectory
 
 NAME = re.compile(r"[A-Za-z_]\w*(?:/[A-Za-z_]\w*)+")  # a quantity, or what is meant as one
-SI = {"m", "rad", "m.s-1", "rad.s-1", "N", "N.m", "Pa", "s", "1"}
 MOMENT = r"\s*at\(\s*([^,()]+?)\s*,\s*((?:[^()]|\([^()]*\))+?)\s*\)\s*"
 TWO_MOMENTS = re.compile(rf"{MOMENT}-{MOMENT}")
 

@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 
+from kemba.events import feet
 from kemba.mechanism.knee import flexion
 from kemba.mechanism.links import Robot
 from kemba.model import Model
 from kemba.ocp.task.task import Task
-from kemba.scene import above_ground
 from kemba.trajectory import Trajectory
 
 
@@ -23,7 +23,7 @@ def longest_leg(robot: Robot) -> float:
 
 def rise_of_feet(plan: Trajectory) -> float | None:
     """How far [m] all feet are off the ground at most; None where the columns do not say."""
-    heights = [*above_ground(plan).values()]
+    heights = [*feet(plan).values()]
     return float(np.min(heights, axis=0).max()) if heights else None
 
 
