@@ -44,6 +44,7 @@ class Planner:
     requirements: list[Requirement]
     session: Session = field(default_factory=Session)
     start: Trajectory | None = None
+    pulse: float = 0.0  # [s], of valves that are sought; the task's dwell where that is more
     outcome: Outcome | None = None  # of the elastic solve after a failure
 
     def schedule(self, nodes: int, reduction: Reduction) -> Schedule:
@@ -54,7 +55,8 @@ class Planner:
             program = Transcription(self.model, self.task, requirements, reduction, nodes)
         options = {"max_iter": self.task.solver.max_iterations, **self.task.solver.options}
         name = "half" if reduction.symmetric else "whole"
-        return self.session.schedule(program, options, f" ({name} robot, {nodes} nodes)")
+        where = f" ({name} robot, {nodes} nodes)"
+        return self.session.schedule(program, options, where, self.pulse)
 
     def guess(self, transcription: Transcription) -> Iterate:
         """The automatic start guess on a program's grid."""

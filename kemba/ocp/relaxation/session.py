@@ -44,18 +44,25 @@ class Session:
     attempts: list[Attempt] = field(default_factory=list)
     building: Stopwatch = field(default_factory=Stopwatch)
 
-    def schedule(self, t: Transcription, options: Mapping[str, Any], where: str = "") -> Schedule:
-        """A program ready to be solved; `where` follows the name of every solve."""
+    def schedule(
+        self, t: Transcription, options: Mapping[str, Any], where: str = "", pulse: float = 0.0
+    ) -> Schedule:
+        """A program ready to be solved, its valves with pulses of `pulse` [s] at least; `where`
+        follows the name of every solve."""
         ipopt = Ipopt(t, options, self.control, self.building)
-        return Schedule(t, ipopt, lambda name: self.tell(f"{name}{where}"), self.attempts)
+        return Schedule(t, ipopt, pulse, lambda name: self.tell(f"{name}{where}"), self.attempts)
 
 
 @dataclass
 class Schedule:
-    """A transcription being solved: its solver, the listener, what was tried."""
+    """A transcription being solved: its solver, the listener, what was tried.
+
+    `pulse`: the shortest pulse [s] of a valve that is rounded; the task's dwell where that is more.
+    """
 
     transcription: Transcription
     ipopt: Ipopt
+    pulse: float = 0.0
     tell: Callable[[str], None] = lambda text: None
     attempts: list[Attempt] = field(default_factory=list)
 
@@ -111,10 +118,10 @@ class Schedule:
         """Columns of the valves -> values (nodes + 1,), rounded to 0 or 1, within the task's
         bounds.
 
-        Pulses shorter than the task's dwell time are removed.
+        Shorter pulses than asked are removed.
         """
         t = self.transcription
-        least, h = t.task.min_dwell, t.h(point.Y)
+        least, h = max(t.task.min_dwell, self.pulse), t.h(point.Y)
         rounded = {c: dwelling(point.Y[:, c], h, least) for c in t.layout.binary}
         return {c: np.clip(u, t.lower[:, c], t.upper[:, c]) for c, u in rounded.items()}
 
