@@ -5,7 +5,7 @@ at once.
     python benchmarks/full_plant.py --sets 1 --logs FOLDER --progress
     python benchmarks/full_plant.py --write    # into docs/full-plant.md; finished sets are kept
 
-Each set is three shipped plans, played on the plant and logged at 1 kHz with the usual noise, and
+Each set is three plans, played on the plant and logged at 1 kHz with the usual noise, and
 two more that are not learnt from. The plant (configs/models/plant.yaml) has orifice chambers, a
 supply line, a lag of the valves, seal friction, damping, a leak and cushions, none of which the
 planning model has. Kept of each set, in a file: verdict, ladder of held-out errors in units of the
@@ -35,8 +35,7 @@ from kemba.identify.discover import discover
 from kemba.identify.robot.problem import robot_problem
 from kemba.identify.workflow import write_answer
 from kemba.model import load_model
-from kemba.ocp import load_task, task_model
-from kemba.ocp.shipped.shelf import neighbours
+from kemba.ocp import load_task, plan
 from kemba.plant import Commands, Profile, run
 from kemba.plant.execution.controller import Gains
 from kemba.plant.execution.sensors import Sensors, take_log
@@ -45,7 +44,7 @@ from kemba.trajectory import Trajectory
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs" / "full-plant.md"
-SETS = (  # tasks whose shipped plans are learnt from, and tasks to judge by
+SETS = (  # tasks whose plans are learnt from, and tasks to judge by
     (("hop", "jump height=0.4 m", "jump"), ("jump height=0.54 m", "jump height=0.43 m")),
     (
         ("jump height=0.56 m", "jump_forward distance=0.2 m", "jump height=0.76 m"),
@@ -80,21 +79,19 @@ def followed(plan: Trajectory) -> JointControl:
 
 
 def plant_log(asked: str, rest: float = 0.2) -> Trajectory:
-    """A log of the full plant that plays the shipped plan of a task, and `rest` [s] after it."""
+    """A log of the full plant that plays the plan of a task, and `rest` [s] after it."""
     name, _, change = asked.partition(" ")
-    task, _ = load_task(f"{name}.yaml", [change] if change else [])
-    entry = neighbours(task, task_model(task))[0].entry
-    rng = np.random.default_rng([7, *entry.name.encode()])
-    plan = entry.plan
-    time = plan.time - plan.time[0]
-    valves = {n: Profile.of(time, np.round(plan[n])) for n in plan.names if "/valve/" in n}
-    placed = ("body/x", "body/z", "body/pitch", *(n for n in plan.names if n.endswith("/q")))
-    start = {n: float(plan[n][0]) for n in placed}
+    motion = plan(*load_task(f"{name}.yaml", [change] if change else [])).trajectory
+    rng = np.random.default_rng([7, *asked.encode()])
+    time = motion.time - motion.time[0]
+    valves = {n: Profile.of(time, np.round(motion[n])) for n in motion.names if "/valve/" in n}
+    placed = ("body/x", "body/z", "body/pitch", *(n for n in motion.names if n.endswith("/q")))
+    start = {n: float(motion[n][0]) for n in placed}
     sensors, duration = Sensors.usual(), float(time[-1]) + rest
-    commands, times = Commands(valves, followed(plan)), sensors.times(duration, rng)
+    commands, times = Commands(valves, followed(motion)), sensors.times(duration, rng)
     truth = run(load_model("plant"), start, commands, duration, None, times).trajectory
     log = take_log(truth, sensors, rng)
-    log.meta["name"] = entry.name
+    log.meta["name"] = asked
     return log
 
 

@@ -22,7 +22,7 @@ def row(file: str) -> str:
     """One motion, as a row of a table."""
     task, document = load_task(file, ["solver.time_limit=900 s"])
     try:
-        best = best_plan(task, document, Approach(cold=True), Listener())
+        best = best_plan(task, document, Approach(), Listener())
     except KembaError as error:
         return f"| {task.name} | refused | | | {error} |"
     found = best.plan

@@ -1,9 +1,9 @@
-"""Tasks of one's own: other poses, bounds and models, from shipped plans and from a guess.
+"""Tasks of one's own: other poses, bounds and models.
 
     python benchmarks/own_tasks.py --write    # the table of docs/continuing.md
 
-Each task is planned as `solve` plans it, then as by `--cold`, side by side in one process: CPU
-seconds of plan, table and executions, and whether the plan is good.
+Each task is planned as `solve` plans it, without memory: CPU seconds of plan, table and
+executions, and whether the plan is good.
 """
 
 from __future__ import annotations
@@ -50,16 +50,16 @@ TASKS = (
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "continuing.md"
 BEGIN, END = "<!-- own tasks: written by benchmarks/own_tasks.py -->", "<!-- end of own tasks -->"
 HEAD = (
-    "| changed | good | torque² [N².m².s] | CPU s | from a guess: good | torque² | CPU s |",
-    "|---|---|---:|---:|---|---:|---:|",
+    "| changed | good | torque² [N².m².s] | CPU s |",
+    "|---|---|---:|---:|",
 )
 
 
-def planned(name: str, changes: list[str], cold: bool) -> str:
+def planned(name: str, changes: list[str]) -> str:
     """Whether the plan is good, its squared torque and its seconds, as cells of a table."""
     task, document = load_task(name, changes)
     began = time.process_time()
-    made = best_plan(task, document, Approach(cold=cold), Listener())
+    made = best_plan(task, document, Approach(), Listener())
     seconds = time.process_time() - began
     torque = made.plan.cost["torque_squared_integral"]
     return f"{'yes' if made.good else 'no'} | {torque:.3g} | {seconds:.1f}"
@@ -67,7 +67,7 @@ def planned(name: str, changes: list[str], cold: bool) -> str:
 
 def rows(count: int | None) -> Iterator[str]:
     """The lines of the table, with a first plan that is not counted: it loads what all need."""
-    planned("jump.yaml", [], cold=False)
+    planned("jump.yaml", [])
     with tempfile.TemporaryDirectory() as folder:
         for name, changes, effect in TASKS[:count]:
             own = list(changes)
@@ -76,8 +76,7 @@ def rows(count: int | None) -> Iterator[str]:
                 model.write_text(f"base: planning\neffects:\n  - {effect}\n", encoding="utf-8")
                 own.append(f"model={model}")
             told = ", ".join(changes) or f"its model has {effect}"
-            cells = [planned(name, own, cold) for cold in (False, True)]
-            yield f"| `{name.removesuffix('.yaml')}`, {told} | {cells[0]} | {cells[1]} |"
+            yield f"| `{name.removesuffix('.yaml')}`, {told} | {planned(name, own)} |"
 
 
 def main() -> None:

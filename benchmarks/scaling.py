@@ -1,12 +1,10 @@
 """Solve time against the number of nodes, with the fitted exponent.
 
-    python benchmarks/scaling.py [--save docs/scaling.png] [--nodes 50 100] [--cold]
+    python benchmarks/scaling.py [--save docs/scaling.png] [--nodes 50 100]
 
 Prints the median CPU time of all solves of a plan, refined and executed as by default, how many
 times the median the longest one took, and the exponent p of time ~ N^p. Aims: p at most 1.1, and
-no solve above 3 times the median. By default five tasks near the shipped plans; `--cold` starts one
-task from three slightly different guesses, not executed. `--refine none` measures plans of implicit
-Euler.
+no solve above 3 times the median. `--refine none` measures plans of implicit Euler.
 """
 
 from __future__ import annotations
@@ -26,26 +24,21 @@ from kemba.sweep import machine
 
 NODES = (50, 100, 200, 400)
 TASKS = ("jump.yaml", "jump_forward.yaml")  # half robot first; whole robot
-NEAR: Sequence[list[str]] = (
+CHANGES: Sequence[list[str]] = (
     [],
     ["height=0.48 m"],
     ["height=0.53 m", "supply=0.73 MPa"],
     ["payload=0.2 kg"],
     ["supply=0.68 MPa", "payload=0.1 kg"],
 )
-GUESSES: Sequence[list[str]] = (
-    [],
-    ["guess_noise=0.02", "seed=1"],
-    ["guess_noise=0.02", "seed=2"],
-)
 
 
 def seconds(name: str, nodes: int, asked: argparse.Namespace) -> list[float]:
     """CPU times [s] of the solves that end in a plan, also in one that misses a tolerance."""
-    times, approach = [], Approach(cold=asked.cold, replay=not asked.cold)
+    times = []
     fixed = [f"refine={asked.refine}", f"nodes={nodes}", f"solver.time_limit={asked.time_limit}"]
-    for changes in (GUESSES if asked.cold else NEAR)[: asked.repeats]:
-        found = best_plan(*load_task(name, [*fixed, *changes]), approach, Listener()).plan
+    for changes in CHANGES[: asked.repeats]:
+        found = best_plan(*load_task(name, [*fixed, *changes]), Approach(), Listener()).plan
         took = f"{name:20s} N = {nodes:4d}  {found.solve_cpu_s:7.2f} s"
         print(f"{took}  {found.iterations:5d} iterations  {found.sentence}", flush=True)
         if found.status.plan:
@@ -72,8 +65,7 @@ def _cell(times: Sequence[float]) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--save", default="scaling.png")
-    parser.add_argument("--repeats", type=int, help="of the tasks or guesses: only the first")
-    parser.add_argument("--cold", action="store_true", help="from guesses, not shipped plans")
+    parser.add_argument("--repeats", type=int, help="of the changes: only the first")
     parser.add_argument("--refine", choices=("radau", "none"), default="radau")
     parser.add_argument("--time-limit", type=float, default=300.0)
     parser.add_argument("--nodes", type=int, nargs="+", default=NODES)

@@ -1,6 +1,6 @@
 """Where the seconds of `kemba-opt solve` go, from the start of the process to its end.
 
-Usage: python benchmarks/whole_command.py [--cold] [--repeat N] [TASK ...]
+Usage: python benchmarks/whole_command.py [--repeat N] [TASK ...]
 
 Each command runs in a process of its own. CPU seconds and wall seconds are printed for each stage.
 CPU seconds count this process and the one that draws the figure; they depend little on what else
@@ -89,11 +89,10 @@ def staged(arguments: list[str]) -> None:
     print("\n" + json.dumps(stages))
 
 
-def measured(task: str, cold: bool) -> dict[str, list[float]]:
+def measured(task: str) -> dict[str, list[float]]:
     """The stages of one command in a process of its own, and the whole process."""
     with tempfile.TemporaryDirectory() as folder:
-        arguments = ["solve", task, "--out", str(Path(folder) / "run"), "-q"]
-        arguments += ["--cold"] * cold
+        arguments = ["solve", task, "--out", str(Path(folder) / "run"), "-q", "--no-memory"]
         begin = time.perf_counter()
         command = [sys.executable, __file__, "--staged", *arguments]
         done = subprocess.run(command, capture_output=True, text=True, check=True)
@@ -111,12 +110,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("tasks", nargs="*", default=TASKS)
     parser.add_argument("--repeat", type=int, default=1, help="times; the least is printed")
-    parser.add_argument("--cold", action="store_true", help="without shipped plans")
     asked = parser.parse_args()
     print(f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores,", end=" ")
     print(f"load {os.getloadavg()[0]:.1f}, Python {platform.python_version()}")
     for task in asked.tasks:
-        runs = [measured(task, asked.cold) for _ in range(asked.repeat)]
+        runs = [measured(task) for _ in range(asked.repeat)]
         print(f"\n| {task} | CPU s | wall s |\n|---|---|---|")
         for name in runs[0]:
             cpu, wall = (min(run[name][i] for run in runs) for i in (0, 1))

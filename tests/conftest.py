@@ -9,3 +9,4 @@ from __future__ import annotations
 import os
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+os.environ["KEMBA_MEMORY"] = ""  # no test begins from the plans of another

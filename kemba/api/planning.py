@@ -76,6 +76,7 @@ def plan(
     starts: int = 1,
     replay: bool = True,
     cold: bool = False,
+    memory: bool = True,
     progress: Tell = silent,
     **changes: Any,
 ) -> Planned:
@@ -83,8 +84,9 @@ def plan(
 
     `task`: a path, a shipped name, or a loaded task; `out`: its run folder, `runs/TASK-N` without.
     `changes` are those of `--set`: `height` is that of the body's centre (at 0.45 m the feet rise
-    1 cm), `feet` that of the feet. `cold`: begin from a guess, also where a shipped
-    plan is near. `progress` gets the name of every stage. Raises KembaError for
+    1 cm), `feet` that of the feet. `cold`: begin from a guess, also where an
+    earlier plan of yours is near; `memory`: whether such plans are looked up, and this one listed.
+    `progress` gets the name of every stage. Raises KembaError for
     mistakes; a task that cannot be met is no mistake, the certificate says why.
     """
     if isinstance(task, Task):
@@ -103,7 +105,7 @@ def plan(
         resolved,
         document,
         Listener(progress),
-        Approach(starts=starts, replay=replay, cold=cold),
+        Approach(starts=starts, replay=replay, cold=cold, memory=memory),
         figure=False,
     )
     return Planned(folder.path, answer)

@@ -11,7 +11,6 @@ from kemba.ocp.continuation.continue_plan import Continuation, Continuing
 from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.planned import Plan
 from kemba.ocp.planner import Planner
-from kemba.stopwatch import Stopwatch
 
 TORQUE = "torque_squared_integral"
 
@@ -25,9 +24,7 @@ def continued(planner: Planner, origin: Origin) -> tuple[Plan | None, str]:
     if task.refine != "radau":
         return None, "it gives refined plans, and this task asks for refine: none"
     way = Continuation(model, task, planner.requirements, origin, session.control, session.tell)
-    solving = Stopwatch()
-    with solving.running():
-        answer = way.run()
+    answer = way.run()
     session.attempts += way.steps
     new, certificate = answer.trajectory, answer.certificate
     if answer.ending is Ending.INTERRUPTED or new is None or certificate is None:
@@ -51,14 +48,11 @@ def continued(planner: Planner, origin: Origin) -> tuple[Plan | None, str]:
         status=status,
         sentence=facts,
         cost=cost,
-        attempts=tuple(session.attempts),
-        solve_s=solving.wall,
-        solve_cpu_s=solving.cpu,
-        build_s=session.building.wall,
         variables=way.size[0],
         constraints=way.size[1],
         refined=True,
         continued=True,
+        start=f"run: {origin.run}" if origin.run else "guess",
         stages=answer.stages,
     )
     return found, ""
@@ -90,5 +84,4 @@ def with_grip(planner: Planner, found: Plan) -> Plan:
     if near is None:
         what = f"`grip` is not kept ({why})"
         return replace(found, status=Status.ACCEPTABLE, sentence=f"{what}; {found.sentence}")
-    wall, cpu = found.solve_s + near.solve_s, found.solve_cpu_s + near.solve_cpu_s
-    return replace(near, continued=None, solve_s=wall, solve_cpu_s=cpu)
+    return replace(near, continued=None)

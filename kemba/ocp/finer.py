@@ -68,8 +68,7 @@ def _from_fewer(planner: Planner) -> Plan | None:
     )
     near, _ = continued(replace(planner, task=task.model_copy(update=plain)), origin)
     if near is not None:
-        wall, cpu = found.solve_s + near.solve_s, found.solve_cpu_s + near.solve_cpu_s
-        return replace(near, task=task, continued=None, solve_s=wall, solve_cpu_s=cpu)
+        return replace(near, task=task, continued=None)
     ended = planner.session.control.ended()
     return None if ended is None else _kept(found, task.nodes, ended)
 

@@ -14,7 +14,7 @@ from kemba.ocp.infeasibility.diagnostic import Relax
 from kemba.ocp.infeasibility.explain import Explanation
 from kemba.ocp.nlp.ipopt import Iterate
 from kemba.ocp.phases.stages import Stages
-from kemba.ocp.relaxation.session import Attempt, Session
+from kemba.ocp.relaxation.session import Attempt
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.solution import to_trajectory
@@ -34,16 +34,16 @@ class Plan:
     status: Status
     sentence: str
     cost: dict[str, float]
-    attempts: tuple[Attempt, ...]
-    solve_s: float
-    solve_cpu_s: float
-    build_s: float
     variables: int
     constraints: int
+    attempts: tuple[Attempt, ...] = ()  # of all solves up to this plan, as the times
+    solve_s: float = 0.0
+    solve_cpu_s: float = 0.0
+    build_s: float = 0.0
     relax: tuple[Relax, ...] = ()
     refined: bool = False
     continued: bool | None = None  # whether it comes from an earlier plan, where one was given
-    start: str = "guess"  # or the shipped plan from which it begins
+    start: str = "guess"  # or the run from which it begins
     stages: Stages | None = field(default=None, repr=False, compare=False)  # of a refined plan
 
     @property
@@ -53,12 +53,7 @@ class Plan:
 
 
 def judge(
-    requirements: Sequence[Requirement],
-    transcription: Transcription,
-    point: Iterate,
-    session: Session,
-    solve_s: float,
-    solve_cpu_s: float,
+    requirements: Sequence[Requirement], transcription: Transcription, point: Iterate
 ) -> Plan:
     """Certificate, status and sentence of what was found; `requirements` are all of the task's."""
     task, model = transcription.task, transcription.model
@@ -75,10 +70,6 @@ def judge(
         status=status,
         sentence=sentence,
         cost=costs(model, trajectory),
-        attempts=tuple(session.attempts),
-        solve_s=solve_s,
-        solve_cpu_s=solve_cpu_s,
-        build_s=session.building.wall,
         variables=transcription.variables,
         constraints=transcription.constraints,
     )

@@ -23,7 +23,6 @@ from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.symmetry import Reduction, find_symmetry, mirrored_requirements, whole
 from kemba.ocp.transcription.transcribe import Transcription
-from kemba.stopwatch import Stopwatch
 from kemba.trajectory import Trajectory
 
 
@@ -180,15 +179,5 @@ class Planner:
 
 def searched(planner: Planner, refused: bool) -> Plan:
     """What the strategies find, judged; the start guess for a task that a check refused."""
-    building = planner.session.building
-    before, solving = replace(building), Stopwatch()
-    with solving.running():
-        transcription, point = planner.refuse() if refused else planner.run()
-    return judge(
-        planner.requirements,
-        transcription,
-        point,
-        planner.session,
-        solve_s=solving.wall - (building.wall - before.wall),
-        solve_cpu_s=solving.cpu - (building.cpu - before.cpu),
-    )
+    transcription, point = planner.refuse() if refused else planner.run()
+    return judge(planner.requirements, transcription, point)

@@ -1,4 +1,4 @@
-"""From a task to a certified plan: checked, solved, refined; or why there is none."""
+"""From a task to certified plans: checked, solved, refined; or why there is none."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import islice
 from pathlib import Path
 
 from kemba.config import Document
@@ -16,6 +15,7 @@ from kemba.ocp.certificate.status import Status
 from kemba.ocp.continuation.between import Origin
 from kemba.ocp.continued import continued, from_scratch, with_grip
 from kemba.ocp.finer import found_and_refined
+from kemba.ocp.guesses import Guess, guesses
 from kemba.ocp.infeasibility.checks import check_task
 from kemba.ocp.infeasibility.diagnostic import Diagnostic
 from kemba.ocp.infeasibility.explain import Explanation, explanation, refusal
@@ -23,18 +23,120 @@ from kemba.ocp.nlp.ipopt import Control
 from kemba.ocp.nlp.watcher import Watch
 from kemba.ocp.planned import Plan, clear, explained
 from kemba.ocp.planner import Planner
-from kemba.ocp.reading import asked_of, task_model
+from kemba.ocp.reading import asked_of
 from kemba.ocp.relaxation.session import Session
 from kemba.ocp.sequence import as_one, motions
-from kemba.ocp.shipped.entry import Entry
-from kemba.ocp.shipped.shelf import Near, Neighbour, neighbours, relatives, ways
 from kemba.ocp.task.requirement import Requirement
-from kemba.ocp.task.resolve import resolve
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.symmetry import whole
 from kemba.ocp.transcription.transcribe import Transcription
 from kemba.stopwatch import Stopwatch, Tell, silent
 from kemba.trajectory import Trajectory
+
+LEFT = "its executions miss what the task allows"  # why a plan was not the last one
+
+
+@dataclass(frozen=True)
+class Planning:
+    """A task that is being planned: its plans from one start after the other, one time limit.
+
+    `clock` counts all of it, `planner.session.building` what was spent before and between solves.
+    """
+
+    document: Document
+    planner: Planner
+    clock: Stopwatch
+
+    @classmethod
+    def of(
+        cls,
+        task: Task,
+        document: Document | None = None,
+        model: str | Path | None = None,
+        log: Path | None = None,
+        tell: Tell = silent,
+        watch: Watch | None = None,
+        start: Trajectory | None = None,
+        stop: Callable[[], bool] | None = None,
+    ) -> Planning:
+        """The planning of a task, as `plan`. Raises ConfigErrors for wrong names and units."""
+        document = document or Document(task.model_dump())
+        deadline = time.monotonic() + task.solver.time_limit
+        building, clock = Stopwatch(), Stopwatch()
+        with building.running(), clock.running():
+            if task.sequence:
+                task, built, requirements = as_one(task, document)
+            else:
+                built, requirements = asked_of(task, document, model)
+        session = Session(Control(deadline, log, watch, stop), tell, building=building)
+        return cls(document, Planner(task, built, requirements, session, start), clock)
+
+    @cached_property
+    def diagnostics(self) -> Sequence[Diagnostic]:
+        """What certainly cannot be met."""
+        p = self.planner
+        with self.clock.running(), p.session.building.running():
+            return check_task(p.task, p.model, p.requirements, self.document)
+
+    @property
+    def refused(self) -> Explanation | None:
+        """Why there is no plan to be sought."""
+        return refusal(self.diagnostics)
+
+    def plans(self, origin: Origin | None = None) -> Iterator[Plan]:
+        """Plans of the task, made when asked for: from an earlier plan, then from one guess after
+        the other as long as they give any."""
+        failed = ""
+        if origin is not None and self.refused is None:
+            near, failed = self.continued(origin)
+            if near is not None:
+                yield near
+                failed = LEFT
+            failed = failed if origin.given else ""
+        task, planner = self.planner.task, self.planner
+        for number, guess in enumerate(guesses(task, planner.model)):
+            if number:
+                planner.session.tell("another guess")
+            found = self._from_guess(guess if planner.start is None else replace(guess, pulse=0.0))
+            found = from_scratch(found, failed) if failed else found
+            yield replace(found, start=f"guess {number + 1}" if number else found.start)
+            over = planner.session.control.ended() is not None or planner.start is not None
+            if over or not found.status.plan or task.refine != "radau":
+                return
+
+    def continued(self, origin: Origin) -> tuple[Plan | None, str]:
+        """The task's plan from another one, or None and the reason where that fails."""
+        with self.clock.running():
+            found, why = continued(self.planner, origin)
+        return found and self._timed(found), why
+
+    def _from_guess(self, guess: Guess) -> Plan:
+        refused = self.refused
+        task = self.planner.task
+        begins = task.model_copy(update=guess.update)
+        planner = replace(self.planner, task=begins, pulse=guess.pulse, outcome=None)
+        with self.clock.running():
+            found = replace(found_and_refined(planner, refused is not None), task=task)
+            if found.status is Status.SOLVED and task.grip < 1.0:
+                found = with_grip(self.planner, found)
+            if found.status is Status.SOLVED and task.clearance:
+                found = clear(found)
+        if not found.status.plan and found.status is not Status.INTERRUPTED:
+            own = task, planner.model, planner.outcome, self.diagnostics, self.document
+            why = refused or explanation(*own)
+            found = found if why is None else explained(found, why)
+        return self._timed(found)
+
+    def _timed(self, found: Plan) -> Plan:
+        """A plan with all solves and times up to it."""
+        clock, session = self.clock, self.planner.session
+        return replace(
+            found,
+            attempts=tuple(session.attempts),
+            solve_s=clock.wall - session.building.wall,
+            solve_cpu_s=clock.cpu - session.building.cpu,
+            build_s=session.building.wall,
+        )
 
 
 def plan(
@@ -56,121 +158,25 @@ def plan(
     earlier plan that is solved again for the changed figures; where that fails, the plan is made
     from scratch, and `Plan.continued` is False.
     """
-    job = _job(task, document, model, Control(_deadline(task), log, watch, stop), tell, start)
-    planner, refused, failed = job.planner, job.refused, ""
-    if origin is not None and refused is None:
-        near, failed = continued(planner, origin)
-        if near is not None:
-            return near
-    found = found_and_refined(planner, refused is not None)
-    if found.status is Status.SOLVED and task.grip < 1.0:
-        found = with_grip(planner, found)
-    if found.status is Status.SOLVED and task.clearance:
-        found = clear(found)
-    if not found.status.plan and found.status is not Status.INTERRUPTED:
-        own = task, planner.model, planner.outcome, job.diagnostics, job.document
-        why = refused or explanation(*own)
-        found = found if why is None else explained(found, why)
-    return from_scratch(found, failed) if failed else found
+    first: Plan | None = None
+    for found in Planning.of(task, document, model, log, tell, watch, start, stop).plans(origin):
+        first = first or found
+        if found.status is Status.SOLVED:
+            return found
+    assert first is not None
+    ended = Status.INTERRUPTED if found.status is Status.INTERRUPTED else first.status
+    return replace(spent(first, found), status=ended)
 
 
-def plans_nearby(
-    task: Task,
-    document: Document | None = None,
-    log: Path | None = None,
-    tell: Tell = silent,
-    watch: Watch | None = None,
-    stop: Callable[[], bool] | None = None,
-) -> Iterator[tuple[Plan, Entry]]:
-    """Plans of a task and the near shipped plans from which they begin, the nearest of each way
-    (`ways`).
-
-    Only solved ones; none where no shipped plan is near, or the task cannot be met. Raises
-    ConfigErrors as `plan` does.
-    """
-    control = Control(_deadline(task), log, watch, stop)
-    job = _job(task, document, None, control, tell)
-    if job.refused is not None:
-        return
-    model, tried = job.planner.model, Near.current().tried
-    listed = neighbours(task, model)
-    if not listed:
-        listed = relatives(task, model)
-        if next(job.planner.reductions()).symmetric:
-            tried = 1  # a plan of half the robot from a guess takes little longer
-    for near in islice(ways(listed), tried):
-        found, _ = continued(job.planner, _origin(near))
-        if found is not None and found.status is Status.SOLVED:
-            yield replace(found, continued=None, start=f"shipped: {near.entry.name}"), near.entry
-        if control.ended() is not None:
-            return
-
-
-def _origin(near: Neighbour) -> Origin:
-    """A shipped plan with its model and what was asked of it."""
-    entry, own = near.entry, near.asked()
-    model = task_model(own)
-    asked = resolve(own, model, Document(own.model_dump()))
-    name, dear = f"the shipped plan {entry.name}", "one from a guess (--cold) may take less"
-    once, stages = own.grip == 1.0, entry.stages
-    return Origin(entry.plan, model, tuple(asked), name, dear, once=once, stages=stages)
-
-
-def plan_from(
-    origin: Origin,
-    task: Task,
-    document: Document | None = None,
-    log: Path | None = None,
-    tell: Tell = silent,
-    watch: Watch | None = None,
-    stop: Callable[[], bool] | None = None,
-) -> tuple[Plan | None, str]:
-    """A task's plan from another plan, or None and the reason where that fails."""
-    control = Control(_deadline(task), log, watch, stop)
-    return continued(_job(task, document, None, control, tell).planner, origin)
-
-
-@dataclass(frozen=True)
-class _Job:
-    """A task, and what solves it."""
-
-    document: Document
-    planner: Planner
-
-    @cached_property
-    def diagnostics(self) -> Sequence[Diagnostic]:
-        """What certainly cannot be met; found when it is asked for."""
-        p = self.planner
-        with p.session.building.running():
-            return check_task(p.task, p.model, p.requirements, self.document)
-
-    @property
-    def refused(self) -> Explanation | None:
-        """Why there is no plan to be sought."""
-        return refusal(self.diagnostics)
-
-
-def _job(
-    task: Task,
-    document: Document | None,
-    model: str | Path | None,
-    control: Control,
-    tell: Tell = silent,
-    start: Trajectory | None = None,
-) -> _Job:
-    document = document or Document(task.model_dump())
-    building = Stopwatch()
-    with building.running():
-        if task.sequence:
-            task, built, requirements = as_one(task, document)
-        else:
-            built, requirements = asked_of(task, document, model)
-    session = Session(control, tell, building=building)
-    return _Job(document, Planner(task, built, requirements, session, start))
-
-
-def _deadline(task: Task) -> float:
-    return time.monotonic() + task.solver.time_limit
+def spent(old: Plan, new: Plan) -> Plan:
+    """A plan with the solves and times up to a later one."""
+    return replace(
+        old,
+        attempts=new.attempts,
+        solve_s=new.solve_s,
+        solve_cpu_s=new.solve_cpu_s,
+        build_s=new.build_s,
+    )
 
 
 def check_feasible(

@@ -17,6 +17,7 @@ from kemba.report.drawing import Drawer, Here, Nowhere
 from kemba.runs import PLANT_RUN, STAGES, RunFolder, write_json
 from kemba.solve import Approach, best_plan
 from kemba.solve.listener import Listener
+from kemba.solve.memory import remember
 from kemba.solve.trial import Motions
 from kemba.trajectory import Trajectory
 
@@ -54,6 +55,8 @@ def solve_into(
         with suppress(WriteError):  # the first error says more
             folder.finish("failed")
         raise
+    if approach.memory and result["good"]:
+        remember(found, folder.path)
     facts = {key: result[key] for key in ("sentence", "good", "start")}
     folder.finish(result["status"], **facts)
     return result

@@ -7,7 +7,6 @@ from pathlib import Path
 from kemba.ocp import load_task, task_model
 from kemba.ocp.continuation.between import Origin
 from kemba.ocp.continuation.kept import read_stages
-from kemba.ocp.shipped.kind import figures_of
 from kemba.ocp.task.resolve import resolve
 from kemba.runs import STAGES, load_run
 
@@ -26,5 +25,5 @@ def origin_of(run: str | Path) -> Origin:
         model,
         tuple(resolve(task, model, document)),
         stages=read_stages(found.path / STAGES),
-        figures=figures_of(task, model),
+        run=str(run),
     )

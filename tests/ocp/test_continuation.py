@@ -20,9 +20,9 @@ from kemba.ocp.nlp.ipopt import Control
 from kemba.ocp.phases.modes import Phase
 from kemba.ocp.phases.notes import noted_phases, phase_notes
 from kemba.ocp.phases.radau import RADAU3
+from kemba.ocp.planning import Planning, plan
 from kemba.ocp.reading import asked_of, load_task
 from kemba.ocp.refinement.refine import Refiner, reduction_of, valve_columns
-from kemba.ocp.shipped.shelf import neighbours
 from kemba.ocp.transcription.symmetry import whole
 from kemba.ocp.transcription.unilateral import read_constraints
 from kemba.runs import load_run
@@ -87,23 +87,6 @@ def test_what_cannot_be_continued_is_made_from_scratch(hop: Path, tmp_path: Path
     assert "made from scratch, because the earlier plan could not be continued" in str(
         answer["sentence"]
     )
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("height", [0.55, 0.6])
-def test_a_plan_begins_from_a_shipped_one_that_is_nearer(tmp_path: Path, height: float) -> None:
-    """From 0.5 m up the order of valves changes; continued to 0.55 m it costs half as much again,
-    from scratch to 0.6 m ten times as much."""
-    code, _ = solve("jump.yaml", "--no-figure", "--json", "--out", tmp_path / "first")
-    code, answer = solve("--from", tmp_path / "first", "--set", f"height={height} m", "--no-figure",
-                         "--json", "--out", tmp_path / "second")  # fmt: skip
-    assert code == 0 and answer["continued"] is False and answer["good"]
-    said, start = str(answer["sentence"]), str(answer["start"])
-    assert "begins from a shipped plan: the earlier one is further" in said
-    assert start.startswith("shipped: ")
-    cost, known = answer["cost"], answer["best_known"]
-    assert isinstance(cost, dict) and isinstance(known, dict)
-    assert cost["torque_squared_integral"] < 1.5 * known["cost"]
 
 
 def test_from_and_resume_exclude_each_other(hop: Path) -> None:
@@ -174,17 +157,23 @@ def test_columns_of_new_effects_are_filled(hop: Path) -> None:
     assert np.all(found["front/foot/Fz"] == 0.0)
 
 
+def test_a_plan_whose_valves_are_ruled_out_begins_no_task(hop: Path) -> None:
+    """Phases keep their valves: no row of the program would say that they must stay closed."""
+    task, document = load_task("hop.yaml", ["nodes=60", "bounds.*/valve/*=0"])
+    assert Planning.of(task, document).continued(origin_of(hop))[0] is None
+
+
 def test_impacts_of_a_start_are_met() -> None:
     """A trajectory has no velocities after impacts; the start of a continuation has."""
     task, document = load_task("jump.yaml")
     model, asked = asked_of(task, document)
-    plan = neighbours(task, model)[0].entry.plan
-    half = reduction_of(model, task, asked, plan)
+    motion = plan(task, document).trajectory
+    half = reduction_of(model, task, asked, motion)
     constraints = read_constraints(model, half)
     valves = len(valve_columns(model, half))
-    phases = noted_phases(plan.meta, constraints, valves, len(plan) - 1)
+    phases = noted_phases(motion.meta, constraints, valves, len(motion) - 1)
     assert phases is not None
-    program, x = Refiner(model, task, asked, plan, half, Control()).build(phases, plan, RADAU3)
+    program, x = Refiner(model, task, asked, motion, half, Control()).build(phases, motion, RADAU3)
     impacts = [row.label.startswith("impact") for row in program.rows]
     worst = [
         float(np.abs(np.array(program.problem.g(y, [])).ravel()[impacts]).max())

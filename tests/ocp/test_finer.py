@@ -12,7 +12,7 @@ from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.radau import RADAU5
 from kemba.ocp.phases.stages import Stages
 from kemba.ocp.planned import Plan
-from kemba.ocp.planning import plan, plans_nearby
+from kemba.ocp.planning import plan
 from kemba.ocp.reading import load_task
 from kemba.ocp.refinement.refine import Refiner, reduction_of
 from kemba.ocp.refinement.start import on_elements
@@ -20,8 +20,8 @@ from kemba.ocp.refinement.start import on_elements
 
 @pytest.fixture(scope="module")
 def coarse() -> Plan:
-    """The 0.5 m jump on 100 nodes, from a shipped plan."""
-    return next(plans_nearby(*load_task("jump.yaml")))[0]
+    """The 0.5 m jump on 100 nodes."""
+    return plan(*load_task("jump.yaml"))
 
 
 def on(nodes: int, coarse: Plan) -> tuple[PhaseProgram, Stages]:

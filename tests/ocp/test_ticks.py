@@ -11,7 +11,7 @@ from kemba.ocp.controller import PERIOD
 from kemba.ocp.phases.modes import Phase
 from kemba.ocp.phases.ticks import edge_times
 from kemba.ocp.planned import Plan
-from kemba.ocp.planning import plan_from, plans_nearby
+from kemba.ocp.planning import Planning
 from kemba.ocp.reading import load_task
 from kemba.ocp.transcription.symmetry import find_symmetry, whole
 
@@ -33,9 +33,11 @@ def off_ticks(model: Model, plan: Plan) -> float:
 
 def test_a_plan_on_ticks_has_its_edges_there() -> None:
     task, document = load_task("jump.yaml", ["height=0.54 m"])
-    old = next(plans_nearby(task, document))[0]
+    planning = Planning.of(task, document)
+    old = next(planning.plans())
     known = (old.trajectory, old.model, old.requirements)
-    new, why = plan_from(Origin(*known, once=True, ticks=True, stages=old.stages), task, document)
+    origin = Origin(*known, once=True, ticks=True, stages=old.stages)
+    new, why = planning.continued(origin)
     assert new is not None, why
     assert off_ticks(old.model, old) > 1e-4
     assert off_ticks(new.model, new) < 1e-8

@@ -9,7 +9,7 @@ import pytest
 from ocp.runs import solved
 
 from kemba.ocp import controller_table, load_task
-from kemba.ocp.planning import plans_nearby
+from kemba.ocp.planning import plan
 from kemba.plant import execute
 from kemba.plant.execution.moved_edges import edges_of, moves, shared_edges, with_moved
 from kemba.plant.execution.retiming import ExecutedTable, RetimingSettings, executed_table, retimed
@@ -41,7 +41,7 @@ def test_two_late_edges_of_all_legs_are_found_in_few_executions(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """No single move makes them good."""
-    found = next(plans_nearby(*load_task("jump.yaml")))[0]
+    found = plan(*load_task("jump.yaml"))
     table = controller_table(found.model, found.trajectory)
     spoilt = with_moved(table, shared_edges(table)[:2], (1, 1))
     assert spoilt is not None

@@ -37,8 +37,11 @@ def solve(
         ),
     ] = None,
     cold: Annotated[
-        bool, typer.Option("--cold", help="Begin from a guess, not from a near shipped plan.")
+        bool, typer.Option("--cold", help="Begin from a guess, not from an earlier plan of yours.")
     ] = False,
+    memory: Annotated[
+        bool, typer.Option(help="Look up earlier plans of yours, and list this one with them.")
+    ] = True,
     time_limit: Annotated[float | None, typer.Option(help="Seconds of solving at most.")] = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Check the task and say its size; solve nothing.")
@@ -125,7 +128,7 @@ def solve(
         Interrupt(lambda text: say(text, quiet)) as stop,
     ):
         listener = Listener(progress.tell, progress.watch, stop)
-        approach = Approach(start, starts, jobs, replay, origin, cold)
+        approach = Approach(start, starts, jobs, replay, origin, cold, memory)
         answer = solve_into(folder, resolved, document, listener, approach, figure, drawing)
     if json:
         print_json(answer)

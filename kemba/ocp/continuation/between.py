@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from math import isfinite
 from typing import Any
 
@@ -25,8 +25,8 @@ class Origin:
     where the whole change fails in one step, also from the earlier plan solved on its new
     intervals, nothing else is tried. `ticks`: valve edges of the new plan are on the controller's
     ticks; where that fails at once, these ticks do not fit, and nothing else is tried. `stages`:
-    the solved program of the plan, where it is at hand. `figures`: those of its task
-    (`kemba.ocp.shipped.kind`), where they are known.
+    the solved program of the plan, where it is at hand. `run`: its folder; `given`: whether the
+    user named it.
     """
 
     plan: Trajectory
@@ -37,7 +37,8 @@ class Origin:
     once: bool = False
     ticks: bool = False
     stages: Stages | None = None
-    figures: Mapping[str, float] = field(default_factory=dict)
+    run: str = ""
+    given: bool = True
 
 
 def model_between(old: Model, new: Model, share: float) -> Model:

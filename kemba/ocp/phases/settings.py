@@ -161,10 +161,6 @@ class Refining(Settings):
         40.0, "1", "usual iterations whose time long ones may cost together", "tuned: solves that "
         "converged lost 21 at most, those that took a minute 50 to 300", decides=True,
     )  # fmt: skip
-    second_start: float = setting(
-        0.05, "1", "guess noise of the second start where the first plan does not refine", HAND,
-        decides=True,
-    )  # fmt: skip
 
 
 class Repair(Settings):

@@ -56,7 +56,6 @@ def _solve_cases(expansion: Expansion, name: str, block: SolveBlock) -> list[Cas
         work: dict[str, Any] = {
             "task": task.model_dump(exclude_none=True),
             "model": model_hash(task.model),
-            "cold": block.cold,
             "replay": block.replay,
         }
         aim = {key: value for key, value in work["task"].items() if key not in HOW}

@@ -25,14 +25,12 @@ class Block(Draws):
 class SolveBlock(Block):
     """Tasks to plan; `grid` and `vary` name keys of the task, `model` replaces its model.
 
-    `cold`: begin from guesses only, not from shipped plans. `replay`: execute the plans; those that
-    miss the tolerances of their task do not succeed.
+    `replay`: execute the plans; those that miss the tolerances of their task do not succeed.
     """
 
     kind: Literal["solve"]
     task: str
     model: str | None = None
-    cold: bool = False
     replay: bool = True
     expect: Annotated[float, Param("1", lower=0.0, upper=1.0)] = 1.0
 

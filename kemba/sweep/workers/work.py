@@ -14,7 +14,7 @@ def solve_case(work: Work) -> Record:
     from kemba.ocp import Task
     from kemba.solve import Approach, Listener, best_plan
 
-    approach = Approach(cold=work["cold"], replay=work["replay"])
+    approach = Approach(replay=work["replay"])
     task, document = parse(work["task"], Task), Document(work["task"])
     best = best_plan(task, document, approach, Listener())
     kept = (

@@ -1,1 +1,0 @@
-"""Shipped plans of the shipped robot, from which near tasks begin."""

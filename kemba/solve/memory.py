@@ -1,0 +1,127 @@
+"""Plans that the user has made: a list in the user's data folder, and the nearest as a start.
+
+Never needed: where the list, an entry or a run folder is gone or damaged, plans begin from guesses.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from kemba.errors import KembaError
+from kemba.files import WriteError, atomic_text
+from kemba.model import Model
+from kemba.ocp import Plan, Task
+from kemba.ocp.certificate.objective import objective
+from kemba.ocp.continuation.between import Origin
+from kemba.solve.earlier import origin_of
+from kemba.solve.kind import NEAR, distance, figures_of, kind_of
+from kemba.stopwatch import Tell
+
+MOST = 1000  # entries; the oldest go first
+NAME = "plans.jsonl"
+
+
+@dataclass(frozen=True)
+class Remembered:
+    """A good plan of the user: fingerprint and figures of its task, what its task counts, and its
+    run folder."""
+
+    kind: str
+    figures: dict[str, float]
+    cost: float
+    run: str
+
+
+def list_file() -> Path | None:
+    """Where the plans are listed: in KEMBA_MEMORY, or the user's data folder.
+
+    None for an empty KEMBA_MEMORY, and for a user without a home.
+    """
+    own = os.environ.get("KEMBA_MEMORY")
+    if own is not None:
+        return Path(own) / NAME if own else None
+    if base := os.environ.get("XDG_DATA_HOME"):
+        return Path(base) / "kemba" / NAME
+    try:
+        return Path.home() / ".local" / "share" / "kemba" / NAME
+    except RuntimeError:  # neither HOME nor an entry in the list of users
+        return None
+
+
+def recalled(task: Task, model: Model, tell: Tell) -> Origin | None:
+    """The user's nearest plan of the same kind of task; None where none is near, or where the task
+    asks for a start or method of its own."""
+    plain = task.method == "relaxation" and task.refine == "radau" and task.guess == "automatic"
+    if not plain or task.guess_noise or task.seed:
+        return None
+    asked = figures_of(task, model)
+    near = [(distance(model, asked, one.figures), one) for one in _alike(task, model, tell)]
+    for apart, one in sorted(near, key=lambda pair: pair[0]):
+        if apart > NEAR:
+            break
+        try:
+            origin = origin_of(one.run)
+        except KembaError:  # moved, changed or removed since
+            continue
+        hint = "one from a guess (--no-memory) may take less"
+        return replace(
+            origin, name=f"the earlier plan {one.run}", dear=hint, once=True, given=False
+        )
+    return None
+
+
+def best_known(task: Task, model: Model, tell: Tell) -> dict[str, Any] | None:
+    """The cheapest of the user's plans of the same task, `of` so many; None where there is none."""
+    asked = figures_of(task, model)
+    same = [r.cost for r in _alike(task, model, tell) if distance(model, asked, r.figures) < 1e-6]
+    return {"cost": min(same), "of": len(same)} if same else None
+
+
+def remember(found: Plan, run: Path) -> None:
+    """Add a good plan to the list; nothing happens where that cannot be written."""
+    file = list_file()
+    if file is None:
+        return
+    cost = objective(found.model, found.task, found.requirements, found.trajectory)
+    kind, figures = kind_of(found.task, found.model), figures_of(found.task, found.model)
+    own = Remembered(kind, figures, cost, str(run.resolve()))
+    kept = [one for one in _listed(file, lambda text: None) if one.run != own.run]
+    try:
+        with atomic_text(file) as stream:
+            for one in [*kept, own][-MOST:]:
+                stream.write(json.dumps(asdict(one)) + "\n")
+    except WriteError:
+        return
+
+
+def _alike(task: Task, model: Model, tell: Tell) -> list[Remembered]:
+    file = list_file()
+    listed = [] if file is None else list(_listed(file, tell))
+    kind = kind_of(task, model) if listed else ""
+    return [one for one in listed if one.kind == kind]
+
+
+def _listed(file: Path, tell: Tell) -> Iterator[Remembered]:
+    """The entries of the list; what cannot be read is left out, and said."""
+    try:
+        lines = file.read_text(encoding="utf-8").splitlines()
+    except FileNotFoundError:
+        return
+    except (OSError, ValueError) as error:
+        tell(f"{file} cannot be read and is left out: {error}")
+        return
+    damaged = 0
+    for line in lines:
+        try:
+            entry = json.loads(line)
+            figures = {str(key): float(value) for key, value in entry["figures"].items()}
+            yield Remembered(str(entry["kind"]), figures, float(entry["cost"]), str(entry["run"]))
+        except (ValueError, KeyError, TypeError, AttributeError):
+            damaged += 1
+    if damaged:
+        tell(f"{damaged} entries of {file} cannot be read and are left out")
