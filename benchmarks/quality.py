@@ -50,7 +50,7 @@ def _asked(name: str, use: tuple[float, float], figure: str) -> tuple[str, ...]:
 
 
 def default(asked: tuple[str, ...], limit: float) -> dict[str, Any]:
-    """The plan that `solve` gives: from shipped plans or a guess, executed."""
+    """The plan that `solve` gives, executed."""
     return _executed(asked, limit, ())
 
 

@@ -63,7 +63,7 @@ def _state(results: dict[str, Any]) -> str:
 
 def _rates(blocks: dict[str, Any], rows: list[dict[str, Any]]) -> Iterator[str]:
     yield (
-        "| block | a plan | refined and replaying | from a shipped plan | good "
+        "| block | a plan | refined and replaying | from the first guess | good "
         "| 95 % Wilson interval | expected |"
     )
     yield "|---|---:|---:|---:|---:|---:|---:|"
@@ -71,10 +71,10 @@ def _rates(blocks: dict[str, Any], rows: list[dict[str, Any]]) -> Iterator[str]:
         own = [row for row in rows if row["block"] == name]
         plans = sum(row["status"] in ("solved", "acceptable") for row in own)
         replaying = sum(bool(row["refined"] and row["replays"]) for row in own)
-        shipped = sum((row["start"] or "").startswith("shipped") for row in own)
+        first = sum(row["start"] == "guess" for row in own)
         low, high = block["interval"]
         yield (
-            f"| {name} | {plans} | {replaying} | {shipped} "
+            f"| {name} | {plans} | {replaying} | {first} "
             f"| {block['succeeded']} of {block['cases']} ({block['rate']:.1%}) "
             f"| {low:.1%} to {high:.1%} | {block['expected']:.0%} |"
         )

@@ -37,7 +37,7 @@ Settings whose origin says *tuned: by hand on the twin* were chosen on logs of t
 twin in `tests/twin`, before this study. The study is what is known of how much they matter.
 
 The sample can have 12 bench cases, 4 robot cases (two effects, nothing, an unknown effect) and the
-tasks `stand`, `jump` and `hop`, which are solved without the shipped plans. What has been run of it
+tasks `stand`, `jump` and `hop`, which are solved from guesses. What has been run of it
 stands at the head of each table, with the day. One case is more than 5 % of so small a sample, so
 **bold** means: at least one case changed, and more cases are needed to say how often. A plan that
 is `interrupted` took five times the usual iterations. No value leaves the range in which it has a
@@ -71,7 +71,7 @@ FOUND = """## What was found
   five times the usual iterations); all other settings of the stages change its cost only (column
   *cost*). The program has many local optima, and each change may lead to another one. No threshold
   can be derived that avoids this. What helps is to begin from plans that are known to be cheap
-  ([shipped plans](continuing.md)), or from several starts (`kemba-opt solve TASK --starts 4`).
+  ([from an earlier run](continuing.md)), or from several starts (`kemba-opt solve TASK --starts 4`).
 - **`compare`**: the largest error ratio of a good model (1.15) and the largest error of a figure
   (two sigmas) flipped cases in which nothing is missing. Both are gone. Figures take their
   likeliest values, given their declared tolerances, and absent effects the spike of `discover`.

@@ -25,9 +25,9 @@ TASKS = ("jump.yaml", "jump_forward.yaml")
 
 # stage: (module, function); each stage is without those that it contains
 STAGES = {
-    "plan": ("kemba.ocp.planning", "searched"),
-    "from a shipped plan": ("kemba.ocp.planning", "continued"),
-    "refinement": ("kemba.ocp.refined", "on_phases"),
+    "plan": ("kemba.ocp.finer", "searched"),
+    "from an earlier plan": ("kemba.ocp.planning", "continued"),
+    "refinement": ("kemba.ocp.finer", "refined"),
     "table": ("kemba.solve.trial", "retimed"),
     "replays": ("kemba.solve.trial", "judged"),
     "files": ("kemba.report.solving", "_write"),

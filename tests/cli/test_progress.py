@@ -71,7 +71,7 @@ def test_a_plan_from_another_one_takes_its_own_time(clock: Clock) -> None:
     """Until that fails and the plan is made from a guess."""
     left = Left(SOLVE)
     clock.now += 2.0
-    left.enter("from the shipped plan up-0500: the best one")
+    left.enter("from the earlier plan runs/jump-1: the best one")
     assert left.share == NEAR["from the"] and left.seconds == pytest.approx(18.0)
     left.enter("relax (half robot, 50 nodes)")
     assert left.words == ""
@@ -80,7 +80,7 @@ def test_a_plan_from_another_one_takes_its_own_time(clock: Clock) -> None:
 def test_how_many_plans_a_robust_task_tries_is_not_guessed(clock: Clock) -> None:
     left = Left(SOLVE)
     clock.now += 2.0
-    left.enter("from the shipped plan up-0500: the best one")
+    left.enter("from the earlier plan runs/jump-1: the best one")
     assert left.words
     clock.now += 2.0
     left.enter("as asked, hold 0.3 s: 57 of 60 scenarios succeed (95 %: 86 to 98 %)")
