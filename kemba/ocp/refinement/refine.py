@@ -21,6 +21,7 @@ from kemba.ocp.phases.radau import RADAU3, RADAU5, STATE, Scheme
 from kemba.ocp.phases.requirements import add_requirements
 from kemba.ocp.phases.settings import Elements, Refining, Repair
 from kemba.ocp.phases.stages import Stages
+from kemba.ocp.refinement.insertion import improved
 from kemba.ocp.refinement.repair import misfit, repaired, simplified
 from kemba.ocp.refinement.sample import certificate, to_trajectory
 from kemba.ocp.refinement.solve import rough, solve, warm
@@ -140,7 +141,7 @@ class Refiner:
                 found = self.repair(phases, found)
             if found.done:
                 break
-        return replace(found, iterations=self.iterations)
+        return replace(improved(self, found), iterations=self.iterations)
 
     def repair(self, phases: list[Phase], found: Refined) -> Refined:
         """The solution on phases repaired until their modes fit, else how the last try ended."""
@@ -221,12 +222,14 @@ class Refiner:
             carried(program, coarser.columns, coarser.scheme.points, x), settings.near_fine
         )
         found = self._solve(program, start, warm(settings.rough_iterations))
-        ended = self._ended(program, found)
-        if not found.solved:
-            return ended
-        trajectory = to_trajectory(program, found.Y)
-        measured = certificate(program, found.Y, trajectory)
-        own = Stages.of(program, found)
+        return self.read(program, found) if found.solved else self._ended(program, found)
+
+    def read(self, program: PhaseProgram, solution: Iterate) -> Refined:
+        """A solved program as a plan."""
+        trajectory = to_trajectory(program, solution.Y)
+        measured = certificate(program, solution.Y, trajectory)
+        own = Stages.of(program, solution)
+        ended = self._ended(program, solution)
         return replace(ended, trajectory=trajectory, certificate=measured, stages=own)
 
     def build(
