@@ -71,7 +71,7 @@ FOUND = """## What was found
   five times the usual iterations); all other settings of the stages change its cost only (column
   *cost*). The program has many local optima, and each change may lead to another one. No threshold
   can be derived that avoids this. What helps is to begin from plans that are known to be cheap
-  ([from an earlier run](continuing.md)), or from several starts (`kemba-opt solve TASK --starts 4`).
+  ([earlier runs](continuing.md)), or from several starts (`kemba-opt solve TASK --starts 4`).
 - **`compare`**: the largest error ratio of a good model (1.15) and the largest error of a figure
   (two sigmas) flipped cases in which nothing is missing. Both are gone. Figures take their
   likeliest values, given their declared tolerances, and absent effects the spike of `discover`.
