@@ -48,15 +48,12 @@ VARIANTS: dict[str, dict[str, Variant]] = {
     "general": {
         "as shipped": SHIPPED,
         "from the guess": Variant(grown=False),
-        "two rounds of moving switches": Variant(solver={"valve_search": 2}),
         "plain Hessian": Variant({Newton: {"regularisation": 0.0}}),
         "changed plans at their bounds": Variant({Starts: {"changed": 1e-6}}),
         "memory by IPOPT's default": Variant(solver={"options": {"mumps_mem_percent": 1000}}),
     },
     "symmetric": {
         "as shipped": SHIPPED,
-        "two rounds of moving switches": Variant(solver={"valve_search": 2}),
-        "no round": Variant(solver={"valve_search": 0}),
         "pairs relaxed by 1, 0.1 and 0.01 before": Variant(ladder=(1.0, 0.1, 0.01)),
         "pairs relaxed by 0.01 at first": Variant({Relaxation: {"loose": 1e-2}}),
         "changed plans at their bounds": Variant({Starts: {"changed": 1e-6}}),

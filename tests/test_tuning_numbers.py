@@ -61,7 +61,6 @@ CONSTANTS = {  # file -> names, why
     "ocp/mpcc/stationary.py": ("STEP LONGEST", "the same"),
     "ocp/nlp/stagnation.py": ("USUAL", "iterations of which a median is taken"),
     "ocp/controller.py": ("PERIOD", "rate of the robot's controller"),
-    "ocp/shipped/kind.py": ("LETTERS", "length of a fingerprint"),
     "effects/rigs/axis.py": ("PLATE", "tolerance of an effect's figures"),
     "effects/mechanics/geometry.py": ("SIZES", "sizes of an effect's parameters"),
     "mechanism/own_rigs.py": ("GRAVITY", "of the earth"),
@@ -222,5 +221,5 @@ def test_thresholds_of_verdicts_and_stages_are_in_the_sensitivity_study() -> Non
         for field in dataclasses.fields(cls)  # type: ignore[arg-type]
         if field.metadata["decides"]
     }
-    assert {"Relaxation.loose", "Starts.interior_push", "Ends.tol", "ValveSearch.reach"} <= deciding
+    assert {"Relaxation.loose", "Starts.interior_push", "Ends.tol", "Grids.reach"} <= deciding
     assert {"DiscoverSettings.significant", "GateSettings.missing"} <= deciding

@@ -15,7 +15,7 @@ OTHERS = 2  # further guesses at most: each costs as much as the first
 
 
 @dataclass(frozen=True)
-class Guess:
+class StartGuess:
     """A start guess with `noise` drawn by `seed`, and the shortest `pulse` [s] of a valve that is
     sought from it."""
 
@@ -29,7 +29,7 @@ class Guess:
         return {"guess_noise": self.noise, "seed": self.seed}
 
 
-def guesses(task: Task, model: Model) -> Sequence[Guess]:
+def guesses(task: Task, model: Model) -> Sequence[StartGuess]:
     """The guesses of a task.
 
     A relaxed valve is open in part; rounded on a grid it opens and closes from node to node. Pulses
@@ -38,7 +38,7 @@ def guesses(task: Task, model: Model) -> Sequence[Guess]:
     """
     fill = max(model.mechanism.need_cylinder().fill)
     longer = max(fill, task.min_dwell)
-    found = [Guess(pulse, task.guess_noise, task.seed) for pulse in (longer, task.min_dwell)]
+    found = [StartGuess(pulse, task.guess_noise, task.seed) for pulse in (longer, task.min_dwell)]
     noise = max(task.guess_noise, NOISE)
-    found += [Guess(longer, noise, task.seed + k) for k in range(1, OTHERS + 1)]
+    found += [StartGuess(longer, noise, task.seed + k) for k in range(1, OTHERS + 1)]
     return list(dict.fromkeys(found))

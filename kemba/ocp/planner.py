@@ -15,10 +15,9 @@ from kemba.ocp.relaxation.guess import automatic_guess
 from kemba.ocp.relaxation.lifting import confirm, grow
 from kemba.ocp.relaxation.penalty import METHODS, penalise
 from kemba.ocp.relaxation.resume import resumed
-from kemba.ocp.relaxation.schedule import RELAX, binary, find, refine_grid, tighten
+from kemba.ocp.relaxation.schedule import RELAX, binary, find, fix, refine_grid, tighten
 from kemba.ocp.relaxation.session import Schedule, Session, Stopped
-from kemba.ocp.relaxation.settings import ValveSearch
-from kemba.ocp.relaxation.valve_search import search_neighbourhood
+from kemba.ocp.relaxation.settings import Grids
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.symmetry import Reduction, find_symmetry, mirrored_requirements, whole
@@ -29,7 +28,7 @@ from kemba.trajectory import Trajectory
 def grids(nodes: int) -> list[int]:
     """Numbers of nodes from coarse to fine, each about half of the next."""
     found = [nodes // 2, nodes]
-    while found[0] > ValveSearch.current().finest:
+    while found[0] > Grids.current().finest:
         found.insert(0, found[0] // 2)
     return found
 
@@ -84,7 +83,7 @@ class Planner:
         for reduction in self.reductions() if self.start is not None else ():
             yield lambda r=reduction: self._continued(r)  # type: ignore[misc]
         for reduction in self.reductions():
-            if self.task.solver.coarse and nodes // 2 >= ValveSearch.current().coarsest:
+            if self.task.solver.coarse and nodes // 2 >= Grids.current().coarsest:
                 yield lambda r=reduction: self._coarse_to_fine(r)  # type: ignore[misc]
             yield lambda r=reduction: self._direct(r)  # type: ignore[misc]
 
@@ -107,12 +106,12 @@ class Planner:
         assert self.start is not None
         schedule = self.schedule(self.task.nodes, reduction)
         point = binary(schedule, resumed(schedule.transcription, self.start))
-        return self._finish(schedule, self._searched_nearby(schedule, point))
+        return self._finish(schedule, self._fixed(schedule, point))
 
     def _sought(self, schedule: Schedule) -> Iterate:
         """A plan with binary valves: grown from half a robot's where legs are equal and only the
         requirements differ, else from the guess."""
-        t, rounds = schedule.transcription, self.task.solver.valve_search
+        t = schedule.transcription
         ordered = bool(self.task.contacts)  # half a robot says nothing of who stands when
         if self.half is not None and not ordered and self.alike != self.requirements:
             half = self.schedule(t.nodes, self.half)
@@ -120,13 +119,11 @@ class Planner:
             if point.solved:
                 point = grow(schedule, half.transcription, point, self.guess(t))
             if point.solved:
-                return search_neighbourhood(schedule, point, rounds - 1, best=point)
-        return self._searched_nearby(schedule, find(schedule, self.guess(t)))
+                return point
+        return self._fixed(schedule, find(schedule, self.guess(t)))
 
-    def _searched_nearby(self, schedule: Schedule, point: Iterate) -> Iterate:
-        if not point.solved:
-            return point
-        return search_neighbourhood(schedule, point, self.task.solver.valve_search)
+    def _fixed(self, schedule: Schedule, point: Iterate) -> Iterate:
+        return fix(schedule, point) if point.solved else point
 
     def _finish(self, schedule: Schedule, point: Iterate) -> tuple[Transcription, Iterate]:
         point = tighten(schedule, point) if point.solved else point

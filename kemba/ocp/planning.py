@@ -15,7 +15,7 @@ from kemba.ocp.certificate.status import Status
 from kemba.ocp.continuation.between import Origin
 from kemba.ocp.continued import continued, from_scratch, with_grip
 from kemba.ocp.finer import found_and_refined
-from kemba.ocp.guesses import Guess, guesses
+from kemba.ocp.guesses import StartGuess, guesses
 from kemba.ocp.infeasibility.checks import check_task
 from kemba.ocp.infeasibility.diagnostic import Diagnostic
 from kemba.ocp.infeasibility.explain import Explanation, explanation, refusal
@@ -110,7 +110,7 @@ class Planning:
             found, why = continued(self.planner, origin)
         return found and self._timed(found), why
 
-    def _from_guess(self, guess: Guess) -> Plan:
+    def _from_guess(self, guess: StartGuess) -> Plan:
         refused = self.refused
         task = self.planner.task
         begins = task.model_copy(update=guess.update)

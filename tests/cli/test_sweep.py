@@ -139,7 +139,7 @@ def test_a_real_sweep_is_solved_and_not_repeated(
     for case in cases:
         height = float(case["values"]["height"].removesuffix(" m"))
         assert 0.5 <= height <= 0.52 and case["apex_m"] == pytest.approx(height, abs=1e-3)
-        assert case["start"].startswith("shipped: ") and case["refined"] and case["replays"]
+        assert case["start"].startswith("guess") and case["refined"] and case["replays"]
     again = CliRunner().invoke(app, ["sweep", "s.yaml", "--jobs", "1", "--json"])
     assert again.exit_code == 0 and json.loads(again.stdout)["good"]
     assert {p.name: p.read_bytes() for p in Path("sweeps/test/cases").iterdir()} == kept

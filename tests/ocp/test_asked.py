@@ -127,9 +127,7 @@ def test_an_execution_may_be_late_where_a_bound_begins() -> None:
 @pytest.mark.parametrize(
     ("place", "value"), [("end.*/piston/x", "30 mm"), ("end.*/foot/z", "5 cm")]
 )
-def test_an_end_is_kept_or_told(
-    tmp_path: Path, place: str, value: str
-) -> None:
+def test_an_end_is_kept_or_told(tmp_path: Path, place: str, value: str) -> None:
     """Both were once dropped, because the order of contacts decides them."""
     words = ["solve", "jump.yaml", "--set", f"{place}={value}", "--no-figure", "--json"]
     done = CliRunner().invoke(app, [*words, "--out", str(tmp_path / "run"), "--time-limit", "60"])

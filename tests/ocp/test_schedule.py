@@ -64,13 +64,6 @@ def test_what_does_not_grow_starts_from_the_guess() -> None:
     assert found.attempts[-2].ending is Ending.ITERATION_LIMIT
 
 
-@pytest.mark.parametrize(("rounds", "least", "most"), [(0, 0, 0), (1, 1, 1), (3, 2, 3)])
-def test_switches_move_as_often_as_asked(rounds: int, least: int, most: int) -> None:
-    found, solves = told("jump", "nodes=50", "refine=none", f"solver.valve_search={rounds}")
-    assert found.status is Status.SOLVED
-    assert least <= sum(solve.startswith("move switches") for solve in solves) <= most
-
-
 @pytest.mark.parametrize(
     ("limit", "ending"),
     [

@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from kemba_cli.main import app
 from typer.testing import CliRunner
 
 from kemba.ocp import load_task, task_model
 from kemba.solve.kind import NEAR, distance, figures_of, kind_of
 from kemba.solve.memory import NAME, best_known, list_file, recalled
+from kemba_cli.main import app
 
 
 def solve(folder: Path, *words: str) -> dict[str, Any]:

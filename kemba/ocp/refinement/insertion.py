@@ -7,24 +7,20 @@ gradient of a switched system (Egerstedt, Wardi and Axelsson, IEEE TAC 51, 2006)
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
 
-from kemba.ocp.nlp.ipopt import Iterate
+from kemba.ocp.nlp.ipopt import Control, Iterate
 from kemba.ocp.nlp.stagnation import Stagnation
 from kemba.ocp.phases.modes import Phase
 from kemba.ocp.phases.program import PhaseProgram
-from kemba.ocp.phases.radau import RADAU5, STATE
+from kemba.ocp.phases.radau import STATE
 from kemba.ocp.phases.settings import Refining
 from kemba.ocp.refinement.solve import solve, warm
 from kemba.ocp.transcription.layout import STEP
-
-if TYPE_CHECKING:
-    from kemba.ocp.refinement.refine import Refined, Refiner
 
 Solution = tuple[PhaseProgram, Iterate]
 
@@ -121,41 +117,37 @@ def transferred(old: PhaseProgram, x: np.ndarray, new: PhaseProgram) -> np.ndarr
     return np.clip(y, new.lower[: b.size], new.upper[: b.size])
 
 
-def improved(refiner: Refiner, found: Refined) -> Refined:
-    """A solved plan with pulses put in, one after the other, while they lower its cost.
+def with_pulses(
+    program: PhaseProgram,
+    start: Iterate,
+    build: Callable[[Sequence[Phase]], PhaseProgram],
+    control: Control,
+) -> Solution | None:
+    """A program solved from a start near its solution, with pulses put in, one after the other,
+    while they lower its cost; None where it has no solution near.
 
-    A pulse that takes the motion off its order of contacts and stops has no solution near; after
-    a few such the plan is left as it is.
+    `build` makes the program of other phases on the same elements. A pulse that takes the motion
+    off its order of contacts and stops has no solution near; after a few such the plan is left as
+    it is.
     """
-    stages, start = found.stages, found.trajectory
-    if stages is None or start is None:
-        return found
-    refiner.tell("phases: pulses that lower the cost")
-    program, _ = refiner.build(stages.phases, start, RADAU5)
-    x = stages.start(program)
-    best = None if x is None else _solved(refiner, program, stages.iterate(program, x))
-    if best is None:
-        return found
-    left, failed = pulses(*best), 0
-    while left and failed < FAILS:
+    best = _solved(program, start, control)
+    left, failed = [] if best is None else pulses(*best), 0
+    while best is not None and left and failed < FAILS:
         (program, solution), pulse = best, left.pop(0)
         least = PAYS * abs(solution.objective)
         if pulse.gain < least:
             break
-        longer, _ = refiner.build(inserted(program.phases, pulse), start, RADAU5)
-        new = _solved(refiner, longer, Iterate(transferred(program, solution.Y, longer)))
+        longer = build(inserted(program.phases, pulse))
+        new = _solved(longer, Iterate(transferred(program, solution.Y, longer)), control)
         if new is not None and new[1].objective < solution.objective - least:
             best, left = new, pulses(*new)
         else:
             failed += 1
-    made = refiner.read(*best)
-    kept = made.certificate is not None and made.certificate.within(refiner.task.tolerances)
-    return made if kept else found
+    return best
 
 
-def _solved(refiner: Refiner, program: PhaseProgram, start: Iterate) -> Solution | None:
+def _solved(program: PhaseProgram, start: Iterate, control: Control) -> Solution | None:
     """A program with its solution; None where it has none near."""
     stagnation = Stagnation(PATIENCE, UNDERWAY, Refining.current().slow)
-    found = solve(program, start, warm(ITERATIONS), refiner.control, stagnation)
-    refiner.iterations += found.iterations
+    found = solve(program, start, warm(ITERATIONS), control, stagnation)
     return (program, found) if found.solved else None

@@ -21,7 +21,7 @@ from kemba.ocp.phases.radau import RADAU3, RADAU5, STATE, Scheme
 from kemba.ocp.phases.requirements import add_requirements
 from kemba.ocp.phases.settings import Elements, Refining, Repair
 from kemba.ocp.phases.stages import Stages
-from kemba.ocp.refinement.insertion import improved
+from kemba.ocp.refinement.insertion import with_pulses
 from kemba.ocp.refinement.repair import misfit, repaired, simplified
 from kemba.ocp.refinement.sample import certificate, to_trajectory
 from kemba.ocp.refinement.solve import rough, solve, warm
@@ -141,7 +141,22 @@ class Refiner:
                 found = self.repair(phases, found)
             if found.done:
                 break
-        return replace(improved(self, found), iterations=self.iterations)
+        return replace(self.improved(found), iterations=self.iterations)
+
+    def improved(self, found: Refined) -> Refined:
+        """A solved plan with the pulses of valves that lower its cost."""
+        stages, start = found.stages, found.trajectory
+        if stages is None or start is None:
+            return found
+        self.tell("phases: pulses that lower the cost")
+        program, _ = self.build(stages.phases, start, RADAU5)
+        x = stages.start(program)
+        assert x is not None
+        begin = stages.iterate(program, x)
+        best = with_pulses(program, begin, lambda p: self.build(p, start, RADAU5)[0], self.control)
+        made = found if best is None else self.read(*best)
+        kept = made.certificate is not None and made.certificate.within(self.task.tolerances)
+        return made if kept else found
 
     def repair(self, phases: list[Phase], found: Refined) -> Refined:
         """The solution on phases repaired until their modes fit, else how the last try ended."""

@@ -11,7 +11,7 @@ from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.nlp.ipopt import Bounds, Iterate, warm
 from kemba.ocp.nlp.stagnation import Stagnation
 from kemba.ocp.relaxation.session import Schedule
-from kemba.ocp.relaxation.settings import Ends, Relaxation, Starts, ValveSearch
+from kemba.ocp.relaxation.settings import Ends, Grids, Relaxation, Starts
 from kemba.ocp.transcription.parameters import Parameters
 from kemba.ocp.transcription.transcribe import Transcription
 
@@ -106,7 +106,7 @@ def move(schedule: Schedule, start: Iterate, eps: float | None = None, **more: A
 
 def _released(valves: dict[int, np.ndarray]) -> dict[int, Bounds]:
     """Bounds of the valve columns: free near their switches, fixed elsewhere."""
-    reach, bounds = ValveSearch.current().reach, {}
+    reach, bounds = Grids.current().reach, {}
     for column, u in valves.items():
         near = np.zeros(len(u), dtype=bool)
         for k in np.flatnonzero(np.diff(u)):

@@ -100,10 +100,6 @@ class Ends(Settings):
         200, "1", "limit of the first solve on a finer grid; valves that fit take 20 to 100",
         "derived: twice the longest seen", decides=True,
     )  # fmt: skip
-    moved_iterations: int = setting(
-        80, "1", "limit of a solve with moved switches; plans that take longer are seldom better",
-        CHOSEN, decides=True,
-    )  # fmt: skip
     stagnation_iterations: int = setting(
         40, "1", "iterations without a smaller violation, after which a finer grid's valves do not "
         "fit", CHOSEN, decides=True,
@@ -117,14 +113,11 @@ class Ends(Settings):
     )  # fmt: skip
 
 
-class ValveSearch(Settings):
-    """How valve switches are moved, and on which grids valves are sought."""
+class Grids(Settings):
+    """On which grids valves are sought, and how far their switches move where a plan of half a
+    robot becomes one of the whole."""
 
-    reach: int = setting(4, "1", "nodes by which a switch may move at a time", CHOSEN, decides=True)
-    pays: float = setting(
-        0.02, "1", "relative fall of the cost that makes another round worth while",
-        "convention: plans of one task differ by more from start to start", decides=True,
-    )  # fmt: skip
+    reach: int = setting(4, "1", "nodes by which a switch may move", CHOSEN, decides=True)
     coarsest: int = setting(24, "1", "nodes of the coarsest grid", CHOSEN, decides=True)
     finest: int = setting(
         80, "1", "nodes of the finest grid on which valves are sought", CHOSEN, decides=True

@@ -144,7 +144,6 @@ class Solver(Section):
     max_iterations: Annotated[int, Field(ge=1)] = 3000
     symmetry: bool = True
     coarse: bool = True
-    valve_search: Annotated[int, Field(ge=0)] = 1
     complementarity: Annotated[float, Param("1", lower=1e-7, upper=1e-3)] = 1e-6
     options: dict[str, float | int | str] = Field(default_factory=dict)
 
