@@ -87,7 +87,7 @@ class Copy:
         # files change within a second, which compiled Python does not see; solvers' code is not
         # compiled and the plant's is kept here, for every bug would leave code of its own in the
         # user's cache
-        setting = {"PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1", "KEMBA_COMPILE": "0"}
+        setting = {"PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1"}
         setting["KEMBA_CACHE"] = str(self.root.parent / "cache")
         return subprocess.Popen(
             [sys.executable, str(LIST.with_name("mutants_server.py"))],

@@ -125,6 +125,25 @@ def lock_folder(folder: Path) -> BaseFileLock | None:
     return lock
 
 
+@contextmanager
+def alone(folder: str | None) -> Iterator[None]:
+    """Other processes wait here for the same folder; where it cannot be locked, or is None, nobody
+    does."""
+    from filelock import FileLock
+
+    lock = None if folder is None else FileLock(Path(folder) / LOCK)
+    try:
+        if lock is not None:
+            lock.acquire()
+    except (OSError, NotImplementedError):
+        lock = None
+    try:
+        yield
+    finally:
+        if lock is not None:
+            lock.release()
+
+
 def unlock(lock: BaseFileLock | None, folder: Path) -> None:
     """Release a folder."""
     if lock is not None:

@@ -6,7 +6,6 @@ the multi-phase program of the plan, from the plan.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,7 +19,6 @@ from kemba.files import write_error
 from kemba.folders import fresh
 from kemba.model import Model
 from kemba.ocp import Task, load_task, task_model
-from kemba.ocp.functions.settings import Functions
 from kemba.ocp.nlp.program import Program
 from kemba.ocp.planner import Planner
 from kemba.ocp.relaxation.settings import Relaxation
@@ -28,7 +26,6 @@ from kemba.ocp.task.resolve import resolve
 from kemba.ocp.transcription.parameters import Parameters
 from kemba.runs import load_run, write_json
 from kemba.sensitivity.replanned import PlanProgram
-from kemba.settings import changed
 from kemba.trajectory import Trajectory
 
 FUNCTIONS = ("nlp", "grad_f", "jac_g", "hess_lag")
@@ -119,9 +116,8 @@ def export_nlp(source: Path, folder: Path, force: bool = False) -> list[Path]:
     for name in names:
         for ending in (".casadi", ".json"):
             fresh(folder / f"{name}{ending}", force)
-    with changed(Functions, large=sys.maxsize):  # compiled code would not travel
-        listed = list(programs(task, document, plan))
-        return [path for named in listed for path in write_program(named, folder)]
+    listed = list(programs(task, document, plan))
+    return [path for named in listed for path in write_program(named, folder)]
 
 
 def _finite(values: np.ndarray) -> list[float | None]:

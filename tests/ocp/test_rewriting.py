@@ -114,7 +114,7 @@ def test_damping_adds_the_same_curvature_everywhere() -> None:
 def test_equal_blocks_share_their_functions_and_others_do_not() -> None:
     def code(factor: float) -> Code:
         z, p = ca.SX.sym("z", 2), ca.SX.sym("p")
-        return code_of(z, p, p * z[0] ** 2, ca.sin(factor * z[1]), worth_compiling=True)
+        return code_of(z, p, p * z[0] ** 2, ca.sin(factor * z[1]), shared=True)
 
     first, same, other = code(3.7), code(3.7), code(3.8)
     assert same is first
@@ -127,17 +127,17 @@ def test_equal_blocks_share_their_functions_and_others_do_not() -> None:
 def test_only_so_many_blocks_are_kept() -> None:
     z, p = ca.SX.sym("z"), ca.SX.sym("p", 0)
     with changed(Functions, kept=2):
-        first = code_of(z, p, z, z + 1.5, worth_compiling=True)
+        first = code_of(z, p, z, z + 1.5, shared=True)
         for k in range(3):
-            code_of(z, p, z, z + 2.5 + k, worth_compiling=True)
-        assert code_of(z, p, z, z + 1.5, worth_compiling=True) is not first
+            code_of(z, p, z, z + 2.5 + k, shared=True)
+        assert code_of(z, p, z, z + 1.5, shared=True) is not first
 
 
 def test_problems_that_differ_by_bounds_only_are_made_once() -> None:
     def problem(factor: float, last: int = 2) -> BlockProblem:
         z = ca.SX.sym("z", 2)
         block = RowBlock(z, ca.sin(factor * z[1]), z[0] ** 2, np.array([[0, 1], [1, last]]))
-        return block_problem([block], 4, ca.SX(0, 1), worth_compiling=True)
+        return block_problem([block], 4, ca.SX(0, 1), shared=True)
 
     problem(2.7).hess_lag(0, 0, 1, 1)  # its functions are made, and compiled once they are large
     kept = problem(2.7)

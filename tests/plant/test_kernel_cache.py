@@ -1,5 +1,6 @@
 """The compiled kernel on disk: a missing or damaged cache only costs time."""
 
+import os
 import stat
 from pathlib import Path
 
@@ -7,6 +8,7 @@ import numba
 import pytest
 
 from kemba.plant.kernel import jit
+from kemba.plant.simulation import loading
 
 
 def twice(x: float) -> float:
@@ -15,7 +17,9 @@ def twice(x: float) -> float:
 
 def test_what_was_compiled_is_loaded_again(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(jit, "FOLDER", str(tmp_path))
+    assert not jit.is_kept("twice")
     assert jit.entry(twice)(2.0) == 4.0
+    assert jit.is_kept("twice")
     (kept,) = tmp_path.rglob("*.nbc")
     before = kept.stat().st_mtime_ns
     again = jit.entry(twice)
@@ -59,3 +63,39 @@ def test_numbas_own_settings_stay() -> None:
     before = numba.config.OPT, numba.config.CACHE_DIR, numba.config.LOOP_VECTORIZE
     jit.entry(twice)(3.0)
     assert before == (numba.config.OPT, numba.config.CACHE_DIR, numba.config.LOOP_VECTORIZE)
+
+
+def test_a_user_without_a_home_has_no_folder(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("KEMBA_CACHE", "XDG_CACHE_HOME"):
+        monkeypatch.delenv(name, raising=False)
+
+    def nowhere() -> Path:
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.setattr(Path, "home", nowhere)
+    assert jit.find_folder() is None
+
+
+@pytest.mark.skipif(os.name != "posix" or os.geteuid() != 0, reason="only root can give away")
+def test_a_folder_of_another_user_is_not_used(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("KEMBA_CACHE", str(tmp_path))
+    assert jit.find_folder() is not None
+    os.chown(tmp_path, 12345, 12345)
+    assert jit.find_folder() is None
+
+
+def test_the_first_time_a_second_process_compiles(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    started: list[None] = []
+    monkeypatch.setattr(loading, "_compiler", lambda: started.append(None))
+    monkeypatch.setattr(jit, "FOLDER", str(tmp_path))
+    loading._load()
+    assert len(started) == 1
+    (tmp_path / "play.play-46.py311.1.nbc").touch()
+    loading._load()
+    monkeypatch.setattr(jit, "FOLDER", None)
+    loading._load()
+    assert len(started) == 1

@@ -1,1 +1,1 @@
-"""CasADi functions of a program: blocks, exact sparse derivatives, compiled code."""
+"""CasADi functions of a program: blocks, exact sparse derivatives."""

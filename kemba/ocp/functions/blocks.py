@@ -46,7 +46,7 @@ class BlockProblem:
     """min sum f, g stacked block by block, with Jacobian and Hessian given exactly.
 
     `nlp`, `grad_f`, `jac_g`, `hess_lag` are what `ca.nlpsol` asks for, made when first asked for,
-    as compiled code where that is worth while; `g`: (x, p) -> (rows,).
+    `g`: (x, p) -> (rows,).
     """
 
     def __init__(self, blocks: Sequence[PlacedBlock], size: int, parameters: int) -> None:
@@ -132,22 +132,22 @@ _kept: Recent[tuple[object, ...], BlockProblem] = Recent()  # by code and column
 
 
 def block_problem(
-    blocks: Sequence[RowBlock], size: int, p: ca.SX, worth_compiling: bool = False
+    blocks: Sequence[RowBlock], size: int, p: ca.SX, shared: bool = False
 ) -> BlockProblem:
     """The problem of `blocks` in `size` variables, with parameters p.
 
-    `worth_compiling`: many solves are ahead. Then a problem that differs from an earlier one of the
-    process by bounds only, such as a jump to another height, is that one.
+    `shared`: many solves are ahead. Then a problem that differs from an earlier one of the process
+    by bounds only, such as a jump to another height, is that one.
     """
-    codes = [code_of(b.z, p, b.f, b.g, worth_compiling) for b in blocks]
+    codes = [code_of(b.z, p, b.f, b.g, shared) for b in blocks]
     placed = [PlacedBlock(c, b.columns) for c, b in zip(codes, blocks, strict=True)]
 
     def make() -> BlockProblem:
         return BlockProblem(placed, size, p.numel())
 
-    parts = ((b.code, b.code.made, b.columns.shape, b.columns.tobytes()) for b in placed)
+    parts = ((b.code, b.columns.shape, b.columns.tobytes()) for b in placed)
     key = (size, p.numel(), *parts)
-    return _kept.get(key, make, Functions.current().problems) if worth_compiling else make()
+    return _kept.get(key, make, Functions.current().problems) if shared else make()
 
 
 def _gather(x: ca.MX, columns: np.ndarray) -> ca.MX:

@@ -14,7 +14,6 @@ import casadi as ca
 import numpy as np
 
 from kemba.cache import Recent
-from kemba.ocp.functions.compiled import compiled
 from kemba.ocp.functions.constants import parameterised
 from kemba.ocp.functions.settings import Functions
 from kemba.ocp.functions.signs import canonical_signs
@@ -26,7 +25,6 @@ class Code:
     """Rows `g` (m,) and cost `f` of the local variables `z` (n,) and of what is `given` (k,).
 
     `given` are the parameters of the problem, then the constants with the values `numbers`.
-    `worth_compiling`: many solves are ahead.
     """
 
     z: ca.SX
@@ -34,9 +32,7 @@ class Code:
     f: ca.SX
     g: ca.SX
     numbers: np.ndarray
-    worth_compiling: bool
     _mapped: dict[tuple[int, str], list[ca.Function]] = field(default_factory=dict)
-    _compiled: list[ca.Function] = field(default_factory=list)  # once there is a library
 
     @cached_property
     def multipliers(self) -> tuple[ca.SX, ca.SX]:
@@ -66,25 +62,7 @@ class Code:
     def at(self, points: int) -> list[ca.Function]:
         """At `points` side by side: cost, rows, the cost's slope, the rows' Jacobian, the
         Lagrangian's Hessian; see `_functions` for one point."""
-        functions = self._best
-        return self._at(points, functions[-1].class_name(), functions)
-
-    @property
-    def made(self) -> str:
-        """Which kind of functions there is by now, "" for none: that of an equal block may be
-        compiled meanwhile."""
-        return str(self._best[-1].class_name()) if "_functions" in self.__dict__ else ""
-
-    @property
-    def _best(self) -> list[ca.Function]:
-        """The functions for one point, compiled where there is a library by now."""
-        plain = functions = self._functions
-        large = plain[-1].n_instructions() > Functions.current().large
-        if self.worth_compiling and large:
-            functions = self._compiled or plain[:2] + compiled(plain[2:])
-            if functions[-1] is not plain[-1]:
-                self._compiled[:] = functions
-        return functions
+        return self._at(points, "all", self._functions)
 
     def _at(self, points: int, name: str, functions: list[ca.Function]) -> list[ca.Function]:
         if (points, name) not in self._mapped:
@@ -109,16 +87,16 @@ class Code:
 _kept: Recent[str, Code] = Recent()  # by the text of a block's functions
 
 
-def code_of(z: ca.SX, p: ca.SX, f: ca.SX, g: ca.SX, worth_compiling: bool) -> Code:
+def code_of(z: ca.SX, p: ca.SX, f: ca.SX, g: ca.SX, shared: bool) -> Code:
     """The code of cost f and rows g of z and parameters p.
 
-    Where it is `worth_compiling`, constants become parameters, so that equal blocks share one
-    library, and parts that differ only in sign are written once; the code of an equal block is
-    used again.
+    Where it is `shared`, constants become parameters, so that blocks which differ in numbers are
+    equal, and parts that differ only in sign are written once; the code of an equal block is used
+    again.
     """
     g = ca.densify(g)
-    if not worth_compiling:
-        return Code(z, p, f, g, np.zeros(0), False)
+    if not shared:
+        return Code(z, p, f, g, np.zeros(0))
     text = ca.Function("block", [z, p], [f, g]).serialize()
     return _kept.get(text, lambda: _rewritten(z, p, f, g), Functions.current().kept)
 
@@ -126,7 +104,7 @@ def code_of(z: ca.SX, p: ca.SX, f: ca.SX, g: ca.SX, worth_compiling: bool) -> Co
 def _rewritten(z: ca.SX, p: ca.SX, f: ca.SX, g: ca.SX) -> Code:
     (f, g), constants, numbers = parameterised([z, p], [f, g])
     f, g = canonical_signs([z, p, constants], [f, g])
-    return Code(z, ca.vertcat(p, constants), f, g, numbers, True)
+    return Code(z, ca.vertcat(p, constants), f, g, numbers)
 
 
 def _column(matrix: ca.SX) -> ca.SX:

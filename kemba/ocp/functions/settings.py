@@ -1,4 +1,4 @@
-"""Settings for Newton steps, warm starts and compiled functions."""
+"""Settings for Newton steps, warm starts and functions."""
 
 from __future__ import annotations
 
@@ -34,14 +34,6 @@ class Functions(Settings):
     few: int = setting(
         8, "1", "points at which evaluating one by one is as fast as all at once",
         "tuned: timed when written, code not kept",
-    )  # fmt: skip
-    large: int = setting(
-        1000, "1", "instructions of a Hessian block that make compiling worth while",
-        "tuned: timed when written, code not kept",
-    )  # fmt: skip
-    stale: float = setting(
-        600.0, "s", "age of an unfinished compilation that is thought dead",
-        "convention: ten minutes",
     )  # fmt: skip
     problems: int = setting(
         8, "1", "programs that are kept for equal ones of the process",

@@ -242,7 +242,7 @@ class PhaseProgram:
     def problem(self) -> BlockProblem:
         """The functions for IPOPT."""
         blocks = [RowBlock(part.z, part.g, part.f, part.columns) for part in self.parts]
-        return block_problem(blocks, self.columns.size, ca.SX(0, 1), worth_compiling=True)
+        return block_problem(blocks, self.columns.size, ca.SX(0, 1), shared=True)
 
     @cached_property
     def parts(self) -> list[PhasePart]:

@@ -99,7 +99,7 @@ class Transcription:
             g_bounds += [(rows.lower, rows.upper)] * len(where) * len(rows.labels)
         self.meanings = meanings
         self.g_lower, self.g_upper = (np.array(b) for b in zip(*g_bounds, strict=True))
-        self.problem = block_problem(blocks, index.size, p, worth_compiling=True)
+        self.problem = block_problem(blocks, index.size, p, shared=True)
 
     def _rest_before_start(self) -> None:
         """Inputs and forces of node 0 are fixed at zero and its step at the nominal one."""

@@ -1,6 +1,7 @@
 """The compiler's switch, and the folder that keeps what it made.
 
-The first simulation on a machine waits for the compiler, later ones load what it made. Code is
+The first simulation on a machine waits for the compiler, later ones and other processes load what
+it made. Code is
 loaded only from a folder that belongs to the user and that nobody else can write; without one
 every process compiles anew.
 """
@@ -19,6 +20,7 @@ import numba
 from numba import njit
 
 from kemba.cache import cache_folder, is_own
+from kemba.folders import alone
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 LEAN = {"error_model": "numpy", "_nrt": False}  # IEEE division; no counting of references
@@ -51,7 +53,7 @@ def entry(function: Function) -> Function:
     def call(*arguments: Any) -> Any:
         nonlocal made
         if not made.overloads:
-            with _COMPILING, _settings():
+            with _COMPILING, _settings(), alone(FOLDER):
                 types = tuple(numba.typeof(value) for value in arguments)
                 try:
                     made.compile(types)
@@ -62,6 +64,11 @@ def entry(function: Function) -> Function:
 
     call.__dict__["dispatcher"] = made
     return cast(Function, call)
+
+
+def is_kept(name: str) -> bool:
+    """Whether the folder holds machine code of a function of the kernel."""
+    return FOLDER is not None and any(Path(FOLDER).rglob(f"*.{name}-*.nbc"))
 
 
 @contextmanager
