@@ -65,7 +65,8 @@ def _gaps(program: PhaseProgram, view: View, i: int, constraint: Constraint) -> 
         program.mode_constraint(i, "lands", view.z("q v"), own * rate, -soft / SPEED, INF, late)
     program.mode_constraint(i, "touch", view.z("q"), g, 0.0, 0.0, touching)
     if constraint.friction is not None:
-        low = -settings.lands / SPEED
+        least = settings.lands if soft is None else min(settings.lands, soft / 2)
+        low = -least / SPEED
         program.mode_constraint(i, "approach", view.z("q v"), rate, -INF, low, list(hits.values()))
 
 
