@@ -50,7 +50,7 @@ class ModeConstraints(Settings):
     )  # fmt: skip
     lands: float = setting(
         0.3, "m.s-1", "least speed at which a foot comes down, or half of the most that the task "
-        "allows: one that is slower by 0.2 is stopped on its way by a valve, and touches 3 ms later",
+        "allows; at 0.1 m/s a pulse of a valve stops it on its way, and it touches 3 ms later",
         "tuned: jumps of 0.55 to 0.77 m; at 0.1 m/s that of 0.77 m came down 2.8 ms late",
         decides=True,
     )  # fmt: skip
