@@ -12,7 +12,13 @@ from kemba.ocp import controller_table, load_task
 from kemba.ocp.planning import plan
 from kemba.plant import execute
 from kemba.plant.execution.moved_edges import edges_of, moves, shared_edges, with_moved
-from kemba.plant.execution.retiming import ExecutedTable, RetimingSettings, executed_table, retimed
+from kemba.plant.execution.retiming import (
+    ExecutedTable,
+    RetimingSettings,
+    Roundings,
+    executed_table,
+    retimed,
+)
 from kemba.settings import changed
 from kemba.trajectory import Trajectory
 
@@ -86,3 +92,18 @@ def test_valves_stay_zero_or_one(column: str) -> None:
     run = solved("jump")
     mended = retimed(run.model, run.plan, late(controller_table(run.model, run.plan), 3)).table
     assert set(np.unique(mended[column])) <= {0.0, 1.0}
+
+
+def test_an_execution_with_other_flights_tells_no_slopes() -> None:
+    """Two flights where the plan has one: nothing to compare, and no error."""
+    run = solved("jump")
+    table = controller_table(run.model, run.plan)
+    errors = iter([np.full(3, 2.0), *([np.full(6, 1.5)] * 20)])
+
+    def executed(tried: Trajectory) -> ExecutedTable:
+        signed = next(errors)
+        return ExecutedTable(tried, None, signed, float(signed.max()))
+
+    search = Roundings(executed, 10)
+    best = search.around(search.tried(table), shared_edges(table))
+    assert best.error == 1.5

@@ -119,7 +119,7 @@ class Roundings:
             found = self.tried(table) if table is not None else None
             if found is None or not found.lands:
                 continue
-            if start.lands:
+            if start.lands and found.signed.shape == start.signed.shape:  # the same flights
                 effects.seen(ticks, found.signed, alone)
             if found.error < best.error:
                 best = found
