@@ -45,6 +45,8 @@ class Plan:
     continued: bool | None = None  # whether it comes from an earlier plan, where one was given
     start: str = "guess"  # or the run from which it begins
     stages: Stages | None = field(default=None, repr=False, compare=False)  # of a refined plan
+    # the same before pulses of valves were put in
+    plain: Plan | None = field(default=None, repr=False, compare=False)
 
     @property
     def iterations(self) -> int:

@@ -99,7 +99,10 @@ class Planning:
                 planner.session.tell("another guess")
             found = self._from_guess(guess if planner.start is None else replace(guess, pulse=0.0))
             found = from_scratch(found, failed) if failed else found
-            yield replace(found, start=f"guess {number + 1}" if number else found.start)
+            start = f"guess {number + 1}" if number else found.start
+            yield replace(found, start=start)
+            if found.plain is not None:
+                yield replace(found.plain, start=f"{start}, without further pulses")
             over = planner.session.control.ended() is not None or planner.start is not None
             if over or not found.status.plan or task.refine != "radau":
                 return
@@ -118,14 +121,17 @@ class Planning:
         with self.clock.running():
             found = replace(found_and_refined(planner, refused is not None), task=task)
             if found.status is Status.SOLVED and task.grip < 1.0:
-                found = with_grip(self.planner, found)
-            if found.status is Status.SOLVED and task.clearance:
-                found = clear(found)
+                found = replace(with_grip(self.planner, found), plain=None)
         if not found.status.plan and found.status is not Status.INTERRUPTED:
             own = task, planner.model, planner.outcome, self.diagnostics, self.document
             why = refused or explanation(*own)
             found = found if why is None else explained(found, why)
-        return self._timed(found)
+        plain = found.plain and self._timed(self._clear(replace(found.plain, task=task)))
+        return replace(self._timed(self._clear(found)), plain=plain)
+
+    def _clear(self, found: Plan) -> Plan:
+        asked = found.status is Status.SOLVED and self.planner.task.clearance
+        return clear(found) if asked else found
 
     def _timed(self, found: Plan) -> Plan:
         """A plan with all solves and times up to it."""

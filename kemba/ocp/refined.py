@@ -10,22 +10,22 @@ from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.planned import Plan
 from kemba.ocp.planner import Planner
 from kemba.ocp.refinement import refine
+from kemba.ocp.refinement.refine import Refined
 from kemba.ocp.relaxation.session import Attempt
 
 
 def refined(planner: Planner, found: Plan) -> Plan:
     """The plan on its own phases; where that fails, the same with the reason."""
-    task, model, session = found.task, found.model, planner.session
-    free = task.model_copy(update={"grip": 1.0})  # it comes last, from the plan that is found
-    answer = refine(
-        model,
-        free,
-        found.requirements,
-        found.trajectory,
-        control=session.control,
-        tell=session.tell,
-    )
+    session = planner.session
+    free = found.task.model_copy(update={"grip": 1.0})  # it comes last, from the plan that is found
+    asked = planner.model, free, found.requirements, found.trajectory
+    answer = refine(*asked, control=session.control, tell=session.tell)
     session.attempts.append(Attempt("phases", answer.ending, answer.iterations))
+    made = _judged(found, answer)
+    return made if answer.plain is None else replace(made, plain=_judged(found, answer.plain))
+
+
+def _judged(found: Plan, answer: Refined) -> Plan:
     new, certificate = answer.trajectory, answer.certificate
     if answer.ending is Ending.INTERRUPTED:
         kept = "interrupted while refining, the implicit Euler plan is kept"
@@ -34,16 +34,16 @@ def refined(planner: Planner, found: Plan) -> Plan:
         return _unrefined(found, answer.sentence)
     if certificate.missed:
         return _unrefined(found, missed_of(certificate.missed))
-    if not certificate.within(task.tolerances):
+    if not certificate.within(found.task.tolerances):
         return _unrefined(found, "its result misses the task's tolerances")
-    status, sentence = verdict(task, certificate, new, answer.ending)
+    status, sentence = verdict(found.task, certificate, new, answer.ending)
     return replace(
         found,
         trajectory=new,
         certificate=certificate,
         status=status,
         sentence=f"{sentence}, refined on {len(answer.phases)} phases",
-        cost=costs(model, new),
+        cost=costs(found.model, new),
         refined=True,
         stages=answer.stages,
     )

@@ -88,3 +88,14 @@ def test_a_plan_gets_cheaper_and_stays_what_was_asked() -> None:
     costs = [objective(p.model, p.task, p.requirements, p.trajectory) for p in (before, after)]
     assert costs[1] < 0.5 * costs[0]
     assert after.status == "solved" and after.certificate.within(after.task.tolerances)
+
+
+def test_the_plan_without_pulses_comes_next() -> None:
+    """For executions that do not follow the pulses."""
+    plans = Planning.of(without().task).plans()
+    after, plain = next(plans), next(plans)
+    assert (after.start, plain.start) == ("guess", "guess, without further pulses")
+    assert plain.stages is not None and after.stages is not None
+    assert len(plain.stages.phases) < len(after.stages.phases)
+    costs = [objective(p.model, p.task, p.requirements, p.trajectory) for p in (without(), plain)]
+    assert costs[1] == pytest.approx(costs[0], rel=1e-3) and plain.status == "solved"

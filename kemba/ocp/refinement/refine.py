@@ -47,7 +47,8 @@ class Refined:
     """A plan on phases: its trajectory, what it violates, how the last solve ended, iterations.
 
     `trajectory` and `certificate` are None where no program could be built or solved; `reason`
-    says why a program could not be built. `stages`: the program's solution.
+    says why a program could not be built. `stages`: the program's solution. `plain`: the plan
+    before pulses were put in.
     """
 
     trajectory: Trajectory | None
@@ -57,6 +58,7 @@ class Refined:
     phases: tuple[Phase, ...] = ()
     reason: str = ""
     stages: Stages | None = None
+    plain: Refined | None = None
 
     @property
     def solved(self) -> bool:
@@ -155,8 +157,9 @@ class Refiner:
         begin = stages.iterate(program, x)
         best = with_pulses(program, begin, lambda p: self.build(p, start, RADAU5)[0], self.control)
         made = found if best is None else self.read(*best)
-        kept = made.certificate is not None and made.certificate.within(self.task.tolerances)
-        return made if kept else found
+        if made.certificate is None or not made.certificate.within(self.task.tolerances):
+            return found
+        return made if made.phases == found.phases else replace(made, plain=found)
 
     def repair(self, phases: list[Phase], found: Refined) -> Refined:
         """The solution on phases repaired until their modes fit, else how the last try ended."""
