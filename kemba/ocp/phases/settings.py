@@ -96,7 +96,7 @@ class Refining(Settings):
         decides=True,
     )  # fmt: skip
     near_elastic: float = setting(
-        1.0, "1", "proximal weight of an elastic solve", HAND, decides=True
+        0.01, "1", "proximal weight of an elastic solve", HAND, decides=True
     )
     near_fine: float = setting(
         1.0, "1", "proximal weight of the finer scheme's solve", HAND, decides=True
