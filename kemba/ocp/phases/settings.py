@@ -99,7 +99,7 @@ class Refining(Settings):
         0.01, "1", "proximal weight of an elastic solve", HAND, decides=True
     )
     near_fine: float = setting(
-        1.0, "1", "proximal weight of the finer scheme's solve", HAND, decides=True
+        0.01, "1", "proximal weight of the finer scheme's solve", HAND, decides=True
     )
     rounds: int = setting(6, "1", "elastic solves of one reading", HAND, decides=True)
     iterations_half: int = setting(
@@ -115,7 +115,7 @@ class Refining(Settings):
         60, "1", "iterations of other solves by either scheme", HAND, decides=True
     )
     elastic_iterations: int = setting(
-        100, "1", "iterations of an elastic solve", HAND, decides=True
+        200, "1", "iterations of an elastic solve", HAND, decides=True
     )
     mu: float = setting(1e-4, "1", "barrier parameter of a warm start", HAND, decides=True)
     elastic_mu: float = setting(

@@ -39,7 +39,6 @@ from kemba.stopwatch import Stage, Tell, silent
 from kemba.trajectory import Trajectory
 
 Start = Trajectory | tuple[PhaseProgram, np.ndarray]  # nodes, or the scaled variables of a program
-MUB, MUF = 1e-2, 1e-3
 SOLVES = 3  # of a plan whose phases fit: the nearest, the best, and that more exactly
 
 
@@ -161,11 +160,13 @@ class Refiner:
                 start, found = (program, near.Y), self._ended(program, near)
                 if found.done:
                     return found
+                if not near.solved:
+                    return found
                 wrong = misfits(program, near.Y)
-                if wrong or not near.solved:
+                if wrong:
                     break
             else:
-                return self.written(phases, near)
+                return self.fine(program, near.Y)
             better = repaired(program, wrong, self.marks)
             if better is None:
                 break
@@ -185,7 +186,7 @@ class Refiner:
         settings = Refining.current()
         program, x = self.build(phases, start, RADAU3, settings.price)
         program.keep_short(x, Elements.current().fair)
-        options = {**rough(settings.elastic_iterations), "mu_init": MUB}
+        options = {**rough(settings.elastic_iterations), "mu_init": settings.elastic_mu / 10}
         return program, self._solve(program, program.loosened(x), options)
 
     def finest(self, phases: Sequence[Phase], start: Start) -> tuple[PhaseProgram, Iterate]:
@@ -193,18 +194,8 @@ class Refiner:
         settings = Refining.current()
         program, x = self.build(phases, start, RADAU5, settings.price)
         x = program.loosened(program.proximal(x, settings.near_fine))
-        options = {**warm(settings.elastic_iterations), "mu_init": MUF}
+        options = {**warm(settings.elastic_iterations), "mu_init": settings.elastic_mu / 100}
         return program, self._solve(program, x, options)
-
-    def written(self, phases: Sequence[Phase], found: Iterate) -> Refined:
-        """The plan of a solution by the finer scheme."""
-        program, x = self.build(phases, self.plan, RADAU5)
-        ended = self._ended(program, found)
-        x = found.Y[: len(x)]
-        trajectory = to_trajectory(program, x)
-        measured = certificate(program, x, trajectory)
-        own = Stages.of(program, replace(found, Y=x))
-        return replace(ended, trajectory=trajectory, certificate=measured, stages=own)
 
     def exact(self, phases: Sequence[Phase], start: Start) -> Refined:
         """The solution nearest to the plan by the coarser scheme, then the best one by both."""
@@ -258,7 +249,10 @@ class Refiner:
         ended = self._ended(program, found)
         if not found.solved:
             return ended
-        return self.written(coarser.phases, found)
+        trajectory = to_trajectory(program, found.Y)
+        measured = certificate(program, found.Y, trajectory)
+        own = Stages.of(program, found)
+        return replace(ended, trajectory=trajectory, certificate=measured, stages=own)
 
     def build(
         self, phases: Sequence[Phase], start: Start, scheme: Scheme, elastic: float = 0.0
