@@ -211,15 +211,6 @@ class PhaseProgram:
         self.added.append(PhasePart((), z, nothing, pull, 0.0, 0.0, at))
         return np.concatenate([x, x[index]])
 
-    def keep_short(self, x: np.ndarray, steps: float) -> None:
-        """Bound the elements to `steps` times the nominal step, or to their length in x if longer.
-
-        `x` (size,): scaled variables.
-        """
-        index = self.columns.h[:, 0]
-        longest = self.upper[index] * steps / Elements.current().longest
-        self.upper[index] = np.maximum(longest, x[index])
-
     @property
     def soft(self) -> list[Soft]:
         """The mode constraints that may be violated."""

@@ -19,7 +19,7 @@ from kemba.ocp.phases.modes import Phase, read_phases
 from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.radau import RADAU3, RADAU5, STATE, Scheme
 from kemba.ocp.phases.requirements import add_requirements
-from kemba.ocp.phases.settings import Elements, Refining
+from kemba.ocp.phases.settings import Refining
 from kemba.ocp.phases.stages import Stages
 from kemba.ocp.refinement.repair import misfits, repaired, simplified
 from kemba.ocp.refinement.sample import certificate, to_trajectory
@@ -120,9 +120,7 @@ class Refiner:
     @property
     def left(self) -> int:
         """Iterations that may still be spent."""
-        settings, half = Refining.current(), self.reduction.symmetric
-        most = settings.iterations_half if half else settings.iterations_whole
-        return most - self.iterations
+        return Refining.current().iterations - self.iterations
 
     def run(self) -> Refined:
         """The first reading that solves, else how the last one ended."""
@@ -177,7 +175,7 @@ class Refiner:
         """The elastic program of the coarser scheme, near the start."""
         settings = Refining.current()
         program, x = self.build(phases, start, RADAU3, settings.price)
-        x = program.loosened(program.proximal(x, settings.near_elastic))
+        x = program.loosened(program.proximal(x, settings.near_later))
         options = {**rough(settings.elastic_iterations), "mu_init": settings.elastic_mu}
         return program, self._solve(program, x, options)
 
@@ -185,7 +183,6 @@ class Refiner:
         """The elastic program of the coarser scheme, for the task's cost."""
         settings = Refining.current()
         program, x = self.build(phases, start, RADAU3, settings.price)
-        program.keep_short(x, Elements.current().fair)
         options = {**rough(settings.elastic_iterations), "mu_init": settings.elastic_mu / 10}
         return program, self._solve(program, program.loosened(x), options)
 
@@ -193,7 +190,7 @@ class Refiner:
         """The elastic program of the finer scheme, for the task's cost near the start."""
         settings = Refining.current()
         program, x = self.build(phases, start, RADAU5, settings.price)
-        x = program.loosened(program.proximal(x, settings.near_fine))
+        x = program.loosened(program.proximal(x, settings.near_later))
         options = {**warm(settings.elastic_iterations), "mu_init": settings.elastic_mu / 100}
         return program, self._solve(program, x, options)
 
@@ -202,9 +199,8 @@ class Refiner:
         program, x = self.build(phases, start, RADAU3)
         self.tell(Stage("phases: near the plan", 1, SOLVES))
         settings = Refining.current()
-        half = self.reduction.symmetric
-        iterations = settings.nearest_half if half else settings.rough_iterations
-        found = self._solve(program, program.proximal(x, settings.near), rough(iterations))
+        options = rough(settings.rough_iterations)
+        found = self._solve(program, program.proximal(x, settings.near), options)
         if not found.solved:
             return self._ended(program, found)
         return self.simpler(program, found.Y) or self.finish(program, found.Y)
@@ -223,7 +219,6 @@ class Refiner:
         first."""
         self.tell(Stage("phases: the best plan", 2, SOLVES))
         program, start = self.build(near.phases, self.plan, RADAU3)
-        program.keep_short(x, Elements.current().fair)
         best = self._solve(program, x[: len(start)], rough(Refining.current().rough_iterations))
         found = self._ended(program, best)
         if best.solved:
@@ -243,7 +238,7 @@ class Refiner:
         settings = Refining.current()
         program, _ = self.build(coarser.phases, self.plan, RADAU5)
         start = program.proximal(
-            carried(program, coarser.columns, coarser.scheme.points, x), settings.near_fine
+            carried(program, coarser.columns, coarser.scheme.points, x), settings.near_later
         )
         found = self._solve(program, start, warm(settings.rough_iterations))
         ended = self._ended(program, found)

@@ -14,7 +14,7 @@ import numpy as np
 
 from kemba.ocp.phases.modes import AHEAD, BACK, HELD, OPEN, Phase
 from kemba.ocp.phases.program import PhaseProgram
-from kemba.ocp.phases.settings import Elements, Refining, Repair
+from kemba.ocp.phases.settings import Elements, Refining
 
 
 class Misfit(NamedTuple):
@@ -98,7 +98,7 @@ def simplified(program: PhaseProgram, x: np.ndarray, marks: Sequence[int]) -> li
     phases = list(program.phases)
     for p in range(1, len(phases) - 1):
         around = (phases[p - 1].modes, phases[p + 1].modes)
-        brief = h[p] * phases[p].elements <= Repair.current().collapsed * shortest
+        brief = h[p] * phases[p].elements <= Elements.current().collapsed * shortest
         if brief and phases[p].modes not in around:
             phases[p] = replace(phases[p], modes=_nearest_modes(phases, p))
     found = merged(phases, marks)
