@@ -31,8 +31,8 @@ class Soft:
     """A mode constraint that may be violated.
 
     `constraint`: the index of its unilateral constraint; `kind`: what it asks (gap, slip, ...);
-    `elements` (repeats,): where it holds, that after it for a moment; `above`, `below` (repeats,) or None: columns of the slacks
-    by which it leaves its upper and its lower bound.
+    `elements` (repeats,): where it holds, for a moment the one after it; `above`, `below`
+    (repeats,) or None: columns of the slacks by which it leaves its upper and its lower bound.
     """
 
     constraint: int

@@ -16,6 +16,9 @@ from kemba.ocp.phases.modes import AHEAD, BACK, HELD, OPEN, Phase
 from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.settings import Elements, Refining
 
+FAR = 0.1  # of the worst misfit
+FITS = 10.0  # times the tolerance of rows: a larger slack is no rounding
+
 
 class Misfit(NamedTuple):
     """The mode of a constraint that is violated in an element: what it asks, the side, how far."""
@@ -32,11 +35,11 @@ def misfits(program: PhaseProgram, x: np.ndarray) -> list[Misfit]:
 
     With an exact penalty, slacks of modes that fit are zero to the solver's tolerance.
     """
-    found, fits = [], Refining.current().rough_rows
+    found, fits = [], FITS * Refining.current().rough_rows
     for soft in program.soft:
         for way, side in ((soft.above, 1), (soft.below, -1)):
             for e, size in zip(soft.elements, x[way], strict=True) if way is not None else ():
-                if size > 10 * fits:
+                if size > fits:
                     found.append(Misfit(int(e), soft.constraint, soft.kind, side, float(size)))
     return sorted(found)
 
@@ -46,12 +49,14 @@ def repaired(
 ) -> list[Phase] | None:
     """Phases with other modes where they do not fit; None where nothing is left to change.
 
-    The times of borders are free, so a touch that comes too early comes after the next event: it
-    leaves the whole phase. What follows in the same touch is left, for it may follow from that.
+    What is violated far less than the worst is left, for it may follow from that, and so is what
+    comes later in the same touch. The times of borders are free, so a touch that is too early comes
+    after the next event: it leaves the whole phase.
     """
     modes = np.array([p.modes for p in program.phases for _ in range(p.elements)])
     before, begun = modes.copy(), set()
-    for misfit in found:
+    worst = max((misfit.size for misfit in found), default=0.0)
+    for misfit in (m for m in found if m.size > FAR * worst):
         e, i = misfit.element, misfit.constraint
         own = before[:, i]
         if misfit.kind not in ("touch", "rate", "approach"):
@@ -127,4 +132,3 @@ def _nearest_modes(phases: Sequence[Phase], p: int) -> tuple[int, ...]:
         return (differ or len(other.modes) + 1, -other.elements)
 
     return min(sides, key=distance).modes
-

@@ -70,34 +70,27 @@ def carried(program: PhaseProgram, old: Columns, points: np.ndarray, x: np.ndarr
     c, y = program.columns, np.zeros(program.columns.size)
     knots = np.concatenate([[0.0], points])
     lasting = x[old.h[old.phase_of, 0]]
-    begins = np.concatenate([[0.0], np.cumsum(lasting)])
+    ends = np.concatenate([[0.0], np.cumsum(lasting)])
     same = program.nodes == len(lasting)
-    spans = [(p.first, p.last) for p in (program.phases if same else old.phases)]
     for g in STATE:
         y[c.first[g]] = x[old.first[g]]
-    for p, (phase, (first, last)) in enumerate(zip(program.phases, spans, strict=True)):
-        h = y[c.h[p]] = (begins[last] - begins[first]) / phase.elements
-
-        def at(elements: float, first: int = first, last: int = last, h: float = h):  # type: ignore
-            """The old element in which so many elements of this phase end, and the share of it."""
-            time = begins[first] + elements * h
-            e = int(np.searchsorted(begins[first : last + 1], time - 1e-9 * h)) - 1 + first
-            e = min(max(e, first), last - 1)
-            return e, min(1.0, (time - begins[e]) / lasting[e])
-
+    for p, phase in enumerate(program.phases):
+        span = phase if same else old.phases[p]
+        within = ends[span.first : span.last + 1] - ends[span.first]
+        h = y[c.h[p]] = within[-1] / phase.elements
         for k in range(phase.elements):
             e = phase.first + k
-            y[c.u[e]] = x[old.u[at(k + 0.5)[0]]]
+            y[c.u[e]] = x[old.u[span.first + _element(within, (k + 0.5) * h)[0]]]
             for stage, point in zip(c.stages[e], program.scheme.points, strict=True):
-                there, share = at(k + point)
-                begin, stages = old.begin(there), old.stages[there]
+                at, share = _element(within, (k + point) * h)
+                begin, stages = old.begin(span.first + at), old.stages[span.first + at]
                 states, forces = _lagrange(knots, share), _lagrange(points, share)
                 for g in STATE:
                     y[stage[g]] = states @ np.array([x[begin[g]], *(x[s[g]] for s in stages)])
                 y[stage["lam"]] = forces @ np.array([x[s["lam"]] for s in stages])
         if p in c.after:
-            y[c.after[p]] = x[old.begin(first)["v"]]
-            q = old.starts.get(first)
+            q = old.starts.get(span.first, -1)
+            y[c.after[p]] = x[old.begin(span.first)["v"]]
             y[c.impulse[p]] = x[old.impulse[q]] if q in old.impulse else 0.0
     return np.clip(y, program.lower, program.upper)
 
@@ -110,6 +103,14 @@ def on_elements(program: PhaseProgram, solved: Stages) -> np.ndarray | None:
         return kept
     others = solved.scaled(program)
     return None if others is None else carried(program, others[0], program.scheme.points, others[1])
+
+
+def _element(ends: np.ndarray, time: float) -> tuple[int, float]:
+    """The element in which a time is, and its share of that element in (0, 1]; `ends`
+    (elements + 1,): where the first begins and every one ends."""
+    slack = 1e-9 * ends[-1]
+    at = int(np.clip(np.searchsorted(ends, time - slack) - 1, 0, len(ends) - 2))
+    return at, min(1.0, (time - ends[at]) / (ends[at + 1] - ends[at]))
 
 
 def _lagrange(knots: np.ndarray, point: float) -> np.ndarray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import operator
 from collections.abc import Callable, Sequence
 
 from kemba.errors import suggest
@@ -56,11 +57,14 @@ def _clear_swings(task: Task, model: Model) -> list[Requirement]:
     """The clearance in the middle of what a foot flies between two parts of `contacts`."""
     assert task.clearance is not None
     known, found = quantities(model), []
-    parts = list(zip(task.contacts, spans(task.contacts), strict=True))
     for leg in model.mechanism.legs:
-        for stands, run in itertools.groupby(parts, lambda part: leg in part[0].on):
-            own = [span for _, span in run]
-            begin, end = own[0][0], own[-1][1]
+        parts = [
+            (leg in part.on, *span)
+            for part, span in zip(task.contacts, spans(task.contacts), strict=True)
+        ]
+        for stands, run in itertools.groupby(parts, operator.itemgetter(0)):
+            own = list(run)
+            begin, end = own[0][1], own[-1][2]
             if not stands:
                 middle, half = (begin + end) / 2, FLIGHT * (end - begin) / 2
                 during = middle - half, middle + half
