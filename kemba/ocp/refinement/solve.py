@@ -25,7 +25,7 @@ def solve(
     own = {**program.task.solver.options, **exact(), **options}
     longest = settings.stagnation_iterations, settings.stagnation_near, settings.slow
     if program.elastic > 0.0:  # such a program has a solution
-        longest = np.inf, np.inf, np.inf
+        stagnation = Stagnation(np.inf, 0.0)
     stagnation = stagnation or Stagnation(*longest)
     return Ipopt(program, own, control).solve(start, stagnation=stagnation)
 
