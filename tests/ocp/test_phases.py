@@ -183,6 +183,21 @@ def test_a_contact_that_cannot_be_is_found_and_taken_out() -> None:
     assert repaired(program, violated, tried.marks) == list(found.phases)
 
 
+def test_other_phases_on_the_same_elements_begin_where_the_old_ones_are() -> None:
+    euler, found = both(*CASES[1])
+    assert found.stages is not None
+    tried = refiner(euler)
+    program, _ = tried.build(found.phases, euler.trajectory, RADAU5)
+    x = found.stages.start(program)
+    assert x is not None
+    _, others = wrong_touch(found.phases, tried.marks)
+    split, y = tried.build(others, (program, x), RADAU5)
+    for e in range(program.nodes):
+        for old, new in zip(program.columns.stages[e], split.columns.stages[e], strict=True):
+            for group in ("q", "v", "s"):
+                np.testing.assert_allclose(y[new[group]], x[old[group]], atol=1e-6)
+
+
 def test_merging_keeps_borders_where_the_task_asks_for_something() -> None:
     a, b, c = (Phase(i, i + 1, (0,), (1.0,)) for i in range(3))
     assert merged([a, b, c], []) == [Phase(0, 3, (0,), (1.0,))]
