@@ -100,7 +100,6 @@ class Refining(Settings):
         0.01, "1", "proximal weight of later solves; an elastic program violates modes that can "
         "hold where it is large beside the price", HAND, decides=True,
     )  # fmt: skip
-    rounds: int = setting(6, "1", "elastic solves of one reading", HAND, decides=True)
     iterations: int = setting(800, "1", "of all solves together", HAND, decides=True)
     rough_iterations: int = setting(
         60, "1", "iterations of other solves by either scheme", HAND, decides=True

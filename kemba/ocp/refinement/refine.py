@@ -39,6 +39,7 @@ from kemba.stopwatch import Stage, Tell, silent
 from kemba.trajectory import Trajectory
 
 Start = Trajectory | tuple[PhaseProgram, np.ndarray]  # nodes, or the scaled variables of a program
+UNFIT = "no order of its contacts and stops was found that holds"
 SOLVES = 3  # of a plan whose phases fit: the nearest, the best, and that more exactly
 
 
@@ -148,20 +149,17 @@ class Refiner:
         modes, they are repaired, and the nearest is solved again from there.
         """
         start: Start = self.plan
-        for _ in range(Refining.current().rounds):
-            if phases in self.seen or self.left <= 0:
-                break
+        while phases not in self.seen and self.left > 0:
             self.seen.append(phases)
             self.tell("phases: changing the order of contacts and valves")
             for solved in (self.nearest, self.best, self.finest):
                 program, near = solved(phases, start)
                 start, found = (program, near.Y), self._ended(program, near)
-                if found.done:
-                    return found
                 if not near.solved:
                     return found
                 wrong = misfits(program, near.Y)
                 if wrong:
+                    found = replace(found, reason=UNFIT)
                     break
             else:
                 return self.fine(program, near.Y)
