@@ -96,10 +96,13 @@ class Refining(Settings):
         10.0, "1", "proximal weight of the first solve; without, short steps wander off", HAND,
         decides=True,
     )  # fmt: skip
-    near_later: float = setting(
-        0.01, "1", "proximal weight of later solves; an elastic program violates modes that can "
-        "hold where it is large beside the price", HAND, decides=True,
+    near_elastic: float = setting(
+        0.01, "1", "proximal weight of elastic solves; modes that can hold are violated where it "
+        "is large beside the price", HAND, decides=True,
     )  # fmt: skip
+    near_fine: float = setting(
+        1.0, "1", "proximal weight of the finer scheme's solve", HAND, decides=True
+    )
     iterations: int = setting(800, "1", "of all solves together", HAND, decides=True)
     rough_iterations: int = setting(
         60, "1", "iterations of other solves by either scheme", HAND, decides=True

@@ -173,7 +173,7 @@ class Refiner:
         """The elastic program of the coarser scheme, near the start."""
         settings = Refining.current()
         program, x = self.build(phases, start, RADAU3, settings.price)
-        x = program.loosened(program.proximal(x, settings.near_later))
+        x = program.loosened(program.proximal(x, settings.near_elastic))
         options = {**rough(settings.elastic_iterations), "mu_init": settings.elastic_mu}
         return program, self._solve(program, x, options)
 
@@ -188,7 +188,7 @@ class Refiner:
         """The elastic program of the finer scheme, for the task's cost near the start."""
         settings = Refining.current()
         program, x = self.build(phases, start, RADAU5, settings.price)
-        x = program.loosened(program.proximal(x, settings.near_later))
+        x = program.loosened(program.proximal(x, settings.near_elastic))
         options = {**warm(settings.elastic_iterations), "mu_init": settings.elastic_mu / 100}
         return program, self._solve(program, x, options)
 
@@ -236,7 +236,7 @@ class Refiner:
         settings = Refining.current()
         program, _ = self.build(coarser.phases, self.plan, RADAU5)
         start = program.proximal(
-            carried(program, coarser.columns, coarser.scheme.points, x), settings.near_later
+            carried(program, coarser.columns, coarser.scheme.points, x), settings.near_fine
         )
         found = self._solve(program, start, warm(settings.rough_iterations))
         ended = self._ended(program, found)
