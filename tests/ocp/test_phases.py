@@ -16,10 +16,10 @@ from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.nlp.ipopt import Control
 from kemba.ocp.phases.modes import OPEN, Phase
 from kemba.ocp.phases.radau import RADAU3, RADAU5, Scheme
-from kemba.ocp.phases.settings import ModeConstraints, Refining, Repair
+from kemba.ocp.phases.settings import ModeConstraints, Refining
 from kemba.ocp.refinement import Refined, refine
 from kemba.ocp.refinement.refine import Refiner, reduction_of
-from kemba.ocp.refinement.repair import merged, misfit, repaired
+from kemba.ocp.refinement.repair import merged, misfits, repaired
 from kemba.ocp.transcription.solution import arrays
 from kemba.ocp.transcription.unilateral import read_constraints
 from kemba.plant.execution.replay import replay
@@ -44,7 +44,7 @@ CASES = [
 ]
 QUICK = [CASES[1]]
 MARKS = {case: [] if case in QUICK else [pytest.mark.slow] for case in CASES}
-SOME = "450 iterations are enough on some processors only"  # the rounding of their BLAS decides
+SOME = "800 iterations are enough on some processors only"  # the rounding of their BLAS decides
 MARKS["jump_forward", "distance=0.2 m"] += [pytest.mark.xfail(reason=SOME, strict=False)]
 EVERY = [pytest.param(*case, marks=marks) for case, marks in MARKS.items()]
 
@@ -174,13 +174,26 @@ def test_a_contact_that_cannot_be_is_found_and_taken_out() -> None:
     euler, found = both(*CASES[1])
     tried = refiner(euler)
     k, wrong = wrong_touch(found.phases, tried.marks)
-    program, near = tried.rough(wrong, euler.trajectory)
-    blame = misfit(program, near.Y)
-    phase, constraint = np.unravel_index(int(np.argmax(blame)), blame.shape)
-    assert blame.max() > 10 * Repair.current().fits and constraint == 0
-    assert k in (program.phases[phase].first, program.phases[phase].last)
-    better = repaired(program, near.Y, tried.marks)
-    assert better == list(found.phases)
+    program, near = tried.nearest(wrong, euler.trajectory)
+    violated = misfits(program, near.Y)
+    worst = max(violated, key=lambda misfit: misfit.size)
+    assert (worst.constraint, worst.element, worst.kind) == (0, k, "touch")
+    assert repaired(program, violated, tried.marks) == list(found.phases)
+
+
+def test_other_phases_on_the_same_elements_begin_where_the_old_ones_are() -> None:
+    euler, found = both(*CASES[1])
+    assert found.stages is not None
+    tried = refiner(euler)
+    program, _ = tried.build(found.phases, euler.trajectory, RADAU5)
+    x = found.stages.start(program)
+    assert x is not None
+    _, others = wrong_touch(found.phases, tried.marks)
+    split, y = tried.build(others, (program, x), RADAU5)
+    for e in range(program.nodes):
+        for old, new in zip(program.columns.stages[e], split.columns.stages[e], strict=True):
+            for group in ("q", "v", "s"):
+                np.testing.assert_allclose(y[new[group]], x[old[group]], atol=1e-6)
 
 
 def test_merging_keeps_borders_where_the_task_asks_for_something() -> None:
@@ -217,7 +230,7 @@ def test_refining_ends_at_its_deadline() -> None:
 
 def test_refining_spends_no_more_iterations_than_it_may() -> None:
     euler = euler_plan(*CASES[1])
-    with changed(Refining, iterations_half=7):
+    with changed(Refining, iterations=7):
         found = refine(euler.model, euler.task, euler.requirements, euler.trajectory)
     assert not found.solved and 0 < found.iterations <= 7
 

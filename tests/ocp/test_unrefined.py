@@ -15,8 +15,7 @@ from kemba.settings import changed
 def unrefined(tmp_path_factory: pytest.TempPathFactory) -> Plan:
     """A plan whose refinement is given three iterations."""
     task, document = load_task(plain_task(tmp_path_factory.mktemp("plain")), ["nodes=24"])
-    few = dict.fromkeys(("iterations_half", "nearest_half", "rough_iterations"), 3)
-    with changed(Refining, elastic_iterations=3, rounds=1, **few):
+    with changed(Refining, iterations=3):
         return plan(task, document)
 
 

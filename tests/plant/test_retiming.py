@@ -47,7 +47,7 @@ def test_two_late_edges_of_all_legs_are_found_in_few_executions(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """No single move makes them good."""
-    found = plan(*load_task("jump.yaml", ["height=0.55 m"]))
+    found = plan(*load_task("jump.yaml", ["height=0.48 m"]))
     table = controller_table(found.model, found.trajectory)
     spoilt = with_moved(table, shared_edges(table)[:2], (1, 1))
     assert spoilt is not None

@@ -26,7 +26,7 @@ from kemba.ocp.phases.modes import Phase
 from kemba.ocp.phases.notes import noted_phases
 from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.radau import RADAU5
-from kemba.ocp.phases.settings import Elements, Refining
+from kemba.ocp.phases.settings import Refining
 from kemba.ocp.phases.stages import Stages
 from kemba.ocp.phases.ticks import on_ticks
 from kemba.ocp.refinement.refine import Refined, Refiner, reduction_of, refine, valve_columns
@@ -263,7 +263,6 @@ class Continuation:
         stages = self.solution
         kept = on_elements(program, stages) if stages is not None else None
         x = with_impacts(program, x, Continuing.current().ease) if kept is None else kept
-        program.keep_short(x, Elements.current().fair)
         if self.origin.ticks:
             on_ticks(program, x)
         known = kept is not None

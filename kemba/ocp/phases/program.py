@@ -31,13 +31,13 @@ class Soft:
     """A mode constraint that may be violated.
 
     `constraint`: the index of its unilateral constraint; `kind`: what it asks (gap, slip, ...);
-    `phases` (repeats,): where it holds; `above`, `below` (repeats,) or None: columns of the slacks
-    by which it leaves its upper and its lower bound.
+    `elements` (repeats,): where it holds, for a moment the one after it; `above`, `below`
+    (repeats,) or None: columns of the slacks by which it leaves its upper and its lower bound.
     """
 
     constraint: int
     kind: str
-    phases: np.ndarray
+    elements: np.ndarray
     above: np.ndarray | None
     below: np.ndarray | None
 
@@ -187,7 +187,11 @@ class PhaseProgram:
             own[:, j] if used else None for j, used in ((0, high < INF), (-1, low > -INF))
         )
         g = g - slack[0] * float(high < INF) + slack[-1] * float(low > -INF)
-        soft = Soft(i, kind, np.array([p for p, _ in where]), above, below)
+        nodes = self.columns.nodes()
+        spans = [(self.phases[p].first, self.phases[p].last - 1) for p, _ in where]
+        ends = [nodes[index].max() - 1 for index in columns]
+        elements = np.array([np.clip(e, *span) for e, span in zip(ends, spans, strict=True)])
+        soft = Soft(i, kind, elements, above, below)
         at, price = np.hstack([np.array(columns), own]), self.elastic * ca.sum1(slack)
         self.added.append(PhasePart((label,), ca.vertcat(z, slack), g, price, low, high, at, soft))
 
@@ -206,15 +210,6 @@ class PhaseProgram:
         pull, at = weight / 2 * (z[0] - z[1]) ** 2, np.column_stack([index, fixed])
         self.added.append(PhasePart((), z, nothing, pull, 0.0, 0.0, at))
         return np.concatenate([x, x[index]])
-
-    def keep_short(self, x: np.ndarray, steps: float) -> None:
-        """Bound the elements to `steps` times the nominal step, or to their length in x if longer.
-
-        `x` (size,): scaled variables.
-        """
-        index = self.columns.h[:, 0]
-        longest = self.upper[index] * steps / Elements.current().longest
-        self.upper[index] = np.maximum(longest, x[index])
 
     @property
     def soft(self) -> list[Soft]:

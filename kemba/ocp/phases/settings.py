@@ -67,11 +67,12 @@ class Elements(Settings):
         0.03, "1", "times the nominal step: shortest element", TRIALS, decides=True
     )
     longest: float = setting(
-        3.0, "1", "times the nominal step: longest element", HAND, decides=True
-    )
-    fair: float = setting(
-        2.0, "1", "times the nominal step: longest element of a good solution; on longer ones two "
-        "stages err, for lower costs", TRIALS, decides=True,
+        2.0, "1", "times the nominal step: longest element; on longer ones two stages err, for "
+        "lower costs", TRIALS, decides=True,
+    )  # fmt: skip
+    collapsed: float = setting(
+        3.0, "1", "times the shortest duration: a phase that short has collapsed", TRIALS,
+        decides=True,
     )  # fmt: skip
     vented: float = setting(
         0.01, "1", "of a state's range: room below its lower bound, since a vented chamber stays "
@@ -98,26 +99,18 @@ class Refining(Settings):
         decides=True,
     )  # fmt: skip
     near_elastic: float = setting(
-        1.0, "1", "proximal weight of an elastic solve", HAND, decides=True
-    )
+        0.01, "1", "proximal weight of elastic solves; modes that can hold are violated where it "
+        "is large beside the price", HAND, decides=True,
+    )  # fmt: skip
     near_fine: float = setting(
         1.0, "1", "proximal weight of the finer scheme's solve", HAND, decides=True
     )
-    rounds: int = setting(6, "1", "elastic solves of one reading", HAND, decides=True)
-    iterations_half: int = setting(
-        300, "1", "of all solves together, half a robot", TRIALS, decides=True
-    )
-    iterations_whole: int = setting(
-        450, "1", "of all solves together, whole robot", HAND, decides=True
-    )
-    nearest_half: int = setting(
-        50, "1", "iterations of the first solve, half a robot", HAND, decides=True
-    )
+    iterations: int = setting(800, "1", "of all solves together", HAND, decides=True)
     rough_iterations: int = setting(
         60, "1", "iterations of other solves by either scheme", HAND, decides=True
     )
     elastic_iterations: int = setting(
-        100, "1", "iterations of an elastic solve", HAND, decides=True
+        200, "1", "iterations of an elastic solve", HAND, decides=True
     )
     mu: float = setting(1e-4, "1", "barrier parameter of a warm start", HAND, decides=True)
     elastic_mu: float = setting(
@@ -162,21 +155,4 @@ class Refining(Settings):
     slow: float = setting(
         40.0, "1", "usual iterations whose time long ones may cost together", "tuned: solves that "
         "converged lost 21 at most, those that took a minute 50 to 300", decides=True,
-    )  # fmt: skip
-
-
-class Repair(Settings):
-    """When modes fit, and which of them change."""
-
-    fits: float = setting(3e-4, "1", "scaled: modes with less violation fit", HAND, decides=True)
-    matters: float = setting(
-        0.1, "1", "of the worst misfit: smaller ones are left for the next round", HAND,
-        decides=True,
-    )  # fmt: skip
-    sliver: int = setting(
-        3, "1", "elements: longest phase that is removed first", STEPS, decides=True
-    )
-    collapsed: float = setting(
-        3.0, "1", "times the shortest duration: a phase that short has collapsed", TRIALS,
-        decides=True,
     )  # fmt: skip

@@ -18,7 +18,7 @@ from kemba.ocp.nlp.stagnation import Stagnation
 from kemba.ocp.phases.modes import Phase
 from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.radau import STATE
-from kemba.ocp.phases.settings import Elements, Refining
+from kemba.ocp.phases.settings import Refining
 from kemba.ocp.refinement.solve import solve, warm
 from kemba.ocp.transcription.layout import STEP
 
@@ -149,6 +149,5 @@ def with_pulses(
 def _solved(program: PhaseProgram, start: Iterate, control: Control) -> Solution | None:
     """A program with its solution; None where it has none near."""
     stagnation = Stagnation(PATIENCE, UNDERWAY, Refining.current().slow)
-    program.keep_short(start.Y, Elements.current().fair)
     found = solve(program, start, warm(ITERATIONS), control, stagnation)
     return (program, found) if found.solved else None

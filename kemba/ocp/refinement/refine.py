@@ -19,10 +19,10 @@ from kemba.ocp.phases.modes import Phase, read_phases
 from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.radau import RADAU3, RADAU5, STATE, Scheme
 from kemba.ocp.phases.requirements import add_requirements
-from kemba.ocp.phases.settings import Elements, Refining, Repair
+from kemba.ocp.phases.settings import Refining
 from kemba.ocp.phases.stages import Stages
 from kemba.ocp.refinement.insertion import with_pulses
-from kemba.ocp.refinement.repair import misfit, repaired, simplified
+from kemba.ocp.refinement.repair import misfits, repaired, simplified
 from kemba.ocp.refinement.sample import certificate, to_trajectory
 from kemba.ocp.refinement.solve import rough, solve, warm
 from kemba.ocp.refinement.start import carried, start_vector
@@ -39,6 +39,8 @@ from kemba.ocp.transcription.unilateral import read_constraints
 from kemba.stopwatch import Stage, Tell, silent
 from kemba.trajectory import Trajectory
 
+Start = Trajectory | tuple[PhaseProgram, np.ndarray]  # nodes, or the scaled variables of a program
+UNFIT = "no order of its contacts and stops was found that holds"
 SOLVES = 3  # of a plan whose phases fit: the nearest, the best, and that more exactly
 
 
@@ -122,9 +124,7 @@ class Refiner:
     @property
     def left(self) -> int:
         """Iterations that may still be spent."""
-        settings, half = Refining.current(), self.reduction.symmetric
-        most = settings.iterations_half if half else settings.iterations_whole
-        return most - self.iterations
+        return Refining.current().iterations - self.iterations
 
     def run(self) -> Refined:
         """The first reading that solves, else how the last one ended."""
@@ -162,35 +162,62 @@ class Refiner:
         return made if made.phases == found.phases else replace(made, plain=found)
 
     def repair(self, phases: list[Phase], found: Refined) -> Refined:
-        """The solution on phases repaired until their modes fit, else how the last try ended."""
-        start = self.plan
-        for _ in range(Refining.current().rounds):
-            if phases in self.seen or self.left <= 0:
-                break
+        """The solution on phases repaired until their modes fit, else how the last try ended.
+
+        All programs are elastic: the nearest, the best, and that more exactly. Where one violates
+        modes, they are repaired, and the nearest is solved again from there.
+        """
+        start: Start = self.plan
+        while phases not in self.seen and self.left > 0:
             self.seen.append(phases)
             self.tell("phases: changing the order of contacts and valves")
-            program, near = self.rough(phases, start)
-            ended = self._ended(program, near)
-            if ended.done:
-                return ended
-            if misfit(program, near.Y).max(initial=0.0) <= Repair.current().fits:
-                found = self.finish(program, near.Y)
-                if found.done:
+            for solved in (self.nearest, self.best, self.finest):
+                program, near = solved(phases, start)
+                start, found = (program, near.Y), self._ended(program, near)
+                if not near.solved:
+                    return found
+                wrong = misfits(program, near.Y)
+                if wrong:
+                    found = replace(found, reason=UNFIT)
                     break
-            better = repaired(program, near.Y, self.marks)
+            else:
+                return self.fine(program, near.Y)
+            better = repaired(program, wrong, self.marks)
             if better is None:
                 break
-            phases, start = better, to_trajectory(program, near.Y)
+            phases = better
         return found
 
-    def exact(self, phases: Sequence[Phase], start: Trajectory) -> Refined:
+    def nearest(self, phases: Sequence[Phase], start: Start) -> tuple[PhaseProgram, Iterate]:
+        """The elastic program of the coarser scheme, near the start."""
+        settings = Refining.current()
+        program, x = self.build(phases, start, RADAU3, settings.price)
+        x = program.loosened(program.proximal(x, settings.near_elastic))
+        options = {**rough(settings.elastic_iterations), "mu_init": settings.elastic_mu}
+        return program, self._solve(program, x, options)
+
+    def best(self, phases: Sequence[Phase], start: Start) -> tuple[PhaseProgram, Iterate]:
+        """The elastic program of the coarser scheme, for the task's cost."""
+        settings = Refining.current()
+        program, x = self.build(phases, start, RADAU3, settings.price)
+        options = {**rough(settings.elastic_iterations), "mu_init": settings.elastic_mu / 10}
+        return program, self._solve(program, program.loosened(x), options)
+
+    def finest(self, phases: Sequence[Phase], start: Start) -> tuple[PhaseProgram, Iterate]:
+        """The elastic program of the finer scheme, for the task's cost near the start."""
+        settings = Refining.current()
+        program, x = self.build(phases, start, RADAU5, settings.price)
+        x = program.loosened(program.proximal(x, settings.near_elastic))
+        options = {**warm(settings.elastic_iterations), "mu_init": settings.elastic_mu / 100}
+        return program, self._solve(program, x, options)
+
+    def exact(self, phases: Sequence[Phase], start: Start) -> Refined:
         """The solution nearest to the plan by the coarser scheme, then the best one by both."""
         program, x = self.build(phases, start, RADAU3)
         self.tell(Stage("phases: near the plan", 1, SOLVES))
         settings = Refining.current()
-        half = self.reduction.symmetric
-        iterations = settings.nearest_half if half else settings.rough_iterations
-        found = self._solve(program, program.proximal(x, settings.near), rough(iterations))
+        options = rough(settings.rough_iterations)
+        found = self._solve(program, program.proximal(x, settings.near), options)
         if not found.solved:
             return self._ended(program, found)
         return self.simpler(program, found.Y) or self.finish(program, found.Y)
@@ -201,7 +228,7 @@ class Refiner:
         phases = simplified(program, x, self.marks)
         if phases is None or self.left <= 0:
             return None
-        found = self.exact(phases, to_trajectory(program, x))
+        found = self.exact(phases, (program, x))
         return found if found.done else None
 
     def finish(self, near: PhaseProgram, x: np.ndarray) -> Refined:
@@ -209,7 +236,6 @@ class Refiner:
         first."""
         self.tell(Stage("phases: the best plan", 2, SOLVES))
         program, start = self.build(near.phases, self.plan, RADAU3)
-        program.keep_short(x, Elements.current().fair)
         best = self._solve(program, x[: len(start)], rough(Refining.current().rough_iterations))
         found = self._ended(program, best)
         if best.solved:
@@ -221,14 +247,6 @@ class Refiner:
             if found.done:
                 break
         return found
-
-    def rough(self, phases: Sequence[Phase], start: Trajectory) -> tuple[PhaseProgram, Iterate]:
-        """The elastic program of the coarser scheme, solved."""
-        settings = Refining.current()
-        program, x = self.build(phases, start, RADAU3, settings.price)
-        x = program.loosened(program.proximal(x, settings.near_elastic))
-        options = {**rough(settings.elastic_iterations), "mu_init": settings.elastic_mu}
-        return program, self._solve(program, x, options)
 
     def fine(self, coarser: PhaseProgram, x: np.ndarray) -> Refined:
         """The exact program with the finer scheme, from a solution `x` (size,) with the coarser
@@ -251,7 +269,7 @@ class Refiner:
         return replace(ended, trajectory=trajectory, certificate=measured, stages=own)
 
     def build(
-        self, phases: Sequence[Phase], start: Trajectory, scheme: Scheme, elastic: float = 0.0
+        self, phases: Sequence[Phase], start: Start, scheme: Scheme, elastic: float = 0.0
     ) -> tuple[PhaseProgram, np.ndarray]:
         """The program of some phases and its start (size,), scaled.
 
@@ -261,7 +279,11 @@ class Refiner:
         program = PhaseProgram(
             self.model, self.task, self.reduction, phases, constraints, scheme, elastic
         )
-        x = start_vector(program, start)
+        if isinstance(start, Trajectory):
+            x = start_vector(program, start)
+        else:
+            near, own = start
+            x = carried(program, near.columns, near.scheme.points, own)
         first, end = program.columns.first, program.columns.end(program.nodes)
         at_first = Independent({g: x[first[g]] for g in STATE})
         add_requirements(

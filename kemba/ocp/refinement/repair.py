@@ -1,55 +1,96 @@
-"""Modes that do not fit: they are changed where an elastic program violates them."""
+"""Modes that do not fit: they are changed in the elements where an elastic program violates them.
+
+The elastic program is an exact penalty: its slacks are zero but where modes contradict each other.
+So the mode of a constraint changes in those elements only, the way the sign of the slack says.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from kemba.ocp.phases.modes import AHEAD, BACK, HELD, OPEN, Phase
 from kemba.ocp.phases.program import PhaseProgram
-from kemba.ocp.phases.settings import Elements, Repair
+from kemba.ocp.phases.settings import Elements, Refining
+
+FAR = 0.1  # of the worst misfit
+FITS = 10.0  # times the tolerance of rows: a larger slack is no rounding
 
 
-def misfit(program: PhaseProgram, x: np.ndarray) -> np.ndarray:
-    """The violation of every constraint's mode in every phase (phases, constraints), by the
-    worst of its scaled rows."""
-    found = np.zeros((len(program.phases), len(program.constraints)))
-    for soft in program.soft:
-        for way in (soft.above, soft.below):
-            if way is not None:
-                np.maximum.at(found[:, soft.constraint], soft.phases, x[way])
-    return found
+class Misfit(NamedTuple):
+    """The mode of a constraint that is violated in an element: what it asks, the side, how far."""
+
+    element: int
+    constraint: int
+    kind: str
+    side: int
+    size: float
 
 
-def repaired(program: PhaseProgram, x: np.ndarray, marks: Sequence[int]) -> list[Phase] | None:
-    """Phases with other modes where they fit worst; None where nothing is left to change.
+def misfits(program: PhaseProgram, x: np.ndarray) -> list[Misfit]:
+    """What an elastic program violates at `x` (size,), scaled variables, in the order of time.
 
-    A phase that is short or has collapsed takes the modes of a neighbour. In other phases the
-    constraint with the largest violation changes its mode. `x` (size,): scaled variables.
+    With an exact penalty, slacks of modes that fit are zero to the solver's tolerance.
     """
-    repair = Repair.current()
-    blame = misfit(program, x)
-    phases = list(program.phases)
-    worst = blame.max(axis=1)
-    touched: set[int] = set()
-    for p in np.argsort(-worst):
-        if worst[p] <= max(repair.fits, repair.matters * worst.max()):
-            break
-        short = _shortest_near(program, x, int(p))
-        if touched & {int(p), short}:
+    found, fits = [], FITS * Refining.current().rough_rows
+    for soft in program.soft:
+        for way, side in ((soft.above, 1), (soft.below, -1)):
+            for e, size in zip(soft.elements, x[way], strict=True) if way is not None else ():
+                if size > fits:
+                    found.append(Misfit(int(e), soft.constraint, soft.kind, side, float(size)))
+    return sorted(found)
+
+
+def repaired(
+    program: PhaseProgram, found: Sequence[Misfit], marks: Sequence[int]
+) -> list[Phase] | None:
+    """Phases with other modes where they do not fit; None where nothing is left to change.
+
+    What is violated far less than the worst is left, for it may follow from that, and so is what
+    comes later in the same touch. The times of borders are free, so a touch that is too early comes
+    after the next event: it leaves the whole phase.
+    """
+    modes = np.array([p.modes for p in program.phases for _ in range(p.elements)])
+    before, begun = modes.copy(), set()
+    worst = max((misfit.size for misfit in found), default=0.0)
+    for misfit in (m for m in found if m.size > FAR * worst):
+        e, i = misfit.element, misfit.constraint
+        own = before[:, i]
+        if misfit.kind not in ("touch", "rate", "approach"):
+            modes[e, i] = _other(own, misfit)
             continue
-        if short is not None:
-            modes = _nearest_modes(phases, short)
-            touched |= {short - 1, short, short + 1}
-        else:
-            short, i = int(p), int(np.argmax(blame[p]))
-            modes = _changed(program, x, short, i)
-            touched |= {short}
-        phases[short] = replace(phases[short], modes=modes)
-    found = merged(phases, marks)
-    return None if found == merged(program.phases, marks) else found
+        first = e
+        while first > 0 and own[first - 1] != OPEN:
+            first -= 1
+        if (i, first) in begun:
+            continue
+        begun.add((i, first))
+        phase = program.phases[program.columns.phase_of[e]]
+        last = phase.last if e == first else e + 1
+        modes[e:last, i] = OPEN
+    phases = [
+        replace(p, first=e, last=e + 1, modes=tuple(int(m) for m in modes[e]))
+        for p in program.phases
+        for e in range(p.first, p.last)
+    ]
+    new = merged(phases, marks)
+    return None if new == merged(program.phases, marks) else new
+
+
+def _other(modes: np.ndarray, misfit: Misfit) -> int:
+    """The mode that a violation suggests; `modes` (elements,): those of the constraint."""
+    e, kind, side = misfit.element, misfit.kind, misfit.side
+    mode = int(modes[e])
+    if kind == "gap":  # closed still, or already, as beside it
+        beside = [int(modes[k]) for k in (e - 1, e + 1) if 0 <= k < len(modes)]
+        return max(beside) or HELD
+    slides = {"slip": side, "settles": side, "cone forward": -1, "cone backward": 1}
+    if kind == "settles" or (kind in slides and mode == HELD):
+        return AHEAD if slides[kind] > 0 else BACK
+    return HELD if kind in slides else mode
 
 
 def simplified(program: PhaseProgram, x: np.ndarray, marks: Sequence[int]) -> list[Phase] | None:
@@ -58,11 +99,12 @@ def simplified(program: PhaseProgram, x: np.ndarray, marks: Sequence[int]) -> li
     `x` (size,): scaled variables.
     """
     h = x[program.columns.h[:, 0]] * program.layout.scale[program.layout.slices["h"]][0]
-    least = _collapsed(program)
+    shortest = Elements.current().shortest * program.task.duration / program.nodes
     phases = list(program.phases)
     for p in range(1, len(phases) - 1):
         around = (phases[p - 1].modes, phases[p + 1].modes)
-        if h[p] * phases[p].elements <= least and phases[p].modes not in around:
+        brief = h[p] * phases[p].elements <= Elements.current().collapsed * shortest
+        if brief and phases[p].modes not in around:
             phases[p] = replace(phases[p], modes=_nearest_modes(phases, p))
     found = merged(phases, marks)
     return None if found == merged(program.phases, marks) else found
@@ -81,30 +123,6 @@ def merged(phases: Sequence[Phase], marks: Sequence[int]) -> list[Phase]:
     return found
 
 
-def _collapsed(program: PhaseProgram) -> float:
-    """Element duration [s] below which a phase has collapsed."""
-    shortest = Elements.current().shortest * program.task.duration / program.nodes
-    return Repair.current().collapsed * shortest
-
-
-def _shortest_near(program: PhaseProgram, x: np.ndarray, p: int) -> int | None:
-    """The shortest of phase p and its neighbours whose modes may be replaced, or None.
-
-    Shortest by its elements, then by its duration in x, which the elastic program may distort.
-    """
-    h = x[program.columns.h[:, 0]] * program.layout.scale[program.layout.slices["h"]][0]
-    least = _collapsed(program)
-    last = len(program.phases) - 1
-    near = [
-        k
-        for k in (p - 1, p, p + 1)
-        if 0 < k < last
-        and (program.phases[k].elements <= Repair.current().sliver or h[k] <= least)
-        and _nearest_modes(program.phases, k) != program.phases[k].modes
-    ]
-    return min(near, key=lambda k: (program.phases[k].elements, h[k]), default=None)
-
-
 def _nearest_modes(phases: Sequence[Phase], p: int) -> tuple[int, ...]:
     """The modes of the neighbour that differ least, the longer neighbour's if both do."""
     sides = [phases[p - 1], phases[p + 1]]
@@ -114,31 +132,3 @@ def _nearest_modes(phases: Sequence[Phase], p: int) -> tuple[int, ...]:
         return (differ or len(other.modes) + 1, -other.elements)
 
     return min(sides, key=distance).modes
-
-
-def _changed(program: PhaseProgram, x: np.ndarray, p: int, i: int) -> tuple[int, ...]:
-    """The modes of phase p; constraint i gets the mode that its worst violation suggests."""
-    worst, kind, sign = 0.0, "", 0
-    for soft in program.soft:
-        here = soft.phases == p
-        if soft.constraint != i or not here.any():
-            continue
-        for way, side in ((soft.above, 1), (soft.below, -1)):
-            size = 0.0 if way is None else float(x[way[here]].max())
-            if size > worst:
-                worst, kind, sign = size, soft.kind, side
-    modes = list(program.phases[p].modes)
-    modes[i] = _other(modes[i], kind, sign)
-    return tuple(modes)
-
-
-def _other(mode: int, kind: str, sign: int) -> int:
-    if kind in ("touch", "rate"):
-        return OPEN
-    if kind == "slip" and mode == HELD:
-        return AHEAD if sign > 0 else BACK
-    if kind == "cone forward" and mode == HELD:
-        return BACK
-    if kind == "cone backward" and mode == HELD:
-        return AHEAD
-    return HELD

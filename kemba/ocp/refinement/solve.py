@@ -23,9 +23,10 @@ def solve(
     settings say."""
     settings = Refining.current()
     own = {**program.task.solver.options, **exact(), **options}
-    elastic = program.elastic > 0.0  # such a program has a solution
-    longest = np.inf if elastic else settings.stagnation_iterations
-    stagnation = stagnation or Stagnation(longest, settings.stagnation_near, settings.slow)
+    longest = settings.stagnation_iterations, settings.stagnation_near, settings.slow
+    if program.elastic > 0.0:  # such a program has a solution
+        stagnation = Stagnation(np.inf, 0.0)
+    stagnation = stagnation or Stagnation(*longest)
     return Ipopt(program, own, control).solve(start, stagnation=stagnation)
 
 

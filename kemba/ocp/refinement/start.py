@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from kemba.ocp.phases.columns import Columns
@@ -63,31 +61,37 @@ def _between(times: np.ndarray, rows: np.ndarray, now: np.ndarray) -> np.ndarray
 
 
 def carried(program: PhaseProgram, old: Columns, points: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """The scaled variables (size,) of `program` from a solution `x` of the same phases.
+    """The scaled variables (size,) of `program` from a solution `x` of the same phases, on the same
+    number of elements or another, or of other phases on the same elements.
 
-    Its variables are at the columns `old`, by a scheme with stages at `points`; the number of its
-    elements may be another. States and forces are read off the polynomials of its elements, inputs
-    in the middle of each new one.
+    Its variables are at the columns `old`, by a scheme with stages at `points`. States and forces
+    are read off the polynomials of its elements, inputs in the middle of each new one.
     """
     c, y = program.columns, np.zeros(program.columns.size)
     knots = np.concatenate([[0.0], points])
+    lasting = x[old.h[old.phase_of, 0]]
+    ends = np.concatenate([[0.0], np.cumsum(lasting)])
+    same = program.nodes == len(lasting)
     for g in STATE:
         y[c.first[g]] = x[old.first[g]]
-    for p, (phase, before) in enumerate(zip(program.phases, old.phases, strict=True)):
-        ratio = before.elements / phase.elements
-        y[c.h[p]] = x[old.h[p]] * ratio
+    for p, phase in enumerate(program.phases):
+        span = phase if same else old.phases[p]
+        within = ends[span.first : span.last + 1] - ends[span.first]
+        h = y[c.h[p]] = within[-1] / phase.elements
         for k in range(phase.elements):
             e = phase.first + k
-            y[c.u[e]] = x[old.u[before.first + int((k + 0.5) * ratio)]]
+            y[c.u[e]] = x[old.u[span.first + _element(within, (k + 0.5) * h)[0]]]
             for stage, point in zip(c.stages[e], program.scheme.points, strict=True):
-                at, share = _element((k + point) * ratio)
-                begin, stages = old.begin(before.first + at), old.stages[before.first + at]
+                at, share = _element(within, (k + point) * h)
+                begin, stages = old.begin(span.first + at), old.stages[span.first + at]
                 states, forces = _lagrange(knots, share), _lagrange(points, share)
                 for g in STATE:
                     y[stage[g]] = states @ np.array([x[begin[g]], *(x[s[g]] for s in stages)])
                 y[stage["lam"]] = forces @ np.array([x[s["lam"]] for s in stages])
-    for p in program.impacts:
-        y[c.after[p]], y[c.impulse[p]] = x[old.after[p]], x[old.impulse[p]]
+        if p in c.after:
+            q = old.starts.get(span.first, -1)
+            y[c.after[p]] = x[old.begin(span.first)["v"]]
+            y[c.impulse[p]] = x[old.impulse[q]] if q in old.impulse else 0.0
     return np.clip(y, program.lower, program.upper)
 
 
@@ -101,10 +105,12 @@ def on_elements(program: PhaseProgram, solved: Stages) -> np.ndarray | None:
     return None if others is None else carried(program, others[0], program.scheme.points, others[1])
 
 
-def _element(time: float) -> tuple[int, float]:
-    """The element that a time [elements] is in, and its share of that element in (0, 1]."""
-    at = max(0, math.ceil(time - 1e-9) - 1)
-    return at, min(1.0, time - at)
+def _element(ends: np.ndarray, time: float) -> tuple[int, float]:
+    """The element in which a time is, and its share of that element in (0, 1]; `ends`
+    (elements + 1,): where the first begins and every one ends."""
+    slack = 1e-9 * ends[-1]
+    at = int(np.clip(np.searchsorted(ends, time - slack) - 1, 0, len(ends) - 2))
+    return at, min(1.0, (time - ends[at]) / (ends[at + 1] - ends[at]))
 
 
 def _lagrange(knots: np.ndarray, point: float) -> np.ndarray:

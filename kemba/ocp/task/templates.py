@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+import operator
 from collections.abc import Callable, Sequence
 
 from kemba.errors import suggest
@@ -20,7 +22,8 @@ AFTER = 1e-6  # of the motion: forces act from the node after the one at which a
 def flight_clearance(task: Task, model: Model, others: Sequence[Requirement]) -> list[Requirement]:
     """Every foot at least as high as the task's clearance in the middle of the flight.
 
-    The flight is the ballistic one about the highest goal of the body, from legs stretched on the
+    With `contacts`, that is the middle of each of its flights, over the ground under it. Else the
+    flight is the ballistic one about the highest goal of the body, from legs stretched on the
     ground at the start; of it the middle part counts. A flight that is longer than the motion fills
     it; that the duration is too short is said by the checks. Without `folding`, a jump too low for
     the clearance has what stretched legs leave: nothing where they reach the ground. Raises
@@ -29,6 +32,8 @@ def flight_clearance(task: Task, model: Model, others: Sequence[Requirement]) ->
     apex = highest(others)
     if not task.clearance:
         return []
+    if task.contacts:
+        return _clear_swings(task, model)
     if apex is None or apex.at is None:
         raise ValueError("needs a goal for body/z at the top of the flight")
     robot = model.mechanism.need_robot()
@@ -46,6 +51,28 @@ def flight_clearance(task: Task, model: Model, others: Sequence[Requirement]) ->
         Requirement(("clearance",), known[f"{leg}/foot/gap"], None, least, math.inf, during)
         for leg in (model.mechanism.legs if least > 0.0 else ())
     ]
+
+
+def _clear_swings(task: Task, model: Model) -> list[Requirement]:
+    """The clearance in the middle of what a foot flies between two parts of `contacts`."""
+    assert task.clearance is not None
+    known, found = quantities(model), []
+    for leg in model.mechanism.legs:
+        parts = [
+            (leg in part.on, *span)
+            for part, span in zip(task.contacts, spans(task.contacts), strict=True)
+        ]
+        for stands, run in itertools.groupby(parts, operator.itemgetter(0)):
+            own = list(run)
+            begin, end = own[0][1], own[-1][2]
+            if not stands:
+                middle, half = (begin + end) / 2, FLIGHT * (end - begin) / 2
+                during = middle - half, middle + half
+                gap = known[f"{leg}/foot/gap"]
+                found.append(
+                    Requirement(("clearance",), gap, None, task.clearance, math.inf, during)
+                )
+    return found
 
 
 def feet_at_apex(task: Task, model: Model, others: Sequence[Requirement]) -> list[Requirement]:

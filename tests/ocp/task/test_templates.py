@@ -43,6 +43,17 @@ def test_feet_stand_or_bear_nothing(tmp_path: Path) -> None:
     assert labels.count("contacts:rear/foot/Fz") == 4
 
 
+def test_feet_are_clear_in_the_middle_of_each_of_their_flights(tmp_path: Path) -> None:
+    tmp_path.joinpath("own.yaml").write_text("clearance: 3 cm\n" + BOUND)
+    found = asked_of(*load_task(tmp_path / "own.yaml"))[1]
+    clear = [r for r in found if r.location == ("clearance",)]
+    flights = {name: [r.during for r in clear if r.quantity.name == f"{name}/foot/z"]
+               for name in ("rear", "front")}  # fmt: skip
+    assert flights["rear"] == [pytest.approx((0.03, 0.17)), pytest.approx((0.49, 0.91))]
+    assert flights["front"] == [pytest.approx((0.09, 0.51)), pytest.approx((0.83, 0.97))]
+    assert {r.lower for r in clear} == {0.03}
+
+
 @pytest.mark.parametrize(
     ("was", "now", "said"),
     [
