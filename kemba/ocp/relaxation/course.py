@@ -22,6 +22,7 @@ from kemba.ocp.task.task import Task
 from kemba.ocp.task.terrain import ground_at
 
 Array = np.ndarray
+WITHIN = np.linspace(0.05, 0.95, 19)  # shares of a swing at which it is looked what stands below
 LIFT = 0.05  # m; how high a foot swings over the line between its places
 FOLDED = 0.4  # leg length in flight, between retracted (0) and stretched (1)
 STANDS = 0.7  # the same where a flight begins or ends
@@ -191,7 +192,6 @@ def in_order(
     for i, (leg, place) in enumerate(robot.legs.items()):
         hips = np.column_stack([x + place.hip * np.cos(pitch), z + place.hip * np.sin(pitch)])
         foot = _foot(task, parts, standing[:, i], t, hips, reach)
-        foot[:, 1] += ground.height(foot[:, 0]) if standing[:, i].any() else 0.0
         feet[leg] = foot - hips
         load[leg] = np.where(standing[here, i], bears[here], 0.0)
     return Course(x, z, pitch, feet, load)
@@ -293,7 +293,8 @@ def _foot(
     reach: tuple[float, float],
 ) -> Array:
     """Where a foot is (n, 2): on the ground below its hip's place in the middle of each stance, and
-    swinging between; turned with the body before its first and after its last stance."""
+    swinging between, over all that stands there; turned with the body before its first and after
+    its last stance."""
     runs: list[tuple[float, float]] = []
     for (begin, end), on in zip(parts, stands, strict=True):
         if on and runs and runs[-1][1] == begin:
@@ -312,10 +313,24 @@ def _foot(
             (runs[0][0] + last, runs[0][1] + last),
         ]
         places = [places[-1] - stride, *places, places[0] + stride]
-    knots = [time for run in runs for time in run]
-    x = np.interp(t, knots, [place for place in places for _ in range(2)])
-    z = np.zeros_like(t)
-    for (_, left), (down, _) in itertools.pairwise(runs):
+    heights = task.scene.skyline(np.array(places))
+    x, z = np.full_like(t, places[0]), np.full_like(t, heights[0])
+    for i, ((_, left), (down, _)) in enumerate(itertools.pairwise(runs)):
         swing = np.clip((t - left) / max(down - left, 1e-9), 0.0, 1.0)
-        z += LIFT * np.sin(np.pi * swing) ** 2
+        way, rise = places[i + 1] - places[i], heights[i + 1] - heights[i]
+        ahead, inside = places[i] + way * WITHIN, np.sin(np.pi * WITHIN) ** 2
+        over = task.scene.skyline(ahead) - heights[i] - rise * WITHIN
+        if over.max() > 0.0:  # up first, then across
+            across = _cycloid(_cycloid(WITHIN))
+            over = task.scene.skyline(places[i] + way * across) - heights[i] - rise * WITHIN
+            x += way * _cycloid(_cycloid(swing))
+        else:
+            x += way * swing
+        bump = LIFT + max(0.0, float((over / inside).max()))
+        z += rise * swing + bump * np.sin(np.pi * swing) ** 2
     return np.column_stack([x, z])
+
+
+def _cycloid(share: Array) -> Array:
+    """The way of a motion that rests at both ends, at shares of its time, from 0 to 1."""
+    return np.asarray(share - np.sin(2.0 * np.pi * share) / (2.0 * np.pi))

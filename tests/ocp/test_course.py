@@ -1,0 +1,49 @@
+"""The course of a start guess: where feet are between their stances."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from kemba.ocp import load_task
+from kemba.ocp.reading import asked_of
+from kemba.ocp.relaxation.course import LIFT, in_order
+from kemba.ocp.task.task import Task
+
+STANCES = (
+    "{on: [front, rear], share: 35 %}, {on: air, share: 35 %}, {on: [front, rear], share: 30 %}"
+)
+
+
+def foot(*words: str) -> tuple[Task, np.ndarray]:
+    """Places of the front foot (n, 2) of a jump of 0.6 m ahead."""
+    task, document = load_task(
+        "jump_forward.yaml", [f"contacts=[{STANCES}]", "distance=0.6 m", "folding=false", *words]
+    )
+    model, asked = asked_of(task, document)
+    course = in_order(model, task, asked, np.linspace(0.0, task.duration, 81), (0.2, 0.4))
+    hip = next(iter(model.mechanism.need_robot().legs.values())).hip
+    hips = np.column_stack([course.x + hip * np.cos(course.pitch), course.z])
+    return task, hips + course.feet["front"]
+
+
+def test_on_level_ground_a_foot_swings_evenly() -> None:
+    _, places = foot()
+    assert np.allclose(places[:, 1].max(), LIFT, atol=1e-3)
+    moving = np.abs(np.diff(places[:, 0])) > 1e-9
+    assert np.ptp(np.diff(places[:, 0])[moving][1:-1]) < 1e-9
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("terrain=[{from: 0.28 m, height: 0.15 m}]",),
+        ("obstacles=[{from: 0.45 m, to: 0.5 m, height: 0.2 m}]",),
+        ("terrain=[{from: 0.5 m, height: -0.2 m}]",),
+    ],
+)
+def test_a_foot_swings_over_what_stands_between(words: tuple[str, ...]) -> None:
+    task, places = foot(*words)
+    above = places[:, 1] - task.scene.skyline(places[:, 0])
+    assert above.min() > -5e-3  # it is looked at 19 shares of the swing
+    assert above.max() < 0.6
