@@ -19,7 +19,9 @@ SHIPPED = {"monoped": (0.42, 0.25), "hound": (0.6, 0.45)}
 # the height that is asked for, no more: with these nodes, the highest of two is not good
 # (monoped's drifts open-loop, hound's is not refined), and solve says so
 ASKED = "goals.apex.maximise=false"
-LOOSER = {"monoped": ("tolerances.table_apex=5 mm",)}  # so that the other verbs have a plan
+
+# at 0.42 m its table misses the apex by 2.3 mm: a tick moves it by more
+LOOSER = {"monoped": ("tolerances.table_apex=5 mm",)}
 
 
 def run(*arguments: str | Path) -> Any:
@@ -43,7 +45,7 @@ def whole_way(task: str | Path, model: str, home: Path, *settings: str) -> dict[
     return found
 
 
-@pytest.mark.xfail(reason="its table misses by 6.6 mm: a tick moves its apex by more than 2 mm")
+@pytest.mark.slow
 def test_the_table_of_the_monoped_keeps_the_usual_tolerance(tmp_path: Path) -> None:
     words = ("model=monoped", "height=0.45 m", "duration=0.25 s", ASKED, "nodes=30")
     options = [part for text in words for part in ("--set", text)]

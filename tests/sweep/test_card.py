@@ -25,7 +25,7 @@ def test_card(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     sweep, document = load_sweep(tmp_path / "s.yaml")
     folder = open_folder(tmp_path / "out", sweep, document)
     cases = expand(sweep, document, folder)
-    own = {"refined": True, "replays": True, "start": "shipped: low"}
+    own = {"refined": True, "replays": True, "start": "guess"}
     figures = {"solve_s": 1.5, "solve_cpu_s": 1.0, "wall_s": 2.0, "iterations": 100}
     records = {
         cases[0].key: {"status": "solved", "good": True, "sentence": "solved", **figures, **own},
