@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import argparse
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from kemba.files import atomic_text
+from kemba.sweep import machine
+
+Rows = Callable[[int | None], Iterable[str]]  # the lines of the first so many tasks
 
 
 def put_block(page: Path, begin: str, end: str, lines: Iterable[str]) -> None:
@@ -26,3 +30,17 @@ def printed(lines: Iterable[str]) -> list[str]:
         print(line, flush=True)
         found.append(line)
     return found
+
+
+def table_of_tasks(
+    told: str, page: Path, marks: tuple[str, str], head: Iterable[str], rows: Rows
+) -> None:
+    """The main function of a benchmark that plans a list of tasks: prints a table, and writes it
+    into `page` between `marks` if asked to."""
+    parser = argparse.ArgumentParser(description=told.splitlines()[0])
+    parser.add_argument("--tasks", type=int, default=None, help="so many of the list")
+    parser.add_argument("--write", action="store_true", help=f"into {page.name}")
+    asked = parser.parse_args()
+    table = [*head, *printed(rows(asked.tasks)), "", f"On {machine()}."]
+    if asked.write:
+        put_block(page, *marks, table)

@@ -8,7 +8,6 @@ own weights, phases, CPU seconds.
 
 from __future__ import annotations
 
-import argparse
 import os
 import time
 from collections.abc import Iterator
@@ -17,13 +16,12 @@ from unittest.mock import patch
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from block import printed, put_block
+from block import table_of_tasks
 
 from kemba.ocp import load_task
 from kemba.ocp.certificate.objective import objective
 from kemba.ocp.planning import Planning
 from kemba.ocp.refinement.insertion import FAILS
-from kemba.sweep import machine
 
 MOTIONS = Path(__file__).with_name("motions")
 TASKS = (
@@ -62,15 +60,5 @@ def rows(count: int | None) -> Iterator[str]:
         yield f"| `{told}` | {cells[0]} | {cells[1]} |"
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--tasks", type=int, default=None, help="so many of the list")
-    parser.add_argument("--write", action="store_true", help="into docs/refine.md")
-    asked = parser.parse_args()
-    table = [*HEAD, *printed(rows(asked.tasks)), "", f"On {machine()}."]
-    if asked.write:
-        put_block(PAGE, BEGIN, END, table)
-
-
 if __name__ == "__main__":
-    main()
+    table_of_tasks(__doc__, PAGE, (BEGIN, END), HEAD, rows)

@@ -8,17 +8,15 @@ executions, and whether the plan is good.
 
 from __future__ import annotations
 
-import argparse
 import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from block import printed, put_block
+from block import table_of_tasks
 
 from kemba.ocp import load_task
 from kemba.solve import Approach, Listener, best_plan
-from kemba.sweep import machine
 
 # The task, what is changed in it, and effects that its model is given.
 TASKS = (
@@ -79,15 +77,5 @@ def rows(count: int | None) -> Iterator[str]:
             yield f"| `{name.removesuffix('.yaml')}`, {told} | {planned(name, own)} |"
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--tasks", type=int, default=None, help="so many of the list")
-    parser.add_argument("--write", action="store_true", help="into docs/continuing.md")
-    asked = parser.parse_args()
-    table = [*HEAD, *printed(rows(asked.tasks)), "", f"On {machine()}."]
-    if asked.write:
-        put_block(PAGE, BEGIN, END, table)
-
-
 if __name__ == "__main__":
-    main()
+    table_of_tasks(__doc__, PAGE, (BEGIN, END), HEAD, rows)

@@ -98,11 +98,11 @@ class Planning:
             if number:
                 planner.session.tell("another guess")
             found = self._from_guess(guess if planner.start is None else replace(guess, pulse=0.0))
-            found = from_scratch(found, failed) if failed else found
             start = f"guess {number + 1}" if number else found.start
-            yield replace(found, start=start)
-            if found.plain is not None:
-                yield replace(found.plain, start=f"{start}, without further pulses")
+            for each, how in ((found, ""), (found.plain, ", without further pulses")):
+                if each is not None:
+                    told = from_scratch(each, failed) if failed else each
+                    yield replace(told, start=f"{start}{how}")
             over = planner.session.control.ended() is not None or planner.start is not None
             if over or not found.status.plan or task.refine != "radau":
                 return

@@ -29,7 +29,7 @@ def test_a_plan_keeps_to_its_share_of_the_friction() -> None:
     assert grip_of(high(0.5).model, high(0.5).trajectory) == pytest.approx(0.5, abs=1e-3)
     assert high(0.5).status is Status.SOLVED
     cost = [high(grip).cost["torque_squared_integral"] for grip in (1.0, 0.5)]
-    assert cost[0] < cost[1] < 3.0 * cost[0]
+    assert cost[0] < cost[1]
 
 
 def test_it_is_planned_and_judged_on_the_ground_of_its_model() -> None:

@@ -16,9 +16,10 @@ from kemba.ocp.phases.radau import RADAU5
 from kemba.ocp.planned import Plan
 from kemba.ocp.planning import Planning
 from kemba.ocp.refinement import insertion
-from kemba.ocp.refinement.insertion import Pulse, inserted, pulses, reduced_costs, transferred
+from kemba.ocp.refinement.insertion import Pulse, inserted, pulses, reduced_costs
 from kemba.ocp.refinement.refine import Refiner, reduction_of
 from kemba.ocp.refinement.solve import solve, warm
+from kemba.ocp.refinement.start import carried
 
 
 @cache
@@ -64,7 +65,7 @@ def test_a_pulse_splits_its_phase_and_keeps_the_motion() -> None:
     phases = inserted(program.phases, best)
     assert [p.valves for p in phases if (p.first, p.last) == (best.first, best.last)] != []
     longer, _ = refiner.build(phases, without().trajectory, RADAU5)
-    y = transferred(program, found.Y, longer)
+    y = carried(longer, program.columns, program.scheme.points, found.Y)
     for before, after in zip(program.columns.stages, longer.columns.stages, strict=True):
         for g in after[-1]:
             assert np.allclose(found.Y[before[-1][g]], y[after[-1][g]], atol=1e-9)

@@ -17,16 +17,15 @@ from kemba.ocp.nlp.ipopt import Control, Iterate
 from kemba.ocp.nlp.stagnation import Stagnation
 from kemba.ocp.phases.modes import Phase
 from kemba.ocp.phases.program import PhaseProgram
-from kemba.ocp.phases.radau import STATE
 from kemba.ocp.phases.settings import Refining
 from kemba.ocp.refinement.solve import solve, warm
+from kemba.ocp.refinement.start import carried
 from kemba.ocp.transcription.layout import STEP
 
 Solution = tuple[PhaseProgram, Iterate]
 
 PAYS = 0.02  # of the cost: a smaller gain is within what starts differ by
 FAILS = 2  # pulses without a cheaper plan, after which no other is tried
-ITERATIONS = 60  # of a solve; those that converge take 20 to 46
 # a solve is given up after so many first iterations without a smaller violation, while that is
 # above UNDERWAY (scaled)
 PATIENCE, UNDERWAY = 10, 0.5
@@ -96,27 +95,6 @@ def inserted(phases: Sequence[Phase], pulse: Pulse) -> list[Phase]:
     return [*phases[: pulse.phase], *cut, *phases[pulse.phase + 1 :]]
 
 
-def transferred(old: PhaseProgram, x: np.ndarray, new: PhaseProgram) -> np.ndarray:
-    """Scaled variables (size,) of a program on the same elements whose phases are parts of the old
-    ones, from a solution `x` of these."""
-    a, b = old.columns, new.columns
-    y = np.zeros(b.size)
-    for g in STATE:
-        y[b.first[g]] = x[a.first[g]]
-    for e in range(new.nodes):
-        y[b.u[e]] = x[a.u[e]]
-        for here, there in zip(b.stages[e], a.stages[e], strict=True):
-            for g in here:
-                y[here[g]] = x[there[g]]
-    for p, phase in enumerate(new.phases):
-        y[b.h[p]] = x[a.h[a.phase_of[phase.first]]]
-    starts = {old.phases[p].first: p for p in old.impacts}
-    for p in new.impacts:
-        q = starts[new.phases[p].first]
-        y[b.after[p]], y[b.impulse[p]] = x[a.after[q]], x[a.impulse[q]]
-    return np.clip(y, new.lower[: b.size], new.upper[: b.size])
-
-
 def with_pulses(
     program: PhaseProgram,
     start: Iterate,
@@ -138,7 +116,8 @@ def with_pulses(
         if pulse.gain < least:
             break
         longer = build(inserted(program.phases, pulse))
-        new = _solved(longer, Iterate(transferred(program, solution.Y, longer)), control)
+        begin = carried(longer, program.columns, program.scheme.points, solution.Y)
+        new = _solved(longer, Iterate(begin), control)
         if new is not None and new[1].objective < solution.objective - least:
             best, left = new, pulses(*new)
         else:
@@ -148,6 +127,7 @@ def with_pulses(
 
 def _solved(program: PhaseProgram, start: Iterate, control: Control) -> Solution | None:
     """A program with its solution; None where it has none near."""
-    stagnation = Stagnation(PATIENCE, UNDERWAY, Refining.current().slow)
-    found = solve(program, start, warm(ITERATIONS), control, stagnation)
+    settings = Refining.current()
+    stagnation = Stagnation(PATIENCE, UNDERWAY, settings.slow)
+    found = solve(program, start, warm(settings.rough_iterations), control, stagnation)
     return (program, found) if found.solved else None
