@@ -86,6 +86,7 @@ def test_missing_cases_are_a_bad_answer(sweep: Any, done_before: list[Path]) -> 
     assert limited.exit_code == 1 and json.loads(limited.stdout)["status"] == "limit"
 
 
+@pytest.mark.slow
 def test_interruption_leaves_a_table(sweep: Any, done_before: list[Path]) -> None:
     done_before[1].unlink()
     command = [sys.executable, "-c", "from kemba_cli.main import main; main()"]
@@ -119,6 +120,7 @@ def test_bad_input(sweep: Any) -> None:
     assert sweep("--out", "notes.txt").exit_code == 2
 
 
+@pytest.mark.slow
 def test_a_real_sweep_is_solved_and_not_repeated(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -25,7 +25,7 @@ EXAMPLES = {
     "bench logs": 12,
     "mapped logs": 6,
     "sidecars": 6,
-    "other formats": 30,
+    "other formats": 12,
 }  # of files 10 each
 SLOW = {"robot logs": 20, "compare": 20, "discover": 6}
 

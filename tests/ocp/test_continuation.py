@@ -66,6 +66,7 @@ def test_a_near_task_is_continued(hop: Path, tmp_path: Path, change: str) -> Non
     assert modes(tmp_path / "run") == modes(hop)
 
 
+@pytest.mark.slow
 def test_a_learnt_model_is_continued(hop: Path, tmp_path: Path) -> None:
     model = tmp_path / "learnt.yaml"
     model.write_text(

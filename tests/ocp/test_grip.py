@@ -24,6 +24,7 @@ def high(grip: float) -> Plan:
     return plan(task, document)
 
 
+@pytest.mark.slow
 def test_a_plan_keeps_to_its_share_of_the_friction() -> None:
     assert grip_of(high(1.0).model, high(1.0).trajectory) > 0.9
     assert grip_of(high(0.5).model, high(0.5).trajectory) == pytest.approx(0.5, abs=1e-3)

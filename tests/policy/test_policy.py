@@ -183,6 +183,7 @@ def test_the_reference_player_is_short_and_needs_only_numpy() -> None:
     assert roots <= {"__future__", "os", "typing", "numpy"}
 
 
+@pytest.mark.slow
 def test_simulate_with_a_policy(tmp_path: Path) -> None:
     words = ["solve", "drop.yaml", "--set", "nodes=40", "--no-figure", "-q"]
     CliRunner().invoke(app, [*words, "--out", str(tmp_path / "run")])

@@ -67,6 +67,7 @@ def test_nothing_is_found_where_nothing_is_hidden(tmp_path: Path) -> None:
     assert compare_logs(kept)[0].noise_ratio == pytest.approx(found.error_before, 0.01)
 
 
+@pytest.mark.slow
 def test_what_the_catalogue_lacks_is_not_given_a_name(tmp_path: Path) -> None:
     found, _ = answer(tmp_path, "magnet", 6)
     assert found.verdict == "unknown" and not found.added, found.sentence

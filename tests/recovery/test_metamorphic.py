@@ -48,6 +48,7 @@ def bench(tmp_path_factory: pytest.TempPathFactory):
     return make
 
 
+@pytest.mark.slow
 def test_units_and_order_of_columns_are_no_matter(bench, tmp_path: Path) -> None:
     paths, first = bench("seal_friction")
     assert first.added == ("seal_friction",)

@@ -277,6 +277,7 @@ def test_the_supply_is_a_share_of_that_at_the_start() -> None:
     assert supply_share(Trajectory(time, {"body/z [m]": time})) is None
 
 
+@pytest.mark.slow
 def test_a_rig_has_its_page_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The paper's bench and a drive of the user's own, with every column they have."""
     monkeypatch.chdir(tmp_path)

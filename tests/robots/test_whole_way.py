@@ -52,7 +52,7 @@ def test_the_table_of_the_monoped_keeps_the_usual_tolerance(tmp_path: Path) -> N
     run("solve", "max_jump.yaml", "--out", tmp_path / "run", "--no-figure", *options)
 
 
-@pytest.mark.parametrize("robot", SHIPPED)
+@pytest.mark.parametrize("robot", ["monoped", pytest.param("hound", marks=pytest.mark.slow)])
 def test_a_shipped_robot_goes_the_whole_way(robot: str, tmp_path: Path) -> None:
     height, duration = SHIPPED[robot]
     asked = (f"height={height} m", f"duration={duration} s", ASKED)

@@ -33,12 +33,14 @@ def grounds(folder: Path, low: float, count: int = 50) -> list[Scenario]:
     return scenarios(path, plant_of(planned(0.5).task), count)
 
 
+@pytest.mark.slow
 def test_friction_is_counted_on_as_far_as_the_scenarios_have_it(tmp_path: Path) -> None:
     model = planned(0.5).model
     assert least_grip(model, grounds(tmp_path, 0.5)) == pytest.approx(0.51, abs=0.01)
     assert least_grip(model, grounds(tmp_path, 0.8)) == pytest.approx(0.804, abs=0.01)
 
 
+@pytest.mark.slow
 def test_a_high_jump_leans_on_friction_and_takes_all_its_time(tmp_path: Path) -> None:
     found, cases = planned(0.84), grounds(tmp_path, 0.5)
     first, second = gripping(found, cases), longer(found, cases)

@@ -87,6 +87,7 @@ def test_the_plants_verdict_is_information_beside_a_learnt_model(tmp_path: Path)
     assert "expected apex" in told
 
 
+@pytest.mark.slow
 def test_what_lies_beyond_the_logs_and_a_missing_spread_are_said(tmp_path: Path) -> None:
     model = learnt(tmp_path, covariance=False, measured={"apex": [0.3, 0.4]})
     told = solved(model).result["sentence"]

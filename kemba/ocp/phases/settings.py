@@ -102,9 +102,6 @@ class Refining(Settings):
         0.01, "1", "proximal weight of elastic solves; modes that can hold are violated where it "
         "is large beside the price", HAND, decides=True,
     )  # fmt: skip
-    near_fine: float = setting(
-        1.0, "1", "proximal weight of the finer scheme's solve", HAND, decides=True
-    )
     iterations: int = setting(800, "1", "of all solves together", HAND, decides=True)
     rough_iterations: int = setting(
         60, "1", "iterations of other solves by either scheme", HAND, decides=True

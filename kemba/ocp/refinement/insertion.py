@@ -96,21 +96,16 @@ def inserted(phases: Sequence[Phase], pulse: Pulse) -> list[Phase]:
 
 
 def with_pulses(
-    program: PhaseProgram,
-    start: Iterate,
-    build: Callable[[Sequence[Phase]], PhaseProgram],
-    control: Control,
-) -> Solution | None:
-    """A program solved from a start near its solution, with pulses put in, one after the other,
-    while they lower its cost; None where it has no solution near.
+    best: Solution, build: Callable[[Sequence[Phase]], PhaseProgram], control: Control
+) -> Solution:
+    """A solved program with pulses put in, one after the other, while they lower its cost.
 
     `build` makes the program of other phases on the same elements. A pulse that takes the motion
     off its order of contacts and stops has no solution near; after a few such the plan is left as
     it is.
     """
-    best = _solved(program, start, control)
-    left, failed = [] if best is None else pulses(*best), 0
-    while best is not None and left and failed < FAILS:
+    left, failed = pulses(*best), 0
+    while left and failed < FAILS:
         (program, solution), pulse = best, left.pop(0)
         least = PAYS * abs(solution.objective)
         if pulse.gain < least:

@@ -115,6 +115,7 @@ class Refiner:
     tell: Tell = silent
     iterations: int = 0
     seen: list[list[Phase]] = field(default_factory=list)  # phases that were tried
+    solution: tuple[PhaseProgram, Iterate] | None = None  # by the finer scheme
 
     @property
     def marks(self) -> list[int]:
@@ -147,16 +148,12 @@ class Refiner:
 
     def improved(self, found: Refined) -> Refined:
         """A solved plan with the pulses of valves that lower its cost."""
-        stages, start = found.stages, found.trajectory
-        if stages is None or start is None:
+        start = found.trajectory
+        if self.solution is None or start is None:
             return found
         self.tell("phases: pulses that lower the cost")
-        program, _ = self.build(stages.phases, start, RADAU5)
-        x = stages.start(program)
-        assert x is not None
-        begin = stages.iterate(program, x)
-        best = with_pulses(program, begin, lambda p: self.build(p, start, RADAU5)[0], self.control)
-        made = found if best is None else self.read(*best)
+        best = with_pulses(self.solution, lambda p: self.build(p, start, RADAU5)[0], self.control)
+        made = self.read(*best)
         if made.certificate is None or not made.certificate.within(self.task.tolerances):
             return found
         return made if made.phases == found.phases else replace(made, plain=found)
@@ -254,11 +251,12 @@ class Refiner:
         self.tell(Stage("phases: the best plan, more exactly", 3, SOLVES))
         settings = Refining.current()
         program, _ = self.build(coarser.phases, self.plan, RADAU5)
-        start = program.proximal(
-            carried(program, coarser.columns, coarser.scheme.points, x), settings.near_fine
-        )
+        start = carried(program, coarser.columns, coarser.scheme.points, x)
         found = self._solve(program, start, warm(settings.rough_iterations))
-        return self.read(program, found) if found.solved else self._ended(program, found)
+        if not found.solved:
+            return self._ended(program, found)
+        self.solution = program, found
+        return self.read(program, found)
 
     def read(self, program: PhaseProgram, solution: Iterate) -> Refined:
         """A solved program as a plan."""
