@@ -112,7 +112,9 @@ class Planner:
         """A plan with binary valves: grown from half a robot's where legs are equal and only the
         requirements differ, else from the guess."""
         t = schedule.transcription
-        ordered = bool(self.task.contacts)  # half a robot says nothing of who stands when
+        legs = len(self.model.mechanism.need_robot().legs)
+        # half a robot says nothing of legs that stand one after the other
+        ordered = any(len(part.on) not in (0, legs) for part in self.task.contacts)
         if self.half is not None and not ordered and self.alike != self.requirements:
             half = self.schedule(t.nodes, self.half)
             point = find(half, self.guess(half.transcription))

@@ -47,6 +47,15 @@ def test_without_symmetry_it_starts_from_the_guess() -> None:
     assert solves[0] == "relax (whole robot, 25 nodes)"
 
 
+TOGETHER, APART = "[[rear, front], air, [rear, front]]", "[rear, air, [rear, front]]"
+
+
+@pytest.mark.parametrize(("contacts", "first"), [(TOGETHER, "half"), (APART, "whole")])
+def test_legs_that_stand_together_grow_from_half_a_robot(contacts: str, first: str) -> None:
+    _, solves = told("jump_forward", *FORWARD, f"contacts={contacts}", "solver.time_limit=0.5 s")
+    assert solves[0] == f"relax ({first} robot, 25 nodes)"
+
+
 def test_what_does_not_grow_starts_from_the_guess() -> None:
     """A whole robot that gets too few iterations to grow from half a one."""
     task, document = load_task("jump_forward", [*FORWARD, PATIENT])
