@@ -71,6 +71,13 @@ class Planner:
         """The requirements whose mirror images are required as well."""
         return mirrored_requirements(self.model, self.requirements)
 
+    @property
+    def together(self) -> bool:
+        """Whether all legs stand together, as far as `contacts` says: half a robot knows nothing
+        of legs that stand one after the other."""
+        legs = self.model.mechanism.need_robot().legs if self.task.contacts else ()
+        return all(len(part.on) in (0, len(legs)) for part in self.task.contacts)
+
     def reductions(self) -> Iterator[Reduction]:
         """Half robot first where model and task are mirror images of themselves."""
         if self.half is not None and self.alike == self.requirements:
@@ -112,10 +119,7 @@ class Planner:
         """A plan with binary valves: grown from half a robot's where legs are equal and only the
         requirements differ, else from the guess."""
         t = schedule.transcription
-        legs = len(self.model.mechanism.need_robot().legs)
-        # half a robot says nothing of legs that stand one after the other
-        ordered = any(len(part.on) not in (0, legs) for part in self.task.contacts)
-        if self.half is not None and not ordered and self.alike != self.requirements:
+        if self.half is not None and self.together and self.alike != self.requirements:
             half = self.schedule(t.nodes, self.half)
             point = find(half, self.guess(half.transcription))
             if point.solved:
