@@ -126,7 +126,8 @@ def _report(found: Complaint, document: Document) -> KembaError:
         return document.error(place, _at(place, _size(found.value)), f"{_allowed(found)} expected")
     what = _at(place, f"{_shown(found.value)} is out of range")
     if found.kind in BOUNDS:
-        return document.error(place, what, BOUNDS[found.kind].format(**found.context) + " was expected")
+        wanted = BOUNDS[found.kind].format(**found.context)
+        return document.error(place, what, f"{wanted} was expected")
     what = _at(place, f"{_shown(found.value)} is not what this key takes")
     return document.error(place, what)
 
@@ -134,8 +135,8 @@ def _report(found: Complaint, document: Document) -> KembaError:
 def _size(value: Any) -> str:
     """How many entries a list or a group of keys has; a group names its keys."""
     count = len(value) if isinstance(value, (list, tuple, set, dict)) else 0
-    keys = f" ({', '.join(map(str, list(value)[:MOST]))})" if isinstance(value, dict) and value else ""
-    return f"has {count} {'entry' if count == 1 else 'entries'}{keys}"
+    keys = ", ".join(map(str, list(value)[:MOST])) if isinstance(value, dict) else ""
+    return f"has {count} {'entry' if count == 1 else 'entries'}" + (f" ({keys})" if keys else "")
 
 
 def _allowed(found: Complaint) -> str:
@@ -172,8 +173,8 @@ def _expectation(found: Complaint) -> str:
         for item in getattr(info, "metadata", ()):
             if isinstance(item, Param):
                 return expectation(item.unit)
-        if getattr(info, "description", None):
-            return f"needed: {info.description}"
+        if description := getattr(info, "description", None):
+            return f"needed: {description}"
     return "this file needs it"
 
 
