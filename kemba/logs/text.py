@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import warnings
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -28,18 +29,20 @@ def read_text(path: Path, layout: ColumnMap) -> Raw:
 
     above, names = _header(path, layout)
     try:
-        table = pd.read_csv(
-            path,
-            sep=layout.pattern,
-            header=None,
-            skiprows=above,
-            decimal=layout.decimal,
-            keep_default_na=False,
-            na_values=MISSING,
-            low_memory=False,
-            skipinitialspace=True,
-            encoding=encoding(path),
-        )
+        with warnings.catch_warnings():
+            # columns whose pieces are of several kinds are texts here, one by one
+            warnings.simplefilter("ignore", pd.errors.DtypeWarning)
+            table = pd.read_csv(
+                path,
+                sep=layout.pattern,
+                header=None,
+                skiprows=above,
+                decimal=layout.decimal,
+                keep_default_na=False,
+                na_values=MISSING,
+                skipinitialspace=True,
+                encoding=encoding(path),
+            )
     except pd.errors.EmptyDataError:
         raise KembaError(str(path), "is empty", "a table was expected") from None
     except UnicodeDecodeError:
