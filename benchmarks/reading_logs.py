@@ -185,7 +185,7 @@ def measured(path: Path, load: str, read: str, repeats: int) -> tuple[float, flo
         done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
         if done.returncode:
             raise RuntimeError(done.stderr)
-        found.append(tuple(map(float, done.stdout.split())))
+        found.append(tuple(map(float, done.stdout.split()[-2:])))
     times, sizes = zip(*found, strict=True)
     return min(times), min(sizes)
 

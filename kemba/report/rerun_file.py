@@ -42,7 +42,7 @@ def record_run(
 ) -> Path:
     """The same as `write_rerun` of a run folder or a log, with the arguments of `view_run`."""
     source, ghost = shown(run, column_map, plan)
-    return write_rerun(source, fresh(out, force), model, ghost)
+    return write_rerun(source, fresh(out, force, "--rerun"), model, ghost)
 
 
 def write_rerun(
