@@ -123,7 +123,7 @@ def _report(found: Complaint, document: Document) -> KembaError:
     if found.kind == "value_error":
         return document.error(place, _at(place, str(found.context["error"])))
     if found.kind in ("too_short", "too_long"):
-        return document.error(place, _at(place, _size(found.value)), f"{_allowed(found)} expected")
+        return document.error(place, _at(place, _size(found)), f"{_allowed(found)} expected")
     what = _at(place, f"{_shown(found.value)} is out of range")
     if found.kind in BOUNDS:
         wanted = BOUNDS[found.kind].format(**found.context)
@@ -132,11 +132,13 @@ def _report(found: Complaint, document: Document) -> KembaError:
     return document.error(place, what)
 
 
-def _size(value: Any) -> str:
-    """How many entries a list or a group of keys has; a group names its keys."""
+def _size(found: Complaint) -> str:
+    """How many entries a list or a group of keys has; too many keys are named."""
+    value = found.value
     count = len(value) if isinstance(value, (list, tuple, set, dict)) else 0
-    keys = ", ".join(map(str, list(value)[:MOST])) if isinstance(value, dict) else ""
-    return f"has {count} {'entry' if count == 1 else 'entries'}" + (f" ({keys})" if keys else "")
+    named = isinstance(value, dict) and found.kind == "too_long"
+    keys = f" ({', '.join(map(str, list(value)[:MOST]))})" if named else ""
+    return f"has {count} {'entry' if count == 1 else 'entries'}{keys}"
 
 
 def _allowed(found: Complaint) -> str:

@@ -11,7 +11,7 @@ from kemba_cli.common import Force, Foreign, Json, OwnEffects, Quiet, newest, pr
 
 
 def view(
-    run: Annotated[
+    motion: Annotated[
         Path | None, typer.Argument(help="Run folder, or the log of a motion (the newest run).")
     ] = None,
     out: Annotated[
@@ -20,8 +20,8 @@ def view(
     model: Annotated[
         str | None, typer.Option(help="Model YAML with the robot, not the run's own.")
     ] = None,
-    plan: Annotated[
-        Path | None, typer.Option("--run", help="Run folder whose plan is drawn as a ghost.")
+    run: Annotated[
+        Path | None, typer.Option(help="Run folder whose plan is drawn as a ghost.")
     ] = None,
     rerun: Annotated[
         Path | None, typer.Option(help="Recording (.rrd) for the Rerun viewer to write instead.")
@@ -37,15 +37,15 @@ def view(
 
     Example: kemba-opt view runs/jump-1 --show
     """
-    motion = run or newest(quiet)
+    shown = motion or newest(quiet)
     if rerun is None:
         from kemba.report.stage import view_run
 
-        path = view_run(motion, out, model, force, column_map, plan)
+        path = view_run(shown, out, model, force, column_map, run)
     else:
         from kemba.report.rerun_file import record_run
 
-        path = record_run(motion, rerun, model, force, column_map, plan)
+        path = record_run(shown, rerun, model, force, column_map, run)
     print_json({"view": str(path)}) if json else typer.echo(path)
     if show and rerun is None:
         import webbrowser
