@@ -1,6 +1,6 @@
 """The cost of kemba's plans beside the authors' published ones, on like terms.
 
-    python benchmarks/authors_plans.py --save docs/plan-quality.md
+    python benchmarks/authors_plans.py --save benchmarks/pages/plan-quality.md
 
 Like terms: what the authors' program asks, no hold, no clearance, no bound on impacts and no cost
 of air; with their boom, whose weight they left out, and with kemba's. The cost is the time integral

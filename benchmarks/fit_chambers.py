@@ -1,5 +1,5 @@
 """Fit physical chambers to the paper's Tables I and II: where the defaults of orifice_chamber and
-supply_line come from, and what chambers like these can meet (docs/pneumatics.md).
+supply_line come from, and what chambers like these can meet (docs/physics.md).
 
     python benchmarks/fit_chambers.py
 

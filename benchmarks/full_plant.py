@@ -3,7 +3,7 @@ at once.
 
     python benchmarks/full_plant.py            # all sets, about 2 CPU minutes each
     python benchmarks/full_plant.py --sets 1 --logs FOLDER --progress
-    python benchmarks/full_plant.py --write    # into docs/full-plant.md; finished sets are kept
+    python benchmarks/full_plant.py --write    # into benchmarks/pages; finished sets are kept
 
 Each set is three plans, played on the plant and logged at 1 kHz with the usual noise, and
 two more that are not learnt from. The plant (configs/models/plant.yaml) has orifice chambers, a
@@ -43,7 +43,7 @@ from kemba.plant.simulation.commands import JointControl
 from kemba.trajectory import Trajectory
 
 ROOT = Path(__file__).parents[1]
-DOCS = ROOT / "docs" / "full-plant.md"
+DOCS = ROOT / "benchmarks" / "pages" / "full-plant.md"
 SETS = (  # tasks whose plans are learnt from, and tasks to judge by
     (("hop", "jump height=0.4 m", "jump"), ("jump height=0.54 m", "jump height=0.43 m")),
     (

@@ -1,9 +1,9 @@
 """Jumps on the spot as `solve` plans them, height by height: do they come true and land softly?
 
     python benchmarks/heights.py [--folder runs/heights]          # plans what is not there yet
-    python benchmarks/heights.py --save docs/plan-quality.md      # writes the table
+    python benchmarks/heights.py --save benchmarks/pages/plan-quality.md      # writes the table
     python benchmarks/heights.py --folder runs/longer --set "duration=0.75 s" \
-        --save docs/plan-quality.md
+        --save benchmarks/pages/plan-quality.md
 
 A run is kept in the folder; delete it to plan it anew.
 """

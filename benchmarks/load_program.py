@@ -1,4 +1,4 @@
-"""Load a program that `kemba-opt export --nlp` wrote; needs CasADi only (docs/plan-quality.md).
+"""Load a program of `kemba-opt export --nlp`; needs CasADi only (benchmarks/pages/plan-quality.md).
 
 Usage: python benchmarks/load_program.py nlp/refined.casadi
 """

@@ -1,6 +1,6 @@
 """kemba's relaxation schedule on programs with complementarity pairs from the literature.
 
-    python benchmarks/mpcc_set.py [--starts 10] [--save docs/plan-quality.md]
+    python benchmarks/mpcc_set.py [--starts 10] [--save benchmarks/pages/plan-quality.md]
     python benchmarks/mpcc_set.py --branches      # the best values, by all branches
 
 *Solved*: no row, bound or product of a pair is violated by more than 1e-6, and the cost is within

@@ -2,7 +2,7 @@
 
     git clone https://github.com/nosnoc/nosbench
     python benchmarks/nosbench.py nosbench/problems/casadi --count 40 --results nosbench.jsonl
-    python benchmarks/nosbench.py --results nosbench.jsonl --save docs/nosbench.md
+    python benchmarks/nosbench.py --results nosbench.jsonl --save benchmarks/pages/nosbench.md
 
 Every solve has a process of its own, CPU seconds at most, and is judged by the program's own
 functions: *solved* is no violation and no product above 1e-6. Files are drawn at random, half of

@@ -1,4 +1,4 @@
-"""Write docs/reliability-of-the-program.md from what was really run.
+"""Write benchmarks/pages/reliability-of-the-program.md from what was really run.
 
     python benchmarks/program_page.py
 
@@ -22,7 +22,7 @@ from kemba.identify.settings import DiscoverSettings
 from kemba.scenarios.rate import wilson
 
 ROOT = Path(__file__).parents[1]
-PAGE = ROOT / "docs" / "reliability-of-the-program.md"
+PAGE = ROOT / "benchmarks" / "pages" / "reliability-of-the-program.md"
 POINTS = Path(__file__).with_name("program_points.yaml")
 LOGS = (
     "sidecars",

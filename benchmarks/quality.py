@@ -2,7 +2,7 @@
 
     python benchmarks/quality.py [--starts 20] [--limit 600]   # goes on where the record ends
     python benchmarks/quality.py --part 1/2                   # every second task, for two cores
-    python benchmarks/quality.py --save docs/plan-quality.md       # writes the table
+    python benchmarks/quality.py --save benchmarks/pages/plan-quality.md       # writes the table
 
 A random start has guess noise 0.25 and a seed, as those of `--starts`. It is planned without
 refinement first, which is cheap; the three cheapest of a task are refined and executed. The best

@@ -1,4 +1,4 @@
-"""Write docs/reliability.md from the results of a sweep.
+"""Write benchmarks/pages/reliability.md from the results of a sweep.
 
 kemba-opt sweep reliability.yaml --jobs 2
 python benchmarks/reliability.py sweeps/reliability
@@ -14,7 +14,7 @@ from typing import Any
 from kemba.config import load_yaml
 from kemba.files import atomic_text, read_json
 
-CARD = Path(__file__).resolve().parent.parent / "docs" / "reliability.md"
+CARD = Path(__file__).resolve().parent.parent / "benchmarks" / "pages" / "reliability.md"
 TIMES = {
     "build, wall [s]": "build_s",
     "solve, wall [s]": "solve_s",

@@ -4,7 +4,7 @@ Plans each task as `kemba-opt solve` does, draws conditions from `configs/uncert
 executes the plan's table on the full plant: open loop, and with its feedback policy. Every
 execution is kept in a record; what is there of the same table is not executed again, so that an
 interrupted run continues. A task may carry changes: "jump height=0.6 m, supply=0.6 MPa". The page,
-docs/robustness.md, is written from the record.
+benchmarks/pages/robustness.md, is written from the record.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ WAYS = {  # how a table is executed, under which uncertainties
     "twice": ("twice", "open loop"),
     "feedback": ("twice", "feedback"),
 }
-CARD = Path(__file__).resolve().parent.parent / "docs" / "robustness.md"
+CARD = Path(__file__).resolve().parent.parent / "benchmarks" / "pages" / "robustness.md"
 KEYS = ("task", "conditions", "way", "of", "drawn", "index")  # what names an execution
 SOLVE = "from kemba_cli.main import main; main()"
 

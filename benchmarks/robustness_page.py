@@ -1,4 +1,4 @@
-"""docs/robustness.md from the record that benchmarks/robustness.py keeps."""
+"""benchmarks/pages/robustness.md from the record that benchmarks/robustness.py keeps."""
 
 from __future__ import annotations
 

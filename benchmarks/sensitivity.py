@@ -3,7 +3,7 @@
 
     python benchmarks/sensitivity.py --part 1/2 --jobs 1
     python benchmarks/sensitivity.py --verbs schedule --only Relaxation
-    python benchmarks/sensitivity.py --report                     # writes docs/sensitivity.md
+    python benchmarks/sensitivity.py --report              # writes benchmarks/pages/sensitivity.md
 
 `discover` and `compare`: cases of the blind studies, made by the twin in tests/twin. `schedule`:
 shipped tasks. Only settings marked `decides` are changed, one at a time. A case is run again from

@@ -12,7 +12,7 @@ from typing import Any
 
 from kemba.settings import Settings
 
-PAGE = Path(__file__).resolve().parents[1] / "docs" / "sensitivity.md"
+PAGE = Path(__file__).resolve().parents[1] / "benchmarks" / "pages" / "sensitivity.md"
 FIRST = Path(__file__).with_name("sensitivity_first.md")  # tables whose records were not kept
 LIMIT = 0.05  # share of verdicts that may change when a threshold is doubled
 VERBS = {

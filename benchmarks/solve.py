@@ -1,6 +1,6 @@
 """Time the shipped tasks: program sizes, build and solve times, iterations, all from a cold start.
 
-    python benchmarks/solve.py --repeats 5 --save docs/benchmarks.md
+    python benchmarks/solve.py --repeats 5 --save benchmarks/pages/benchmarks.md
 
 Every case is a fresh process of `kemba-opt solve`, one after the other; the cases take turns, so
 that a slow minute of the machine meets all of them. Prints a table in Markdown; `--save` replaces

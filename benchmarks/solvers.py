@@ -1,6 +1,6 @@
 """Other solvers on kemba's programs: do they solve them, and in how many iterations?
 
-    python benchmarks/solvers.py nlp/*.casadi --limit 60 --save docs/plan-quality.md
+    python benchmarks/solvers.py nlp/*.casadi --limit 60 --save benchmarks/pages/plan-quality.md
 
 The files are those of `kemba-opt export RUN --nlp`. Each solve has a process of its own, CPU
 seconds at most, and the solver's own options, but for its output. `--save` replaces the table of

@@ -40,7 +40,7 @@ SEVERAL = (
 )
 SEED = 8100
 SECONDS = 1.0  # of each log
-PAGE = ROOT / "docs" / "benchmarks.md"
+PAGE = ROOT / "benchmarks" / "pages" / "benchmarks.md"
 BEGIN, END = "<!-- waiting: written by benchmarks/waiting.py -->", "<!-- end of waiting -->"
 
 

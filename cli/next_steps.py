@@ -74,9 +74,9 @@ def after_plot(runs: Sequence[Path]) -> str:
     return f"report {shlex.quote(str(planned[0]))}" if len(planned) == len(runs) == 1 else ""
 
 
-def after_map(log: Path, column_map: Path) -> str:
-    """A drafted map is tried on its log."""
-    return f"check {_typed([log], column_map)}"
+def after_map(log: Path, column_map: Path, model: str = PLANNING) -> str:
+    """A drafted map is tried on its log, with the model of the machine that it was drafted for."""
+    return f"check {_typed([log], column_map, model)}"
 
 
 def after_check(

@@ -12,16 +12,12 @@ from typing import Any
 
 # the last line of pages that a script writes from results
 NEXT = {
-    "benchmarks.md": "[what makes it converge](solving.md), or [sweeps](sweeps.md) of your own",
     "cli.md": "[plan a jump](plan.md), or [how files are written](files.md)",
     "effects.md": "[an effect of your own](extending.md), or [the physics](physics.md)",
-    "real-data.md": "[rigs of your own](rigs.md), or [how discovery works](discovery.md)",
-    "reliability.md": "[why not?](why-not.md), or [sweeps](sweeps.md) of your own",
-    "reliability-of-the-program.md": "[what is trusted](security.md), or [install](start.md)",
-    "robustness.md": "[feedback around a plan](policy.md), or [sweeps](sweeps.md) of your own",
-    "security.md": "[how files are written](files.md), or [sweeps on a cluster](sweeps.md)",
-    "sensitivity.md": "[how discovery works](discovery.md), or [how plans are found](solving.md)",
 }
+
+# a link to what a study has measured, which stays in the repository
+RECORD = re.compile(r"\[([^\]]+)\]\(\.\./benchmarks/pages/([\w-]+\.md)(?:#[\w-]+)?\)")
 
 TYPES = {
     "boolean": "true or false",
@@ -63,6 +59,7 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
     if page.file.src_uri == "tasks.md":
         body, line, rest = markdown.rpartition("\nNext: ")
         markdown = f"{body}\n## From the schema\n\n{task_keys()}{line}{rest}"
+    markdown = RECORD.sub(r"\1 (`benchmarks/pages/\2`)", markdown)
     onwards = NEXT.get(page.file.src_uri)
     return f"{markdown}\n\nNext: {onwards}.\n" if onwards else markdown
 

@@ -12,7 +12,7 @@
 #
 # Why it matters: rigs record at 10 kHz and fits read at 1 kHz. A supply at rest reads 1 % low, and
 # a fit of area or gain finds 1 % between channels that went through decimate and others that did
-# not; gains of 1.009 and 1.013 between force and pressure times area (docs/real-data.md) are of
+# not; gains of 1.009 and 1.013 between force and pressure times area (benchmarks/pages/real-data.md) are of
 # this size. Channels that all went through it agree with each other and with no scale.
 #
 # Read: SciPy's reference of decimate (filter named, gain not), of cheby1 (even orders: gain below 1

@@ -179,14 +179,15 @@ def _is_empty(path: Path) -> bool:
 def typed(
     logs: Sequence[str | Path], column_map: str | Path | None = None, model: str | None = None
 ) -> str:
-    """Logs as they are typed behind a verb, of many in one folder `folder/*.csv`, with the options
-    that they need."""
-    paths = [str(log) for log in logs]
-    if len(paths) < MANY:
-        words = [shlex.quote(path) for path in paths]
-    else:
-        folders = dict.fromkeys(path.rpartition("/")[0] for path in paths)
-        words = [f"{shlex.quote(folder) + '/' if folder else ''}*.csv" for folder in folders]
+    """Logs as they are typed behind a verb, with the options that they need; `folder/*.csv` where
+    that stands for many of them and for no other file."""
+    paths, words = [str(log) for log in logs], list[str]()
+    for folder in dict.fromkeys(path.rpartition("/")[0] for path in paths):
+        own = [path for path in paths if path.rpartition("/")[0] == folder]
+        there = {str(path) for path in Path(folder or ".").glob("*.csv")}
+        all_of_it = len(own) >= MANY and there == {str(Path(path)) for path in own}
+        pattern = f"{shlex.quote(folder) + '/' if folder else ''}*.csv"
+        words += [pattern] if all_of_it else [shlex.quote(path) for path in own]
     options = {"--map": column_map, "--model": model}
     words += [f"{name} {shlex.quote(str(value))}" for name, value in options.items() if value]
     return " ".join(words)

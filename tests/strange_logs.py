@@ -71,6 +71,17 @@ NAMES: dict[str, dict[str, str]] = {
     "planar": {"body/x": "x", "body/z": "y", "body/pitch": "theta", "hip/q": "hip_q_{l}",
                "hip/tau": "hip_tau_{l}", "piston/x": "cyl_x_{l}", "valve/extend": "u_ext_{l}",
                "valve/retract": "u_ret_{l}"},
+    "actual": {"body/x": "Actual Position Body X", "body/z": "Actual Position Body Z",
+               "body/pitch": "Actual Angle Body Pitch", "hip/q": "Actual Angle Hip {Leg}",
+               "hip/tau": "Commanded Torque Hip {Leg}", "piston/x": "Actual Stroke Piston {Leg}",
+               "valve/extend": "Solenoid {Leg} Out", "valve/retract": "Solenoid {Leg} In"},
+    "simulink": {"body/x": "body.x", "body/z": "body.z", "body/pitch": "body.r",
+                 "hip/q": "motor state ({L}).q", "hip/tau": "motor command ({L}).tau",
+                 "piston/x": "piston state ({L}).p", "valve/extend": "piston command ({L}).ue",
+                 "valve/retract": "piston command ({L}).ur"},
+    "numbered": {"body/x": "ch_a", "body/z": "ch_b", "body/pitch": "ch_c", "hip/q": "ch_d{n}",
+                 "hip/tau": "ch_e{n}", "piston/x": "ch_f{n}", "valve/extend": "ch_g{n}",
+                 "valve/retract": "ch_h{n}"},
 }  # fmt: skip
 BEIN = {"front": "vorne", "rear": "hinten"}
 UNITS = {  # ours -> how it is written, and how many of it one of ours is
@@ -156,7 +167,8 @@ def noisy(rng: Rng, rows: int = 420) -> Trajectory:
 def _name(scheme: str, name: str) -> str:
     leg = next((leg for leg in LEGS if name.startswith(leg)), "")
     form = NAMES[scheme][name.removeprefix(f"{leg}/")]
-    return form.format(leg=leg, Leg=leg.title(), bein=BEIN.get(leg, ""), l=leg[:1].upper())
+    return form.format(leg=leg, Leg=leg.title(), bein=BEIN.get(leg, ""), l=leg[:1].upper(),
+                       L=leg[:1].upper(), n=LEGS.index(leg) if leg else "")  # fmt: skip
 
 
 def _ns(log: Trajectory) -> np.ndarray:
@@ -328,6 +340,31 @@ def _mcap(table: dict[str, np.ndarray], below: dict[str, str], path: Path) -> Pa
     return path
 
 
+def _tdms(table: dict[str, np.ndarray], below: dict[str, str], path: Path) -> Path:
+    from nptdms import ChannelObject, TdmsWriter
+
+    path = path.with_suffix(".tdms")
+    wave = {"wf_increment": 1e-3, "wf_start_offset": 0.0}
+    units = {name: {"unit_string": unit} for name, unit in below.items()}
+    numeric = {n: v for n, v in table.items() if v.dtype.kind in "fi"}
+    channels = [ChannelObject("log", n, v, wave | units.get(n, {})) for n, v in numeric.items()]
+    with TdmsWriter(path) as writer:
+        writer.write_segment(channels)
+    return path
+
+
+def _mf4(table: dict[str, np.ndarray], below: dict[str, str], path: Path) -> Path:
+    from asammdf import MDF, Signal
+
+    path = path.with_suffix(".mf4")
+    numeric = {n: v for n, v in table.items() if v.dtype.kind in "fi"}
+    at = 1e-3 * np.arange(len(next(iter(numeric.values()))))
+    with MDF() as file:
+        file.append([Signal(v, at, below.get(n, ""), n) for n, v in numeric.items()])
+        file.save(path, overwrite=True)
+    return path
+
+
 FORMS: dict[str, Callable[[dict[str, np.ndarray], dict[str, str], Path], Path]] = {
     "comma": _text(",", ".", ".csv"),
     "semicolon": _text(";", ",", ".csv"),
@@ -338,6 +375,8 @@ FORMS: dict[str, Callable[[dict[str, np.ndarray], dict[str, str], Path], Path]] 
     "json": _json,
     "mat": _mat,
     "mcap": _mcap,
+    "tdms": _tdms,
+    "mf4": _mf4,
 }
 
 

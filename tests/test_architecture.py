@@ -63,6 +63,7 @@ ONLY_IN = {
     "asammdf": {"logs"},
     "nptdms": {"logs"},
     "pyulog": {"logs"},
+    "rerun": {"report"},
 }
 SOURCES = sorted([*ROOT.glob("kemba/**/*.py"), *ROOT.glob("cli/**/*.py")])
 FOLDERS = (".", ".ci", ".github", "cli", "configs", "docs", "kemba", "tests")

@@ -23,7 +23,8 @@ from kemba.ocp.task.task import Bound, Goal, Solver, Task, Tolerances
 from kemba_cli.main import app
 
 ROOT = Path(__file__).parent.parent
-PAGES = sorted([*ROOT.glob("docs/*.md"), ROOT / "README.md"])
+RECORDS = sorted(ROOT.glob("benchmarks/pages/*.md"))
+PAGES = sorted([*ROOT.glob("docs/*.md"), *RECORDS, ROOT / "README.md"])
 
 
 @pytest.mark.parametrize("section", [Task, Solver, Tolerances, Goal, Bound])

@@ -76,7 +76,7 @@ def test_the_message_of_extending_is_the_real_one() -> None:
 
 
 def test_fitted_chambers_meet_tables_1_and_2_as_documented() -> None:
-    """Every entry within what docs/pneumatics.md admits."""
+    """Every entry within what docs/physics.md admits."""
     losses = [SupplyLine(), HoseLag(T=1e-3), SealFriction(F_c=5.9), PistonDamping(c=20.0)]
     chamber = OrificeChamber(V_r=15.0e-6)
     rig = Model(rig_mechanism(load_cylinder("dsnu-25-70")), [Valve(), chamber, *losses])

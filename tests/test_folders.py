@@ -156,5 +156,16 @@ def test_a_full_disk_is_told_and_leaves_nothing(monkeypatch: pytest.MonkeyPatch)
 def test_logs_are_named_as_they_are_typed() -> None:
     assert typed(["a b.csv", Path("c.csv")]) == "'a b.csv' c.csv"
     assert typed(["a.csv"], "map.yaml", "mine.yaml") == "a.csv --map map.yaml --model mine.yaml"
-    many = [f"logs/log-{number}.csv" for number in range(6)]
+    many = [Path(f"logs/log-{number}.csv") for number in range(6)]
+    many[0].parent.mkdir()
+    for log in many:
+        log.touch()
     assert typed(many, "m.yaml") == "logs/*.csv --map m.yaml"
+    assert typed([*many, "a.csv"]) == "logs/*.csv a.csv"
+
+
+def test_no_pattern_takes_in_logs_of_other_machines() -> None:
+    many = [f"log-{number}.csv" for number in range(6)]
+    for log in [*many, "of_another_machine.csv"]:
+        Path(log).touch()
+    assert typed(many) == " ".join(many)

@@ -21,6 +21,8 @@ def test_every_point_names_tests_that_exist() -> None:
 
 
 def test_the_page_is_of_these_points() -> None:
-    page = (ROOT / "docs" / "reliability-of-the-program.md").read_text(encoding="utf-8")
+    page = (ROOT / "benchmarks" / "pages" / "reliability-of-the-program.md").read_text(
+        encoding="utf-8"
+    )
     for point in POINTS:
         assert f"| {point['number']} | {point['defect']} |" in page

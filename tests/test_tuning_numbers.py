@@ -55,7 +55,7 @@ CONSTANTS = {  # file -> names, why
     "plant/execution/controller.py": ("PERIOD", "rate of the robot's controller"),
     "ocp/mpcc/homotopy.py": (
         "LOOSE FACTOR EXACT OFF LONG BRANCH SCALED",
-        "figures of a general method, chosen on NOSBENCH (docs/nosbench.md)",
+        "figures of a general method, chosen on NOSBENCH (benchmarks/pages/nosbench.md)",
     ),
     "ocp/mpcc/solve.py": ("TRIED MARGIN SWITCHES PAYS SLOPE RESIDUAL", "the same"),
     "ocp/mpcc/stationary.py": ("STEP LONGEST", "the same"),

@@ -24,7 +24,7 @@ Prepared = tuple[list[dict[str, Any]], Callable[[], Problem]]  # what is hidden,
 Prepare = Callable[[Setting], Prepared]
 Draw = Callable[..., Sequence[Setting]]  # all cases, of the usual seed or of another
 TIME_LIMIT = 300.0  # s, that of the command
-DOCS = Path(__file__).resolve().parents[2] / "docs" / "blind-tests.md"
+DOCS = Path(__file__).resolve().parents[2] / "benchmarks" / "pages" / "blind-tests.md"
 
 
 # noise of the sensors: white, or AR(1) with so much left after 1 ms, with wider steps, or drifting

@@ -1,4 +1,4 @@
-"""Write docs/real-data.md: what the tool says of data that nobody here made.
+"""Write benchmarks/pages/real-data.md: what the tool says of data that nobody here made.
 
 KEMBA_DATA=folder python -m benchmarks.real.page            ten minutes of CPU time
 python -m benchmarks.real.page --download                   into the cache of the user
@@ -16,7 +16,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from benchmarks.real import cylinder, emps, seals, vessel
 from benchmarks.real.data import Absent
 
-PAGE = Path(__file__).parents[2] / "docs" / "real-data.md"
+PAGE = Path(__file__).parents[2] / "benchmarks" / "pages" / "real-data.md"
 HEAD = """# Real data
 
 Written by `python -m benchmarks.real.page`; do not edit. Nobody here made these data, and the

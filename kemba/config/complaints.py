@@ -32,6 +32,16 @@ EXPECTED = {
     "dataclass_type": "a group of keys",
     "none_required": "nothing",
 }
+BOUNDS = {  # what a key takes, by pydantic's kind of a bound that a value exceeds
+    "greater_than": "more than {gt}",
+    "greater_than_equal": "at least {ge}",
+    "less_than": "less than {lt}",
+    "less_than_equal": "at most {le}",
+    "multiple_of": "a multiple of {multiple_of}",
+    "string_too_short": "a text of at least {min_length} characters",
+    "string_too_long": "a text of at most {max_length} characters",
+    "string_pattern_mismatch": "a text of the form {pattern}",
+}
 MOST = 50  # mistakes of one file; more do not help and take long to find
 SHOWN = 80  # characters of a value in a message
 UNKNOWN_KEY = ("extra_forbidden", "unexpected_keyword_argument")
@@ -112,13 +122,30 @@ def _report(found: Complaint, document: Document) -> KembaError:
         return _not_among(found, document)
     if found.kind == "value_error":
         return document.error(place, _at(place, str(found.context["error"])))
-    if found.kind == "too_short":
-        least = f"at least {found.context['min_length']} were expected"
-        count = int(found.context["actual_length"])
-        what = f"has {count} {'entry' if count == 1 else 'entries'}"
-        return document.error(place, _at(place, what), least)
-    message = found.message[0].lower() + found.message[1:]
-    return document.error(place, _at(place, f"{_shown(found.value)}: {message}"))
+    if found.kind in ("too_short", "too_long"):
+        return document.error(place, _at(place, _size(found)), f"{_allowed(found)} expected")
+    what = _at(place, f"{_shown(found.value)} is out of range")
+    if found.kind in BOUNDS:
+        wanted = BOUNDS[found.kind].format(**found.context)
+        return document.error(place, what, f"{wanted} was expected")
+    what = _at(place, f"{_shown(found.value)} is not what this key takes")
+    return document.error(place, what)
+
+
+def _size(found: Complaint) -> str:
+    """How many entries a list or a group of keys has; too many keys are named."""
+    value = found.value
+    count = len(value) if isinstance(value, (list, tuple, set, dict)) else 0
+    named = isinstance(value, dict) and found.kind == "too_long"
+    keys = f" ({', '.join(map(str, list(value)[:MOST]))})" if named else ""
+    return f"has {count} {'entry' if count == 1 else 'entries'}{keys}"
+
+
+def _allowed(found: Complaint) -> str:
+    """How many entries were expected: `at most 3 were`."""
+    least = found.kind == "too_short"
+    count = found.context["min_length" if least else "max_length"]
+    return f"at {'least' if least else 'most'} {count} {'was' if count == 1 else 'were'}"
 
 
 def _unknown_tag(found: Complaint, document: Document) -> KembaError:
@@ -142,13 +169,15 @@ def _not_among(found: Complaint, document: Document) -> KembaError:
 
 
 def _expectation(found: Complaint) -> str:
-    """What a missing key should hold, when its schema says so."""
+    """What a key should hold, as its schema says."""
     for schema in found.holders:
         info = fields_of(schema).get(str(found.place[-1]))
         for item in getattr(info, "metadata", ()):
             if isinstance(item, Param):
                 return expectation(item.unit)
-    return ""
+        if description := getattr(info, "description", None):
+            return f"needed: {description}"
+    return "this file needs it"
 
 
 def _at(place: Location, what: str) -> str:

@@ -13,6 +13,7 @@ from kemba.identify.compare.words import place_of
 from kemba.identify.doubt.unexplained import UnexplainedSettings
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
+from kemba.identify.problem.problem import Problem
 from kemba.units import short
 
 BENCH = "run this cylinder alone on a rig: slow strokes, fast strokes, and the rod locked"
@@ -23,6 +24,11 @@ NEXT = {  # by the end of a channel's name
     "pitch": "tilt the body by hand in the air, and let it drop with the legs at rest",
 }
 BODY = "let the robot drop with the legs at rest, and move the boom by hand"
+ON_RIGS = {  # by the kind of rig of the model; a piston of the robot on its bench has none
+    "drive": "move the axis slowly and fast, to and fro, with and without load",
+    "vessel": "fill and empty the vessel from several pressures",
+}
+STROKES = "move the rod slowly and fast over its whole stroke, hold it between, at other pressures"
 
 
 @dataclass(frozen=True)
@@ -63,14 +69,16 @@ def rest_of(search: Search, best: Hypothesis, unsure: Collection[str]) -> Remain
     bins = sorted(conditions(problem, theta), key=lambda b: -b.ratio)
     worst = [f"{place_of(b)} ({short(b.ratio)} times the noise)" for b in bins if b.significant][:1]
     channel = profiles[0].channel if law else bins[0].channel if worst else ""
-    advice = _advice(channel)
+    advice = _advice(problem, channel)
     if unsure:
         named = " and ".join(unsure)
         advice = f"'kemba-opt experiment' proposes a test that tells {named} from what looks alike"
     return Remainder("; ".join([*worst, *law]) or "no condition in particular", advice)
 
 
-def _advice(channel: str) -> str:
-    """What to measure to learn more about a channel."""
+def _advice(problem: Problem, channel: str) -> str:
+    """What to measure to learn more about a channel, on the machine that the logs are of."""
+    if not problem.moves:
+        return ON_RIGS.get(problem.model.mechanism.rig, STROKES)
     parts = channel.replace(" ", "/").split("/")
     return next((text for key, text in NEXT.items() if key in parts), BODY)

@@ -15,6 +15,7 @@ from kemba.logs.recording import Column, Raw
 from kemba.trajectory import Array
 
 MISSING = ["", *"nan NaN NAN na NA null NULL none None -".split()]
+PIECE = 50_000  # rows that are read at a time: their texts take more memory than the numbers
 COMMENT = ("#", "%", "//")  # before a header, as of numpy.savetxt
 
 
@@ -28,17 +29,19 @@ def read_text(path: Path, layout: ColumnMap) -> Raw:
 
     above, names = _header(path, layout)
     try:
-        table = pd.read_csv(
-            path,
-            sep=layout.pattern,
-            header=None,
-            skiprows=above,
-            decimal=layout.decimal,
-            keep_default_na=False,
-            na_values=MISSING,
-            low_memory=False,
-            skipinitialspace=True,
-            encoding=encoding(path),
+        pieces = list(
+            pd.read_csv(
+                path,
+                sep=layout.pattern,
+                header=None,
+                skiprows=above,
+                decimal=layout.decimal,
+                keep_default_na=False,
+                na_values=MISSING,
+                skipinitialspace=True,
+                encoding=encoding(path),
+                chunksize=PIECE,
+            )
         )
     except pd.errors.EmptyDataError:
         raise KembaError(str(path), "is empty", "a table was expected") from None
@@ -49,13 +52,13 @@ def read_text(path: Path, layout: ColumnMap) -> Raw:
         raise KembaError(str(path), what, hint="`separator` and `skip_rows` of the map") from None
     except OSError as error:
         raise KembaError(str(path), error.strerror or str(error)) from None
-    width = table.shape[1]
+    width = pieces[0].shape[1]
     if width < len(names):
         what = f"rows have {width} cells below {len(names)} headers"
         raise KembaError(f"{path}:{above + 1}", what, hint="`separator` and `skip_rows` of the map")
     found = {}
-    for name, column in zip(numbered(names, width), table, strict=True):
-        cells = table[column].to_numpy()
+    for name, column in zip(numbered(names, width), pieces[0], strict=True):
+        cells = np.concatenate([piece[column].to_numpy() for piece in pieces])
         found[name] = cells if cells.dtype.kind in "fiub" else cells.astype(object)
         if cells.dtype.kind == "f" and np.isinf(cells).any():
             row = above + 1 + int(np.argmax(np.isinf(cells)))

@@ -46,8 +46,19 @@ def flexions(leg: Leg, x: Array) -> Array:
     """Knee flexions (n,) [rad] for piston extensions `x` (n,) [m]. Raises as `flexion` does."""
     cosine, phase = _triangle(leg, x)
     if np.any(beyond := np.abs(cosine) > 1.0):
-        raise ValueError(f"the knee cannot reach a piston extension of {x[beyond][0]:g} m")
+        least, most = (1e3 * length for length in extensions(leg))
+        reach = f"it reaches {least:.1f} to {most:.1f} mm"
+        far = f"the knee cannot reach a piston extension of {1e3 * x[beyond][0]:.1f} mm"
+        raise ValueError(f"{far}; {reach}")
     return np.asarray(np.arccos(cosine) - np.arctan2(*phase))
+
+
+def extensions(leg: Leg) -> tuple[float, float]:
+    """The least and the largest piston extension [m] at which the linkage closes, whatever the
+    stroke."""
+    femur = (leg.femur.length**2 + leg.piston.mount**2) ** 0.5
+    ends = abs(femur - leg.piston.pin), femur + leg.piston.pin
+    return ends[0] - leg.piston.retracted, ends[1] - leg.piston.retracted
 
 
 def flexion_of(leg: Leg, x: ca.SX) -> ca.SX:

@@ -26,12 +26,15 @@ BESIDE = 2.0  # m of ground before and behind the motion
 AROUND = 0.3  # s, shown before and after the ghost moves
 
 
-def write_view(source: Source, path: str | Path, model: str | None = None) -> Path:
-    """Write a page with the motion of a source in 3-D; it needs no other file.
+def write_view(
+    source: Source, path: str | Path, model: str | None = None, ghost: Source | None = None
+) -> Path:
+    """Write a page with the motion of a source in 3-D; it needs no other file. `ghost`: a second
+    motion, drawn pale.
 
     Raises KembaError when columns are missing or the file cannot be written.
     """
-    return write_page(path, source.name, stage(source, model))
+    return write_page(path, source.name, stage(source, model, ghost))
 
 
 def view_run(
@@ -40,15 +43,26 @@ def view_run(
     model: str | None = None,
     force: bool = False,
     column_map: str | Path | None = None,
+    plan: str | Path | None = None,
 ) -> Path:
-    """The page of a run folder or a CSV; written to `out` or as a new file beside the motion.
+    """The page of a run folder or a log; written to `out` or as a new file beside the motion.
 
-    `column_map`: for the log of another program. Raises KembaError where columns are missing or the
-    page cannot be written.
+    `column_map`: for the log of another program. `plan`: the run that is drawn as a ghost. Raises
+    KembaError where columns are missing or the page cannot be written.
     """
-    source = load_source(run, load_map(column_map) if column_map else None)
+    source, ghost = shown(run, column_map, plan)
     assert source.path is not None
-    return write_view(source, place_for(out, source.path.with_name("view.html"), force), model)
+    place = place_for(out, source.path.with_name("view.html"), force)
+    return write_view(source, place, model, ghost)
+
+
+def shown(
+    run: str | Path, column_map: str | Path | None, plan: str | Path | None
+) -> tuple[Source, Source | None]:
+    """The motion of a run folder or a log, and that of the run which is its ghost, if there is
+    one. Raises KembaError."""
+    source = load_source(run, load_map(column_map) if column_map else None)
+    return source, load_source(plan) if plan else None
 
 
 def stage(

@@ -148,7 +148,7 @@ def test_check_tells_the_same_mistakes() -> None:
     ("option", "told"),
     [
         ("nods=3", "nods: unknown key; did you mean 'nodes'?"),
-        ("nodes=2", "nodes: '2': input should be greater than or equal to 4"),
+        ("nodes=2", "nodes: '2' is out of range; at least 4 was expected"),
         ("height=2 kg", "height: '2 kg' is a mass; a length such as '0.5 m' was expected"),
         ("supply=0.9 bar", "supply: '0.9 bar' is out of range; at least 101325 Pa was expected"),
         ("goals.apx.equals=1", "goals.apx.quantity: missing"),

@@ -7,15 +7,16 @@ import shlex
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-PAGES = {p.name: p for p in [*sorted(ROOT.glob("docs/*.md")), ROOT / "README.md"]}
+FOLDERS = ("docs", "benchmarks/pages")  # the site, and what studies have measured
+WRITTEN = [p for folder in FOLDERS for p in sorted(ROOT.glob(f"{folder}/*.md"))]
+PAGES = {p.name: p for p in [*WRITTEN, ROOT / "README.md"]}
 FENCE = re.compile(r"^( *)```(\w*)[^\n]*\n(.*?)^ *```", re.DOTALL | re.MULTILINE)
 SHELL = ("sh", "console")
 PLACEHOLDER = re.compile(r"\b(?:[A-Z]{3,}|[A-Z]+_[A-Z]+)\b(?![.=])|\.\.\.")
 
 # Pages whose commands other tests or jobs execute.
 ELSEWHERE = {
-    "example-tables.md": "tests/identify/test_examples.py",
-    "example-foreign.md": "tests/identify/test_examples.py",
+    "examples.md": "tests/identify/test_examples.py",
     "gallery.md": "tests/test_examples.py",
     "tutorial.md": "tests/documents/test_tutorial.py",
     "experiment.md": "tests/identify/test_experiment.py",

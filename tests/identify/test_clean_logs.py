@@ -124,6 +124,17 @@ def test_readings_that_stand_still_tell_one_thing() -> None:
     assert step_of(values + 1e-12 * np.arange(len(values))) == pytest.approx(8.0)
 
 
+def test_a_motion_without_rest_is_no_coarse_sensor() -> None:
+    """Its slowest step is none of the sensor's."""
+    t = np.arange(0.0, 4.0, 1e-3)
+    q = 35.0 * t + 0.3 * np.sin(20.0 * t)
+    assert step_of(q) == 0.0
+    step, swing = 2 * np.pi / 4096, np.sin(3.0 * t)
+    assert step_of(np.round(swing / step) * step) == pytest.approx(step, rel=1e-6)
+    written = np.round(np.round(swing / step) * step, 5)  # as a file has it
+    assert step_of(written) == pytest.approx(step, rel=0.01)
+
+
 def test_coarse_sensors_are_told(bench_log: BenchLog) -> None:
     (remark,) = limits_of([changed(bench_log(), coarse)])
     assert remark.startswith("piston/F comes in steps of 8 N") and "noise of 2.3" in remark

@@ -15,9 +15,13 @@ from kemba_cli.main import app
 ROOT = Path(__file__).parents[2]
 
 
-def commands(page: str) -> list[list[str]]:
-    """Arguments of every kemba-opt call of a page, in order."""
-    text = (ROOT / "docs" / page).read_text(encoding="utf-8")
+TABLES, FOREIGN = (
+    (ROOT / "docs" / "examples.md").read_text(encoding="utf-8").split("\n## Example: ")
+)
+
+
+def commands(text: str) -> list[list[str]]:
+    """Arguments of every kemba-opt call of an example, in order."""
     return [shlex.split(line) for line in re.findall(r"^\$ kemba-opt (.+)$", text, re.MULTILINE)]
 
 
@@ -28,13 +32,12 @@ def run(arguments: list[str]) -> str:
 
 
 def test_the_tables_tell_of_friction_supply_and_tubes() -> None:
-    page = (ROOT / "docs" / "example-tables.md").read_text(encoding="utf-8")
-    tables, *others = commands("example-tables.md")
+    tables, *others = commands(TABLES)
     said = run(tables)
-    assert said.splitlines()[0] in page
+    assert said.splitlines()[0] in TABLES
     found = json.loads(run([*tables, "--json"]))
     for mode, losses in found["losses_n"].items():
-        assert f"| {mode} | {' | '.join(f'{loss:.1f}' for loss in losses)} |" in page
+        assert f"| {mode} | {' | '.join(f'{loss:.1f}' for loss in losses)} |" in TABLES
     low, high = found["seal_friction_n"]
     assert 5.5 < low < high < 8.5
     assert all(shortfall[-1] > 0.08 for shortfall in found["supply_shortfall"].values())
@@ -52,7 +55,7 @@ def at_home(authors_plan: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.nightly
 @pytest.mark.usefixtures("at_home")
 def test_a_foreign_plan_lacks_the_weight_of_the_boom() -> None:
-    compare, discover, adopt = commands("example-foreign.md")
+    compare, discover, adopt = commands(FOREIGN)
     cells = json.loads(run([*compare, "--json"]))["cells"]
     worst = max(
         (c for c in cells if c["phase"] == "flight" and c["mode"] == "00"), key=lambda c: c["ratio"]

@@ -19,6 +19,7 @@ from kemba.errors import KembaError
 from kemba.identify.logs.reading import read_log
 from kemba.logs import ColumnMap, ColumnSource, load_map, open_log
 from kemba.logs.draft.draft import draft_map
+from kemba.logs.formats.decoding import Topic
 from kemba.logs.opening import raw_columns
 from kemba.trajectory import Trajectory
 
@@ -372,3 +373,28 @@ def test_what_holds_no_series_is_named_with_the_way_out(tmp_path: Path) -> None:
     savemat(tmp_path / "log.mat", {"gain": 3.0, "name": "EMPS"})
     with pytest.raises(KembaError, match="holds no vector of numbers: 'gain'"):
         draft_map(tmp_path / "log.mat", LEGS)
+
+
+def test_messages_of_several_shapes_are_one_topic() -> None:
+    """Fields that come later, lists that grow, a number that becomes a list, texts between."""
+    topic = Topic("/log")
+    messages = [
+        {"a": 1.0, "state": "idle"},
+        {"a": 2, "b": [3.0]},
+        {"a": 3.0, "b": [4.0, 5.0], "state": "on"},
+        {"a": 4.0, "b": 6.0},
+        {"name": ["hip", "knee"], "position": [7.0, 8.0]},
+        {"name": ["knee", "hip"], "position": np.array([9.0, 10.0])},
+    ]
+    for stamp, message in enumerate(messages):
+        topic.add(stamp, message)
+    nan = np.nan
+    expected = {
+        "a": [1, 2, 3, 4, nan, nan], "b/0": [nan, 3, 4, nan, nan, nan],
+        "b/1": [nan, nan, 5, nan, nan, nan], "b": [nan, nan, nan, 6, nan, nan],
+        "position/hip": [nan] * 4 + [7, 10], "position/knee": [nan] * 4 + [8, 9],
+    }  # fmt: skip
+    columns = topic.group().columns
+    assert columns.keys() == expected.keys() and "state" in topic.texts
+    for name, values in expected.items():
+        np.testing.assert_array_equal(columns[name], values)

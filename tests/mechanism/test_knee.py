@@ -44,5 +44,12 @@ def test_pivot_to_pin_is_the_cylinder_with_its_rod() -> None:
 
 
 def test_out_of_reach() -> None:
-    with pytest.raises(ValueError, match=r"cannot reach a piston extension of 0\.2 m"):
+    with pytest.raises(
+        ValueError, match=r"extension of 200\.0 mm; it reaches -\d+\.\d to \d+\.\d mm"
+    ):
         knee.flexion(LEG, 0.2)
+    for x in knee.extensions(LEG):
+        inside = x + np.copysign(1e-6, 0.05 - x)
+        assert np.isfinite(knee.flexion(LEG, inside))
+        with pytest.raises(ValueError, match="it reaches"):
+            knee.flexion(LEG, 2 * x - inside)

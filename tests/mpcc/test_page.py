@@ -1,4 +1,4 @@
-"""The examples of docs/nosbench.md run as they stand."""
+"""The examples of benchmarks/pages/nosbench.md run as they stand."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-PAGE = Path(__file__).parents[2] / "docs/nosbench.md"
+PAGE = Path(__file__).parents[2] / "benchmarks/pages/nosbench.md"
 EXAMPLES = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
 
 

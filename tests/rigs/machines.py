@@ -60,6 +60,32 @@ def drive_log(
     return path
 
 
+def turning_log(path: Path, turns: float, seconds: float = 6.0) -> Path:
+    """A pendulum (1.5 kg at 0.25 m, rotor 0.02 kg.m2, friction 0.4 N.m, damping 0.05 N.m.s) that a
+    motor turns over at about so many rad/s."""
+    rng = np.random.default_rng(0)
+    inertia, weight = 0.02 + 1.5 * 0.25**2, 1.5 * 9.81 * 0.25
+
+    def motor(t: float, v: float) -> float:
+        return 3.0 * (turns * (1 + 0.3 * np.sin(np.pi * t)) - v)
+
+    def motion(t: float, y: np.ndarray) -> list[float]:
+        q, v = y
+        force = motor(t, v) - 0.4 * np.tanh(v / 1e-3) - 0.05 * v - weight * np.sin(q)
+        return [v, force / inertia]
+
+    t = np.arange(0.0, seconds, 1e-3)
+    q, v = solve_ivp(motion, (0.0, seconds), [0.0, turns], "LSODA", t, rtol=1e-8, atol=1e-9,
+                     max_step=2e-3).y  # fmt: skip
+    columns = {
+        "axis/q [rad]": q + 1e-4 * rng.standard_normal(len(t)),
+        "axis/tau [N.m]": np.array([motor(*at) for at in zip(t, v, strict=True)])
+        + 0.02 * rng.standard_normal(len(t)),
+    }
+    Trajectory(t, columns, {"kind": "drive"}).write(path)
+    return path
+
+
 def cylinder_log(
     path: Path, pressure: float, coulomb: float = 4.0, mu: float = 0.0, seed: int = 0
 ) -> Path:

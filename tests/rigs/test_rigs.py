@@ -10,7 +10,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from machines import cogging_log, cylinder_log, drive_log, model_file, vessel_log
+from machines import cogging_log, cylinder_log, drive_log, model_file, turning_log, vessel_log
 from real_data import reader, real
 from typer.testing import CliRunner
 
@@ -105,6 +105,22 @@ def test_a_pendulum_is_characterised(tmp_path: Path) -> None:
     before, _ = compare_logs([log], str(tmp_path / "model.yaml"))
     after, _ = compare_logs([log], str(out))
     assert after.noise_ratio < 1.1 and before.noise_ratio > 1.8
+
+
+@pytest.mark.parametrize("turns", [3.0, 35.0])
+def test_a_pendulum_that_turns_fast_is_as_exact_as_a_slow_one(turns: float, tmp_path: Path) -> None:
+    """Within the filter it turns by half a radian: sin(q) behind it is not sin of what is."""
+    log = turning_log(tmp_path / "a.csv", turns)
+    rig = {"kind": "drive", "motion": "rotary", "inertia": "0.02 kg.m2",
+           "load": {"mass": "1.5 kg", "arm": "0.25 m"}}  # fmt: skip
+    whole = {"kind": "axis_friction", "F_c": 0.4}, {"kind": "axis_damping", "F_v": 0.05}
+    found, _ = compare_logs([log], model_file(tmp_path, rig, *whole))
+    assert found.good and found.noise_ratio == pytest.approx(1.0, abs=0.1)
+    figures = {f.name: f.value for f in characterise_logs([log], model_file(
+        tmp_path, rig, {"kind": "axis_friction"}, {"kind": "axis_damping"})).figures}  # fmt: skip
+    assert figures["axis_friction.F_c"] == pytest.approx(0.4, rel=0.02)
+    assert figures["axis_damping.F_v"] == pytest.approx(0.05, rel=0.04)
+    assert figures["drive_axis.J"] == pytest.approx(0.02, rel=0.06)
 
 
 def logs_of_a_cylinder(folder: Path, **friction: float) -> list[Path]:

@@ -108,8 +108,8 @@ def test_lines_that_say_nothing_or_have_wrong_units_are_refused() -> None:
 
 
 def test_a_new_kind_of_terrain_is_one_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """As docs/terrain.md shows it: a file in the folder of kinds, and nothing else."""
-    page = (Path(__file__).parents[2] / "docs/terrain.md").read_text(encoding="utf-8")
+    """As docs/motions.md shows it: a file in the folder of kinds, and nothing else."""
+    page = (Path(__file__).parents[2] / "docs/motions.md").read_text(encoding="utf-8")
     source = page.split("```python\n")[1].split("```")[0]
     (tmp_path / "waves.py").write_text(source, encoding="utf-8")
     monkeypatch.setattr(terrain, "__path__", [*terrain.__path__, str(tmp_path)])

@@ -57,4 +57,4 @@ def draft_map(
             say(f"answer what is open in {out}: correct its lines, then use it", quiet)
         raise typer.Exit(BAD_ANSWER)
     say(f"look through {out}: signs and zeros of angles cannot be guessed", quiet)
-    say_next(after_map(log, out), quiet)
+    say_next(after_map(log, out, model), quiet)

@@ -11,7 +11,7 @@ from kemba_cli.common import Force, Foreign, Json, OwnEffects, Quiet, newest, pr
 
 
 def view(
-    run: Annotated[
+    motion: Annotated[
         Path | None, typer.Argument(help="Run folder, or the log of a motion (the newest run).")
     ] = None,
     out: Annotated[
@@ -20,6 +20,12 @@ def view(
     model: Annotated[
         str | None, typer.Option(help="Model YAML with the robot, not the run's own.")
     ] = None,
+    run: Annotated[
+        Path | None, typer.Option(help="Run folder whose plan is drawn as a ghost.")
+    ] = None,
+    rerun: Annotated[
+        Path | None, typer.Option(help="Recording (.rrd) for the Rerun viewer to write instead.")
+    ] = None,
     column_map: Foreign = None,
     show: Annotated[bool, typer.Option("--show", help="Open it in the browser.")] = False,
     force: Force = False,
@@ -27,15 +33,21 @@ def view(
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Write a motion in 3-D as a self-contained HTML page, to turn, zoom and play.
+    """Write a motion in 3-D as a self-contained HTML page, to turn, zoom and play, or for Rerun.
 
     Example: kemba-opt view runs/jump-1 --show
     """
-    from kemba.report.stage import view_run
+    shown = motion or newest(quiet)
+    if rerun is None:
+        from kemba.report.stage import view_run
 
-    path = view_run(run or newest(quiet), out, model, force, column_map)
+        path = view_run(shown, out, model, force, column_map, run)
+    else:
+        from kemba.report.rerun_file import record_run
+
+        path = record_run(shown, rerun, model, force, column_map, run)
     print_json({"view": str(path)}) if json else typer.echo(path)
-    if show:
+    if show and rerun is None:
         import webbrowser
 
         webbrowser.open(path.resolve().as_uri())

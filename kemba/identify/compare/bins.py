@@ -36,7 +36,7 @@ class BinSettings(Settings):
         0.3,
         "1",
         "power of a good model's own error, in units of the noise's: disturbances have a colour",
-        "tuned: by hand on 17 cases of the twin, docs/sensitivity.md",
+        "tuned: by hand on 17 cases of the twin, benchmarks/pages/sensitivity.md",
         decides=True,
     )
     false_discoveries: float = setting(

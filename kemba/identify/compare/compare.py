@@ -184,11 +184,12 @@ def phrase(found: Comparison) -> str:
         return f"The model explains the logs to within the noise: its error is {ratio}."
     if not bad:
         return f"The model's error is {ratio}; no single condition stands out."
-    worst = f"worst: {place_of(bad[0])} ({short(bad[0].ratio)} times)"
+    clearest = "worst" if bad[0].ratio >= found.noise_ratio else "most surely"
+    worst = f"{clearest}: {place_of(bad[0])} ({short(bad[0].ratio)} times)"
     if found.tolerable:
         return (
-            f"The nominal model errs by {ratio}; {worst}; but parameters within their usual "
-            f"tolerance would explain the logs ({short(found.tolerant_ratio)} times)."
+            f"The model's error is {ratio}; {worst}; but its nominal figures may be off by as much "
+            f"as is usual, and then it would be {short(found.tolerant_ratio)} times."
         )
     grade = "nearly explains" if found.noise_ratio < CompareSettings.fair else "does not explain"
     hints = [h for kind in ("law", "command", "conflict") for h in _first(found.hints, kind)]

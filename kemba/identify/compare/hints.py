@@ -77,9 +77,8 @@ class Response:
     def hint(self) -> Hint:
         late = f"{self.lag[self.peak] * 1e3:.0f} ms after {command(self.command)}"
         verb = "switches" if "valve/" in self.command else "changes"
-        return Hint(
-            "command", f"{quantity(self.channel)} errs {late} {verb}", float(abs(self.z[self.peak]))
-        )
+        what = f"the prediction of {quantity(self.channel)} goes wrong {late} {verb}"
+        return Hint("command", what, float(abs(self.z[self.peak])))
 
 
 def lacking(found: Sequence[ForceProfile]) -> list[Hint]:
@@ -127,7 +126,7 @@ def _strongest(
 def conflicts(problem: Problem, rows: Rows, r: Array, known: Slopes) -> list[Hint]:
     """Parameters whose best values differ by more than their error allows, from run to run or from
     one valve mode to another; the clearest first. `r` (n,): the residual."""
-    groups = {"each run": rows.run, "each valve mode": codes(rows.mode)}
+    groups = {"all runs": rows.run, "all positions of the valves": codes(rows.mode)}
     found = [
         hint
         for text, group in groups.items()
@@ -157,8 +156,8 @@ def _wandering(r: Array, known: Slopes, group: Labels, text: str) -> Iterable[Hi
         p = _agreement(information, own @ solve @ (n.T @ r) - slope[told, i])
         if p < settings.certain / len(known.leads):
             weight = float(-np.log10(max(p, 1e-300)))
-            what = f"fitting {c.key} to {text} gives different values"
-            yield Hint("conflict", f"{what}: the model lacks something here", weight)
+            what = f"no one value of {c.key} fits {text}"
+            yield Hint("conflict", f"{what}, so the model lacks something else", weight)
 
 
 def _agreement(information: Array, pull: Array) -> float:

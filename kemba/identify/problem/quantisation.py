@@ -14,6 +14,11 @@ class QuantisationSettings(Settings):
     # readings closer than this share of their range are one reading: conversion of units rounds in
     # the fifteenth digit, files have six or more
     same = 1e-6
+    # readings come in steps where most differences of neighbours are whole steps: of what moves
+    # without a rest, the smallest difference is its slowest motion
+    near = 0.15  # distance from a whole number of steps that rounding in a file makes
+    few = 5.5  # differences of more steps tell nothing, since the error of the step adds up
+    most = 0.6  # share of differences that are whole steps; by chance 0.3 are
     coarse: float = setting(
         2.0,
         "1",
@@ -25,13 +30,17 @@ class QuantisationSettings(Settings):
 
 
 def step_of(values: Array) -> float:
-    """The smallest step between two readings of a channel (n,), in its unit; 0 for one reading."""
+    """The step in which a channel (n,) is read, in its unit; 0 where it has none."""
+    settings = QuantisationSettings.current()
     known = np.unique(values[np.isfinite(values)])
     steps = np.diff(known)
     if not len(steps):
         return 0.0
-    least = QuantisationSettings.current().same * np.ptp(known)
-    return float(steps[steps > least].min())
+    steps = steps[steps > settings.same * np.ptp(known)]
+    counts = steps / steps.min()
+    counts = counts[counts < settings.few]
+    whole = np.abs(counts - np.round(counts)) < settings.near
+    return float(steps.min()) if np.mean(whole) > settings.most else 0.0
 
 
 def is_coarse(step: float, sigma: float) -> bool:

@@ -37,6 +37,10 @@ class Balance:
         slopes = ca.horzcat(ca.jacobian(force, node.a), ca.jacobian(force, node.u))
         self._force = ca.Function("force", symbols, [ca.densify(force)])
         self._slopes = ca.Function("slopes", symbols, [ca.densify(slopes.T)])
+        at_rest = ca.substitute(force, ca.vertcat(node.v, node.a), ca.DM.zeros(2))
+        bends = ca.which_depends(at_rest, node.q, 2, True)[0]
+        self._bends = bool(bends)
+        self._static = ca.Function("static", symbols, [ca.densify(at_rest)])
         self._states = len(model.states)
         if self._states:
             rate = rate_of(node)
@@ -50,12 +54,26 @@ class Balance:
 
     def force(self, log: Filtered, values: Mapping[str, float]) -> Array:
         """Force (k,) at the judged rows; `values` holds every name of `names`."""
-        return np.asarray(self._force(*self._arguments(log, values))).ravel()
+        found = np.asarray(self._force(*self._arguments(log, values))).ravel()
+        return found + self._bent(log, values) if self._bends else found
 
     def slopes(self, log: Filtered, values: Mapping[str, float]) -> Array:
         """Slopes (k, 1 + inputs) of the force: by the acceleration and by each input."""
         found: Array = np.asarray(self._slopes(*self._arguments(log, values)))
         return np.asarray(found.T)
+
+    def _bent(self, log: Filtered, values: Mapping[str, float]) -> Array:
+        """What the force (k,) of the position is more behind the filter than at the position that
+        is behind it."""
+        p = np.array([values[name] for name in self.names]).reshape(-1, 1)
+        u = np.stack([log.others[name] for name in self.inputs])
+        rest = np.zeros((1, len(log.q)))
+        s, fixed = np.zeros((self._states, len(log.q))), np.repeat(p, len(log.q), axis=1)
+        read, behind = (
+            np.asarray(self._static(s, q[None], rest, rest, u, fixed)).ravel()
+            for q in (log.read, log.q)
+        )
+        return np.asarray((log.smoothed(read) - behind)[log.rows])
 
     def _arguments(self, log: Filtered, values: Mapping[str, float]) -> list[Array]:
         p = np.array([values[name] for name in self.names]).reshape(-1, 1)

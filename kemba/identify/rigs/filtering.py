@@ -2,7 +2,9 @@
 
 A balance of forces holds for filtered channels as it holds for the channels themselves, if each of
 them goes through the same filter ("parallel filtering", M. Gautier, 1997). So the filter costs no
-accuracy of an inertia, and a rate is the difference of the filtered position.
+accuracy of an inertia, and a rate is the difference of the filtered position. What is no linear
+function of the position, such as the weight of a pendulum, is filtered itself: sin(q) behind the
+filter is not the sine of what is behind it.
 """
 
 from __future__ import annotations
@@ -38,10 +40,11 @@ class RigFilterSettings:
 class Filtered:
     """Channels on a regular grid, filtered; the grid has jumps where the log has gaps.
 
-    `time` [s], `q`, `v`, `a` (n,): position and its rates; `others` (n,) by name. `rows` (k,):
-    indices of the rows that are judged, away from gaps. `q_sigma`, `v_sigma`, `a_sigma`: noise of
-    the filtered position and its rates; `sigma`: noise of the others by name. `width` [s] of the
-    filter. `begins` (m,): first index of every stretch without a gap.
+    `time` [s], `q`, `v`, `a` (n,): position and its rates; `others` (n,) by name; `read` (n,): the
+    position as it was read. `rows` (k,): indices of the rows that are judged, away from gaps.
+    `q_sigma`, `v_sigma`, `a_sigma`: noise of the filtered position and its rates; `sigma`: noise of
+    the others by name. `width` [s] of the filter. `begins` (m,): first index of every stretch
+    without a gap.
     """
 
     time: Array
@@ -56,6 +59,12 @@ class Filtered:
     sigma: dict[str, float]
     width: float
     begins: np.ndarray
+    read: Array
+
+    def smoothed(self, values: Array) -> Array:
+        """Values (n,) of the grid behind the filter of the channels."""
+        width = self.width / float(np.median(np.diff(self.time)))
+        return np.concatenate([_smooth(y, width) for y in np.split(values, self.begins[1:])])
 
 
 def filtered(
@@ -65,19 +74,22 @@ def filtered(
     creep: float,
     heavy: float = 0.0,
     known: Mapping[str, float] | None = None,
+    turn: float = np.inf,
 ) -> Filtered:
     """The channels of one log, all through one filter.
 
     The filter is the narrowest one behind which the rate is known well against `creep` [unit of
     the rate] and the force of the inertia `heavy` well against the other channels. `known`: noise
-    (1 sigma) by name, "" for the position. Rows with a missing reading are left out.
+    (1 sigma) by name, "" for the position, which a sensor reads anew after each `turn`. Rows with a
+    missing reading are left out.
     """
     settings, known = RigFilterSettings, known or {}
     good = np.isfinite(position) & np.all([np.isfinite(y) for y in others.values()], axis=0)
     time, position = time[good], position[good]
     others = {name: y[good] for name, y in others.items()}
     step = float(np.median(np.diff(time)))
-    noise = known.get("", max(difference_sigma(position), settings.finest * np.ptp(position) / 50))
+    finest = settings.finest * min(float(np.ptp(position)), turn) / 50
+    noise = known.get("", max(difference_sigma(position), finest))
     force = max((float(np.std(y)) for y in others.values()), default=1.0)
     width = next(
         (s for s in settings.widths
@@ -93,11 +105,9 @@ def filtered(
             continue
         grid = time[first] + step * np.arange(n)
         columns = [np.interp(grid, time, y) for y in (position, *others.values())]
-        smooth = [
-            gaussian_filter1d(y, width, truncate=settings.reach, mode="nearest") for y in columns
-        ]
+        smooth = [_smooth(y, width) for y in columns]
         v = np.gradient(smooth[0], step)
-        parts.append(np.stack([grid, smooth[0], v, np.gradient(v, step), *smooth[1:]]))
+        parts.append(np.stack([grid, smooth[0], v, np.gradient(v, step), columns[0], *smooth[1:]]))
         begins.append(count)
         edge = int(settings.reach * width) + 2
         rows.append(count + np.arange(edge, n - edge, width))
@@ -115,7 +125,7 @@ def filtered(
         table[1],
         table[2],
         table[3],
-        dict(zip(names, table[4:], strict=True)),
+        dict(zip(names, table[5:], strict=True)),
         np.concatenate(rows),
         GAIN[0] * noise / np.sqrt(width),
         _rate_noise(noise, step, width),
@@ -123,7 +133,13 @@ def filtered(
         sigma,
         width * step,
         np.array(begins),
+        table[4],
     )
+
+
+def _smooth(values: Array, width: float) -> Array:
+    reach = RigFilterSettings.reach
+    return np.asarray(gaussian_filter1d(values, width, truncate=reach, mode="nearest"))
 
 
 def _rate_noise(sigma: float, step: float, width: int) -> float:
@@ -146,4 +162,4 @@ def _nothing(names: list[str]) -> Filtered:
     index = np.zeros(0, dtype=int)
     empty = dict.fromkeys(names, none)
     zero = dict.fromkeys(names, 0.0)
-    return Filtered(none, none, none, none, empty, index, 0.0, 0.0, 0.0, zero, 0.0, index)
+    return Filtered(none, none, none, none, empty, index, 0.0, 0.0, 0.0, zero, 0.0, index, none)

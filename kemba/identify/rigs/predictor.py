@@ -102,7 +102,8 @@ class Predictor:
         }
         others[self.answer] = log.others[self.answer]
         v, a = moved.rates
-        return replace(log, q=moved.value, v=v, a=a, others=others)
+        read = moved.value + log.read - log.q
+        return replace(log, q=moved.value, v=v, a=a, others=others, read=read)
 
     def _values(self, theta: Theta) -> dict[str, float]:
         nominal = {name: factor for name, (factor, _) in self.figures.items()}

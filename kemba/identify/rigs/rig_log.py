@@ -62,9 +62,9 @@ def prepare(log: Trajectory, model: Model) -> RigLog:
     given = log.meta.get("noise", {})
     known = {("" if name == place else name): sigma for name, sigma in given.items()}
     heavy = _inertia(model)
-    found = filtered(
-        log.time, log[place], {n: log[n] for n in names}, mechanism.sign_speed, heavy, known
-    )
+    turn = 2 * np.pi if mechanism.logged[place] == "rad" else np.inf
+    others = {n: log[n] for n in names}
+    found = filtered(log.time, log[place], others, mechanism.sign_speed, heavy, known, turn)
     name = str(log.meta.get("name", "log"))
     if not len(found.rows):
         what = "has no stretch without gaps that is long enough for a rate"

@@ -46,7 +46,11 @@ class MixUpSettings(Settings):
         4.0, "1", "factor by which a mix-up must make the feet stand better", BY_HAND, decides=True
     )
     zero: float = setting(
-        0.05, "m", "height by which the zero of body/z must be off", BY_HAND, decides=True
+        0.05,
+        "m",
+        "height by which the zero of body/z must be off where other lengths make feet stand, too",
+        BY_HAND,
+        decides=True,
     )
     alike: float = setting(
         1.5, "1", "factor within which hypotheses of as many mistakes cannot be told", BY_HAND
@@ -62,10 +66,15 @@ class MixUp:
     change: Change
 
 
-def mixed_up(physics: Physics, log: ResampledLog, most: int = 2) -> Iterator[KembaError]:
-    """The mistake in the columns of a log, or up to `most` of them, if its feet stand much better
-    without."""
+def mixed_up(physics: Physics, log: ResampledLog, lengths: bool = False) -> Iterator[KembaError]:
+    """The mistake in the columns of a log, or two of them, if its feet stand much better without.
+
+    `lengths`: other lengths of the legs make feet stand as well; then one mistake must do, for two
+    say no more than a length does.
+    """
     limits, feet = MixUpSettings.current(), _Feet(physics, log)
+    feet.least = limits.zero if lengths else 0.0
+    most = 1 if lengths else 2
     error = feet.restless([])
     if error is None or error < limits.small:
         return
@@ -178,6 +187,7 @@ class _Feet:
 
     def __init__(self, physics: Physics, log: ResampledLog) -> None:
         self.physics, self.log = physics, log
+        self.least = 0.0  # zero of body/z that is a mistake, at least [m]
         limits = MixUpSettings.current()
         self.step = float(np.median(np.diff(log.time)))
         self.half = max(1, round(0.5 * limits.window / self.step))
@@ -209,7 +219,7 @@ class _Feet:
             return None  # the body is under the ground
         if _rezeroed(some):
             zero = float(np.median(np.take_along_axis(height, lowest, axis=1)))
-            if abs(zero) < MixUpSettings.current().zero and some[0].text == OTHER_ZERO:
+            if abs(zero) < self.least and any(m.text == OTHER_ZERO for m in some):
                 return None
             height = height - zero
         far = np.hypot(height, np.linalg.norm(after - before, axis=2))

@@ -68,9 +68,8 @@ def faults_of(problem: JudgedLogs) -> list[KembaError]:
     """What is wrong with the logs of a problem, the simplest first: columns by the feet alone, the
     sign of torques, then what no model explains, and the valves if they are the reason."""
     logs, physics = problem.state.batch.resampled, problem.state.physics
-    # two mistakes at once say no more than one length that is off
-    most = 1 if problem.lengths else 2
-    faults = [fault for log in logs for fault in mixed_up(physics, log, most)]
+    lengths = bool(problem.lengths)
+    faults = [fault for log in logs for fault in mixed_up(physics, log, lengths)]
     faults = faults or list(_turned(problem.standing, problem.runs))
     if faults:
         return faults

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import re
 import zipfile
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,6 +21,7 @@ from kemba.logs.recording import Column, Raw, Recording, by_length
 from kemba.logs.times import seconds
 from kemba.trajectory import TIME, Trajectory
 
+SPACE = re.compile(r"[ \t\n\r]*")
 BROKEN = (ValueError, TypeError, KeyError, EOFError, NotImplementedError, zipfile.BadZipFile)
 
 
@@ -63,9 +66,9 @@ def read_json(path: Path) -> Recording:
     """Columns by name, under `columns` or at the top; null is a missing reading. Raises KembaError
     where the file is no such object."""
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = _content(path.read_text(encoding="utf-8"))
         columns = content.get("columns", content)
-        found = {k: _array(v) for k, v in columns.items() if isinstance(v, list)}
+        found = {k: _array(v) for k, v in columns.items() if isinstance(v, list | np.ndarray)}
     except OSError as error:
         raise KembaError(str(path), error.strerror or str(error)) from None
     except (ValueError, TypeError, AttributeError, RecursionError) as error:
@@ -109,8 +112,50 @@ def _matrix(name: str, array: Column, arrays: Mapping[str, Column]) -> Raw:
     return {label: tall[:, i] for i, label in enumerate(names)}
 
 
-def _array(values: list[Any]) -> Column:
+def _content(text: str) -> dict[str, Any]:
+    """The object of a JSON text, lists of columns as arrays: a list takes four times as much memory
+    as its array, and so only one is there at a time. Raises ValueError."""
+    found, end = _members(text, 0)
+    if text[end:].strip():
+        raise ValueError(f"more behind its end, at {end}")
+    return found
+
+
+def _members(text: str, at: int) -> tuple[dict[str, Any], int]:
+    """The members of the object that begins at `at`, of its `columns` alike, and where it ends."""
+    decode, found = json.JSONDecoder().raw_decode, dict[str, Any]()
+
+    def after(mark: str, at: int) -> int:
+        begin = _begin(text, at)
+        if text[begin : begin + 1] != mark:
+            raise ValueError(f"'{mark}' was expected at {begin}")
+        return _begin(text, begin + 1)
+
+    at = after("{", at)
+    while text[at : at + 1] != "}":
+        at = after(",", at) if found else at
+        key, at = decode(text, at)
+        at = after(":", at)
+        inner = key == "columns" and text[at : at + 1] == "{"
+        value, at = _members(text, at) if inner else decode(text, at)
+        with suppress(ValueError, TypeError):
+            value = _array(value) if isinstance(value, list) else value
+        if not isinstance(key, str):
+            raise ValueError(f"the name of a column was expected before {at}")
+        found[key], at = value, _begin(text, at)
+    return found, at + 1
+
+
+def _begin(text: str, at: int) -> int:
+    """Where the next thing begins that is no space."""
+    match = SPACE.match(text, at)
+    return match.end() if match else at
+
+
+def _array(values: list[Any] | Column) -> Column:
     """A list of JSON as an array: of texts, of numbers that no float holds, else of floats."""
+    if isinstance(values, np.ndarray):
+        return values
     if values and all(isinstance(value, str) for value in values):
         return np.array(values)
     if values and all(type(value) is int for value in values):

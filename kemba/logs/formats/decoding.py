@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+from array import array
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -11,43 +14,75 @@ import numpy as np
 from kemba.logs.recording import Group, Raw
 
 Decode = Callable[[bytes], Any]
+NUMBERS = (bool, int, float, np.number)
+KNOWN: dict[type, tuple[str, ...]] = {}  # fields of the classes of messages that were met
 
 
 class Topic:
-    """Messages of one topic as they come in: stamps [ns], and numbers by path."""
+    """Messages of one topic as they come in: stamps [ns], and numbers by path.
+
+    Messages of one shape are kept side by side, so that the paths are put together once a shape.
+    """
 
     def __init__(self, name: str, decode: Decode = json.loads) -> None:
         self.name, self.decode = name, decode
         self.stamps: list[int] = []
-        self.columns: dict[str, list[float]] = {}
-        self.texts: set[str] = set()
+        self._shapes: dict[tuple[Any, ...], _Shape] = {}
 
     def add(self, stamp: int, message: Any) -> None:
         """Append a message; fields that come later than others are missing before."""
-        row = len(self.stamps)
+        numbers: list[float] = []
+        signs: list[Any] = []
+        _leaves(message, numbers, signs)
+        key = tuple(signs)
+        shape = self._shapes.get(key)
+        if shape is None:
+            shape = self._shapes[key] = _Shape([name for name, _ in flat(message)])
+            shape.texts = {n for n, value in flat(message) if isinstance(value, str)}
+        shape.numbers.extend(numbers)
+        shape.rows.append(len(self.stamps))
         self.stamps.append(stamp)
-        for name, value in flat(message):
-            if isinstance(value, str):
-                self.texts.add(name)
-                continue
-            column = self.columns.get(name)
-            if column is None:
-                column = self.columns[name] = [np.nan] * row
-            elif len(column) < row:
-                column.extend([np.nan] * (row - len(column)))
-            if len(column) == row:
-                column.append(value)
+
+    @cached_property
+    def texts(self) -> set[str]:
+        """Paths of texts, once all messages are in."""
+        return {name for shape in self._shapes.values() for name in shape.texts}
+
+    @cached_property
+    def columns(self) -> Raw:
+        """The numbers (n,) by path, NaN where a message has none, once all messages are in."""
+        found: Raw = {}
+        for shape in self._shapes.values():
+            table = np.frombuffer(shape.numbers).reshape(len(shape.rows), len(shape.names))
+            for name, values in zip(shape.names, table.T, strict=True):
+                if name in shape.texts:
+                    continue
+                if name not in found:
+                    found[name] = np.full(len(self.stamps), np.nan)
+                found[name][shape.rows] = values
+        self._shapes = {key: replace(s, numbers=array("d")) for key, s in self._shapes.items()}
+        return found
 
     def group(self) -> Group:
         """The topic in the order of its stamps, equal ones once."""
         stamps = np.array(self.stamps, dtype=np.int64)
         order = np.argsort(stamps, kind="stable")
         order = order[np.concatenate([[True], np.diff(stamps[order]) > 0])]
-        columns: Raw = {}
-        for name, values in self.columns.items():
-            values.extend([np.nan] * (len(stamps) - len(values)))
-            columns[name] = np.array(values)[order]
+        if len(order) == len(stamps) and np.all(np.diff(order) > 0):
+            return Group(self.name, stamps, "ns", self.columns)
+        columns = {name: values[order] for name, values in self.columns.items()}
         return Group(self.name, stamps[order], "ns", columns)
+
+
+@dataclass
+class _Shape:
+    """Messages whose numbers and texts have the same paths `names` (k,): their `rows` (m,), and
+    their `numbers` (m k,), NaN for a text."""
+
+    names: list[str]
+    texts: set[str] = field(default_factory=set)
+    rows: list[int] = field(default_factory=list)
+    numbers: array[float] = field(default_factory=lambda: array("d"))
 
 
 def decoder(encoding: str, schema: Any) -> Decode | None:
@@ -114,13 +149,47 @@ def flat(value: Any, name: str = "") -> Iterator[tuple[str, float | str]]:
             yield from flat(item, path)
 
 
+def _leaves(value: Any, numbers: list[float], signs: list[Any]) -> None:
+    """Append the numbers of a message in the order of `flat`, NaN for a text, and signs of its
+    shape: keys, lengths, and the names of entries."""
+    kind = type(value)
+    if kind is np.ndarray and value.ndim == 1 and value.dtype.kind in "fiub":
+        numbers.extend(value.tolist())
+        signs.append(len(value))
+    elif kind is list and not value:
+        signs.append(0)
+    elif kind is str:
+        numbers.append(np.nan)
+        signs.append("")
+    elif isinstance(value, NUMBERS):
+        numbers.append(float(value))
+        signs.append("number")
+    else:
+        items = _items(value)
+        signs.append((*items, *_entries(items)) if "name" in items else tuple(items))
+        for item in items.values():
+            if type(item) is float:  # most are, and a call takes longer than all else
+                numbers.append(item)
+                signs.append("number")
+            else:
+                _leaves(item, numbers, signs)
+
+
+def _fields(kind: type) -> tuple[str, ...]:
+    """The fields of a class of messages; none of what is no dataclass."""
+    if kind not in KNOWN:
+        known = getattr(kind, "__dataclass_fields__", ())
+        KNOWN[kind] = tuple(key for key in known if key[0] != "_")
+    return KNOWN[kind]
+
+
 def _items(value: Any) -> Mapping[str, Any]:
+    if fields := _fields(type(value)):
+        return {key: getattr(value, key) for key in fields}
     if isinstance(value, dict):
         return value
     if isinstance(value, list | tuple | np.ndarray):
         return {str(i): item for i, item in enumerate(value)}
-    if hasattr(value, "__dataclass_fields__"):
-        return {key: getattr(value, key) for key in value.__dataclass_fields__ if key[0] != "_"}
     if hasattr(value, "DESCRIPTOR"):
         return {field.name: getattr(value, field.name) for field in value.DESCRIPTOR.fields}
     if hasattr(value, "__len__") and not isinstance(value, str | bytes):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -108,6 +109,9 @@ def _table(
     path: Path, lines: list[str], separator: str | None, decimal: str, width: int, row: int
 ) -> np.ndarray:
     """The numbers (n, width); an empty cell is no reading, and a comment after them is left out."""
+    with suppress(ValueError):  # of whole rows; what is no number is told at its place below
+        whole = [line.replace(decimal, ".") for line in lines] if decimal != "." else lines
+        return np.loadtxt(whole, delimiter=separator, usecols=range(width), ndmin=2, comments=None)
     found = np.full((len(lines), width), np.nan)
     count = 0
     for line in lines:

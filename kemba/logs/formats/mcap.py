@@ -164,5 +164,6 @@ def _field(topics: dict[str, Topic], header: str, rows: int) -> np.ndarray[Any, 
     found = topics[topic or "/"]
     if field in found.texts:
         raise ValueError(header)
-    values = found.columns.get(field, [])
-    return np.array([*values, *[math.nan] * (rows - len(values))])
+    values, column = found.columns.get(field, np.zeros(0)), np.full(rows, np.nan)
+    column[: len(values)] = values
+    return column

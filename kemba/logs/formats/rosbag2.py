@@ -60,7 +60,7 @@ def _take(file: Path, topics: dict[str, Topic], said: list[str]) -> None:
                 said.append(f"topic {name} is not read: its messages are {encoding} of {kind}")
                 continue
             known[number] = topics.setdefault(name, Topic(name, decode))
-        query = "SELECT topic_id, timestamp, data FROM messages ORDER BY timestamp"
+        query = "SELECT topic_id, timestamp, data FROM messages"
         for number, stamp, data in base.execute(query):
             if number in known:
                 known[number].add(stamp, known[number].decode(data))

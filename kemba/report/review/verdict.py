@@ -136,7 +136,7 @@ def of_logs(
             "nothing is to be added to the model; plan the next jump with it.",
         )
     if found.tolerable:
-        text = f"the model errs by {ratio}, which figures within their tolerance would explain"
+        text = f"the model errs by {ratio}, no more than its nominal figures may be off"
         aim = "go on with this model, or identify its figures:"
         return ReviewVerdict(
             "fair", _joined([*parts, text]), aim, f"kemba-opt discover {words['logs']}"

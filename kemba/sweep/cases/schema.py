@@ -63,4 +63,6 @@ class Sweep(Section):
     name: FileName = "sweep"
     notes: str = ""
     seed: Annotated[int, Field(ge=0)] = 0
-    blocks: Annotated[dict[FileName, AnyBlock], Field(min_length=1)]
+    blocks: Annotated[dict[FileName, AnyBlock], Field(min_length=1)] = Field(
+        description="what is to be solved or executed, block by block"
+    )

@@ -81,6 +81,10 @@ MISTAKES: dict[str, tuple[dict[str, Change], str]] = {
         {"body__z": lambda z: z - z[0]},
         r"body/z counts from another zero \(-\d+ mm too much\)",
     ),
+    "zero of the height": (
+        {"body__z": lambda z: z - 0.02},
+        r"stand: body/z counts from another zero \(-2\d mm too much\); corrected, it is [0-4] mm",
+    ),
     "down": ({"body__z": np.negative}, "body/z counts downwards"),
     "two": (
         {"rear__hip__q": np.negative, "front__piston__x": lambda x: 0.07 - x},
@@ -131,12 +135,19 @@ def test_faults_of_sensors_are_not_taken_for_mistakes(
 ) -> None:
     """These are for `discover` to find."""
     for changes in (
-        {"body__z": lambda z: z - 0.02},
+        {"body__z": lambda z: z - 0.01},
         {"hip__q": lambda q: 1.05 * q},
         {"pitch": lambda p: p + 0.03},
         {"piston__x": lambda x: np.roll(x, 5)},
     ):
         assert not found(physics, changed(standing, physics, **changes))
+
+
+def test_lengths_are_no_zero_of_the_height(physics: Physics, standing: ResampledLog) -> None:
+    """Where other lengths make the feet stand as well, 20 mm are no zero, 80 mm are one."""
+    for off, named in ((0.02, False), (0.08, True)):
+        low = changed(standing, physics, body__z=lambda z, off=off: z - off)
+        assert any("another zero" in str(f) for f in mixed_up(physics, low, lengths=True)) is named
 
 
 def test_a_flight_tells_nothing(physics: Physics, standing: ResampledLog) -> None:
