@@ -38,11 +38,13 @@ from ablation_page import table, write
 
 from blind import bench, report, robot, second
 from blind.kinds import Record, hidden, kind, named
+from kemba.identify.bench.predicted import PredictedLogs
 from kemba.identify.bench.problem import BenchProblem
 from kemba.identify.discover import discover
 from kemba.identify.doubt.cross_validation import Gain
 from kemba.identify.evidence.spike_slab import NULL
 from kemba.identify.robot.problem import RobotProblem
+from kemba.identify.written.joint import JointFit
 from kemba.settings import changed
 
 STUDIES = {"bench": bench, "robot": robot, "second": second}
@@ -179,7 +181,9 @@ def _modules() -> list[Any]:
 
 
 @contextmanager
-def replaced(rule: Rule, wrap: Callable[[Callable[..., Any]], Callable[..., Any]]) -> Iterator[None]:
+def replaced(
+    rule: Rule, wrap: Callable[[Callable[..., Any]], Callable[..., Any]]
+) -> Iterator[None]:
     """Within this block, every place that calls the rule's function calls `wrap(function)`."""
     module, _, path = rule.at.partition(":")
     owner = import_module(HOME + module)
@@ -281,12 +285,40 @@ def remembered() -> Iterator[None]:
 
         return call
 
+    def of_one_log(self: PredictedLogs, theta: Any, index: int) -> Any:
+        """Readings of one log: how other logs begin does not matter."""
+        log = self.logs[index]
+        told = ((n, v) for n, v in theta.items() if self.starts.get(n, (index,))[0] == index)
+        key = id(log), self.predictor.exact, tuple(sorted(told))
+        if key not in known:
+            alive.append(log)
+            known[key] = predict(self, theta, index)
+        return known[key]
+
+    predict = PredictedLogs.readings
     with ExitStack() as stack:
+        stack.enter_context(patch.object(PredictedLogs, "readings", of_one_log))
+        stack.enter_context(patch("kemba.identify.discover.joint_fit", unjudged))
         for cls in (BenchProblem, RobotProblem):
             for name in (*LEARNING, *PREDICTING):
                 new = remember(f"{cls.__name__}.{name}", getattr(cls, name))
                 stack.enter_context(patch.object(cls, name, new))
         yield
+
+
+def unjudged(problem: Any, hypothesis: Any, theta: Any) -> JointFit:
+    """A joint fit without its costs: intervals of the written model decide no verdict."""
+    names, values = [], []
+    for effect in hypothesis:
+        candidate = problem.candidates[effect]
+        for key, p in candidate.keys().items():
+            name = candidate.reciprocal.get(p.name, (p.name, ""))[0]
+            names.append(f"{effect}.{name}")
+            values.append(theta.get(key, p.off))
+    names += problem.own_figures
+    values += [theta.get(name, 1.0) for name in problem.own_figures]
+    x = np.array(values)
+    return JointFit(dict(theta), tuple(names), x, x, x, np.zeros((len(x), len(x))))
 
 
 def answered(problem: Any, setting: Record, truth: Any) -> Record:
@@ -359,6 +391,7 @@ def main() -> None:
     parser.add_argument("--study", choices=STUDIES, default="bench")
     parser.add_argument("--cases", default="40", help="so many of the beginning, or begin:end")
     parser.add_argument("--without", action="append", default=[], help="rules, by commas")
+    parser.add_argument("--seconds", type=float, help="length of bench logs, other than recorded")
     parser.add_argument("--out", type=Path, default=RECORDS)
     parser.add_argument("--report", action="store_true", help="run nothing, only tell the results")
     parser.add_argument("--write", action="store_true", help="put the table into docs/tried.md")
@@ -367,6 +400,8 @@ def main() -> None:
         begin, _, end = options.cases.rpartition(":")
         cases = list(enumerate(STUDIES[options.study].cases()))[int(begin or 0) : int(end)]
         for index, setting in cases:
+            if options.seconds and "duration" in setting:
+                setting["duration"] = options.seconds
             run(options.study, index, setting, options.without, options.out)
     found = table(report.read(options.out))
     print(found)
