@@ -5,18 +5,17 @@
     python benchmarks/ablation.py --study bench --cases 40 --without "swaps,secants"
     python benchmarks/ablation.py --report [--write]
 
-A rule is a function of the search, of the doubts or of the verdict that is replaced from outside by
-one that does nothing; the program itself has no switches. Each case is answered as it is, which
+A rule is a function of the search, of the doubts or of the verdict that is replaced from outside
+by one that does nothing; the program itself has no switches. Each case is answered as it is, which
 rules acted is noted, and it is answered again without each of these. `--without`: without several
-rules at once. Predictions are kept within a case, so that an answer costs only what differs. Answers
-have no time limit. Results are kept in benchmarks/ablation.jsonl: an interrupted study goes on where
-it stopped.
+rules at once. Predictions are kept within a case, so that an answer costs only what differs. No
+answer has a time limit. Results are kept in benchmarks/ablation.jsonl: an interrupted study goes on
+where it stopped.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import sys
 import time
@@ -35,9 +34,9 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "benchmarks")]
 
 import numpy as np
 from ablation_page import table, write
-
 from blind import bench, report, robot, second
 from blind.kinds import Record, hidden, kind, named
+
 from kemba.identify.bench.predicted import PredictedLogs
 from kemba.identify.bench.problem import BenchProblem
 from kemba.identify.discover import discover

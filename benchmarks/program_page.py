@@ -151,7 +151,7 @@ open 2 ms later, and beside sensors that are late by parts of a row. Intervals a
 slopes at the best fit, with nothing read off between rows
 (`kemba/identify/written/joint.py`).
 
-Something is missing up to a p-value of {DiscoverSettings.current().significant:g}. {levels}
+Something is missing up to a p-value of {DiscoverSettings.significant:g}. {levels}
 
 Where no effect is there at all, p-values are larger than uniform ones and intervals wider than
 needed: the test is careful.

@@ -53,7 +53,7 @@ def powers(seed: int, folder: Path) -> tuple[float, float, float]:
     mode, jacobian = base.point.mode, base.jacobian
     linear = mode.linear
     left = mode.residual + jacobian @ (best_fit(linear) - linear.at)
-    blocks = time_blocks(problem, shortest=DiscoverSettings.current().fine)
+    blocks = time_blocks(problem, shortest=DiscoverSettings.fine)
     along = directions(jacobian, base.ranker(linear).nuisance)
     plain = np.stack([jacobian[blocks == b].T @ left[blocks == b] for b in np.unique(blocks)])
     others = left_out_noise(jacobian, left, linear.width, blocks)

@@ -63,7 +63,7 @@ def discover(
     `holdout`: other logs, on which the answer is judged; `time_limit` [s]; `say`: told of progress.
     """
     started = time.monotonic()
-    share = DiscoverSettings.current().searching
+    share = DiscoverSettings.searching
     search = Search(problem, started + share * time_limit, say, due=started + time_limit)
     found = _discovered(search, search.first(), holdout)
     found.answer.runtime_s = time.monotonic() - started
@@ -79,7 +79,7 @@ def _discovered(search: Search, guess: Hypothesis, holdout: Problem | None) -> D
     error on left-out data counts; a complete one counts more than a mixture.
     """
     guessed = search.problem.structures & set(guess)
-    least = 0.0 if guessed else SearchSettings.current().structural
+    least = 0.0 if guessed else SearchSettings.structural
     theta = search.points[guess].fit.theta
     other = None if search.ended else ahead(search.problem, theta, least)
     anew = _built_anew(search, other, holdout) if other else None
@@ -184,15 +184,15 @@ def _undecided(search: Search, test: NullTest, kept: HeldOut | None) -> Discover
     """What logs allow to say that are too short for anything to be significant: whether something
     differs, but not what."""
     gain, doubts = best_gain(search), Doubts()
-    differs = test.share(gain) <= DiscoverSettings.current().significant
-    if differs or error(search, NULL, kept) > VerdictSettings.current().whole:
-        piece = DiscoverSettings.current().fine
+    differs = test.share(gain) <= DiscoverSettings.significant
+    if differs or error(search, NULL, kept) > VerdictSettings.whole:
+        piece = DiscoverSettings.fine
         doubts = Doubts((f"they hold {test.blocks} pieces of {piece:g} s, and chance alone needs "
                          f"{test.needed} to be ruled out",))  # fmt: skip
     ranking = ranked(search, Belief(), kept)
     answer = _answer(search, NULL, test.p_value(gain), test, ranking, None, kept, doubts)
     if doubts.reasons:
-        answer.next = f"record at least {(test.needed + 1) * DiscoverSettings.current().fine:.1f} s"
+        answer.next = f"record at least {(test.needed + 1) * DiscoverSettings.fine:.1f} s"
         answer.sentence = phrase(answer)
     return Discovery(answer, search, NULL, kept, fitted_errors(search, NULL))
 

@@ -39,7 +39,7 @@ def doubts_about(
 ) -> Doubts:
     """Why the best answer cannot be complete, and whether it is a part of one; `ended`: the time
     was over before the search was."""
-    settings, reasons, best = VerdictSettings.current(), [], belief.best
+    settings, reasons, best = VerdictSettings, [], belief.best
     before, after = (error(search, h, kept) for h in (NULL, best))
     least = settings.part
     if drift is not None:
@@ -80,7 +80,7 @@ def doubts_about(
 def fits_where_it_acts(search: Search, best: Hypothesis) -> bool:
     """Whether hardly any error is left where the answer acts."""
     before, after = excess_where_acting(search, best)
-    return after <= VerdictSettings.current().where_it_acts * before
+    return after <= VerdictSettings.where_it_acts * before
 
 
 def unasked(search: Search, best: Hypothesis) -> Hypothesis:
@@ -101,4 +101,4 @@ def verdict_on(best: Hypothesis, formula: Formula | None, doubts: Doubts) -> Ver
 
 def is_sure(ranked: Ranked) -> bool:
     """Whether an effect is likely enough to be added to a model, and nothing could stand for it."""
-    return ranked.probability >= VerdictSettings.current().sure and not ranked.equivalent_to
+    return ranked.probability >= VerdictSettings.sure and not ranked.equivalent_to

@@ -28,7 +28,7 @@ SIZE = 10.0  # N; the size of every effect of the toy
 
 def machine(seed: int) -> dict[str, float]:
     """Figures off within their tolerance, every effect there with a small share of its size."""
-    rng, prior = np.random.default_rng([seed, 1]), SpikeSlabSettings.current()
+    rng, prior = np.random.default_rng([seed, 1]), SpikeSlabSettings
     share, small = rng.choice(prior.tolerances), prior.spike * SIZE
     z = rng.standard_normal(len(EFFECTS) + 2)
     truth = {f"{name}.a": small * size for name, size in zip(EFFECTS, z[2:], strict=True)}
@@ -41,7 +41,7 @@ def lacking(seed: int) -> tuple[dict[str, float], str, float]:
 
     The machine's imperfection adds to the effect or hides some: as much as an interval counts.
     """
-    rng, prior = np.random.default_rng([seed, 2]), SpikeSlabSettings.current()
+    rng, prior = np.random.default_rng([seed, 2]), SpikeSlabSettings
     name = ("kick", "wave", "hum", "ramp")[seed % 4]
     size = SIZE * rng.choice([-1.0, 1.0]) * rng.uniform(0.5, 1.5)
     there = size * (1.0 + prior.spike * rng.standard_normal())

@@ -245,7 +245,7 @@ def test_intervals_are_1_96_sigma_either_way(size: float) -> None:
     found = discover(problem)
     value = values(found.search, ("kick",), "kick")["a"]
     noise = 1.0 / float(np.linalg.norm(problem._shapes["kick"]))
-    sigma = np.hypot(noise, SpikeSlabSettings.current().spike * value.value)
+    sigma = np.hypot(noise, SpikeSlabSettings.spike * value.value)
     assert value.high - value.value == pytest.approx(1.96 * sigma, rel=0.05)
     assert value.value - value.low == pytest.approx(1.96 * sigma, rel=0.05)
 

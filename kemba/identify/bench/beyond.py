@@ -38,7 +38,7 @@ def weight(predicted: PredictedLogs, theta: Theta, formula: str, coefficient: fl
     forces = (_forces(predicted, theta, i)[formula] for i in range(len(predicted.logs)))
     percent = BenchFormulaSettings.peak
     peak = max(float(np.percentile(np.abs(force), percent)) for force in forces)
-    return abs(coefficient) * peak / BenchLogSettings.current().friction
+    return abs(coefficient) * peak / BenchLogSettings.friction
 
 
 def leftover(
@@ -67,7 +67,7 @@ def _imperfection(
     """Spread (n,) of the force residual, in noise units, when every effect of the catalogue may
     be there with a small share of its size."""
     base = predicted.standardised({}, index)["piston/F"]
-    power, spike = np.ones(len(base)), SpikeSlabSettings.current().spike
+    power, spike = np.ones(len(base)), SpikeSlabSettings.spike
     for c in candidates.values():
         small = within(candidates, {c.key: c.lead.off + spike * c.lead.size})
         power += (predicted.standardised(small, index)["piston/F"] - base) ** 2

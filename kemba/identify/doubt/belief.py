@@ -22,7 +22,7 @@ from kemba.identify.settings import DiscoverSettings
 def believed(search: Search, best: Hypothesis, p_value: float) -> Belief:
     """The best hypothesis without what is not significant, too small, refuted by left-out data or
     of no use there."""
-    if not best or p_value > DiscoverSettings.current().significant:
+    if not best or p_value > DiscoverSettings.significant:
         return Belief(NULL, p_value)
     belief = Belief(best, p_value)
     while belief.best:
@@ -60,7 +60,7 @@ def material(search: Search, hypothesis: Hypothesis) -> Hypothesis:
     """Those effects of a hypothesis that are larger than a model's usual imperfection, and whose
     intervals exclude that they are absent."""
     score, linear = search.points[hypothesis].score, search.points[hypothesis].linear
-    settings = DiscoverSettings.current()
+    settings = DiscoverSettings
     least = settings.matters if len(hypothesis) == 1 else settings.matters_too
 
     def share(effect: str) -> float:

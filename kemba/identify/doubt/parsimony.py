@@ -32,26 +32,17 @@ from kemba.identify.evidence.bootstrap import BootstrapSettings
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis, log_prior
 from kemba.identify.settings import RankingSettings
-from kemba.settings import Settings, setting
 
 
-class ParsimonySettings(Settings):
+class ParsimonySettings:
     """When left-out data choose among hypotheses that explain the data as well."""
 
-    plain: float = setting(
-        2.0,
-        "1",
-        "standard errors by which left-out data must gain by the one that they choose",
-        "convention: two, since several are asked",
-        decides=True,
-    )
-    share: float = setting(
-        0.1,
-        "1",
-        "of what a larger answer leaves beyond the noise, what it must explain more",
-        "convention: a tenth; 0.18 gives the same answer on a real drive, 0.04 a lag more",
-        decides=True,
-    )
+    # standard errors by which left-out data must gain by the one that they choose: two, since
+    # several are asked
+    plain = 2.0
+    # of what a larger answer leaves beyond the noise, what it must explain more: a tenth; 0.18
+    # gives the same answer on a real drive, 0.04 a lag more
+    share = 0.1
 
 
 @dataclass(frozen=True)
@@ -187,7 +178,7 @@ def is_plain(search: Search, hypothesis: Hypothesis) -> bool:
     """Whether left-out data and nominal figures gain by a hypothesis, plainly more than their
     scatter."""
     gain = gain_over_nothing(search, hypothesis)
-    return gain.nats > max(ParsimonySettings.current().plain * gain.error, _least())
+    return gain.nats > max(ParsimonySettings.plain * gain.error, _least())
 
 
 def is_plain_enough(search: Search, hypothesis: Hypothesis) -> bool:
@@ -201,7 +192,7 @@ def is_plain_enough(search: Search, hypothesis: Hypothesis) -> bool:
     gain = gain_over_nothing(search, hypothesis, quarters=True)
     nats = search.points[hypothesis].log_evidence - search.points[NULL].log_evidence
     expected = float(np.sqrt(max(nats, 0.0) / 2.0)) - 1.0
-    errors = min(max(expected, 1.0), ParsimonySettings.current().plain)
+    errors = min(max(expected, 1.0), ParsimonySettings.plain)
     return gain.nats > max(errors * gain.error, _least())
 
 
@@ -212,7 +203,7 @@ def needed_instead(search: Search, idle: Hypothesis) -> Hypothesis:
     A bias of one leg's piston may fit as well as the opposite one of the other leg, and only one of
     them predicts.
     """
-    count, same = len(search.problem.candidates), RankingSettings.current().same
+    count, same = len(search.problem.candidates), RankingSettings.same
     likely = {h: p.log_evidence + log_prior(h, count) for h, p in search.points.items()}
     near = [h for h, p in likely.items() if p > max(likely[idle] - same, likely[NULL])]
     needed = [h for h in near if len(h) == len(idle) and is_plain(search, h)]
@@ -250,7 +241,7 @@ def is_little(search: Search, smaller: Hypothesis, larger: Hypothesis) -> bool:
     """
     rows = search.points[larger].windowed.count.sum()
     left = 0.5 * max(0.0, float(window_powers(search, larger).sum() - rows))
-    share = ParsimonySettings.current().share
+    share = ParsimonySettings.share
     if window_gain(search, larger, smaller).nats >= share * left:
         return False
     before, after = excess_where_acting(search, larger, smaller)
@@ -259,7 +250,7 @@ def is_little(search: Search, smaller: Hypothesis, larger: Hypothesis) -> bool:
 
 def _least() -> float:
     """Nats that are any evidence at all."""
-    return BootstrapSettings.current().least
+    return BootstrapSettings.least
 
 
 def _remark(search: Search, best: Hypothesis, chosen: Hypothesis) -> str:

@@ -61,11 +61,11 @@ def null_test(search: Search) -> NullTest:
 def redrawn_noise(search: Search, linear: Linear, jacobian: Array) -> Array:
     """J'e (b, k) of short blocks of what a fit of everything in `linear`, with slopes (n, k),
     leaves of the null's residual: noise for the bootstrap."""
-    problem, settings = search.problem, LeftOutNoiseSettings.current()
+    problem, settings = search.problem, LeftOutNoiseSettings
     left = search.points[NULL].mode.residual + jacobian @ (best_fit(linear) - linear.at)
     if search.thorough:  # then slopes there may leave more than the best fit does
         rest = min(search.points.values(), key=lambda point: point.mode.cost).mode.residual
         left = min(left, rest, key=lambda errors: float(errors @ errors))
-    blocks = time_blocks(problem, shortest=DiscoverSettings.current().fine)
+    blocks = time_blocks(problem, shortest=DiscoverSettings.fine)
     power = settings.power_in_motion if problem.moves else settings.power
     return left_out_noise(jacobian, left, linear.width, blocks, power)

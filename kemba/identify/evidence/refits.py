@@ -82,7 +82,7 @@ class Refits:
         if others or not problem.moves or problem.is_straight(candidate.key):
             return
         size = fit.theta[candidate.key] - candidate.lead.off
-        if abs(size) > SearchSettings.current().least * candidate.lead.size:
+        if abs(size) > SearchSettings.least * candidate.lead.size:
             own = set(candidate.keys())
             absent = {k: v for k, v in fit.theta.items() if k not in own}
             change = problem.residual(fit.theta) - problem.residual(absent)

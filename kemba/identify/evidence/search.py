@@ -30,7 +30,7 @@ class Search(Refits):
         """The first guess: the best of the single effects that look best."""
         self.say("fitting the model as it is, and a slope for every effect")
         self.start()
-        best = self._round(NULL, SearchSettings.current().leaders)
+        best = self._round(NULL, SearchSettings.leaders)
         if instead := self._leaves_far_less(best):
             best = self._along(instead)
         self.say(f"first guess: {' + '.join(best) or 'nothing'}")
@@ -42,7 +42,7 @@ class Search(Refits):
         Along the motion that data without an effect would have, its evidence counts for less than
         that of effects which change the motion a little. Another structure is built in instead.
         """
-        settings, structures = SearchSettings.current(), self.problem.structures
+        settings, structures = SearchSettings, self.problem.structures
         singles = [h for h in self.points if len(h) == 1 and not structures & set(h)]
         if not self.problem.moves or not singles or self.ended:
             return NULL
@@ -53,7 +53,7 @@ class Search(Refits):
 
     def further(self, best: Hypothesis) -> Hypothesis:
         """The likeliest hypothesis, searched for from the first guess."""
-        leaders = SearchSettings.current().leaders
+        leaders = SearchSettings.leaders
         if self.problem.moves:
             return self._follow(best)
         if best != NULL:
@@ -72,7 +72,7 @@ class Search(Refits):
         """Nothing and the likeliest single effects fitted anew, where the best of them explains
         hardly anything of an error that is no noise, and slopes at the fit of nothing are no fair
         judge: its figures are not believed, or slopes promise what modes do not show."""
-        settings = SearchSettings.current()
+        settings = SearchSettings
         error, left = (self.points[h].fitted_error for h in (NULL, best))
         if error <= settings.structural or excess(left) <= settings.unexplained * excess(error):
             return best
@@ -96,7 +96,7 @@ class Search(Refits):
         An effect that changes the motion much is underrated along the first motion. So where no
         refit is better than nothing, the linear evidence may choose the hypothesis to follow.
         """
-        settings = SearchSettings.current()
+        settings = SearchSettings
         for _ in range(settings.followed):
             guess = best or self._first_of_table()
             if guess == NULL or self.ended:
@@ -112,14 +112,14 @@ class Search(Refits):
         among = self._contenders()
         self.start(among, self._settle(guess))
         self.visit(guess)
-        return self._round(NULL, SearchSettings.current().leaders)
+        return self._round(NULL, SearchSettings.leaders)
 
     def _regrow(self, best: Hypothesis) -> Hypothesis:
         """Find the motion again with an answer of several effects, and let it grow from there.
 
         Each effect that joins changes the motion, and with it what the others seem to be.
         """
-        for _ in range(SearchSettings.current().regrown):
+        for _ in range(SearchSettings.regrown):
             if len(best) < 2 or self.ended:
                 break
             before = best
@@ -134,7 +134,7 @@ class Search(Refits):
     def _settle(self, hypothesis: Hypothesis) -> Mapping[str, float]:
         """Find the motion that a hypothesis makes of the data, until late sensors stay as late; the
         best theta there."""
-        settings, theta = SearchSettings.current(), self.points[hypothesis].fit.theta
+        settings, theta = SearchSettings, self.points[hypothesis].fit.theta
         asked = self.problem
         for _ in range(settings.settled):
             self.problem = self.problem.relinearise(theta)
@@ -156,7 +156,7 @@ class Search(Refits):
         best."""
         null = self.points[NULL].log_evidence
         gains = {h: e - null for h, e in self.base.table.items() if len(h) == 1}
-        least = SearchSettings.current().promising * max(gains.values())
+        least = SearchSettings.promising * max(gains.values())
         return frozenset(h for h, gain in gains.items() if gain > least or h in self.points)
 
     def _first_of_table(self) -> Hypothesis:
@@ -190,13 +190,13 @@ class Search(Refits):
             self.share_modes()
         if given == NULL:
             self._try_stand_ins(self.best())
-        if given == NULL and self.points[NULL].fitted_error > SearchSettings.current().structural:
+        if given == NULL and self.points[NULL].fitted_error > SearchSettings.structural:
             for structure in sorted(self.problem.structures):
                 self.visit((structure,))
         return self.best()
 
     def _refit_leaders(self, given: Hypothesis, leaders: int, least: float) -> None:
-        settings = SearchSettings.current()
+        settings = SearchSettings
         table = self._extensions(given)
         order = sorted(table, key=lambda h: -table[h])[:leaders]
         gain = table[order[0]] - self.points[given].log_evidence
@@ -234,14 +234,14 @@ class Search(Refits):
         base = max(single.values())
         pairs = [h for h in self.base.table if len(h) == 2]
         best_pair = max(pairs, key=self.base.table.__getitem__, default=NULL)
-        if best_pair and self.base.table[best_pair] > base + SearchSettings.current().gain:
+        if best_pair and self.base.table[best_pair] > base + SearchSettings.gain:
             for name in best_pair:
                 single[(name,)] = max(single[(name,)], base)
         return single
 
     def _grow(self, best: Hypothesis) -> Hypothesis:
         """Add effects, one by one, while the evidence grows."""
-        settings = SearchSettings.current()
+        settings = SearchSettings
         while len(best) < settings.largest and not self.ended:
             grown = self._round(best, settings.leaders_grown)
             if grown == best or len(grown) <= len(best):
@@ -251,7 +251,7 @@ class Search(Refits):
 
     def _swap(self, best: Hypothesis) -> Hypothesis:
         """Take each effect away, or swap it for another; what was swapped may grow again."""
-        settings = SearchSettings.current()
+        settings = SearchSettings
         for _ in range(settings.swapped):
             before = best
             for member in best if len(best) > 1 else ():
@@ -271,5 +271,5 @@ class Search(Refits):
         """Refitted hypotheses that gained a good share of what the best one gained."""
         null = self.points[NULL].log_evidence
         gains = {h: p.log_evidence - null for h, p in self.points.items() if h}
-        least = SearchSettings.current().promising * max(gains.values())
+        least = SearchSettings.promising * max(gains.values())
         return [h for h, gain in gains.items() if gain > least]

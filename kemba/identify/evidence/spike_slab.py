@@ -15,52 +15,24 @@ from kemba.identify.evidence.linear import Linear
 from kemba.identify.evidence.neighbours import Neighbours
 from kemba.identify.evidence.windows import START
 from kemba.identify.problem.problem import Array, Candidate
-from kemba.settings import BY_HAND, Settings, setting
 
 
-class SpikeSlabSettings(Settings):
+class SpikeSlabSettings:
     """The prior: of every effect the width of its spike and of its slab, and of hypotheses."""
 
-    spike: float = setting(
-        0.05,
-        "1",
-        "width of the spike: every effect of the catalogue may be there with this share of its "
-        "size",
-        f"{BY_HAND}; that intervals count it as 5 % and not as 2 % came of benchmarks/blind",
-        decides=True,
-    )
-    slab: float = setting(
-        0.7, "1", "width of the slab: of a large effect, in sizes", BY_HAND, decides=True
-    )
+    # width of the spike: every effect of the catalogue may be there with this share of its size;
+    # that intervals count it as 5 % and not as 2 % came of benchmarks/blind
+    spike = 0.05
+    slab = 0.7  # width of the slab: of a large effect, in sizes
     silent = 1e-6  # width of the spike of a formula: none, but not singular
-    tolerances: tuple[float, ...] = setting(
-        (0.5, 1.0, 1.5),
-        "1",
-        "how far nominal figures are off, in prior sigmas; evidence is averaged over these",
-        "convention: three nodes around one prior sigma, which is itself uncertain",
-        decides=True,
-    )
-    nothing: float = setting(
-        0.5, "1", "prior probability that nothing is missing", "convention: even odds",
-        decides=True,
-        at_most=0.9,
-    )  # fmt: skip
-    single: float = setting(
-        0.4, "1", "prior probability of one effect, shared by all", BY_HAND, decides=True
-    )
-    pair: float = setting(
-        0.01, "1", "prior probability of two effects, shared by all pairs", BY_HAND, decides=True
-    )
-    triple: float = setting(
-        0.001, "1", "prior probability of three, shared by all triples", BY_HAND, decides=True
-    )
-    further: float = setting(
-        0.1,
-        "1",
-        "each further effect makes an answer this much less likely",
-        "tuned: by hand on the twin of tests/twin, no benchmark; as from two to three",
-        decides=True,
-    )
+    # how far nominal figures are off, in prior sigmas; evidence is averaged over these: three nodes
+    # around one prior sigma, which is itself uncertain
+    tolerances = (0.5, 1.0, 1.5)
+    nothing = 0.5  # prior probability that nothing is missing: even odds
+    single = 0.4  # prior probability of one effect, shared by all
+    pair = 0.01  # prior probability of two effects, shared by all pairs
+    triple = 0.001  # prior probability of three, shared by all triples
+    further = 0.1  # each further effect makes an answer this much less likely: as from two to three
 
 
 Hypothesis = tuple[str, ...]  # names of the effects that are large, sorted
@@ -92,7 +64,7 @@ class Ranker:
         spike: float | None = None,
         silent: Iterable[str] = (),
     ) -> None:
-        self._prior = SpikeSlabSettings.current()
+        self._prior = SpikeSlabSettings
         spike = self._prior.spike if spike is None else spike
         self.linear, self.candidates, self.spike = linear, candidates, spike
         self.silent = frozenset(silent)
@@ -187,7 +159,7 @@ class Ranker:
 def log_prior(hypothesis: Hypothesis, count: int) -> float:
     """Log prior probability of a hypothesis among `count` effects: all effects are equally likely,
     and each further one makes a hypothesis less likely."""
-    prior, size = SpikeSlabSettings.current(), len(hypothesis)
+    prior, size = SpikeSlabSettings, len(hypothesis)
     share = (prior.nothing, prior.single, prior.pair, prior.triple)[min(size, 3)]
     share *= prior.further ** max(size - 3, 0)
     return float(np.log(share / max(comb(count, size), 1)))

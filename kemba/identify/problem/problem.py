@@ -114,7 +114,7 @@ class Problem(ABC):
     def steps(self, theta: Theta, name: str) -> Iterable[tuple[dict[str, float], float]]:
         """Steps for a finite difference along `name`: changed entries of theta, and how far they
         go [the parameter's unit]. Two of them where both signs are possible."""
-        settings = StepSettings.current()
+        settings = StepSettings
         if name in self.nuisance:
             nominal, sigma = self.nuisance[name]
             h, value = settings.nuisance * sigma, theta.get(name, nominal)

@@ -5,22 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from kemba.identify.problem.types import Array, Flags, Labels
-from kemba.settings import Settings, setting
 
 
-class QuantisationSettings(Settings):
+class QuantisationSettings:
     """How the step of a sensor is found."""
 
     # readings closer than this share of their range are one reading: conversion of units rounds in
     # the fifteenth digit, files have six or more
     same = 1e-6
-    coarse: float = setting(
-        2.0,
-        "1",
-        "steps of so many sigmas of the noise are coarse",
-        "literature: below it, noise makes rounding errors independent (Widrow and Kollar 2008)",
-        decides=True,
-    )
+    # steps of so many sigmas of the noise are coarse: below it, noise makes rounding errors
+    # independent (Widrow and Kollar 2008)
+    coarse = 2.0
     longest = 1000  # rows at rest that count as one reading; of a longer rest more count
 
 
@@ -30,14 +25,14 @@ def step_of(values: Array) -> float:
     steps = np.diff(known)
     if not len(steps):
         return 0.0
-    least = QuantisationSettings.current().same * np.ptp(known)
+    least = QuantisationSettings.same * np.ptp(known)
     return float(steps[steps > least].min())
 
 
 def is_coarse(step: float, sigma: float) -> bool:
     """Whether a sensor's step is so much larger than its noise that rounding errors depend on each
     other."""
-    return step > QuantisationSettings.current().coarse * sigma
+    return step > QuantisationSettings.coarse * sigma
 
 
 def telling(values: Array, sigma: float) -> Flags:
@@ -63,7 +58,7 @@ def telling(values: Array, sigma: float) -> Flags:
 
 def _still(level: Labels) -> int:
     """How many of the first readings (n,), counted in steps, keep to one level or to two."""
-    level = level[: QuantisationSettings.current().longest]
+    level = level[: QuantisationSettings.longest]
     low, high = np.minimum.accumulate(level), np.maximum.accumulate(level)
     moved = high - low > 1
     return int(np.argmax(moved)) if moved.any() else len(moved)

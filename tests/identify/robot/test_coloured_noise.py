@@ -92,7 +92,7 @@ def test_logs_tell_whether_their_sensors_drift(drift: float) -> None:
     drifting = found.drifting()
     assert drifting is not None and drifting.drifting() is None
     gain = log_likelihood(drifting, {}) - log_likelihood(found, {})
-    assert (gain > DriftSettings.current().strong) == (drift > 0.0)
+    assert (gain > DriftSettings.strong) == (drift > 0.0)
 
 
 @pytest.mark.parametrize(

@@ -71,7 +71,7 @@ def fitted_anew(
     top = min(found, key=lambda h: found[h].cost)
     for hypothesis, one in found.items():
         start = with_own(problem, found[top].theta, hypothesis, one.theta)
-        fair = hypothesis == NULL and one.cost > found[top].cost + SharedSettings.current().least
+        fair = hypothesis == NULL and one.cost > found[top].cost + SharedSettings.least
         if hypothesis != top and (fair or fits[hypothesis].cost(start) < one.cost):
             found[hypothesis] = _better(one, fits[hypothesis].found(start))
     return found

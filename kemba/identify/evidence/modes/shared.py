@@ -16,21 +16,15 @@ from kemba.identify.evidence.modes.small_effects import cost_at
 from kemba.identify.evidence.point import LinearisationPoint
 from kemba.identify.evidence.spike_slab import Hypothesis
 from kemba.identify.problem.problem import Problem, Theta
-from kemba.settings import Settings, setting
 
 Points = Mapping[Hypothesis, LinearisationPoint]
 
 
-class SharedSettings(Settings):
+class SharedSettings:
     """When a hypothesis is judged again."""
 
-    least: float = setting(
-        3.0,
-        "nats",
-        "cost that a beginning must save",
-        "literature: Kass and Raftery 1995, less is no strong evidence",
-        decides=True,
-    )
+    # cost that a beginning must save [nats]: Kass and Raftery 1995, less is no strong evidence
+    least = 3.0
 
 
 def better_beginnings(
@@ -45,7 +39,7 @@ def better_beginnings(
         beside = [with_own(problem, base, hypothesis, own) for base in (theta, bare)]
         starts = [theta, *beside]
         costs = [_cost(problem, point, start) for start in starts]
-        if min(costs) < point.mode.cost - SharedSettings.current().least:
+        if min(costs) < point.mode.cost - SharedSettings.least:
             found[hypothesis] = dict(starts[int(np.argmin(costs))])
     return found
 
