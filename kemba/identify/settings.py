@@ -11,7 +11,6 @@ class DiscoverSettings:
     significant = 0.03
     matters = 0.2  # an effect below this share of its size is not reported
     apart = 1.96  # sigmas by which an effect differs from none: its 95 % interval
-    matters_too = 0.3  # the same for an effect beside a stronger one
     # length of the blocks whose signs are redrawn by the bootstrap [s]: three times the memory of
     # its coloured forces
     fine = 0.1
@@ -30,10 +29,6 @@ class VerdictSettings:
     part = 0.1  # smallest share of the error beyond the noise that a part of an answer explains
     # the same where more than `whole` is left and repeats itself, or a figure drifts
     part_of_structure = 0.5
-    # share of the squared excess left where an answer acts, up to which it is a part however much
-    # is left elsewhere: on the 20 cases of benchmarks/blind/bench.py outside the catalogue wrong
-    # answers left 0.019 to 1.3, and a right cushion beside another error 0.002
-    where_it_acts = 0.01
     sure = 0.95  # probability from which an effect is sure: 95 %
 
 

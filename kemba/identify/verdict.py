@@ -6,12 +6,11 @@ from dataclasses import dataclass
 
 from kemba.errors import enumerated
 from kemba.identify.answer import ENDED, Ranked, Verdict
-from kemba.identify.doubt.acting import excess_where_acting
 from kemba.identify.doubt.formula import Formula
 from kemba.identify.doubt.held_out import HeldOut, error
 from kemba.identify.doubt.parsimony import Belief
 from kemba.identify.doubt.run_consistency import Drift
-from kemba.identify.doubt.unexplained import explains_structure, unfinished
+from kemba.identify.doubt.unexplained import unfinished
 from kemba.identify.evidence.point import excess
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
@@ -50,8 +49,7 @@ def doubts_about(
         least = settings.part_of_structure
     elif pattern := pattern_left(search, best):
         reasons.append(f"the error that is left has a pattern: {pattern}")
-        if not explains_structure(search, best):
-            least = settings.part_of_structure
+        least = settings.part_of_structure
     if drift is None and after <= settings.whole:
         least = settings.part  # a whole answer may leave as much
     if ended and after > settings.whole:
@@ -70,17 +68,10 @@ def doubts_about(
         others = ", ".join(" + ".join(h) for h in belief.rivals)
         reasons.append(f"{others} would predict left-out data as well as {' + '.join(best)}")
     part = bool(best) and excess(after) <= (1.0 - least) * excess(before)
-    part = part or (bool(best and reasons) and fits_where_it_acts(search, best))
     unsure = unasked(search, best) if ended else ()
     if unsure and not reasons:
         return Doubts((ENDED,), part=True, unsure=unsure)
     return Doubts(tuple(reasons), part, unsure)
-
-
-def fits_where_it_acts(search: Search, best: Hypothesis) -> bool:
-    """Whether hardly any error is left where the answer acts."""
-    before, after = excess_where_acting(search, best)
-    return after <= VerdictSettings.where_it_acts * before
 
 
 def unasked(search: Search, best: Hypothesis) -> Hypothesis:

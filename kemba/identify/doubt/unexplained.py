@@ -72,10 +72,3 @@ def unfinished(search: Search, best: Hypothesis) -> bool:
         return structure > settings.structure
     before, _ = structured(search, NULL)
     return structure > settings.left * max(before - power, 0.0)
-
-
-def explains_structure(search: Search, best: Hypothesis) -> bool:
-    """Whether an answer leaves hardly any of the error that repeats itself without it: of a lost
-    force of 20 N 0.4 %, of a wrong supply that stands for something else all of it."""
-    before, after = (structured(search, h)[1] for h in (NULL, best))
-    return after < UnexplainedSettings.left * before

@@ -9,8 +9,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from kemba.identify.evidence.linear import estimate, names_of
-from kemba.identify.evidence.modes.shared import better_beginnings
-from kemba.identify.evidence.modes.small_effects import Mode
 from kemba.identify.evidence.null_model import Baseline
 from kemba.identify.evidence.point import LinearisationPoint
 from kemba.identify.evidence.refit import Fit, refit
@@ -29,7 +27,6 @@ class Refits:
     `time.monotonic` [s]. `say`: told of progress. `points`: every hypothesis that was refitted.
     `begin`: figures of the model as it is, where a fit found them already. `base`: the null model.
     `in_pieces`: the error that is told is of quarters of runs left out, and not of whole runs.
-    `thorough`: nothing and its rivals were fitted anew, by slopes of their own.
     `own`: the problem and theta of the model as it is, along the motion that it makes of the data
     itself, where late sensors have led to a motion along which it cannot be judged.
     """
@@ -41,12 +38,9 @@ class Refits:
     begin: Mapping[str, float] = field(default_factory=dict)
     due: float = np.inf
     in_pieces: bool = False
-    thorough: bool = False
     own: tuple[Problem, Theta] | None = None
     base: Baseline = field(init=False)
     _thetas: dict[Hypothesis, dict[str, float]] = field(default_factory=dict)
-    _beginnings: dict[Hypothesis, dict[str, float]] = field(default_factory=dict)
-    _compared: dict[Hypothesis, Mode] = field(default_factory=dict)
     _stale: bool = False
 
     @property
@@ -111,8 +105,7 @@ class Refits:
         slopes = np.take(base.jacobian, at, axis=1)
         for i, column in own.items():
             slopes[:, i] = column
-        also = self._beginnings.get(hypothesis)
-        return base.judged(hypothesis, fit, names, slopes, also=also)
+        return base.judged(hypothesis, fit, names, slopes)
 
     def _guess(self, hypothesis: Hypothesis) -> dict[str, float]:
         """Where a refit starts: at its last result, or at the linear estimate from the largest part
@@ -132,22 +125,6 @@ class Refits:
         self.refresh()
         count = len(self.problem.candidates)
         return max(self.points, key=lambda h: self.points[h].log_evidence + log_prior(h, count))
-
-    def share_modes(self) -> bool:
-        """Judge every hypothesis from the best mode of all where it fits better there; whether any
-        did."""
-        best = min(self.points.values(), key=lambda point: point.mode.cost)
-        others = {h: p for h, p in self.points.items() if p is not best}
-        new = {h: p for h, p in others.items() if self._compared.get(h) is not best.mode}
-        found = better_beginnings(self.problem, new, best)
-        self._compared |= dict.fromkeys(new, best.mode)
-        self._beginnings |= found
-        if NULL in found:
-            self.base.begin_at(found[NULL])
-            self.points[NULL] = self.base.point
-        for hypothesis in filter(None, found):
-            self.points[hypothesis] = self._point(hypothesis, self.points[hypothesis].fit)
-        return bool(found)
 
     def singles(self) -> dict[Hypothesis, float]:
         """Linear evidence of every single effect."""

@@ -7,15 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kemba.identify.evidence.modes.rivals import fitted_anew, judged_anew, promised
 from kemba.identify.evidence.noise.colour import with_learnt_colour
 from kemba.identify.evidence.null_model import Baseline
-from kemba.identify.evidence.point import excess
 from kemba.identify.evidence.refit import Frozen, refit
 from kemba.identify.evidence.refits import Refits
 from kemba.identify.evidence.search_settings import SearchSettings
-from kemba.identify.evidence.spike_slab import NULL, Hypothesis, log_prior
-from kemba.identify.evidence.strain import stand_ins
+from kemba.identify.evidence.spike_slab import NULL, Hypothesis
 
 
 @dataclass
@@ -31,29 +28,11 @@ class Search(Refits):
         self.say("fitting the model as it is, and a slope for every effect")
         self.start()
         best = self._round(NULL, SearchSettings.leaders)
-        if instead := self._leaves_far_less(best):
-            best = self._along(instead)
         self.say(f"first guess: {' + '.join(best) or 'nothing'}")
         return best
 
-    def _leaves_far_less(self, best: Hypothesis) -> Hypothesis:
-        """The single effect that leaves far less than the best hypothesis, if there is one.
-
-        Along the motion that data without an effect would have, its evidence counts for less than
-        that of effects which change the motion a little. Another structure is built in instead.
-        """
-        settings, structures = SearchSettings, self.problem.structures
-        singles = [h for h in self.points if len(h) == 1 and not structures & set(h)]
-        if not self.problem.moves or not singles or self.ended:
-            return NULL
-        error = {h: self.points[h].fitted_error for h in (best, *singles)}
-        least = min(singles, key=error.__getitem__)
-        far_less = excess(error[least]) < settings.far_less * excess(error[best])
-        return least if error[best] > settings.structural and far_less else NULL
-
     def further(self, best: Hypothesis) -> Hypothesis:
         """The likeliest hypothesis, searched for from the first guess."""
-        leaders = SearchSettings.leaders
         if self.problem.moves:
             return self._follow(best)
         if best != NULL:
@@ -63,54 +42,24 @@ class Search(Refits):
             self.points = {NULL: self.base.point}
             for number, hypothesis in enumerate(promising, start=1):
                 self.visit(hypothesis, number, len(promising))
-            best = self._round(NULL, leaders)
-        if len(best) < 2 and not self.ended:
-            best = self._look_closer(best)
+            best = self._round(NULL, SearchSettings.leaders)
         return self._swap(self._grow(best)) if best else best
-
-    def _look_closer(self, best: Hypothesis) -> Hypothesis:
-        """Nothing and the likeliest single effects fitted anew, where the best of them explains
-        hardly anything of an error that is no noise, and slopes at the fit of nothing are no fair
-        judge: its figures are not believed, or slopes promise what modes do not show."""
-        settings = SearchSettings
-        error, left = (self.points[h].fitted_error for h in (NULL, best))
-        if error <= settings.structural or excess(left) <= settings.unexplained * excess(error):
-            return best
-        evidence = {h: p.log_evidence for h, p in self.points.items() if len(h) == 1}
-        likely = sorted(evidence, key=lambda h: -evidence[h])[: settings.closer]
-        instead = self._try_stand_ins(NULL)
-        promise = max(promised(self.base, self.points[h]) for h in (NULL, best))
-        if not instead and promise <= settings.promise:
-            return best
-        self.say("fitting nothing anew")
-        points = {h: self.points[h] for h in (NULL, *likely, *instead)}
-        fits = fitted_anew(self.base, points, lambda: self.ended, self.say)
-        self.points = dict(judged_anew(self.base, points, fits))
-        self.thorough = True
-        return self.best()
 
     def _follow(self, best: Hypothesis) -> Hypothesis:
         """Repeat the search along the motion that the best hypothesis makes of the data, until the
-        best hypothesis stays the same.
-
-        An effect that changes the motion much is underrated along the first motion. So where no
-        refit is better than nothing, the linear evidence may choose the hypothesis to follow.
-        """
-        settings = SearchSettings
-        for _ in range(settings.followed):
-            guess = best or self._first_of_table()
-            if guess == NULL or self.ended:
+        best hypothesis stays the same."""
+        for _ in range(SearchSettings.followed):
+            if best == NULL or self.ended:
                 return best
-            best = self._along(guess)
-            if best in (guess, NULL):
+            before, best = best, self._along(best)
+            if best == before:
                 break
         return self._swap(self._regrow(self._grow(best))) if best else best
 
     def _along(self, guess: Hypothesis) -> Hypothesis:
         """The best single effect along the motion that a guess makes of the data."""
         self.say(f"searching again with {' + '.join(guess)} in the model")
-        among = self._contenders()
-        self.start(among, self._settle(guess))
+        self.start(self._settle(guess))
         self.visit(guess)
         return self._round(NULL, SearchSettings.leaders)
 
@@ -124,7 +73,7 @@ class Search(Refits):
                 break
             before = best
             self.say(f"searching again with {' + '.join(best)} in the model")
-            self.start(frozenset(), self._settle(best))
+            self.start(self._settle(best))
             self.visit(best)
             best = self._grow(best)
             if best == before:
@@ -151,45 +100,19 @@ class Search(Refits):
                 break
         return theta
 
-    def _contenders(self) -> frozenset[Hypothesis]:
-        """Single effects that were refitted, or whose linear evidence gains a good share of the
-        best."""
-        null = self.points[NULL].log_evidence
-        gains = {h: e - null for h, e in self.base.table.items() if len(h) == 1}
-        least = SearchSettings.promising * max(gains.values())
-        return frozenset(h for h, gain in gains.items() if gain > least or h in self.points)
-
-    def _first_of_table(self) -> Hypothesis:
-        """Of the refitted single effects the one with the largest linear evidence, if that beats
-        nothing."""
-        count = len(self.problem.candidates)
-        null = self.points[NULL].log_evidence + log_prior(NULL, count)
-        tables = {h: e for h, e in self.singles().items() if h in self.points}
-        first = max(tables, key=tables.__getitem__, default=NULL)
-        better = first and tables[first] + log_prior(first, count) > null
-        return first if better else NULL
-
-    def start(
-        self, among: frozenset[Hypothesis] | None = None, theta: Mapping[str, float] | None = None
-    ) -> None:
+    def start(self, theta: Mapping[str, float] | None = None) -> None:
         """Null fit, noise colour, and the linear table at the null; `theta`: the best guess."""
         if self.problem.moves:
             about = theta or self.begin
             self.problem = with_learnt_colour(self.problem, about, careful=bool(theta))
-        self.base = Baseline(self.problem, among, theta or self.begin)
+        self.base = Baseline(self.problem, theta or self.begin)
         self.problem = self.base.problem
         self.points = {NULL: self.base.point}
 
     def _round(self, given: Hypothesis, leaders: int, least: float = -np.inf) -> Hypothesis:
         """Refit `given` with one more effect, the likeliest ones whose linear evidence is `least`
-        or more; the best of all points so far. Where a refit shows a better mode for all, once
-        more."""
+        or more; the best of all points so far."""
         self._refit_leaders(given, leaders, least)
-        if not self.problem.moves and self.share_modes():
-            self._refit_leaders(given, leaders, least)
-            self.share_modes()
-        if given == NULL:
-            self._try_stand_ins(self.best())
         if given == NULL and self.points[NULL].fitted_error > SearchSettings.structural:
             for structure in sorted(self.problem.structures):
                 self.visit((structure,))
@@ -213,31 +136,12 @@ class Search(Refits):
                 break
             self.visit(hypothesis, number, len(order))
 
-    def _try_stand_ins(self, hypothesis: Hypothesis) -> list[Hypothesis]:
-        """Refit the effects that may stand behind nominal figures which a hypothesis moves too far;
-        those that are refitted."""
-        begun = stand_ins(self.points[hypothesis], self.problem)
-        for effect, start in begun.items():
-            if self.ended:
-                break
-            self._thetas.setdefault(effect, start)
-            self.visit(effect)
-        return [effect for effect in begun if effect in self.points]
-
     def _extensions(self, given: Hypothesis) -> dict[Hypothesis, float]:
-        """Linear evidence of `given` plus one effect. The members of a pair that is much better
-        than any single effect count as much as the best single effect."""
-        if given != NULL:
-            ranker = self.base.ranker(self.points[given].mode.linear)
-            return ranker.table((len(given) + 1,), given=given)
-        single = self.singles()
-        base = max(single.values())
-        pairs = [h for h in self.base.table if len(h) == 2]
-        best_pair = max(pairs, key=self.base.table.__getitem__, default=NULL)
-        if best_pair and self.base.table[best_pair] > base + SearchSettings.gain:
-            for name in best_pair:
-                single[(name,)] = max(single[(name,)], base)
-        return single
+        """Linear evidence of `given` plus one effect."""
+        if given == NULL:
+            return self.singles()
+        ranker = self.base.ranker(self.points[given].mode.linear)
+        return ranker.table((len(given) + 1,), given=given)
 
     def _grow(self, best: Hypothesis) -> Hypothesis:
         """Add effects, one by one, while the evidence grows."""

@@ -16,10 +16,6 @@ class SearchSettings:
     far_share = 0.7  # or no farther behind than this share of the gain
     promising = 0.5  # share of the best gain with which an effect is tried again
     followed = 2  # times that the motion is found again with the best guess
-    # share of the excess error that the likeliest effect leaves, below which another one that
-    # leaves less is followed first: a quadratic damping of -62 N.s2.m-2 leaves 0.37 of what a mount
-    # of the piston leaves, which was likelier along the first motion
-    far_less = 0.5
     # times that the motion is found before a search along it, until late sensors stay as late: a
     # piston 5.2 ms late is found 3.2 ms late along the motion as it is read, 5.2 ms along the
     # second one after it
@@ -30,10 +26,4 @@ class SearchSettings:
     swapped = 2  # rounds in which effects of an answer are taken away or swapped
     leaders_grown = 3  # effects that are refitted beside the best answer
     leaders_swapped = 2  # effects that are refitted in place of one of the answer
-    gain = 3.0  # gain from which a pair recommends its members [nats]
     least = 0.1  # size of an effect from which its secant replaces its slope
-    promise = 10.0  # what slopes promise beyond a mode, from which they are [nats]
-    # share of the excess error that the best effect leaves, from which they are; others grow from
-    # an effect that explains more
-    unexplained = 0.8
-    closer = 3  # effects that are fitted anew
