@@ -33,8 +33,8 @@ What each rule of `discover` is worth is told by `benchmarks/ablation.py` ([trie
 The sample can have the tasks `stand`, `jump` and `hop`, which are solved from guesses. What has
 been run of it stands at the head of each table, with the day. One case is more than 5 % of so
 small a sample, so **bold** means: at least one case changed, and more cases are needed to say how
-often. A plan that is `interrupted` took five times the usual iterations. No value leaves the range in which it has a
-meaning: twice a share of 0.7 is 1.
+often. A plan that is `interrupted` took five times the usual iterations. No value leaves the range
+in which it has a meaning: twice a share of 0.7 is 1.
 
 There are two studies. The tables that come first are made from `benchmarks/sensitivity.jsonl`,
 which later runs extend. Of the first study only its tables were kept; they stand at the end, and
