@@ -8,8 +8,8 @@
 The cases are shipped tasks. Only settings marked `decides` are changed, one at a time. A case is
 run again from the first stage on that reads the setting; where no stage reads it, nothing can
 change and nothing is run. Results are kept in benchmarks/sensitivity.jsonl with the day on which
-they were run: an interrupted study goes on where it stopped, and the page says how old its figures are. Later lines
-replace earlier ones. Parts of a study may run at the same time.
+they were run: an interrupted study goes on where it stopped, and the page says how old its figures
+are. Later lines replace earlier ones. Parts of a study may run at the same time.
 """
 
 from __future__ import annotations
