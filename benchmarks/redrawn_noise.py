@@ -28,9 +28,9 @@ from twin.cases import bench_case
 from twin.figures import Robot
 from twin.measure import Sensors
 
+from kemba.identify.evidence.colour import best_fit
+from kemba.identify.evidence.left_out_noise import left_out_noise
 from kemba.identify.evidence.linear import time_blocks
-from kemba.identify.evidence.noise.colour import best_fit
-from kemba.identify.evidence.noise.left_out_noise import left_out_noise
 from kemba.identify.evidence.search import Search
 from kemba.identify.logs.reading import read_logs
 from kemba.identify.problem.problem import Array

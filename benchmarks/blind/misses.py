@@ -61,7 +61,6 @@ def gain(search: Search, record: Record) -> float:
     answered, true = tuple(sorted(named(record))), (hidden(record)[0],)
     for hypothesis in (answered, true):
         search.visit(hypothesis)
-    search.refresh()
     if search.problem.moves:
         return misfit(search, answered) - misfit(search, true)
     starts = [search.points[h].mode.theta for h in (NULL, answered, true)]

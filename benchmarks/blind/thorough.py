@@ -13,8 +13,8 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from kemba.errors import KembaError
+from kemba.identify.evidence.bounded import effect_bounds
 from kemba.identify.evidence.linear import Linear, estimate, priors, usual_shapes
-from kemba.identify.evidence.modes.bounded import effect_bounds
 from kemba.identify.evidence.null_model import Baseline
 from kemba.identify.evidence.point import LinearisationPoint
 from kemba.identify.evidence.refit import Fit

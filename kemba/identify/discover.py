@@ -19,8 +19,7 @@ from kemba.identify.doubt.run_consistency import drifting
 from kemba.identify.doubt.significance import best_gain, null_test
 from kemba.identify.evidence.bootstrap import NullTest, smallest_detectable
 from kemba.identify.evidence.figures import Rebuilt, ahead, settled
-from kemba.identify.evidence.search import Search
-from kemba.identify.evidence.search_settings import SearchSettings
+from kemba.identify.evidence.search import Search, SearchSettings
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
 from kemba.identify.evidence.windows import error_ratio
 from kemba.identify.problem.problem import Problem
@@ -140,7 +139,6 @@ def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> 
     best, p_value, ended = belief.best, belief.p_value, ended or search.late
     for hypothesis in filter(None, (best, whole)):
         search.visit(hypothesis)
-    search.refresh()
     if test.too_short:
         return _undecided(search, test, kept)
     # what is too small to be reported still explains: a formula must do better than with it

@@ -12,8 +12,8 @@ from kemba.identify.doubt.belief import strength
 from kemba.identify.doubt.cross_validation import left_out
 from kemba.identify.doubt.held_out import HeldOut, error, error_as_it_is
 from kemba.identify.doubt.parsimony import Belief
+from kemba.identify.evidence.bounded import within_bounds
 from kemba.identify.evidence.linear import is_shape
-from kemba.identify.evidence.modes.bounded import within_bounds
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import (
     NULL,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kemba.identify.evidence.noise.left_out_noise import LeftOutNoiseSettings, left_out_noise
+from kemba.identify.evidence.left_out_noise import LeftOutNoiseSettings, left_out_noise
 from kemba.identify.problem.problem import Array, Labels
 
 BLOCKS, ROWS, EFFECTS = 24, 50, 12

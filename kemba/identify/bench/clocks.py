@@ -15,8 +15,8 @@ from scipy.optimize import minimize_scalar
 
 from kemba.identify.bench.bench_log import BenchLog
 from kemba.identify.bench.motion import SmoothedMotion
+from kemba.identify.evidence.colour import best_fit
 from kemba.identify.evidence.linear import Linear, condense, names_of, priors
-from kemba.identify.evidence.noise.colour import best_fit
 from kemba.identify.logs.settings import GateSettings
 from kemba.identify.problem.problem import Problem, Theta
 from kemba.trajectory import Trajectory

@@ -13,7 +13,7 @@ from typing_extensions import Self
 from kemba.errors import KembaError
 from kemba.identify.bench import clocks
 from kemba.identify.bench.bench_log import BenchLog, prepare
-from kemba.identify.bench.beyond import formula_columns, leftover, weight
+from kemba.identify.bench.beyond import formula_columns, leftover
 from kemba.identify.bench.missing import bench_missing
 from kemba.identify.bench.operating_point import (
     bench_force_channel,
@@ -189,10 +189,6 @@ class BenchProblem(Problem):
             return {}
         names, columns = formula_columns(self.predicted, theta)
         return dict(zip(names, self.whiten(columns).T, strict=True))
-
-    def weight(self, theta: Theta, formula: str, coefficient: float) -> float:
-        """Largest force of a formula as a share of a usual friction."""
-        return weight(self.predicted, theta, formula, coefficient)
 
     def leftover(self, theta: Theta) -> Leftover:
         """Force residual, and what a force could depend on."""

@@ -40,7 +40,6 @@ class Prediction:
     """Rod force and chamber forces at the samples, with the force's local sensitivities."""
 
     force: Array
-    by_rate: Array  # dF/dv
     by_valve: Array  # (n, 2) dF/du
     valve: Array  # (n, 2) share of the sample's neighbourhood in which each valve is on
     states: dict[str, Array]
@@ -57,7 +56,7 @@ class RigModel:
         inputs = [node.s, node.q, node.v, node.a, node.u, node.p]
         self._rest = Rest(node.s, inputs[1:], rate, list(model.states.values()))
         force = node.outputs["piston/F"]
-        results = ca.vertcat(force, ca.jacobian(force, node.v), ca.jacobian(force, node.u).T)
+        results = ca.vertcat(force, ca.jacobian(force, node.u).T)
         self._functions = {
             "step": _step(node, rate),
             "force": ca.Function("force", inputs, [ca.densify(force)]),
@@ -101,7 +100,7 @@ class RigModel:
         for place, weight in V_NODES:
             v = v0 + place * motion.v_sigma
             force += weight * self._mapped("force", n)(s, x, v, a, blurred, fixed)[0]
-        return Prediction(force, out[1], out[2:4].T, blurred.T, states)
+        return Prediction(force, out[1:3].T, blurred.T, states)
 
     def _integrate(
         self, times: Array, motion: SmoothedMotion, u: Array, p: Array, start: Mapping[str, float]

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import lsq_linear
 
+from kemba.identify.evidence.bounded import effect_bounds
 from kemba.identify.evidence.linear import Linear
-from kemba.identify.evidence.modes.bounded import effect_bounds
 from kemba.identify.evidence.point import LinearisationPoint
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
@@ -83,24 +83,20 @@ def left_out(search: Search, hypothesis: Hypothesis, against: Hypothesis = NULL)
     return gained(0.5 * (theirs - ours), _apart(search, hypothesis, against, fine))
 
 
-def window_gain(
-    search: Search, hypothesis: Hypothesis, against: Hypothesis, quarters: bool = False
-) -> Gain:
-    """The same of the rows summed over aggregation windows; `quarters`: each quarter of a run
-    predicted from all others, in any case."""
-    fine = quarters or one_part_shows(search, hypothesis, against)
+def window_gain(search: Search, hypothesis: Hypothesis, against: Hypothesis) -> Gain:
+    """The same of the rows summed over aggregation windows."""
+    fine = one_part_shows(search, hypothesis, against)
     ours, theirs = (window_powers(search, h, fine) for h in (hypothesis, against))
     return gained(0.5 * (theirs - ours), _apart(search, hypothesis, against, fine))
 
 
-def gain_over_nothing(search: Search, hypothesis: Hypothesis, quarters: bool = False) -> Gain:
-    """Gain over nothing of the rows summed over aggregation windows, and of the nominal figures;
-    `quarters` as in `window_gain`.
+def gain_over_nothing(search: Search, hypothesis: Hypothesis) -> Gain:
+    """Gain over nothing of the rows summed over aggregation windows, and of the nominal figures.
 
     Without its effects, nominal figures may move until left-out data are predicted as well: a body
     that is 2.3 prior sigmas too heavy for a payload. Their prior is knowledge as data are.
     """
-    gain = window_gain(search, hypothesis, NULL, quarters)
+    gain = window_gain(search, hypothesis, NULL)
     saved = figures_off(search, NULL) - figures_off(search, hypothesis)
     return Gain(gain.nats + saved, gain.error)
 

@@ -122,7 +122,6 @@ def likeliest_part(search: Search, hypothesis: Hypothesis) -> Hypothesis:
 def _visit(search: Search, hypotheses: list[Hypothesis]) -> None:
     for number, hypothesis in enumerate(hypotheses, start=1):
         search.visit(hypothesis, number, len(hypotheses))
-    search.refresh()
 
 
 def overclaimed(search: Search, smaller: Hypothesis, larger: Hypothesis) -> bool:

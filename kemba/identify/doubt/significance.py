@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from kemba.identify.evidence.bootstrap import NullTest, bootstrap
+from kemba.identify.evidence.colour import best_fit
+from kemba.identify.evidence.left_out_noise import LeftOutNoiseSettings, left_out_noise
 from kemba.identify.evidence.linear import Linear, time_blocks
-from kemba.identify.evidence.noise.colour import best_fit
-from kemba.identify.evidence.noise.left_out_noise import LeftOutNoiseSettings, left_out_noise
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL
 from kemba.identify.problem.problem import Array

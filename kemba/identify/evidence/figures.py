@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kemba.identify.evidence.colour import best_fit
 from kemba.identify.evidence.linear import linearise, names_of, time_blocks
-from kemba.identify.evidence.noise.colour import best_fit
 from kemba.identify.evidence.refit import Frozen, refit
 from kemba.identify.evidence.spike_slab import NULL
 from kemba.identify.evidence.windows import error_ratio

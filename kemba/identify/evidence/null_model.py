@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
+from kemba.identify.evidence.colour import best_fit, learnt_colour, with_learnt_colour
 from kemba.identify.evidence.linear import (
     Linear,
     condense,
@@ -11,10 +12,9 @@ from kemba.identify.evidence.linear import (
     names_of,
     priors,
 )
-from kemba.identify.evidence.modes.small_effects import Mode, mode_of
-from kemba.identify.evidence.noise.colour import best_fit, learnt_colour, with_learnt_colour
 from kemba.identify.evidence.point import Division, LinearisationPoint
 from kemba.identify.evidence.refit import Fit, Frozen, refit
+from kemba.identify.evidence.small_effects import Mode, mode_of
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis, Ranker
 from kemba.identify.problem.problem import Array, Problem
 
@@ -95,19 +95,12 @@ class Baseline:
         names = names_of(self.problem, theta)
         self.jacobian = self.problem.jacobian(theta, names) if jacobian is None else jacobian
         self.residual = self.problem.residual(theta)
-        self.rescore(theta, names)
-        ranker = self.ranker(self.point.mode.linear)
-        self.table = ranker.table((0, 1))
-
-    def rescore(self, theta: Mapping[str, float] | None = None, names: Names = ()) -> None:
-        """Score the null with the slopes as they are now, at theta or where it was."""
-        theta = self.point.fit.theta if theta is None else theta
-        names = names or self.point.linear.names
         linear, windowed = self.division.linear(theta, names, self.jacobian, self.residual)
         fit = Fit(dict(theta), 0.5 * float(self.residual @ self.residual))
         mode = self._mode(NULL, [theta], linear, self.jacobian)
-        score = self.ranker(mode.linear).score(NULL)
-        self.point = LinearisationPoint(NULL, fit, linear, windowed, mode, score)
+        ranker = self.ranker(mode.linear)
+        self.point = LinearisationPoint(NULL, fit, linear, windowed, mode, ranker.score(NULL))
+        self.table = ranker.table((0, 1))
 
     def judged(
         self,

@@ -2,22 +2,80 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+import time
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from kemba.identify.evidence.noise.colour import with_learnt_colour
+from kemba.identify.evidence.colour import with_learnt_colour
+from kemba.identify.evidence.linear import estimate, names_of
 from kemba.identify.evidence.null_model import Baseline
-from kemba.identify.evidence.refit import Frozen, refit
-from kemba.identify.evidence.refits import Refits
-from kemba.identify.evidence.search_settings import SearchSettings
-from kemba.identify.evidence.spike_slab import NULL, Hypothesis
+from kemba.identify.evidence.point import LinearisationPoint
+from kemba.identify.evidence.refit import Fit, Frozen, refit
+from kemba.identify.evidence.spike_slab import NULL, Hypothesis, log_prior, probabilities
+from kemba.identify.problem.problem import Problem, Theta
+from kemba.stopwatch import Stage
+
+
+class SearchSettings:
+    """Which hypotheses are refitted."""
+
+    leaders = 6  # effects that are refitted in a round
+    sure = 3  # leaders that are refitted however far behind they are
+    sure_grown = 2  # the same beside effects that are found already
+    far = 40.0  # other leaders are refitted when not farther behind [nats]
+    # error of the model as it is, in noise units, from which another structure is refitted whatever
+    # its linear evidence is
+    structural = 1.3
+    far_share = 0.7  # or no farther behind than this share of the gain
+    promising = 0.5  # share of the best gain with which an effect is tried again
+    followed = 2  # times that the motion is found again with the best guess
+    # times that the motion is found before a search along it, until late sensors stay as late: a
+    # piston 5.2 ms late is found 3.2 ms late along the motion as it is read, 5.2 ms along the
+    # second one after it
+    settled = 4
+    still = 0.1  # change of such a delay, in rows, at which it stays: below its 1 sigma
+    largest = 10  # effects in one answer: more than any machine is expected to lack
+    regrown = 3  # times that an answer of several effects is begun again where it has led
+    swapped = 2  # rounds in which effects of an answer are taken away or swapped
+    leaders_grown = 3  # effects that are refitted beside the best answer
+    leaders_swapped = 2  # effects that are refitted in place of one of the answer
 
 
 @dataclass
-class Search(Refits):
-    """Which hypotheses are refitted, and in which order; `run` fills it."""
+class Search:
+    """The null model, and every hypothesis that was refitted beside it; `run` fills it.
+
+    `problem`: the problem as it is now; it is replaced when its noise colour is learnt or its
+    motion found again. `deadline`: when to stop searching, `due`: when the answer is due, by
+    `time.monotonic` [s]. `say`: told of progress. `points`: every hypothesis that was refitted.
+    `begin`: figures of the model as it is, where a fit found them already. `base`: the null model.
+    `in_pieces`: the error that is told is of quarters of runs left out, and not of whole runs.
+    `own`: the problem and theta of the model as it is, along the motion that it makes of the data
+    itself, where late sensors have led to a motion along which it cannot be judged.
+    """
+
+    problem: Problem
+    deadline: float = np.inf
+    say: Callable[[str], None] = lambda text: None
+    points: dict[Hypothesis, LinearisationPoint] = field(default_factory=dict)
+    begin: Mapping[str, float] = field(default_factory=dict)
+    due: float = np.inf
+    in_pieces: bool = False
+    own: tuple[Problem, Theta] | None = None
+    base: Baseline = field(init=False)
+    _thetas: dict[Hypothesis, dict[str, float]] = field(default_factory=dict)
+
+    @property
+    def ended(self) -> bool:
+        """Whether the time is over. A first effect is refitted all the same."""
+        return time.monotonic() > self.deadline
+
+    @property
+    def late(self) -> bool:
+        """Whether the answer is due: nothing more is refitted to doubt it."""
+        return time.monotonic() > self.due
 
     def run(self) -> Hypothesis:
         """The likeliest hypothesis; everything that was refitted stays in `points`."""
@@ -177,3 +235,55 @@ class Search(Refits):
         gains = {h: p.log_evidence - null for h, p in self.points.items() if h}
         least = SearchSettings.promising * max(gains.values())
         return [h for h, gain in gains.items() if gain > least]
+
+    def visit(self, hypothesis: Hypothesis, number: int = 1, of: int = 1) -> LinearisationPoint:
+        """Refit a hypothesis, once, and score it there; `number` `of` so many, for who waits."""
+        if hypothesis not in self.points:
+            name = f"refitting {' + '.join(hypothesis)}"
+            self.say(Stage(name, number, of) if of > 1 else name)
+            fit = refit(self.problem, hypothesis, self._guess(hypothesis), self.base.frozen)
+            self.points[hypothesis] = self._point(hypothesis, fit)
+            self._thetas[hypothesis] = fit.theta
+        return self.points[hypothesis]
+
+    def _point(self, hypothesis: Hypothesis, fit: Fit) -> LinearisationPoint:
+        """The problem about a refitted point: slopes of its own parameters are those of the fit,
+        all others are the null's."""
+        names, base = names_of(self.problem, fit.theta), self.base
+        known = {n: i for i, n in enumerate(base.point.linear.names)}
+        own = {i: fit.columns[n] for i, n in enumerate(names) if n in fit.columns}
+        at = [0 if i in own else known[n] for i, n in enumerate(names)]
+        slopes = np.take(base.jacobian, at, axis=1)
+        for i, column in own.items():
+            slopes[:, i] = column
+        return base.judged(hypothesis, fit, names, slopes)
+
+    def _guess(self, hypothesis: Hypothesis) -> dict[str, float]:
+        """Where a refit starts: at its last result, or at the linear estimate from the largest part
+        of the hypothesis that was refitted."""
+        if hypothesis in self._thetas:
+            return self._thetas[hypothesis]
+        parts = [h for h in self.points if set(h) < set(hypothesis)]
+        part = max(parts, key=lambda h: (len(h), self.points[h].log_evidence))
+        point = self.points[part]
+        linear = point.mode.linear
+        z = self.base.ranker(linear).score(hypothesis).z
+        guess = estimate(self.problem, linear, z)
+        return {**guess, **{k: v for k, v in point.fit.theta.items() if k not in guess}}
+
+    def best(self) -> Hypothesis:
+        """The likeliest of all refitted hypotheses."""
+        count = len(self.problem.candidates)
+        return max(self.points, key=lambda h: self.points[h].log_evidence + log_prior(h, count))
+
+    def singles(self) -> dict[Hypothesis, float]:
+        """Linear evidence of every single effect."""
+        return {h: e for h, e in self.base.table.items() if len(h) == 1}
+
+    def probabilities(self, dismissed: Collection[Hypothesis] = ()) -> dict[Hypothesis, float]:
+        """Of all refitted hypotheses, and of the other single effects by their linear evidence;
+        without the hypotheses `dismissed` as too small or as refuted by left-out data."""
+        evidence = self.singles()
+        evidence |= {h: p.log_evidence for h, p in self.points.items()}
+        evidence = {h: e for h, e in evidence.items() if h not in dismissed}
+        return probabilities(evidence, len(self.problem.candidates))

@@ -7,13 +7,11 @@ and so it looks like a small force, or like a faulty sensor.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from kemba.identify.problem.sensor_noise import ColourSettings
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
+from kemba.identify.problem.types import Array
 
 
 class DriftColumnSettings:

@@ -18,7 +18,8 @@ import numpy as np
 
 from kemba.errors import KembaError
 from kemba.identify.logs.local_fit import local_fit
-from kemba.identify.robot.dynamics.physics import Array, Physics
+from kemba.identify.problem.types import Array
+from kemba.identify.robot.dynamics.physics import Physics
 from kemba.identify.robot.motion.resampled import ResampledLog
 
 Columns = Mapping[str, Array]

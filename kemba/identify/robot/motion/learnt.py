@@ -7,7 +7,6 @@ sensor.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -21,9 +20,8 @@ from kemba.identify.problem.sensor_noise import (
     pairs,
     weighted,
 )
+from kemba.identify.problem.types import Array
 from kemba.identify.robot.motion.filter import FilterGains, System, innovations
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
 def learnt_noise(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from kemba.identify.evidence.linear import Linear, is_on, linearise, time_blocks
-from kemba.identify.evidence.modes.small_effects import mode_of
+from kemba.identify.evidence.small_effects import mode_of
 from kemba.identify.problem.problem import Array, Labels, Problem, Theta
 from kemba.identify.problem.sensor_faults import moves_readings
 
