@@ -41,10 +41,8 @@ from kemba.identify.bench.predicted import PredictedLogs
 from kemba.identify.bench.problem import BenchProblem
 from kemba.identify.discover import discover
 from kemba.identify.doubt.cross_validation import Gain
-from kemba.identify.evidence.spike_slab import NULL
 from kemba.identify.robot.problem import RobotProblem
 from kemba.identify.written.joint import JointFit
-from kemba.settings import changed
 
 STUDIES = {"bench": bench, "robot": robot, "second": second}
 RECORDS = ROOT / "benchmarks" / "ablation.jsonl"
@@ -96,28 +94,14 @@ def _differs(result: Any, search: Any, best: Any, *_: Any) -> bool:
     return bool(result != best)
 
 
-SEARCH, REFITS = "evidence.search:Search.", "evidence.refits:Refits."
-PARSIMONY, BELIEF = "doubt.parsimony:", "doubt.belief:"
-FORMULA = "doubt.formula"
+SEARCH, PARSIMONY, FORMULA = "evidence.search:Search.", "doubt.parsimony:", "doubt.formula"
 RULES = [
-    Rule("far less", SEARCH + "_leaves_far_less", lambda s, best: NULL),
-    Rule("fits anew", SEARCH + "_look_closer", lambda s, best: best,
-         lambda result, s, best: bool(s.thorough)),
-    Rule("stand-ins", SEARCH + "_try_stand_ins", lambda s, h: []),
-    Rule("shared modes", REFITS + "share_modes", lambda s: False),
-    Rule("secants", REFITS + "_learn_secant", lambda s, h, fit: None,
-         lambda result, s, h, fit: bool(s._stale)),
     Rule("begun again", SEARCH + "_regrow", lambda s, best: best,
          lambda result, s, best: len(best) > 1),
     Rule("late sensors stay", SEARCH + "_settle", once,
          lambda result, s, h: bool(s.problem.held_back(result))),
     Rule("swaps", SEARCH + "_swap", lambda s, best: best, _differs),
-    Rule("pairs recommend", SEARCH + "_extensions",
-         lambda s, given: s.singles() if given == NULL else
-         s.base.ranker(s.points[given].mode.linear).table((len(given) + 1,), given=given)),
-    Rule("slopes may lead", SEARCH + "_first_of_table", lambda s: NULL),
-    Rule("followed twice", "evidence.search_settings:SearchSettings", values={"followed": 1}),
-    Rule("glances", "evidence.null_model:Baseline._improved", lambda b, h: {}, always),
+    Rule("followed twice", "evidence.search:SearchSettings", values={"followed": 1}),
     Rule("colour anew", "evidence.null_model:Baseline.seen_from", lambda b, theta: None, always),
     Rule("drifting sensors", "evidence.colour:_with_drift", lambda p, theta: p,
          lambda result, p, theta: result is not p),
@@ -130,42 +114,28 @@ RULES = [
     Rule("other shapes", "evidence.refit:RefitSettings", values={"factor": 1e9}),
     Rule("enlarged noise", "evidence.left_out_noise:_enlarged",
          lambda own, left, root, power: own.T @ left, always),
-    Rule("plain gain", "doubt.significance:_plain_gain", lambda s: -np.inf),
-    Rule("strained nothing", "doubt.significance:strained",
-         lambda point, problem: np.zeros(len(point.linear.at), bool),
-         lambda result, *_: bool(result.any()), only="doubt.significance"),
-    Rule("material", BELIEF + "material", lambda s, h: h),
-    Rule("stricter beside", "settings:DiscoverSettings", values={"matters_too": 0.2}),
+    Rule("material", "doubt.belief:material", lambda s, h: h),
     Rule("rows refute", "doubt.cross_validation:left_out", lambda *_: Gain(1.0, 0.0),
          lambda result, s, h, *_: result.refuted or (len(h) > 1 and not result.pays),
          only="doubt.belief"),
     Rule("simplest", PARSIMONY + "simplest", lambda s, belief: belief,
          lambda result, s, belief: result.best != belief.best),
     Rule("overclaimed", PARSIMONY + "overclaimed", lambda *_: False),
-    Rule("overclaimed (only with it)", PARSIMONY + "overclaimed", lambda *_: True),
     Rule("little", PARSIMONY + "is_little", lambda *_: False),
-    Rule("little where acting", "doubt.acting:excess_where_acting", lambda *_: (0.0, 1.0),
-         lambda result, *_: result[0] - result[1] >= 0.1 * result[1], only="doubt.parsimony"),
     Rule("idle", PARSIMONY + "is_idle", lambda *_: False),
-    Rule("needed instead", PARSIMONY + "needed_instead", lambda *_: NULL),
-    Rule("quarters need", BELIEF + "_quarters_need", lambda *_: False),
     Rule("one part shows", "doubt.cross_validation:one_part_shows", lambda *_: False),
     Rule("figures' share of a gain", "doubt.cross_validation:figures_off", lambda *_: 0.0, always),
     Rule("ratio error", "doubt.cross_validation:gained", plain_error, always),
     Rule("written by folds", "doubt.predictive:predictive", lambda s, best, likeliest: best),
     Rule("strong ones written", "doubt.predictive:STRONG", values={"STRONG": np.inf}),
     Rule("formulas", FORMULA + ":look", lambda s, best: None),
-    Rule("formula: size", FORMULA + ":_matters", lambda s, formula: formula.candidates),
     Rule("formula: bootstrap", "evidence.bootstrap:bootstrap", lambda *_: NoThreshold(), always,
          only=FORMULA),
     Rule("formula: drifts", "doubt.drifts:drift_columns",
          lambda p: (np.empty((len(p.rows()), 0)), np.empty(0)),
          lambda result, p: bool(result[0].size)),
-    Rule("runs disagree", "doubt.run_consistency:drifting", lambda *_: None),
     Rule("unfinished", "doubt.unexplained:unfinished", lambda *_: False),
     Rule("pattern left", "rest:pattern_left", lambda *_: ""),
-    Rule("explains structure", "doubt.unexplained:explains_structure", lambda *_: False),
-    Rule("fits where it acts", "verdict:fits_where_it_acts", lambda *_: False),
     Rule("mixture", "stages:is_mixture", lambda share: False),
     Rule("nothing explains", "settings:VerdictSettings", values={"unexplained": -1.0}),
     Rule("error left", "settings:VerdictSettings", values={"whole": np.inf}),
@@ -213,16 +183,8 @@ def without(rule: Rule) -> Iterator[None]:
     module, _, name = rule.at.partition(":")
     place = import_module(HOME + module)
     found = getattr(place, name)
-    (field, value), *_ = rule.values.items()
-    if not isinstance(found, type):
-        with patch.object(place, field, value):
-            yield
-    elif field in getattr(found, "__dataclass_fields__", ()):
-        with changed(found, **rule.values):
-            yield
-    else:
-        with patch.object(found, field, value):
-            yield
+    with patch.multiple(found if isinstance(found, type) else place, **rule.values):
+        yield
 
 
 @contextmanager

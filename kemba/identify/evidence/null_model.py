@@ -30,8 +30,8 @@ class NullModelSettings:
 class Baseline:
     """The null hypothesis refitted, with slopes to every effect of the catalogue.
 
-    `problem`: the problem under the noise colour learnt. `point`: the null. `table`: log evidence
-    by hypothesis, linear. `jacobian` (n, k) and `residual` (n,) at the null. `begin`:
+    `problem`: the problem under the noise colour learnt. `point`: the null. `table`: linear
+    log evidence of every single effect. `jacobian` (n, k) and `residual` (n,) at the null. `begin`:
     where the fit of curved figures begins.
     """
 
@@ -63,8 +63,7 @@ class Baseline:
 
     def best_gain(self) -> float:
         """Linear evidence [nats] of the best single effect over the null, about the null's mode."""
-        singles = self.ranker(self.point.mode.linear).table((1,))
-        return max(singles.values()) - self.point.log_evidence
+        return max(self.table.values()) - self.point.log_evidence
 
     def seen_from(self, theta: Mapping[str, float]) -> None:
         """Learn the noise colour from the residual at theta, and rank all hypotheses again."""
@@ -100,7 +99,7 @@ class Baseline:
         mode = self._mode(NULL, [theta], linear, self.jacobian)
         ranker = self.ranker(mode.linear)
         self.point = LinearisationPoint(NULL, fit, linear, windowed, mode, ranker.score(NULL))
-        self.table = ranker.table((0, 1))
+        self.table = ranker.table()
 
     def judged(
         self,

@@ -197,9 +197,8 @@ class Search:
     def _extensions(self, given: Hypothesis) -> dict[Hypothesis, float]:
         """Linear evidence of `given` plus one effect."""
         if given == NULL:
-            return self.singles()
-        ranker = self.base.ranker(self.points[given].mode.linear)
-        return ranker.table((len(given) + 1,), given=given)
+            return self.base.table
+        return self.base.ranker(self.points[given].mode.linear).table(given)
 
     def _grow(self, best: Hypothesis) -> Hypothesis:
         """Add effects, one by one, while the evidence grows."""
@@ -276,14 +275,9 @@ class Search:
         count = len(self.problem.candidates)
         return max(self.points, key=lambda h: self.points[h].log_evidence + log_prior(h, count))
 
-    def singles(self) -> dict[Hypothesis, float]:
-        """Linear evidence of every single effect."""
-        return {h: e for h, e in self.base.table.items() if len(h) == 1}
-
     def probabilities(self, dismissed: Collection[Hypothesis] = ()) -> dict[Hypothesis, float]:
         """Of all refitted hypotheses, and of the other single effects by their linear evidence;
         without the hypotheses `dismissed` as too small or as refuted by left-out data."""
-        evidence = self.singles()
-        evidence |= {h: p.log_evidence for h, p in self.points.items()}
+        evidence = self.base.table | {h: p.log_evidence for h, p in self.points.items()}
         evidence = {h: e for h, e in evidence.items() if h not in dismissed}
         return probabilities(evidence, len(self.problem.candidates))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from itertools import combinations
 from math import comb
 
 import numpy as np
@@ -121,36 +120,28 @@ class Ranker:
                 total += float(np.log(2.0) + log_ndtr((z[i] - lead.off) / sd))
         return total
 
-    def table(
-        self,
-        sizes: Iterable[int] = (1, 2),
-        among: Iterable[str] | None = None,
-        given: Hypothesis = (),
-    ) -> dict[Hypothesis, float]:
-        """Log evidence of every set of the wanted sizes that contains `given`."""
-        names = sorted(self.candidates if among is None else among)
-        others = [n for n in names if n not in given]
-        extras = [e for size in sizes for e in combinations(others, size - len(given))]
-        parts = [self._beside(given, extras, t) for t in self._prior.tolerances]
+    def table(self, given: Hypothesis = ()) -> dict[Hypothesis, float]:
+        """Log evidence of `given` with each further effect."""
+        others = [name for name in sorted(self.candidates) if name not in given]
+        parts = [self._beside(given, others, t) for t in self._prior.tolerances]
         total = logsumexp(parts, axis=0) - np.log(len(parts))
-        keys = (tuple(sorted((*given, *extra))) for extra in extras)
+        keys = (tuple(sorted((*given, other))) for other in others)
         return dict(zip(keys, total.tolist(), strict=True))
 
-    def _beside(self, given: Hypothesis, extras: list[Hypothesis], tolerance: float) -> list[float]:
-        """Log evidence of `given` with each of the `extras`, from one factor."""
+    def _beside(self, given: Hypothesis, others: list[str], tolerance: float) -> list[float]:
+        """Log evidence of `given` with each of the `others`, from one factor."""
         linear, base = self.linear, self.widths(given, tolerance)
         wide = self.widths(tuple(self.candidates), tolerance)
         shift = linear.mean - linear.at
         near = Neighbours.of(self._gram, self._slope, self._power, shift, base)
         found = []
-        for extra in extras:
-            names = [*given, *extra]
-            i, j = ([self.lead[e] for e in own] for own in (extra, names))
+        for other in others:
+            names, i = [*given, other], [self.lead[other]]
+            j = [self.lead[e] for e in names]
             evidence, step, sd = near.with_widths(i, wide[i], np.array(j, dtype=int))
-            signed = (self.candidates[e].lead.signed for e in names)
-            for a, free in enumerate(signed):
-                if not free:
-                    z = linear.at[j[a]] + step[a] - self.candidates[names[a]].lead.off
+            for a, lead in enumerate(self.candidates[e].lead for e in names):
+                if not lead.signed:
+                    z = linear.at[j[a]] + step[a] - lead.off
                     evidence += float(np.log(2.0) + log_ndtr(z / sd[a]))
             found.append(evidence)
         return found
