@@ -81,7 +81,7 @@ class RobotProblem(Problem):
     ) -> None:
         self.logs = tuple(logs)
         self.window = RobotProblemSettings.window  # innovations are one-step errors
-        self.model, self.unknown = model, unknown or ForceDensity.current()
+        self.model, self.unknown = model, unknown or ForceDensity()
         if any(log.meta.get("torques") is False for log in logs):
             self.unknown = replace(self.unknown, hip=10.0)  # N2.m2.s: 10 N.m for 0.1 s
         found = robot_candidates(model)
