@@ -29,10 +29,10 @@ def table(records: Sequence[Record]) -> str:
     count = {s: sum(r["study"] == s for r in whole.values()) for s in {r["study"] for r in told}}
     cases = ", ".join(f"{n} {s}" for s, n in sorted(count.items()))
     lines = [
-        f"Cases of the blind studies: {cases}. Bench logs of 2 s, no time limit; *all that are gone*: "
-        "the program without these rules, logs as recorded, against recorded answers. Columns count "
-        "what answers without the rule gain and lose; *acted*: in so many cases the rule did "
-        "something. From `python benchmarks/ablation.py --report --write`.",
+        f"Cases of the blind studies: {cases}. Bench logs of 2 s, no time limit; "
+        "*all that are gone*: the program without these rules, logs as recorded, against recorded "
+        "answers. Columns count what answers without the rule gain and lose; *acted*: in so many "
+        "cases the rule did something. From `python benchmarks/ablation.py --report --write`.",
         "",
         "| without | acted | asked | answers that change | right first | exactly right "
         "| false alarms | sure and wrong |",
