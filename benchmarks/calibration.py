@@ -32,6 +32,7 @@ import sys
 import tempfile
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
@@ -44,7 +45,6 @@ from twin.measure import Sensors
 
 from kemba.identify.settings import DiscoverSettings
 from kemba.identify.workflow import discover_logs
-from kemba.settings import changed
 
 SEED = 70_000  # no case of it was looked at while the method was built
 HIDDEN = ("seal_friction", "valve_delay", "piston_damping", "supply_scale", "gas_spring")
@@ -94,7 +94,7 @@ def main() -> int:
     parser.add_argument("--only", choices=["clean", "missing"], help="of these cases only")
     parser.add_argument("--machines", choices=MACHINES, default=MACHINES[0])
     parser.add_argument("--length", type=float, default=LENGTH, help="seconds of each log")
-    usual = DiscoverSettings.current().significant
+    usual = DiscoverSettings.significant
     parser.add_argument("--level", type=float, default=usual, help="p-value that is significant")
     arguments = parser.parse_args()
     about = arguments.machines
@@ -104,7 +104,7 @@ def main() -> int:
         for name, run in (("clean", clean), ("missing", missing)):
             if arguments.only not in (None, name):
                 continue
-            level = changed(DiscoverSettings, significant=arguments.level)
+            level = patch.multiple(DiscoverSettings, significant=arguments.level)
             with tempfile.TemporaryDirectory() as folder, level:
                 found = run(number, Path(folder), arguments.machines, arguments.length)
             found["length"] = arguments.length

@@ -41,7 +41,7 @@ STIFF = 1e-4  # s; a lag shorter than this is none: the twin cannot integrate it
 def robot(seed: int) -> Robot:
     """A robot whose nominal figures are off as its model declares."""
     rng, nominal = np.random.default_rng([seed, 11]), Robot()
-    share, air = rng.choice(SpikeSlabSettings.current().tolerances), nominal.air.copy()
+    share, air = rng.choice(SpikeSlabSettings.tolerances), nominal.air.copy()
     for name, (_, tolerance) in nominal_figures(load_model(rig=True)).items():
         air[:, COLUMN[name]] *= 1.0 + share * tolerance * rng.standard_normal()
     return replace(nominal, air=air)
@@ -55,7 +55,7 @@ def small_effects(
     rng, model = np.random.default_rng([seed, 12]), load_model(rig=True)
     noise = {channel: sensors.spread(channel) for channel in fault_channels("bench")}
     candidates = effect_candidates(model) | sensor_candidates(noise, model)
-    spike = SpikeSlabSettings.current().spike
+    spike = SpikeSlabSettings.spike
     wanted = [c for c in candidates.values() if times or c.lead.unit != "s"]
     found = [_small(c, spike * rng.standard_normal()) for c in wanted]
     return [effect for effect in found if effect and effect["kind"] != except_for]

@@ -83,7 +83,7 @@ def run(truth: str, other: str, seed: int) -> dict[str, Any]:
 
 def table(records: list[dict[str, Any]]) -> str:
     """The page's table and its summary."""
-    clear = ExperimentSettings.current().clear
+    clear = ExperimentSettings.clear
     rows = [
         "| hidden | rival | first log | best standard test | log | expected | measured "
         "| designed: log | expected | measured |",

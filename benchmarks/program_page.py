@@ -151,7 +151,7 @@ open 2 ms later, and beside sensors that are late by parts of a row. Intervals a
 slopes at the best fit, with nothing read off between rows
 (`kemba/identify/written/joint.py`).
 
-Something is missing up to a p-value of {DiscoverSettings.current().significant:g}. {levels}
+Something is missing up to a p-value of {DiscoverSettings.significant:g}. {levels}
 
 Where no effect is there at all, p-values are larger than uniform ones and intervals wider than
 needed: the test is careful.
@@ -163,7 +163,7 @@ slow noise for effects. {noise}
 Delays of a fraction of a row were worst: an edge falls before or after a reading, while a slope
 over a row tells of neither. A refitted delay had the residual of its own size, and the model
 without it had not. Every hypothesis is now scored where it fits best, small effects included, by
-the residual there (`kemba/identify/evidence/modes/small_effects.py`), and logs and simulated logs
+the residual there (`kemba/identify/evidence/small_effects.py`), and logs and simulated logs
 are asked the same: what the slopes about the best fit of nothing say of single effects.
 The verdict also rests on another rule: an effect below a fifth of its size is no finding.
 """

@@ -28,9 +28,9 @@ from twin.cases import bench_case
 from twin.figures import Robot
 from twin.measure import Sensors
 
+from kemba.identify.evidence.colour import best_fit
+from kemba.identify.evidence.left_out_noise import left_out_noise
 from kemba.identify.evidence.linear import time_blocks
-from kemba.identify.evidence.noise.colour import best_fit
-from kemba.identify.evidence.noise.left_out_noise import left_out_noise
 from kemba.identify.evidence.search import Search
 from kemba.identify.logs.reading import read_logs
 from kemba.identify.problem.problem import Array
@@ -53,7 +53,7 @@ def powers(seed: int, folder: Path) -> tuple[float, float, float]:
     mode, jacobian = base.point.mode, base.jacobian
     linear = mode.linear
     left = mode.residual + jacobian @ (best_fit(linear) - linear.at)
-    blocks = time_blocks(problem, shortest=DiscoverSettings.current().fine)
+    blocks = time_blocks(problem, shortest=DiscoverSettings.fine)
     along = directions(jacobian, base.ranker(linear).nuisance)
     plain = np.stack([jacobian[blocks == b].T @ left[blocks == b] for b in np.unique(blocks)])
     others = left_out_noise(jacobian, left, linear.width, blocks)

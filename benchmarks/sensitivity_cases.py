@@ -1,29 +1,19 @@
-"""Cases of the sensitivity study: stages that are run again from where a setting is read.
-
-What is slow and pure (residuals, slopes, new linearisations) is remembered while a case runs with
-all settings as they are, and taken from memory where the settings that it reads are the same.
-"""
+"""Cases of the sensitivity study: stages that are run again from where a setting is read."""
 
 from __future__ import annotations
 
-import copy
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from functools import wraps
-from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
-import numpy as np
 from sensitivity_page import Change
 
 from kemba.settings import Settings, changed
 
 MORE = 5  # times the usual iterations, after which a plan counts as not found
 UNHURRIED = ["solver.time_limit=3600"]  # a busy machine must not decide
-PURE = ("residual", "jacobian", "leftover", "relinearise", "recolour")
 Stages = Sequence[tuple[str, Callable[[Any], Any]]]
-Values = dict[type[Settings], Settings]
 
 
 @contextmanager
@@ -43,8 +33,8 @@ def recorded() -> Iterator[set[type[Settings]]]:
 class Case:
     """One case, run stage by stage; each stage makes something of what the one before made."""
 
-    def __init__(self, name: str, stages: Stages, memory: Memory | None = None) -> None:
-        self.name, self.stages, self.memory = name, stages, memory or Memory()
+    def __init__(self, name: str, stages: Stages) -> None:
+        self.name, self.stages = name, stages
         self.states: list[Any] = [None]
         self.reads: list[set[type[Settings]]] = []
 
@@ -52,9 +42,8 @@ class Case:
         """The answer with all settings as they are."""
         for _, stage in self.stages:
             with recorded() as seen:
-                self.states.append(stage(kept(self.states[-1])))
+                self.states.append(stage(self.states[-1]))
             self.reads.append(seen)
-        self.memory.learning = False
         return self.states[-1]
 
     def answer(self, change: Change) -> Any | None:
@@ -77,135 +66,7 @@ class Case:
         return state
 
     def _stage(self, i: int, state: Any) -> Any:
-        return self.stages[i][1](kept(state))
-
-
-def kept(state: Any) -> Any:
-    """A copy that later stages may change. Problems do not change, and are not copied."""
-    if not isinstance(state, tuple):
-        return state
-    search = state[0]
-    shared = (search.problem, search.base.problem, search.base.division.problem)
-    return copy.deepcopy(state, {id(p): p for p in shared})
-
-
-class Memory:
-    """Answers of pure functions, each with the settings that were read for it."""
-
-    def __init__(self) -> None:
-        self.learning = True
-        self._answers: dict[Any, list[tuple[Values, Any]]] = {}
-        self._alive: dict[int, Any] = {}  # so that no other object gets the same id
-
-    def remembered(self, function: Callable[..., Any]) -> Callable[..., Any]:
-        """The function, called again only where the settings that it reads have changed."""
-
-        @wraps(function)
-        def call(*args: Any, **more: Any) -> Any:
-            key = (function, *(self._key(a) for a in args), self._key(more))
-            for values, answer in self._answers.get(key, ()):
-                if all(cls.current() == value for cls, value in values.items()):
-                    return answer.copy() if isinstance(answer, np.ndarray) else answer
-            with recorded() as seen:
-                answer = function(*args, **more)
-            if self.learning:
-                stored = answer.copy() if isinstance(answer, np.ndarray) else answer
-                values = {cls: cls.current() for cls in seen}
-                self._answers.setdefault(key, []).append((values, stored))
-            return answer
-
-        return call
-
-    @contextmanager
-    def on(self, cls: type[Any], names: Sequence[str]) -> Iterator[None]:
-        """Methods of a class that remember, within this block."""
-        methods = {name: self.remembered(getattr(cls, name)) for name in names}
-        with patch.multiple(cls, **methods):
-            yield
-
-    def _key(self, value: Any) -> Any:
-        """A value as part of a key; other objects by what they are."""
-        if isinstance(value, Mapping):
-            return tuple(sorted((k, self._key(v)) for k, v in value.items()))
-        if isinstance(value, np.ndarray):
-            return value.shape, value.tobytes()
-        if isinstance(value, list | tuple | set | frozenset):
-            return tuple(value)
-        if isinstance(value, str | int | float | bool) or value is None:
-            return value
-        self._alive[id(value)] = value
-        return id(value)
-
-
-def discovery(name: str, kind: str, setting: dict[str, Any], folder: Path) -> Case:
-    """A case of a blind study: gate, problem, checks, search, answer."""
-    from blind import bench, robot
-
-    from kemba.identify.bench.problem import BenchProblem, bench_problem
-    from kemba.identify.compare.compare import compare
-    from kemba.identify.discover import judged
-    from kemba.identify.evidence.search import Search
-    from kemba.identify.logs.gate import BadData, check_logs
-    from kemba.identify.logs.reading import read_logs
-    from kemba.identify.robot.problem import RobotProblem, robot_problem
-    from kemba.model.spec import load_model
-
-    paths = (bench if kind == "bench" else robot).logs_of(setting, folder)[0]
-    logs = read_logs(paths)
-    memory = Memory()
-
-    def checked(_: Any) -> Any:
-        try:
-            check_logs(logs)
-        except BadData:
-            return None
-        return logs
-
-    def problem(good: Any) -> Any:
-        if good is None:
-            return None
-        if kind == "bench":
-            model = load_model(bench.MODELS[setting["chambers"]], rig=True)
-            return bench_problem(logs, model)
-        return robot_problem(logs, load_model())
-
-    def validated(found: Any) -> Any:
-        try:
-            if found is not None:
-                found.validate()
-        except BadData:
-            return None
-        return found
-
-    def searched(found: Any) -> Any:
-        if found is None:
-            return None
-        search = Search(found)
-        with memory.on(BenchProblem, PURE), memory.on(RobotProblem, PURE):
-            return search, search.run()
-
-    def answered(state: Any) -> dict[str, Any]:
-        if state is None:
-            return {"verdict": "bad-data", "added": [], "same": []}
-        with memory.on(BenchProblem, PURE), memory.on(RobotProblem, PURE):
-            answer = judged(*state).answer
-        rows = [r for r in answer.ranking if r.effect in answer.added]
-        same = sorted({other for r in rows for other in r.equivalent_to})
-        return {"verdict": answer.verdict, "added": sorted(answer.added), "same": same}
-
-    def compared(found: Any) -> dict[str, Any]:
-        if found is None:
-            return {"verdict": "bad-data", "hints": []}
-        with memory.on(BenchProblem, PURE), memory.on(RobotProblem, PURE):
-            done = compare(found, "model")
-        kinds = sorted({hint.kind for hint in done.hints})
-        grade = "good" if done.good else "tolerable" if done.tolerable else "bad"
-        return {"verdict": grade, "hints": kinds}
-
-    begin = [("gate", checked), ("problem", problem), ("checks", validated)]
-    if name.startswith("compare"):
-        return Case(name, [*begin, ("compare", compared)], memory)
-    return Case(name, [*begin, ("search", searched), ("answer", answered)], memory)
+        return self.stages[i][1](state)
 
 
 def planning(name: str) -> Case:

@@ -15,11 +15,6 @@ from kemba.settings import Settings
 PAGE = Path(__file__).resolve().parents[1] / "benchmarks" / "pages" / "sensitivity.md"
 FIRST = Path(__file__).with_name("sensitivity_first.md")  # tables whose records were not kept
 LIMIT = 0.05  # share of verdicts that may change when a threshold is doubled
-VERBS = {
-    "discover": "Verdicts of `discover`: the verdict, or which effects it names",
-    "compare": "Verdicts of `compare`: good, tolerable or bad, and the kinds of its hints",
-    "schedule": "Plans: how they end",
-}
 HEAD = """# Sensitivity to the thresholds
 
 A threshold on which a verdict depends is a setting (`kemba/settings.py`) that is marked `decides`.
@@ -33,15 +28,13 @@ Columns *half* and *double* count the cases that changed. Whole numbers are roun
 halving leaves as they are show no change. This page is written by
 `python benchmarks/sensitivity.py --report`.
 
-Settings whose origin says *tuned: by hand on the twin* were chosen on logs of the independent
-twin in `tests/twin`, before this study. The study is what is known of how much they matter.
+What each rule of `discover` is worth is told by `benchmarks/ablation.py` ([tried](tried.md)).
 
-The sample can have 12 bench cases, 4 robot cases (two effects, nothing, an unknown effect) and the
-tasks `stand`, `jump` and `hop`, which are solved from guesses. What has been run of it
-stands at the head of each table, with the day. One case is more than 5 % of so small a sample, so
-**bold** means: at least one case changed, and more cases are needed to say how often. A plan that
-is `interrupted` took five times the usual iterations. No value leaves the range in which it has a
-meaning: twice a share of 0.7 is 1.
+The sample can have the tasks `stand`, `jump` and `hop`, which are solved from guesses. What has
+been run of it stands at the head of each table, with the day. One case is more than 5 % of so
+small a sample, so **bold** means: at least one case changed, and more cases are needed to say how
+often. A plan that is `interrupted` took five times the usual iterations. No value leaves the range
+in which it has a meaning: twice a share of 0.7 is 1.
 
 There are two studies. The tables that come first are made from `benchmarks/sensitivity.jsonl`,
 which later runs extend. Of the first study only its tables were kept; they stand at the end, and
@@ -49,19 +42,6 @@ the program has changed since.
 """
 FOUND = """## What was found
 
-- **Steps of secants**. In the first study secants of absent effects went 0.6 sizes far
-  (`StepSettings.switch`), and with twice that bench case 10, where nothing is missing, was called
-  unknown. The columns of the delays did it. A delay changes the readings beside an edge. The
-  longer the delay, the more rows change, so that a long secant tells little of a short delay, and
-  the small delays of this machine (3 % of their size) are left over as an error. Now a time goes
-  one row far, which the log gives, and every other effect goes one size (`Problem.steps`). No
-  number is left to choose. The records under `StepSettings.switch` (sizes) and `StepSettings.rows`
-  (rows) were made while both were still numbers, each 1: see the settings that are gone.
-- **Tolerances of nominal figures** (`SpikeSlabSettings.tolerances`). Half of them turns nothing
-  into a missing `sensor_scale` on bench case 10. There the twin's figures are off by 2 % (1 sigma),
-  which is just what the model declares. Half of the tolerances says that the figures are known
-  twice as well as they are, and a scatter that is not allowed must look like a fault. So this is
-  no threshold but a statement about the machine: no log can give it. Twice of it changes nothing.
 - **Plans, second study**: 21 settings of `jump`, solved cold, were halved and doubled, and all 42
   plans are solved: the two barrier parameters that decide about `stand` do not decide here. Costs
   are 0.80 to 1.27 times, iterations 0.84 to 1.12 times those with all settings as they are. The
@@ -72,15 +52,6 @@ FOUND = """## What was found
   *cost*). The program has many local optima, and each change may lead to another one. No threshold
   can be derived that avoids this. What helps is to begin from plans that are known to be cheap
   ([earlier runs](continuing.md)), or from several starts (`kemba-opt solve TASK --starts 4`).
-- **`compare`**: the largest error ratio of a good model (1.15) and the largest error of a figure
-  (two sigmas) flipped cases in which nothing is missing. Both are gone. Figures take their
-  likeliest values, given their declared tolerances, and absent effects the spike of `discover`.
-  What tells is how far they would have to be off (`kemba/identify/compare/tolerance.py`). What is
-  left is `BinSettings.own_error` = 0.3. It was studied by hand on bench cases 0 to 11 and robot
-  cases 0, 2, 3, 7, 12: every effect counts as bad and every case of nothing as tolerable. Half of
-  it makes two of the six cases of nothing bad, because the colour of their disturbances then
-  counts as an error. Twice of it makes one of them good instead of tolerable: 1 of 17 verdicts.
-  No effect is lost in either.
 """
 
 Record = dict[str, Any]
@@ -125,10 +96,8 @@ def read(path: Path) -> list[Record]:
 def write(changes: Sequence[Change], records: Sequence[Record]) -> None:
     """The whole page."""
     parts = [HEAD]
-    for verb, title in VERBS.items():
-        own = [r for r in records if r["case"].partition(":")[0] == verb]
-        if own:
-            parts.append(section(verb, title, changes, own))
+    if records:
+        parts.append(section("Plans: how they end", changes, records))
     studied = {r["setting"] for r in records}
     first = FIRST.read_text(encoding="utf-8")
     parts += [FOUND, f"## The first study\n\nIts records were not kept.\n\n{first}"]
@@ -140,23 +109,22 @@ def write(changes: Sequence[Change], records: Sequence[Record]) -> None:
     print(f"{PAGE.name}: {len(records)} records")
 
 
-def section(verb: str, title: str, changes: Sequence[Change], records: Sequence[Record]) -> str:
-    """The table of one verb, and what changed."""
+def section(title: str, changes: Sequence[Change], records: Sequence[Record]) -> str:
+    """The table, and what changed."""
     base = {r["case"]: r["answer"] for r in records if not r["setting"]}
     found: dict[str, dict[float, dict[str, Any]]] = defaultdict(lambda: defaultdict(dict))
     for r in records:
         if r["setting"]:
             found[r["setting"]][r["factor"]][r["case"]] = r["answer"]
-    kinds = sorted({":".join(case.split(":")[1:-1]) for case in base} - {""})
-    sample = " and ".join(f"{sum(f':{k}:' in c for c in base)} {k}" for k in kinds) or len(base)
+    sample = len(base)
     days = sorted({r["date"] for r in records if "date" in r})
     run_on = f" Run on {' and '.join(days)}." if days else ""
     share = f"One case is {100 / len(base):.0f} %."
     lines = [f"## {title}", "", f"Sample: {sample} cases. {share}{run_on}", ""]
-    more = " | cost, iterations at half; double" if verb == "schedule" else ""
     lines += [
-        f"| setting | value | unit | cases | half | double{more} | origin |",
-        "|---|---|---|---|---|---" + ("|---" if more else "") + "|---|",
+        "| setting | value | unit | cases | half | double "
+        "| cost, iterations at half; double | origin |",
+        "|---|---|---|---|---|---|---|---|",
     ]
     told, untouched, gone = [], [], []
     for name, by_factor in found.items():
@@ -173,10 +141,9 @@ def section(verb: str, title: str, changes: Sequence[Change], records: Sequence[
         large = len(flips[2.0]) > LIMIT * len(base)
         shown = f"**`{name}`**" if large else f"`{name}`"
         counts = f"{len(flips[0.5])} | {len(flips[2.0])}"
-        extra = f" | {costs(base, by_factor)}" if more else ""
         origin = about.metadata["origin"].replace("|", "/")
         row = f"| {shown} | {about.default} | {about.metadata['unit']} | {len(cases)} | {counts}"
-        lines.append(f"{row}{extra} | {origin} |")
+        lines.append(f"{row} | {costs(base, by_factor)} | {origin} |")
         told += [
             f"- `{name}` times {f:g}, {case}: {words(base[case])}, then {words(by_factor[f][case])}"
             for f, which in flips.items()
@@ -203,13 +170,12 @@ def flipped(base: dict[str, Any], answers: dict[str, Any]) -> list[str]:
 
 def key(answer: dict[str, Any]) -> tuple[Any, ...]:
     """What counts as a verdict."""
-    return (answer["verdict"], *answer.get("added", ()), *answer.get("hints", ()))
+    return (answer["verdict"],)
 
 
 def words(answer: dict[str, Any]) -> str:
     """A verdict in short."""
-    parts = [*answer.get("added", ()), *answer.get("hints", ())]
-    parts += [f"cost {answer['cost']:.3g}"] if "cost" in answer else []
+    parts = [f"cost {answer['cost']:.3g}"] if "cost" in answer else []
     return f"{answer['verdict']} ({', '.join(parts)})" if parts else str(answer["verdict"])
 
 

@@ -12,7 +12,7 @@ from kemba.settings import Settings, setting
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 
-from sensitivity_cases import Case, Memory
+from sensitivity_cases import Case
 from sensitivity_page import Change, flipped, section
 
 
@@ -50,7 +50,7 @@ def case(runs: list[str]) -> Case:
         runs.append("last")
         return {"verdict": "large" if found > Late.current().limit else "small"}
 
-    made = Case("discover:toy:0", [("first", first), ("last", last)])
+    made = Case("schedule:toy", [("first", first), ("last", last)])
     assert made.base() == {"verdict": "large"}
     runs.clear()
     return made
@@ -69,23 +69,6 @@ def test_whole_numbers_stay_whole() -> None:
     assert Change(Late, "parts", 0.5).value == (0.5, 1.0)
 
 
-def test_slow_functions_are_called_again_where_their_settings_changed() -> None:
-    from kemba.settings import changed
-
-    calls = []
-
-    def slow(theta: dict[str, float]) -> float:
-        calls.append(theta)
-        return theta["a"] * Early.current().gain
-
-    quick = Memory().remembered(slow)
-    assert quick({"a": 1.0}) == quick({"a": 1.0}) == 2.0 and len(calls) == 1
-    with changed(Unread, number=5.0):
-        assert quick({"a": 1.0}) == 2.0 and len(calls) == 1
-    with changed(Early, gain=3.0):
-        assert quick({"a": 1.0}) == 3.0 and len(calls) == 2
-
-
 def test_the_page_marks_what_flips_when_doubled(case: Case) -> None:
     changes = [Change(Late, "limit", f) for f in (0.5, 2.0)]
     records = [{"case": case.name, "setting": "", "factor": 1.0, "answer": {"verdict": "large"}}]
@@ -93,10 +76,10 @@ def test_the_page_marks_what_flips_when_doubled(case: Case) -> None:
         answer = case.answer(change)
         name = {"case": case.name, "setting": change.name, "factor": change.factor}
         records.append({**name, "answer": answer})
-    text = section("discover", "Verdicts", changes, records)
-    assert "| **`Late.limit`** | 3 | 1 | 1 | 0 | 1 | convention: three |" in text
+    text = section("Plans", changes, records)
+    assert "| **`Late.limit`** | 3 | 1 | 1 | 0 | 1 | -, -; -, - | convention: three |" in text
     assert "Run on" not in text  # of records without a date
-    dated = section("discover", "Verdicts", changes, [{**r, "date": "2026-11-22"} for r in records])
+    dated = section("Plans", changes, [{**r, "date": "2026-11-22"} for r in records])
     assert "Run on 2026-11-22." in dated
     assert flipped({case.name: {"verdict": "large"}}, {case.name: None}) == []
 
@@ -104,5 +87,5 @@ def test_the_page_marks_what_flips_when_doubled(case: Case) -> None:
 def test_the_page_keeps_what_was_found_of_settings_that_are_gone(case: Case) -> None:
     base = {"case": case.name, "setting": "", "factor": 1.0, "answer": {"verdict": "large"}}
     gone = {**base, "setting": "Old.step", "factor": 2.0, "answer": {"verdict": "small"}}
-    text = section("discover", "Verdicts", [], [base, gone])
+    text = section("Plans", [], [base, gone])
     assert "`Old.step` (half 0, double 1 of 1)" in text and "| Old.step" not in text

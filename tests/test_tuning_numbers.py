@@ -222,4 +222,3 @@ def test_thresholds_of_verdicts_and_stages_are_in_the_sensitivity_study() -> Non
         if field.metadata["decides"]
     }
     assert {"Relaxation.loose", "Starts.interior_push", "Ends.tol", "Grids.reach"} <= deciding
-    assert {"DiscoverSettings.significant", "GateSettings.missing"} <= deciding

@@ -33,10 +33,8 @@ from scipy.stats import chi2
 
 from blind import report, study
 from blind.kinds import Record, hidden, kind, named
+from blind.thorough import ThoroughFit, promised, with_own
 from kemba.identify.discover import discover
-from kemba.identify.evidence.modes.rivals import promised
-from kemba.identify.evidence.modes.shared import with_own
-from kemba.identify.evidence.modes.thorough import ThoroughFit
 from kemba.identify.evidence.refit import Fit
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
@@ -63,7 +61,6 @@ def gain(search: Search, record: Record) -> float:
     answered, true = tuple(sorted(named(record))), (hidden(record)[0],)
     for hypothesis in (answered, true):
         search.visit(hypothesis)
-    search.refresh()
     if search.problem.moves:
         return misfit(search, answered) - misfit(search, true)
     starts = [search.points[h].mode.theta for h in (NULL, answered, true)]

@@ -151,7 +151,7 @@ def phrase(answer: Answer) -> str:
     """The verdict in one plain sentence."""
     if answer.verdict == "nothing":
         what = "Nothing is missing as far as these data can tell"
-        if answer.p_value_nothing <= DiscoverSettings.current().significant:
+        if answer.p_value_nothing <= DiscoverSettings.significant:
             what = f"What differs {'may be chance' if answer.idle else 'is too small to matter'}"
         before, after = f"{answer.error_before:.2f}", f"{answer.error_after:.2f}"
         told = f"{what} (p = {answer.p_value_nothing:.2g}); the error is {after} times the noise"

@@ -19,8 +19,7 @@ from kemba.identify.doubt.run_consistency import drifting
 from kemba.identify.doubt.significance import best_gain, null_test
 from kemba.identify.evidence.bootstrap import NullTest, smallest_detectable
 from kemba.identify.evidence.figures import Rebuilt, ahead, settled
-from kemba.identify.evidence.search import Search
-from kemba.identify.evidence.search_settings import SearchSettings
+from kemba.identify.evidence.search import Search, SearchSettings
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
 from kemba.identify.evidence.windows import error_ratio
 from kemba.identify.problem.problem import Problem
@@ -63,7 +62,7 @@ def discover(
     `holdout`: other logs, on which the answer is judged; `time_limit` [s]; `say`: told of progress.
     """
     started = time.monotonic()
-    share = DiscoverSettings.current().searching
+    share = DiscoverSettings.searching
     search = Search(problem, started + share * time_limit, say, due=started + time_limit)
     found = _discovered(search, search.first(), holdout)
     found.answer.runtime_s = time.monotonic() - started
@@ -79,7 +78,7 @@ def _discovered(search: Search, guess: Hypothesis, holdout: Problem | None) -> D
     error on left-out data counts; a complete one counts more than a mixture.
     """
     guessed = search.problem.structures & set(guess)
-    least = 0.0 if guessed else SearchSettings.current().structural
+    least = 0.0 if guessed else SearchSettings.structural
     theta = search.points[guess].fit.theta
     other = None if search.ended else ahead(search.problem, theta, least)
     anew = _built_anew(search, other, holdout) if other else None
@@ -140,7 +139,6 @@ def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> 
     best, p_value, ended = belief.best, belief.p_value, ended or search.late
     for hypothesis in filter(None, (best, whole)):
         search.visit(hypothesis)
-    search.refresh()
     if test.too_short:
         return _undecided(search, test, kept)
     # what is too small to be reported still explains: a formula must do better than with it
@@ -184,15 +182,15 @@ def _undecided(search: Search, test: NullTest, kept: HeldOut | None) -> Discover
     """What logs allow to say that are too short for anything to be significant: whether something
     differs, but not what."""
     gain, doubts = best_gain(search), Doubts()
-    differs = test.share(gain) <= DiscoverSettings.current().significant
-    if differs or error(search, NULL, kept) > VerdictSettings.current().whole:
-        piece = DiscoverSettings.current().fine
+    differs = test.share(gain) <= DiscoverSettings.significant
+    if differs or error(search, NULL, kept) > VerdictSettings.whole:
+        piece = DiscoverSettings.fine
         doubts = Doubts((f"they hold {test.blocks} pieces of {piece:g} s, and chance alone needs "
                          f"{test.needed} to be ruled out",))  # fmt: skip
     ranking = ranked(search, Belief(), kept)
     answer = _answer(search, NULL, test.p_value(gain), test, ranking, None, kept, doubts)
     if doubts.reasons:
-        answer.next = f"record at least {(test.needed + 1) * DiscoverSettings.current().fine:.1f} s"
+        answer.next = f"record at least {(test.needed + 1) * DiscoverSettings.fine:.1f} s"
         answer.sentence = phrase(answer)
     return Discovery(answer, search, NULL, kept, fitted_errors(search, NULL))
 

@@ -51,7 +51,7 @@ class Proposal:
         first, second = self.rivals
         chosen, standard = self.chosen, self.design.standard
         word, length = strength(self.nats), f"{chosen.log_s:.2g} s of log"
-        if self.nats < ExperimentSettings.current().clear:
+        if self.nats < ExperimentSettings.clear:
             return (
                 f"No test of a rig that was tried separates {first} from {second}: the best, "
                 f"'{chosen.rig.name}' ({length}), is expected to give {word} evidence."

@@ -12,8 +12,8 @@ from kemba.identify.doubt.belief import strength
 from kemba.identify.doubt.cross_validation import left_out
 from kemba.identify.doubt.held_out import HeldOut, error, error_as_it_is
 from kemba.identify.doubt.parsimony import Belief
+from kemba.identify.evidence.bounded import within_bounds
 from kemba.identify.evidence.linear import is_shape
-from kemba.identify.evidence.modes.bounded import within_bounds
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import (
     NULL,
@@ -46,7 +46,7 @@ def ranked(
     )
     found = []
     before = error(search, NULL, kept)
-    for effect in order[: max(RankingSettings.current().shown, len(whole))]:
+    for effect in order[: max(RankingSettings.shown, len(whole))]:
         written = joint is not None and effect in whole
         hypothesis = (whole if written else best) if effect in {*whole, *best} else NULL
         hypothesis = hypothesis or _likeliest_with(search, effect)
@@ -78,7 +78,7 @@ def _likeliest_with(search: Search, effect: str) -> Hypothesis:
 
 def _doubted(probability: Mapping[Hypothesis, float]) -> dict[Hypothesis, float]:
     """Where nothing was found significant, nothing is the likeliest."""
-    most = RankingSettings.current().doubted
+    most = RankingSettings.doubted
     rest = sum(p for h, p in probability.items() if h)
     scale = min(1.0, most / rest) if rest > 0 else 1.0
     return {h: p * scale if h else 1.0 - rest * scale for h, p in probability.items()}
@@ -88,7 +88,7 @@ def equivalents(search: Search, belief: Belief, effect: str) -> tuple[str, ...]:
     """Effects that could stand in this one's place in the answer: they explain the data, or predict
     left-out data, as well."""
     hypothesis = belief.best
-    own, same = search.points[hypothesis].log_evidence, RankingSettings.current().same
+    own, same = search.points[hypothesis].log_evidence, RankingSettings.same
     near = {h for h, p in search.points.items() if own - p.log_evidence < same}
     rest = set(hypothesis) - {effect}
     found: set[str] = set()
@@ -124,7 +124,7 @@ def values(search: Search, hypothesis: Hypothesis, effect: str) -> dict[str, Val
 def _interval(centre: float, variance: float, switch: Parameter | None) -> tuple[float, float]:
     """95 % interval of an effect's `switch`, or of the logarithm of its shape (None)."""
     step = 1.0 if switch is None else abs(centre - switch.off)
-    reach = 1.96 * float(np.hypot(np.sqrt(variance), SpikeSlabSettings.current().spike * step))
+    reach = 1.96 * float(np.hypot(np.sqrt(variance), SpikeSlabSettings.spike * step))
     return centre - reach, centre + reach
 
 

@@ -48,14 +48,14 @@ def pattern_left(search: Search, best: Hypothesis) -> str:
     things a little.
     """
     point = search.points[best]
-    if not best or point.fitted_error < BinSettings.current().tolerated:
+    if not best or point.fitted_error < BinSettings.tolerated:
         return ""
-    settings, problem = ForceProfileSettings.current(), search.problem
+    settings, problem = ForceProfileSettings, search.problem
     found = force_profiles(problem, problem.residual(point.fit.theta))
     plain = [force for force in found if force.largest > settings.negligible * force.usual]
     first = max(plain, key=lambda force: force.gain, default=None)
     gained = point.log_evidence - search.points[NULL].log_evidence
-    least = max(settings.plain, UnexplainedSettings.current().left * gained)
+    least = max(settings.plain, UnexplainedSettings.left * gained)
     if first is None or first.gain < least * point.fitted_error**2:
         return ""
     return str(first)

@@ -89,7 +89,7 @@ def is_mixture(share: Value) -> bool:
 
 def _verdict(second: Verdict, before: float, after: float) -> Verdict:
     """What the verdict on the second model says of the first, from the errors before and after."""
-    settings = VerdictSettings.current()
+    settings = VerdictSettings
     share = excess(after) / max(excess(before), 1e-9)
     if second in ("missing", "nothing") and (
         after <= settings.whole or share <= settings.whole_share

@@ -6,12 +6,11 @@ from dataclasses import dataclass
 
 from kemba.errors import enumerated
 from kemba.identify.answer import ENDED, Ranked, Verdict
-from kemba.identify.doubt.acting import excess_where_acting
 from kemba.identify.doubt.formula import Formula
 from kemba.identify.doubt.held_out import HeldOut, error
 from kemba.identify.doubt.parsimony import Belief
 from kemba.identify.doubt.run_consistency import Drift
-from kemba.identify.doubt.unexplained import explains_structure, unfinished
+from kemba.identify.doubt.unexplained import unfinished
 from kemba.identify.evidence.point import excess
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
@@ -39,7 +38,7 @@ def doubts_about(
 ) -> Doubts:
     """Why the best answer cannot be complete, and whether it is a part of one; `ended`: the time
     was over before the search was."""
-    settings, reasons, best = VerdictSettings.current(), [], belief.best
+    settings, reasons, best = VerdictSettings, [], belief.best
     before, after = (error(search, h, kept) for h in (NULL, best))
     least = settings.part
     if drift is not None:
@@ -50,8 +49,7 @@ def doubts_about(
         least = settings.part_of_structure
     elif pattern := pattern_left(search, best):
         reasons.append(f"the error that is left has a pattern: {pattern}")
-        if not explains_structure(search, best):
-            least = settings.part_of_structure
+        least = settings.part_of_structure
     if drift is None and after <= settings.whole:
         least = settings.part  # a whole answer may leave as much
     if ended and after > settings.whole:
@@ -70,17 +68,10 @@ def doubts_about(
         others = ", ".join(" + ".join(h) for h in belief.rivals)
         reasons.append(f"{others} would predict left-out data as well as {' + '.join(best)}")
     part = bool(best) and excess(after) <= (1.0 - least) * excess(before)
-    part = part or (bool(best and reasons) and fits_where_it_acts(search, best))
     unsure = unasked(search, best) if ended else ()
     if unsure and not reasons:
         return Doubts((ENDED,), part=True, unsure=unsure)
     return Doubts(tuple(reasons), part, unsure)
-
-
-def fits_where_it_acts(search: Search, best: Hypothesis) -> bool:
-    """Whether hardly any error is left where the answer acts."""
-    before, after = excess_where_acting(search, best)
-    return after <= VerdictSettings.current().where_it_acts * before
 
 
 def unasked(search: Search, best: Hypothesis) -> Hypothesis:
@@ -101,4 +92,4 @@ def verdict_on(best: Hypothesis, formula: Formula | None, doubts: Doubts) -> Ver
 
 def is_sure(ranked: Ranked) -> bool:
     """Whether an effect is likely enough to be added to a model, and nothing could stand for it."""
-    return ranked.probability >= VerdictSettings.current().sure and not ranked.equivalent_to
+    return ranked.probability >= VerdictSettings.sure and not ranked.equivalent_to

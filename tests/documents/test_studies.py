@@ -16,7 +16,6 @@ SMALL = {
     "benchmarks/faults.py": ["--faults", "1", "--only", "simulate"],
     "benchmarks/fuzz.py": ["--examples", "3"],
     "benchmarks/learning.py": ["--machines", "1", "--ways", "correction", "--record", "one.jsonl"],
-    "benchmarks/left_out_power.py": ["--draws", "20"],
     "benchmarks/plant_tables.py": ["plant", "--figures", "figures"],
     "benchmarks/scaling.py": ["--nodes", "20", "40", "--repeats", "1"],
     "benchmarks/sensitivity.py": ["--report"],

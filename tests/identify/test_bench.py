@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -25,7 +26,6 @@ from kemba.identify.written.adopt import adopt_effect
 from kemba.model.spec import load_model, load_spec
 from kemba.plant import Profile
 from kemba.plant.rig.imposed import drive, hermite
-from kemba.settings import changed
 from kemba.trajectory import Trajectory
 
 BenchLog = Callable[..., Trajectory]
@@ -183,8 +183,8 @@ def test_from_logs_to_a_model_and_the_next_test(bench_log: BenchLog, tmp_path: P
     other = written["ranking"][1]["effect"]
     assert adopt_effect(out, other, tmp_path / "other.yaml").is_file()
     with (
-        changed(DesignSearchSettings, members=5, generations=0),
-        changed(ExperimentSettings, tests=1),
+        patch.multiple(DesignSearchSettings, members=5, generations=0),
+        patch.multiple(ExperimentSettings, tests=1),
     ):
         proposal = propose(out, tmp_path / "next.yaml")
     assert proposal.nats > 0 and (tmp_path / "next.yaml").is_file()

@@ -49,7 +49,7 @@ def test_q_values_control_false_discoveries() -> None:
 def test_of_many_good_conditions_none_stands_out() -> None:
     """300 conditions of a model that is right to within what is tolerated."""
     rng = np.random.default_rng(1)
-    most = BinSettings.current().tolerated
+    most = BinSettings.tolerated
     found = binned([rng.normal(0.0, most, 40) for _ in range(300)])
     assert not any(b.significant for b in found)
 

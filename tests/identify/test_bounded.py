@@ -9,7 +9,7 @@ import pytest
 from toy_problem import Toy
 
 from kemba.identify.doubt.cross_validation import within_tolerance
-from kemba.identify.evidence.modes.bounded import within_bounds
+from kemba.identify.evidence.bounded import within_bounds
 from kemba.identify.evidence.search import Search
 from kemba.identify.ranking import values
 

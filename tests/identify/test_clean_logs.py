@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -21,7 +22,6 @@ from kemba.identify.logs.limits import limits_of
 from kemba.identify.problem.quantisation import step_of, telling
 from kemba.identify.workflow import discover_logs
 from kemba.model.spec import load_model
-from kemba.settings import changed as settings_changed
 from kemba.trajectory import Array, Trajectory
 
 BenchLog = Callable[..., Trajectory]
@@ -182,7 +182,7 @@ def test_two_clocks_that_drift_apart_are_known(
 
 def test_a_drift_is_looked_for_in_the_first_rows_only(bench_log: BenchLog) -> None:
     log = bench_log(duration=1.0)
-    with settings_changed(ClockSettings, rows=2500):
+    with patch.multiple(ClockSettings, rows=2500):
         found = looked_at([log, log, log, log])
     assert [len(one) for one in found] == [1000, 1000, 500]
     assert looked_at([log]) == [log]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from pathlib import Path
+from unittest.mock import patch
 
 import pytest
 from rehearsal import FIRST, Machine, fitted, measured_evidence, problem_of
@@ -21,15 +22,18 @@ from kemba.identify.design.settings import (
 from kemba.identify.experiment import propose
 from kemba.model.spec import load_model
 from kemba.plant.rig.bench import load_rig
-from kemba.settings import changed
 from kemba_cli.main import app
 
 
 @pytest.fixture
 def short_search() -> Iterator[None]:
     """A search that tries few short tests, and looks at one test of each rig only."""
-    few = changed(DesignSearchSettings, members=6, generations=1)
-    with few, changed(ExperimentSettings, tests=1), changed(RigCourseSettings, longest=0.8):
+    few = patch.multiple(DesignSearchSettings, members=6, generations=1)
+    with (
+        few,
+        patch.multiple(ExperimentSettings, tests=1),
+        patch.multiple(RigCourseSettings, longest=0.8),
+    ):
         yield
 
 

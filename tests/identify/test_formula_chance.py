@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from unittest.mock import patch
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -12,7 +14,6 @@ from kemba.identify.doubt.formula import by_chance, look
 from kemba.identify.evidence.bootstrap import BootstrapSettings, NullTest
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL
-from kemba.settings import changed
 
 
 @pytest.mark.parametrize("width", [0.3, 1.0, 10.0])
@@ -22,12 +23,12 @@ def test_the_best_of_many_absent_terms_passes_less_often_than_a_p_value(width: f
     z = rng.standard_normal((20_000, 36))
     gain = 0.5 * z**2 * width**2 / (1.0 + width**2) - 0.5 * np.log(1.0 + width**2)
     false = np.mean(gain.max(axis=1) > by_chance(36))
-    assert false <= BootstrapSettings.current().rare
+    assert false <= BootstrapSettings.rare
 
 
 def test_a_stricter_p_value_asks_for_more() -> None:
     usual = by_chance(36)
-    with changed(BootstrapSettings, rare=0.01):
+    with patch.multiple(BootstrapSettings, rare=0.01):
         assert by_chance(36) == pytest.approx(usual + np.log(2.0))
     assert by_chance(72) == pytest.approx(usual + np.log(2.0))
 

@@ -4,7 +4,6 @@ limit kept from being asked."""
 from __future__ import annotations
 
 from collections.abc import Callable
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,9 +13,7 @@ from kemba.effects import BY_KIND
 from kemba.identify.answer import ENDED
 from kemba.identify.bench.problem import bench_problem
 from kemba.identify.discover import discover
-from kemba.identify.doubt import parsimony
-from kemba.identify.doubt.belief import believed
-from kemba.identify.doubt.cross_validation import Gain, figures_off, window_gain
+from kemba.identify.doubt.cross_validation import figures_off, window_gain
 from kemba.identify.doubt.parsimony import Belief, is_idle
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL
@@ -78,44 +75,6 @@ def test_what_left_out_data_do_not_need_is_not_named() -> None:
     assert any("wave would fit these readings better" in remark for remark in answer.remarks)
 
 
-@pytest.mark.parametrize(("last", "named"), [(0.0, True), (-0.7, False)])
-def test_few_runs_tell_little_of_their_scatter(last: float, named: bool) -> None:
-    """A force in three of four runs, in the last one so many times as large: quarters of runs may
-    need it plainly where runs scatter more than they gain."""
-    problem = Toy({}, runs=4)
-    problem.window = 20
-    force = np.where(problem.rows().run == 3, last, 1.0)  # N
-    problem.measured = problem.measured + 3.0 * force * problem._shapes["wave"]
-    search = Search(problem)
-    search.start()
-    search.visit(("wave",))
-    assert is_idle(search, ("wave",))
-    assert believed(search, ("wave",), 0.0025).best == (("wave",) if named else ())
-
-
-@pytest.mark.parametrize(
-    ("evidence", "nats", "error", "enough"),
-    [
-        (6.2, 10.2, 6.9, True),  # 1.5 standard errors: a true effect seldom gains two
-        (6.2, 5.9, 6.9, False),
-        (6.2, 0.9, 0.3, False),  # less than a nat
-        (30.8, 27.8, 18.7, False),  # a true effect would have gained two
-        (30.8, 37.8, 18.7, True),
-    ],
-)
-def test_quarters_are_asked_for_what_evidence_lets_expect(
-    monkeypatch: pytest.MonkeyPatch, evidence: float, nats: float, error: float, enough: bool
-) -> None:
-    """Gain of left-out quarters, its standard error, and the gain of evidence."""
-    points = {
-        ("bias",): SimpleNamespace(log_evidence=evidence),
-        NULL: SimpleNamespace(log_evidence=0.0),
-    }
-    monkeypatch.setattr(parsimony, "gain_over_nothing", lambda *_, quarters: Gain(nats, error))
-    search = SimpleNamespace(points=points)
-    assert parsimony.is_plain_enough(search, ("bias",)) == enough  # type: ignore[arg-type]
-
-
 @pytest.mark.parametrize(("force", "sigmas"), [(5.0, 3.0), (0.5, 0.75)])
 def test_a_nominal_figure_far_off_speaks_for_an_effect(force: float, sigmas: float) -> None:
     """A force that the nominal gain may imitate, so that left-out data need no effect."""
@@ -129,33 +88,3 @@ def test_a_nominal_figure_far_off_speaks_for_an_effect(force: float, sigmas: flo
     assert abs(window_gain(search, ("kick",), NULL).nats) < 1.0
     assert figures_off(search, NULL) == pytest.approx(0.5 * sigmas**2, rel=0.1)
     assert is_idle(search, ("kick",)) == (sigmas < 1.0)
-
-
-@pytest.mark.parametrize(
-    ("gains", "evidence", "chosen"),
-    [
-        ((0.4, 273.0, 50.0), (30.0, 28.4, 30.2), ("rear",)),  # front and rear fit as well
-        ((0.4, 273.0, 50.0), (30.0, 26.4, 30.2), ()),  # rear fits worse
-        ((0.4, 19.0, 50.0), (30.0, 28.4, 30.2), ()),  # two standard errors are 20 nats
-        ((0.4, 273.0, 50.0), (1.2, 0.1, 1.2), ()),  # nothing is likelier than rear
-    ],
-)
-def test_left_out_data_choose_among_effects_that_fit_as_well(
-    monkeypatch: pytest.MonkeyPatch,
-    gains: tuple[float, ...],
-    evidence: tuple[float, ...],
-    chosen: tuple[str, ...],
-) -> None:
-    """Where the likeliest one is idle; of pairs, which fit more, none is taken for a single one."""
-    names = (("front",), ("rear",), ("front", "payload"))
-    points = {h: SimpleNamespace(log_evidence=e) for h, e in zip(names, evidence, strict=True)}
-    points[()] = SimpleNamespace(log_evidence=0.0)
-    known = dict(zip(names, gains, strict=True))
-
-    def gained(search: Search, h: tuple[str, ...]) -> Gain:
-        return Gain(known[h], 10.0)
-
-    monkeypatch.setattr(parsimony, "gain_over_nothing", gained)
-    problem = SimpleNamespace(candidates=("front", "payload", "rear"))
-    search = SimpleNamespace(points=points, problem=problem)
-    assert parsimony.needed_instead(search, ("front",)) == chosen  # type: ignore[arg-type]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -24,7 +25,6 @@ from kemba.model.spec import load_model
 from kemba.ocp import Task
 from kemba.ocp.planning import check_feasible
 from kemba.plant.execution.controller import execute
-from kemba.settings import changed
 
 SWAY = Sway(angle=0.06, leans=4, duration=0.8, pace=1.2)
 
@@ -66,7 +66,7 @@ def test_the_twin_agrees_on_a_hip(tmp_path: Path) -> None:
         for e, p, v in (("hip_friction", "T_c", 0.9), ("hip_damping", "b", 0.3))
     ]
     (tmp_path / "answer.json").write_text(json.dumps({"ranking": rows, "base": "planning"}))
-    with changed(SwaySettings, tried=4):
+    with patch.multiple(SwaySettings, tried=4):
         found = propose_motion(tmp_path, tmp_path / "next.yaml", bounded=False)
     assert found.nats >= found.design.standard.evidence.least and found.nats > 1.0
     table = tmp_path / "controller.csv"

@@ -15,7 +15,6 @@ from scipy.stats import kstest
 from toy_problem import EFFECTS, Toy
 
 from kemba.identify.discover import discover
-from kemba.identify.doubt import significance
 from kemba.identify.doubt.belief import believed
 from kemba.identify.doubt.parsimony import Belief
 from kemba.identify.doubt.significance import best_gain
@@ -28,7 +27,7 @@ SIZE = 10.0  # N; the size of every effect of the toy
 
 def machine(seed: int) -> dict[str, float]:
     """Figures off within their tolerance, every effect there with a small share of its size."""
-    rng, prior = np.random.default_rng([seed, 1]), SpikeSlabSettings.current()
+    rng, prior = np.random.default_rng([seed, 1]), SpikeSlabSettings
     share, small = rng.choice(prior.tolerances), prior.spike * SIZE
     z = rng.standard_normal(len(EFFECTS) + 2)
     truth = {f"{name}.a": small * size for name, size in zip(EFFECTS, z[2:], strict=True)}
@@ -41,7 +40,7 @@ def lacking(seed: int) -> tuple[dict[str, float], str, float]:
 
     The machine's imperfection adds to the effect or hides some: as much as an interval counts.
     """
-    rng, prior = np.random.default_rng([seed, 2]), SpikeSlabSettings.current()
+    rng, prior = np.random.default_rng([seed, 2]), SpikeSlabSettings
     name = ("kick", "wave", "hum", "ramp")[seed % 4]
     size = SIZE * rng.choice([-1.0, 1.0]) * rng.uniform(0.5, 1.5)
     there = size * (1.0 + prior.spike * rng.standard_normal())
@@ -86,21 +85,6 @@ def test_the_best_of_the_pairs_does_not_count_as_one_effect() -> None:
     assert best_gain(search(a=2.0, b=3.0, a_b=30.0)) == 3.0
     assert best_gain(search(a_b=30.0)) == 30.0  # nothing else was refitted
     assert best_gain(search()) == 0.0
-
-
-@pytest.mark.parametrize(("plain", "gain"), [(True, 9.0), (False, 0.5)])
-def test_a_refit_counts_where_left_out_data_plainly_need_it(
-    monkeypatch: pytest.MonkeyPatch, plain: bool, gain: float
-) -> None:
-    """Slopes about the null's mode show 0.5 nats. A lag fits more by a shape of its own."""
-    found = search(supply=9.0, lag=20.0, lag_supply=30.0)
-    keys = {"supply": ["k"], "lag": ["c", "T"]}
-    candidates = {n: SimpleNamespace(keys=lambda own=own: own) for n, own in keys.items()}
-    found.problem = SimpleNamespace(moves=False, candidates=candidates)
-    found.base = SimpleNamespace(best_gain=lambda: 0.5)
-    monkeypatch.setattr(significance, "strained", lambda point, problem: np.zeros(3, dtype=bool))
-    monkeypatch.setattr(significance, "is_plain", lambda search, hypothesis: plain)
-    assert best_gain(found) == gain
 
 
 def test_what_chance_does_as_often_is_not_believed() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from unittest.mock import patch
+
 import numpy as np
 import pytest
 from toy_problem import Toy
@@ -14,7 +16,6 @@ from kemba.identify.doubt.cross_validation import (
 )
 from kemba.identify.doubt.parsimony import is_idle
 from kemba.identify.evidence.search import Search
-from kemba.settings import changed
 
 
 def test_parts_that_gain_alike_have_the_usual_standard_error() -> None:
@@ -61,7 +62,7 @@ def test_whole_runs_cannot_confirm_what_one_alone_shows(alone: float, idle: bool
     search = Search(one_run_hums(8.0))
     search.start()
     search.visit(("hum",))
-    with changed(CrossValidationSettings, alone=alone):
+    with patch.multiple(CrossValidationSettings, alone=alone):
         assert is_idle(search, ("hum",)) == idle
 
 

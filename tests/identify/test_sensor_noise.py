@@ -18,7 +18,7 @@ COLOUR, DRIFT = 8e-3, 1.0  # s
 
 def learnt(noise: ChannelNoise, most: float, rows: float = 2000.0) -> ChannelNoise:
     """What is learnt of a sensor with this noise, read every millisecond."""
-    settings = ColourSettings.current()
+    settings = ColourSettings
     apart = 1e-3 * np.array(settings.lags)
     memories = (0.0, *settings.memories, *settings.drifts)
     kinds = [ChannelNoise(0.0, ((1.0, m),)) if m else ChannelNoise() for m in memories]

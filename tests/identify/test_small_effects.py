@@ -9,7 +9,7 @@ import pytest
 
 from kemba.identify.discover import discover
 from kemba.identify.evidence.linear import linearise, time_blocks
-from kemba.identify.evidence.modes.small_effects import mode_of
+from kemba.identify.evidence.small_effects import mode_of
 from kemba.identify.evidence.spike_slab import NULL, Ranker
 from kemba.identify.problem.problem import Array, Candidate, Parameter, Problem, Rows, Theta
 from kemba.identify.written.joint import joint_fit

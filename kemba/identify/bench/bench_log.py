@@ -18,34 +18,27 @@ from kemba.identify.problem.noise import difference_sigma
 from kemba.identify.problem.problem import Array, Flags
 from kemba.identify.problem.quantisation import telling
 from kemba.identify.problem.sensor_noise import ChannelNoise
-from kemba.settings import BY_HAND, Settings, setting
 from kemba.trajectory import Trajectory
 
 PRESSURES = ("chamber/extend/P", "chamber/retract/P")
 
 
-class BenchLogSettings(Settings):
+class BenchLogSettings:
     """How a bench log is prepared."""
 
     finest_force = 0.2  # smallest noise of the force sensor [N]
     finest_pressure = 100.0  # smallest noise of a pressure sensor [Pa]
     finest_share = 5e-4  # noise that is added, as a share of a channel's range
-    gap: float = setting(
-        0.012, "s", "longest gap of the position that is bridged", BY_HAND, decides=True
-    )
+    gap = 0.012  # longest gap of the position that is bridged [s]
     # time after which chambers do not depend on the moment of a switching [s]: three times the
     # slowest rise time of Table I
     memory = 0.12
     neighbours = 9  # samples over which the largest error of the velocity counts
     # usual damping, by which an error of the velocity makes one of the force [N.s.m-1]
     damping = 60.0
-    friction: float = setting(
-        10.0,
-        "N",
-        "usual friction of a cylinder, in doubt where the direction of motion is in doubt",
-        "derived: the tables of the paper imply 6 to 8 N",
-        decides=True,
-    )
+    # usual friction of a cylinder, in doubt where the direction of motion is in doubt [N]: the
+    # tables of the paper imply 6 to 8 N
+    friction = 10.0
     creeping = 200.0  # damping that a slow piston has in addition [N.s.m-1]
     creep = 0.08  # speed up to which it has it [m.s-1]
 
@@ -82,7 +75,7 @@ class BenchLog:
     def velocity_error(self) -> Array:
         """Force error (n,) [N] that the error of the velocity makes, alike for every hypothesis:
         damping, and a friction of usual size where the direction of motion is in doubt."""
-        usual = BenchLogSettings.current()
+        usual = BenchLogSettings
         v, sigma = self.motion.v, maximum_filter1d(self.motion.v_sigma, usual.neighbours)
         high, low = np.tanh((v + 2 * sigma) / V_COULOMB), np.tanh((v - 2 * sigma) / V_COULOMB)
         slope = usual.damping + usual.creeping * np.exp(-((v / usual.creep) ** 2))
@@ -124,7 +117,7 @@ def noise_of(channel: str, y: Array) -> float:
 
     It is never below a small least noise, so that simulated logs without any noise can be judged.
     """
-    settings = BenchLogSettings.current()
+    settings = BenchLogSettings
     least = settings.finest_force if channel == "piston/F" else settings.finest_pressure
     spread = float(np.ptp(y[np.isfinite(y)]))
     return max(difference_sigma(y), least + settings.finest_share * spread)
@@ -136,7 +129,7 @@ def unpredictable(time: Array, good: Flags, sent: Array) -> Flags:
     Where a valve switched within a gap, the moment is not known. The rows after such a gap count
     again when the chambers no longer depend on that moment.
     """
-    settings = BenchLogSettings.current()
+    settings = BenchLogSettings
     known = np.flatnonzero(good)
     wide = np.flatnonzero(np.diff(time[known]) > settings.gap)
     hidden = np.zeros(len(time), dtype=bool)

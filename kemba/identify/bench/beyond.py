@@ -6,18 +6,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from kemba.identify.bench.bench_log import BenchLogSettings
 from kemba.identify.bench.formulas import features, terms
 from kemba.identify.bench.predicted import PredictedLogs
 from kemba.identify.evidence.linear import within
 from kemba.identify.evidence.spike_slab import SpikeSlabSettings
 from kemba.identify.problem.types import Array, Candidate, Leftover, Theta
-
-
-class BenchFormulaSettings:
-    """What counts as the largest force of a formula."""
-
-    peak = 99.5  # percentile of the rows that is taken as the largest [%]
 
 
 def formula_columns(predicted: PredictedLogs, theta: Theta) -> tuple[tuple[str, ...], Array]:
@@ -31,14 +24,6 @@ def formula_columns(predicted: PredictedLogs, theta: Theta) -> tuple[tuple[str, 
                 column = force if channel == "piston/F" else np.zeros(len(force))
                 parts.setdefault(formula, []).append((column / np.sqrt(variance))[keep])
     return tuple(parts), np.stack([np.concatenate(p) for p in parts.values()], axis=1)
-
-
-def weight(predicted: PredictedLogs, theta: Theta, formula: str, coefficient: float) -> float:
-    """Largest force of a formula as a share of what matters in practice."""
-    forces = (_forces(predicted, theta, i)[formula] for i in range(len(predicted.logs)))
-    percent = BenchFormulaSettings.peak
-    peak = max(float(np.percentile(np.abs(force), percent)) for force in forces)
-    return abs(coefficient) * peak / BenchLogSettings.current().friction
 
 
 def leftover(
@@ -67,7 +52,7 @@ def _imperfection(
     """Spread (n,) of the force residual, in noise units, when every effect of the catalogue may
     be there with a small share of its size."""
     base = predicted.standardised({}, index)["piston/F"]
-    power, spike = np.ones(len(base)), SpikeSlabSettings.current().spike
+    power, spike = np.ones(len(base)), SpikeSlabSettings.spike
     for c in candidates.values():
         small = within(candidates, {c.key: c.lead.off + spike * c.lead.size})
         power += (predicted.standardised(small, index)["piston/F"] - base) ** 2

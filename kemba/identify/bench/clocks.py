@@ -15,11 +15,10 @@ from scipy.optimize import minimize_scalar
 
 from kemba.identify.bench.bench_log import BenchLog
 from kemba.identify.bench.motion import SmoothedMotion
+from kemba.identify.evidence.colour import best_fit
 from kemba.identify.evidence.linear import Linear, condense, names_of, priors
-from kemba.identify.evidence.noise.colour import best_fit
 from kemba.identify.logs.settings import GateSettings
 from kemba.identify.problem.problem import Problem, Theta
-from kemba.settings import BY_HAND, Settings, setting
 from kemba.trajectory import Trajectory
 
 COMMANDS, POSITION = "clock:valve", "clock:piston/x"  # names in theta
@@ -32,53 +31,31 @@ OWNERS: Mapping[str, Mapping[str, float]] = {
 }
 
 
-class ClockSettings(Settings):
+class ClockSettings:
     """Clocks that run at different rates."""
 
-    rate: float = setting(
-        3e-4,
-        "1",
-        "prior sigma of what is left of a rate after logs were put on one clock",
-        "tuned: the search for it was off by 0.1e-3 to 0.3e-3 on logs of the twin",
-        decides=True,
-    )
-    farthest: float = setting(
-        0.16, "s", "largest drift over a log that is looked for before any fit", BY_HAND
-    )
-    stride: float = setting(
-        8e-3, "s", "step of that search", "derived: the fastest rise time of Table I"
-    )
-    rows: int = setting(
-        6000,
-        "1",
-        "rows of the logs in which a drift is looked for",
-        "derived: the search takes about 6 s of CPU time for so many; `check` has to end in 10 s",
-    )
-    fits: float = setting(
-        1.0,
-        "1",
-        "mean square, in noise units, that a fit with all effects may leave of logs in which no "
-        "drift is looked for",
-        "tuned: 0.8 to 1.1 on clean logs of the twin of tests/twin, where one effect is missing "
-        "0.9 to 19",
-    )
-    better: float = setting(
-        0.9,
-        "1",
-        "share of its cost that such a fit may keep with a drift that is believed",
-        "tuned: on the twin, 0.99 or more on 22 logs without drift, 0.02 to 0.6 with 10 ms or "
-        "more of the commands",
-        decides=True,
-    )
-    again: float = setting(
-        3.0, "1", "factor of the least cost within which a trial is linearised again", BY_HAND
-    )
+    # prior sigma of what is left of a rate after logs were put on one clock: the search for it was
+    # off by 0.1e-3 to 0.3e-3 on logs of the twin
+    rate = 3e-4
+    farthest = 0.16  # largest drift over a log that is looked for before any fit [s]
+    stride = 8e-3  # step of that search [s]: the fastest rise time of Table I
+    # rows of the logs in which a drift is looked for: the search takes about 6 s of CPU time for so
+    # many; `check` has to end in 10 s
+    rows = 6000
+    # mean square, in noise units, that a fit with all effects may leave of logs in which no drift
+    # is looked for: 0.8 to 1.1 on clean logs of the twin of tests/twin, where one effect is missing
+    # 0.9 to 19
+    fits = 1.0
+    # share of its cost that such a fit may keep with a drift that is believed: on the twin, 0.99 or
+    # more on 22 logs without drift, 0.02 to 0.6 with 10 ms or more of the commands
+    better = 0.9
+    again = 3.0  # factor of the least cost within which a trial is linearised again
 
 
 def nuisance(drift: Drift | None) -> dict[str, tuple[float, float]]:
     """Nominal value and prior sigma of the rates that are not exactly known after a drift."""
     moved = OWNERS[drift[0]] if drift else ()
-    return dict.fromkeys(moved, (0.0, ClockSettings.current().rate))
+    return dict.fromkeys(moved, (0.0, ClockSettings.rate))
 
 
 def by_one_clock(run: BenchLog, theta: Theta) -> BenchLog:
@@ -112,13 +89,13 @@ def motion_by_one_clock(motion: SmoothedMotion, theta: Theta) -> SmoothedMotion:
 
 def looked_at(logs: Sequence[Trajectory]) -> list[Trajectory]:
     """The first logs, as many as are searched for a drift; the last of them is cut."""
-    found, left = [], ClockSettings.current().rows
+    found, left = [], ClockSettings.rows
     for log in logs:
         kept = slice(0, left)
         columns = {h: log[n][kept] for h, n in zip(log.headers, log.names, strict=True)}
         found.append(Trajectory(log.time[kept], columns, log.meta) if len(log) > left else log)
         left -= len(log)
-        if left < GateSettings.current().fewest:
+        if left < GateSettings.fewest:
             break
     return found
 
@@ -130,7 +107,7 @@ def drift_between(problem: Problem, logs: Sequence[BenchLog]) -> Drift | None:
     The model with all effects free is linearised and fitted at every trial of a rate; where a rate
     does well it is linearised again, since slopes along a wrong motion may praise a wrong rate.
     """
-    settings, at_zero = ClockSettings.current(), _Linearised(problem, {})
+    settings, at_zero = ClockSettings, _Linearised(problem, {})
     usual = at_zero.cost({})
     if 2.0 * usual < settings.fits * at_zero.rows:
         return None

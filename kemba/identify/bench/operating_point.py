@@ -51,7 +51,7 @@ def bench_force_channel(predicted: PredictedLogs, rows: Rows, at: OperatingPoint
         for i, log in enumerate(predicted.logs):
             own = rows.run == i
             after[side][own] = risen(*switchings(log)[f"valve/{side}"], rows.time[own])
-    usual = BenchLogSettings.current().friction
+    usual = BenchLogSettings.friction
     return ForceChannel("rod", "N", usual, quantities, columns, after)
 
 

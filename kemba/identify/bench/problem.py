@@ -13,7 +13,7 @@ from typing_extensions import Self
 from kemba.errors import KembaError
 from kemba.identify.bench import clocks
 from kemba.identify.bench.bench_log import BenchLog, prepare
-from kemba.identify.bench.beyond import formula_columns, leftover, weight
+from kemba.identify.bench.beyond import formula_columns, leftover
 from kemba.identify.bench.missing import bench_missing
 from kemba.identify.bench.operating_point import (
     bench_force_channel,
@@ -40,30 +40,18 @@ from kemba.identify.problem.types import (
     Theta,
 )
 from kemba.model.model import Model
-from kemba.settings import BY_HAND, Settings, setting
 from kemba.trajectory import Trajectory
 
 
-class BenchProblemSettings(Settings):
+class BenchProblemSettings:
     """How well pressure sensors are known, and what counts as a change and as rest."""
 
     # prior sigma of the bias of a pressure sensor [Pa]: two atmospheres; its zero is the
     # atmosphere's or that of a vacuum
     pressure_zero = 2e5
-    pressure_gain: float = setting(
-        0.02,
-        "1",
-        "prior sigma of the scale error of a pressure sensor",
-        "convention: nominal figures are off by 1 to 3 %",
-        decides=True,
-    )
-    step: float = setting(
-        0.1,
-        "1",
-        "step of finite differences of a start, as a share of the state's scale",
-        BY_HAND,
-        decides=True,
-    )
+    # prior sigma of the scale error of a pressure sensor: nominal figures are off by 1 to 3 %
+    pressure_gain = 0.02
+    step = 0.1  # step of finite differences of a start, as a share of the state's scale
     rest = 2e-3  # speed below which the piston rests [m.s-1]
 
 
@@ -104,7 +92,7 @@ class BenchProblem(Problem):
         self._state_scale = {q.name: q.scale for q in model.states.values()}
         for key, (_, name) in starts.items():
             self.nuisance[key] = (0.0, self._state_scale[name])
-        known = BenchProblemSettings.current()
+        known = BenchProblemSettings
         for channel in self.channels[1:]:
             self.nuisance[f"sensor_bias:{channel}.b"] = (0.0, known.pressure_zero)
             self.nuisance[f"sensor_scale:{channel}.k"] = (0.0, known.pressure_gain)
@@ -146,7 +134,7 @@ class BenchProblem(Problem):
         """Columns (n,) of the initial states: one evaluation moves the starts of all runs."""
         if not names:
             return {}
-        starts, share = self.predicted.starts, BenchProblemSettings.current().step
+        starts, share = self.predicted.starts, BenchProblemSettings.step
         at = self.rows(runs).run
         base = self.residual(theta, runs)
         columns: dict[str, Array] = {}
@@ -159,7 +147,7 @@ class BenchProblem(Problem):
         return columns
 
     def rows(self, runs: Collection[int] | None = None) -> Rows:
-        rest = BenchProblemSettings.current().rest
+        rest = BenchProblemSettings.rest
         parts: list[tuple[np.ndarray, ...]] = []
         for i in range(len(self.logs)) if runs is None else runs:
             log = self.logs[i]
@@ -201,10 +189,6 @@ class BenchProblem(Problem):
             return {}
         names, columns = formula_columns(self.predicted, theta)
         return dict(zip(names, self.whiten(columns).T, strict=True))
-
-    def weight(self, theta: Theta, formula: str, coefficient: float) -> float:
-        """Largest force of a formula as a share of a usual friction."""
-        return weight(self.predicted, theta, formula, coefficient)
 
     def leftover(self, theta: Theta) -> Leftover:
         """Force residual, and what a force could depend on."""

@@ -50,7 +50,7 @@ def position_noise(logs: Sequence[tuple[Array, Array]]) -> ChannelNoise:
     """Noise of the position sensor that all `logs` (times [s] and positions [m], both (n,)) share,
     in each log's `difference_sigma`; white where the piston rests too little to tell."""
     quiet = [found for time, x in logs if (found := _quiet(time, x)) is not None]
-    settings = ColourSettings.current()
+    settings = ColourSettings
     if sum(int(q.rest.sum()) for q in quiet) < settings.fewest:
         return ChannelNoise()
     n = max(len(q.left) for q in quiet)
@@ -85,7 +85,7 @@ def _quiet(time: Array, x: Array) -> _Quiet | None:
 def _expected(memory: float, step: float) -> Array:
     """Autocovariances (1, lags) of what the cubic leaves of noise of unit sigma and this memory
     [s], on an even grid of this `step` [s]."""
-    width, lags = QuietSettings.width, np.array(ColourSettings.current().lags)
+    width, lags = QuietSettings.width, np.array(ColourSettings.lags)
     left = np.eye(1, 4 * width + 1, 2 * width)[0]
     left = left - local_fit(left, width, 1.0, 3)  # the filter's answer to one reading
     reach = np.convolve(left, left[::-1])

@@ -18,7 +18,6 @@ from kemba.model.exponential import midpoint_step
 from kemba.model.model import Model
 from kemba.model.node import Node
 from kemba.model.rest import Rest, rate_of
-from kemba.settings import Settings, setting
 
 # The velocity is known within v_sigma: the force is its mean over three Gauss-Hermite nodes
 V_NODES, V_MIDDLE = ((-np.sqrt(3.0), 1 / 6), (np.sqrt(3.0), 1 / 6)), 2 / 3  # sigma, weight
@@ -26,18 +25,14 @@ V_NODES, V_MIDDLE = ((-np.sqrt(3.0), 1 / 6), (np.sqrt(3.0), 1 / 6)), 2 / 3  # si
 Pulses = tuple[list[Pulse], list[Pulse]]  # of the extend and the retract valve
 
 
-class RigModelSettings(Settings):
+class RigModelSettings:
     """Integration of the chambers along an imposed motion."""
 
     step = 1.5e-3  # longest step [s]: a fifth of the fastest rise time of Table I, 8 ms
     chunk = 512  # steps per call of a compiled function
-    blur: float = setting(
-        0.75e-3,
-        "s",
-        "time around a switching in which its effect on a sample is uncertain",
-        "derived: over half a row of 1 ms; a log does not say on which side its sample was taken",
-        decides=True,
-    )
+    # time around a switching in which its effect on a sample is uncertain [s]: over half a row of 1
+    # ms; a log does not say on which side its sample was taken
+    blur = 0.75e-3
 
 
 @dataclass(frozen=True)
@@ -45,7 +40,6 @@ class Prediction:
     """Rod force and chamber forces at the samples, with the force's local sensitivities."""
 
     force: Array
-    by_rate: Array  # dF/dv
     by_valve: Array  # (n, 2) dF/du
     valve: Array  # (n, 2) share of the sample's neighbourhood in which each valve is on
     states: dict[str, Array]
@@ -62,7 +56,7 @@ class RigModel:
         inputs = [node.s, node.q, node.v, node.a, node.u, node.p]
         self._rest = Rest(node.s, inputs[1:], rate, list(model.states.values()))
         force = node.outputs["piston/F"]
-        results = ca.vertcat(force, ca.jacobian(force, node.v), ca.jacobian(force, node.u).T)
+        results = ca.vertcat(force, ca.jacobian(force, node.u).T)
         self._functions = {
             "step": _step(node, rate),
             "force": ca.Function("force", inputs, [ca.densify(force)]),
@@ -106,7 +100,7 @@ class RigModel:
         for place, weight in V_NODES:
             v = v0 + place * motion.v_sigma
             force += weight * self._mapped("force", n)(s, x, v, a, blurred, fixed)[0]
-        return Prediction(force, out[1], out[2:4].T, blurred.T, states)
+        return Prediction(force, out[1:3].T, blurred.T, states)
 
     def _integrate(
         self, times: Array, motion: SmoothedMotion, u: Array, p: Array, start: Mapping[str, float]
@@ -117,7 +111,7 @@ class RigModel:
         n = len(times) - 1
         moved = [np.interp(middle, motion.time, c) for c in (motion.x, motion.v, motion.a)]
         inputs = np.stack([np.diff(times), *moved, *u[:, :-1]])
-        chunk = RigModelSettings.current().chunk
+        chunk = RigModelSettings.chunk
         inputs = np.pad(inputs, ((0, 0), (0, -n % chunk)))  # steps of no length at the end
         fixed = np.repeat(p[:, None], chunk, axis=1)
         step, states = self._mapped("step", chunk), [s0[:, None]]
@@ -168,7 +162,7 @@ def _breakpoints(samples: Array, events: Array) -> tuple[Array, Any]:
     m depends on the number of events only, so that compiled functions can be used again.
     """
     inside = np.clip(events, samples[0], samples[-1])
-    pieces = np.ceil(np.diff(samples) / RigModelSettings.current().step - 1e-6).astype(int)
+    pieces = np.ceil(np.diff(samples) / RigModelSettings.step - 1e-6).astype(int)
     fill = [
         np.linspace(samples[i], samples[i + 1], pieces[i] + 1)[1:-1]
         for i in np.flatnonzero(pieces > 1)
@@ -188,7 +182,7 @@ def share(intervals: Array, times: Array) -> Array:
     knots = np.concatenate([[times[0] - 1.5], flat, [times[-1] + 1.5]])
     slope = np.arange(len(knots) - 1) % 2
     on_time = np.concatenate([[0.0], np.cumsum(slope * np.diff(knots))])
-    blur = RigModelSettings.current().blur
+    blur = RigModelSettings.blur
     later = np.interp(times + blur, knots, on_time)
     earlier = np.interp(times - blur, knots, on_time)
     return np.asarray(np.clip((later - earlier) / (2 * blur), 0.0, 1.0))

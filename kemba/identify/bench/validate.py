@@ -11,36 +11,23 @@ from kemba.errors import KembaError
 from kemba.identify.bench.bench_log import BenchLog
 from kemba.identify.bench.motion import SmoothedMotion
 from kemba.identify.problem.problem import Array
-from kemba.settings import BY_HAND, Settings, setting
 
 Predict = Callable[[BenchLog], Array]  # the nominal force along a run
 
 
-class BenchValidateSettings(Settings):
+class BenchValidateSettings:
     """When the columns of a bench log are said to be mixed up."""
 
-    better: float = setting(
-        4.0, "1", "factor by which a mix-up must fit better", BY_HAND, decides=True
-    )
-    small: float = setting(
-        4.0, "1", "error, in sigmas, that no mix-up would leave", BY_HAND, decides=True
-    )
-    close: float = setting(
-        0.25, "1", "share of the force's spread that a mix-up may leave", BY_HAND, decides=True
-    )
-    nothing: float = setting(
-        1.2, "1", "share of the spread left by a model that explains nothing", BY_HAND, decides=True
-    )
-    latest: float = setting(
-        0.015, "s", "a longer lag is no sensor's delay but another clock", BY_HAND, decides=True
-    )
+    better = 4.0  # factor by which a mix-up must fit better
+    small = 4.0  # error, in sigmas, that no mix-up would leave
+    close = 0.25  # share of the force's spread that a mix-up may leave
+    nothing = 1.2  # share of the spread left by a model that explains nothing
+    latest = 0.015  # a longer lag is no sensor's delay but another clock [s]
     resolution = 1e-3  # resolution of lags [s]: a usual row
     shortest = 400  # steps of resolution that a lag can be read from
     farthest = 0.5  # longest lag [s]
-    alike: float = setting(0.3, "1", "correlation that a lag must reach", BY_HAND, decides=True)
-    more_alike: float = setting(
-        1.5, "1", "factor by which a lag must raise the correlation", BY_HAND, decides=True
-    )
+    alike = 0.3  # correlation that a lag must reach
+    more_alike = 1.5  # factor by which a lag must raise the correlation
 
 
 def mix_ups(run: BenchLog, stroke: float) -> Iterator[tuple[str, BenchLog]]:
@@ -75,7 +62,7 @@ def mix_ups(run: BenchLog, stroke: float) -> Iterator[tuple[str, BenchLog]]:
 
 def contradictions(run: BenchLog, stroke: float, predict: Predict) -> list[KembaError]:
     """What must be wrong with a run's columns, if anything."""
-    path, limits = run.name, BenchValidateSettings.current()
+    path, limits = run.name, BenchValidateSettings
     error, scale = _misfit(run, predict)
     if error < limits.small * run.sigma["piston/F"]:
         return []
@@ -119,7 +106,7 @@ def _misfit_mixed_up(trial: BenchLog, predict: Predict) -> tuple[float, float]:
 
 def _clock(run: BenchLog, predict: Predict) -> list[KembaError]:
     """A force that comes much later or earlier than any sensor's delay has another clock."""
-    keep, limits = run.keep["piston/F"], BenchValidateSettings.current()
+    keep, limits = run.keep["piston/F"], BenchValidateSettings
     grid = np.arange(run.motion.time[0], run.motion.time[-1], limits.resolution)
     if len(grid) < limits.shortest or not any(run.commands):
         return []

@@ -12,7 +12,6 @@ import numpy as np
 from kemba.identify.evidence.windows import codes, rms
 from kemba.identify.problem.problem import Array, Labels, Rows, Texts
 from kemba.identify.tails import chi2_above, false_discoveries
-from kemba.settings import BY_HAND, Settings, setting
 
 ASSUMED = ("/foot/x", "/foot/z", "/stop")  # channels that no sensor measures
 STEADY = ("rest", "stance2")  # phases in which they can be relied on
@@ -28,29 +27,17 @@ PHASES = {
 MODES = {"00": "closed", "10": "extend", "01": "retract", "11": "both"}
 
 
-class BinSettings(Settings):
+class BinSettings:
     """When the error under one condition is called significant."""
 
-    fewest: int = setting(5, "1", "windows that make a bin", BY_HAND, decides=True)
-    own_error: float = setting(
-        0.3,
-        "1",
-        "power of a good model's own error, in units of the noise's: disturbances have a colour",
-        "tuned: by hand on 17 cases of the twin, benchmarks/pages/sensitivity.md",
-        decides=True,
-    )
-    false_discoveries: float = setting(
-        0.01,
-        "1",
-        "share of the bins called significant that may be so by chance",
-        "literature: Benjamini and Hochberg 1995 control it; one in a hundred by convention",
-        decides=True,
-    )
-
-    @property
-    def tolerated(self) -> float:
-        """Error ratio that a good model may have."""
-        return math.sqrt(1.0 + self.own_error)
+    fewest = 5  # windows that make a bin
+    # power of a good model's own error, in units of the noise's: disturbances have a colour; by
+    # hand on 17 cases of the twin, benchmarks/pages/tried.md
+    own_error = 0.3
+    # share of the bins called significant that may be so by chance: Benjamini and Hochberg 1995
+    # control it; one in a hundred by convention
+    false_discoveries = 0.01
+    tolerated = math.sqrt(1.0 + own_error)  # error ratio that a good model may have
 
 
 @dataclass(frozen=True)
@@ -67,7 +54,7 @@ class ConditionBin:
 
     @property
     def significant(self) -> bool:
-        return self.q_value < BinSettings.current().false_discoveries
+        return self.q_value < BinSettings.false_discoveries
 
 
 def condition_bins(rows: Rows, region: Texts, first: Labels, sums: Array) -> Iterable[ConditionBin]:
@@ -82,7 +69,7 @@ def condition_bins(rows: Rows, region: Texts, first: Labels, sums: Array) -> Ite
     sound = ~doubtful(rows)[first]
     kinds, own = np.unique(table[sound], axis=0, return_inverse=True)
     groups = [sums[sound][own.ravel() == i] for i in range(len(kinds))]
-    fewest = BinSettings.current().fewest
+    fewest = BinSettings.fewest
     known = [i for i, z in enumerate(groups) if len(z) >= fewest]
     q = false_discoveries([excess(groups[i]) for i in known]) if known else ()
     for i, q_value in zip(known, q, strict=True):
@@ -112,7 +99,7 @@ def excess(z: Array) -> float:
     if len(z) > 1:
         z = np.delete(z, np.argmax(np.abs(z)))
     count = len(z) / correlation_length(z**2)
-    return chi2_above(np.mean(z**2) / BinSettings.current().tolerated ** 2 * count, count)
+    return chi2_above(np.mean(z**2) / BinSettings.tolerated**2 * count, count)
 
 
 def correlation_length(y: Array) -> float:

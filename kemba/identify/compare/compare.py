@@ -62,7 +62,7 @@ class Comparison:
 
     @property
     def good(self) -> bool:
-        good = BinSettings.current().tolerated
+        good = BinSettings.tolerated
         return self.noise_ratio <= good and not any(c.significant for c in self.bins)
 
     @property
@@ -132,13 +132,13 @@ def _tolerant(rows: Rows, region: Texts, window: Windows, found: Tolerant) -> tu
     """Error ratio of what the figures' tolerance leaves; whether it is within the noise, under each
     condition nearly so, and the figures are not too far off. One condition of many may be a little
     worse by chance."""
-    if found.q_value < BinSettings.current().false_discoveries:
+    if found.q_value < BinSettings.false_discoveries:
         return rms(window.sums(found.left)), False
     sums = window.sums(found.left)
     fair = CompareSettings.fair
     bins = condition_bins(rows, region, window.first, sums)
     clean = not any(c.significant and c.ratio > fair for c in bins)
-    return rms(sums), clean and rms(sums) <= BinSettings.current().tolerated
+    return rms(sums), clean and rms(sums) <= BinSettings.tolerated
 
 
 def measured_units(rows: Rows) -> dict[str, str]:

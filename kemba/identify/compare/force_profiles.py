@@ -11,11 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from kemba.identify.problem.problem import Array, Flags, ForceChannel, Problem
-from kemba.settings import BY_HAND, Settings, setting
 from kemba.units import short
 
 
-class ForceProfileSettings(Settings):
+class ForceProfileSettings:
     """How a missing force is looked for, and when it is said to be there."""
 
     bins = 8  # most bins of a quantity
@@ -25,27 +24,11 @@ class ForceProfileSettings(Settings):
     first_lag = 0.0015  # shortest time from a command's change to an error [s]: over one row
     last_lag = 0.042  # longest time [s]: beyond the slowest rise time of Table I, 37 ms
     lag_step = 0.004  # step of these times [s]
-    same: float = setting(
-        0.1,
-        "1",
-        "share of a force's power by which bins may differ and still be one force",
-        BY_HAND,
-        decides=True,
-    )
-    doubt: float = setting(
-        20.0, "nats", "gain beyond which a force is there without doubt", BY_HAND, decides=True
-    )
-    negligible: float = setting(
-        0.1, "1", "negligible force over a channel's usual force", BY_HAND, decides=True
-    )
+    same = 0.1  # share of a force's power by which bins may differ and still be one force
+    doubt = 20.0  # gain beyond which a force is there without doubt [nats]
+    negligible = 0.1  # negligible force over a channel's usual force
     sure = 3.0  # sigmas beyond which a bin's force is not zero: three sigmas
-    plain: float = setting(
-        60.0,
-        "nats",
-        "gain that nominal figures at the edge of their tolerance do not reach",
-        BY_HAND,
-        decides=True,
-    )
+    plain = 60.0  # gain that nominal figures at the edge of their tolerance do not reach [nats]
 
 
 @dataclass(frozen=True)
@@ -65,13 +48,13 @@ class ForceProfile:
     @property
     def matters(self) -> bool:
         """Whether a force is certainly there, and is not negligible."""
-        settings = ForceProfileSettings.current()
+        settings = ForceProfileSettings
         return self.gain > settings.doubt and self.largest > settings.negligible * self.usual
 
     @property
     def largest(self) -> float:
         """The largest force [unit] that differs from zero by more than its error."""
-        plain = np.abs(self.force) > ForceProfileSettings.current().sure * self.sigma
+        plain = np.abs(self.force) > ForceProfileSettings.sure * self.sigma
         return float(np.max(np.abs(self.force[plain]), initial=0.0))
 
     @property
@@ -80,7 +63,7 @@ class ForceProfile:
         weight = 1.0 / self.sigma**2
         mean = float(np.sum(weight * self.force) / np.sum(weight))
         varies = float(np.sum(weight * (self.force - mean) ** 2))
-        same = ForceProfileSettings.current().same
+        same = ForceProfileSettings.same
         return mean if varies < same * float(np.sum(weight)) * mean**2 else None
 
     def __str__(self) -> str:
@@ -128,7 +111,7 @@ def force_profile(channel: ForceChannel, label: str, residual: Array) -> ForcePr
 def _solved(
     channel: ForceChannel, label: str, centre: Array, shapes: Array, residual: Array
 ) -> ForceProfile:
-    columns, wide = channel.columns(shapes), ForceProfileSettings.current().wide
+    columns, wide = channel.columns(shapes), ForceProfileSettings.wide
     prior = np.eye(shapes.shape[-1]) / (wide * channel.usual) ** 2
     gram, slope = columns.T @ columns + prior, columns.T @ residual
     force = -np.linalg.solve(gram, slope)
@@ -141,7 +124,7 @@ def _solved(
 
 def lags() -> Array:
     """Edges (k,) [s] of the times between a command's change and an error."""
-    settings = ForceProfileSettings.current()
+    settings = ForceProfileSettings
     return np.arange(settings.first_lag, settings.last_lag, settings.lag_step)
 
 
@@ -162,7 +145,7 @@ def risen(times: Array, sizes: Array, at: Array) -> Array:
 
 def bins(values: Array) -> Array | None:
     """Edges (b + 1,) of bins with the same number of samples each; None with too few samples."""
-    settings = ForceProfileSettings.current()
+    settings = ForceProfileSettings
     seen = values[np.isfinite(values)]
     if len(seen) < 2 * settings.fewest:
         return None

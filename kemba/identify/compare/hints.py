@@ -21,19 +21,12 @@ from kemba.identify.evidence.spike_slab import SpikeSlabSettings
 from kemba.identify.evidence.windows import codes
 from kemba.identify.problem.problem import Array, Changes, Labels, Problem, Rows
 from kemba.identify.tails import chi2_above, normal_at
-from kemba.settings import BY_HAND, Settings, setting
 
 
-class HintSettings(Settings):
+class HintSettings:
     """When a hint is certain."""
 
-    certain: float = setting(
-        1e-4,
-        "1",
-        "p-value below which a hint is certain, over all that were tried",
-        BY_HAND,
-        decides=True,
-    )
+    certain = 1e-4  # p-value below which a hint is certain, over all that were tried
     dependent = 1.5  # z scores are divided by this: rows are not quite independent
     information = 4.0  # information on a parameter, per size squared, that a run must give
 
@@ -70,7 +63,7 @@ class Response:
 
     @property
     def certain(self) -> bool:
-        certain = HintSettings.current().certain
+        certain = HintSettings.certain
         return bool(np.abs(self.z[self.peak]) > normal_at(certain / (2 * self.tests)))
 
     @property
@@ -83,7 +76,7 @@ class Response:
 
 def lacking(found: Sequence[ForceProfile]) -> list[Hint]:
     """The missing force that explains most, if it explains enough."""
-    plain = ForceProfileSettings.current().plain
+    plain = ForceProfileSettings.plain
     best = max(found, key=lambda profile: profile.gain, default=None)
     return [Hint("law", str(best), best.gain)] if best and best.gain > plain else []
 
@@ -109,7 +102,7 @@ def _strongest(
         if name in changes:
             own = rows.run == i
             rise[own] = risen(*changes[name], rows.time[own])
-    dependent = HintSettings.current().dependent
+    dependent = HintSettings.dependent
     best, tests = None, commands * len(rows.channels)
     for k, channel in enumerate(rows.channels):
         own = rows.channel == k
@@ -141,7 +134,7 @@ def _wandering(r: Array, known: Slopes, group: Labels, text: str) -> Iterable[Hi
     `group` (n,): group of each row. The nuisance parameters are free within their priors, and the
     same in all groups.
     """
-    settings = HintSettings.current()
+    settings = HintSettings
     parts = [group == i for i in np.unique(group)]
     by_part = [(known.by_lead[own], known.by_nuisance[own], r[own]) for own in parts]
     power = np.stack([np.sum(j * j, axis=0) for j, _, _ in by_part])
@@ -169,7 +162,7 @@ def _agreement(information: Array, pull: Array) -> float:
     """
     if len(pull) < 2:
         return 1.0
-    imperfect = SpikeSlabSettings.current().spike
+    imperfect = SpikeSlabSettings.spike
     spread = np.linalg.pinv(information, rcond=1e-9, hermitian=True)
     a = spread @ pull
     certainty = np.linalg.inv(spread + imperfect**2 * np.eye(len(a)))

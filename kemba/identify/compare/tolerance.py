@@ -54,7 +54,7 @@ def within_tolerance(residual: Array, known: Slopes) -> Tolerant:
     small share of its size, as under every hypothesis of `discover`. The likeliest values, in units
     of these sigmas, are then no larger than standard normal numbers are.
     """
-    spike = SpikeSlabSettings.current().spike
+    spike = SpikeSlabSettings.spike
     columns = np.hstack([spike * known.by_lead, known.by_nuisance])
     h = columns.T @ columns + np.eye(columns.shape[1])
     off = -np.linalg.solve(h, columns.T @ residual)

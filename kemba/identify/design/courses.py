@@ -15,13 +15,13 @@ STEEPEST = 1.5  # highest speed of a monotone cubic piece that begins and ends a
 
 def dimensions() -> int:
     """Numbers that a course is made of: its places, twice the pulses of each valve, its laps."""
-    settings = RigCourseSettings.current()
+    settings = RigCourseSettings
     return settings.places + 4 * settings.pulses + 1
 
 
 def course(point: Array, duration: float, stroke: float) -> CourseRig:
     """The course of a point (k,) of the unit cube, which lasts `duration` [s]."""
-    settings = RigCourseSettings.current()
+    settings = RigCourseSettings
     count, pulses = settings.places, settings.pulses
     laps = 1 + min(int(point[-1] * settings.most_laps), settings.most_laps - 1)
     every = duration / (laps * (count - 1))
@@ -63,7 +63,7 @@ def beginnings(count: int, seed: int) -> Array:
     cube evenly."""
     from scipy.stats import qmc
 
-    settings = RigCourseSettings.current()
+    settings = RigCourseSettings
     plain = np.array(list(_plain(settings.places, settings.pulses)))
     more = max(count - len(plain), 1)
     even = qmc.Sobol(dimensions(), rng=seed).random_base2(int(np.ceil(np.log2(more))))

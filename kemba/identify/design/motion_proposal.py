@@ -47,8 +47,8 @@ class MotionProposal:
     @property
     def repeats(self) -> int | None:
         """Runs until the evidence is decisive; None where that would be too many."""
-        count = math.ceil(ExperimentSettings.current().clear / max(self.nats, 1e-9))
-        return count if count <= ExperimentSettings.current().repeats else None
+        count = math.ceil(ExperimentSettings.clear / max(self.nats, 1e-9))
+        return count if count <= ExperimentSettings.repeats else None
 
     @property
     def sentence(self) -> str:

@@ -54,7 +54,7 @@ class Sway:
 
 def controller(model: Model, sway: Sway) -> Trajectory:
     """The controller's table that sways a robot from its standing pose by its hip gains alone."""
-    settle = SwaySettings.current().hold
+    settle = SwaySettings.hold
     times = np.arange(round((settle + sway.duration) / PERIOD) + 1) * PERIOD - settle
     angle, rate = sway.lean(np.clip(times, 0.0, None))
     columns: dict[str, Array] = {}
@@ -69,7 +69,7 @@ def controller(model: Model, sway: Sway) -> Trajectory:
 
 def task(model: Model, name: str, sway: Sway, done: Trajectory, notes: str) -> dict[str, Any]:
     """The task of a sway that was simulated as `done`: the same ways at the same times."""
-    settings = SwaySettings.current()
+    settings = SwaySettings
     nodes = max(round(settings.nodes * sway.duration), settings.fewest)
     leg = next(iter(model.mechanism.legs))
     still = {"rest": True, "body/x": "0 m", "body/pitch": "0 deg", "*/foot/z": "0 m"}

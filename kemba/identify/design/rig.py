@@ -35,7 +35,7 @@ class RigDesign:
     @property
     def chosen(self) -> JudgedRig:
         """The designed test, except where only the standard one settles the question."""
-        clear = ExperimentSettings.current().clear
+        clear = ExperimentSettings.clear
         least, other = self.designed.evidence.least, self.standard.evidence.least
         return self.standard if least < min(clear, other) else self.designed
 
@@ -52,10 +52,10 @@ def design_rig_test(
     None where a rig cannot show two of them.
     """
     bench, settings = (
-        VirtualBench(model, ExperimentSettings.current().rows),
-        RigCourseSettings.current(),
+        VirtualBench(model, ExperimentSettings.rows),
+        RigCourseSettings,
     )
-    coarse = VirtualBench(model, ExperimentSettings.current().coarse)
+    coarse = VirtualBench(model, ExperimentSettings.coarse)
     say("judging the standard tests")
     standards = list(judged_menu(coarse, rivals))
     if not standards:
@@ -68,7 +68,7 @@ def design_rig_test(
         found = separation(coarse.problem(course(point, duration, bench.stroke)), rivals)
         return found.worth if found is not None else 0.0
 
-    search = DesignSearchSettings.current()
+    search = DesignSearchSettings
     say(f"designing a test of {duration:.1f} s")
     best = best_point(worth, beginnings(search.members, search.seed), say, bounded)
     rig = course(best.point, duration, bench.stroke)

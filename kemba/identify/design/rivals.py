@@ -46,7 +46,7 @@ def contenders(answer: Mapping[str, Any]) -> Rivals:
     beside = set(answer.get("added", ())) - {first}
     likely = [name for name in rows if name not in beside]
     order = dict.fromkeys([first, *rows[first]["equivalent_to"], *likely])
-    chosen = [name for name in order if name in rows][: ExperimentSettings.current().rivals]
+    chosen = [name for name in order if name in rows][: ExperimentSettings.rivals]
     shared = {k: v for e in beside - set(chosen) if e in rows for k, v in _values(rows[e]).items()}
     return Rivals({name: _values(rows[name]) for name in chosen}, shared)
 

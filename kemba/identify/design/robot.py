@@ -67,7 +67,7 @@ def design_motion(
     """
     if len(model.mechanism.legs) < 2:
         raise KembaError(model.name, "stands on one leg; no safe motion is known for it")
-    settings, search = SwaySettings.current(), DesignSearchSettings.current()
+    settings, search = SwaySettings, DesignSearchSettings
     started, count = time.monotonic(), 0
     found: list[Tried] = []
     standard: Tried | None = None
@@ -92,7 +92,7 @@ def design_motion(
 
 def try_out(model: Model, sway: Sway, rivals: Rivals) -> Tried | None:
     """A sway on the simulation; None where it is not safe."""
-    settings = SwaySettings.current()
+    settings = SwaySettings
     try:
         done = execute(controller(model, sway), model, sample=1.0 / settings.rows).trajectory
     except KembaError:
@@ -112,13 +112,13 @@ def expected(model: Model, done: Trajectory, rivals: Rivals) -> Separation:
 
 def expected_of_run(run: str | Path, model: Model, rivals: Rivals) -> Separation:
     """The same of a run folder's plan."""
-    done = execute(run, model, sample=1.0 / SwaySettings.current().rows).trajectory
+    done = execute(run, model, sample=1.0 / SwaySettings.rows).trajectory
     return expected(model, done, rivals)
 
 
 def safe(model: Model, done: Trajectory) -> bool:
     """Whether feet stand and carry, knees stay up, and hips have torque to spare, all the time."""
-    settings, legs = SwaySettings.current(), model.mechanism.legs
+    settings, legs = SwaySettings, model.mechanism.legs
     share = 0.5 * model.mechanism.weight * settings.load
     peak = {e.on: e.tau_peak for e in model.effects if isinstance(e, Motor)}
     for leg in legs:
@@ -151,7 +151,7 @@ def _sways(count: int, seed: int, height: float, best: Callable[[], list[Tried]]
 def _sway(point: Array, height: float) -> Sway:
     """The sway of a point (4,) of the unit cube, of hips at this height [m]; its angle is as large
     as the acceleration allows, where that is less."""
-    s = SwaySettings.current()
+    s = SwaySettings
     plain = Sway(
         angle=1.0,
         leans=1 + min(int(point[1] * s.leans), s.leans - 1),
@@ -166,7 +166,7 @@ def _sway(point: Array, height: float) -> Sway:
 
 def _point(sway: Sway) -> Array:
     """The point (4,) of a sway, in the middle of its number of leans."""
-    s = SwaySettings.current()
+    s = SwaySettings
     return np.array(
         [
             np.log(sway.angle / s.least) / np.log(s.most / s.least),

@@ -34,7 +34,7 @@ def best_point(
     """
     from scipy.optimize import differential_evolution
 
-    settings, started = DesignSearchSettings.current(), time.monotonic()
+    settings, started = DesignSearchSettings, time.monotonic()
     seen: list[tuple[float, Array]] = []
 
     def cost(point: Array) -> float:

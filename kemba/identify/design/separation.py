@@ -42,7 +42,7 @@ class Separation:
     @property
     def worth(self) -> float:
         """What a search makes large: evidence counts most where there is little of it."""
-        clear = ExperimentSettings.current().clear
+        clear = ExperimentSettings.clear
         return float(sum(np.log1p(n / clear) for n in self.nats.values()))
 
     def json(self, log_s: float) -> dict[str, Any]:

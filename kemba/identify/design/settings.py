@@ -2,39 +2,25 @@
 
 from __future__ import annotations
 
-from kemba.settings import BY_HAND, Settings, setting
 
-
-class ExperimentSettings(Settings):
+class ExperimentSettings:
     """The sensors of a rig, and when a question is settled."""
 
-    force_noise: float = setting(
-        1.0, "N", "noise of the force sensor", "convention: a usual transducer of a rig"
-    )
-    position_noise: float = setting(
-        1e-5, "m", "noise of the position sensor", "convention: a usual one of a rig"
-    )
-    unexplained: float = setting(
-        0.5,
-        "N",
-        "force that not even a good model explains",
-        "convention: half the noise of the sensor; without it slow errors would be averaged away",
-    )
-    memory: float = setting(
-        0.03, "s", "time in which that force changes", "convention: that of the fastest rise times"
-    )
-    sample: int = setting(20000, "1", "rows of noise from which its colour is learnt", BY_HAND)
-    rows: float = setting(1000.0, "Hz", "rows per second of the simulated logs", BY_HAND)
-    coarse: float = setting(500.0, "Hz", "the same while the best test is looked for", BY_HAND)
-    tests: int = setting(12, "1", "most tests of one rig that are simulated to judge it", BY_HAND)
-    clear: float = setting(
-        5.0,
-        "nats",
-        "evidence that settles a question",
-        "literature: Kass and Raftery 1995, 'very strong' evidence begins at 5 nats",
-    )
-    repeats: int = setting(10, "1", "most runs of one motion", "convention: an afternoon")
-    rivals: int = setting(4, "1", "effects that are to be told apart", "convention: few")
+    force_noise = 1.0  # noise of the force sensor [N]: a usual transducer of a rig
+    position_noise = 1e-5  # noise of the position sensor [m]: a usual one of a rig
+    # force that not even a good model explains [N]: half the noise of the sensor; without it slow
+    # errors would be averaged away
+    unexplained = 0.5
+    memory = 0.03  # time in which that force changes [s]: that of the fastest rise times
+    sample = 20000  # rows of noise from which its colour is learnt
+    rows = 1000.0  # rows per second of the simulated logs [Hz]
+    coarse = 500.0  # the same while the best test is looked for [Hz]
+    tests = 12  # most tests of one rig that are simulated to judge it
+    # evidence that settles a question [nats]: Kass and Raftery 1995, 'very strong' evidence begins
+    # at 5 nats
+    clear = 5.0
+    repeats = 10  # most runs of one motion: an afternoon
+    rivals = 4  # effects that are to be told apart: few
 
 
 class SeparationSettings:
@@ -43,74 +29,49 @@ class SeparationSettings:
     steps = 3  # steps of the fit of a rival
 
 
-class RigCourseSettings(Settings):
+class RigCourseSettings:
     """What a designed test of a rig may do."""
 
-    longest: float = setting(2.0, "s", "longest log of a designed test", "convention: short")
-    shortest: float = setting(
-        0.3,
-        "s",
-        "shortest log of a designed test",
-        "derived: chambers fill and vent three times, at the slowest rise time of Table I",
-    )
-    share: float = setting(
-        0.5, "1", "its log time as a share of that of the best standard test", "convention: half"
-    )
-    places: int = setting(9, "1", "places that the rod goes through", BY_HAND)
-    most_laps: int = setting(3, "1", "most times that it goes through them", BY_HAND)
-    pulses: int = setting(3, "1", "pulses of each valve", BY_HAND)
-    dwell: float = setting(
-        0.02,
-        "s",
-        "shortest time between two switchings of a valve",
-        "derived: twice the dead time of the paper's valves",
-    )
-    fastest: float = setting(
-        1.2, "m.s-1", "highest speed of the rod", "convention: that of the fastest standard test"
-    )
+    longest = 2.0  # longest log of a designed test [s]: short
+    # shortest log of a designed test [s]: chambers fill and vent three times, at the slowest rise
+    # time of Table I
+    shortest = 0.3
+    share = 0.5  # its log time as a share of that of the best standard test: half
+    places = 9  # places that the rod goes through
+    most_laps = 3  # most times that it goes through them
+    pulses = 3  # pulses of each valve
+    # shortest time between two switchings of a valve [s]: twice the dead time of the paper's valves
+    dwell = 0.02
+    fastest = 1.2  # highest speed of the rod [m.s-1]: that of the fastest standard test
 
 
-class DesignSearchSettings(Settings):
+class DesignSearchSettings:
     """The search for the best test: differential evolution."""
 
-    members: int = setting(16, "1", "tests of each generation", BY_HAND)
-    generations: int = setting(3, "1", "generations after the first", BY_HAND)
-    seed: int = setting(1, "1", "seed of the search", "convention: the same answer every time")
-    budget: float = setting(
-        60.0, "s", "time after which no new test is tried", "convention: a user waits one minute"
-    )
+    members = 16  # tests of each generation
+    generations = 3  # generations after the first
+    seed = 1  # seed of the search: the same answer every time
+    budget = 60.0  # time after which no new test is tried [s]: a user waits one minute
 
 
-class SwaySettings(Settings):
+class SwaySettings:
     """What a robot may do in a designed motion."""
 
-    least: float = setting(0.03, "rad", "smallest lean of the hips", BY_HAND)
-    most: float = setting(0.25, "rad", "largest lean of the hips", "convention: 4 cm of the body")
-    acceleration: float = setting(
-        8.0,
-        "m.s-2",
-        "largest acceleration of the body",
-        "tuned: feet of the shipped robot slip at about 10",
-    )
-    leans: int = setting(6, "1", "most leans", BY_HAND)
-    shortest: float = setting(0.5, "s", "shortest sway", BY_HAND)
-    longest: float = setting(
-        0.9, "s", "longest sway", "tuned: plans of up to so long replay without feedback"
-    )
-    pace: float = setting(1.5, "1", "most by which a lean is longer than the one before", BY_HAND)
-    hold: float = setting(0.3, "s", "rest before the motion", "convention: as the shipped tasks")
-    nodes: int = setting(50, "1", "nodes of the task per second", "convention: steps of 20 ms")
-    fewest: int = setting(30, "1", "fewest nodes of the task", BY_HAND)
-    knee: float = setting(0.02, "m", "least height of the knees", "convention: as the hop")
-    slip: float = setting(
-        2e-3, "m", "way of a foot that counts as slipping", "convention: boom noise, 6 sigma"
-    )
-    load: float = setting(
-        0.15, "1", "least load of a foot, as a share of half the weight", "convention: margin"
-    )
-    effort: float = setting(
-        0.8, "1", "largest torque of a hip, as a share of its peak", "convention: margin"
-    )
-    tried: int = setting(12, "1", "motions that are tried", "convention: a minute")
-    least_tried: int = setting(6, "1", "motions that are tried on the slowest machine", BY_HAND)
-    rows: float = setting(500.0, "Hz", "rows per second of the simulated logs", BY_HAND)
+    least = 0.03  # smallest lean of the hips [rad]
+    most = 0.25  # largest lean of the hips [rad]: 4 cm of the body
+    # largest acceleration of the body [m.s-2]: feet of the shipped robot slip at about 10
+    acceleration = 8.0
+    leans = 6  # most leans
+    shortest = 0.5  # shortest sway [s]
+    longest = 0.9  # longest sway [s]: plans of up to so long replay without feedback
+    pace = 1.5  # most by which a lean is longer than the one before
+    hold = 0.3  # rest before the motion [s]: as the shipped tasks
+    nodes = 50  # nodes of the task per second: steps of 20 ms
+    fewest = 30  # fewest nodes of the task
+    knee = 0.02  # least height of the knees [m]: as the hop
+    slip = 2e-3  # way of a foot that counts as slipping [m]: boom noise, 6 sigma
+    load = 0.15  # least load of a foot, as a share of half the weight: margin
+    effort = 0.8  # largest torque of a hip, as a share of its peak: margin
+    tried = 12  # motions that are tried: a minute
+    least_tried = 6  # motions that are tried on the slowest machine
+    rows = 500.0  # rows per second of the simulated logs [Hz]

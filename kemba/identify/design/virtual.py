@@ -36,7 +36,7 @@ class VirtualBench:
         tests = rig.tests(np.random.default_rng(0), self.stroke)
         logs = [
             prepare(test.name, virtual_log(test, self.rows, i), on_rows=True)
-            for i, test in enumerate(islice(tests, ExperimentSettings.current().tests))
+            for i, test in enumerate(islice(tests, ExperimentSettings.tests))
         ]
         if len(logs) > 1:
             return self._coloured(BenchProblem(logs, self.model))
@@ -69,13 +69,13 @@ def as_predicted(problem: BenchProblem, theta: Theta) -> BenchProblem:
 def log_time(rig: Rig, stroke: float) -> float:
     """Seconds of log of the tests that are judged."""
     tests: Iterable[Test] = rig.tests(np.random.default_rng(0), stroke)
-    tests = islice(tests, ExperimentSettings.current().tests)
+    tests = islice(tests, ExperimentSettings.tests)
     return sum(float(test.times[-1] - test.times[0]) for test in tests)
 
 
 def virtual_log(test: Test, rows: float, seed: int = 0) -> Trajectory:
     """A test as a log with so many rows per second. Its force is the noise of the sensor alone."""
-    settings, rng = ExperimentSettings.current(), np.random.default_rng(seed)
+    settings, rng = ExperimentSettings, np.random.default_rng(seed)
     step = float(test.times[1] - test.times[0])
     times = test.times[:: max(1, round(1.0 / (step * rows)))]
     x, _ = test.motion(times)
@@ -93,7 +93,7 @@ def virtual_log(test: Test, rows: float, seed: int = 0) -> Trajectory:
 def _colour(rows: float) -> Colour:
     """Colour of white noise of the force sensor and of what no model explains, in units of the
     former."""
-    settings, rng = ExperimentSettings.current(), np.random.default_rng(0)
+    settings, rng = ExperimentSettings, np.random.default_rng(0)
     keep = float(np.exp(-1.0 / (rows * settings.memory)))
     slow = lfilter([np.sqrt(1.0 - keep**2)], [1.0, -keep], rng.standard_normal(settings.sample))
     share = settings.unexplained / settings.force_noise

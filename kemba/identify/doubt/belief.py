@@ -8,9 +8,7 @@ from kemba.identify.doubt.cross_validation import left_out
 from kemba.identify.doubt.parsimony import (
     Belief,
     is_idle,
-    is_plain_enough,
     likeliest_part,
-    needed_instead,
     none_of,
     simplest,
 )
@@ -22,7 +20,7 @@ from kemba.identify.settings import DiscoverSettings
 def believed(search: Search, best: Hypothesis, p_value: float) -> Belief:
     """The best hypothesis without what is not significant, too small, refuted by left-out data or
     of no use there."""
-    if not best or p_value > DiscoverSettings.current().significant:
+    if not best or p_value > DiscoverSettings.significant:
         return Belief(NULL, p_value)
     belief = Belief(best, p_value)
     while belief.best:
@@ -41,27 +39,16 @@ def believed(search: Search, best: Hypothesis, p_value: float) -> Belief:
         simpler = simplest(search, belief)
         if simpler.best != best:
             belief = simpler
-        elif not is_idle(search, best):
-            return simpler
-        elif other := needed_instead(search, best):
-            belief = simpler.without(best, other)
         else:
-            return simpler if _quarters_need(search, best) else none_of(simpler)
+            return none_of(simpler) if is_idle(search, best) else simpler
     return belief
-
-
-def _quarters_need(search: Search, best: Hypothesis) -> bool:
-    """Whether quarters of runs that are left out need one effect: three to five runs tell little of
-    how much they scatter. Several together may imitate what differs between runs."""
-    return len(best) == 1 and is_plain_enough(search, best)
 
 
 def material(search: Search, hypothesis: Hypothesis) -> Hypothesis:
     """Those effects of a hypothesis that are larger than a model's usual imperfection, and whose
     intervals exclude that they are absent."""
     score, linear = search.points[hypothesis].score, search.points[hypothesis].linear
-    settings = DiscoverSettings.current()
-    least = settings.matters if len(hypothesis) == 1 else settings.matters_too
+    settings = DiscoverSettings
 
     def share(effect: str) -> float:
         c = search.problem.candidates[effect]
@@ -69,9 +56,7 @@ def material(search: Search, hypothesis: Hypothesis) -> Hypothesis:
         step, sd = abs(score.z[i] - c.lead.off), np.sqrt(score.covariance[i, i])
         return float(step / c.lead.size) if step > settings.apart * sd else 0.0
 
-    strongest = max(hypothesis, key=lambda e: strength(search, e, hypothesis))
-    shares = {e: share(e) for e in hypothesis}
-    return tuple(e for e in shares if shares[e] >= (settings.matters if e == strongest else least))
+    return tuple(e for e in hypothesis if share(e) >= settings.matters)
 
 
 def strength(search: Search, effect: str, best: Hypothesis) -> float:

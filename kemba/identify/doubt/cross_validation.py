@@ -11,47 +11,25 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import lsq_linear
 
+from kemba.identify.evidence.bounded import effect_bounds
 from kemba.identify.evidence.linear import Linear
-from kemba.identify.evidence.modes.bounded import effect_bounds
 from kemba.identify.evidence.point import LinearisationPoint
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
 from kemba.identify.evidence.windows import START
 from kemba.identify.problem.problem import Array, Labels
-from kemba.settings import BY_HAND, Settings, setting
 
 
-class CrossValidationSettings(Settings):
+class CrossValidationSettings:
     """When left-out data refute an answer."""
 
-    refuted: float = setting(
-        2.0,
-        "nats",
-        "loss on left-out data, beyond its standard error, that refutes an answer",
-        BY_HAND,
-        decides=True,
-    )
-    tolerated: float = setting(
-        3.0,
-        "1",
-        "prior sigmas by which a nominal figure may be off",
-        "convention: three sigmas",
-        decides=True,
-    )
-    alone: float = setting(
-        0.9,
-        "1",
-        "share, in one run, of what tells two hypotheses apart, from which quarters of runs are "
-        "left out instead of runs",
-        BY_HAND,
-        decides=True,
-    )
-    none: float = setting(
-        1e-6, "1", "width of the spike of absent effects", "convention: none, but not singular"
-    )
-    free: float = setting(
-        1e6, "1", "prior sigmas by which an effect may be off", "convention: no bound"
-    )
+    refuted = 2.0  # loss on left-out data, beyond its standard error, that refutes an answer [nats]
+    tolerated = 3.0  # prior sigmas by which a nominal figure may be off: three sigmas
+    # share, in one run, of what tells two hypotheses apart, from which quarters of runs are left
+    # out instead of runs
+    alone = 0.9
+    none = 1e-6  # width of the spike of absent effects: none, but not singular
+    free = 1e6  # prior sigmas by which an effect may be off: no bound
 
 
 @dataclass(frozen=True)
@@ -64,7 +42,7 @@ class Gain:
     @property
     def refuted(self) -> bool:
         """Whether left-out data speak against it, by more than their scatter."""
-        return self.nats + self.error < -CrossValidationSettings.current().refuted
+        return self.nats + self.error < -CrossValidationSettings.refuted
 
     @property
     def pays(self) -> bool:
@@ -76,7 +54,7 @@ def one_part_shows(search: Search, hypothesis: Hypothesis, against: Hypothesis =
     """Whether one part of the logs alone can tell two hypotheses apart, so that what remains
     without that part says nothing of it."""
     apart = _apart(search, hypothesis, against)
-    return bool(apart.max() > CrossValidationSettings.current().alone * apart.sum())
+    return bool(apart.max() > CrossValidationSettings.alone * apart.sum())
 
 
 def _apart(
@@ -105,24 +83,20 @@ def left_out(search: Search, hypothesis: Hypothesis, against: Hypothesis = NULL)
     return gained(0.5 * (theirs - ours), _apart(search, hypothesis, against, fine))
 
 
-def window_gain(
-    search: Search, hypothesis: Hypothesis, against: Hypothesis, quarters: bool = False
-) -> Gain:
-    """The same of the rows summed over aggregation windows; `quarters`: each quarter of a run
-    predicted from all others, in any case."""
-    fine = quarters or one_part_shows(search, hypothesis, against)
+def window_gain(search: Search, hypothesis: Hypothesis, against: Hypothesis) -> Gain:
+    """The same of the rows summed over aggregation windows."""
+    fine = one_part_shows(search, hypothesis, against)
     ours, theirs = (window_powers(search, h, fine) for h in (hypothesis, against))
     return gained(0.5 * (theirs - ours), _apart(search, hypothesis, against, fine))
 
 
-def gain_over_nothing(search: Search, hypothesis: Hypothesis, quarters: bool = False) -> Gain:
-    """Gain over nothing of the rows summed over aggregation windows, and of the nominal figures;
-    `quarters` as in `window_gain`.
+def gain_over_nothing(search: Search, hypothesis: Hypothesis) -> Gain:
+    """Gain over nothing of the rows summed over aggregation windows, and of the nominal figures.
 
     Without its effects, nominal figures may move until left-out data are predicted as well: a body
     that is 2.3 prior sigmas too heavy for a payload. Their prior is knowledge as data are.
     """
-    gain = window_gain(search, hypothesis, NULL, quarters)
+    gain = window_gain(search, hypothesis, NULL)
     saved = figures_off(search, NULL) - figures_off(search, hypothesis)
     return Gain(gain.nats + saved, gain.error)
 
@@ -172,7 +146,7 @@ def within_tolerance(search: Search, linear: Linear, hypothesis: Hypothesis) -> 
     Effects of the hypothesis stay within their bounds, as in a refit: a delay that ends at its
     bound would else be judged where no valve can be.
     """
-    settings = CrossValidationSettings.current()
+    settings = CrossValidationSettings
     ranker = search.base.ranker(linear, spike=settings.none)
     width = ranker.widths(hypothesis, 1.0)
     gram, slope, _ = linear.total

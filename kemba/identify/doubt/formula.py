@@ -14,27 +14,13 @@ from kemba.identify.evidence.linear import condense
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis, Ranker
 from kemba.identify.problem.problem import Array, Candidate, Parameter
-from kemba.settings import BY_HAND, Settings, setting
 
 
-class TermSettings(Settings):
+class TermSettings:
     """Which terms make a formula."""
 
-    width: float = setting(
-        10.0,
-        "1",
-        "prior of a term's force, in sigmas of the noise where it acts most",
-        BY_HAND,
-        decides=True,
-    )
+    width = 10.0  # prior of a term's force, in sigmas of the noise where it acts most
     terms = 2  # most terms of a formula: a formula can be read
-    matters: float = setting(
-        0.2,
-        "1",
-        "smallest force of a formula, as a share of what matters in practice",
-        BY_HAND,
-        decides=True,
-    )
     no_force = 1e-9  # force, in sigmas, of a term that acts nowhere: zero
 
 
@@ -66,7 +52,7 @@ def extended(search: Search, formulas: Mapping[str, Array]) -> tuple[Ranker, Arr
 
     Beside them every sensor may drift: a formula is what no drift explains.
     """
-    mode, settings = search.points[NULL].mode, TermSettings.current()
+    mode, settings = search.points[NULL].mode, TermSettings
     names = {f"term{i}": formula for i, formula in enumerate(formulas)}
     columns = np.stack([formulas[f] for f in names.values()], axis=1)
     reach = np.percentile(np.abs(columns), 99, axis=0)
@@ -102,7 +88,7 @@ def by_chance(count: int) -> float:
     A Bayes factor exceeds exp(g) with a probability of exp(-g) at most where its term is not there
     (Markov's inequality); `count` of them do so with `count` times that probability at most.
     """
-    return float(np.log(count / BootstrapSettings.current().rare))
+    return float(np.log(count / BootstrapSettings.rare))
 
 
 def look(search: Search, best: Hypothesis) -> Formula | None:
@@ -116,7 +102,7 @@ def look(search: Search, best: Hypothesis) -> Formula | None:
     if not formulas:
         return None
     ranker, jacobian, names = extended(search, formulas)
-    chosen = _matters(search, _formula(ranker, names, _grow(ranker, names)))
+    chosen = _grow(ranker, names)
     alone = _formula(ranker, names, chosen)
     catalogue = search.points[best].log_evidence - null.log_evidence
     if not chosen or alone.gain <= catalogue + by_chance(len(names)):
@@ -128,18 +114,9 @@ def look(search: Search, best: Hypothesis) -> Formula | None:
     return replace(alone, gain=alone.gain - catalogue, p_value=test.p_value(alone.gain))
 
 
-def _matters(search: Search, formula: Formula) -> Hypothesis:
-    """Those terms of a formula that are more than the imperfection that every model has: a small
-    one beside a large one would let the formula look better than the effect that is there."""
-    problem, theta = search.problem, search.points[NULL].fit.theta
-    parts = zip(formula.candidates, formula.terms, formula.coefficients, strict=True)
-    least = TermSettings.current().matters
-    return tuple(n for n, term, (c, _) in parts if problem.weight(theta, term, c) > least)
-
-
 def _grow(ranker: Ranker, names: Mapping[str, str]) -> Hypothesis:
     """Terms chosen one after the other; each must add enough evidence."""
-    least, most = by_chance(len(names)), TermSettings.current().terms
+    least, most = by_chance(len(names)), TermSettings.terms
     chosen: Hypothesis = ()
     reached = ranker.score(chosen).log_evidence
     for _ in range(most):

@@ -19,9 +19,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-
-from kemba.identify.doubt.acting import excess_where_acting
 from kemba.identify.doubt.cross_validation import (
     gain_over_nothing,
     left_out,
@@ -31,27 +28,14 @@ from kemba.identify.doubt.cross_validation import (
 from kemba.identify.evidence.bootstrap import BootstrapSettings
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis, log_prior
-from kemba.identify.settings import RankingSettings
-from kemba.settings import Settings, setting
 
 
-class ParsimonySettings(Settings):
+class ParsimonySettings:
     """When left-out data choose among hypotheses that explain the data as well."""
 
-    plain: float = setting(
-        2.0,
-        "1",
-        "standard errors by which left-out data must gain by the one that they choose",
-        "convention: two, since several are asked",
-        decides=True,
-    )
-    share: float = setting(
-        0.1,
-        "1",
-        "of what a larger answer leaves beyond the noise, what it must explain more",
-        "convention: a tenth; 0.18 gives the same answer on a real drive, 0.04 a lag more",
-        decides=True,
-    )
+    # of what a larger answer leaves beyond the noise, what it must explain more: a tenth; 0.18
+    # gives the same answer on a real drive, 0.04 a lag more
+    share = 0.1
 
 
 @dataclass(frozen=True)
@@ -86,8 +70,8 @@ def simplest(search: Search, belief: Belief) -> Belief:
     known = _known_parts(search, best)
     least = min(known, key=lambda h: window_powers(search, h).sum())
     equal = [h for h in known if is_enough(search, h, least)]
-    plain = [h for h in equal if overclaimed(search, h, best) or is_little(search, h, best)]
-    fine = plain or [best]
+    fine = [h for h in equal if overclaimed(search, h, best) or is_little(search, h, best)]
+    fine = fine or [best]
     few = [h for h in fine if len(h) == min(map(len, fine))]
     chosen = max(few, key=lambda h: search.points[h].log_evidence)
     if chosen == best:
@@ -138,7 +122,6 @@ def likeliest_part(search: Search, hypothesis: Hypothesis) -> Hypothesis:
 def _visit(search: Search, hypotheses: list[Hypothesis]) -> None:
     for number, hypothesis in enumerate(hypotheses, start=1):
         search.visit(hypothesis, number, len(hypotheses))
-    search.refresh()
 
 
 def overclaimed(search: Search, smaller: Hypothesis, larger: Hypothesis) -> bool:
@@ -183,42 +166,6 @@ def is_idle(search: Search, best: Hypothesis) -> bool:
     return not gain.pays or gain.nats < _least()
 
 
-def is_plain(search: Search, hypothesis: Hypothesis) -> bool:
-    """Whether left-out data and nominal figures gain by a hypothesis, plainly more than their
-    scatter."""
-    gain = gain_over_nothing(search, hypothesis)
-    return gain.nats > max(ParsimonySettings.current().plain * gain.error, _least())
-
-
-def is_plain_enough(search: Search, hypothesis: Hypothesis) -> bool:
-    """The same where quarters of runs are left out, as plainly as its evidence lets expect.
-
-    Where a true effect gains g nats, left-out quarters gain about sqrt(g/2) standard errors, and in
-    19 of 20 cases at most one less than that. Below 18 nats, to ask for two is to refuse true
-    effects as often as what chance makes: left-out data cannot tell the two apart
-    (`benchmarks/left_out_power.py`).
-    """
-    gain = gain_over_nothing(search, hypothesis, quarters=True)
-    nats = search.points[hypothesis].log_evidence - search.points[NULL].log_evidence
-    expected = float(np.sqrt(max(nats, 0.0) / 2.0)) - 1.0
-    errors = min(max(expected, 1.0), ParsimonySettings.current().plain)
-    return gain.nats > max(errors * gain.error, _least())
-
-
-def needed_instead(search: Search, idle: Hypothesis) -> Hypothesis:
-    """Of the hypotheses that explain the data as well as an idle one, by as many effects, and are
-    likelier than nothing, the one that left-out data need most; NULL where they need none.
-
-    A bias of one leg's piston may fit as well as the opposite one of the other leg, and only one of
-    them predicts.
-    """
-    count, same = len(search.problem.candidates), RankingSettings.current().same
-    likely = {h: p.log_evidence + log_prior(h, count) for h, p in search.points.items()}
-    near = [h for h, p in likely.items() if p > max(likely[idle] - same, likely[NULL])]
-    needed = [h for h in near if len(h) == len(idle) and is_plain(search, h)]
-    return max(needed, key=lambda h: gain_over_nothing(search, h).nats, default=NULL)
-
-
 def none_of(belief: Belief) -> Belief:
     """The belief in nothing, where the best hypothesis is idle."""
     remark = (
@@ -243,23 +190,19 @@ def is_enough(search: Search, smaller: Hypothesis, larger: Hypothesis) -> bool:
 
 def is_little(search: Search, smaller: Hypothesis, larger: Hypothesis) -> bool:
     """Whether the larger hypothesis gains little beside what it leaves of left-out data beyond
-    their noise, also where its further effects act.
+    their noise.
 
     Where a motion repeats, so does what the model lacks: effects that imitate some of it predict
     left-out data as well.
     """
     rows = search.points[larger].windowed.count.sum()
     left = 0.5 * max(0.0, float(window_powers(search, larger).sum() - rows))
-    share = ParsimonySettings.current().share
-    if window_gain(search, larger, smaller).nats >= share * left:
-        return False
-    before, after = excess_where_acting(search, larger, smaller)
-    return before - after < share * after
+    return window_gain(search, larger, smaller).nats < ParsimonySettings.share * left
 
 
 def _least() -> float:
     """Nats that are any evidence at all."""
-    return BootstrapSettings.current().least
+    return BootstrapSettings.least
 
 
 def _remark(search: Search, best: Hypothesis, chosen: Hypothesis) -> str:

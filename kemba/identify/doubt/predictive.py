@@ -35,7 +35,6 @@ def predictive(search: Search, best: Hypothesis, likeliest: Hypothesis) -> Hypot
         parts = {e: tuple(x for x in whole if x != e) for e in whole if e not in best}
         for part in parts.values():
             search.visit(part)
-        search.refresh()
         gain = {e: window_gain(search, whole, part).nats for e, part in parts.items()}
         least = min(gain, key=gain.__getitem__)
         if gain[least] > ANY and left_out(search, whole, parts[least]).nats > 0.0:
@@ -72,5 +71,4 @@ def quoted(
 def _joint(search: Search, hypothesis: Hypothesis) -> dict[str, float]:
     """The joint estimate of a hypothesis, which is refitted first."""
     search.visit(hypothesis)
-    search.refresh()
     return joint_estimate(search.problem, hypothesis, search.points[hypothesis].fit.theta)

@@ -10,42 +10,17 @@ from kemba.identify.doubt.cross_validation import within_tolerance
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis, SpikeSlabSettings
 from kemba.identify.problem.problem import Array, Labels
-from kemba.settings import BY_HAND, Settings, setting
 
 
-class RunConsistencySettings(Settings):
+class RunConsistencySettings:
     """When a parameter differs from run to run."""
 
-    clear: float = setting(
-        100.0,
-        "nats",
-        "gain of a value per run over one value for all that is asked for",
-        BY_HAND,
-        decides=True,
-    )
-    share_of_rows: float = setting(
-        0.01, "nats", "the same per row of the logs", BY_HAND, decides=True
-    )
-    share: float = setting(
-        0.1, "1", "the same as a share of the gain of the answer itself", BY_HAND, decides=True
-    )
-    spread: float = setting(
-        1.2, "1", "sizes between the smallest and the largest value", BY_HAND, decides=True
-    )
-    forgiven: float = setting(
-        0.15,
-        "1",
-        "error of a run, in sigmas of one row, that all its rows may share",
-        BY_HAND,
-        decides=True,
-    )
-    informed: float = setting(
-        0.2,
-        "1",
-        "a run is asked where it gives the parameter with this sigma, in sizes",
-        BY_HAND,
-        decides=True,
-    )
+    clear = 100.0  # gain of a value per run over one value for all that is asked for [nats]
+    share_of_rows = 0.01  # the same per row of the logs [nats]
+    share = 0.1  # the same as a share of the gain of the answer itself
+    spread = 1.2  # sizes between the smallest and the largest value
+    forgiven = 0.15  # error of a run, in sigmas of one row, that all its rows may share
+    informed = 0.2  # a run is asked where it gives the parameter with this sigma, in sizes
 
 
 @dataclass(frozen=True)
@@ -67,7 +42,7 @@ class Drift:
 
 def drifting(search: Search, best: Hypothesis) -> Drift | None:
     """The clearest case of a parameter that differs, in the error that the best answer leaves."""
-    settings, spike = RunConsistencySettings.current(), SpikeSlabSettings.current().spike
+    settings, spike = RunConsistencySettings, SpikeSlabSettings.spike
     problem, point = search.problem, search.points[best]
     if len(problem.runs) < 2:
         return None

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from kemba.identify.doubt.parsimony import is_plain
 from kemba.identify.evidence.bootstrap import NullTest, bootstrap
+from kemba.identify.evidence.colour import best_fit
+from kemba.identify.evidence.left_out_noise import LeftOutNoiseSettings, left_out_noise
 from kemba.identify.evidence.linear import Linear, time_blocks
-from kemba.identify.evidence.noise.colour import best_fit
-from kemba.identify.evidence.noise.left_out_noise import LeftOutNoiseSettings, left_out_noise
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL
-from kemba.identify.evidence.strain import strained
 from kemba.identify.problem.problem import Array
 from kemba.identify.settings import DiscoverSettings
 
@@ -20,33 +16,16 @@ def best_gain(search: Search) -> float:
     """Evidence [nats] of the best single effect over nothing, as in the simulated logs: by the
     slopes about the null's mode. A refit, with shapes of its own, finds more than any of theirs.
 
-    Where the motion depends on the model, or the null's figures are not believed, slopes there tell
-    too little: of the refitted single effects; of the smallest sets that were refitted, where no
-    single effect was. A larger set is one of many more than the simulated logs are searched for,
-    and would look rarer than it is.
+    Where the motion depends on the model, slopes there tell too little: of the refitted single
+    effects; of the smallest sets that were refitted, where no single effect was. A larger set is
+    one of many more than the simulated logs are searched for, and would look rarer than it is.
     """
-    slopes_tell = not search.problem.moves and not search.thorough
-    if slopes_tell and not strained(search.points[NULL], search.problem).any():
-        return max(search.base.best_gain(), _plain_gain(search))
+    if not search.problem.moves:
+        return search.base.best_gain()
     sizes = [len(h) for h in search.points if h]
     null = search.points[NULL].log_evidence
     gains = (p.log_evidence - null for h, p in search.points.items() if len(h) == min(sizes))
     return max(gains) if sizes else 0.0
-
-
-def _plain_gain(search: Search) -> float:
-    """Evidence [nats] of the best refitted single effect that left-out data plainly need.
-
-    Slopes about the null's mode do not show what nominal figures hide that are a little off: a
-    supply 5 % too low beside orifices, 9 nats by its refit and -0.5 by these slopes.
-    """
-    null = search.points[NULL].log_evidence
-    gains = {
-        h: p.log_evidence - null
-        for h, p in search.points.items()
-        if len(h) == 1 and len(search.problem.candidates[h[0]].keys()) == 1
-    }
-    return max((g for h, g in gains.items() if is_plain(search, h)), default=-np.inf)
 
 
 def null_test(search: Search) -> NullTest:
@@ -61,11 +40,8 @@ def null_test(search: Search) -> NullTest:
 def redrawn_noise(search: Search, linear: Linear, jacobian: Array) -> Array:
     """J'e (b, k) of short blocks of what a fit of everything in `linear`, with slopes (n, k),
     leaves of the null's residual: noise for the bootstrap."""
-    problem, settings = search.problem, LeftOutNoiseSettings.current()
+    problem, settings = search.problem, LeftOutNoiseSettings
     left = search.points[NULL].mode.residual + jacobian @ (best_fit(linear) - linear.at)
-    if search.thorough:  # then slopes there may leave more than the best fit does
-        rest = min(search.points.values(), key=lambda point: point.mode.cost).mode.residual
-        left = min(left, rest, key=lambda errors: float(errors @ errors))
-    blocks = time_blocks(problem, shortest=DiscoverSettings.current().fine)
+    blocks = time_blocks(problem, shortest=DiscoverSettings.fine)
     power = settings.power_in_motion if problem.moves else settings.power
     return left_out_noise(jacobian, left, linear.width, blocks, power)

@@ -7,22 +7,13 @@ import numpy as np
 from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis
 from kemba.identify.problem.problem import Array, Labels
-from kemba.settings import BY_HAND, Settings, setting
 
 
-class UnexplainedSettings(Settings):
+class UnexplainedSettings:
     """When error that repeats itself tells that something is missing."""
 
-    structure: float = setting(
-        1.0,
-        "1",
-        "repeatable mean square, in noise units, that an imperfect model may leave",
-        BY_HAND,
-        decides=True,
-    )
-    left: float = setting(
-        0.1, "1", "the same as a share of what the answer explains", BY_HAND, decides=True
-    )
+    structure = 1.0  # repeatable mean square, in noise units, that an imperfect model may leave
+    left = 0.1  # the same as a share of what the answer explains
     clip = 30.0  # residuals are clipped at so many sigmas
     ridges = (1e-4, 1e-2, 1.0)  # penalties of the regression that are tried
     folds = 5  # blocks of time that are left out in turn: five
@@ -34,7 +25,7 @@ def structured(search: Search, hypothesis: Hypothesis) -> tuple[float, float]:
     A regression on everything that a force could depend on is learnt on some blocks of time. What
     it predicts in the other blocks is structure: noise cannot be predicted, however coloured.
     """
-    settings = UnexplainedSettings.current()
+    settings = UnexplainedSettings
     left_over = search.problem.leftover(search.points[hypothesis].fit.theta)
     if left_over is None:
         return 1.0, 0.0
@@ -65,7 +56,7 @@ def _predicted_folds(r: Array, columns: Array, folds: Labels, ridge: float) -> A
 
 def _folds(run: Labels) -> Labels:
     """Which fold each row (n,) belongs to: runs are cut into blocks of time, dealt out in turn."""
-    folds = UnexplainedSettings.current().folds
+    folds = UnexplainedSettings.folds
     labels = np.zeros(len(run), dtype=int)
     for i in np.unique(run):
         own = np.flatnonzero(run == i)
@@ -75,16 +66,9 @@ def _folds(run: Labels) -> Labels:
 
 def unfinished(search: Search, best: Hypothesis) -> bool:
     """Whether so much structure is left that the answer cannot be complete."""
-    settings = UnexplainedSettings.current()
+    settings = UnexplainedSettings
     power, structure = structured(search, best)
     if not best or structure <= settings.structure:
         return structure > settings.structure
     before, _ = structured(search, NULL)
     return structure > settings.left * max(before - power, 0.0)
-
-
-def explains_structure(search: Search, best: Hypothesis) -> bool:
-    """Whether an answer leaves hardly any of the error that repeats itself without it: of a lost
-    force of 20 N 0.4 %, of a wrong supply that stands for something else all of it."""
-    before, after = (structured(search, h)[1] for h in (NULL, best))
-    return after < UnexplainedSettings.current().left * before

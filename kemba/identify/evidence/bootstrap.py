@@ -12,35 +12,22 @@ from scipy.special import log_ndtr, logsumexp
 from kemba.identify.evidence.spike_slab import Hypothesis, Ranker, SpikeSlabSettings
 from kemba.identify.problem.problem import Array
 from kemba.identify.settings import DiscoverSettings
-from kemba.settings import Settings, setting
 
 
-class BootstrapSettings(Settings):
+class BootstrapSettings:
     """The test whether anything is missing."""
 
-    draws: int = setting(
-        400,
-        "1",
-        "number of simulated logs",
-        "derived: twelve of them lie beyond the p-value asked for, so that it is known to a third",
-    )
-    rare: float = setting(
-        0.02,
-        "1",
-        "share of simulated logs that reach a threshold by chance",
-        "convention: one in fifty; stricter than DiscoverSettings.significant, since no left-out "
-        "data are asked about formulas and detectable sizes",
-        decides=True,
-    )
-    least: float = setting(
-        1.0, "nats", "smallest threshold of the log evidence", "convention: evidence of one nat"
-    )
-    silent: float = setting(
-        1e-6,
-        "1",
-        "share of what the prior tells of an effect, below which data tell nothing of it",
-        "derived: rounding alone leaves about 1e-10, as of a place along level ground",
-    )
+    # number of simulated logs: twelve of them lie beyond the p-value asked for, so that it is known
+    # to a third
+    draws = 400
+    # share of simulated logs that reach a threshold by chance: one in fifty; stricter than
+    # DiscoverSettings.significant, since no left-out data are asked about formulas and detectable
+    # sizes
+    rare = 0.02
+    least = 1.0  # smallest threshold of the log evidence [nats]: evidence of one nat
+    # share of what the prior tells of an effect, below which data tell nothing of it: rounding
+    # alone leaves about 1e-10, as of a place along level ground
+    silent = 1e-6
 
 
 @dataclass(frozen=True)
@@ -72,7 +59,7 @@ class NullTest:
     @property
     def needed(self) -> int:
         """Pieces from which something can be significant."""
-        return 1 + int(np.ceil(-np.log2(DiscoverSettings.current().significant)))
+        return 1 + int(np.ceil(-np.log2(DiscoverSettings.significant)))
 
     @property
     def too_short(self) -> bool:
@@ -82,7 +69,7 @@ class NullTest:
     @property
     def threshold(self) -> float:
         """Log evidence that such logs reach rarely."""
-        settings = BootstrapSettings.current()
+        settings = BootstrapSettings
         return float(max(np.quantile(self.scores, 1.0 - settings.rare), settings.least))
 
 
@@ -100,7 +87,7 @@ def bootstrap(
     k): J'e of short blocks of the error of a flexible model. A block keeps the colour of the
     noise; a random sign of each block makes new noise.
     """
-    draws = BootstrapSettings.current().draws if draws is None else draws
+    draws = BootstrapSettings.draws if draws is None else draws
     rng = np.random.default_rng(seed)
     slopes = _slopes(ranker, noise, rng, draws)
     base = _evidence(ranker, (), slopes)
@@ -114,7 +101,7 @@ def _slopes(ranker: Ranker, noise: Array, rng: np.random.Generator, draws: int) 
     """J'r (k, draws) of logs in which nothing is missing, at the prior mean."""
     linear = ranker.linear
     signs = rng.choice([-1.0, 1.0], size=(draws, len(noise)))
-    tolerance = rng.choice(SpikeSlabSettings.current().tolerances, size=draws)
+    tolerance = rng.choice(SpikeSlabSettings.tolerances, size=draws)
     truth = rng.standard_normal((draws, len(linear.width))) * ranker.widths((), 1.0)
     truth[:, ranker.figures] *= tolerance[:, None]
     for effect, i in ranker.lead.items():
@@ -126,7 +113,7 @@ def _slopes(ranker: Ranker, noise: Array, rng: np.random.Generator, draws: int) 
 def _evidence(ranker: Ranker, hypothesis: Hypothesis, slopes: Array) -> Array:
     """Log evidence (draws,), up to a term that all hypotheses share."""
     gram = ranker.linear.gram.sum(axis=0)
-    parts, tolerances = [], SpikeSlabSettings.current().tolerances
+    parts, tolerances = [], SpikeSlabSettings.tolerances
     for tolerance in tolerances:
         width = ranker.widths(hypothesis, tolerance)
         factor = cho_factor(gram * np.outer(width, width) + np.eye(len(width)), lower=True)
@@ -156,13 +143,13 @@ def smallest_detectable(ranker: Ranker, threshold: float) -> dict[str, float | N
     """Effect -> size [its switch's unit] that these data would show above the threshold [nats] nine
     times in ten; None where they show it at no size, as a place along level ground."""
     found: dict[str, float | None] = {}
-    prior = SpikeSlabSettings.current()
+    prior = SpikeSlabSettings
     for effect, i in ranker.lead.items():
         size = ranker.candidates[effect].lead.size
         wide = prior.slab * size
         covariance = ranker.score((effect,)).covariance
         told = 1.0 / covariance[i, i] - 1.0 / wide**2
-        if told * wide**2 < BootstrapSettings.current().silent:
+        if told * wide**2 < BootstrapSettings.silent:
             found[effect] = None
             continue
         variance = 1.0 / told

@@ -12,27 +12,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kemba.identify.evidence.colour import best_fit
 from kemba.identify.evidence.linear import linearise, names_of, time_blocks
-from kemba.identify.evidence.noise.colour import best_fit
 from kemba.identify.evidence.refit import Frozen, refit
 from kemba.identify.evidence.spike_slab import NULL
 from kemba.identify.evidence.windows import error_ratio
 from kemba.identify.problem.problem import Problem
-from kemba.settings import BY_HAND, Settings, setting
 
 
-class FigureFitSettings(Settings):
+class FigureFitSettings:
     """How the figures of another structure are found."""
 
     rounds = 4  # times that the figures are fitted along a motion
     gain = 0.02  # share of the error that another round must take away
-    ahead: float = setting(
-        100.0,
-        "nats",
-        "gain from which another structure is built in, every effect free in both",
-        BY_HAND,
-        decides=True,
-    )
+    ahead = 100.0  # gain from which another structure is built in, every effect free in both [nats]
 
 
 @dataclass(frozen=True)
@@ -47,7 +40,7 @@ class Rebuilt:
 
 def settled(problem: Problem) -> tuple[Problem, dict[str, float]]:
     """The problem along the motion that its best figures make of the data, and these figures."""
-    settings, free = FigureFitSettings.current(), tuple(problem.nuisance)
+    settings, free = FigureFitSettings, tuple(problem.nuisance)
     best, figures, least, found = problem, dict[str, float](), np.inf, dict[str, float]()
     for _ in range(settings.rounds):
         slopes = Frozen(free, problem.jacobian(found, free))
@@ -72,7 +65,7 @@ def ahead(problem: Problem, theta: Mapping[str, float], error: float) -> Rebuilt
     built, figures = settled(plain.rebuilt(theta))
     rows = min(len(plain.residual({})), len(built.residual(figures)))
     nats = rows * (_unexplained(plain, {}) - _unexplained(built, figures))
-    return Rebuilt(built, figures, nats) if nats > FigureFitSettings.current().ahead else None
+    return Rebuilt(built, figures, nats) if nats > FigureFitSettings.ahead else None
 
 
 def _unexplained(problem: Problem, theta: Mapping[str, float]) -> float:

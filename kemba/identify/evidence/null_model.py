@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Mapping
 
-import numpy as np
-
+from kemba.identify.evidence.colour import best_fit, learnt_colour, with_learnt_colour
 from kemba.identify.evidence.linear import (
     Linear,
     condense,
     estimate,
-    moved,
     names_of,
     priors,
-    slopes_at,
-    within,
 )
-from kemba.identify.evidence.modes.small_effects import Mode, mode_of
-from kemba.identify.evidence.noise.colour import best_fit, learnt_colour, with_learnt_colour
 from kemba.identify.evidence.point import Division, LinearisationPoint
 from kemba.identify.evidence.refit import Fit, Frozen, refit
+from kemba.identify.evidence.small_effects import Mode, mode_of
 from kemba.identify.evidence.spike_slab import NULL, Hypothesis, Ranker
 from kemba.identify.problem.problem import Array, Problem
 
@@ -28,20 +22,17 @@ Names = tuple[str, ...]
 
 
 class NullModelSettings:
-    """How single effects are looked at before the leaders are refitted."""
+    """How the model as it is is fitted."""
 
-    glances = 1  # evaluations of each single effect
-    rounds = 2  # refits of the model as it is
-    absurd = 1e5  # residual in sigmas at which nothing can be predicted: beyond data
+    rounds = 2  # linear steps
 
 
 class Baseline:
     """The null hypothesis refitted, with slopes to every effect of the catalogue.
 
-    `problem`: the problem under the noise colour learnt. `point`: the null. `table`: log evidence
-    by hypothesis, linear. `jacobian` (n, k) and `residual` (n,) at the null. `among`: single
-    effects whose evidence is improved by a few evaluations (None: all). `begin`: where the fit of
-    curved figures begins.
+    `problem`: the problem under the noise colour learnt. `point`: the null. `table`: linear
+    log evidence of every single effect. `jacobian` (n, k) and `residual` (n,) at the null. `begin`:
+    where the fit of curved figures begins.
     """
 
     point: LinearisationPoint
@@ -51,10 +42,9 @@ class Baseline:
     def __init__(
         self,
         problem: Problem,
-        among: frozenset[Hypothesis] | None = None,
         begin: Mapping[str, float] | None = None,
     ) -> None:
-        self.problem, self.among, self.begin = problem, among, dict(begin or {})
+        self.problem, self.begin = problem, dict(begin or {})
         self.division = Division(problem)
         self.table: dict[Hypothesis, float] = {}
         self._start()
@@ -73,8 +63,7 @@ class Baseline:
 
     def best_gain(self) -> float:
         """Linear evidence [nats] of the best single effect over the null, about the null's mode."""
-        singles = self.ranker(self.point.mode.linear).table((1,))
-        return max(singles.values()) - self.point.log_evidence
+        return max(self.table.values()) - self.point.log_evidence
 
     def seen_from(self, theta: Mapping[str, float]) -> None:
         """Learn the noise colour from the residual at theta, and rank all hypotheses again."""
@@ -105,22 +94,12 @@ class Baseline:
         names = names_of(self.problem, theta)
         self.jacobian = self.problem.jacobian(theta, names) if jacobian is None else jacobian
         self.residual = self.problem.residual(theta)
-        self.rescore(theta, names)
-        ranker = self.ranker(self.point.mode.linear)
-        self.table = ranker.table((0, 1, 2) if self.among is None else (0, 1))
-        singles = [h for h in self.table if len(h) == 1]
-        chosen = singles if self.among is None else [h for h in singles if h in self.among]
-        self.table |= self._improved([h for h in chosen if not self._is_straight(h)])
-
-    def rescore(self, theta: Mapping[str, float] | None = None, names: Names = ()) -> None:
-        """Score the null with the slopes as they are now, at theta or where it was."""
-        theta = self.point.fit.theta if theta is None else theta
-        names = names or self.point.linear.names
         linear, windowed = self.division.linear(theta, names, self.jacobian, self.residual)
         fit = Fit(dict(theta), 0.5 * float(self.residual @ self.residual))
         mode = self._mode(NULL, [theta], linear, self.jacobian)
-        score = self.ranker(mode.linear).score(NULL)
-        self.point = LinearisationPoint(NULL, fit, linear, windowed, mode, score)
+        ranker = self.ranker(mode.linear)
+        self.point = LinearisationPoint(NULL, fit, linear, windowed, mode, ranker.score(NULL))
+        self.table = ranker.table()
 
     def judged(
         self,
@@ -128,19 +107,11 @@ class Baseline:
         fit: Fit,
         names: Names,
         slopes: Array,
-        start: Mapping[str, float] | None = None,
-        also: Mapping[str, float] | None = None,
     ) -> LinearisationPoint:
-        """The point of a refitted hypothesis with its slopes (n, k) along `names`; its mode is
-        sought from `start`, or from the fit and from `also`."""
+        """The point of a refitted hypothesis with its slopes (n, k) along `names`."""
         r = self.problem.residual(fit.theta)
         linear, windowed = self.division.linear(fit.theta, names, slopes, r)
-        if start is not None:
-            starts = [start]
-        elif self.problem.moves:
-            starts = [fit.theta]
-        else:
-            starts = [fit.theta, self._beside(fit.theta), *([also] if also else [])]
+        starts = [fit.theta] if self.problem.moves else [fit.theta, self._beside(fit.theta)]
         mode = self._mode(hypothesis, starts, linear, slopes)
         score = self.ranker(mode.linear).score(hypothesis)
         return LinearisationPoint(hypothesis, fit, linear, windowed, mode, score)
@@ -151,23 +122,6 @@ class Baseline:
         found = self.point.mode.theta.items()
         return {k: v for k, v in found if k.rsplit(".", 1)[0] not in on} | dict(theta)
 
-    def about(self, theta: Mapping[str, float], fit: Fit) -> None:
-        """Judge the null with slopes at theta, its mode, and all hypotheses beside it; `fit`: of
-        the nominal figures alone."""
-        names = self.point.linear.names
-        self.jacobian = slopes_at(self.problem, theta, names)
-        self.residual = self.problem.residual(fit.theta)
-        self.point = self.judged(NULL, fit, names, self.jacobian, theta)
-        self.table = self.ranker(self.point.mode.linear).table((0, 1, 2))
-
-    def begin_at(self, theta: Mapping[str, float]) -> None:
-        """Judge the null from theta on, and every single effect of the table beside it."""
-        mode = self._mode(NULL, [theta, self.point.mode.theta], self.point.linear, self.jacobian)
-        score = self.ranker(mode.linear).score(NULL)
-        self.point = replace(self.point, mode=mode, score=score)
-        singles = self.ranker(mode.linear).table((1,))
-        self.table |= {h: max(e, self.table[h]) for h, e in singles.items()}
-
     def _mode(
         self,
         hypothesis: Hypothesis,
@@ -177,60 +131,6 @@ class Baseline:
     ) -> Mode:
         """The mode of a hypothesis from the best of these starts."""
         return mode_of(self.problem, hypothesis, starts, linear, slopes, self.division.blocks)
-
-    def _improved(self, hypotheses: Sequence[Hypothesis]) -> dict[Hypothesis, float]:
-        """The best log evidence of single effects within a few Newton steps, with the true residual
-        there and the slopes of the null."""
-        found = dict.fromkeys(hypotheses, -np.inf)
-        tried = [(h, theta) for h in hypotheses for theta in self._starts(h)]
-        for _ in range(NullModelSettings.glances + 1):
-            seen = list(zip(tried, self._about([theta for _, theta in tried]), strict=True))
-            tried = []
-            for (hypothesis, _), linear in seen:
-                if linear is None:
-                    continue
-                score = self.ranker(linear).score(hypothesis)
-                found[hypothesis] = max(found[hypothesis], score.log_evidence)
-                tried.append((hypothesis, self._estimate(hypothesis, linear, score.z)))
-        return found
-
-    def _is_straight(self, hypothesis: Hypothesis) -> bool:
-        """Whether residuals are linear in a single effect."""
-        return self.problem.is_straight(self.problem.candidates[hypothesis[0]].key)
-
-    def _starts(self, hypothesis: Hypothesis) -> Iterator[dict[str, float]]:
-        """The null; times also begin at their size, on both sides, as residuals are far from linear
-        in them."""
-        yield dict(self.point.fit.theta)
-        candidate = self.problem.candidates[hypothesis[0]]
-        if candidate.lead.unit == "s":
-            for sign in (1.0, -1.0) if candidate.lead.signed else (1.0,):
-                size = within(self.problem.candidates, candidate.typical(sign))
-                yield {**self.point.fit.theta, **size}
-
-    def _about(self, thetas: Sequence[Mapping[str, float]]) -> Iterator[Linear | None]:
-        """The slopes of the null about each theta; None where nothing can be predicted: a linear
-        estimate may point there."""
-        null, blocks = self.point, self.division.blocks
-        apart = [theta for theta in thetas if theta != null.fit.theta]
-        residuals = iter(self.problem.residuals(apart).T if apart else ())
-        for theta in thetas:
-            if theta == null.fit.theta:
-                yield null.mode.linear
-                continue
-            r = next(residuals)
-            if np.all(np.abs(r) < NullModelSettings.absurd):
-                at, _, _ = priors(self.problem, theta, null.mode.linear.names)
-                yield moved(null.mode.linear, at, self.jacobian, r, blocks)
-            else:
-                yield None
-
-    def _estimate(self, hypothesis: Hypothesis, linear: Linear, z: Array) -> dict[str, float]:
-        """Theta at the z (k,) of a hypothesis's score; absent effects stay as they are."""
-        problem = self.problem
-        free = {*problem.nuisance, *(problem.candidates[e].key for e in hypothesis)}
-        at = np.where([name in free for name in linear.names], z, linear.at)
-        return within(problem.candidates, estimate(problem, linear, at))
 
     def _learn_noise(self, theta: Mapping[str, float], keep: bool) -> Array | None:
         """Learn the noise colour from the residual that is left when every effect may help to

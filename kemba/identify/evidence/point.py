@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from kemba.identify.evidence.linear import Linear, LinearSettings, condense, priors, time_blocks
-from kemba.identify.evidence.modes.small_effects import Mode
 from kemba.identify.evidence.refit import Fit
+from kemba.identify.evidence.small_effects import Mode
 from kemba.identify.evidence.spike_slab import Hypothesis, Score
 from kemba.identify.evidence.windows import Windows, windows_of
 from kemba.identify.problem.problem import Array, Labels, Problem

@@ -14,18 +14,15 @@ from kemba.identify.evidence.linear import is_shape
 from kemba.identify.evidence.spike_slab import Hypothesis, SpikeSlabSettings
 from kemba.identify.problem.problem import Array, Parameter, Problem
 from kemba.identify.problem.slopes import bounded
-from kemba.settings import BY_HAND, Settings, setting
 
 
-class RefitSettings(Settings):
+class RefitSettings:
     """The nonlinear refit of one hypothesis."""
 
     evaluations = 10  # largest number of evaluations
     cost = 3e-6  # relative change of the cost at which a fit ends
     change = 1e-4  # relative change of x at which a fit ends
-    step: float = setting(
-        0.03, "1", "step of finite differences, in prior widths", BY_HAND, decides=True
-    )
+    step = 0.03  # step of finite differences, in prior widths
     bound = 8.0  # largest distance from the prior mean, in widths
     farthest = 3.0  # largest start of a switch, in sizes
     nearest = 0.1  # smallest start of a switch, in sizes
@@ -75,7 +72,7 @@ def _starts(
     problem: Problem, hypothesis: Hypothesis, start: Mapping[str, float]
 ) -> Iterable[dict[str, float]]:
     """Effects start where `start` has them, but not at off; shapes also at other values."""
-    settings = RefitSettings.current()
+    settings = RefitSettings
     theta = {k: v for k, v in start.items() if k in problem.nuisance}
     shapes: list[tuple[str, Parameter]] = []
     for effect in hypothesis:
@@ -97,7 +94,7 @@ def _starts(
 
 def _inside(value: float, parameter: Parameter) -> float:
     """A start that is on, not too far out, and on the possible side."""
-    settings = RefitSettings.current()
+    settings = RefitSettings
     farthest = settings.farthest * parameter.size
     step = np.clip(value - parameter.off, -farthest, farthest)
     least = settings.nearest * parameter.size
@@ -124,7 +121,7 @@ class _LeastSquares:
         self.nuisance = list(frozen.names)
         self.curved = [n for n in problem.curved if n in frozen.names]
         self.start = dict(start)
-        self.settings, self.slab = RefitSettings.current(), SpikeSlabSettings.current().slab
+        self.settings, self.slab = RefitSettings, SpikeSlabSettings.slab
         self._last: tuple[Array, Array] | None = None  # x, and residuals there
 
     def run(self) -> Fit:

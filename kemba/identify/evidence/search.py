@@ -2,25 +2,80 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+import time
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from kemba.identify.evidence.modes.rivals import fitted_anew, judged_anew, promised
-from kemba.identify.evidence.noise.colour import with_learnt_colour
+from kemba.identify.evidence.colour import with_learnt_colour
+from kemba.identify.evidence.linear import estimate, names_of
 from kemba.identify.evidence.null_model import Baseline
-from kemba.identify.evidence.point import excess
-from kemba.identify.evidence.refit import Frozen, refit
-from kemba.identify.evidence.refits import Refits
-from kemba.identify.evidence.search_settings import SearchSettings
-from kemba.identify.evidence.spike_slab import NULL, Hypothesis, log_prior
-from kemba.identify.evidence.strain import stand_ins
+from kemba.identify.evidence.point import LinearisationPoint
+from kemba.identify.evidence.refit import Fit, Frozen, refit
+from kemba.identify.evidence.spike_slab import NULL, Hypothesis, log_prior, probabilities
+from kemba.identify.problem.problem import Problem, Theta
+from kemba.stopwatch import Stage
+
+
+class SearchSettings:
+    """Which hypotheses are refitted."""
+
+    leaders = 6  # effects that are refitted in a round
+    sure = 3  # leaders that are refitted however far behind they are
+    sure_grown = 2  # the same beside effects that are found already
+    far = 40.0  # other leaders are refitted when not farther behind [nats]
+    # error of the model as it is, in noise units, from which another structure is refitted whatever
+    # its linear evidence is
+    structural = 1.3
+    far_share = 0.7  # or no farther behind than this share of the gain
+    promising = 0.5  # share of the best gain with which an effect is tried again
+    followed = 2  # times that the motion is found again with the best guess
+    # times that the motion is found before a search along it, until late sensors stay as late: a
+    # piston 5.2 ms late is found 3.2 ms late along the motion as it is read, 5.2 ms along the
+    # second one after it
+    settled = 4
+    still = 0.1  # change of such a delay, in rows, at which it stays: below its 1 sigma
+    largest = 10  # effects in one answer: more than any machine is expected to lack
+    regrown = 3  # times that an answer of several effects is begun again where it has led
+    swapped = 2  # rounds in which effects of an answer are taken away or swapped
+    leaders_grown = 3  # effects that are refitted beside the best answer
+    leaders_swapped = 2  # effects that are refitted in place of one of the answer
 
 
 @dataclass
-class Search(Refits):
-    """Which hypotheses are refitted, and in which order; `run` fills it."""
+class Search:
+    """The null model, and every hypothesis that was refitted beside it; `run` fills it.
+
+    `problem`: the problem as it is now; it is replaced when its noise colour is learnt or its
+    motion found again. `deadline`: when to stop searching, `due`: when the answer is due, by
+    `time.monotonic` [s]. `say`: told of progress. `points`: every hypothesis that was refitted.
+    `begin`: figures of the model as it is, where a fit found them already. `base`: the null model.
+    `in_pieces`: the error that is told is of quarters of runs left out, and not of whole runs.
+    `own`: the problem and theta of the model as it is, along the motion that it makes of the data
+    itself, where late sensors have led to a motion along which it cannot be judged.
+    """
+
+    problem: Problem
+    deadline: float = np.inf
+    say: Callable[[str], None] = lambda text: None
+    points: dict[Hypothesis, LinearisationPoint] = field(default_factory=dict)
+    begin: Mapping[str, float] = field(default_factory=dict)
+    due: float = np.inf
+    in_pieces: bool = False
+    own: tuple[Problem, Theta] | None = None
+    base: Baseline = field(init=False)
+    _thetas: dict[Hypothesis, dict[str, float]] = field(default_factory=dict)
+
+    @property
+    def ended(self) -> bool:
+        """Whether the time is over. A first effect is refitted all the same."""
+        return time.monotonic() > self.deadline
+
+    @property
+    def late(self) -> bool:
+        """Whether the answer is due: nothing more is refitted to doubt it."""
+        return time.monotonic() > self.due
 
     def run(self) -> Hypothesis:
         """The likeliest hypothesis; everything that was refitted stays in `points`."""
@@ -30,30 +85,12 @@ class Search(Refits):
         """The first guess: the best of the single effects that look best."""
         self.say("fitting the model as it is, and a slope for every effect")
         self.start()
-        best = self._round(NULL, SearchSettings.current().leaders)
-        if instead := self._leaves_far_less(best):
-            best = self._along(instead)
+        best = self._round(NULL, SearchSettings.leaders)
         self.say(f"first guess: {' + '.join(best) or 'nothing'}")
         return best
 
-    def _leaves_far_less(self, best: Hypothesis) -> Hypothesis:
-        """The single effect that leaves far less than the best hypothesis, if there is one.
-
-        Along the motion that data without an effect would have, its evidence counts for less than
-        that of effects which change the motion a little. Another structure is built in instead.
-        """
-        settings, structures = SearchSettings.current(), self.problem.structures
-        singles = [h for h in self.points if len(h) == 1 and not structures & set(h)]
-        if not self.problem.moves or not singles or self.ended:
-            return NULL
-        error = {h: self.points[h].fitted_error for h in (best, *singles)}
-        least = min(singles, key=error.__getitem__)
-        far_less = excess(error[least]) < settings.far_less * excess(error[best])
-        return least if error[best] > settings.structural and far_less else NULL
-
     def further(self, best: Hypothesis) -> Hypothesis:
         """The likeliest hypothesis, searched for from the first guess."""
-        leaders = SearchSettings.current().leaders
         if self.problem.moves:
             return self._follow(best)
         if best != NULL:
@@ -63,68 +100,38 @@ class Search(Refits):
             self.points = {NULL: self.base.point}
             for number, hypothesis in enumerate(promising, start=1):
                 self.visit(hypothesis, number, len(promising))
-            best = self._round(NULL, leaders)
-        if len(best) < 2 and not self.ended:
-            best = self._look_closer(best)
+            best = self._round(NULL, SearchSettings.leaders)
         return self._swap(self._grow(best)) if best else best
-
-    def _look_closer(self, best: Hypothesis) -> Hypothesis:
-        """Nothing and the likeliest single effects fitted anew, where the best of them explains
-        hardly anything of an error that is no noise, and slopes at the fit of nothing are no fair
-        judge: its figures are not believed, or slopes promise what modes do not show."""
-        settings = SearchSettings.current()
-        error, left = (self.points[h].fitted_error for h in (NULL, best))
-        if error <= settings.structural or excess(left) <= settings.unexplained * excess(error):
-            return best
-        evidence = {h: p.log_evidence for h, p in self.points.items() if len(h) == 1}
-        likely = sorted(evidence, key=lambda h: -evidence[h])[: settings.closer]
-        instead = self._try_stand_ins(NULL)
-        promise = max(promised(self.base, self.points[h]) for h in (NULL, best))
-        if not instead and promise <= settings.promise:
-            return best
-        self.say("fitting nothing anew")
-        points = {h: self.points[h] for h in (NULL, *likely, *instead)}
-        fits = fitted_anew(self.base, points, lambda: self.ended, self.say)
-        self.points = dict(judged_anew(self.base, points, fits))
-        self.thorough = True
-        return self.best()
 
     def _follow(self, best: Hypothesis) -> Hypothesis:
         """Repeat the search along the motion that the best hypothesis makes of the data, until the
-        best hypothesis stays the same.
-
-        An effect that changes the motion much is underrated along the first motion. So where no
-        refit is better than nothing, the linear evidence may choose the hypothesis to follow.
-        """
-        settings = SearchSettings.current()
-        for _ in range(settings.followed):
-            guess = best or self._first_of_table()
-            if guess == NULL or self.ended:
+        best hypothesis stays the same."""
+        for _ in range(SearchSettings.followed):
+            if best == NULL or self.ended:
                 return best
-            best = self._along(guess)
-            if best in (guess, NULL):
+            before, best = best, self._along(best)
+            if best == before:
                 break
         return self._swap(self._regrow(self._grow(best))) if best else best
 
     def _along(self, guess: Hypothesis) -> Hypothesis:
         """The best single effect along the motion that a guess makes of the data."""
         self.say(f"searching again with {' + '.join(guess)} in the model")
-        among = self._contenders()
-        self.start(among, self._settle(guess))
+        self.start(self._settle(guess))
         self.visit(guess)
-        return self._round(NULL, SearchSettings.current().leaders)
+        return self._round(NULL, SearchSettings.leaders)
 
     def _regrow(self, best: Hypothesis) -> Hypothesis:
         """Find the motion again with an answer of several effects, and let it grow from there.
 
         Each effect that joins changes the motion, and with it what the others seem to be.
         """
-        for _ in range(SearchSettings.current().regrown):
+        for _ in range(SearchSettings.regrown):
             if len(best) < 2 or self.ended:
                 break
             before = best
             self.say(f"searching again with {' + '.join(best)} in the model")
-            self.start(frozenset(), self._settle(best))
+            self.start(self._settle(best))
             self.visit(best)
             best = self._grow(best)
             if best == before:
@@ -134,7 +141,7 @@ class Search(Refits):
     def _settle(self, hypothesis: Hypothesis) -> Mapping[str, float]:
         """Find the motion that a hypothesis makes of the data, until late sensors stay as late; the
         best theta there."""
-        settings, theta = SearchSettings.current(), self.points[hypothesis].fit.theta
+        settings, theta = SearchSettings, self.points[hypothesis].fit.theta
         asked = self.problem
         for _ in range(settings.settled):
             self.problem = self.problem.relinearise(theta)
@@ -151,52 +158,26 @@ class Search(Refits):
                 break
         return theta
 
-    def _contenders(self) -> frozenset[Hypothesis]:
-        """Single effects that were refitted, or whose linear evidence gains a good share of the
-        best."""
-        null = self.points[NULL].log_evidence
-        gains = {h: e - null for h, e in self.base.table.items() if len(h) == 1}
-        least = SearchSettings.current().promising * max(gains.values())
-        return frozenset(h for h, gain in gains.items() if gain > least or h in self.points)
-
-    def _first_of_table(self) -> Hypothesis:
-        """Of the refitted single effects the one with the largest linear evidence, if that beats
-        nothing."""
-        count = len(self.problem.candidates)
-        null = self.points[NULL].log_evidence + log_prior(NULL, count)
-        tables = {h: e for h, e in self.singles().items() if h in self.points}
-        first = max(tables, key=tables.__getitem__, default=NULL)
-        better = first and tables[first] + log_prior(first, count) > null
-        return first if better else NULL
-
-    def start(
-        self, among: frozenset[Hypothesis] | None = None, theta: Mapping[str, float] | None = None
-    ) -> None:
+    def start(self, theta: Mapping[str, float] | None = None) -> None:
         """Null fit, noise colour, and the linear table at the null; `theta`: the best guess."""
         if self.problem.moves:
             about = theta or self.begin
             self.problem = with_learnt_colour(self.problem, about, careful=bool(theta))
-        self.base = Baseline(self.problem, among, theta or self.begin)
+        self.base = Baseline(self.problem, theta or self.begin)
         self.problem = self.base.problem
         self.points = {NULL: self.base.point}
 
     def _round(self, given: Hypothesis, leaders: int, least: float = -np.inf) -> Hypothesis:
         """Refit `given` with one more effect, the likeliest ones whose linear evidence is `least`
-        or more; the best of all points so far. Where a refit shows a better mode for all, once
-        more."""
+        or more; the best of all points so far."""
         self._refit_leaders(given, leaders, least)
-        if not self.problem.moves and self.share_modes():
-            self._refit_leaders(given, leaders, least)
-            self.share_modes()
-        if given == NULL:
-            self._try_stand_ins(self.best())
-        if given == NULL and self.points[NULL].fitted_error > SearchSettings.current().structural:
+        if given == NULL and self.points[NULL].fitted_error > SearchSettings.structural:
             for structure in sorted(self.problem.structures):
                 self.visit((structure,))
         return self.best()
 
     def _refit_leaders(self, given: Hypothesis, leaders: int, least: float) -> None:
-        settings = SearchSettings.current()
+        settings = SearchSettings
         table = self._extensions(given)
         order = sorted(table, key=lambda h: -table[h])[:leaders]
         gain = table[order[0]] - self.points[given].log_evidence
@@ -213,35 +194,15 @@ class Search(Refits):
                 break
             self.visit(hypothesis, number, len(order))
 
-    def _try_stand_ins(self, hypothesis: Hypothesis) -> list[Hypothesis]:
-        """Refit the effects that may stand behind nominal figures which a hypothesis moves too far;
-        those that are refitted."""
-        begun = stand_ins(self.points[hypothesis], self.problem)
-        for effect, start in begun.items():
-            if self.ended:
-                break
-            self._thetas.setdefault(effect, start)
-            self.visit(effect)
-        return [effect for effect in begun if effect in self.points]
-
     def _extensions(self, given: Hypothesis) -> dict[Hypothesis, float]:
-        """Linear evidence of `given` plus one effect. The members of a pair that is much better
-        than any single effect count as much as the best single effect."""
-        if given != NULL:
-            ranker = self.base.ranker(self.points[given].mode.linear)
-            return ranker.table((len(given) + 1,), given=given)
-        single = self.singles()
-        base = max(single.values())
-        pairs = [h for h in self.base.table if len(h) == 2]
-        best_pair = max(pairs, key=self.base.table.__getitem__, default=NULL)
-        if best_pair and self.base.table[best_pair] > base + SearchSettings.current().gain:
-            for name in best_pair:
-                single[(name,)] = max(single[(name,)], base)
-        return single
+        """Linear evidence of `given` plus one effect."""
+        if given == NULL:
+            return self.base.table
+        return self.base.ranker(self.points[given].mode.linear).table(given)
 
     def _grow(self, best: Hypothesis) -> Hypothesis:
         """Add effects, one by one, while the evidence grows."""
-        settings = SearchSettings.current()
+        settings = SearchSettings
         while len(best) < settings.largest and not self.ended:
             grown = self._round(best, settings.leaders_grown)
             if grown == best or len(grown) <= len(best):
@@ -251,7 +212,7 @@ class Search(Refits):
 
     def _swap(self, best: Hypothesis) -> Hypothesis:
         """Take each effect away, or swap it for another; what was swapped may grow again."""
-        settings = SearchSettings.current()
+        settings = SearchSettings
         for _ in range(settings.swapped):
             before = best
             for member in best if len(best) > 1 else ():
@@ -271,5 +232,52 @@ class Search(Refits):
         """Refitted hypotheses that gained a good share of what the best one gained."""
         null = self.points[NULL].log_evidence
         gains = {h: p.log_evidence - null for h, p in self.points.items() if h}
-        least = SearchSettings.current().promising * max(gains.values())
+        least = SearchSettings.promising * max(gains.values())
         return [h for h, gain in gains.items() if gain > least]
+
+    def visit(self, hypothesis: Hypothesis, number: int = 1, of: int = 1) -> LinearisationPoint:
+        """Refit a hypothesis, once, and score it there; `number` `of` so many, for who waits."""
+        if hypothesis not in self.points:
+            name = f"refitting {' + '.join(hypothesis)}"
+            self.say(Stage(name, number, of) if of > 1 else name)
+            fit = refit(self.problem, hypothesis, self._guess(hypothesis), self.base.frozen)
+            self.points[hypothesis] = self._point(hypothesis, fit)
+            self._thetas[hypothesis] = fit.theta
+        return self.points[hypothesis]
+
+    def _point(self, hypothesis: Hypothesis, fit: Fit) -> LinearisationPoint:
+        """The problem about a refitted point: slopes of its own parameters are those of the fit,
+        all others are the null's."""
+        names, base = names_of(self.problem, fit.theta), self.base
+        known = {n: i for i, n in enumerate(base.point.linear.names)}
+        own = {i: fit.columns[n] for i, n in enumerate(names) if n in fit.columns}
+        at = [0 if i in own else known[n] for i, n in enumerate(names)]
+        slopes = np.take(base.jacobian, at, axis=1)
+        for i, column in own.items():
+            slopes[:, i] = column
+        return base.judged(hypothesis, fit, names, slopes)
+
+    def _guess(self, hypothesis: Hypothesis) -> dict[str, float]:
+        """Where a refit starts: at its last result, or at the linear estimate from the largest part
+        of the hypothesis that was refitted."""
+        if hypothesis in self._thetas:
+            return self._thetas[hypothesis]
+        parts = [h for h in self.points if set(h) < set(hypothesis)]
+        part = max(parts, key=lambda h: (len(h), self.points[h].log_evidence))
+        point = self.points[part]
+        linear = point.mode.linear
+        z = self.base.ranker(linear).score(hypothesis).z
+        guess = estimate(self.problem, linear, z)
+        return {**guess, **{k: v for k, v in point.fit.theta.items() if k not in guess}}
+
+    def best(self) -> Hypothesis:
+        """The likeliest of all refitted hypotheses."""
+        count = len(self.problem.candidates)
+        return max(self.points, key=lambda h: self.points[h].log_evidence + log_prior(h, count))
+
+    def probabilities(self, dismissed: Collection[Hypothesis] = ()) -> dict[Hypothesis, float]:
+        """Of all refitted hypotheses, and of the other single effects by their linear evidence;
+        without the hypotheses `dismissed` as too small or as refuted by left-out data."""
+        evidence = self.base.table | {h: p.log_evidence for h, p in self.points.items()}
+        evidence = {h: e for h, e in evidence.items() if h not in dismissed}
+        return probabilities(evidence, len(self.problem.candidates))

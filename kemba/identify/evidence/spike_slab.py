@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from itertools import combinations
 from math import comb
 
 import numpy as np
@@ -15,52 +14,24 @@ from kemba.identify.evidence.linear import Linear
 from kemba.identify.evidence.neighbours import Neighbours
 from kemba.identify.evidence.windows import START
 from kemba.identify.problem.problem import Array, Candidate
-from kemba.settings import BY_HAND, Settings, setting
 
 
-class SpikeSlabSettings(Settings):
+class SpikeSlabSettings:
     """The prior: of every effect the width of its spike and of its slab, and of hypotheses."""
 
-    spike: float = setting(
-        0.05,
-        "1",
-        "width of the spike: every effect of the catalogue may be there with this share of its "
-        "size",
-        f"{BY_HAND}; that intervals count it as 5 % and not as 2 % came of benchmarks/blind",
-        decides=True,
-    )
-    slab: float = setting(
-        0.7, "1", "width of the slab: of a large effect, in sizes", BY_HAND, decides=True
-    )
+    # width of the spike: every effect of the catalogue may be there with this share of its size;
+    # that intervals count it as 5 % and not as 2 % came of benchmarks/blind
+    spike = 0.05
+    slab = 0.7  # width of the slab: of a large effect, in sizes
     silent = 1e-6  # width of the spike of a formula: none, but not singular
-    tolerances: tuple[float, ...] = setting(
-        (0.5, 1.0, 1.5),
-        "1",
-        "how far nominal figures are off, in prior sigmas; evidence is averaged over these",
-        "convention: three nodes around one prior sigma, which is itself uncertain",
-        decides=True,
-    )
-    nothing: float = setting(
-        0.5, "1", "prior probability that nothing is missing", "convention: even odds",
-        decides=True,
-        at_most=0.9,
-    )  # fmt: skip
-    single: float = setting(
-        0.4, "1", "prior probability of one effect, shared by all", BY_HAND, decides=True
-    )
-    pair: float = setting(
-        0.01, "1", "prior probability of two effects, shared by all pairs", BY_HAND, decides=True
-    )
-    triple: float = setting(
-        0.001, "1", "prior probability of three, shared by all triples", BY_HAND, decides=True
-    )
-    further: float = setting(
-        0.1,
-        "1",
-        "each further effect makes an answer this much less likely",
-        "tuned: by hand on the twin of tests/twin, no benchmark; as from two to three",
-        decides=True,
-    )
+    # how far nominal figures are off, in prior sigmas; evidence is averaged over these: three nodes
+    # around one prior sigma, which is itself uncertain
+    tolerances = (0.5, 1.0, 1.5)
+    nothing = 0.5  # prior probability that nothing is missing: even odds
+    single = 0.4  # prior probability of one effect, shared by all
+    pair = 0.01  # prior probability of two effects, shared by all pairs
+    triple = 0.001  # prior probability of three, shared by all triples
+    further = 0.1  # each further effect makes an answer this much less likely: as from two to three
 
 
 Hypothesis = tuple[str, ...]  # names of the effects that are large, sorted
@@ -92,7 +63,7 @@ class Ranker:
         spike: float | None = None,
         silent: Iterable[str] = (),
     ) -> None:
-        self._prior = SpikeSlabSettings.current()
+        self._prior = SpikeSlabSettings
         spike = self._prior.spike if spike is None else spike
         self.linear, self.candidates, self.spike = linear, candidates, spike
         self.silent = frozenset(silent)
@@ -149,36 +120,28 @@ class Ranker:
                 total += float(np.log(2.0) + log_ndtr((z[i] - lead.off) / sd))
         return total
 
-    def table(
-        self,
-        sizes: Iterable[int] = (1, 2),
-        among: Iterable[str] | None = None,
-        given: Hypothesis = (),
-    ) -> dict[Hypothesis, float]:
-        """Log evidence of every set of the wanted sizes that contains `given`."""
-        names = sorted(self.candidates if among is None else among)
-        others = [n for n in names if n not in given]
-        extras = [e for size in sizes for e in combinations(others, size - len(given))]
-        parts = [self._beside(given, extras, t) for t in self._prior.tolerances]
+    def table(self, given: Hypothesis = ()) -> dict[Hypothesis, float]:
+        """Log evidence of `given` with each further effect."""
+        others = [name for name in sorted(self.candidates) if name not in given]
+        parts = [self._beside(given, others, t) for t in self._prior.tolerances]
         total = logsumexp(parts, axis=0) - np.log(len(parts))
-        keys = (tuple(sorted((*given, *extra))) for extra in extras)
+        keys = (tuple(sorted((*given, other))) for other in others)
         return dict(zip(keys, total.tolist(), strict=True))
 
-    def _beside(self, given: Hypothesis, extras: list[Hypothesis], tolerance: float) -> list[float]:
-        """Log evidence of `given` with each of the `extras`, from one factor."""
+    def _beside(self, given: Hypothesis, others: list[str], tolerance: float) -> list[float]:
+        """Log evidence of `given` with each of the `others`, from one factor."""
         linear, base = self.linear, self.widths(given, tolerance)
         wide = self.widths(tuple(self.candidates), tolerance)
         shift = linear.mean - linear.at
         near = Neighbours.of(self._gram, self._slope, self._power, shift, base)
         found = []
-        for extra in extras:
-            names = [*given, *extra]
-            i, j = ([self.lead[e] for e in own] for own in (extra, names))
+        for other in others:
+            names, i = [*given, other], [self.lead[other]]
+            j = [self.lead[e] for e in names]
             evidence, step, sd = near.with_widths(i, wide[i], np.array(j, dtype=int))
-            signed = (self.candidates[e].lead.signed for e in names)
-            for a, free in enumerate(signed):
-                if not free:
-                    z = linear.at[j[a]] + step[a] - self.candidates[names[a]].lead.off
+            for a, lead in enumerate(self.candidates[e].lead for e in names):
+                if not lead.signed:
+                    z = linear.at[j[a]] + step[a] - lead.off
                     evidence += float(np.log(2.0) + log_ndtr(z / sd[a]))
             found.append(evidence)
         return found
@@ -187,7 +150,7 @@ class Ranker:
 def log_prior(hypothesis: Hypothesis, count: int) -> float:
     """Log prior probability of a hypothesis among `count` effects: all effects are equally likely,
     and each further one makes a hypothesis less likely."""
-    prior, size = SpikeSlabSettings.current(), len(hypothesis)
+    prior, size = SpikeSlabSettings, len(hypothesis)
     share = (prior.nothing, prior.single, prior.pair, prior.triple)[min(size, 3)]
     share *= prior.further ** max(size - 3, 0)
     return float(np.log(share / max(comb(count, size), 1)))

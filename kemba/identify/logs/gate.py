@@ -62,7 +62,7 @@ def _unit_of(name: str) -> str | None:
 
 
 def _time(log: Trajectory) -> Iterator[KembaError]:
-    t, limits = log.time, GateSettings.current()
+    t, limits = log.time, GateSettings
     if len(t) < limits.fewest:
         yield _fault(log, f"has {len(t)} rows", f"at least {limits.fewest} were expected")
         return
@@ -92,7 +92,7 @@ def _time(log: Trajectory) -> Iterator[KembaError]:
 
 
 def _cells(log: Trajectory) -> Iterator[KembaError]:
-    limits = GateSettings.current()
+    limits = GateSettings
     for name in needed(log):
         y = log[name]
         missing = ~np.isfinite(y)
@@ -108,7 +108,7 @@ def _cells(log: Trajectory) -> Iterator[KembaError]:
 
 
 def _valve(log: Trajectory, name: str, y: Array) -> Iterator[KembaError]:
-    far, state = GateSettings.current().valve, np.clip(np.round(y), 0.0, 1.0)
+    far, state = GateSettings.valve, np.clip(np.round(y), 0.0, 1.0)
     wrong = np.isfinite(y) & (np.abs(y - state) > far)
     if wrong.any():
         i = int(np.argmax(wrong))
@@ -137,7 +137,7 @@ def _range(log: Trajectory, name: str, y: Array) -> Iterator[KembaError]:
     if known is None:
         return
     low, high, expected = known
-    limits = GateSettings.current()
+    limits = GateSettings
     if name.endswith("piston/x") and "stroke" in log.meta:
         high = log.meta["stroke"] + limits.beyond
     outside = np.isfinite(y) & ((y < low) | (y > high))
@@ -160,7 +160,7 @@ def _frozen(log: Trajectory, name: str, y: Array) -> Iterator[KembaError]:
     """A sensor that repeats one reading while it is noisy elsewhere: dead, stuck or saturated."""
     if name.endswith("hip/tau"):
         return
-    limits = GateSettings.current()
+    limits = GateSettings
     good = np.flatnonzero(np.isfinite(y))
     values = y[good]
     equal = np.diff(values) == 0
@@ -179,7 +179,7 @@ def _frozen(log: Trajectory, name: str, y: Array) -> Iterator[KembaError]:
 
 def _leap(log: Trajectory, name: str, y: Array) -> Iterator[KembaError]:
     """A position that jumps from one row to the next, and stays there."""
-    limits = GateSettings.current()
+    limits = GateSettings
     good = np.flatnonzero(np.isfinite(y))
     step, passed = np.diff(y[good]), np.diff(log.time[good])
     far = np.abs(step) > limits.fastest * passed + limits.leap
@@ -205,7 +205,7 @@ def _longest(flags: np.ndarray) -> tuple[int, int]:
 
 def _excitation(log: Trajectory) -> Iterator[KembaError]:
     """Something must be commanded or move, and no sensor may be dead."""
-    limits = GateSettings.current()
+    limits = GateSettings
     valves = [n for n in log.names if "valve/" in n]
     switched = any(np.ptp(log[n][np.isfinite(log[n])]) > 0 for n in valves)
     moving = [n for n in needed(log) if n.endswith("/x") or n == "body/z"]

@@ -6,12 +6,11 @@ What `scipy.signal.savgol_filter` gives; its import takes half a second of every
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from scipy.ndimage import correlate1d
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
+from kemba.identify.problem.types import Array
 
 
 def local_fit(values: Array, width: int, step: float, degree: int, derivative: int = 0) -> Array:

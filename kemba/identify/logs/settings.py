@@ -4,67 +4,35 @@ from __future__ import annotations
 
 import math
 
-from kemba.settings import BY_HAND, Settings, setting
 
-
-class GateSettings(Settings):
+class GateSettings:
     """When a log is refused."""
 
-    shortest: float = setting(0.15, "s", "a log must last at least so long", BY_HAND, decides=True)
-    fewest: int = setting(60, "1", "a log must have at least so many rows", BY_HAND, decides=True)
-    slowest: float = setting(
-        0.02,
-        "s",
-        "largest median distance of rows",
-        "convention: 50 rows a second; chambers of Table I need 8 to 37 ms to fill",
-        decides=True,
-    )
+    shortest = 0.15  # a log must last at least so long [s]
+    fewest = 60  # a log must have at least so many rows
+    # largest median distance of rows [s]: 50 rows a second; chambers of Table I need 8 to 37 ms to
+    # fill
+    slowest = 0.02
     # median distance of rows that suggests a time in ms [s]: nobody logs at 2 Hz, 1 kHz is usual
     milliseconds = 0.5
-    gaps: float = setting(
-        0.5, "s", "mean distance of rows that means long gaps", BY_HAND, decides=True
-    )
-    missing: float = setting(
-        0.3, "1", "share of readings of a needed column that may be missing", BY_HAND, decides=True
-    )
-    impossible: float = setting(
-        0.002,
-        "1",
-        "share of impossible readings that a needed column may have",
-        BY_HAND,
-        decides=True,
-    )
-    impossible_elsewhere: float = setting(
-        0.05, "1", "the same for columns that are not needed", BY_HAND, decides=True
-    )
+    gaps = 0.5  # mean distance of rows that means long gaps [s]
+    missing = 0.3  # share of readings of a needed column that may be missing
+    impossible = 0.002  # share of impossible readings that a needed column may have
+    impossible_elsewhere = 0.05  # the same for columns that are not needed
     # a valve column may be off 0 or 1 by this: a scaled voltage is off by a few per mille to a few
     # per cent
     valve = 0.02
     # readings beyond this, in the channel's SI unit, count as missing: a broken record, not a
     # measured value; its square would overflow
     absurd = 1e12
-    quiet: float = setting(
-        1e-4,
-        "1",
-        "noise over range below which a channel counts as noiseless",
-        BY_HAND,
-        decides=True,
-    )
-    frozen: int = setting(
-        40, "1", "equal readings in a row that mean a dead sensor", BY_HAND, decides=True
-    )
+    quiet = 1e-4  # noise over range below which a channel counts as noiseless
+    frozen = 40  # equal readings in a row that mean a dead sensor
     repeats = 0.2  # share of equal neighbours elsewhere that means a coarse sensor
-    fastest: float = setting(8.0, "m.s-1", "no piston moves faster", BY_HAND, decides=True)
-    leap: float = setting(
-        0.004, "m", "a position may be off by this between two rows", BY_HAND, decides=True
-    )
+    fastest = 8.0  # no piston moves faster [m.s-1]
+    leap = 0.004  # a position may be off by this between two rows [m]
     calm = 0.3  # a leap stands beside steps of less than this share of the largest
-    moves: float = setting(
-        2e-3, "m", "a position with less travel does not move", BY_HAND, decides=True
-    )
-    beyond: float = setting(
-        0.015, "m", "a position may read so far past the stroke", BY_HAND, decides=True
-    )
+    moves = 2e-3  # a position with less travel does not move [m]
+    beyond = 0.015  # a position may read so far past the stroke [m]
     dead = 200  # rows without any change that mean a dead sensor
 
 

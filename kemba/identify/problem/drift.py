@@ -7,44 +7,34 @@ and so it looks like a small force, or like a faulty sensor.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from kemba.identify.problem.sensor_noise import ColourSettings
-from kemba.settings import Settings, setting
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
+from kemba.identify.problem.types import Array
 
 
-class DriftColumnSettings(Settings):
+class DriftColumnSettings:
     """Drifts that any sensor may have."""
 
-    waves: int = setting(
-        8,
-        "1",
-        "cosines of a run",
-        "derived: 92 to 99 % of the variance of a lag of 1 s in 0.5 to 4 s",
-    )
-    size: float = setting(
-        1.0, "1", "sigma of a drift, in stated sigmas", "convention: as the noise"
-    )
+    waves = 8  # cosines of a run: 92 to 99 % of the variance of a lag of 1 s in 0.5 to 4 s
+    size = 1.0  # sigma of a drift, in stated sigmas: as the noise
 
 
 def drift_waves(time: Array) -> tuple[Array, Array]:
     """Cosines (n, d) of a run's rows at `time` (n,) [s], and the standard deviations (d,) that make
     a drift of them."""
     length = max(float(np.ptp(time)), 1e-9)
-    order = np.arange(float(DriftColumnSettings.current().waves))
+    order = np.arange(float(DriftColumnSettings.waves))
     return np.cos(np.pi * np.outer((time - time[0]) / length, order)), _sigmas(order, length)
 
 
 def _sigmas(order: Array, length: float) -> Array:
     """Standard deviations (d,) of cosines that make a lag of unit variance, over `length` [s]."""
-    memory = max(ColourSettings.current().drifts)
+    memory = max(ColourSettings.drifts)
     variance = np.where(order == 0, 0.5, 1.0) / (1.0 + (np.pi * order * memory / length) ** 2)
     mean = variance @ np.where(order == 0, 1.0, 0.5)
-    return np.asarray(DriftColumnSettings.current().size * np.sqrt(variance / mean))
+    return np.asarray(DriftColumnSettings.size * np.sqrt(variance / mean))
 
 
 @dataclass(frozen=True)

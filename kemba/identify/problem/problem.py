@@ -114,7 +114,7 @@ class Problem(ABC):
     def steps(self, theta: Theta, name: str) -> Iterable[tuple[dict[str, float], float]]:
         """Steps for a finite difference along `name`: changed entries of theta, and how far they
         go [the parameter's unit]. Two of them where both signs are possible."""
-        settings = StepSettings.current()
+        settings = StepSettings
         if name in self.nuisance:
             nominal, sigma = self.nuisance[name]
             h, value = settings.nuisance * sigma, theta.get(name, nominal)
@@ -283,11 +283,6 @@ class Problem(ABC):
         """Simple terms beyond the catalogue: formula -> whitened column (n,) per unit of its
         coefficient."""
         return {}
-
-    def weight(self, theta: Theta, formula: str, coefficient: float) -> float:
-        """Largest force of a formula as a share of what matters in practice. Default: infinite,
-        so that every formula counts."""
-        return math.inf
 
     def leftover(self, theta: Theta) -> Leftover | None:
         """What the model at theta leaves over, with what it may depend on; None: not known."""

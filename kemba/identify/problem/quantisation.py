@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from kemba.identify.problem.types import Array, Flags, Labels
-from kemba.settings import Settings, setting
 
 
-class QuantisationSettings(Settings):
+class QuantisationSettings:
     """How the step of a sensor is found."""
 
     # readings closer than this share of their range are one reading: conversion of units rounds in
@@ -19,34 +18,29 @@ class QuantisationSettings(Settings):
     near = 0.15  # distance from a whole number of steps that rounding in a file makes
     few = 5.5  # differences of more steps tell nothing, since the error of the step adds up
     most = 0.6  # share of differences that are whole steps; by chance 0.3 are
-    coarse: float = setting(
-        2.0,
-        "1",
-        "steps of so many sigmas of the noise are coarse",
-        "literature: below it, noise makes rounding errors independent (Widrow and Kollar 2008)",
-        decides=True,
-    )
+    # steps of so many sigmas of the noise are coarse: below it, noise makes rounding errors
+    # independent (Widrow and Kollar 2008)
+    coarse = 2.0
     longest = 1000  # rows at rest that count as one reading; of a longer rest more count
 
 
 def step_of(values: Array) -> float:
     """The step in which a channel (n,) is read, in its unit; 0 where it has none."""
-    settings = QuantisationSettings.current()
     known = np.unique(values[np.isfinite(values)])
     steps = np.diff(known)
     if not len(steps):
         return 0.0
-    steps = steps[steps > settings.same * np.ptp(known)]
+    steps = steps[steps > QuantisationSettings.same * np.ptp(known)]
     counts = steps / steps.min()
-    counts = counts[counts < settings.few]
-    whole = np.abs(counts - np.round(counts)) < settings.near
-    return float(steps.min()) if np.mean(whole) > settings.most else 0.0
+    counts = counts[counts < QuantisationSettings.few]
+    whole = np.abs(counts - np.round(counts)) < QuantisationSettings.near
+    return float(steps.min()) if np.mean(whole) > QuantisationSettings.most else 0.0
 
 
 def is_coarse(step: float, sigma: float) -> bool:
     """Whether a sensor's step is so much larger than its noise that rounding errors depend on each
     other."""
-    return step > QuantisationSettings.current().coarse * sigma
+    return step > QuantisationSettings.coarse * sigma
 
 
 def telling(values: Array, sigma: float) -> Flags:
@@ -72,7 +66,7 @@ def telling(values: Array, sigma: float) -> Flags:
 
 def _still(level: Labels) -> int:
     """How many of the first readings (n,), counted in steps, keep to one level or to two."""
-    level = level[: QuantisationSettings.current().longest]
+    level = level[: QuantisationSettings.longest]
     low, high = np.minimum.accumulate(level), np.maximum.accumulate(level)
     moved = high - low > 1
     return int(np.argmax(moved)) if moved.any() else len(moved)

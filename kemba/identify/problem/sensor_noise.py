@@ -11,15 +11,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.optimize import nnls
 
-from kemba.settings import BY_HAND, Settings, setting
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
-Flags = np.ndarray[Any, np.dtype[np.bool_]]
+from kemba.identify.problem.types import Array, Flags
 
 
 @dataclass(frozen=True)
@@ -41,7 +37,7 @@ class ChannelNoise:
         return np.asarray(np.where(apart == 0.0, self.white**2, 0.0) + lags)
 
 
-class ColourSettings(Settings):
+class ColourSettings:
     """How the colour of sensors is learnt."""
 
     # memories of coloured noise that are tried [s]: each twice the one before, from two rows to the
@@ -56,9 +52,7 @@ class ColourSettings(Settings):
     least = 0.6  # smallest noise that is believed, in stated sigmas: as on the bench
     sharpest = 0.1  # smallest share of the noise's sigma that is white: a sound filter
     slight = 0.5  # sigma of a lag below which it is left out, as a share of what is as fast
-    plain: float = setting(
-        10.0, "1", "gain in chi2 per lag from which a channel is coloured", BY_HAND, decides=True
-    )
+    plain = 10.0  # gain in chi2 per lag from which a channel is coloured
 
 
 @dataclass(frozen=True)
@@ -73,7 +67,7 @@ def chosen_noise(
     a: Array, b: Array, kinds: Sequence[Kind], most: Array, known: Flags
 ) -> tuple[ChannelNoise, ...]:
     """The noise of each channel: white, unless lags explain `b` (rows,) clearly better."""
-    settings = ColourSettings.current()
+    settings = ColourSettings
     scale = np.maximum(np.linalg.norm(a, axis=0), 1e-12)
     drift = min(settings.drifts)
 
@@ -115,7 +109,7 @@ def _sound(white: float, lags: Sequence[tuple[float, float]], most: float) -> Ch
     drift may be large, and colour beside it is what differs from row to row. Where the whole is
     more than `most`, the slowest lag gives way, if it is not the only one.
     """
-    settings = ColourSettings.current()
+    settings = ColourSettings
     whole = ChannelNoise(white, tuple(lags)).spread
     if len(lags) > 1 and whole > most:
         (slowest, memory), excess = lags[-1], whole**2 - most**2
@@ -154,7 +148,7 @@ def lag_noise(memory: float, h: Array, draws: int, rng: np.random.Generator) -> 
 
 def pairs(errors: Array) -> Array:
     """How many pairs of rows (m, lags) so many apart are known of errors (n, L, m)."""
-    good, lags = np.isfinite(errors), ColourSettings.current().lags
+    good, lags = np.isfinite(errors), ColourSettings.lags
     found = [(good[: len(good) - lag] & good[lag:]).sum(axis=(0, 1)) for lag in lags]
     return np.stack(found, axis=1).astype(float)
 
@@ -165,6 +159,6 @@ def covariances(columns: Array, errors: Array, counts: Array) -> Array:
     known = np.where(np.isfinite(errors)[..., None], columns, 0.0)
     # a channel's rows one after the other: each lag is one dot product, which BLAS takes
     z = np.ascontiguousarray(np.moveaxis(known, 2, 0)).reshape(errors.shape[2], len(errors), -1)
-    lags = ColourSettings.current().lags
+    lags = ColourSettings.lags
     total = [[np.vdot(one[: len(one) - lag], one[lag:]) for lag in lags] for one in z]
     return np.asarray(np.array(total) / columns.shape[-1] / np.maximum(counts, 1.0))

@@ -7,22 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from kemba.identify.problem.types import Array
-from kemba.settings import BY_HAND, Settings, setting
 
 
-class StepSettings(Settings):
+class StepSettings:
     """Steps of finite differences."""
 
-    nuisance: float = setting(
-        0.5, "1", "step of a nominal figure, in prior sigmas", BY_HAND, decides=True
-    )
-    parameter: float = setting(
-        0.05,
-        "1",
-        "step of a parameter that is on, as a share of its size or value",
-        BY_HAND,
-        decides=True,
-    )
+    nuisance = 0.5  # step of a nominal figure, in prior sigmas
+    parameter = 0.05  # step of a parameter that is on, as a share of its size or value
     absurd = 1e5  # residual in sigmas at which nothing can be predicted: beyond data
 
 
@@ -35,7 +26,7 @@ def mean_slope(base: Array, there: Sequence[Array], steps: Sequence[float]) -> A
     """Mean slope, shaped as the residuals `base`, of finite `steps` that lead to the residuals
     `there`; zero where every step leads to where nothing can be predicted: a rod that is driven
     through its cylinder's end leaves no volume to the air."""
-    absurd = StepSettings.current().absurd
+    absurd = StepSettings.absurd
     known = [i for i, r in enumerate(there) if np.all(np.abs(r) < absurd)]
     if not known:
         return np.zeros_like(base)

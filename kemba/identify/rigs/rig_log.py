@@ -12,23 +12,18 @@ from kemba.identify.logs.gate import BadData
 from kemba.identify.problem.types import Array
 from kemba.identify.rigs.filtering import Filtered, filtered
 from kemba.model.model import Model
-from kemba.settings import Settings, setting
 from kemba.trajectory import Trajectory
 
 ANSWER = {"cylinder": "piston/F", "drive": "axis/tau"}
 PLACE = {"cylinder": "piston/x", "drive": "axis/q"}
 
 
-class RigLogSettings(Settings):
+class RigLogSettings:
     """Which rows of a rig's log a friction is known in."""
 
-    doubted: float = setting(
-        2.0,
-        "1",
-        "travel after a turn within which friction is in doubt, over that in which seals stretch",
-        "convention: that travel is taken to be known to a factor of two",
-        decides=True,
-    )
+    # travel after a turn within which friction is in doubt, over that in which seals stretch: that
+    # travel is taken to be known to a factor of two
+    doubted = 2.0
     # time around a turn that the filter mixes into a row, over the filter's width: three sigmas of
     # the Gaussian
     blurred = 3.0
@@ -76,7 +71,7 @@ def prepare(log: Trajectory, model: Model) -> RigLog:
     doubt = 0.5 * (high - low)
     if "measured_chambers.travel" in model.parameters:
         travel = model.parameters["measured_chambers.travel"][1]
-        settings, step = RigLogSettings.current(), float(np.median(np.diff(found.time)))
+        settings, step = RigLogSettings, float(np.median(np.diff(found.time)))
         held = 1.0 - np.abs(_stretch(found, settings.doubted * travel))
         reach = 2 * int(np.ceil(settings.blurred * found.width / step)) + 1
         doubt = np.maximum(doubt, maximum_filter1d(held, reach)[found.rows])

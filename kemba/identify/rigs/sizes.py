@@ -16,22 +16,15 @@ from kemba.identify.problem.candidates import CandidateSettings
 from kemba.identify.problem.types import Array, Candidate, Parameter, Theta
 from kemba.identify.rigs.predictor import Predictor
 from kemba.identify.rigs.rig_log import RigLog
-from kemba.settings import BY_HAND, Settings, setting
 
 
-class RigSizeSettings(Settings):
+class RigSizeSettings:
     """What matters on a rig of the user's own."""
 
-    seal: float = setting(
-        200.0,
-        "N.m-1",
-        "usual friction of a cylinder over its bore",
-        "derived: cylinders of 25 mm break away at about 0.1 bar, which is 5 N",
-        decides=True,
-    )
-    drive: float = setting(
-        0.05, "1", "usual friction of a drive over its largest force", BY_HAND, decides=True
-    )
+    # usual friction of a cylinder over its bore [N.m-1]: cylinders of 25 mm break away at about 0.1
+    # bar, which is 5 N
+    seal = 200.0
+    drive = 0.05  # usual friction of a drive over its largest force
     large = 95.0  # percentile of the rows that counts as the largest [%]
     fading = 0.2  # rate at which a Stribeck friction fades, over the largest rate
     stretch = 1e-3  # travel until contacts slide, over the whole travel
@@ -41,7 +34,7 @@ class RigSizeSettings(Settings):
 
 def usual_force(predictor: Predictor, logs: Iterable[RigLog]) -> float:
     """A friction [N or N.m] that is neither small nor large on this rig."""
-    settings, bore = RigSizeSettings.current(), predictor.model.mechanism.bore
+    settings, bore = RigSizeSettings, predictor.model.mechanism.bore
     if bore is not None:
         return settings.seal * bore.bore
     forces = [np.abs(log.channels.others[predictor.answer]) for log in logs]
@@ -56,7 +49,7 @@ def sized(
     usual, found = usual_force(predictor, logs), {}
     typical = _typical(predictor, logs)
     base = np.concatenate([predictor.gap(log, {}) for log in logs])
-    percent = RigSizeSettings.current().large
+    percent = RigSizeSettings.large
     for name, candidate in candidates.items():
         if candidate.sensor and candidate.lead.unit == "s" and _hidden(predictor, logs, candidate):
             continue
@@ -83,7 +76,7 @@ def _hidden(predictor: Predictor, logs: tuple[RigLog, ...], candidate: Candidate
     if stretch is None:
         return False
     speed = np.concatenate([np.abs(log.speed) for log in logs])
-    fast = float(np.percentile(speed, RigSizeSettings.current().large))
+    fast = float(np.percentile(speed, RigSizeSettings.large))
     return fast * candidate.lead.size < stretch[1]
 
 
@@ -114,7 +107,7 @@ def _with_units(candidate: Candidate, predictor: Predictor) -> Candidate:
 
 def _typical(predictor: Predictor, logs: tuple[RigLog, ...]) -> dict[str, float]:
     """Where the search for shapes starts, by name in theta."""
-    settings = RigSizeSettings.current()
+    settings = RigSizeSettings
     speed = np.concatenate([np.abs(log.speed) for log in logs])
     places = np.concatenate([log.channels.q[log.channels.rows] for log in logs])
     fast, travel = float(np.percentile(speed, settings.large)), float(np.ptp(places))
@@ -145,7 +138,7 @@ def _strongest_period(predictor: Predictor, logs: tuple[RigLog, ...]) -> tuple[f
     left = _residual(base, force)
     travel = float(np.ptp(q))
     finest = max(travel / 300.0, 4.0 * float(np.median(np.abs(np.diff(q)))) + 1e-12)
-    count = RigSizeSettings.current().periods
+    count = RigSizeSettings.periods
     best, answer = 0.0, (travel / 3.0, 1.0)
     for period in np.geomspace(min(finest, travel / 3.0), travel / 1.5, count):
         wave = np.exp(2j * np.pi * q / period)

@@ -18,18 +18,15 @@ from kemba.identify.problem.types import Array, Rows, Theta
 from kemba.identify.rigs.blow_down import BlowDown
 from kemba.identify.rigs.candidates import standing_candidates
 from kemba.model.model import Model
-from kemba.settings import BY_HAND, Settings, setting
 from kemba.trajectory import Trajectory
 
 CHANNELS = ("vessel/P", "vessel/T")
 
 
-class VesselSettings(Settings):
+class VesselSettings:
     """How well a vessel's readings and its start are known."""
 
-    noise: float = setting(
-        0.01, "1", "noise of a reading over the range of its channel", BY_HAND, decides=True
-    )
+    noise = 0.01  # noise of a reading over the range of its channel
     warmth = 0.5  # smallest noise of a temperature [K]: IEC 60584 class 1 allows 1.5 K
     farthest = 3.0  # largest factor by which a figure is tried off
     late = 0.02  # usual delay of a sensor, such as a thermometer's, over a log's length
@@ -59,7 +56,7 @@ class VesselLog:
 
 def prepare(log: Trajectory, ambient: float) -> VesselLog:
     """The readings of a log; a vessel without a temperature at its first row is at `ambient`."""
-    settings, known = VesselSettings.current(), log.meta.get("noise", {})
+    settings, known = VesselSettings, log.meta.get("noise", {})
     readings, sigma = {}, {}
     for name in CHANNELS:
         if name in log:
@@ -88,7 +85,7 @@ class VesselProblem(Problem):
         self, logs: Sequence[VesselLog], model: Model, figures: Mapping[str, float] | None = None
     ) -> None:
         self.model, self.logs = model, tuple(logs)
-        settings = VesselSettings.current()
+        settings = VesselSettings
         self.runs = tuple(log.name for log in self.logs)
         sigmas = {n: float(np.median([g.sigma[n] for g in self.logs if n in g.sigma]))
                   for n in CHANNELS if any(n in g.sigma for g in self.logs)}  # fmt: skip
@@ -115,14 +112,14 @@ class VesselProblem(Problem):
             parts += [
                 (expected[name] - y) / log.sigma[name] for name, (_, y) in log.readings.items()
             ]
-        return bounded(np.concatenate(parts), RefitSettings.current().absurd)
+        return bounded(np.concatenate(parts), RefitSettings.absurd)
 
     def expected(self, theta: Theta, index: int) -> dict[str, Array]:
         """Channel -> what should have been read (k,), in its unit."""
         log = self.logs[index]
         blow, values = self._blow_down(theta), self._values(theta)
         shift = [theta.get(f"start:{name}[{index}]", 0.0) for name in CHANNELS]
-        far = VesselSettings.current().farthest
+        far = VesselSettings.farthest
         start = np.array(log.start) * np.clip(1.0 + np.array(shift) / log.start, 1.0 / far, far)
         time, states = blow.run(log.begin, log.begin + log.duration, start, values)
         found = {}
@@ -161,7 +158,7 @@ class VesselProblem(Problem):
     def _values(self, theta: Theta) -> dict[str, float]:
         nominal = {name: factor for name, (factor, _) in self.figures.items()}
         values = {n: theta.get(n, nominal.get(n, 0.0)) for n in self._blow_down(theta).names}
-        far = VesselSettings.current().farthest  # beyond, nothing can be predicted
+        far = VesselSettings.farthest  # beyond, nothing can be predicted
         return {
             n: float(np.clip(v, 1.0 / far, far)) if n in nominal else v for n, v in values.items()
         }

@@ -13,18 +13,15 @@ import numpy as np
 from kemba.errors import KembaError
 from kemba.identify.problem.types import Array, Rows
 from kemba.identify.robot.state import LinearisedState
-from kemba.settings import BY_HAND, Settings, setting
 from kemba.trajectory import Trajectory
 
 HINT = "correct it in a column map (--map)"
 
 
-class CommandSettings(Settings):
+class CommandSettings:
     """When the commands of a robot log are said to be mixed up."""
 
-    better: float = setting(
-        1.5, "1", "factor by which the other sign of torques must leave less", BY_HAND, decides=True
-    )
+    better = 1.5  # factor by which the other sign of torques must leave less
 
 
 def valve_mix_ups(
@@ -59,7 +56,7 @@ def _taken(log: Trajectory, source: dict[str, str], inverted: bool = False) -> T
 def turned_torques(state: LinearisedState, rows: Rows, r: Array) -> Iterator[KembaError]:
     """The sign of the hips' torques, where the other one leaves much less of the residual r (n,) of
     the hips of the model as it is."""
-    legs, limits = state.physics.legs, CommandSettings.current()
+    legs, limits = state.physics.legs, CommandSettings
     hips = [3 + i for i in range(len(legs))]
     groups = [*([(i,) for i in range(len(legs))] if len(legs) > 1 else []), tuple(range(len(legs)))]
     columns = {group: _turned(state, group) for group in groups}

@@ -25,12 +25,11 @@ from kemba.identify.robot.motion.batch import Batch
 from kemba.identify.robot.motion.contact import steady
 from kemba.mechanism.knee import flexion_of
 from kemba.mechanism.links import altered
-from kemba.settings import BY_HAND, Settings, setting
 
 LEVER = "boom_lever"
 
 
-class StandingSettings(Settings):
+class StandingSettings:
     """How lengths are found from feet that stand."""
 
     every = 0.005  # time between the samples that are used [s]
@@ -55,10 +54,9 @@ class StandingSettings(Settings):
     deep = 0.02  # depth below the ground at which no foot can be [m]
     often = 0.01  # share of samples so deep from which lengths are not believed
     gain = 6.0  # gain over faults of sensors alone from which lengths are believed [nats]
-    turned: float = setting(
-        12.0, "nats", "gain of the other sign of the pitch over any lengths, from which the sign "
-        "is said to be reversed", BY_HAND, decides=True,
-    )  # fmt: skip
+    # gain of the other sign of the pitch over any lengths, from which the sign is said to be
+    # reversed [nats]
+    turned = 12.0
     # prior sigma of the zero of the pitch where its sign is judged: no zero is taken for a sign
     # [rad]
     pitch = 0.05
@@ -87,7 +85,7 @@ class Standing:
     ) -> None:
         self.names, self.legs = tuple(names), len(physics.legs)
         dt = float(np.median(batch.h[batch.valid]))
-        step = max(1, round(StandingSettings.current().every / dt))
+        step = max(1, round(StandingSettings.every / dt))
         q = batch.flat(reference.q)[::step]
         y = physics.call("seen", q, 0 * q, p=physics.nominal)[0]
         lift = steady(reference.a[..., 1:2], dt) / physics.mechanism.need_robot().gravity
@@ -144,7 +142,7 @@ def standing_lengths(
     if not sizes:
         return StandingLengths()
     standing = Standing(physics, batch, reference, tuple(sizes))
-    settings, legs = StandingSettings.current(), standing.legs
+    settings, legs = StandingSettings, standing.legs
     zeros = [settings.angle, settings.body, *[settings.angle] * legs, *[settings.piston] * legs]
     lengths, zeros = [settings.prior * size for size in sizes.values()], [*zeros, settings.sink]
     free = np.array([*lengths, *zeros, settings.lever])
@@ -195,19 +193,19 @@ def _is_turned(standing: Standing, x: Array, width: Array, rows: Flags) -> bool:
     Judged by the samples (n, legs) that stand with either: `rows` with this sign, fitted by `x`.
     """
     loose, turned = width.copy(), standing.turned()
-    loose[len(standing.names)] = StandingSettings.current().pitch
+    loose[len(standing.names)] = StandingSettings.pitch
     drawn = loose.copy()
-    drawn[: len(standing.names)] *= StandingSettings.current().held
+    drawn[: len(standing.names)] *= StandingSettings.held
     either = rows | _refined(turned, np.zeros(len(x)), drawn)[2]
     _, best, _ = _refined(standing, x, loose, either)
     _, other, _ = _refined(turned, np.zeros(len(x)), drawn, either)
-    return best - other > StandingSettings.current().turned
+    return best - other > StandingSettings.turned
 
 
 def _drawn(standing: Standing, x: Array, width: Array, rows: Flags) -> Iterator[float]:
     """Costs of the fits with the lengths of the model: with zeros as exact as they are supposed to
     be, and with the zero of the height, of the pitch or of the hips in doubt."""
-    settings, first = StandingSettings.current(), len(standing.names)
+    settings, first = StandingSettings, len(standing.names)
     hips = range(first + 2, first + 2 + standing.legs)
     doubts = ((), [first + 1], [first], list(hips))
     for places, wide in zip(
@@ -224,7 +222,7 @@ def _only(
     """The refined fit with all lengths but the `free` ones as the model has them."""
     held = np.array([i not in free for i in range(len(standing.names))])
     narrow, begin = width.copy(), x.copy()
-    narrow[: len(held)][held] *= StandingSettings.current().held
+    narrow[: len(held)][held] *= StandingSettings.held
     begin[: len(held)][held] = 0.0
     return _refined(standing, begin, narrow, rows)
 
@@ -236,7 +234,7 @@ def _most_rows(heights: Array) -> int:
 
 def _crowd(heights: Array) -> Array:
     """The heights of the samples that stand at one height near that of the ground."""
-    settings = StandingSettings.current()
+    settings = StandingSettings
     near = np.sort(heights[np.abs(heights) < settings.level])
     ends = np.searchsorted(near, near + settings.window)
     first = int(np.argmax(ends - np.arange(len(near)))) if len(near) else 0
@@ -248,7 +246,7 @@ def _refined(
 ) -> tuple[Array, float, Flags]:
     """The best x (k,) with prior widths (k,), half the sum of squares, and the samples (n, legs)
     that stand; `rows`: which samples are known to."""
-    settings = StandingSettings.current()
+    settings = StandingSettings
     weight = 1.0 / (settings.noise * np.sqrt(settings.together))
     cost = 0.0
     for band in settings.bands:
@@ -271,7 +269,7 @@ def _fit(
     def slopes(z: Array) -> Array:
         return np.vstack([weight * standing.heights(z * width)[1][rows] * width, np.eye(len(z))])
 
-    reach = StandingSettings.current().reach
+    reach = StandingSettings.reach
     start = np.clip(x / width, -0.99 * reach, 0.99 * reach)
     found = least_squares(
         residual, start, slopes, (-reach, reach), loss="soft_l1", f_scale=2.0, max_nfev=10

@@ -12,7 +12,7 @@ import numpy as np
 from kemba.identify.compare.missing_force import spans
 from kemba.identify.problem.problem import Array, MissingForce, Theta
 from kemba.identify.robot.dynamics.reference import densities
-from kemba.identify.robot.dynamics.settings import QuietForceDensity
+from kemba.identify.robot.dynamics.settings import QUIET
 from kemba.identify.robot.motion.filter import System, gains, smooth_with_band
 from kemba.identify.robot.state import LinearisedState
 
@@ -44,7 +44,7 @@ def robot_missing(
     sigma = begin if strength is None else strength
     moment = np.isin(kinds, ("pitch", "hip"))
     least = np.where(moment, settings.negligible_moment, settings.negligible)
-    quiet = densities(state.physics, state.batch, state.schedules, QuietForceDensity.current())
+    quiet = densities(state.physics, state.batch, state.schedules, QUIET)
     y, g = state.measurement(theta), state.acceleration(theta)
     valid, k = state.batch.valid, len(names)
     for _ in range(settings.rounds if strength is None else 1):

@@ -12,15 +12,12 @@ from kemba.identify.robot.motion.batch import Batch
 from kemba.identify.robot.motion.colour import Noise
 from kemba.identify.robot.motion.learnt import learnt_noise
 from kemba.identify.robot.state import LinearisedState
-from kemba.settings import BY_HAND, Settings, setting
 
 
-class SensorNoiseSettings(Settings):
+class SensorNoiseSettings:
     """How far learnt noise may differ from what was known before."""
 
-    stated: float = setting(
-        1.5, "1", "largest learnt noise, in sigmas that a sidecar states", BY_HAND, decides=True
-    )
+    stated = 1.5  # largest learnt noise, in sigmas that a sidecar states
     # the same, in sigmas that were told from differences of rows: third differences show a tenth of
     # AR(1) noise of 0.98 per row
     guessed = 10.0
@@ -28,7 +25,7 @@ class SensorNoiseSettings(Settings):
 
 def stated_noise(batch: Batch) -> tuple[ChannelNoise, ...]:
     """The noise of each channel as the sidecars state it: white where they state no time."""
-    white = ColourSettings.current().sharpest
+    white = ColourSettings.sharpest
     rest = float(np.sqrt(1.0 - white**2))
     return tuple(
         ChannelNoise(white, ((rest, float(memory)),)) if np.isfinite(memory) else ChannelNoise()
@@ -39,7 +36,7 @@ def stated_noise(batch: Batch) -> tuple[ChannelNoise, ...]:
 def with_drifts(noise: Noise, batch: Batch) -> tuple[ChannelNoise, ...]:
     """The noise of each channel with a drift of one stated sigma, where it has none and no
     correlation time is stated."""
-    fastest, slowest = min(ColourSettings.current().drifts), max(ColourSettings.current().drifts)
+    fastest, slowest = min(ColourSettings.drifts), max(ColourSettings.drifts)
     channels = noise or [ChannelNoise()] * len(batch.memory)
 
     def drifts(channel: ChannelNoise) -> bool:
@@ -54,7 +51,7 @@ def with_drifts(noise: Noise, batch: Batch) -> tuple[ChannelNoise, ...]:
 def learnt_from(state: LinearisedState, left: Array, drifts: bool) -> tuple[ChannelNoise, ...]:
     """The noise of each channel, learnt from the rows `left` (rows,) that a flexible model leaves;
     as stated where a correlation time is stated. `drifts`: slow drifts are looked for, too."""
-    motion, batch, settings = state.motion, state.batch, SensorNoiseSettings.current()
+    motion, batch, settings = state.motion, state.batch, SensorNoiseSettings
     k = motion.ref.q.shape[2]
     pushed = motion.inverse @ motion.channels[..., :k]
     most = np.where(batch.stated, settings.stated, settings.guessed)

@@ -49,16 +49,13 @@ from kemba.identify.robot.operating_point import changes, robot_operating_point
 from kemba.identify.robot.state import LinearisedState, linearise_at
 from kemba.identify.robot.validate import faults_of
 from kemba.model.model import Model
-from kemba.settings import BY_HAND, Settings, setting
 from kemba.trajectory import Trajectory
 
 
-class RobotProblemSettings(Settings):
+class RobotProblemSettings:
     """Over how long the errors of robot logs are summed."""
 
-    window: int = setting(
-        20, "1", "rows over which one-step errors are summed", BY_HAND, decides=True
-    )
+    window = 20  # rows over which one-step errors are summed
     predicted = 0.05  # time of a prediction that tells an error in a channel's unit [s]
 
 
@@ -83,8 +80,8 @@ class RobotProblem(Problem):
         figures: Mapping[str, tuple[float, float]] | None = None,
     ) -> None:
         self.logs = tuple(logs)
-        self.window = RobotProblemSettings.current().window  # innovations are one-step errors
-        self.model, self.unknown = model, unknown or ForceDensity.current()
+        self.window = RobotProblemSettings.window  # innovations are one-step errors
+        self.model, self.unknown = model, unknown or ForceDensity()
         if any(log.meta.get("torques") is False for log in logs):
             self.unknown = replace(self.unknown, hip=10.0)  # N2.m2.s: 10 N.m for 0.1 s
         found = robot_candidates(model)
@@ -241,7 +238,7 @@ class RobotProblem(Problem):
         the measured motion; contact forces are the data's."""
         state, batch = self.state, self.batch
         row = float(np.median(batch.h[batch.valid]))
-        steps = max(2, round(RobotProblemSettings.current().predicted / row))
+        steps = max(2, round(RobotProblemSettings.predicted / row))
         y = np.nan_to_num(state.measurement(theta))
         errors = predicted_error(state.motion.system, y, state.acceleration(theta), steps)
         return {

@@ -27,7 +27,7 @@ from kemba.identify.robot.dynamics.reference import (
     first_reference,
     read_schedules,
 )
-from kemba.identify.robot.dynamics.settings import ForceDensity, LooseForceDensity
+from kemba.identify.robot.dynamics.settings import LOOSE, ForceDensity
 from kemba.identify.robot.motion.batch import Batch
 from kemba.identify.robot.motion.colour import Noise
 from kemba.identify.robot.motion.contact import ContactSchedule, loaded
@@ -191,8 +191,7 @@ def linearise_at(
     reference = _without_delays(batch, late - rows * dt, first)
     schedules = read_schedules(physics, batch, reference, p)
     for _ in range(StateSettings.rounds):
-        loose = LooseForceDensity.current()
-        state = _along(physics, batch, sensors, base, ground, schedules, reference, loose, noise)
+        state = _along(physics, batch, sensors, base, ground, schedules, reference, LOOSE, noise)
         y, g = state.measurement(base), state.acceleration(base)
         reference = smoothed(state.motion, state.gain, y, g)
         if sensors.present or any(map(is_fault, base)):  # as true sensors would have seen it

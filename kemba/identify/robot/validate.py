@@ -14,31 +14,16 @@ from kemba.identify.robot.commands import HINT, CommandSettings, turned_torques,
 from kemba.identify.robot.geometry import StandingLengths
 from kemba.identify.robot.mix_ups import mixed_up
 from kemba.identify.robot.state import LinearisedState
-from kemba.settings import BY_HAND, Settings, setting
 from kemba.trajectory import Trajectory
 
 
-class RobotValidateSettings(Settings):
+class RobotValidateSettings:
     """When robot logs contradict themselves or any model."""
 
-    deep: float = setting(
-        0.04,
-        "m",
-        "depth of a foot below the ground that no sensor's fault makes",
-        BY_HAND,
-        decides=True,
-    )
-    often: float = setting(
-        0.03, "1", "share of the rows in which it must be so deep", BY_HAND, decides=True
-    )
-    absurd: float = setting(
-        15.0,
-        "1",
-        "rms one-step error, in sigmas, that no missing effect makes",
-        BY_HAND,
-        decides=True,
-    )
-    faulty: float = setting(4.0, "1", "largest fault of a sensor, in sizes", BY_HAND, decides=True)
+    deep = 0.04  # depth of a foot below the ground that no sensor's fault makes [m]
+    often = 0.03  # share of the rows in which it must be so deep
+    absurd = 15.0  # rms one-step error, in sigmas, that no missing effect makes
+    faulty = 4.0  # largest fault of a sensor, in sizes
 
 
 class JudgedLogs(Protocol):
@@ -87,7 +72,7 @@ def _is_absurd(problem: JudgedLogs, rows: Rows, r: Array) -> bool:
     channels = problem.state.physics.channels
     runs = range(len(problem.logs))
     power = [max(_power(channels, r, rows, rows.run == i).values(), default=0.0) for i in runs]
-    return max(power) > RobotValidateSettings.current().absurd
+    return max(power) > RobotValidateSettings.absurd
 
 
 def _turned(found: StandingLengths, runs: Sequence[str]) -> Iterator[KembaError]:
@@ -112,7 +97,7 @@ def _valves(problem: JudgedLogs, r: Array) -> list[KembaError]:
             found.append((float(np.sqrt(np.mean(left**2))), text))
     before = float(np.sqrt(np.mean(r**2)))
     after, text = min(found, default=(before, ""))
-    if after > before / CommandSettings.current().better:
+    if after > before / CommandSettings.better:
         return []
     what = f"the logs err by {before:.1f} times their noise, and by {after:.1f} times then"
     return [KembaError(", ".join(problem.runs), text, what, HINT)]
@@ -126,7 +111,7 @@ def contradictions(
     `rows` and `r` (n,): the residual of the model as it is. `sensor_columns`: gives the columns
     (n, k) of all sensor faults per size; it is called only where a residual is too large.
     """
-    absurd = RobotValidateSettings.current().absurd
+    absurd = RobotValidateSettings.absurd
     forgiven: Array | None = None
     for i, log in enumerate(state.batch.resampled):
         sunk = list(_sunk(state, i))
@@ -149,7 +134,7 @@ def contradictions(
 
 def _sunk(state: LinearisedState, run: int) -> Iterator[KembaError]:
     """Feet that would be far below the ground for long."""
-    limits = RobotValidateSettings.current()
+    limits = RobotValidateSettings
     legs, log = state.physics.legs, state.batch.resampled[run]
     heights = state.motion.places[: len(log.time), run, 1 : 2 * len(legs) : 2]
     for leg, height in zip(legs, heights.T, strict=True):
@@ -178,7 +163,7 @@ def _forgiven(r: Array, columns: Array) -> Array:
     """The residual (n,) less what faults of sensors can explain: these are to be found, not
     refused. `columns` (n, k) per size of each fault."""
     gram = columns.T @ columns + 1e-9 * np.eye(columns.shape[1])
-    faulty = RobotValidateSettings.current().faulty
+    faulty = RobotValidateSettings.faulty
     lower = np.linalg.cholesky(gram)
     wanted = np.linalg.solve(lower, -columns.T @ r)
     found = lsq_linear(lower.T, wanted, bounds=(-faulty, faulty))

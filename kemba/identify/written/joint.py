@@ -167,7 +167,7 @@ def _judged(
     slopes = problem.jacobian(theta, (*names, *(c.key for c in absent)))
     jacobian, r = slopes[:, : len(names)], problem.residual(theta)
     parameters = problem.parameters()
-    slab, spike = SpikeSlabSettings.current().slab, SpikeSlabSettings.current().spike
+    slab, spike = SpikeSlabSettings.slab, SpikeSlabSettings.spike
     width = [
         slab * parameters[k].size * (theta[k] if is_shape(problem, k) else 1.0) for k in keys
     ] + [problem.nuisance[n][1] for n in (*own, *others)]

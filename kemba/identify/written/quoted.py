@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from kemba.files import sha256
-from kemba.identify.evidence.noise.colour import with_learnt_colour
+from kemba.identify.evidence.colour import with_learnt_colour
 from kemba.identify.evidence.windows import error_ratio, free_starts
 from kemba.identify.problem.problem import Array, Problem
 from kemba.mechanism.robot_file import robot_files

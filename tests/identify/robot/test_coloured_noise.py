@@ -12,7 +12,7 @@ from twin import catalogue, measure
 
 from kemba.identify.compare.compare import compare
 from kemba.identify.discover import discover
-from kemba.identify.evidence.noise.colour import DriftSettings, log_likelihood, with_learnt_colour
+from kemba.identify.evidence.colour import DriftSettings, log_likelihood, with_learnt_colour
 from kemba.identify.problem.sensor_noise import ChannelNoise
 from kemba.identify.robot.motion.colour import coloured, simulated
 from kemba.identify.robot.problem import RobotProblem, robot_problem
@@ -92,7 +92,7 @@ def test_logs_tell_whether_their_sensors_drift(drift: float) -> None:
     drifting = found.drifting()
     assert drifting is not None and drifting.drifting() is None
     gain = log_likelihood(drifting, {}) - log_likelihood(found, {})
-    assert (gain > DriftSettings.current().strong) == (drift > 0.0)
+    assert (gain > DriftSettings.strong) == (drift > 0.0)
 
 
 @pytest.mark.parametrize(

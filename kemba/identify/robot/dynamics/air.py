@@ -9,13 +9,13 @@ import casadi as ca
 import numpy as np
 
 from kemba.effects.pneumatics.switching import delayed, instants, is_on
+from kemba.identify.problem.types import Array
 from kemba.identify.robot.motion.resampled import ResampledLog
 from kemba.machine_code import Native
 from kemba.model.exponential import midpoint_step
 from kemba.model.rest import Rest
 from kemba.quantity import Quantity
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
 Index = np.ndarray[Any, np.dtype[np.int_]]
 
 

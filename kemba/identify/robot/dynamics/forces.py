@@ -7,13 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from kemba.identify.problem.types import Array
 from kemba.identify.robot.dynamics.air import Index
 from kemba.identify.robot.dynamics.inputs import Inputs, air_states, read_inputs
 from kemba.identify.robot.dynamics.linear import LinearisedMotion
 from kemba.identify.robot.dynamics.physics import Physics
 from kemba.identify.robot.motion.batch import Batch
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
 class ForcesSettings:

@@ -4,22 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
-from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from kemba.identify.problem.nominal import leg_by_leg, link_figures, nominal_figures
+from kemba.identify.problem.types import Array, Flags
 from kemba.identify.robot.dynamics.air import Index, StateRunner
 from kemba.identify.robot.dynamics.samples import SampleMap
 from kemba.mechanism.robot import link_regressors
 from kemba.model.model import Model
 from kemba.model.rest import rate_of
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
 FOLDED = 2.9  # rad; a knee folds less far, whatever the lengths of its leg
-
-Flags = np.ndarray[Any, np.dtype[np.bool_]]
 
 
 class FigureSettings:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from kemba.identify.problem.types import Array
 from kemba.identify.robot.dynamics.physics import Physics
 from kemba.identify.robot.dynamics.settings import (
     ContactForceSettings,
@@ -17,8 +18,6 @@ from kemba.identify.robot.dynamics.settings import (
 from kemba.identify.robot.motion.batch import Batch
 from kemba.identify.robot.motion.contact import ContactSchedule, read_schedule
 from kemba.identify.robot.motion.filter import System, gains, smooth
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
 @dataclass(frozen=True)

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import casadi as ca
 import numpy as np
 
+from kemba.identify.problem.types import Array
 from kemba.machine_code import Native
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
 class SampleMap:

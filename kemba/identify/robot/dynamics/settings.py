@@ -6,35 +6,22 @@ Forces are white noise of a spectral density: variance times seconds, N2.s or N2
 from __future__ import annotations
 
 import math
-
-from kemba.settings import BY_HAND, Settings, setting
-
-
-class ForceDensity(Settings):
-    """Density of the forces that no model explains, by channel."""
-
-    body: float = setting(5e-3, "N2.s", "force on the body", BY_HAND, decides=True)
-    pitch: float = setting(2e-4, "N2.m2.s", "moment on the body", BY_HAND, decides=True)
-    hip: float = setting(2e-4, "N2.m2.s", "torque at a hip", BY_HAND, decides=True)
-    rod: float = setting(2e-2, "N2.s", "force on a rod", BY_HAND, decides=True)
+from dataclasses import dataclass
 
 
-class LooseForceDensity(ForceDensity):
-    """The same while the motion is smoothed: the motion follows the data."""
+@dataclass(frozen=True)
+class ForceDensity:
+    """Density of the forces that no model explains: force on the `body` [N2.s], moment on it
+    (`pitch`) and torque at a `hip` [N2.m2.s], force on a `rod` [N2.s]."""
 
-    body: float = setting(0.05, "N2.s", "force on the body", BY_HAND)
-    pitch: float = setting(2e-3, "N2.m2.s", "moment on the body", BY_HAND)
-    hip: float = setting(2e-3, "N2.m2.s", "torque at a hip", BY_HAND)
-    rod: float = setting(0.5, "N2.s", "force on a rod", BY_HAND)
+    body: float = 5e-3
+    pitch: float = 2e-4
+    hip: float = 2e-4
+    rod: float = 2e-2
 
 
-class QuietForceDensity(ForceDensity):
-    """The same while a missing force is estimated: all that is unknown belongs to it."""
-
-    body: float = setting(1e-5, "N2.s", "force on the body", "convention: as good as none")
-    pitch: float = setting(1e-6, "N2.m2.s", "moment on the body", "convention: as good as none")
-    hip: float = setting(1e-6, "N2.m2.s", "torque at a hip", "convention: as good as none")
-    rod: float = setting(1e-5, "N2.s", "force on a rod", "convention: as good as none")
+LOOSE = ForceDensity(0.05, 2e-3, 2e-3, 0.5)  # while the motion is smoothed: it follows the data
+QUIET = ForceDensity(1e-5, 1e-6, 1e-6, 1e-5)  # as good as none: all that is unknown is missing
 
 
 class ContactForceSettings:

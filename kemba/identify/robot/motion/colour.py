@@ -9,15 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from kemba.identify.problem.sensor_noise import ChannelNoise
+from kemba.identify.problem.types import Array
 from kemba.identify.robot.motion.filter import System
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
-
 
 Noise = Sequence[ChannelNoise]  # one per channel; empty: all are white
 

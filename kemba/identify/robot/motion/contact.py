@@ -17,9 +17,7 @@ from scipy.ndimage import (
 )
 
 from kemba.identify.logs.local_fit import local_fit
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
-Flags = np.ndarray[Any, np.dtype[np.bool_]]
+from kemba.identify.problem.types import Array, Flags
 
 
 class ContactSettings:

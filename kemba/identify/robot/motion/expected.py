@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from kemba.identify.problem.types import Array
 from kemba.identify.robot.motion.colour import simulated
 from kemba.identify.robot.motion.filter import FilterGains, System, innovations
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
 class ExpectedSettings:

@@ -7,7 +7,6 @@ sensor.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -21,9 +20,8 @@ from kemba.identify.problem.sensor_noise import (
     pairs,
     weighted,
 )
+from kemba.identify.problem.types import Array
 from kemba.identify.robot.motion.filter import FilterGains, System, innovations
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
 def learnt_noise(
@@ -43,7 +41,7 @@ def learnt_noise(
     force that may be missing. `most` (channels,): largest spread that is believed. `drifts`: slow
     drifts are looked for as well; only where the model is good, for what it lacks is slow, too.
     """
-    settings, channels = ColourSettings.current(), sigma.shape[1]
+    settings, channels = ColourSettings, sigma.shape[1]
     counts = pairs(errors)
     measured = covariances(errors[..., None], errors, counts)
     known = counts[:channels, 0] >= settings.fewest
@@ -68,7 +66,7 @@ def learnt_noise(
 
 def _channel_noise(memory: float, channel: int, sigma: Array, h: Array, m: int) -> Array:
     """Noise (n, L, m, draws) of one channel, of one stated sigma; `memory` [s]: 0 is white."""
-    draws = ColourSettings.current().draws
+    draws = ColourSettings.draws
     rng = np.random.default_rng(17 + channel)
     y = np.zeros((*h.shape, m, draws))
     y[:, :, channel] = sigma[:, channel, None] * lag_noise(memory, h, draws, rng)
@@ -77,6 +75,6 @@ def _channel_noise(memory: float, channel: int, sigma: Array, h: Array, m: int) 
 
 def _force_noise(memory: float, push: Array, h: Array) -> Array:
     """Accelerations (n, L, k, draws) of one force of unit sigma."""
-    draws = ColourSettings.current().draws
+    draws = ColourSettings.draws
     force = lag_noise(memory, h, draws, np.random.default_rng(5))
     return np.asarray(push[..., None] * force[:, :, None])

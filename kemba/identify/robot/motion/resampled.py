@@ -11,9 +11,8 @@ import numpy as np
 from kemba.effects.pneumatics.switching import Pulse, pulses
 from kemba.effects.sensors import CHANNELS
 from kemba.identify.problem.noise import WhiteNoiseSettings, difference_sigma
+from kemba.identify.problem.types import Array
 from kemba.trajectory import Trajectory
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
 class ResamplingSettings:

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from kemba.effects.sensors import SensorEffect, as_measured
 from kemba.effects.series import Series
+from kemba.identify.problem.types import Array
 from kemba.identify.robot.motion.resampled import ResampledLog
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
 class SensingSettings:

@@ -5,22 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from kemba.identify.evidence.linear import Linear, is_on, linearise, time_blocks
-from kemba.identify.evidence.modes.small_effects import mode_of
+from kemba.identify.evidence.small_effects import mode_of
 from kemba.identify.problem.problem import Array, Labels, Problem, Theta
 from kemba.identify.problem.sensor_faults import moves_readings
-from kemba.settings import Settings, setting
 
 
-class DriftSettings(Settings):
+class DriftSettings:
     """When the sensors are taken to drift."""
 
-    strong: float = setting(
-        3.0,
-        "nats",
-        "evidence from which sensors drift",
-        "literature: Kass and Raftery 1995, twenty to one",
-        decides=True,
-    )
+    strong = 3.0  # evidence from which sensors drift [nats]: Kass and Raftery 1995, twenty to one
 
 
 def with_learnt_colour(
@@ -49,7 +42,7 @@ def _with_drift(problem: Problem, theta: Theta) -> Problem:
     if drifting is None:
         return problem
     gain = log_likelihood(drifting, theta) - log_likelihood(problem, theta)
-    return drifting if gain > DriftSettings.current().strong else problem
+    return drifting if gain > DriftSettings.strong else problem
 
 
 def log_likelihood(problem: Problem, theta: Theta) -> float:

@@ -6,30 +6,21 @@ import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 
 from kemba.identify.problem.problem import Array, Labels
-from kemba.settings import BY_HAND, Settings, setting
 
 
-class LeftOutNoiseSettings(Settings):
+class LeftOutNoiseSettings:
     """How much of the noise a fit may have taken for effects."""
 
-    most: float = setting(
-        4.0,
-        "1",
-        "largest factor by which what is left of a block is enlarged: of what acts in one block "
-        "only nobody can tell whether it is noise",
-        BY_HAND,
-        decides=True,
-    )
-    power: float = setting(
-        1.0, "1", "of (I - H)^-1, by which what is left is enlarged; 1: errors of left-out data",
-        "derived: 200 bench machines, whose noise then has 3.5 instead of 4.0 times its power",
-        decides=True,
-    )  # fmt: skip
-    power_in_motion: float = setting(
-        0.5, "1", "the same where the motion depends on the model; 0.5: power of white noise",
-        "tuned: robot logs with noise of 10 ms; with 1 hidden effects had p of 0.08 and 0.13, with "
-        "0.5 0.0025 to 0.012, logs of a clean robot 1.0 by both", decides=True,
-    )  # fmt: skip
+    # largest factor by which what is left of a block is enlarged: of what acts in one block only
+    # nobody can tell whether it is noise
+    most = 4.0
+    # of (I - H)^-1, by which what is left is enlarged; 1: errors of left-out data; 200 bench
+    # machines, whose noise then has 3.5 instead of 4.0 times its power
+    power = 1.0
+    # the same where the motion depends on the model; 0.5: power of white noise; robot logs with
+    # noise of 10 ms; with 1 hidden effects had p of 0.08 and 0.13, with 0.5 0.0025 to 0.012, logs
+    # of a clean robot 1.0 by both
+    power_in_motion = 0.5
 
 
 def left_out_noise(
@@ -54,6 +45,6 @@ def _enlarged(own: Array, left: Array, root: Array, power: float) -> Array:
     """(I - H)^-power J'e (k,) of one block, by the directions of its share H in what is known."""
     seen = solve_triangular(root, own.T, lower=True)
     share, directions = np.linalg.eigh(seen @ seen.T)
-    most = LeftOutNoiseSettings.current().most
+    most = LeftOutNoiseSettings.most
     factor = np.clip(1.0 - share, 1.0 / most, 1.0) ** -power
     return np.asarray(directions @ (factor * (directions.T @ (seen @ left))))

@@ -13,8 +13,10 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from kemba.errors import KembaError
+from kemba.identify.evidence.bounded import effect_bounds
 from kemba.identify.evidence.linear import Linear, estimate, priors, usual_shapes
-from kemba.identify.evidence.modes.bounded import effect_bounds
+from kemba.identify.evidence.null_model import Baseline
+from kemba.identify.evidence.point import LinearisationPoint
 from kemba.identify.evidence.refit import Fit
 from kemba.identify.evidence.spike_slab import Hypothesis, Ranker
 from kemba.identify.evidence.windows import START
@@ -165,3 +167,32 @@ class ThoroughFit:
             return bounded(self.problem.residual(theta), worst)
         except KembaError:
             return np.full(len(self.problem.rows()), worst)
+
+
+def without(problem: Problem, theta: Theta, hypothesis: Hypothesis) -> dict[str, float]:
+    """Theta without the parameters of a hypothesis."""
+    own = _keys(problem, hypothesis)
+    return {k: v for k, v in theta.items() if k not in own}
+
+
+def with_own(
+    problem: Problem, theta: Theta, hypothesis: Hypothesis, own: Theta
+) -> dict[str, float]:
+    """Theta with the parameters of a hypothesis as `own` has them."""
+    keys = _keys(problem, hypothesis)
+    return without(problem, theta, hypothesis) | {k: v for k, v in own.items() if k in keys}
+
+
+def _keys(problem: Problem, hypothesis: Hypothesis) -> set[str]:
+    return {key for effect in hypothesis for key in tuple(problem.candidates[effect].keys())}
+
+
+def promised(base: Baseline, point: LinearisationPoint) -> float:
+    """What slopes say the cost of a mode can still fall by [nats]."""
+    linear = point.mode.linear
+    weight = base.ranker(linear).widths(point.hypothesis, 1.0) ** -2.0
+    gram, slope, power = linear.total
+    off = linear.mean - linear.at
+    pull = weight * off - slope
+    step = np.linalg.solve(gram + np.diag(weight), pull)
+    return point.mode.cost - 0.5 * float(power + weight @ off**2 - pull @ step)

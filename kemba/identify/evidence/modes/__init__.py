@@ -1,1 +1,0 @@
-"""Where a hypothesis fits best: with a little of all other effects, and within all bounds."""
