@@ -68,3 +68,11 @@ def test_left_out_data_are_predicted_with_what_a_parameter_can_be() -> None:
         found = within_tolerance(search, linear, BOTH)
         assert found[linear.index("bend.a")] == pytest.approx(expected, abs=0.5)
         assert found[linear.index("bend.a")] <= largest + 1e-9
+
+
+def test_a_large_effect_does_not_end_at_a_bound() -> None:
+    """As a zero that is off by ten times what is usual: nine sizes here, where a slab has 0.7."""
+    search = Search(Toy({"bend.a": 90.0}))
+    search.start()
+    search.visit(("bend",))
+    assert search.points[("bend",)].fit.theta["bend.a"] == pytest.approx(90.0, rel=0.03)

@@ -23,7 +23,10 @@ class RefitSettings:
     cost = 3e-6  # relative change of the cost at which a fit ends
     change = 1e-4  # relative change of x at which a fit ends
     step = 0.03  # step of finite differences, in prior widths
-    bound = 8.0  # largest distance from the prior mean, in widths
+    bound = 8.0  # largest distance of a nominal figure or a shape from its prior mean, in widths
+    # the same of an effect that is there: a zero may be off by any amount, and what is found must
+    # not end at a bound
+    large = 40.0
     farthest = 3.0  # largest start of a switch, in sizes
     nearest = 0.1  # smallest start of a switch, in sizes
     # a shape also starts at its default times and over this, if within two prior widths
@@ -182,7 +185,9 @@ class _LeastSquares:
 
     def _bounds(self) -> tuple[Array, Array]:
         n, bound = len(self.nuisance), self.settings.bound
-        lower, upper = np.full(n + len(self.own), -bound), np.full(n + len(self.own), bound)
+        far = [self.settings.large if key in self.switches else bound for key in self.own]
+        upper = np.array([bound] * n + far)
+        lower = -upper
         for i, name in enumerate(self.nuisance):
             nominal, sigma = self.problem.nuisance[name]
             low, high = self.problem.limits(name)
