@@ -94,10 +94,11 @@ def requirements() -> str:
 
 Each draw adds four random requirements to one of eight tasks: a quantity at the end, at a moment,
 during an interval or always, near what the plain plan has or well away. The answer of `solve` is
-compared with the written `trajectory.csv`, read by the csv module alone. Of {tried} plans
-{counts["solved"]} are `solved`, and {counts["solved, kept"]} of these files keep all that was added;
-the others are told to fail ({told}; 40 s a solve, beside other work). Of {found["requirements"]}
-requirements {silent} are missed without a word: at most {found["wilson"][1]:.1%} (Wilson, 95 %).
+compared with the written `trajectory.csv`, read by the csv module alone. Of {tried} requirements
+{counts["solved"]} are of tasks that are `solved`, and {counts["solved, kept"]} of these are kept;
+the others are of tasks that are told to fail ({told}; four at random seldom go together, and a
+solve had 40 s beside other work). Missed without a word: {silent}, at most
+{found["wilson"][1]:.1%} (Wilson, 95 %).
 
 More: `python benchmarks/requirements.py --draws 125 --each 4 --seed 4`.
 """
