@@ -34,7 +34,7 @@ def continued(planner: Planner, origin: Origin) -> tuple[Plan | None, str]:
     if not certificate.within(task.tolerances):
         return None, "its result misses the task's tolerances"
     status, sentence = verdict(task, certificate, new, answer.ending)
-    facts = f"{sentence}, refined on {len(answer.phases)} phases from {origin.name}"
+    facts = f"{sentence}, in {len(answer.phases)} phases of contacts and valves, from {origin.name}"
     cost, before = costs(model, new), costs(origin.model, origin.plan)
     if cost[TORQUE] > Continuing.current().dear * before[TORQUE]:
         times = f"{cost[TORQUE] / before[TORQUE]:.0f} times the squared torque"

@@ -42,7 +42,7 @@ def _judged(found: Plan, answer: Refined) -> Plan:
         trajectory=new,
         certificate=certificate,
         status=status,
-        sentence=f"{sentence}, refined on {len(answer.phases)} phases",
+        sentence=f"{sentence}, in {len(answer.phases)} phases of contacts and valves",
         cost=costs(found.model, new),
         refined=True,
         stages=answer.stages,

@@ -17,6 +17,8 @@ from kemba.ocp.transcription.solution import arrays, groups
 from kemba.ocp.transcription.stage import ANGLE_ARM
 from kemba.trajectory import Trajectory
 
+OF_WEIGHT = "of body weight"  # in the unit of a force times its gap
+
 
 @dataclass(frozen=True)
 class Violation:
@@ -165,7 +167,7 @@ class Measurement:
         """Products of the complementarity pairs, forces by body weight."""
         rows = self.model.node.pair_rows
         product = np.abs(self.residual["pair_a"] * self._scaled_b())
-        return self.note(product, [(a.label, f"{a.unit} of body weight", 1.0) for a, _ in rows])
+        return self.note(product, [(a.label, f"{a.unit} {OF_WEIGHT}", 1.0) for a, _ in rows])
 
     def signs(self) -> float:
         """Pairs and limits that are negative."""

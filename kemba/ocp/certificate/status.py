@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from enum import Enum
 
 from kemba.ocp.certificate.asked import MeasuredRequirement
-from kemba.ocp.certificate.certify import Certificate
+from kemba.ocp.certificate.certify import OF_WEIGHT, Certificate
 from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.task.height import rise_of_feet
 from kemba.ocp.task.task import Task
@@ -75,7 +75,8 @@ def verdict(
         return Status.LIMIT, f"a limit came before a plan was found: {worst}"
     if ending in (Ending.INFEASIBLE, Ending.REFUSED):
         return Status.INFEASIBLE, f"the solver finds no motion that meets the task: {worst}"
-    return Status.STALLED, f"no plan was found, {ending.sentence}: {worst}"
+    why = "the solver ended at a motion that is not possible" if ending.good else ending.sentence
+    return Status.STALLED, f"no plan was found, {why}: {worst}"
 
 
 def _feet(trajectory: Trajectory) -> str:
@@ -95,8 +96,11 @@ def _worst(certificate: Certificate) -> str:
     if not certificate.worst:
         return "nothing is violated"
     v = certificate.worst[0]
-    off = f"off by {v.violation:.3g} {v.unit} at node {v.node} ({v.time_s:.3f} s)"
-    return f"worst: {law(v.what)}, {off}"
+    off = f"off by {v.violation:.3g} {v.unit}"
+    if v.unit.endswith(OF_WEIGHT):  # of a pair, one of which must be zero
+        unit = v.unit.removesuffix(OF_WEIGHT)
+        off = f"a force acts over an open gap, {v.violation:.3g} {unit}times the body's weight"
+    return f"worst: {law(v.what)}, {off} at node {v.node} ({v.time_s:.3f} s)"
 
 
 def law(what: str) -> str:
