@@ -14,7 +14,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from kemba.events import PLANNED, read
+from kemba.events import LASTS, PLANNED, read
 from kemba.model import Model
 from kemba.model.impact import felt
 from kemba.ocp.certificate.grip import grip_of
@@ -277,11 +277,20 @@ def _of_the_task(
 
 
 def _stances_in_order(task: Task, plan: Trajectory) -> int:
-    """How many parts of `contacts` a plan has in their order before it first departs from it."""
+    """How many parts of `contacts` a plan has in their order before it first departs from it.
+
+    As in executions, what is shorter than `LASTS` is no event: feet that leave together do so to
+    within that.
+    """
     legs = sorted({name.split("/")[0] for name in plan.names if name.endswith("/foot/Fz")})
     stands = np.array([plan[f"{leg}/foot/Fz"] > 0.0 for leg in legs]).T[1:]
-    found = [tuple(leg for leg, on in zip(legs, row, strict=True) if on) for row in stands]
-    order = [stance for stance, _ in itertools.groupby(found)]
+    lasts: list[tuple[tuple[str, ...], float]] = []
+    for row, h in zip(stands, np.diff(plan.time), strict=True):
+        stance = tuple(leg for leg, on in zip(legs, row, strict=True) if on)
+        before = lasts.pop()[1] if lasts and lasts[-1][0] == stance else 0.0
+        lasts.append((stance, before + float(h)))
+    firm = (stance for stance, h in lasts if h >= LASTS)
+    order = [stance for stance, _ in itertools.groupby(firm)]
     asked = [tuple(sorted(part.on)) for part in task.contacts]
     same = itertools.takewhile(lambda pair: pair[0] == pair[1], zip(order, asked, strict=False))
     return min(sum(1 for _ in same), 2 * len(asked) - len(order))
