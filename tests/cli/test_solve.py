@@ -151,7 +151,7 @@ def test_check_tells_the_same_mistakes() -> None:
         ("nodes=2", "nodes: '2' is out of range; at least 4 was expected"),
         ("height=2 kg", "height: '2 kg' is a mass; a length such as '0.5 m' was expected"),
         ("supply=0.9 bar", "supply: '0.9 bar' is out of range; at least 101325 Pa was expected"),
-        ("goals.apx.equals=1", "goals.apx.quantity: missing"),
+        ("goals.apx.equals=1", "goals.apx.quantity: missing; this file needs it"),
         ("cost.torque=1", "cost: unknown cost 'torque'; did you mean 'torque_squared'?"),
         ("solver.options.tool=1", "solver.options: unknown option 'tool'; did you mean 'tol'?"),
         (

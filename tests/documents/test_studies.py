@@ -13,10 +13,12 @@ from documents.pages import PAGES, ROOT, mentioned
 
 # What makes a study small. They write into their repository, so they run in a copy.
 SMALL = {
+    "benchmarks/ablation.py": ["--cases", "1", "--seconds", "1", "--out", "one.jsonl"],
     "benchmarks/faults.py": ["--faults", "1", "--only", "simulate"],
     "benchmarks/fuzz.py": ["--examples", "3"],
     "benchmarks/learning.py": ["--machines", "1", "--ways", "correction", "--record", "one.jsonl"],
     "benchmarks/plant_tables.py": ["plant", "--figures", "figures"],
+    "benchmarks/requirements.py": ["--draws", "1", "--each", "1", "--limit", "1"],
     "benchmarks/scaling.py": ["--nodes", "20", "40", "--repeats", "1"],
     "benchmarks/sensitivity.py": ["--report"],
     "benchmarks/waiting.py": ["--cases", "1", "--times", "1"],

@@ -20,7 +20,7 @@ from kemba.trajectory import Trajectory
 
 @pytest.mark.parametrize("first", range(0, 40, 10))
 def test_no_log_is_read_wrong(first: int, tmp_path: Path) -> None:
-    """Ten at a time; benchmarks/strange_logs.py takes any number of them."""
+    """Ten at a time; benchmarks/foreign_logs.py takes any number of them."""
     read = 0
     for seed in range(first, first + 10):
         path, log = written(way(seed), tmp_path)

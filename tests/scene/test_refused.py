@@ -13,7 +13,7 @@ from kemba.ocp.reading import load_task
 MOTIONS = Path(__file__).parents[2] / "benchmarks" / "motions"
 SHIPPED = MOTIONS.joinpath("hurdle.yaml").read_text(encoding="utf-8")
 KEPT, _, REST = SHIPPED.partition("obstacles:\n")
-AFTER = REST[REST.index("\nstart:") :]
+AFTER = REST[REST.index("\ncontacts:") :]
 NUMBER = KEPT.count("\n") + 1  # of the line with `obstacles:` or `terrain:`
 
 

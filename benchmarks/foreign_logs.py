@@ -1,6 +1,6 @@
 """Logs as other programs might write them, and what a drafted map makes of each.
 
-python benchmarks/strange_logs.py [COUNT] [FIRST SEED]: a table on the standard output, faults in
+python benchmarks/foreign_logs.py [COUNT] [FIRST SEED]: a table on the standard output, faults in
 full. Exit code 1 where a log was read wrong or crashed.
 """
 
