@@ -7,7 +7,6 @@ from collections.abc import Collection, Mapping
 import numpy as np
 
 from kemba.identify.problem.problem import Array, Candidate, Parameter, Problem, Rows, Theta
-from kemba.model import load_model
 
 EFFECTS = ("bend", "drag", "hum", "kick", "ramp", "twin", "wave")
 
@@ -22,7 +21,6 @@ class Toy(Problem):
         self, truth: Mapping[str, float], seed: int = 0, runs: int = 3, more: int = 0
     ) -> None:
         rng = np.random.default_rng(seed)
-        self.model = load_model(rig=True)
         self.runs = tuple(f"run {i}" for i in range(runs))
         self.nuisance = {"gain": (1.0, 0.02), "slope": (0.0, 0.5)}
         self.candidates = {

@@ -79,6 +79,7 @@ def rest_of(search: Search, best: Hypothesis, unsure: Collection[str]) -> Remain
 def _advice(problem: Problem, channel: str) -> str:
     """What to measure to learn more about a channel, on the machine that the logs are of."""
     if not problem.moves:
-        return ON_RIGS.get(problem.model.mechanism.rig, STROKES)
+        model = getattr(problem, "model", None)
+        return STROKES if model is None else ON_RIGS.get(model.mechanism.rig, STROKES)
     parts = channel.replace(" ", "/").split("/")
     return next((text for key, text in NEXT.items() if key in parts), BODY)
