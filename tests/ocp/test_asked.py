@@ -155,14 +155,20 @@ def test_what_keys_ask_by_themselves_has_its_line_and_figure() -> None:
     assert speed.line == "--set landing.impact_speed=0.2"
 
 
-@pytest.mark.parametrize(("early", "parts"), [(0, 3), (1, 3), (3, 1)])
-def test_feet_leave_together_to_within_what_is_an_event(early: int, parts: int) -> None:
-    """A front foot that leaves some nodes, of 13 to 19 ms, before the rear one."""
+@pytest.mark.parametrize(
+    ("early", "scuff", "parts"), [(0, 0.0, 3), (1, 0.0, 3), (3, 0.0, 1), (0, 50.0, 1)]
+)
+def test_feet_leave_together_to_within_what_is_an_event(
+    early: int, scuff: float, parts: int
+) -> None:
+    """A front foot that leaves some nodes, of 13 to 19 ms, before the rear one; or one that touches
+    in flight for as long, with a force [N]."""
     run, forces = solved("jump"), {}
     for leg, before in (("rear", 0), ("front", early)):
         force = np.where(run.plan[f"{leg}/foot/Fz"] > 1.0, run.plan[f"{leg}/foot/Fz"], 0.0)
         leaves = int(np.flatnonzero(force == 0.0)[1])  # the first is the pose, before any force
         force[leaves - before : leaves] = 0.0
+        force[leaves + 4] = scuff if leg == "front" else 0.0
         forces[f"{leg}/foot/Fz [N]"] = force
     changed = run.plan.with_columns(forces)
     columns = {h: changed[n] for h, n in zip(changed.headers, changed.names, strict=True)}

@@ -279,21 +279,23 @@ def _of_the_task(
 def _stances_in_order(task: Task, plan: Trajectory) -> int:
     """How many parts of `contacts` a plan has in their order before it first departs from it.
 
-    As in executions, what is shorter than `LASTS` is no event: feet that leave together do so to
-    within that.
+    Feet that leave or come together do so to within `LASTS`; a foot that scuffs in between is
+    counted, however short.
     """
-    legs = sorted({name.split("/")[0] for name in plan.names if name.endswith("/foot/Fz")})
-    stands = np.array([plan[f"{leg}/foot/Fz"] > 0.0 for leg in legs]).T[1:]
-    lasts: list[tuple[tuple[str, ...], float]] = []
-    for row, h in zip(stands, np.diff(plan.time), strict=True):
-        stance = tuple(leg for leg, on in zip(legs, row, strict=True) if on)
-        before = lasts.pop()[1] if lasts and lasts[-1][0] == stance else 0.0
-        lasts.append((stance, before + float(h)))
-    firm = (stance for stance, h in lasts if h >= LASTS)
-    order = [stance for stance, _ in itertools.groupby(firm)]
-    asked = [tuple(sorted(part.on)) for part in task.contacts]
-    same = itertools.takewhile(lambda pair: pair[0] == pair[1], zip(order, asked, strict=False))
-    return min(sum(1 for _ in same), 2 * len(asked) - len(order))
+    legs = {name.split("/")[0] for name in plan.names if name.endswith("/foot/Fz")}
+    stands = zip(*((plan[f"{leg}/foot/Fz"] > 0.0)[1:] for leg in legs), strict=True)
+    found = [{leg for leg, on in zip(legs, row, strict=True) if on} for row in stands]
+    spans = [list(rows) for _, rows in itertools.groupby(range(len(found)), found.__getitem__)]
+    order = [found[rows[0]] for rows in spans]
+    kept = order[:1]
+    for rows, stance, after in zip(spans[1:], order[1:], [*order[2:], None], strict=True):
+        brief = plan.time[rows[-1] + 1] - plan.time[rows[0]] < LASTS
+        on_the_way = after is not None and kept[-1] & after <= stance <= kept[-1] | after
+        if stance != kept[-1] and not (brief and on_the_way):
+            kept.append(stance)
+    asked = [set(part.on) for part in task.contacts]
+    same = itertools.takewhile(lambda pair: pair[0] == pair[1], zip(kept, asked, strict=False))
+    return min(sum(1 for _ in same), 2 * len(asked) - len(kept))
 
 
 def _shortest_dwell(model: Model, plan: Trajectory) -> float | None:

@@ -99,7 +99,7 @@ def _worst(certificate: Certificate) -> str:
     off = f"off by {v.violation:.3g} {v.unit}"
     if v.unit.endswith(OF_WEIGHT):  # of a pair, one of which must be zero
         unit = v.unit.removesuffix(OF_WEIGHT)
-        off = f"a force acts over an open gap, {v.violation:.3g} {unit}times the body's weight"
+        off = f"which excludes its force: both at once, {v.violation:.3g} {unit}times the weight"
     return f"worst: {law(v.what)}, {off} at node {v.node} ({v.time_s:.3f} s)"
 
 

@@ -153,10 +153,11 @@ class Refiner:
             return found
         self.tell("phases: pulses that lower the cost")
         best = with_pulses(self.solution, lambda p: self.build(p, start, RADAU5)[0], self.control)
-        made = self.read(*best)
-        if made.certificate is None or not made.certificate.within(self.task.tolerances):
+        if best is self.solution:
             return found
-        return made if made.phases == found.phases else replace(made, plain=found)
+        made = self.read(*best)
+        kept = made.certificate is not None and made.certificate.within(self.task.tolerances)
+        return replace(made, plain=found) if kept else found
 
     def repair(self, phases: list[Phase], found: Refined) -> Refined:
         """The solution on phases repaired until their modes fit, else how the last try ended.
