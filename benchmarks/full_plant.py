@@ -37,9 +37,9 @@ from kemba.identify.workflow import write_answer
 from kemba.model import load_model
 from kemba.ocp import load_task, plan
 from kemba.plant import Commands, Profile, run
-from kemba.plant.execution.controller import Gains
-from kemba.plant.execution.sensors import Sensors, take_log
-from kemba.plant.simulation.commands import JointControl
+from kemba.plant.commands import JointControl
+from kemba.plant.controller import Gains
+from kemba.plant.repeat import Sensors, take_log
 from kemba.trajectory import Trajectory
 
 ROOT = Path(__file__).parents[1]

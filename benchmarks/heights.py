@@ -24,10 +24,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from block import put_block
 
 from kemba.ocp import load_task, task_model
-from kemba.plant.execution.certificate import rest_after
-from kemba.plant.execution.controller import execute
-from kemba.plant.execution.impacts import told
-from kemba.plant.execution.repeat import plant_of
+from kemba.plant.controller import execute
+from kemba.plant.repeat import plant_of
+from kemba.plant.replay import rest_after, told
 from kemba.runs import load_run
 from kemba.sweep import machine
 

@@ -26,7 +26,7 @@ from twin.run import simulate as run_twin
 from twin.scripts import Script, from_table
 
 from kemba.events import STAYS, UPRIGHT
-from kemba.plant.execution.controller import Gains
+from kemba.plant.controller import Gains
 from kemba.plotting.robot.machine import load_machine
 from kemba.trajectory import Trajectory
 

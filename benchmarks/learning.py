@@ -39,8 +39,8 @@ from kemba.learn.round import Asked, learn
 from kemba.model import load_spec
 from kemba.ocp import load_task, task_model
 from kemba.ocp.certificate.status import Status
-from kemba.plant.execution.certificate import rest_after
-from kemba.plant.execution.controller import execute
+from kemba.plant.controller import execute
+from kemba.plant.replay import rest_after
 from kemba.plotting.robot.machine import load_machine
 from kemba.report import solve_into
 from kemba.runs import RunFolder, load_run

@@ -16,7 +16,7 @@ import numpy as np
 from kemba.events import peak
 from kemba.model import Model, load_model
 from kemba.plant import Commands, Profile, Simulated, run
-from kemba.plant.simulation.commands import Sense
+from kemba.plant.commands import Sense
 from kemba.trajectory import Trajectory
 
 LEGS = ("front", "rear")

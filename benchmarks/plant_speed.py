@@ -26,7 +26,7 @@ from kemba.effects.mechanics.load import Payload
 from kemba.events import peak
 from kemba.ocp import controller_table, load_task, plan
 from kemba.plant import Execution, execute, execute_many, replay, replays
-from kemba.plant.execution.counterpart import counterpart
+from kemba.plant.repeat import counterpart
 from kemba.sweep.workers.machine import machine
 from kemba.trajectory import Trajectory
 
@@ -37,7 +37,7 @@ REFERENCE = 1.25e-5  # s
 FIRST_USE = """
 import time
 begin = time.process_time()
-import numba, kemba.plant.simulation.player
+import numba, kemba.plant.player
 imported = time.process_time()
 from kemba.model import load_model
 from kemba.plant import run

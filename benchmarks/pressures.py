@@ -20,9 +20,9 @@ import numpy as np
 
 from kemba.model import Model
 from kemba.ocp import load_task, task_model
-from kemba.plant.execution.certificate import rest_after
-from kemba.plant.execution.controller import Execution, execute
-from kemba.plant.execution.repeat import plant_of
+from kemba.plant.controller import Execution, execute
+from kemba.plant.repeat import plant_of
+from kemba.plant.replay import rest_after
 from kemba.policy.course import course_of
 from kemba.policy.execute import execute_policy
 from kemba.policy.player import Policy

@@ -14,7 +14,7 @@ from kemba.ocp.certificate.objective import costs
 from kemba.ocp.planned import Plan
 from kemba.ocp.planning import plan
 from kemba.ocp.refinement import Refined, refine
-from kemba.plant.execution.replay import Replay, replay
+from kemba.plant.replay import Replay, replay
 
 CASES = (
     ("jump", ["height=0.35 m"]),

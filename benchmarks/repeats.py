@@ -16,7 +16,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from kemba.learn.flight import flight_of
-from kemba.plant.execution.repeat import plant_of, repeat_run
+from kemba.plant.repeat import plant_of, repeat_run
 from kemba.plotting import load_machine, save_figure
 from kemba.plotting.style import COLOURS, SHADE, key_above, paper_figure, paper_style
 from kemba.runs import load_run

@@ -16,7 +16,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from kemba.ocp import controller_table, load_task
-from kemba.plant.execution import retiming
+from kemba.plant import retiming
 from kemba.solve import Approach, Listener, best_plan
 from kemba.sweep import machine
 

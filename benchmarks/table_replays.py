@@ -21,9 +21,8 @@ from block import put_block
 from kemba.events import EXECUTED, PLANNED, read
 from kemba.model import Model
 from kemba.ocp import load_task
-from kemba.plant.execution.certificate import rest_after
-from kemba.plant.execution.controller import execute
-from kemba.plant.execution.replay import Replay
+from kemba.plant.controller import execute
+from kemba.plant.replay import Replay, rest_after
 from kemba.solve import Approach, Listener, best_plan
 from kemba.sweep import machine
 from kemba.trajectory import Trajectory

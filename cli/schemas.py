@@ -21,7 +21,7 @@ SCHEMAS = {
     "cylinders": "kemba.mechanism.cylinder:CylinderTable",
     "sweeps": "kemba.sweep.cases.schema:Sweep",
     "uncertainties": "kemba.scenarios.draw:Uncertainties",
-    "rigs": "kemba.plant.rig.bench:RigFile",
+    "rigs": "kemba.plant.rigs:RigFile",
     "maps": "kemba.logs.columns:ColumnMap",
 }
 # what a file of a kind is called in messages, where its folder's name would mislead

@@ -21,7 +21,7 @@ from kemba.identify.design.rivals import Rivals
 from kemba.identify.evidence.refit import Frozen, refit
 from kemba.identify.logs.reading import read_logs
 from kemba.model.model import Model
-from kemba.plant.rig.rigs import CourseRig, Rig, Test
+from kemba.plant.rigs import CourseRig, Rig, Test
 
 RATE = 1000.0  # Hz
 # what `experiment` takes the sensors of a rig to be

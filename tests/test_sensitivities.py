@@ -12,8 +12,8 @@ from typer.testing import CliRunner
 from kemba.ocp import load_task, task_model
 from kemba.ocp.refinement.sample import to_trajectory
 from kemba.ocp.transcription.stage import COST_SCALE
-from kemba.plant.execution.certificate import rest_after
-from kemba.plant.execution.controller import execute
+from kemba.plant.controller import execute
+from kemba.plant.replay import rest_after
 from kemba.report.sensitivity import sensitivity_of_run
 from kemba.runs import Run, load_run
 from kemba.sensitivity import Sensitivity, figures, sensitivity, write_sensitivity

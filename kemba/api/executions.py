@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from kemba.api.planning import Planned
 from kemba.api.result import Result
 from kemba.folders import claimed
-from kemba.plant.execution.repeat import Repeat, kept, plant_of, repeat_run
+from kemba.plant.repeat import Repeat, kept, plant_of, repeat_run
 from kemba.stopwatch import Tell, silent
 
 if TYPE_CHECKING:

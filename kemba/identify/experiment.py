@@ -16,7 +16,7 @@ from kemba.identify.design.rivals import contenders
 from kemba.identify.design.settings import ExperimentSettings
 from kemba.identify.design.words import strength
 from kemba.model.spec import load_model
-from kemba.plant.rig.rigs import Rig
+from kemba.plant.rigs import Rig
 
 
 @dataclass(frozen=True)

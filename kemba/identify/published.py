@@ -14,7 +14,7 @@ import numpy as np
 
 from kemba.identify.problem.problem import Array
 from kemba.mechanism import Cylinder, load_cylinder
-from kemba.plant.rig.tables import PAPER_FORCE, PAPER_RISE
+from kemba.plant.tables import PAPER_FORCE, PAPER_RISE
 
 MADE_ON = "dsnu-25-70"  # the cylinder on which the paper's tables were measured
 LOSS_COLUMNS = ("0.6 MPa", "0.7 MPa", "0.8 MPa")

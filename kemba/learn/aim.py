@@ -12,10 +12,17 @@ from kemba.errors import KembaError
 from kemba.learn.correction import Correction
 from kemba.learn.flight import FlownJump, flight_of
 from kemba.model import Model
-from kemba.plant.execution.certificate import rest_after
-from kemba.plant.execution.controller import execute, read_controller
-from kemba.plant.execution.moved_edges import Group, edges_of, shared_edges, single_edges
-from kemba.plant.execution.retiming import FALLEN, ExecutedTable, Roundings
+from kemba.plant.controller import execute, read_controller
+from kemba.plant.replay import rest_after
+from kemba.plant.retiming import (
+    FALLEN,
+    ExecutedTable,
+    Group,
+    Roundings,
+    edges_of,
+    shared_edges,
+    single_edges,
+)
 from kemba.plotting.robot.machine import Machine
 from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Trajectory

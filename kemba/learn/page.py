@@ -12,8 +12,8 @@ from kemba.learn.expected import ExpectedApex
 from kemba.learn.round import Round
 from kemba.learn.words import effects
 from kemba.ocp import load_task, task_model
-from kemba.plant.execution.certificate import rest_after
-from kemba.plant.execution.controller import execute
+from kemba.plant.controller import execute
+from kemba.plant.replay import rest_after
 from kemba.plotting.study.learning import plot_executions, plot_rounds
 from kemba.plotting.style import svg_text
 from kemba.report.review.html import pairs, table

@@ -26,8 +26,8 @@ from kemba.learn.rounds import Past, as_executed, entry, past_of
 from kemba.logs import load_map
 from kemba.model import Model
 from kemba.ocp import Task, load_task, task_model
-from kemba.plant.execution.certificate import rest_after
-from kemba.plant.execution.controller import execute
+from kemba.plant.controller import execute
+from kemba.plant.replay import rest_after
 from kemba.plotting.robot.machine import Machine, load_machine
 from kemba.report import solve_into
 from kemba.runs import Run, RunFolder, write_json

@@ -15,7 +15,7 @@ from kemba.files import sha256
 from kemba.identify.written.adopt import reference
 from kemba.model import load_spec
 from kemba.ocp import Task
-from kemba.plant.execution.controller import read_controller
+from kemba.plant.controller import read_controller
 from kemba.runs import Run, load_run
 from kemba.trajectory import Array, Trajectory
 

@@ -10,9 +10,8 @@ import numpy as np
 from scipy.linalg import expm
 
 from kemba.ocp.phases.modes import HELD, OPEN
-from kemba.plant.execution.controller import PERIOD
-from kemba.plant.simulation.commands import JointControl, Profile
-from kemba.plant.simulation.inputs import among
+from kemba.plant.commands import JointControl, Profile, among
+from kemba.plant.controller import PERIOD
 from kemba.policy.events import Edge, Event, Flow, Saltation, Tick
 from kemba.policy.modes import Array, Hybrid, Point
 from kemba.policy.settings import CLOSING, SAME

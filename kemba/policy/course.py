@@ -8,12 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from kemba.model import Model
-from kemba.plant.execution.controller import PERIOD, condition_of, read_controller
-from kemba.plant.simulation.commands import JointControl
-from kemba.plant.simulation.inputs import among, merged
-from kemba.plant.simulation.record import Impact as Hit
-from kemba.plant.simulation.simulate import simulate_one
-from kemba.plant.simulation.valves import delayed
+from kemba.plant.commands import JointControl, among, delayed, merged
+from kemba.plant.controller import PERIOD, condition_of, read_controller
+from kemba.plant.simulate import Impact as Hit
+from kemba.plant.simulate import simulate_one
 from kemba.policy.builder import Builder, switches
 from kemba.policy.events import EventCourse
 from kemba.policy.modes import Array, Hybrid

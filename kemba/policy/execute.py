@@ -9,11 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from kemba.model import Model
-from kemba.plant.execution.controller import PERIOD, Execution, condition_of, later, read_controller
-from kemba.plant.execution.repeat import VALVE_SCATTER, Play
-from kemba.plant.execution.sensors import Sensors
-from kemba.plant.simulation.commands import Commands
-from kemba.plant.simulation.simulate import simulate_one
+from kemba.plant.commands import Commands
+from kemba.plant.controller import PERIOD, Execution, condition_of, later, read_controller
+from kemba.plant.repeat import VALVE_SCATTER, Play, Sensors
+from kemba.plant.simulate import simulate_one
 from kemba.policy.modes import Array
 from kemba.policy.player import Policy
 from kemba.policy.settings import FINE

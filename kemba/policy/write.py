@@ -11,8 +11,8 @@ import numpy as np
 from kemba.errors import KembaError
 from kemba.events import PLANNED, read
 from kemba.model import Model
-from kemba.plant.execution.controller import PERIOD, Gains, hip_control, read_controller
-from kemba.plant.execution.sensors import Sensors
+from kemba.plant.controller import PERIOD, Gains, hip_control, read_controller
+from kemba.plant.repeat import Sensors
 from kemba.policy.course import course_of
 from kemba.policy.events import EventCourse
 from kemba.policy.expected import expected_from

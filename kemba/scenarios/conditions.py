@@ -11,7 +11,7 @@ from kemba.effects.mechanics.load import Payload
 from kemba.errors import KembaError, suggest
 from kemba.events import STANDS
 from kemba.model import Model
-from kemba.plant.execution.replay import first_row
+from kemba.plant.replay import first_row
 from kemba.quantity import to_si
 from kemba.scenarios.schema import Conditions
 from kemba.trajectory import Trajectory
@@ -51,7 +51,7 @@ def start_offsets(model: Model, conditions: Conditions) -> dict[str, float]:
 
 def standing(model: Model, table: Trajectory, offsets: Mapping[str, float]) -> dict[str, float]:
     """The table's first pose, moved; a lower foot that stands is put on the ground again."""
-    from kemba.plant.simulation.start import initial_values, lowest_foot
+    from kemba.plant.simulate import initial_values, lowest_foot
 
     if not offsets:
         return {}

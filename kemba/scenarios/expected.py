@@ -6,8 +6,8 @@ from pathlib import Path
 
 from kemba.errors import KembaError
 from kemba.events import UPRIGHT, turned
-from kemba.plant.execution.controller import execute_many, read_controller
-from kemba.plant.execution.repeat import plant_of
+from kemba.plant.controller import execute_many, read_controller
+from kemba.plant.repeat import plant_of
 from kemba.runs import load_run
 from kemba.scenarios.conditions import standing
 from kemba.scenarios.draw import scenarios

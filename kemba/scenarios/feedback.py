@@ -17,8 +17,8 @@ from kemba.errors import KembaError
 from kemba.files import atomic_path
 from kemba.model import Model
 from kemba.ocp import load_task, task_model
-from kemba.plant.execution.certificate import rest_after
-from kemba.plant.execution.repeat import VALVE_SCATTER, plant_of
+from kemba.plant.repeat import VALVE_SCATTER, plant_of
+from kemba.plant.replay import rest_after
 from kemba.policy.execute import execute_policy
 from kemba.policy.player import Policy
 from kemba.policy.write import FILE, write_policy

@@ -10,8 +10,8 @@ import numpy as np
 
 from kemba.errors import KembaError
 from kemba.model import Model
-from kemba.plant.execution.certificate import rest_after
-from kemba.plant.execution.controller import execute_many
+from kemba.plant.controller import execute_many
+from kemba.plant.replay import rest_after
 from kemba.scenarios.conditions import standing
 from kemba.scenarios.draw import Scenario
 from kemba.scenarios.rate import wilson

@@ -9,8 +9,8 @@ import numpy as np
 
 from kemba.errors import KembaError
 from kemba.model import Model
-from kemba.plant.execution.certificate import rest_after
-from kemba.plant.execution.controller import Execution, execute_many
+from kemba.plant.controller import Execution, execute_many
+from kemba.plant.replay import rest_after
 from kemba.sensitivity.figures import FigureStep
 from kemba.trajectory import Trajectory
 

@@ -11,11 +11,10 @@ import numpy as np
 from kemba.model import Model
 from kemba.ocp import Plan, Task, controller_table
 from kemba.ocp.certificate.asked import MeasuredRequirement, on_execution
-from kemba.plant.execution.certificate import executions, plant_run, summaries
-from kemba.plant.execution.counterpart import counterpart
-from kemba.plant.execution.replay import Replay
-from kemba.plant.execution.retiming import ExecutedTable, retimed
-from kemba.plant.execution.strides import Stability, stability
+from kemba.plant.repeat import counterpart
+from kemba.plant.replay import Replay, executions, plant_run, summaries
+from kemba.plant.retiming import ExecutedTable, retimed
+from kemba.plant.strides import Stability, stability
 from kemba.solve.truth import PLANT, ApexBand, Truth, band_of, beyond, truth_of
 from kemba.solve.verdict import EXECUTIONS, Allowed, Verdict, allowances, judge
 from kemba.stopwatch import Tell, silent

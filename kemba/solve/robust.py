@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from kemba.model import Model
 from kemba.ocp import Plan, Task
 from kemba.ocp.certificate.status import Status
-from kemba.plant.stepping.family import share_equations
+from kemba.plant.equations import share_equations
 from kemba.scenarios.draw import Scenario, scenarios
 from kemba.scenarios.share import ScenarioOutcome, Share, outcomes, share, share_of
 from kemba.solve.judged import judged, plant_of, table_of

@@ -11,8 +11,8 @@ from kemba.ocp import Plan, controller_table
 from kemba.ocp.certificate.objective import objective
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.report import answer, sentence_of, warnings
-from kemba.plant.execution.counterpart import another_robot, lacking
-from kemba.plant.execution.retiming import retimed
+from kemba.plant.repeat import another_robot, lacking
+from kemba.plant.retiming import retimed
 from kemba.solve.judged import Judged, judged
 from kemba.stopwatch import Tell, silent
 from kemba.trajectory import Trajectory

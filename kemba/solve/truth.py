@@ -15,8 +15,8 @@ from kemba.model import Evidence, Model, load_spec
 from kemba.model.drawn import DRAWN, drawn_models
 from kemba.model.spec import evidence_folder
 from kemba.ocp import Plan, Task
-from kemba.plant.execution.certificate import rest_after
-from kemba.plant.execution.controller import Execution, execute_many
+from kemba.plant.controller import Execution, execute_many
+from kemba.plant.replay import rest_after
 from kemba.trajectory import Trajectory
 
 LEARNT, PLANT = "learnt model", "plant"

@@ -10,7 +10,7 @@ from kemba.errors import enumerated
 from kemba.events import LASTS, ORDINALS
 from kemba.ocp.certificate.asked import MeasuredRequirement
 from kemba.ocp.task.task import Tolerances
-from kemba.plant.execution.replay import Replay
+from kemba.plant.replay import Replay
 
 # the executions of a plan, by their keys in the certificate, in words
 EXECUTIONS = {

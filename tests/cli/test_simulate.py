@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from kemba.mechanism import load_robot, robot_mechanism
-from kemba.plant.execution.controller import read_controller
+from kemba.plant.controller import read_controller
 from kemba.trajectory import Trajectory
 from kemba_cli.main import app
 

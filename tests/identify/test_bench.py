@@ -25,7 +25,7 @@ from kemba.identify.workflow import discover_logs
 from kemba.identify.written.adopt import adopt_effect
 from kemba.model.spec import load_model, load_spec
 from kemba.plant import Profile
-from kemba.plant.rig.imposed import drive, hermite
+from kemba.plant.rigs import drive, hermite
 from kemba.trajectory import Trajectory
 
 BenchLog = Callable[..., Trajectory]

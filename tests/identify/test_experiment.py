@@ -21,7 +21,7 @@ from kemba.identify.design.settings import (
 )
 from kemba.identify.experiment import propose
 from kemba.model.spec import load_model
-from kemba.plant.rig.bench import load_rig
+from kemba.plant.rigs import load_rig
 from kemba_cli.main import app
 
 

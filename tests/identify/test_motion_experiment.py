@@ -24,7 +24,7 @@ from kemba.identify.robot.problem import robot_problem
 from kemba.model.spec import load_model
 from kemba.ocp import Task
 from kemba.ocp.planning import check_feasible
-from kemba.plant.execution.controller import execute
+from kemba.plant.controller import execute
 
 SWAY = Sway(angle=0.06, leans=4, duration=0.8, pace=1.2)
 

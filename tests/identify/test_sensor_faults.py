@@ -16,7 +16,7 @@ from kemba.effects.series import Series
 from kemba.identify.bench.problem import bench_problem
 from kemba.identify.robot.problem import robot_problem
 from kemba.model import load_model
-from kemba.plant.execution.sensors import Sensors, take_log
+from kemba.plant.repeat import Sensors, take_log
 from kemba.quantity import Param
 from kemba.trajectory import Trajectory
 

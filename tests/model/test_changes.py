@@ -10,8 +10,7 @@ from typer.testing import CliRunner
 from kemba.errors import KembaError
 from kemba.model.changes import changed_effects
 from kemba.ocp import load_task, task_model
-from kemba.plant.execution.counterpart import counterpart
-from kemba.plant.execution.repeat import plant_of
+from kemba.plant.repeat import counterpart, plant_of
 from kemba_cli.main import app
 
 NAMED = "effects.contact.mu=0.6"

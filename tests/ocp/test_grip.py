@@ -13,7 +13,7 @@ from kemba.ocp.certificate.grip import grip_of
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.planning import plan
 from kemba.ocp.reading import asked_of
-from kemba.plant.execution.controller import execute
+from kemba.plant.controller import execute
 from kemba.solve.judged import judged, plant_of, table_of
 
 

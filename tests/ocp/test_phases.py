@@ -22,7 +22,7 @@ from kemba.ocp.refinement.refine import Refiner, reduction_of
 from kemba.ocp.refinement.repair import merged, misfits, repaired
 from kemba.ocp.transcription.solution import arrays
 from kemba.ocp.transcription.unilateral import read_constraints
-from kemba.plant.execution.replay import replay
+from kemba.plant.replay import replay
 from kemba.settings import changed
 
 CASES = [

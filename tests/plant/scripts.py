@@ -8,7 +8,7 @@ import numpy as np
 
 from kemba.model import Model, load_model
 from kemba.plant import Commands, Profile, Simulated, run
-from kemba.plant.simulation.commands import Sense
+from kemba.plant.commands import Sense
 
 FEMUR, TIBIA = 0.242, 0.234  # m
 AIRBORNE = {

@@ -9,11 +9,19 @@ import pytest
 from kemba.errors import KembaError
 from kemba.mechanism import load_cylinder
 from kemba.model import Model, load_model
-from kemba.plant.rig.bench import bench_model, load_rig, run_rig, write_rig
-from kemba.plant.rig.characterise import Characteristics, characterise
-from kemba.plant.rig.imposed import stroke
-from kemba.plant.rig.rigs import DynamometerRig, LockedRig, RandomRig, Rig
-from kemba.plant.rig.tables import PAPER_FORCE, PAPER_RISE
+from kemba.plant.characterise import Characteristics, characterise
+from kemba.plant.rigs import (
+    DynamometerRig,
+    LockedRig,
+    RandomRig,
+    Rig,
+    bench_model,
+    load_rig,
+    run_rig,
+    stroke,
+    write_rig,
+)
+from kemba.plant.tables import PAPER_FORCE, PAPER_RISE
 from kemba.trajectory import Trajectory
 
 CYLINDER = load_cylinder("dsnu-25-70")

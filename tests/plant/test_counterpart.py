@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from kemba.plant.execution.counterpart import counterpart
+from kemba.plant.repeat import counterpart
 
 OWN = """\
 name: heavy

@@ -14,7 +14,7 @@ from kemba.mechanism.pin_model import build_pin_model
 from kemba.mechanism.robot import tree_angles
 from kemba.model import Model
 from kemba.plant import Commands, Profile, run, simulate
-from kemba.plant.stepping.family import equations_of
+from kemba.plant.equations import equations_of
 from kemba.trajectory import Trajectory
 
 

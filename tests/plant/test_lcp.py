@@ -5,9 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from kemba.plant.kernel.algebra.lcp import by_lemke, solve_lcp
-from kemba.plant.kernel.algebra.lemke import NoSolutionError
 from kemba.plant.kernel.jit import entry
+from kemba.plant.kernel.lcp import NoSolutionError, by_lemke, solve_lcp
 from kemba.plant.kernel.machine import Lcp, lcp_memory
 
 seeds = st.integers(0, 2**32 - 1)

@@ -17,14 +17,14 @@ def test_a_second_thread_loads_the_simulator_where_there_is_a_core(
 ) -> None:
     code = f"""
         import os, sys, threading
-        from kemba.plant.simulation.loading import load_meanwhile
+        from kemba.plant.simulate import load_meanwhile
         assert "numba" not in sys.modules
         os.cpu_count = lambda: {cores}
         load_meanwhile()
         for thread in threading.enumerate():
             if thread.name == "loading":
                 thread.join()
-        print("numba" in sys.modules and "kemba.plant.simulation.player" in sys.modules)
+        print("numba" in sys.modules and "kemba.plant.player" in sys.modules)
     """
     done = subprocess.run(
         [sys.executable, "-c", dedent(code)], capture_output=True, text=True, check=True

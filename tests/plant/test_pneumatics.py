@@ -12,7 +12,7 @@ from kemba.effects.pneumatics.valve import Valve
 from kemba.mechanism import load_cylinder, rig_mechanism
 from kemba.model import Model
 from kemba.plant import Profile
-from kemba.plant.rig.imposed import drive, hermite, locked
+from kemba.plant.rigs import drive, hermite, locked
 
 CYLINDER = load_cylinder("dsnu-25-70")
 AREA_E, AREA_R, STROKE = CYLINDER.area_extend, CYLINDER.area_retract, CYLINDER.stroke

@@ -9,11 +9,11 @@ from plant.scripts import jump, planning
 
 from kemba.effects.mechanics.motor import Motor
 from kemba.plant import Gains, Profile, Simulated, execute, replay, replays, run
-from kemba.plant.execution.controller import hip_control, motor_limits
-from kemba.plant.execution.replay import judge
-from kemba.plant.kernel.control import limited
+from kemba.plant.commands import Commands
+from kemba.plant.controller import hip_control, motor_limits
 from kemba.plant.kernel.jit import entry
-from kemba.plant.simulation.commands import Commands
+from kemba.plant.kernel.play import limited
+from kemba.plant.replay import judge
 from kemba.trajectory import Trajectory
 
 

@@ -11,13 +11,16 @@ from ocp.runs import solved
 from kemba.ocp import controller_table, load_task
 from kemba.ocp.planning import plan
 from kemba.plant import execute
-from kemba.plant.execution.moved_edges import edges_of, moves, shared_edges, with_moved
-from kemba.plant.execution.retiming import (
+from kemba.plant.retiming import (
     ExecutedTable,
     RetimingSettings,
     Roundings,
+    edges_of,
     executed_table,
+    moves,
     retimed,
+    shared_edges,
+    with_moved,
 )
 from kemba.settings import changed
 from kemba.trajectory import Trajectory
@@ -58,7 +61,7 @@ def test_two_late_edges_of_all_legs_are_found_in_few_executions(
         errors.append(done.error)
         return done
 
-    monkeypatch.setattr("kemba.plant.execution.retiming.executed_table", noted)
+    monkeypatch.setattr("kemba.plant.retiming.executed_table", noted)
     mended = retimed(found.model, found.trajectory, spoilt)
     assert errors[0] > 2.0 and errors[-1] <= 1.0
     assert len(errors) <= 2 + len(shared_edges(table))

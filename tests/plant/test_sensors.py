@@ -5,7 +5,7 @@ import pytest
 from plant.scripts import jump
 
 from kemba.effects.sensors import SensorBias, SensorDelay, SensorScale
-from kemba.plant.execution.sensors import Sensors, take_log
+from kemba.plant.repeat import Sensors, take_log
 from kemba.trajectory import Trajectory
 
 

@@ -11,12 +11,10 @@ import pytest
 from kemba.model import Model, load_model
 from kemba.ocp.chain import joined
 from kemba.ocp.controller import controller_table
-from kemba.plant.execution.certificate import executions
-from kemba.plant.execution.replay import Replay, first_row, replay
-from kemba.plant.execution.start import begins_moving, moving_start
-from kemba.plant.execution.strides import kept, multipliers
-from kemba.plant.simulation.commands import Commands, Profile
-from kemba.plant.simulation.simulate import run
+from kemba.plant.commands import Commands, Profile
+from kemba.plant.replay import Replay, begins_moving, executions, first_row, moving_start, replay
+from kemba.plant.simulate import run
+from kemba.plant.strides import kept, multipliers
 from kemba.trajectory import Trajectory
 
 PLAN = Path(__file__).with_name("plans") / "bound.csv"

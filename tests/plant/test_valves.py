@@ -6,8 +6,8 @@ import pytest
 from kemba.effects.pneumatics.timing import ValveCloseDelay
 from kemba.model import load_model
 from kemba.plant import Profile
-from kemba.plant.rig.imposed import drive, locked
-from kemba.plant.simulation.valves import acting
+from kemba.plant.commands import acting
+from kemba.plant.rigs import drive, locked
 
 
 def pulses(profile: Profile) -> list[float]:

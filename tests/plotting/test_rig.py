@@ -8,8 +8,7 @@ from matplotlib.figure import Figure
 from typer.testing import CliRunner
 
 from kemba.errors import KembaError
-from kemba.plant.rig.bench import bench_model, run_rig
-from kemba.plant.rig.rigs import DynamometerRig, LockedRig, RandomRig, Rig
+from kemba.plant.rigs import DynamometerRig, LockedRig, RandomRig, Rig, bench_model, run_rig
 from kemba.plotting import plot_rig
 from kemba.trajectory import Trajectory
 from kemba_cli.main import app

@@ -12,8 +12,8 @@ from typer.testing import CliRunner
 
 from kemba.model import Model, load_model
 from kemba.plant import execute
-from kemba.plant.execution.sensors import Sensors
-from kemba.plant.simulation.commands import Profile
+from kemba.plant.commands import Profile
+from kemba.plant.repeat import Sensors
 from kemba.policy import player
 from kemba.policy.course import course_of
 from kemba.policy.events import Edge, EventCourse, Saltation

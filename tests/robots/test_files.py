@@ -24,7 +24,7 @@ ALLOWED = {
     "kemba/mechanism/robot_file.py",
     "kemba/mechanism/__init__.py",
     "kemba/model/spec.py",
-    "kemba/plant/execution/counterpart.py",
+    "kemba/plant/repeat.py",
     "kemba/identify/written/quoted.py",
     "kemba/solve/truth.py",
     "cli/verbs/inspect/check.py",

@@ -10,7 +10,7 @@ import pytest
 
 from kemba.errors import KembaError
 from kemba.model import Model, load_model
-from kemba.plant.simulation.simulate import run
+from kemba.plant.simulate import run
 from kemba.scenarios.conditions import standing
 from kemba.scenarios.draw import load_uncertainties, scenarios
 from kemba.scenarios.share import share
@@ -112,7 +112,7 @@ def in_the_air(height: float) -> Trajectory:
 @pytest.mark.parametrize("lifted", [0.0, 0.2])
 def test_a_robot_that_is_dropped_stays_in_the_air(lifted: float) -> None:
     """Askew, a foot that stood is put on the ground again; one in the air stays there."""
-    from kemba.plant.simulation.start import lowest_foot
+    from kemba.plant.simulate import lowest_foot
 
     model = planning()
     table = in_the_air(model.mechanism.standing["body/z"] + lifted)

@@ -20,8 +20,8 @@ from kemba.ocp.reading import asked_of, load_task
 from kemba.ocp.relaxation.guess import automatic_guess
 from kemba.ocp.transcription.symmetry import find_symmetry, whole
 from kemba.ocp.transcription.transcribe import Transcription
-from kemba.plant.execution.controller import execute
-from kemba.plant.execution.replay import replay
+from kemba.plant.controller import execute
+from kemba.plant.replay import replay
 from kemba.scene import FLAT, scene_in
 from kemba.solve.judged import plant_of
 from kemba.trajectory import Trajectory

@@ -14,7 +14,7 @@ from kemba.mechanism.robot_file import robot_files
 from kemba.model import load_spec
 from kemba.model.evidence import write_covariance
 from kemba.ocp import load_task
-from kemba.plant.execution.counterpart import counterpart, lacking
+from kemba.plant.repeat import counterpart, lacking
 from kemba.solve import Approach, Listener, best_plan
 from kemba.solve.trial import Trial
 from kemba.solve.truth import truth_of

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from kemba.events import Event, EventComparison
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.task.task import Tolerances
-from kemba.plant.execution.replay import EndError, Replay
+from kemba.plant.replay import EndError, Replay
 from kemba.solve.judged import Judged
 from kemba.solve.trial import Motions, Trial
 from kemba.solve.verdict import EXECUTIONS, Verdict, allowances, judge

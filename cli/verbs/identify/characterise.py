@@ -10,7 +10,7 @@ import typer
 from kemba_cli.common import Force, Foreign, Json, OwnEffects, Quiet, print_json, results, say
 
 if TYPE_CHECKING:
-    from kemba.plant.rig.characterise import Characteristics
+    from kemba.plant.characterise import Characteristics
     from kemba.trajectory import Trajectory
 
 
@@ -64,8 +64,8 @@ def characterise(
         _own_rig(logs, model, out, force, json, quiet, column_map)
         return
     from kemba.logs import load_map, log_files, open_log
-    from kemba.plant.rig.characterise import characterise as fit
-    from kemba.plant.rig.tables import as_json
+    from kemba.plant.characterise import characterise as fit
+    from kemba.plant.tables import as_json
     from kemba_cli.next_steps import after_model, say_next
 
     if out:
@@ -175,7 +175,7 @@ def _draw(
 def _print(found: Characteristics) -> None:
     from rich.table import Table
 
-    from kemba.plant.rig import tables
+    from kemba.plant import tables
 
     for title, columns, rows in (
         ("Chamber force rise time", tables.RISE_COLUMNS, tables.rise_rows(found)),

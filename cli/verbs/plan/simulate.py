@@ -11,7 +11,7 @@ import typer
 from kemba_cli.common import Force, Json, OwnEffects, Quiet, newest, print_json, say
 
 if TYPE_CHECKING:
-    from kemba.plant.rig.rigs import Rig
+    from kemba.plant.rigs import Rig
 
 
 def simulate(
@@ -52,7 +52,7 @@ def simulate(
 
     source = source or str(newest(quiet, "controller.csv"))
     if Path(source).suffix in (".yaml", ".yml"):
-        from kemba.plant.rig.bench import load_rig
+        from kemba.plant.rigs import load_rig
 
         rig = load_rig(source)
         with claimed(out, Path("bench") / rig.name, "*.csv", force) as folder:
@@ -81,7 +81,7 @@ def _run(
     policy: bool,
     tell: Callable[[str], None],
 ) -> dict[str, Any]:
-    from kemba.plant.execution.repeat import kept, plant_of, repeat_run
+    from kemba.plant.repeat import kept, plant_of, repeat_run
 
     plant = plant_of(source, model)
     play, fed_back = None, ""
@@ -109,7 +109,7 @@ def _run(
 
 
 def _rig(rig: Rig, model: str, folder: Path, seed: int, noise: bool) -> dict[str, Any]:
-    from kemba.plant.rig.bench import bench_model, write_rig
+    from kemba.plant.rigs import bench_model, write_rig
 
     logs = write_rig(rig, lambda supply: bench_model(model, supply), folder, seed, noise)
     return {

@@ -81,7 +81,7 @@ def solve(
     from kemba.ocp import load_task
     from kemba.ocp.nlp.interrupt import Interrupt
     from kemba.ocp.reading import asked_of
-    from kemba.plant.simulation.loading import load_meanwhile
+    from kemba.plant.simulate import load_meanwhile
     from kemba.report import solve_into
     from kemba.report.drawing import drawer
     from kemba.runs import RunFolder

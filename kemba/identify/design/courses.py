@@ -8,7 +8,7 @@ import numpy as np
 
 from kemba.identify.design.settings import RigCourseSettings
 from kemba.identify.problem.problem import Array
-from kemba.plant.rig.rigs import CourseRig
+from kemba.plant.rigs import CourseRig
 
 STEEPEST = 1.5  # highest speed of a monotone cubic piece that begins and ends at rest, by its mean
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from kemba.identify.design.rivals import Rivals
 from kemba.identify.design.separation import Separation, separation
 from kemba.identify.design.virtual import VirtualBench, log_time
-from kemba.plant.rig.rigs import DynamometerRig, LockedRig, RandomRig, Rig
+from kemba.plant.rigs import DynamometerRig, LockedRig, RandomRig, Rig
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ import numpy as np
 from kemba.identify.design.settings import SwaySettings
 from kemba.identify.problem.problem import Array
 from kemba.model.model import Model
-from kemba.plant.execution.controller import PERIOD
+from kemba.plant.controller import PERIOD
 from kemba.trajectory import Trajectory
 
 

@@ -21,7 +21,7 @@ from kemba.identify.design.settings import (
 from kemba.identify.design.virtual import VirtualBench, as_predicted, log_time
 from kemba.identify.problem.problem import Array
 from kemba.model.model import Model
-from kemba.plant.rig.rigs import Rig
+from kemba.plant.rigs import Rig
 
 
 @dataclass(frozen=True)

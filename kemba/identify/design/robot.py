@@ -18,8 +18,8 @@ from kemba.identify.design.settings import DesignSearchSettings, SwaySettings
 from kemba.identify.problem.problem import Array
 from kemba.identify.robot.problem import robot_problem
 from kemba.model.model import Model
-from kemba.plant.execution.controller import execute
-from kemba.plant.execution.sensors import Sensors, take_log
+from kemba.plant.controller import execute
+from kemba.plant.repeat import Sensors, take_log
 from kemba.trajectory import Trajectory
 
 # a slow lean to both sides: what one would do without a design

@@ -16,7 +16,7 @@ from kemba.identify.design.settings import ExperimentSettings
 from kemba.identify.problem.noise import Colour, learn
 from kemba.identify.problem.problem import Theta
 from kemba.model.model import Model
-from kemba.plant.rig.rigs import Rig, Test
+from kemba.plant.rigs import Rig, Test
 from kemba.trajectory import Trajectory
 
 

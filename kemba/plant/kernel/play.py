@@ -1,20 +1,56 @@
-"""A whole simulation: from mark to mark, inputs, impacts and record."""
+"""A whole simulation: from mark to mark, inputs, controller, impacts and record."""
 
 from __future__ import annotations
 
 from math import isfinite, isnan
 from typing import NamedTuple
 
-from kemba.plant.kernel.calls import evaluate
-from kemba.plant.kernel.control import Law, control
+from kemba.plant.kernel.contact import evaluate, evaluate_pairs, instant, set_gaps, touching
 from kemba.plant.kernel.events import CLOSED, Impacts, advance, collide
-from kemba.plant.kernel.forces import evaluate_pairs, set_gaps, touching
-from kemba.plant.kernel.impact import instant
 from kemba.plant.kernel.jit import entry, part
-from kemba.plant.kernel.machine import KernelModel, Memory, State
-from kemba.plant.kernel.pace import Pace
+from kemba.plant.kernel.machine import Array, KernelModel, Memory, State
 from kemba.plant.kernel.settings import ContactEvents
-from kemba.plant.stepping.arrays import Array
+from kemba.plant.kernel.step import Pace
+
+
+class Law(NamedTuple):
+    """tau = K_p (q_d - q) + K_d (w_d - w) + tau_ff of some joints, within what the motors give.
+
+    By joint: `angle` and `speed`, places in `State.y`; `torque`, place in x; `limits` (joints, 3),
+    see `limited`. `wanted` (marks, joints, 3): q_d, w_d, tau_ff at every mark of the schedule.
+    """
+
+    K_p: float
+    K_d: float
+    angle: Array
+    speed: Array
+    torque: Array
+    limits: Array
+    wanted: Array
+
+
+@part
+def control(law: Law, k: Memory, now: State, mark: int) -> None:
+    """Set the torques at a mark."""
+    for i in range(len(law.torque)):
+        q, w = now.y[law.angle[i]], now.y[law.speed[i]]
+        q_d, w_d, ahead = law.wanted[mark, i, 0], law.wanted[mark, i, 1], law.wanted[mark, i, 2]
+        tau = law.K_p * (q_d - q) + law.K_d * (w_d - w) + ahead
+        k.x[law.torque[i]] = limited(tau, w, law.limits[i])
+
+
+@part
+def limited(tau: float, w: float, limits: Array) -> float:
+    """The torque [N.m] that a motor at speed `w` [rad/s] gives when `tau` is asked.
+
+    `limits`: peak torque [N.m], speed without load [rad/s], and the slope [N.m.s] at which torque
+    falls with speed.
+    """
+    peak, noload, slope = float(limits[0]), float(limits[1]), float(limits[2])
+    high = min(peak, max(0.0, slope * (noload - w)))
+    low = -min(peak, max(0.0, slope * (noload + w)))
+    return min(max(tau, low), high)
+
 
 DONE, FULL, ASK, EXPLODED, BURIED = 0, 1, 2, 3, 4  # why the kernel comes back
 HELD, DEEP = ContactEvents.current().held, ContactEvents.current().deep

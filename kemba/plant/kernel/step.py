@@ -1,4 +1,4 @@
-"""One step between events: linearly implicit, second order, with contact.
+"""One step between events: linearly implicit, second order, with contact; and its length.
 
 ROS2 as a W-method (Verwer, Spee, Blom, Hundsdorfer, SIAM J. Sci. Comput. 20, 1999): second order
 for any approximate Jacobian, L-stable for an exact one. Only the stiff blocks enter it, damping
@@ -13,12 +13,14 @@ methods do for index 2; lam1 and lam2 solve small complementarity problems w = A
 
 from __future__ import annotations
 
-from kemba.plant.kernel.algebra.linear import factor, solve
-from kemba.plant.kernel.calls import evaluate
-from kemba.plant.kernel.forces import add_forces, evaluate_pairs, remember_push, set_gaps
+from math import sqrt
+from typing import NamedTuple
+
+from kemba.plant.kernel.contact import add_forces, evaluate, evaluate_pairs, remember_push, set_gaps
 from kemba.plant.kernel.jit import kernel, part
-from kemba.plant.kernel.machine import KernelModel, Memory, State
-from kemba.plant.kernel.settings import GAMMA, GapDrift
+from kemba.plant.kernel.lcp import factor, solve
+from kemba.plant.kernel.machine import Array, KernelModel, Memory, State
+from kemba.plant.kernel.settings import GAMMA, GapDrift, StepControl
 
 _DRIFT = GapDrift.current()
 PULL_BACK, SHORTEST, FASTEST = _DRIFT.share, _DRIFT.shortest, _DRIFT.fastest
@@ -128,3 +130,38 @@ def _pull_back(m: KernelModel, k: Memory, h: float) -> None:
         if m.rigid[i]:
             drift = PULL_BACK * k.gap[i] / max(h, SHORTEST)
             k.pairs[m.gaps[i], m.n + m.nl] += max(drift, -FASTEST)
+
+
+_CONTROL = StepControl.current()
+GROWTH, SHRINKING, SAFETY = _CONTROL.growth, _CONTROL.shrinking, _CONTROL.safety
+
+
+class Pace(NamedTuple):
+    """`step` (1,) is the present length, from `shortest` to `longest` [s].
+
+    Of a step the result of the first stage, first order, may differ from that of both by
+    `tolerance`, see `step`; infinite for steps of equal length.
+    """
+
+    step: Array
+    shortest: float
+    longest: float
+    tolerance: float
+
+
+@part
+def keeps_pace(pace: Pace, h: float, apart: float) -> bool:
+    """Whether a step of `h` [s] was short enough; sets the length of the next one.
+
+    `apart`: how far the results of its stages differ. It grows with the square of the length.
+    """
+    if apart < 1e-9 * pace.tolerance:
+        factor = GROWTH
+    else:
+        factor = min(GROWTH, max(SHRINKING, SAFETY * sqrt(pace.tolerance / apart)))
+    again = apart > pace.tolerance and h > 1.001 * pace.shortest
+    wanted = h * factor
+    if not again and h < SAFETY * pace.step[0]:  # cut by an event or a mark
+        wanted = max(wanted, pace.step[0])
+    pace.step[0] = min(pace.longest, max(pace.shortest, wanted))
+    return not again

@@ -9,7 +9,7 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from kemba.plant.rig.rises import Rise, dead_times
+from kemba.plant.characterise import Rise, dead_times
 from kemba.plotting.style import BLUE, GREY, INK, VERMILLION, key_above, paper_figure, paper_style
 
 SHOWN = 0.2  # s after the command

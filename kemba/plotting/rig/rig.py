@@ -10,10 +10,15 @@ from matplotlib.figure import Figure
 
 from kemba.effects import Effect
 from kemba.errors import KembaError
-from kemba.plant.rig.bench import bench_model
-from kemba.plant.rig.characterise import agreement, predict
-from kemba.plant.rig.rises import find_rises
-from kemba.plant.rig.strokes import Stroke, find_stroke, stroke_table
+from kemba.plant.characterise import (
+    Stroke,
+    agreement,
+    find_rises,
+    find_stroke,
+    predict,
+    stroke_table,
+)
+from kemba.plant.rigs import bench_model
 from kemba.plotting.panels import draw_panel
 from kemba.plotting.rig.bench import LOOKS, PANELS, plot_force_velocity
 from kemba.plotting.rig.locked import plot_rises, plot_volumes

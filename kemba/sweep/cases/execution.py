@@ -13,9 +13,9 @@ from kemba.errors import KembaError
 from kemba.files import sha256
 from kemba.model import Model
 from kemba.plant import Gains, Replay, execute
-from kemba.plant.execution.controller import read_controller
-from kemba.plant.execution.counterpart import PLAIN, counterpart
-from kemba.plant.simulation.valves import scattered
+from kemba.plant.commands import scattered
+from kemba.plant.controller import read_controller
+from kemba.plant.repeat import PLAIN, counterpart
 from kemba.runs import load_run
 from kemba.scenarios.conditions import changed_effects, standing, start_offsets
 from kemba.scenarios.sampling import sample

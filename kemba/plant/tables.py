@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from kemba.plant.rig.characterise import Characteristics
-from kemba.plant.rig.estimate import Estimate
+from kemba.plant.characterise import Characteristics, Estimate
 
 # Table I, s, at x = 0 and 70 mm
 PAPER_RISE = {"fill": (0.008, 0.025), "vent": (0.013, 0.037)}

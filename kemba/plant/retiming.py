@@ -1,4 +1,4 @@
-"""Valve edges of a controller table moved by ticks, where its own execution shows that this helps.
+"""Valve edges moved until an execution lands where the plan does.
 
 Rounding an edge to a tick of 1 ms can move the apex of a light robot by a centimetre. Which
 rounding is best depends on the whole motion, so the table is simulated with other roundings.
@@ -6,30 +6,105 @@ rounding is best depends on the whole motion, so the table is simulated with oth
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import combinations, product
+from math import comb
 
 import numpy as np
 
 from kemba.errors import KembaError
 from kemba.events import PLANNED, read
 from kemba.model import Model
-from kemba.plant.execution.certificate import rest_after
-from kemba.plant.execution.controller import execute
-from kemba.plant.execution.moved_edges import (
-    Group,
-    edges_of,
-    moves,
-    shared_edges,
-    single_edges,
-    with_moved,
-)
-from kemba.plant.execution.replay import Replay
-from kemba.plant.execution.start import begins_moving, moving_start
-from kemba.plant.stepping.arrays import Array
+from kemba.plant.controller import execute
+from kemba.plant.kernel.machine import Array
+from kemba.plant.replay import Replay, begins_moving, moving_start, rest_after
 from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Trajectory
+
+Edges = dict[str, list[int]]  # by valve column: ticks at which it opens, closes, opens ...
+Group = list[tuple[str, int]]  # edges that move together: column, and which of its edges
+
+
+# groups of edges that move by a tick at once: a jump of 0.487 m has no near table with three
+# (benchmarks/retiming.py)
+TOGETHER = 4
+FAR = 2  # of which so many may move by two ticks
+# moves of so many groups at most, else of fewer at once: they take 10 ms to compare, a third of an
+# execution
+MANY = 20_000
+
+
+def edges_of(table: Trajectory) -> Edges:
+    """The edges of a table's valves."""
+    names = [name for name in table.names if "/valve/" in name]
+    return {name: np.flatnonzero(np.diff(table[name], prepend=0.0)).tolist() for name in names}
+
+
+def single_edges(table: Trajectory) -> list[Group]:
+    """Every edge alone."""
+    return [[(name, k)] for name, ticks in edges_of(table).items() for k in range(len(ticks))]
+
+
+def shared_edges(table: Trajectory) -> list[Group]:
+    """The same edge of all legs together, where their valves switch equally often."""
+    edges, groups = edges_of(table), list[Group]()
+    for side in ("extend", "retract"):
+        legs = [name for name in edges if name.endswith(side)]
+        counts = {len(edges[name]) for name in legs}
+        if len(legs) > 1 and len(counts) == 1:
+            groups += [[(name, k) for name in legs] for k in range(counts.pop())]
+    return groups
+
+
+def moves(count: int) -> Array:
+    """Ticks (moves, count) by which some of `count` groups may move."""
+    found = list[Array]()
+    for groups in range(1, TOGETHER + 1):
+        ticks = (-2, -1, 1, 2) if groups <= FAR else (-1, 1)
+        if comb(count, groups) * len(ticks) ** groups > MANY:
+            break
+        where = np.array(list(combinations(range(count), groups)), dtype=int).reshape(-1, groups)
+        by = np.array(list(product(ticks, repeat=groups)), dtype=int)
+        block = np.zeros((len(where), len(by), count), dtype=int)
+        places = np.broadcast_to(where[:, None], (len(where), len(by), groups))
+        np.put_along_axis(block, places, np.broadcast_to(by, places.shape), axis=2)
+        found.append(block.reshape(-1, count))
+    return np.concatenate(found)
+
+
+def with_moved(
+    table: Trajectory, groups: Sequence[Group], ticks: Iterable[int]
+) -> Trajectory | None:
+    """The table with groups of edges moved by `ticks`; None where edges would meet."""
+    edges = {name: list(own) for name, own in edges_of(table).items()}
+    for group, by in zip(groups, ticks, strict=True):
+        for name, k in group:
+            edges[name][k] += int(by)
+    if not all(_possible(own, len(table)) for own in edges.values()):
+        return None
+    columns: dict[str, Array] = {}
+    for header, name in zip(table.headers, table.names, strict=True):
+        columns[header] = table[name]
+        if name in edges:
+            columns[header] = np.zeros(len(table))
+            for i, tick in enumerate(edges[name]):
+                columns[header][tick:] = float(i % 2 == 0)
+    return Trajectory(table.time, columns, table.meta)
+
+
+def neighbours(table: Trajectory) -> Iterator[Trajectory]:
+    """Tables with the same edge of all legs, or one edge, a tick earlier or later."""
+    for group in (*shared_edges(table), *single_edges(table)):
+        for tick in (-1, 1):
+            moved = with_moved(table, [group], [tick])
+            if moved is not None:
+                yield moved
+
+
+def _possible(ticks: list[int], rows: int) -> bool:
+    return all(0 <= tick < rows for tick in ticks) and bool(np.all(np.diff(ticks) > 0))
 
 
 class RetimingSettings(Settings):

@@ -1,4 +1,4 @@
-"""The robot's controller (paper, eq. 10): hips PD with feed-forward, valves open loop."""
+"""A plan as the robot's controller executes it."""
 
 from __future__ import annotations
 
@@ -13,11 +13,10 @@ from kemba.effects.mechanics.motor import Motor
 from kemba.errors import KembaError
 from kemba.events import STANDS
 from kemba.model import Model
-from kemba.plant.execution.replay import Replay, first_row, judge
-from kemba.plant.simulation.commands import SAME_TIME, Commands, JointControl, Profile
-from kemba.plant.simulation.simulate import Condition, Simulated, run_many, simulate_one
-from kemba.plant.simulation.start import lowest_foot
-from kemba.plant.stepping.arrays import Array
+from kemba.plant.commands import SAME_TIME, Commands, JointControl, Profile
+from kemba.plant.kernel.machine import Array
+from kemba.plant.replay import Replay, first_row, judge
+from kemba.plant.simulate import Condition, Simulated, lowest_foot, run_many, simulate_one
 from kemba.trajectory import Trajectory
 
 PERIOD = 1e-3  # s; the controller's rate (paper, IV-B)

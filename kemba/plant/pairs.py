@@ -1,4 +1,4 @@
-"""Complementarity pairs as the plant steps them: one force each, gaps told from rates.
+"""Complementarity pairs of a model, as the plant holds them.
 
 Every pair has one side that is a force symbol of its own (z) and an expression on the other (w).
 Where w without forces depends on coordinates only it is a gap: rigid, held at velocity level, or
@@ -16,7 +16,7 @@ import casadi as ca
 import numpy as np
 
 from kemba.errors import KembaError
-from kemba.plant.stepping.arrays import Array
+from kemba.plant.kernel.machine import Array
 
 
 @dataclass(frozen=True)

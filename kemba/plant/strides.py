@@ -12,10 +12,10 @@ from kemba.errors import KembaError
 from kemba.events import UPRIGHT
 from kemba.model import Model
 from kemba.ocp.chain import joined
-from kemba.plant.execution.replay import Replay, first_row
-from kemba.plant.simulation.commands import Commands, Profile
-from kemba.plant.simulation.simulate import run
-from kemba.plant.stepping.arrays import Array
+from kemba.plant.commands import Commands, Profile
+from kemba.plant.kernel.machine import Array
+from kemba.plant.replay import Replay, first_row
+from kemba.plant.simulate import run
 from kemba.trajectory import Trajectory
 
 SUNK = 0.1  # m; a body so far below its plan at the end of a stride has fallen

@@ -8,15 +8,10 @@ import numpy as np
 
 from kemba.errors import KembaError
 from kemba.model import Model
-from kemba.plant.kernel.algebra.lemke import NoSolutionError
-from kemba.plant.kernel.control import Law
-from kemba.plant.kernel.events import MOST, NOTICED, Impacts
-from kemba.plant.kernel.machine import memory, state
-from kemba.plant.kernel.pace import Pace
-from kemba.plant.kernel.play import ASK, BURIED, DONE, EXPLODED, Marks, NextMark, play
-from kemba.plant.kernel.settings import StepLength
-from kemba.plant.simulation.commands import Commands, JointControl, Profile
-from kemba.plant.simulation.inputs import (
+from kemba.plant.commands import (
+    Commands,
+    JointControl,
+    Profile,
     among,
     breaks,
     find_input,
@@ -25,9 +20,14 @@ from kemba.plant.simulation.inputs import (
     merged,
     ticks,
 )
-from kemba.plant.simulation.record import Impact, recorded
-from kemba.plant.stepping.arrays import Array
-from kemba.plant.stepping.equations import Equations
+from kemba.plant.equations import Equations
+from kemba.plant.kernel.events import MOST, NOTICED, Impacts
+from kemba.plant.kernel.lcp import NoSolutionError
+from kemba.plant.kernel.machine import Array, memory, state
+from kemba.plant.kernel.play import ASK, BURIED, DONE, EXPLODED, Law, Marks, NextMark, play
+from kemba.plant.kernel.settings import StepLength
+from kemba.plant.kernel.step import Pace
+from kemba.plant.simulate import Impact, recorded
 
 SMALLER = "try a smaller step, or look for a start that is impossible"
 ROOM = 8 * MOST  # impacts kept in the kernel before they are fetched

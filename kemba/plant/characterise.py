@@ -1,0 +1,455 @@
+"""Air and friction of a cylinder from bench logs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kemba.config import Document, dump_yaml, parse
+from kemba.effects import Effect
+from kemba.effects.pneumatics.chamber import Chamber
+from kemba.effects.pneumatics.damping import ModeDamping
+from kemba.effects.pneumatics.tables import at_supply
+from kemba.effects.pneumatics.valve import Valve
+from kemba.errors import KembaError
+from kemba.mechanism import Cylinder, rig_mechanism
+from kemba.model import Model, ModelSpec
+from kemba.plant.commands import Profile
+from kemba.plant.kernel.machine import Array
+from kemba.plant.rigs import drive, followed
+from kemba.settings import CHOSEN, Settings, setting
+from kemba.trajectory import Trajectory
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A value and its 95 % interval; the interval is NaN where the data are too few."""
+
+    value: float
+    low: float = float("nan")
+    high: float = float("nan")
+
+    def as_dict(self) -> dict[str, float]:
+        """The figures as plain data for JSON."""
+        return {"value": self.value, "low": self.low, "high": self.high}
+
+
+def mean(values: Array) -> Estimate:
+    """The mean of repeated values (n,)."""
+    return linear(np.ones((len(values), 1)), np.asarray(values, dtype=float))[0][0]
+
+
+def linear(X: Array, y: Array, read: Array | None = None) -> tuple[list[Estimate], float]:
+    """Estimates of `read` @ coefficients (of the coefficients without it), and R2 of the fit.
+
+    X (n, k), y (n,), read (m, k).
+    """
+    from scipy.stats import t
+
+    beta, _, rank, _ = np.linalg.lstsq(X, y, rcond=None)
+    rest, freedom = y - X @ beta, len(y) - int(rank)
+    total = float(((y - y.mean()) ** 2).sum())
+    r2 = 1.0 - float(rest @ rest) / total if total > 0.0 else float("nan")
+    read = np.eye(X.shape[1]) if read is None else read
+    values = read @ beta
+    if freedom < 1:
+        return [Estimate(float(value)) for value in values], r2
+    covariance = np.linalg.pinv(X.T @ X) * float(rest @ rest) / freedom
+    width = t.ppf(0.975, freedom) * np.sqrt(np.einsum("ij,jk,ik->i", read, covariance, read))
+    bounds = zip(values, values - width, values + width, strict=True)
+    return [Estimate(float(v), float(a), float(b)) for v, a, b in bounds], r2
+
+
+class RiseSettings(Settings):
+    """Which switchings of a locked rod are read, and where their answer begins."""
+
+    still: float = setting(
+        2e-4,
+        "m",
+        "way below which the rod counts as locked",
+        CHOSEN,
+    )
+    step: float = setting(
+        20.0,
+        "N",
+        "smallest step of the force that is read",
+        CHOSEN,
+    )
+    low: float = setting(
+        0.02,
+        "1",
+        "lower share of the step for the line to its start",
+        CHOSEN,
+    )
+    high: float = setting(
+        0.10,
+        "1",
+        "upper share of the step for the line to its start",
+        CHOSEN,
+    )
+    rows: int = setting(20, "1", "rows that an answer needs", CHOSEN)
+
+
+@dataclass(frozen=True)
+class Rise:
+    """One switching of one chamber of a locked rod.
+
+    `u`: the valve's new value; `x` [m]: the chamber's own extension, of `stroke` [m] at most;
+    `time` [s] from the command and `level` (n,) from 0 to 1 along the step; `dead` [s]; `plateau`
+    [N] the steady force of the chamber when full.
+    """
+
+    u: float
+    x: float
+    stroke: float
+    supply: float
+    chamber: str
+    time: Array
+    level: Array
+    dead: float
+    plateau: float
+
+    def fit(self, dead: float) -> tuple[float, Array]:
+        """Time constant [s] of the first-order answer after `dead`, and the fitted levels."""
+        from scipy.optimize import least_squares
+
+        late = np.clip(self.time - dead, 0.0, None)
+        begin = max(float(np.interp(1 - np.exp(-1), self.level, late)), 1e-4)
+        found = least_squares(
+            lambda p: p[1] * (1.0 - np.exp(-late / abs(p[0]))) - self.level, [begin, 1.0]
+        )
+        tau, full = abs(float(found.x[0])), float(found.x[1])
+        return tau, full * (1.0 - np.exp(-late / tau))
+
+
+@dataclass(frozen=True)
+class RiseTable:
+    """Table I: time constants [s] at both valve states and both ends, dead times [s]."""
+
+    fill: tuple[Estimate, Estimate]
+    vent: tuple[Estimate, Estimate]
+    dead: dict[str, Estimate]
+    r2: float
+    r2_linear: float
+
+
+def find_rises(log: Trajectory, stroke: float) -> Iterator[Rise]:
+    """Every switching of a chamber in a bench log of a cylinder of `stroke` [m], while the rod is
+    locked."""
+    x = log["piston/x"]
+    if np.ptp(x) > RiseSettings.current().still:
+        return
+    valves = {name: log[f"valve/{name}"] > 0.5 for name in ("extend", "retract")}
+    edges = {name: np.flatnonzero(np.diff(v.astype(int))) + 1 for name, v in valves.items()}
+    every = np.sort(np.concatenate([*edges.values()]))
+    for chamber, indices in edges.items():
+        sign, own = (1.0, x) if chamber == "extend" else (-1.0, stroke - x)
+        for edge in indices:
+            later = every[every > edge]
+            stop = int(later[0]) if len(later) else len(log)
+            u = float(valves[chamber][edge])
+            rise = _rise(log, int(edge), stop, sign, chamber)
+            if rise is not None:
+                yield Rise(u=u, x=float(own.mean()), stroke=stroke, **rise)
+
+
+def _rise(
+    log: Trajectory, edge: int, stop: int, sign: float, chamber: str
+) -> dict[str, Any] | None:
+    """The answer to the switching at row `edge`, until row `stop`; None where it shows nothing."""
+    limits = RiseSettings.current()
+    force, time = sign * log["piston/F"], log.time[edge - 1 : stop] - log.time[edge]
+    before = float(force[max(edge - 20, 0) : edge].mean())
+    after = float(force[stop - max((stop - edge) // 10, 3) : stop].mean())
+    if abs(after - before) < limits.step or stop - edge < limits.rows:
+        return None
+    level = (force[edge - 1 : stop] - before) / (after - before)
+    low, high = (_crossing(time, level, share) for share in (limits.low, limits.high))
+    dead = low - (high - low) * limits.low / (limits.high - limits.low)
+    supply = float(log.meta.get("supply", 0.7e6))
+    return {
+        "supply": supply,
+        "chamber": chamber,
+        "time": time,
+        "level": level,
+        "dead": dead,
+        "plateau": max(before, after),
+    }
+
+
+def _crossing(time: Array, level: Array, share: float) -> float:
+    """The first time [s] at which the level passes `share`, interpolated."""
+    i = max(int(np.argmax(level > share)), 1)
+    return float(np.interp(share, level[i - 1 : i + 1], time[i - 1 : i + 1]))
+
+
+def dead_times(rises: Iterable[Rise]) -> dict[str, Estimate]:
+    """Dead times [s] of switching `on` and `off`, as far as the tests have them."""
+    found: dict[str, list[float]] = {}
+    for rise in rises:
+        found.setdefault("on" if rise.u else "off", []).append(rise.dead)
+    return {name: mean(np.array(values)) for name, values in found.items()}
+
+
+def rise_table(rises: Iterable[Rise]) -> RiseTable:
+    """Dead times and the bilinear time constants of eq. 5. Raises KembaError on too few tests."""
+    rises = list(rises)
+    if {r.u for r in rises} != {0.0, 1.0} or len({round(r.x, 4) for r in rises}) < 2:
+        raise KembaError(
+            "characterise",
+            "the locked tests do not cover filling and venting at two positions",
+            "tests as in configs/rigs/locked.yaml were expected",
+        )
+    dead = dead_times(rises)
+    fits = [r.fit(dead["on" if r.u else "off"].value) for r in rises]
+    taus = np.array([tau for tau, _ in fits])
+    level = np.concatenate([r.level for r in rises])
+    error = np.concatenate([fitted for _, fitted in fits]) - level
+    r2 = 1.0 - float(error @ error) / float(((level - level.mean()) ** 2).sum())
+    u, x = np.array([r.u for r in rises]), np.array([r.x / r.stroke for r in rises])
+    corners = np.array([[1, a, b, a * b] for a in (1.0, 0.0) for b in (0.0, 1.0)])
+    table, r2_linear = linear(np.column_stack([np.ones_like(u), u, x, u * x]), taus, corners)
+    return RiseTable((table[0], table[1]), (table[2], table[3]), dead, r2, r2_linear)
+
+
+MODES = {(1, 0): "extend", (0, 1): "retract", (1, 1): "both", (0, 0): "none"}
+
+
+class StrokeSettings(Settings):
+    """Which samples of a stroke count as steady."""
+
+    travel: float = setting(
+        0.01,
+        "m",
+        "way below which the rod does not move",
+        CHOSEN,
+    )
+    moving: float = setting(
+        0.2,
+        "1",
+        "share of the top speed from which the rod moves",
+        CHOSEN,
+    )
+    begin: float = setting(
+        0.5,
+        "1",
+        "share of the way after which chambers have settled",
+        CHOSEN,
+    )
+    end: float = setting(
+        0.85,
+        "1",
+        "share of the way after which the end is near",
+        CHOSEN,
+    )
+    steady: float = setting(
+        0.03,
+        "1",
+        "deviation from the median speed that counts",
+        CHOSEN,
+    )
+    fewest: int = setting(3, "1", "samples that a steady part needs", CHOSEN)
+
+
+@dataclass(frozen=True)
+class Stroke:
+    """One steady stroke: valve mode, supply [Pa], speed [m/s] and force [N]."""
+
+    mode: str
+    supply: float
+    speed: float
+    force: float
+
+
+@dataclass(frozen=True)
+class StrokeLine:
+    """One row of Table II: F = F_static - c_d v."""
+
+    mode: str
+    supply: float
+    F_static: Estimate
+    c_d: Estimate
+    r2: float
+
+
+def find_stroke(log: Trajectory) -> Stroke | None:
+    """The steady part of a bench log in which the rod moves at one speed in one valve mode.
+
+    None where there is no such part.
+    """
+    limits = StrokeSettings.current()
+    modes = {
+        (int(a > 0.5), int(b > 0.5))
+        for a, b in zip(log["valve/extend"], log["valve/retract"], strict=True)
+    }
+    x = log["piston/x"]
+    if len(modes) > 1 or np.ptp(x) < limits.travel:
+        return None
+    v = log["piston/v"] if "piston/v" in log else np.gradient(x, log.time)
+    moving = np.abs(v) > limits.moving * np.abs(v).max()
+    usual = float(np.median(v[moving]))
+    progress = np.abs(x - x[0]) / float(np.abs(x - x[0]).max())
+    used = moving & (progress > limits.begin) & (progress < limits.end)
+    used &= np.abs(v - usual) < limits.steady * abs(usual)
+    if used.sum() < limits.fewest:
+        return None
+    mode = MODES[modes.pop()]
+    supply = 0.0 if mode == "none" else float(log.meta.get("supply", 0.7e6))
+    return Stroke(mode, supply, float(v[used].mean()), float(log["piston/F"][used].mean()))
+
+
+def stroke_table(strokes: Iterable[Stroke]) -> list[StrokeLine]:
+    """Table II: one line per mode and supply with at least two speeds."""
+    groups: dict[tuple[str, float], list[Stroke]] = {}
+    for stroke in strokes:
+        groups.setdefault((stroke.mode, stroke.supply), []).append(stroke)
+    order = list(MODES.values())
+    lines = []
+    for (mode, supply), group in sorted(
+        groups.items(), key=lambda item: (order.index(item[0][0]), item[0][1])
+    ):
+        v = np.array([stroke.speed for stroke in group])
+        if len(np.unique(np.round(v, 3))) < 2:
+            continue
+        force = np.array([stroke.force for stroke in group])
+        (F_static, c_d), r2 = linear(np.column_stack([np.ones_like(v), -v]), force)
+        lines.append(StrokeLine(mode, supply, F_static, c_d, r2))
+    return lines
+
+
+@dataclass(frozen=True)
+class Characteristics:
+    """What bench logs say about a `cylinder`; `check` holds R2 and RMS [N] of the fitted model's
+    force by log, for logs in which the rod and the valves both move."""
+
+    cylinder: Cylinder
+    rises: RiseTable | None
+    lines: list[StrokeLine]
+    plateaus: dict[tuple[str, float], Estimate]
+    check: dict[str, tuple[float, float]]
+
+    def effects(self) -> tuple[Chamber, ModeDamping, Valve]:
+        """The fitted effects; where the logs give nothing the figures of the file are kept."""
+        return fitted_effects(self.cylinder, self.rises, self.lines, self.plateaus)
+
+    def write_model(self, path: str | Path, name: str = "characterised") -> None:
+        """Write a model YAML: the planning model with the fitted chambers, damping and valves.
+
+        Raises KembaError, and writes nothing, where a fitted value is none that a model can have.
+        """
+        effects = [_written(effect) for effect in self.effects()]
+        notes = "chambers, damping and valves fitted by kemba-opt characterise"
+        data = {"name": name, "base": "planning", "effects": effects, "notes": notes}
+        parse(Document(data, f"the figures that these logs give {path}"), ModelSpec)
+        dump_yaml(data, path)
+
+
+def characterise(logs: dict[str, Trajectory], cylinder: Cylinder) -> Characteristics:
+    """Fit eq. 4 to 7 to bench logs by name, of a cylinder of these dimensions. Raises KembaError
+    when they hold nothing to fit."""
+    for name, log in logs.items():
+        _check_columns(name, log)
+    rises = [rise for log in logs.values() for rise in find_rises(log, cylinder.stroke)]
+    strokes = [s for s in map(find_stroke, logs.values()) if s is not None]
+    if not rises and not strokes:
+        raise KembaError(
+            "characterise",
+            "no log holds a locked rod with a switching valve, or a steady stroke",
+            "bench logs as kemba-opt simulate writes them for configs/rigs were expected",
+        )
+    table = rise_table(rises) if rises else None
+    lines, plateaus = stroke_table(strokes), _plateaus(rises)
+    effects = fitted_effects(cylinder, table, lines, plateaus)
+    check = {}
+    for name, log in logs.items():
+        if np.ptp(log["piston/x"]) > 1e-3 and _switches(log):
+            check[name] = _compare(cylinder, effects, log)
+    return Characteristics(cylinder, table, lines, plateaus, check)
+
+
+def fitted_effects(
+    cylinder: Cylinder,
+    rises: RiseTable | None,
+    lines: list[StrokeLine],
+    plateaus: dict[tuple[str, float], Estimate],
+) -> tuple[Chamber, ModeDamping, Valve]:
+    """Chamber, damping and valve with the values of the tables."""
+    chamber, damping = Chamber().of_cylinder(cylinder), ModeDamping().of_cylinder(cylinder)
+    valve = Valve()
+    force = {key: abs(e.value) for key, e in plateaus.items()}
+    force |= {(line.mode, line.supply): abs(line.F_static.value) for line in lines}
+    drag = {(line.mode, line.supply): max(line.c_d.value, 0.0) for line in lines}
+    supplies = sorted({p for mode, p in force if mode in ("extend", "retract") and p > 0.0})
+    if supplies:
+        at = {f"F_{m}": _over(force, m, supplies, chamber, f"F_{m}")
+              for m in ("extend", "retract")}  # fmt: skip
+        chamber = chamber.model_copy(update={"pressures": tuple(supplies), **at})
+    if drag:
+        known = sorted({p for _, p in drag if p > 0.0}) or list(damping.value("pressures"))
+        at = {f"c_{m}": _over(drag, m, known, damping, f"c_{m}")
+              for m in ("extend", "retract", "both")}  # fmt: skip
+        rest = drag.get(("none", 0.0), damping.c_none)
+        damping = damping.model_copy(update={"pressures": tuple(known), **at, "c_none": rest})
+    if rises:
+        times = {name: tuple(e.value for e in getattr(rises, name)) for name in ("fill", "vent")}
+        chamber = chamber.model_copy(update=times)
+        dead = float(np.mean([e.value for e in rises.dead.values()]))
+        valve = valve.model_copy(update={"dead_time": dead})
+    return chamber, damping, valve
+
+
+def _over(
+    found: dict[tuple[str, float], float],
+    mode: str,
+    supplies: list[float],
+    usual: Effect,
+    table: str,
+) -> tuple[float, ...]:
+    """Values of a mode at the supplies, those of `table` of an effect where a test is missing."""
+    return tuple(found.get((mode, p), float(at_supply(usual, table, p))) for p in supplies)
+
+
+def _plateaus(rises: Iterable[Rise]) -> dict[tuple[str, float], Estimate]:
+    """Steady force of each chamber at each supply, from the locked tests."""
+    groups: dict[tuple[str, float], list[float]] = {}
+    for rise in rises:
+        groups.setdefault((rise.chamber, rise.supply), []).append(rise.plateau)
+    return {key: mean(np.array(values)) for key, values in groups.items()}
+
+
+def _compare(cylinder: Cylinder, effects: tuple[Any, ...], log: Trajectory) -> tuple[float, float]:
+    return agreement(predict(cylinder, effects, log), log)
+
+
+def agreement(predicted: Trajectory, log: Trajectory) -> tuple[float, float]:
+    """R2 and RMS [N] of a predicted force on a log of the same times."""
+    error = predicted["piston/F"] - log["piston/F"]
+    spread = float(np.var(log["piston/F"]))
+    return 1.0 - float(np.mean(error**2)) / spread, float(np.sqrt(np.mean(error**2)))
+
+
+def predict(cylinder: Cylinder, effects: tuple[Any, ...], log: Trajectory) -> Trajectory:
+    """What a `cylinder` with `effects` answers to the motion and the valves of a bench log."""
+    supply = float(log.meta.get("supply", 0.7e6))
+    model = Model(rig_mechanism(cylinder), effects, supply, "bench")
+    valves = {name: Profile.of(log.time, log[name]) for name in ("valve/extend", "valve/retract")}
+    return drive(model, followed(log), valves, log.time)
+
+
+def _switches(log: Trajectory) -> bool:
+    return any(np.ptp(log[f"valve/{chamber}"]) > 0.5 for chamber in ("extend", "retract"))
+
+
+def _check_columns(name: str, log: Trajectory) -> None:
+    for column in ("piston/x", "piston/F", "valve/extend", "valve/retract"):
+        if column not in log:
+            raise KembaError(name, f"has no column '{column}'", "a bench log was expected")
+
+
+def _written(effect: Any) -> dict[str, Any]:
+    data = effect.model_dump(exclude_none=True)
+    return {k: list(v) if isinstance(v, tuple) else v for k, v in data.items()}

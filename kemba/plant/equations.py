@@ -1,0 +1,337 @@
+"""The model's residual as the kernel needs it: machine code, and the structure of its pairs.
+
+The residual is affine in accelerations and forces: 0 = M(q) a - F - B lam. The parts are taken
+by AD from the model's own expressions, so the plant has no physics of its own.
+"""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from kemba.cache import Recent
+from kemba.errors import KembaError
+from kemba.machine_code import Native
+from kemba.mechanism import Mechanism
+from kemba.model import SUPPLY, Model
+from kemba.model.node import Node
+from kemba.plant.kernel.machine import Array, KernelModel
+from kemba.plant.kernel.settings import GAMMA, StepLength
+from kemba.plant.pairs import PairTable, read_pairs
+from kemba.settings import Settings, setting
+
+
+class Compiled:
+    """A function of named vectors on fixed memory: called with values, it returns views.
+
+    The views are overwritten by the next call.
+    """
+
+    def __init__(
+        self, name: str, inputs: Mapping[str, ca.SX], outputs: Mapping[str, ca.SX]
+    ) -> None:
+        flat = [
+            ca.densify(ca.vertcat(*(ca.vec(ca.densify(value)) for value in group.values())))
+            for group in (inputs, outputs)
+        ]
+        self.function = ca.Function(name, flat[:1], flat[1:])
+        x, y = np.zeros(flat[0].numel()), np.zeros(flat[1].numel())
+        self._x = _views(x, {key: value.shape for key, value in inputs.items()})
+        self._y = _views(y, {key: value.shape for key, value in outputs.items()})
+        buffer: Any
+        buffer, self._call = self.function.buffer()
+        buffer.set_arg(0, memoryview(x))  # type: ignore[arg-type]
+        buffer.set_res(0, memoryview(y))  # type: ignore[arg-type]
+        self._buffer = buffer  # holds the memory
+
+    def __call__(self, **values: Any) -> dict[str, Array]:
+        for key, value in values.items():
+            self._x[key][...] = value
+        self._call()
+        return self._y
+
+
+def _views(flat: Array, shapes: Mapping[str, tuple[int, int]]) -> dict[str, Array]:
+    views, start = {}, 0
+    for key, (rows, columns) in shapes.items():
+        part = flat[start : start + rows * columns]
+        views[key] = part if columns == 1 else part.reshape((rows, columns), order="F")
+        start += rows * columns
+    return views
+
+
+class Forms:
+    """Expressions of a node's q, v, s, u and p, and the functions that evaluate them elsewhere.
+
+    `parts`: M (n, n), F (n,), B (n, nl), f (ns,). `D` (n, n) = dF/dv and `A` (ns, ns) = df/ds are
+    the stiff blocks. `pairs`: the complementarity pairs.
+    Raises KembaError where an effect breaks the affine form.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self.pairs = read_pairs(node)
+        self.parts = _affine(node)
+        _, F, _, f = self.parts
+        self.D, self.A = ca.jacobian(F, node.v), ca.jacobian(f, node.s)
+        state = [node.q, node.v, node.s, node.u]
+        self.rates = ca.Function("rates", state, [f], {"allow_free": True})
+        self.stiff_rates = ca.Function("stiff_rates", state, [self.A], {"allow_free": True})
+
+
+def _affine(node: Node) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
+    """M, F, B and f of a node."""
+    M, B = ca.jacobian(node.dynamics, node.a), -ca.jacobian(node.dynamics, node.lam)
+    f = -ca.substitute([node.rate], [node.sd], [ca.SX.zeros(node.sd.numel())])[0]
+    moving = ca.vertcat(node.a, node.lam, node.sd)
+    for rows, form in ((node.dynamics_rows, ca.horzcat(M, B)), (node.rate_rows, f)):
+        if form.numel() and any(ca.which_depends(ca.vec(ca.densify(form)), moving, 1, True)):
+            raise KembaError(
+                rows[0].label,
+                "is not affine in accelerations and forces",
+                "the plant steps only such models",
+            )
+    zero = [ca.SX.zeros(node.a.numel()), ca.SX.zeros(node.lam.numel())]
+    bias = ca.substitute([node.dynamics], [node.a, node.lam], zero)[0]
+    return M, -bias, B, f
+
+
+Symbols = dict[str, ca.SX]
+
+
+def impose(forms: Forms, at: Symbols) -> tuple[Symbols, Symbols]:
+    """A step of the effect states from (q, v) to imposed (q1, v1): inputs and outputs."""
+    s, u, h = at["s"], at["u"], ca.SX.sym("h")
+    q1, v1 = ca.SX.sym("q1", at["q"].numel()), ca.SX.sym("v1", at["v"].numel())
+    f = forms.rates(at["q"], at["v"], s, u)
+    left = ca.SX.eye(s.numel()) - GAMMA * h * forms.stiff_rates(at["q"], at["v"], s, u)
+    k1 = eliminate(left, f)
+    f1 = forms.rates(q1, v1, s + h * k1, u)
+    k2 = eliminate(left, f1 - 2 * k1)
+    return {**at, "q1": q1, "v1": v1, "h": h}, {"s": s + h * (3 * k1 + k2) / 2}
+
+
+def eliminate(A: ca.SX, B: ca.SX) -> ca.SX:
+    """Solution X of A X = B by elimination without pivoting, as an expression.
+
+    For matrices whose symmetric part is positive definite, as inertia with dissipation is.
+    """
+    A, B = ca.densify(A), ca.densify(B)
+    n = A.shape[0]
+    for k in range(n):
+        for i in range(k + 1, n):
+            ratio = A[i, k] / A[k, k]
+            A[i, k + 1 :] -= ratio * A[k, k + 1 :]
+            B[i, :] -= ratio * B[k, :]
+    for k in reversed(range(n)):
+        B[k, :] = (B[k, :] - ca.mtimes(A[k, k + 1 :], B[k + 1 :, :])) / A[k, k]
+    return B
+
+
+def numbers_of(model: Model) -> dict[str, float]:
+    """The supply of a model, its parameters, and the entries of its tables as `chamber.fill[0]`."""
+    found = {SUPPLY: model.supply}
+    found |= {name: value for name, (_, value) in model.parameters.items()}
+    for effect in model.effects:
+        for name, table in effect.tables().items():
+            found |= {f"{effect.name}.{name}[{i}]": entry for i, entry in enumerate(table)}
+    return found
+
+
+class Equations:
+    """What the plant knows of a model; `free` names its parameters that each run may change,
+    `scaled` the entries of its tables, by a factor each.
+
+    `machine` is for the kernel. `now(q, v, s, u)`: M (n, n), F (n,), B (n, nl) and f (ns,) at a
+    state. `driven`: a step of the effect states when the motion is imposed. `measure`: outputs.
+    """
+
+    def __init__(self, model: Model, free: Sequence[str] = (), scaled: Sequence[str] = ()) -> None:
+        self.free, self.scaled = tuple(free), tuple(scaled)
+        self.node: Node = model.build(free, scaled) if free or scaled else model.node
+        self._own = numbers_of(model)
+        self.forms = Forms(self.node)
+        self.pairs: PairTable = self.forms.pairs
+
+    def values(self, model: Model) -> Array:
+        """The free parameters and factors (np,) of a model that shares these equations."""
+        there = numbers_of(model)
+        factors = [
+            there[name] / self._own[name] if self._own[name] else 1.0 for name in self.scaled
+        ]
+        return np.array([*(there[name] for name in self.free), *factors], dtype=float)
+
+    @cached_property
+    def machine(self) -> KernelModel:
+        """The model as the kernel sees it."""
+        address, pairs, nl = self.native.address, self.pairs, self.node.lam.numel()
+        rigid = pairs.group[pairs.gaps[pairs.rigid]]
+        slips = np.zeros((nl, nl), dtype=bool)
+        for speed, rows in pairs.free_speeds:
+            slips[speed, rows] = True
+        return KernelModel(
+            full=address["full"],
+            smooth=address["smooth"],
+            pairs=address["pairs"],
+            outputs=address["outputs"],
+            n=self.node.q.numel(),
+            ns=self.node.s.numel(),
+            nl=nl,
+            gaps=pairs.gaps,
+            rigid=pairs.rigid,
+            group=pairs.group,
+            ungapped=pairs.ungapped,
+            hard=np.isin(pairs.group, rigid),
+            slips=slips,
+            scale=self._scale,
+        )
+
+    @property
+    def _scale(self) -> Array:
+        """Usual sizes of velocities and effect states."""
+        states = [row.scale for row in self.node.rate_rows]
+        usual = StepLength.current()
+        rows = self.node.dynamics_rows
+        speeds = [usual.speed if row.unit == "N" else usual.spin for row in rows]
+        return np.array([*speeds, *states])
+
+    @cached_property
+    def native(self) -> Native:
+        """The model's functions in machine code, as `KernelModel` describes them."""
+        node, forms = self.node, self.forms
+        M, F, B, f = forms.parts
+        n, ns = node.q.numel(), node.s.numel()
+        blank = ca.SX(n, n), ca.SX(ns, ns)
+        x = [node.q, node.v, node.s, node.u, node.p, node.a, node.lam]
+        rest = ca.SX.zeros(ns)
+        functions = {
+            "full": [ca.horzcat(forms.D, M, F, B), ca.horzcat(forms.A, f)],
+            "smooth": [ca.horzcat(blank[0], M, F, B), ca.horzcat(blank[1], f)],
+            "pairs": [ca.horzcat(self.pairs.W, self.pairs.L, self.pairs.w0), self.pairs.gap],
+            "outputs": ca.substitute([self._outputs], [node.sd], [rest]),
+        }
+        return Native(x, functions)
+
+    @cached_property
+    def now(self) -> Compiled:
+        """M, F, B and f at a state."""
+        parts = dict(zip(("M", "F", "B", "f"), self.forms.parts, strict=True))
+        return Compiled("now", self._symbols("q", "v", "s", "u"), parts)
+
+    @cached_property
+    def driven(self) -> Compiled:
+        """A step of the effect states along an imposed motion."""
+        return Compiled("driven", *impose(self.forms, self._symbols("q", "v", "s", "u")))
+
+    @cached_property
+    def measure(self) -> Compiled:
+        """The outputs."""
+        symbols = self._symbols("q", "v", "a", "s", "sd", "lam", "u")
+        return Compiled("measure", symbols, {"y": self._outputs})
+
+    @property
+    def _outputs(self) -> ca.SX:
+        return ca.SX(ca.vertcat(*(self.node.outputs[o.name] for o in self.node.output_quantities)))
+
+    def _symbols(self, *names: str) -> dict[str, ca.SX]:
+        return {name: getattr(self.node, name) for name in names}
+
+
+class Kept(Settings):
+    """What a process keeps for the next plan."""
+
+    models: int = setting(
+        8, "1", "models whose machine code is kept",
+        "convention: twice those of a plan: its model and its plant, each with fitted air",
+    )  # fmt: skip
+
+
+@dataclass
+class Family:
+    """Models of one mechanism with the same effects: `numbers` are those of the first of them."""
+
+    structure: tuple[Any, ...]
+    numbers: dict[str, float]
+    equations: Equations
+
+
+_OF_MODEL: weakref.WeakKeyDictionary[Model, Equations] = weakref.WeakKeyDictionary()
+_FAMILIES: dict[int, list[Family]] = {}  # by the identity of the mechanism
+_PLAIN: Recent[tuple[Any, ...], Equations] = Recent()  # by what a model consists of
+
+
+def equations_of(model: Model) -> Equations:
+    """The equations of a model. Models that differ in numbers only share them: what differs is a
+    parameter of the machine code then, see `Equations.values`."""
+    share_equations([model])
+    return _OF_MODEL[model]
+
+
+def share_equations(models: Iterable[Model]) -> None:
+    """Make the equations of models that are simulated together: all that differs among those of a
+    family is free at once, so that its machine code is made once."""
+    found = [(model, _family(model)) for model in models if model not in _OF_MODEL]
+    for model, family in found:
+        _OF_MODEL[model] = family.equations
+
+
+def _family(model: Model) -> Family:
+    """The family of a model, in whose equations all is free in which this one differs."""
+    structure, numbers = _structure(model), numbers_of(model)
+    families = _families(model.mechanism)
+    for family in families:
+        if family.structure == structure:
+            known = {*family.equations.free, *family.equations.scaled}
+            new = {name for name, value in numbers.items() if value != family.numbers[name]}
+            if not new <= known:
+                family.equations = _with_free(model, known | new)
+            return family
+    families.append(Family(structure, numbers, _plain(model, structure, numbers)))
+    return families[-1]
+
+
+def _plain(model: Model, structure: tuple[Any, ...], numbers: dict[str, float]) -> Equations:
+    """Equations without free numbers. They are the same for equal models, whatever was simulated
+    before, so that a process that plans again and again makes them once."""
+    mechanism = model.mechanism
+    if mechanism.drawn is None:
+        return Equations(model)
+    lengths = tuple(sorted(mechanism.offsets.items()))
+    robot = mechanism.drawn.model_dump_json(), lengths, repr(mechanism.scene.json())
+    key = (robot, structure, tuple(numbers.items()), StepLength.current())
+    return _PLAIN.get(key, lambda: Equations(model), Kept.current().models)
+
+
+def _with_free(model: Model, names: set[str]) -> Equations:
+    """Equations in which `names` are free; of an effect one of whose tables is among them, all
+    tables, since a fit changes one after the other."""
+    entries = numbers_of(model).keys() - model.parameters.keys() - {SUPPLY}
+    effects = {name.rpartition(".")[0] for name in names & entries}
+    scaled = sorted(name for name in entries if name.rpartition(".")[0] in effects)
+    return Equations(model, sorted(names - entries), scaled)
+
+
+def _families(mechanism: Mechanism) -> list[Family]:
+    key = id(mechanism)
+    if key not in _FAMILIES:
+        _FAMILIES[key] = []
+        weakref.finalize(mechanism, _FAMILIES.pop, key, None)
+    return _FAMILIES[key]
+
+
+def _structure(model: Model) -> tuple[Any, ...]:
+    """What models must have in common to share equations: all but the numbers of the effects, and
+    which entries of their tables are zero, since no factor changes these."""
+    effects = []
+    for effect in model.effects:
+        tables = effect.tables()
+        apart = {*effect.parameters(), *tables}
+        rest = {name: value for name, value in effect.model_dump().items() if name not in apart}
+        zeros = [[entry == 0.0 for entry in table] for table in tables.values()]
+        effects.append((type(effect), repr((rest, zeros))))
+    return tuple(effects)

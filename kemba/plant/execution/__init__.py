@@ -1,1 +1,0 @@
-"""Plans executed on the plant: controller, replays, repeats, sensors."""

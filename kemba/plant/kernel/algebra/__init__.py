@@ -1,1 +1,0 @@
-"""Small linear systems, complementarity problems and roots, compiled by numba."""

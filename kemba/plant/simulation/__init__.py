@@ -1,1 +1,0 @@
-"""From initial values and commands to a simulated trajectory."""

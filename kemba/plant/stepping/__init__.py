@@ -1,1 +1,0 @@
-"""One step of the plant: equations, contact forces, impacts."""
